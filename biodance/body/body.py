@@ -1,0 +1,176 @@
+"""The Body record: a tree of rigid segments on one-degree-of-freedom joints, with markers, prior SIP, limits and boxes.
+
+Segment frames follow ISB: x anterior, y up, z right (in the upright neutral posture), origin at the proximal joint centre; they are
+the joint frames in which the SIP are written. The lab frame has z up, so the neutral root is rotated by +90 deg about x.
+A joint with several degrees of freedom is a chain of one-dof joints whose intermediate links carry no segment.
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from biodance.errors import BiodanceError, UnknownName
+from biodance.records import Array, Sip, frozen_array
+
+if TYPE_CHECKING:
+    import pinocchio as pin
+
+NO_SEGMENT = -1
+NO_JOINT = -1
+UPRIGHT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+"""(3, 3) lab_R_segment of a neutral upright body facing lab x: x -> lab x, y (up) -> lab z, z (right) -> lab -y."""
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """One revolute degree of freedom.
+
+    ``parent`` index of the parent joint in ``Body.joints`` (-1: the root); ``axis`` (3,) unit vector in the joint's frame, signed so that
+    the positive angle is the anatomical direction in ``positive``; ``rotation`` (3, 3) and ``translation`` (3,) m place the joint frame in
+    the parent joint's frame at zero angle; ``segment`` index of the segment that turns with this joint, -1 for an intermediate link.
+    """
+
+    name: str
+    parent: int
+    axis: Array
+    rotation: Array
+    translation: Array
+    segment: int = NO_SEGMENT
+    positive: str = ""
+
+    def __post_init__(self) -> None:
+        for name, shape in (("axis", (3,)), ("rotation", (3, 3)), ("translation", (3,))):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), shape, f"joint {self.name}.{name}"))
+        if abs(np.linalg.norm(self.axis) - 1) > 1e-9:
+            raise BiodanceError(f"Joint {self.name}: axis {self.axis} is not a unit vector.")
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentMarkers:
+    """Where each marker sits: ``names`` (K), ``segment`` (K,) index, ``position`` (K, 3) m in the segment frame, ``weight`` (K,) >= 0."""
+
+    names: tuple[str, ...]
+    segment: tuple[int, ...]
+    position: Array
+    weight: Array
+
+    def __post_init__(self) -> None:
+        count = len(self.names)
+        object.__setattr__(self, "position", frozen_array(self.position, (count, 3), "SegmentMarkers.position"))
+        object.__setattr__(self, "weight", frozen_array(self.weight, (count,), "SegmentMarkers.weight"))
+        if len(self.segment) != count:
+            raise BiodanceError(f"SegmentMarkers: {count} names but {len(self.segment)} segment indices.")
+
+
+@dataclass(frozen=True, eq=False)
+class JointLimits:
+    """Per joint (n,), along its positive sense: ``lower``, ``upper`` rad; ``velocity`` rad/s > 0; ``torque_lower`` <= 0 <= ``torque_upper`` N·m."""
+
+    lower: Array
+    upper: Array
+    velocity: Array
+    torque_lower: Array
+    torque_upper: Array
+
+    def __post_init__(self) -> None:
+        count = np.size(self.lower)
+        for name in ("lower", "upper", "velocity", "torque_lower", "torque_upper"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), (count,), f"JointLimits.{name}"))
+        if np.any(self.lower > self.upper):
+            raise BiodanceError(f"JointLimits: lower > upper at joint {int(np.argmax(self.lower > self.upper))}.")
+
+
+@dataclass(frozen=True, eq=False)
+class Foot:
+    """The sole: ``segment`` index of the foot, ``outline`` (P, 3) m corners in the foot's segment frame, counter-clockwise from above."""
+
+    segment: int
+    outline: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "outline", frozen_array(self.outline, (None, 3), "Foot.outline"))
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A person or robot as a tree of rigid segments.
+
+    ``segments`` (N) names, the first is the root's; ``joints`` (n) in topological order = Pinocchio's order; ``sip`` prior with covariance;
+    ``limits`` per joint; ``markers`` on segments; ``boxes`` (N, 2, 3) m, lower and upper corner of the shape box in the segment frame;
+    ``com_boxes`` (N, 2, 3) m, where the CoM may be; ``feet`` soles by side ("left", "right"); ``root`` "free_flyer" (nq = 7 + n, nv = 6 + n)
+    or "fixed" (nq = nv = n; the root joint carries no segment then); ``notes`` how the body was made: table, scaling, warnings.
+    """
+
+    name: str
+    segments: tuple[str, ...]
+    joints: tuple[Joint, ...]
+    sip: Sip
+    limits: JointLimits
+    markers: SegmentMarkers
+    boxes: Array
+    com_boxes: Array
+    feet: dict[str, Foot] = field(default_factory=dict)
+    root: Literal["free_flyer", "fixed"] = "free_flyer"
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        count = len(self.segments)
+        object.__setattr__(self, "boxes", frozen_array(self.boxes, (count, 2, 3), f"{self.name}.boxes"))
+        object.__setattr__(self, "com_boxes", frozen_array(self.com_boxes, (count, 2, 3), f"{self.name}.com_boxes"))
+        if self.sip.segments != self.segments:
+            raise BiodanceError(f"{self.name}: the SIP name other segments ({self.sip.segments}) than the body ({self.segments}).")
+        if len(self.limits.lower) != len(self.joints):
+            raise BiodanceError(f"{self.name}: {len(self.joints)} joints but limits for {len(self.limits.lower)}.")
+        if any(joint.parent >= i for i, joint in enumerate(self.joints)):
+            raise BiodanceError(f"{self.name}: a joint comes before its parent.")
+
+    @property
+    def n_root(self) -> int:
+        """Velocity coordinates of the root: 6 or 0."""
+        return 6 if self.root == "free_flyer" else 0
+
+    @property
+    def nq(self) -> int:
+        """Number of position coordinates."""
+        return len(self.joints) + (7 if self.n_root else 0)
+
+    @property
+    def nv(self) -> int:
+        """Number of velocity coordinates."""
+        return len(self.joints) + self.n_root
+
+    @cached_property
+    def segment_joint(self) -> tuple[int, ...]:
+        """(N) index in ``joints`` of the joint that carries each segment; -1 for the root's segment."""
+        carried = {joint.segment: i for i, joint in enumerate(self.joints) if joint.segment != NO_SEGMENT}
+        return tuple(carried.get(i, NO_JOINT) for i in range(len(self.segments)))
+
+    def joint_index(self, name: str) -> int:
+        """Return the index of a joint in ``joints``; its column is ``7 + index`` in q and ``6 + index`` in v for a free-flyer root."""
+        names = tuple(joint.name for joint in self.joints)
+        if name not in names:
+            raise UnknownName.of("joint", name, names)
+        return names.index(name)
+
+    def segment_index(self, name: str) -> int:
+        """Return the index of a segment by name."""
+        if name not in self.segments:
+            raise UnknownName.of("segment", name, self.segments)
+        return self.segments.index(name)
+
+    @property
+    def neutral(self) -> Array:
+        """(nq,) upright posture at zero joint angles, root at the lab origin, facing lab x."""
+        q = np.zeros(self.nq)
+        if self.n_root:
+            q[3:7] = np.array([1.0, 0.0, 0.0, 1.0]) / np.sqrt(2.0)
+        return q
+
+    @cached_property
+    def model(self) -> "pin.Model":
+        """The pinocchio model of this body; never written to. Joint ids are 2 + index in ``joints`` (1 + index for a fixed root)."""
+        from biodance.body.pinocchio_model import build
+
+        return build(self)

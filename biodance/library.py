@@ -1,0 +1,66 @@
+"""Find the data that biodance ships: ``anthropometry/`` and ``protocols/``.
+
+The two folders lie at the top of a checkout and inside the package in an installed wheel; nothing else in biodance knows that.
+"""
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from biodance.errors import BiodanceError, UnknownName
+
+PACKAGE = Path(__file__).resolve().parent
+
+
+def folder(name: str) -> Path:
+    """Return the path of a shipped data folder, for example ``folder("anthropometry")``.
+
+    Raises
+    ------
+    BiodanceError
+        The folder is neither in the package (wheel) nor beside it (checkout): the installation is damaged.
+    """
+    for place in (PACKAGE / name, PACKAGE.parent / name):
+        if place.is_dir():
+            return place
+    raise BiodanceError(
+        f"The data folder {name!r} is neither in {PACKAGE} nor in {PACKAGE.parent}: the installation is damaged. Install biodance again."
+    )
+
+
+def names(path: str, suffix: str = ".toml") -> tuple[str, ...]:
+    """Return the sorted names (file stems) of a shipped family, for example ``names("anthropometry/marker_sets")``."""
+    first, _, rest = path.partition("/")
+    return tuple(sorted(p.stem for p in (folder(first) / rest).glob(f"*{suffix}")))
+
+
+def locate(path: str, name: str, suffix: str = ".toml") -> Path:
+    """Return the file of one member of a shipped family.
+
+    Raises
+    ------
+    UnknownName
+        There is no such member; the message lists all of them.
+    """
+    first, _, rest = path.partition("/")
+    found = folder(first) / rest / f"{name}{suffix}"
+    if not found.is_file():
+        raise UnknownName.of(f"file in {path}", name, names(path, suffix))
+    return found
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Read a TOML file; a syntax error becomes a sentence that names the file and the line.
+
+    Raises
+    ------
+    BiodanceError
+        The file is missing or is not TOML.
+    """
+    try:
+        with open(path, "rb") as stream:
+            return tomllib.load(stream)
+    except OSError as error:
+        raise BiodanceError(f"{path}: cannot be opened ({error.strerror}). Check the path.") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise BiodanceError(f"{path}: is not valid TOML: {error}. Correct that line.") from error

@@ -1,0 +1,1 @@
+"""How it moved: inverse kinematics, smoothing, regressor and dynamics, contact wrench and ZMP."""

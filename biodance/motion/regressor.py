@@ -1,0 +1,77 @@
+"""The root regressor: the ground wrench that a motion needs, linear in the standard inertial parameters (paper eq. 3, upper part).
+
+For every segment with origin p, rotation R, angular velocity w and acceleration dw (lab frame) and origin acceleration a,
+with g the gravity vector, first moment h = R mc and inertia J = R I R' about the segment origin:
+
+    f = m (a - g) + dw x h + w x (w x h)
+    n = h x (a - g) + J dw + w x J w        (about the segment origin)
+
+and the wrench about the lab origin is [f; n + p x f]. Both are linear in [m, mc, I]: the columns of W.
+"""
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.motion.kinematics import SegmentMotion, segment_motion
+from biodance.records import Array, Motion, Wrench
+
+GRAVITY = np.array([0.0, 0.0, -9.80665])
+"""(3,) m/s², lab frame, z up (standard gravity, CGPM 1901)."""
+
+PHI_TENSOR = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
+"""Row and column of Ixx, Ixy, Iyy, Ixz, Iyz, Izz in Pinocchio's order of the ten parameters."""
+
+
+def _skew(vector: Array) -> Array:
+    """Return the cross-product matrices (..., 3, 3) of vectors (..., 3)."""
+    out = np.zeros((*vector.shape, 3))
+    x, y, z = np.moveaxis(vector, -1, 0)
+    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -z, y, -x
+    out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = z, -y, x
+    return out
+
+
+def _inertia_columns(local: Array) -> Array:
+    """Return L (..., 3, 6) with ``L @ [Ixx Ixy Iyy Ixz Iyz Izz] = I @ local`` for vectors ``local`` (..., 3)."""
+    out = np.zeros((*local.shape, 6))
+    for column, (i, j) in enumerate(PHI_TENSOR):
+        out[..., i, column] += local[..., j]
+        if i != j:
+            out[..., j, column] += local[..., i]
+    return out
+
+
+def regressor_of(segments: SegmentMotion, *, gravity: Array = GRAVITY) -> Array:
+    """Return W (T, 6, 10N): wrench about the lab origin, force first, per unit of each parameter of each segment."""
+    rotation, position = segments.rotation, segments.position
+    frames, count = position.shape[:2]
+    turned = np.swapaxes(rotation, -1, -2)
+    w = np.einsum("...ij,...j->...i", turned, segments.angular_velocity)
+    dw = np.einsum("...ij,...j->...i", turned, segments.angular_acceleration)
+    drive = segments.acceleration - gravity
+    skew_w = _skew(w)
+    first = rotation @ (_skew(dw) + skew_w @ skew_w)
+    second = rotation @ (_inertia_columns(dw) + skew_w @ _inertia_columns(w))
+    arm = _skew(position)
+    columns = np.zeros((frames, count, 6, 10))
+    columns[..., :3, 0] = drive
+    columns[..., :3, 1:4] = first
+    columns[..., 3:, 0] = np.einsum("...ij,...j->...i", arm, drive)
+    columns[..., 3:, 1:4] = arm @ first - _skew(drive) @ rotation
+    columns[..., 3:, 4:] = second
+    return np.moveaxis(columns, 1, 2).reshape(frames, 6, 10 * count)
+
+
+def regressor(body: Body, motion: Motion, *, gravity: Array = GRAVITY) -> Array:
+    """Return W (T, 6, 10N) of ``body`` during ``motion``: ``W[t] @ sip.phi`` is the ground wrench about the lab origin (N, N·m).
+
+    Parameters of segment i are columns 10i..10i+9 in Pinocchio's order [m, mc (3), Ixx, Ixy, Iyy, Ixz, Iyz, Izz] about the segment's joint
+    frame. ``gravity`` (3,) m/s² in the lab frame.
+    """
+    return regressor_of(segment_motion(body, motion), gravity=gravity)
+
+
+def predict_wrench(body: Body, motion: Motion, phi: Array | None = None, *, gravity: Array = GRAVITY) -> Wrench:
+    """Return the wrench that ``motion`` needs from the ground with the parameters ``phi`` (10N,), by default the body's prior."""
+    W = regressor(body, motion, gravity=gravity)
+    return Wrench(motion.time, W @ (body.sip.phi if phi is None else phi))

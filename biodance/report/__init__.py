@@ -1,0 +1,1 @@
+"""Figures and pages for the analyst and the subject. Computes nothing."""
