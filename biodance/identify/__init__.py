@@ -1,0 +1,1 @@
+"""What it weighs: base parameters, SIP programmes, uncertainty, added mass, cross-validation."""
