@@ -73,7 +73,7 @@ def base_parameters(triangle: Array, names: tuple[str, ...], *, tolerance: float
     scale = np.linalg.norm(triangle, axis=0)
     largest = scale.max(initial=0.0)
     kept: list[int] = []
-    basis = np.empty((triangle.shape[0], 0))
+    basis: Array = np.empty((triangle.shape[0], 0))
     for column in order:
         vector = triangle[:, column]
         rest = vector - basis @ (basis.T @ vector)
@@ -83,9 +83,9 @@ def base_parameters(triangle: Array, names: tuple[str, ...], *, tolerance: float
             kept.append(column)
             basis = np.column_stack([basis, rest / size])
     kept.sort()
-    regroup = np.zeros((len(kept), triangle.shape[1]))
+    regroup: Array = np.zeros((len(kept), triangle.shape[1]))
     if kept:
-        solution = np.linalg.lstsq(triangle[:, kept], triangle, rcond=None)[0]
+        solution = np.asarray(np.linalg.lstsq(triangle[:, kept], triangle, rcond=None)[0])
         solution[np.abs(solution) < 1e-9] = 0.0
         regroup = solution
     return BaseParameters(tuple(kept), regroup, names)
@@ -104,15 +104,17 @@ def structural_base(body: Body, *, gravity: Array = GRAVITY, seed: int = 0) -> B
     if body.n_root:
         q[:, 3:7] = rng.normal(size=(frames, 4))
         q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
-    motion = Motion(np.arange(frames), q, rng.normal(0, 2, (frames, body.nv)), rng.normal(0, 4, (frames, body.nv)))
+    motion = Motion(np.arange(frames, dtype=float), q, rng.normal(0, 2, (frames, body.nv)), rng.normal(0, 4, (frames, body.nv)))
     W = regressor_of(segment_motion(body, motion), gravity=gravity)
     return base_parameters(fold(W.reshape(-1, W.shape[2])), parameter_names(body))
 
 
 @dataclass(frozen=True, eq=False)
 class BaseEstimate:
-    """Weighted least squares on the base parameters (paper eq. 6, 7): ``value``, ``sd`` (nb,), ``relative_sd`` (nb,) in percent of the value,
-    ``covariance`` (nb, nb), ``condition`` of W_b, ``rank`` of the data in the base set (< count: some cannot be known from these data).
+    """Weighted least squares on the base parameters (paper eq. 6, 7).
+
+    ``value``, ``sd`` (nb,) in SI units, ``covariance`` (nb, nb), ``condition`` of W_b, ``rank`` of the data in the base set
+    (rank < count: some cannot be known from these data; their sd is infinite).
     """
 
     base: BaseParameters

@@ -55,7 +55,7 @@ class Noise:
 
 @dataclass(frozen=True, eq=False)
 class Information:
-    """The triangle of [W y]: ``R`` (p + 1, p + 1) upper triangular, whitened (dimensionless rows per parameter unit); ``frames`` folded in."""
+    """The triangle of [W y]: ``R`` (p + 1, p + 1) upper triangular, whitened (rows in units of noise sd); ``frames`` folded in."""
 
     R: Array
     frames: int
@@ -83,7 +83,7 @@ class Information:
 def fold(rows: Array, onto: Array | None = None) -> Array:
     """Return the upper triangle (n, n) of the QR factorisation of ``onto`` stacked over ``rows`` (m, n)."""
     stacked = rows if onto is None else np.concatenate([onto, rows])
-    triangle = np.linalg.qr(stacked, mode="r")
+    triangle: Array = np.asarray(np.linalg.qr(stacked, mode="r"))
     missing = rows.shape[1] - triangle.shape[0]
     return np.pad(triangle, ((0, missing), (0, 0))) if missing > 0 else triangle
 

@@ -1,0 +1,121 @@
+"""Physically consistent parameters: every segment must be a body that could exist, inside its box.
+
+A segment's ten parameters are those of some positive mass distribution iff its pseudo-inertia
+    J = [[ tr(I)/2 1 - I, h ], [ h', m ]]   (4, 4), h = m c, I about the joint frame
+is positive semidefinite (Wensing, Kim, Slotine 2018, doi 10.1109/LRA.2017.2729659): this holds positive mass, positive inertia and the
+triangle inequality together. The estimate is the point of the constraint set nearest to the posterior mean in the posterior's own metric,
+so that the objective is a plain sum of squares in whitened coordinates and the solver never fails for scale.
+"""
+
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.identify.posterior import Posterior
+from biodance.motion.regressor import PHI_TENSOR
+from biodance.records import Array, Sip
+
+if TYPE_CHECKING:
+    from biodance.body.body import Body
+
+RELATIVE_FLOOR = 1e-3
+"""Smallest eigenvalue allowed, as a share of the prior segment's own smallest eigenvalue (an absolute floor contradicts the tables)."""
+
+
+def _pseudo_inertia_map() -> Array:
+    """Return M (16, 10) with ``J = (M @ phi).reshape(4, 4)``."""
+    M = np.zeros((4, 4, 10))
+    M[3, 3, 0] = 1.0
+    for axis in range(3):
+        M[axis, 3, 1 + axis] = M[3, axis, 1 + axis] = 1.0
+    for column, (i, j) in enumerate(PHI_TENSOR, start=4):
+        if i == j:
+            for axis in range(3):
+                M[axis, axis, column] += 0.5 if axis != i else -0.5
+        else:
+            M[i, j, column] = M[j, i, column] = -1.0
+    return M.reshape(16, 10)
+
+
+PSEUDO_INERTIA = _pseudo_inertia_map()
+
+
+def pseudo_inertia(phi: Array) -> Array:
+    """Return the pseudo-inertia matrices (N, 4, 4) of parameters ``phi`` (10N,)."""
+    return (phi.reshape(-1, 10) @ PSEUDO_INERTIA.T).reshape(-1, 4, 4)
+
+
+def smallest_eigenvalues(phi: Array) -> Array:
+    """Return the smallest eigenvalue (N,) of every segment's pseudo-inertia; negative means that no such body can exist."""
+    return np.asarray(np.linalg.eigvalsh(pseudo_inertia(phi))[:, 0])
+
+
+@dataclass(frozen=True, eq=False)
+class PhysicalFit:
+    """A physically consistent estimate.
+
+    ``sip`` with the posterior's covariance; ``moved`` (N,) True where the consistency constraint acts; ``distance`` from the unconstrained
+    mean in posterior standard deviations; ``status``, and in words its ``cause`` and cure when it is not "solved".
+    """
+
+    sip: Sip
+    moved: NDArray[np.bool_]
+    distance: float
+    status: Literal["solved", "failed"]
+    cause: str = ""
+
+
+def _inside(phi: Array, body: "Body", floor: Array) -> bool:
+    table = phi.reshape(-1, 10)
+    low, high = body.com_boxes[:, 0] * table[:, :1], body.com_boxes[:, 1] * table[:, :1]
+    return bool(np.all(smallest_eigenvalues(phi) >= floor) and np.all(table[:, 1:4] >= low) and np.all(table[:, 1:4] <= high))
+
+
+def physical_fit(belief: Posterior, body: "Body") -> PhysicalFit:
+    """Return the physically consistent parameters nearest to the posterior mean, CoM inside ``body.com_boxes``.
+
+    When the mean is consistent already it is returned as it is. A solver that stops gives the status "failed" and the prior.
+    """
+    prior = belief.prior
+    floor = RELATIVE_FLOOR * np.maximum(smallest_eigenvalues(prior.phi), 0.0)
+    count = len(prior.segments)
+    if _inside(belief.mean, body, floor):
+        return PhysicalFit(belief.sip, np.zeros(count, dtype=bool), 0.0, "solved")
+    x, status = _solve(belief, body, floor)
+    if x is None:
+        cause = f"The solver stopped with {status!r}: the data contradict every body that fits the boxes. Check scaling and force plates."
+        return PhysicalFit(prior, np.ones(count, dtype=bool), float("inf"), "failed", cause)
+    phi = belief.mean + belief.factor @ x
+    acting = smallest_eigenvalues(phi) < 2 * floor + 1e-9
+    return PhysicalFit(Sip(prior.segments, phi, belief.covariance), acting, float(np.linalg.norm(x)), "solved")
+
+
+def _solve(belief: Posterior, body: "Body", floor: Array) -> tuple[Array | None, str]:
+    """Solve min |x|² s.t. J_i(mean + factor x) >= floor, CoM in box; return x (k,) and the solver's word."""
+    import cvxpy as cp
+
+    x = cp.Variable(belief.factor.shape[1])
+    constraints = []
+    for i, J0 in enumerate(pseudo_inertia(belief.prior.phi)):
+        rows = slice(10 * i, 10 * i + 10)
+        scale = 1 / np.sqrt(np.maximum(np.diag(J0), 1e-12))
+        weight = np.outer(scale, scale).ravel()[:, None]
+        slope = weight * (PSEUDO_INERTIA @ belief.factor[rows])
+        level = (weight[:, 0] * (PSEUDO_INERTIA @ belief.mean[rows])).reshape(4, 4) - floor[i] * np.diag(scale**2) * 1.01
+        constraints.append(cp.reshape(slope @ x, (4, 4), order="C") + level >> 0)
+        for side, sign in ((body.com_boxes[i, 0], 1.0), (body.com_boxes[i, 1], -1.0)):
+            pick = sign * (np.eye(10)[1:4] - np.outer(side, np.eye(10)[0])) / max(J0[3, 3], 1e-9)
+            constraints.append((pick @ belief.factor[rows]) @ x + pick @ belief.mean[rows] >= 0)
+    problem = cp.Problem(cp.Minimize(cp.sum_squares(x)), constraints)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # an inaccurate solve is judged below by its own constraints
+            problem.solve(solver=cp.CLARABEL)
+    except cp.error.SolverError as error:
+        return None, str(error)
+    if x.value is None:
+        return None, str(problem.status)
+    return np.asarray(x.value), str(problem.status)
