@@ -112,10 +112,8 @@ def _solve(belief: Posterior, body: "Body", floor: Array) -> tuple[Array | None,
     problem = cp.Problem(cp.Minimize(cp.sum_squares(x)), constraints)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # an inaccurate solve is judged below by its own constraints
+            warnings.simplefilter("ignore")  # an inaccurate solve is not taken: its word is returned
             problem.solve(solver=cp.CLARABEL)
     except cp.error.SolverError as error:
         return None, str(error)
-    if x.value is None:
-        return None, str(problem.status)
-    return np.asarray(x.value), str(problem.status)
+    return (np.asarray(x.value) if problem.status == "optimal" else None), str(problem.status)

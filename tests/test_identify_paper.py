@@ -1,0 +1,67 @@
+"""The paper's programme: its constraints hold, its optimum is the optimum, and it does not guarantee a body that can exist."""
+
+import numpy as np
+import pytest
+from random_bodies import random_body, random_motion
+from scipy.optimize import nnls
+
+from biodance.identify.information import Noise, information
+from biodance.identify.paper_programme import _solve, directions, inequalities, paper_programme
+from biodance.motion.regressor import predict_wrench
+from biodance.records import Wrench
+
+UNIT = Noise.of_sd(1.0, 1.0, np.zeros(3))
+
+
+def data_of(seed: int, *, noise: float):
+    rng = np.random.default_rng(seed)
+    body = random_body(rng, n_segments=4)
+    motion = random_motion(body, rng, frames=200)
+    clean = predict_wrench(body, motion)
+    wrench = Wrench(clean.time, clean.value + noise * rng.normal(size=clean.value.shape))
+    return body, information(body, motion, wrench, UNIT)
+
+
+def test_directions_are_unit_and_cover_the_half_sphere() -> None:
+    v = directions()
+    np.testing.assert_allclose(np.linalg.norm(v, axis=1), 1.0)
+    np.testing.assert_allclose(v.T @ v / len(v), np.eye(3) / 3, atol=0.01)
+
+
+def test_without_noise_the_table_itself_is_the_answer() -> None:
+    body, data = data_of(0, noise=0.0)
+    fit = paper_programme(data, body)
+    assert fit.status == "solved"
+    np.testing.assert_allclose(fit.phi, body.sip.phi, atol=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_every_inequality_and_equality_holds(seed: int) -> None:
+    body, data = data_of(seed, noise=3.0)
+    fit = paper_programme(data, body)
+    A, b = inequalities(body)
+    assert np.all(A @ fit.phi - b > -1e-6)
+    tied = list(fit.base.well_known)
+    if fit.status == "solved":
+        np.testing.assert_allclose(fit.base.base.regroup[tied] @ fit.phi, fit.base.value[tied], rtol=1e-4, atol=1e-5)
+
+
+def least_distance(data, body) -> np.ndarray:
+    """Solve eq. 8 without equalities as least distance programming (Lawson & Hanson 1974, ch. 23), an independent route."""
+    A, b = inequalities(body)
+    p = A.shape[1]
+    H = data.triangle.T @ data.triangle + np.eye(p)
+    centre = np.linalg.solve(H, data.triangle.T @ data.target + body.sip.phi)
+    inverse = np.linalg.inv(np.linalg.cholesky(H).T)
+    G, h = A @ inverse, b - A @ centre
+    u, _ = nnls(np.vstack([G.T, h]), np.append(np.zeros(p), 1.0), maxiter=20000)
+    r = np.vstack([G.T, h]) @ u - np.append(np.zeros(p), 1.0)
+    return centre + inverse @ (-r[:p] / r[p])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_same_optimum_as_least_distance_programming(seed: int) -> None:
+    body, data = data_of(seed, noise=30.0)
+    found, word = _solve(data, body, np.empty((0, 40)), np.empty(0))
+    assert word == "optimal"
+    np.testing.assert_allclose(found, least_distance(data, body), atol=1e-5)
