@@ -1,8 +1,9 @@
 """Base parameters: the combinations of SIP that a wrench can show, found numerically (Gautier 1991, doi 10.1002/rob.4620080405).
 
 Columns of the regressor that never move independently are regrouped: with the independent columns b and the dependent ones d,
-W_d = W_b beta, hence W phi = W_b (phi_b + beta phi_d). The choice of b is deterministic: columns are taken in a fixed order of
-preference (deepest segment first, as the paper prints them: a child's mass regroups into its parents) and kept when they add rank.
+W_d = W_b beta, hence W phi = W_b (phi_b + beta phi_d). The choice of b is deterministic and the one the paper prints (eq. 5, 13): columns
+are taken in a fixed order, root first and mass and YY last within a segment, and kept when they add rank; so a child's mass regroups
+into its parents, and YY of a hinge into XX - YY.
 """
 
 from dataclasses import dataclass
@@ -17,6 +18,8 @@ from biodance.records import Array, Motion, frozen_array
 
 PARAMETERS = ("M", "MX", "MY", "MZ", "XX", "XY", "YY", "XZ", "YZ", "ZZ")
 """Names of the ten parameters of a segment, in Pinocchio's order."""
+PREFERENCE = (1, 2, 3, 4, 5, 7, 8, 9, 6, 0)
+"""Order in which the columns of one segment are offered to the base set: YY and M last."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +72,7 @@ def base_parameters(triangle: Array, names: tuple[str, ...], *, tolerance: float
 
     A column counts as dependent when less than ``tolerance`` of its norm is left after projection on the columns kept before it.
     """
-    order = list(range(triangle.shape[1] - 1, -1, -1))
+    order = sorted(range(triangle.shape[1]), key=lambda c: (c // 10, PREFERENCE.index(c % 10)))
     scale = np.linalg.norm(triangle, axis=0)
     largest = scale.max(initial=0.0)
     kept: list[int] = []
