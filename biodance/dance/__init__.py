@@ -1,0 +1,1 @@
+"""How to move to become known: excitation criteria, postures, transitions, balance."""
