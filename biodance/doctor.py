@@ -1,0 +1,105 @@
+"""What works on this machine, and how to mend what does not. Every risky library is tried in a child process: it may crash, not raise."""
+
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from biodance import library
+from biodance.errors import BiodanceError
+
+PATIENCE = 60.0
+"""Seconds a probe in a child process may take."""
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+
+STILL = "import pyvista; p = pyvista.Plotter(off_screen=True); p.add_mesh(pyvista.Sphere()); p.screenshot(return_img=True); p.close()"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One line of the doctor: ``needed`` False for what only some steps or tests use; ``text`` the version, or how to mend it."""
+
+    name: str
+    works: bool
+    needed: bool
+    text: str
+
+
+@dataclass(frozen=True)
+class Probe:
+    """One thing to try: python ``code`` for a child process (its last printed line is the version), and how to ``mend`` its failure."""
+
+    name: str
+    code: str
+    mend: str
+    needed: bool = True
+
+
+def _importing(module: str) -> str:
+    return f"import {module} as m; print(getattr(m, '__version__', 'loads'))"
+
+
+PROBES = (
+    Probe("pinocchio", _importing("pinocchio"), "It needs the system library libgomp: apt-get install libgomp1; then pip install pin."),
+    Probe("ezc3d", _importing("ezc3d"), "pip install ezc3d"),
+    Probe("c3d (second reader)", "import c3d; print('loads')", "pip install c3d"),
+    Probe("scipy", _importing("scipy"), "pip install scipy"),
+    Probe("cvxpy with Clarabel", "import clarabel, cvxpy; print(cvxpy.__version__)", "pip install cvxpy clarabel"),
+    Probe("matplotlib", _importing("matplotlib"), "pip install matplotlib"),
+    Probe("GL stills (pyvista)", STILL, "pip install 'biodance[viz]'; apt-get install libgl1 libegl1.", needed=False),
+    Probe("opensim (comparisons)", _importing("opensim"), "pip install opensim; only the tests and benchmarks use it.", needed=False),
+    Probe("mujoco (comparisons)", _importing("mujoco"), "pip install mujoco; only the tests use it.", needed=False),
+)  # fmt: skip
+
+
+def run_probe(probe: Probe) -> Finding:
+    """Run ``probe`` in a child process; a crash, an exception or no answer within `PATIENCE` is a finding that says how to mend it."""
+    try:
+        child = subprocess.run([sys.executable, "-c", probe.code], capture_output=True, text=True, timeout=PATIENCE, check=False)
+    except subprocess.TimeoutExpired:
+        return Finding(probe.name, False, probe.needed, f"gives no answer within {PATIENCE:g} s. {probe.mend}")
+    if child.returncode == 0:
+        return Finding(probe.name, True, probe.needed, (child.stdout.strip().splitlines() or ["works"])[-1])
+    lines = child.stderr.strip().splitlines()
+    why = lines[-1] if child.returncode > 0 and lines else f"the process died (code {child.returncode})"
+    return Finding(probe.name, False, probe.needed, f"{why}. {probe.mend}")
+
+
+def _python() -> Finding:
+    right = (3, 11) <= sys.version_info[:2] < (3, 14)
+    return Finding("python", right, True, platform.python_version() + ("" if right else ": install Python 3.11, 3.12 or 3.13."))
+
+
+def _folder(name: str) -> Finding:
+    try:
+        return Finding(f"data folder {name}", True, True, str(library.folder(name)))
+    except BiodanceError as error:
+        return Finding(f"data folder {name}", False, True, str(error))
+
+
+def _browser() -> Finding:
+    found = next(filter(None, map(shutil.which, BROWSERS)), None)
+    return Finding("chromium (page tests)", bool(found), False, found or "apt-get install chromium; only the tests of the pages use it.")
+
+
+def _writable() -> Finding:
+    place = Path.cwd()
+    try:
+        with tempfile.TemporaryFile(dir=place):
+            return Finding("writable folder", True, True, str(place))
+    except OSError as error:
+        return Finding("writable folder", False, True, f"{place}: {error.strerror}. Give --out a folder that you may write to.")
+
+
+def examine(*, tell: Callable[[str], None] = lambda _: None) -> tuple[Finding, ...]:
+    """Try everything, ``tell`` what is being tried, and return one finding each."""
+    found = [_python(), _folder("anthropometry"), _folder("protocols")]
+    for probe in PROBES:
+        tell(probe.name)
+        found.append(run_probe(probe))
+    return (*found, _browser(), _writable())

@@ -1,0 +1,184 @@
+"""What the pipeline found in one session: the records that the report draws and that results.json holds. Computes nothing.
+
+All records are frozen; arrays are in SI units in the lab frame (z up); a wrench is the ground's action on the subject about the lab origin.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.body.body import Body
+from biodance.records import Array, Motion, Session, Subject, Trial
+
+Status = Literal["ok", "warning", "refused"]
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step on one trial or on the session.
+
+    ``status`` "done"; "refused": the data cannot carry it, ``text`` says why and what to do; "failed": a fault of biodance itself.
+    """
+
+    name: str
+    status: Literal["done", "refused", "failed"]
+    text: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Gaps:
+    """Unseen frames as recorded: per marker ``names`` (K) the share ``percent`` (K,) % and the ``longest`` (K,) s; ``total`` % of all."""
+
+    names: tuple[str, ...]
+    percent: Array
+    longest: Array
+    total: float
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerFit:
+    """Distance of the markers to the model: per marker ``names`` (K), ``rms`` and ``max`` (K,) m, NaN = never seen; all together in m."""
+
+    names: tuple[str, ...]
+    rms: Array
+    max: Array
+    total_rms: float
+    total_max: float
+
+
+@dataclass(frozen=True, eq=False)
+class WrenchComparison:
+    """Measured beside simulated wrench.
+
+    ``time`` (T,) s; ``measured``, ``simulated`` (T, 6) N, N·m about the lab origin; ``used`` (T,) True where the plates measure all
+    that the ground does; ``rms`` (6,) N, N·m and ``correlation`` (6,) over the used frames, NaN = not defined; ``notes`` why frames
+    were left out.
+    """
+
+    time: Array
+    measured: Array
+    simulated: Array
+    used: NDArray[np.bool_]
+    rms: Array
+    correlation: Array
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """A quiet standing on the plates from ``start`` to ``end`` s; ``mass`` kg on the plates (mean vertical force / g), ``mass_sd`` kg.
+
+    ``cop`` and ``com`` (T, 2) m, horizontal lab coordinates of the centre of pressure and of the table's centre of mass (``com`` empty
+    without a tracked motion); ``forward`` (2,) unit vector the subject faces; ``com_ahead``, ``com_left`` m: mean of CoM minus CoP along
+    it and to its left; ``feet`` (F, 2) m foot landmarks and their ``foot_names`` (``left_heel`` ...); ``plates`` (P, 4, 2) m corners.
+    """
+
+    trial: str
+    start: float
+    end: float
+    mass: float
+    mass_sd: float
+    cop: Array
+    com: Array
+    forward: Array
+    com_ahead: float
+    com_left: float
+    feet: Array
+    foot_names: tuple[str, ...]
+    plates: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Still:
+    """One instant to draw in 3-D.
+
+    ``bones`` (B, 2, 3) m lines with ``sides`` (B) "left", "right" or "middle"; ``markers`` (K, 3) m as measured; ``plates`` (P, 4, 3) m
+    corners; ``com`` (3,) m; ``force`` and ``cop`` (3,) N, m of the total wrench (NaN = unloaded).
+    """
+
+    trial: str
+    time: float
+    bones: Array
+    sides: tuple[str, ...]
+    markers: Array
+    plates: Array
+    com: Array
+    force: Array
+    cop: Array
+
+
+@dataclass(frozen=True)
+class Check:
+    """One row of the quality table: ``value`` as text with unit, the ``limit`` it is held against, and whether it is inside."""
+
+    what: str
+    where: str
+    value: str
+    limit: str
+    inside: bool
+    advice: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class TrialResult:
+    """One trial after all steps: ``trial`` prepared (as read where preparing was refused); None where the data could not carry a result."""
+
+    trial: Trial
+    steps: tuple[Step, ...]
+    gaps: Gaps | None = None
+    fit: MarkerFit | None = None
+    motion: Motion | None = None
+    comparison: WrenchComparison | None = None
+    standing: Standing | None = None
+
+    @property
+    def status(self) -> Status:
+        """State of the trial: "refused" where no step after reading was done, "warning" where a person must look, "ok" otherwise."""
+        if all(step.status != "done" for step in self.steps):
+            return "refused"
+        return "warning" if self.reasons else "ok"
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """All refusals and warnings of this trial, each once, in order."""
+        refusals = [step.text for step in self.steps if step.status != "done"]
+        return tuple(dict.fromkeys([*refusals, *self.trial.warnings]))
+
+    @property
+    def reason(self) -> str:
+        """The `reasons` as one text; "" if there are none."""
+        return " ".join(self.reasons)
+
+
+@dataclass(frozen=True, eq=False)
+class SessionResult:
+    """The whole session.
+
+    ``body`` that moved (None: no markers or no stature) and ``body_source`` in words; ``standing`` the one whose weight is compared with
+    the declared mass; ``settings`` name -> value of every number that shaped the result.
+    """
+
+    session: Session
+    subject: Subject
+    body: Body | None
+    body_source: str
+    steps: tuple[Step, ...]
+    trials: tuple[TrialResult, ...]
+    checks: tuple[Check, ...]
+    standing: Standing | None
+    still: Still | None
+    settings: Mapping[str, str]
+
+    @property
+    def mass_difference(self) -> float:
+        """Mass on the plates minus declared mass in % of the declared; NaN where either is unknown."""
+        return 100 * (self.standing.mass / self.subject.mass - 1) if self.standing else float("nan")
+
+    @property
+    def needs_a_person(self) -> bool:
+        """Whether anything was refused, warned about or outside its limit."""
+        trouble = any(step.status != "done" for step in self.steps) or any(t.status != "ok" for t in self.trials)
+        return trouble or bool(self.session.refused) or any(not check.inside for check in self.checks)

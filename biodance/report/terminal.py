@@ -1,0 +1,63 @@
+"""What the commands print for a person: short tables on the terminal."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from biodance.doctor import Finding
+from biodance.pipeline.results import SessionResult
+
+
+def _text(value: float | None, digits: int = 1) -> str:
+    return "–" if value is None or value != value else f"{value:.{digits}f}"
+
+
+def _inspected_lines(record: dict[str, Any]) -> list[str]:
+    """Return the lines under the name of one inspected file: markers, plates, masses, warnings."""
+    lines = []
+    if record.get("markers"):
+        known = record.get("marker_set") or "no known set"
+        lines.append(f"{len(record['markers'])} markers ({known}), {_text(record.get('gaps_percent'))} % not seen")
+    for plate in record.get("plates") or ():
+        lines.append(f"plate TYPE {plate['type']}: {_text(plate.get('mean_vertical_n'))} N vertical on average")
+        lines += [f"  {decision}" for decision in plate.get("decisions", ())]
+    if record.get("plates"):
+        on_plates, declared = _text(record.get("mass_on_plates_kg"), 2), _text(record.get("declared_mass_kg"), 2)
+        lines.append(f"mass on the plates {on_plates} kg, declared {declared} kg")
+    return lines + [f"look: {warning}" for warning in record.get("warnings") or ()]
+
+
+def print_inspected(records: Sequence[dict[str, Any]], console: Console) -> None:
+    """Print what `biodance inspect` read of every file."""
+    for record in records:
+        rates = f"{record.get('frames') or 0} frames, {_text(record.get('rate_hz'), 0)} / {_text(record.get('analog_rate_hz'), 0)} Hz"
+        facts = f" {record.get('format') or ''}, {rates}" if record["status"] != "refused" else ""
+        console.print(f"[bold]{escape(str(record['file']))}[/]: {record['status']}{escape(facts)}", soft_wrap=True)
+        lines = _inspected_lines(record) if record["status"] != "refused" else [str(record.get("reason"))]
+        for line in lines:
+            console.print(f"  {escape(line)}", soft_wrap=True)
+
+
+def print_session(result: SessionResult, console: Console) -> None:
+    """Print one line a trial, then all that needs a person."""
+    table = Table("trial", "role", "state", "marker RMS mm", "compared frames", "Fz RMS N", "Fz correlation", box=None, pad_edge=False)
+    for trial in result.trials:
+        rms = _text(1000 * trial.fit.total_rms) if trial.fit else "–"
+        c = trial.comparison
+        wrench = (str(int(c.used.sum())), _text(float(c.rms[2])), _text(float(c.correlation[2]), 3)) if c else ("–", "–", "–")
+        table.add_row(escape(trial.trial.name), trial.trial.role, trial.status, rms, *wrench)
+    console.print(table)
+    for file, why in result.session.refused.items():
+        console.print(f"refused {escape(file)}: {escape(why)}", soft_wrap=True)
+
+
+def print_findings(findings: Sequence[Finding], console: Console) -> None:
+    """Print one line a finding of the doctor."""
+    table = Table(box=None, pad_edge=False, show_header=False)
+    for finding in findings:
+        state = "ok" if finding.works else "MISSING" if finding.needed else "not here (optional)"
+        table.add_row(finding.name, state, escape(finding.text))
+    console.print(table)

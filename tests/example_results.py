@@ -1,0 +1,109 @@
+"""Hand-made results of a session, for tests of the page and of results.json: every part present, and every part refused."""
+
+from pathlib import Path
+
+import numpy as np
+
+from biodance.pipeline.results import (
+    Check,
+    Gaps,
+    MarkerFit,
+    SessionResult,
+    Standing,
+    Step,
+    Still,
+    TrialResult,
+    WrenchComparison,
+)
+from biodance.records import Markers, Plate, Session, Source, Subject, Trial, Wrench
+
+SQUARE = np.array([[0.3, 0.2, 0.0], [-0.3, 0.2, 0.0], [-0.3, -0.2, 0.0], [0.3, -0.2, 0.0]])
+NAMES = tuple(f"M{i:02d}" for i in range(1, 34))
+
+
+def comparison(rng: np.random.Generator) -> WrenchComparison:
+    time = np.arange(300) / 100
+    phase = 2 * np.pi * time[:, None] * np.array([0.7, 1.1, 0.4, 0.9, 0.5, 1.3])
+    measured = np.array([20, 15, 120, 30, 40, 5]) * np.sin(phase) + np.array([0, 0, 640, 10, -20, 0])
+    simulated = measured + rng.normal(0, 1, measured.shape) * np.array([2, 2, 6, 3, 4, 1])
+    used = (time > 0.4) & (time < 2.5)
+    difference = (measured - simulated)[used]
+    cc = [np.corrcoef(measured[used, i], simulated[used, i])[0, 1] for i in range(6)]
+    return WrenchComparison(
+        time, measured, simulated, used, np.sqrt(np.mean(difference**2, axis=0)), np.array(cc), ("90 frames: a foot is beside the plates.",)
+    )
+
+
+def standing(rng: np.random.Generator) -> Standing:
+    cop = 0.1 + np.cumsum(rng.normal(0, 0.0005, (200, 2)), axis=0)
+    feet = np.array([[0.15, 0.25], [-0.05, 0.25], [0.15, -0.02], [-0.05, -0.02]])
+    names = ("left_toe", "left_heel", "right_toe", "right_heel")
+    com = cop + np.array([0.03, 0.002])
+    return Standing(
+        "static",
+        0.5,
+        2.5,
+        65.2,
+        0.1,
+        cop,
+        com,
+        np.array([1.0, 0.0]),
+        0.03,
+        0.002,
+        feet,
+        names,
+        (SQUARE + np.array([0.05, 0.1, 0]))[None, :, :2],
+    )
+
+
+def still() -> Still:
+    bones = np.array([[[0, 0, 0.9], [0, 0, 1.5]], [[0, 0.1, 0.9], [0, 0.1, 0.05]], [[0, -0.1, 0.9], [0, -0.1, 0.05]]])
+    markers = np.concatenate([bones.reshape(-1, 3) + 0.05, [[np.nan] * 3]])
+    com, force, cop = np.array([0, 0, 1.0]), np.array([0, 0, 640.0]), np.array([0.01, 0, 0])
+    return Still("static", 1.0, bones, ("middle", "left", "right"), markers, SQUARE[None], com, force, cop)
+
+
+def trial(name: str, *, warnings: tuple[str, ...] = ()) -> Trial:
+    time = np.arange(300) / 100
+    plate = Plate("plate1", 2, SQUARE, Wrench(time, np.tile([0, 0, 640.0, 0, 0, 0], (300, 1))), ("sign turned: the raw force pulled down",))
+    source = Source(Path(f"/sessions/S01/{name}.c3d"), "ab" * 32, "C3D", 100.0, 1000.0)
+    markers = Markers(NAMES, time, np.zeros((300, len(NAMES), 3)))
+    return Trial(name, "fit", markers, (plate,), source, "plug_in_gait_39", history=("low-pass: 5th order, 10 Hz",), warnings=warnings)
+
+
+def full_session() -> SessionResult:
+    """Return a session in which every step was done, one marker was never seen and one check is outside its limit."""
+    rng = np.random.default_rng(3)
+    rms = np.sort(rng.uniform(0.003, 0.02, len(NAMES)))
+    rms[5] = np.nan
+    fit = MarkerFit(NAMES, rms, 2.2 * rms, 0.011, 0.044)
+    percent = np.zeros(len(NAMES))
+    percent[[3, 5]] = 2.5, 100.0
+    result = TrialResult(
+        trial("walk <1>"),
+        (Step("prepare", "done"), Step("track", "done"), Step("compare", "done")),
+        Gaps(NAMES, percent, percent * 0.03, float(percent.mean())),
+        fit,
+        None,
+        comparison(rng),
+        standing(rng),
+    )
+    checks = (
+        Check("marker distance, RMS", "walk <1>", "11.0 mm", "20 mm", True),
+        Check("gaps", "walk <1>", "3.1 %", "2 %", False, "Fill."),
+    )
+    session = Session(Subject(65.0, 1.7, "F", 31.0, "S01"), (result.trial,), Path("/sessions/S01"), notes=("Sex guessed.",))
+    return SessionResult(
+        session, session.subject, None, "Scaled on static.", (), (result,), checks, result.standing, still(), {"low-pass": "10 Hz"}
+    )
+
+
+def refused_session() -> SessionResult:
+    """Return a session in which nothing after reading could be done, with one unreadable file."""
+    why = "Trial walk: no marker is known. Name a marker set."
+    bare = Trial("walk", "fit", None, (), Source(Path("/sessions/S02/walk.c3d"), "cd" * 32, "C3D"), warnings=("No plates.",))
+    result = TrialResult(bare, (Step("prepare", "refused", why),))
+    session = Session(Subject(float("nan"), float("nan"), "M"), (bare,), Path("/sessions/S02"), {"broken.c3d": "broken.c3d: is empty."})
+    return SessionResult(
+        session, session.subject, None, "No body.", (Step("body", "refused", "No stature."),), (result,), (), None, None, {}
+    )
