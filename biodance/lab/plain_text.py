@@ -1,0 +1,70 @@
+"""Read text as laboratories write it: UTF-8 with or without a mark, UTF-16, or the Windows code page, with any line ends."""
+
+import codecs
+import hashlib
+import math
+from pathlib import Path
+
+from biodance.errors import FileRefused
+
+TEXT_LOOKS_BINARY = b"\x00"
+
+
+def read_bytes(path: Path) -> bytes:
+    """Return the bytes of a file.
+
+    Raises
+    ------
+    FileRefused
+        There is no such file, it cannot be opened, or it is empty.
+    """
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise FileRefused(f"{path}: cannot be opened ({error.strerror or error}). Check the path and the rights.") from error
+    if not content:
+        raise FileRefused(f"{path}: is empty (0 bytes). Export the recording again.")
+    return content
+
+
+def sha256(content: bytes) -> str:
+    """Return the hexadecimal SHA-256 of the bytes, as kept in ``Source.sha256``."""
+    return hashlib.sha256(content).hexdigest()
+
+
+def decode(content: bytes, path: Path) -> str:
+    """Return the text of ``content``: UTF-16 by its mark, else UTF-8, else Windows-1252 (every byte of it has a meaning, so it comes last).
+
+    Raises
+    ------
+    FileRefused
+        The bytes are not text.
+    """
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return content.decode("utf-16", errors="replace")
+    if TEXT_LOOKS_BINARY in content[:4096]:
+        raise FileRefused(f"{path}: holds binary data where text is expected. Check what the file is; its extension does not fit.")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("cp1252", errors="replace")
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a file; FileRefused if it is missing, empty or binary."""
+    return decode(read_bytes(path), path)
+
+
+def cells(line: str) -> list[str]:
+    """Return the cells of one row: between tabs where there are tabs (a cell may be empty), else between runs of blanks."""
+    return [cell.strip() for cell in line.rstrip("\r\n").split("\t")] if "\t" in line else line.split()
+
+
+def number(cell: str, where: str) -> float:
+    """Return the number in a cell; an empty cell is NaN. FileRefused says ``where`` if it is no number."""
+    if not cell:
+        return math.nan
+    try:
+        return float(cell)
+    except ValueError:
+        raise FileRefused(f"{where}: {cell!r} is not a number. Correct that cell or export the file again.") from None
