@@ -35,19 +35,23 @@ def sha256(content: bytes) -> str:
 def decode(content: bytes, path: Path) -> str:
     """Return the text of ``content``: UTF-16 by its mark, else UTF-8, else Windows-1252 (every byte of it has a meaning, so it comes last).
 
+    Line ends become one ``\\n``.
+
     Raises
     ------
     FileRefused
         The bytes are not text.
     """
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return content.decode("utf-16", errors="replace")
-    if TEXT_LOOKS_BINARY in content[:4096]:
+        text = content.decode("utf-16", errors="replace")
+    elif TEXT_LOOKS_BINARY in content[:4096]:
         raise FileRefused(f"{path}: holds binary data where text is expected. Check what the file is; its extension does not fit.")
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return content.decode("cp1252", errors="replace")
+    else:
+        try:
+            text = content.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            text = content.decode("cp1252", errors="replace")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def read_text(path: Path) -> str:
