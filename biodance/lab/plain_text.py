@@ -35,7 +35,7 @@ def sha256(content: bytes) -> str:
 def decode(content: bytes, path: Path) -> str:
     """Return the text of ``content``: UTF-16 by its mark, else UTF-8, else Windows-1252 (every byte of it has a meaning, so it comes last).
 
-    Line ends become one ``\\n``.
+    All line ends become the Unix one.
 
     Raises
     ------
