@@ -1,0 +1,103 @@
+"""The one low-pass filter of biodance: Butterworth, forwards and backwards, for forces and joint coordinates alike.
+
+Two passes give zero phase, double the order and square the gain. A filter designed for the stated cut-off would therefore damp by 6 dB
+there; the single pass is designed for a higher frequency, so that the two passes TOGETHER are 3 dB down (gain 1/sqrt(2)) at the stated
+cut-off. With the bilinear map the correction is exact: tan(pi f_design / rate) = tan(pi f_cutoff / rate) (sqrt(2) - 1)^(-1 / (2 order)).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
+
+from biodance.errors import BiodanceError
+from biodance.records import Array
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """Butterworth low-pass: ``order`` of one pass (the two passes have twice that), ``cutoff`` in Hz where both together are 3 dB down."""
+
+    order: int = 5
+    cutoff: float = 10.0
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.order <= 10:
+            raise BiodanceError(f"The low-pass has the order {self.order}; legal is 1 to 10. Use 5.")
+        if not (np.isfinite(self.cutoff) and self.cutoff > 0):
+            raise BiodanceError(f"The low-pass has the cut-off {self.cutoff} Hz; it must be positive. Use 10 Hz.")
+
+    def __str__(self) -> str:
+        return (
+            f"Butterworth low-pass of order {self.order}, forwards and backwards, 3 dB down at {self.cutoff:g} Hz in both passes together"
+        )
+
+    def shortest(self, rate: float) -> int:
+        """Return the shortest run of samples that is filtered: one period of the cut-off frequency."""
+        return int(np.ceil(rate / self.cutoff)) + 1
+
+
+def design(settings: LowPass, rate: float) -> Array:
+    """Return the second-order sections (S, 6) of one of the two passes at the sampling ``rate`` in Hz.
+
+    Raises
+    ------
+    BiodanceError
+        The rate is not positive, or the cut-off is not below half of it.
+    """
+    if not (np.isfinite(rate) and rate > 0):
+        raise BiodanceError(f"The sampling rate is {rate} Hz, which must be positive. Correct the rate in the file.")
+    if settings.cutoff >= rate / 2:
+        raise BiodanceError(
+            f"The cut-off {settings.cutoff:g} Hz is not below half the sampling rate ({rate:g} Hz). Choose a cut-off below {rate / 2:g} Hz."
+        )
+    raised = np.tan(np.pi * settings.cutoff / rate) * (np.sqrt(2) - 1) ** (-0.5 / settings.order)
+    return butter(settings.order, np.arctan(raised) * rate / np.pi, fs=rate, output="sos")
+
+
+def low_pass(values: Array, rate: float, settings: LowPass) -> Array:
+    """Return ``values`` (T, ...) low-passed along time without delay; NaN stay NaN.
+
+    ``rate`` in Hz. Every column is filtered from gap to gap, never across one; a run shorter than ``settings.shortest(rate)`` samples is
+    returned as it is (``left_raw`` tells which). The ends are continued by point reflection over one period of the cut-off.
+
+    Raises
+    ------
+    BiodanceError
+        The rate or the cut-off is not legal, or the whole signal is shorter than the shortest run.
+    """
+    sections = design(settings, rate)
+    values = np.asarray(values, dtype=float)
+    need = settings.shortest(rate)
+    if values.shape[0] < need:
+        raise BiodanceError(
+            f"{values.shape[0]} samples at {rate:g} Hz are too short for a low-pass at {settings.cutoff:g} Hz: at least {need} are needed. "
+            "Record longer or leave the signal as it is."
+        )
+    columns = values.reshape(values.shape[0], -1)
+    out = columns.copy()
+    whole = ~np.isnan(columns).any(axis=0)
+    if whole.any():
+        out[:, whole] = sosfiltfilt(sections, columns[:, whole], axis=0, padlen=need - 1)
+    for column in np.flatnonzero(~whole):
+        for start, stop in runs(~np.isnan(columns[:, column])):
+            if stop - start >= need:
+                out[start:stop, column] = sosfiltfilt(sections, columns[start:stop, column], padlen=need - 1)
+    return out.reshape(values.shape)
+
+
+def left_raw(values: Array, rate: float, settings: LowPass) -> NDArray[np.bool_]:
+    """Return where ``low_pass`` leaves a number as it is, because its run between two gaps is too short; shape of ``values``."""
+    columns = np.asarray(values, dtype=float).reshape(len(values), -1)
+    out = np.zeros(columns.shape, dtype=bool)
+    for column in np.flatnonzero(np.isnan(columns).any(axis=0)):
+        for start, stop in runs(~np.isnan(columns[:, column])):
+            out[start:stop, column] = stop - start < settings.shortest(rate)
+    return out.reshape(np.shape(values))
+
+
+def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return the runs of True in ``mask`` (T,) as (start, stop), stop excluded."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
+    return [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]

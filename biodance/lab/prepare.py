@@ -1,0 +1,135 @@
+"""Make a trial ready for the model: the set's markers with their gaps dealt with, and every plate filtered and sampled at marker times.
+
+The markers are NOT low-passed: the joint coordinates are, later and with the same filter, so that motion and forces pass it exactly once.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from biodance.errors import BiodanceError, TrialRefused
+from biodance.lab import filters
+from biodance.lab.filters import LowPass
+from biodance.lab.gaps import Gap, fill_gaps, report_gaps
+from biodance.lab.marker_sets import canonical, read_marker_set
+from biodance.records import Array, Markers, Plate, Trial, Wrench
+
+PREPARED = "Prepared for the model."
+OFTEN_HIDDEN = 10.0
+"""Percent of the frames from which on an unseen marker is worth a warning."""
+
+
+def prepare(trial: Trial, *, low_pass: LowPass | None = None, short_gap: float = 0.2) -> Trial:
+    """Return the trial with only its set's markers, gaps filled where that is safe, and the plates' wrenches at marker times.
+
+    ``low_pass`` filters the forces, by default ``LowPass()``; gaps up to ``short_gap`` s are bridged by a spline. Without markers the
+    plates keep their own times; markers outside the plates' time are cut off. Every step is a sentence in ``history``. A trial that
+    was prepared already is returned as it is.
+
+    Raises
+    ------
+    TrialRefused
+        The cut-off is not below half the marker or analog rate, or markers and plates share no time.
+    """
+    if PREPARED in trial.history:
+        return trial
+    settings = low_pass or LowPass()
+    history, warnings = [PREPARED], []
+    markers = trial.markers
+    try:
+        if markers is not None:
+            if markers.time.size > 1:
+                filters.design(settings, markers.rate)
+            markers, said = _common_time(markers, trial)
+            history += said
+            markers, said, warned = _fill(markers, trial.marker_set, short_gap)
+            history, warnings = history + said, warned
+        plates = tuple(_plate(plate, markers, settings) for plate in trial.plates)
+    except TrialRefused:
+        raise
+    except BiodanceError as error:
+        raise TrialRefused(f"Trial {trial.name}: {error}") from error
+    history += [f"{plate.name}: {plate.decisions[-1]}" for plate in plates]
+    return replace(trial, markers=markers, plates=plates, history=(*trial.history, *history), warnings=(*trial.warnings, *warnings))
+
+
+def _common_time(markers: Markers, trial: Trial) -> tuple[Markers, list[str]]:
+    """Return the markers within the time that all plates recorded (one analog sample of tolerance), and what was cut off."""
+    times = [plate.wrench.time for plate in trial.plates if plate.wrench.time.size]
+    if not times:
+        return markers, []
+    step = max((float(np.median(np.diff(time))) for time in times if time.size > 1), default=0.0)
+    first, last = max(time[0] for time in times) - step, min(time[-1] for time in times) + step
+    inside = (markers.time >= first - 1e-9) & (markers.time <= last + 1e-9)
+    if inside.all():
+        return markers, []
+    if not inside.any():
+        raise TrialRefused(
+            f"Trial {trial.name}: the markers ({markers.time[0]:g} to {markers.time[-1]:g} s) and the plates ({first:g} to {last:g} s) "
+            "share no time. Synchronise the files."
+        )
+    kept = Markers(markers.names, markers.time[inside], markers.xyz[inside])
+    return kept, [f"{int((~inside).sum())} of {inside.size} frames were cut off: the plates recorded only {first:.3f} to {last:.3f} s."]
+
+
+def _fill(markers: Markers, set_name: str, short_gap: float) -> tuple[Markers, list[str], list[str]]:
+    """Return the set's markers with filled gaps, the history and the warnings."""
+    history, segments = [], {}
+    if set_name:
+        marker_set = read_marker_set(set_name)
+        segments = {marker.label: marker.segment for marker in marker_set.markers}
+        others = len(markers.names)
+        markers = canonical(markers, marker_set)
+        others -= len(markers.names)
+        history.append(f"{len(markers.names)} markers of the set {set_name} kept, {others} other points left out.")
+    warnings = [
+        f"{gaps.label} was not seen in {gaps.percent:.0f} % of the frames (longest gap {gaps.longest:.2f} s)."
+        for gaps in report_gaps(markers)
+        if gaps.percent > OFTEN_HIDDEN
+    ]
+    filled, gaps = fill_gaps(markers, segments, short=short_gap)
+    return filled, [*history, *_sentences(gaps, markers.time)], warnings
+
+
+def _sentences(gaps: tuple[Gap, ...], time: Array) -> list[str]:
+    """Return one sentence for all bridged gaps and one for every other gap."""
+    bridged = sorted({gap.label for gap in gaps if gap.how.startswith("bridged")})
+    count = sum(gap.how.startswith("bridged") for gap in gaps)
+    said = [f"{count} short gaps bridged by a spline: {', '.join(bridged)}."] if bridged else []
+    others = [gap for gap in gaps if not gap.how.startswith("bridged")]
+    said += [f"{gap.label} {time[gap.start]:.2f} to {time[gap.stop - 1]:.2f} s {gap.how}." for gap in others]
+    return said or ["No marker has a gap."]
+
+
+def _plate(plate: Plate, markers: Markers | None, settings: LowPass) -> Plate:
+    """Return the plate with its wrench filtered and at marker times; the last decision says how."""
+    wrench = plate.wrench
+    if wrench.time.size < 2 or wrench.time.size < settings.shortest(wrench.rate):
+        mean = np.broadcast_to(wrench.value.mean(axis=0), wrench.value.shape)
+        wrench, how = Wrench(wrench.time, mean), f"mean of {wrench.time.size} samples, too few for the low-pass"
+    else:
+        raw = filters.left_raw(wrench.value, wrench.rate, settings).any(axis=1).sum()
+        wrench = Wrench(wrench.time, filters.low_pass(wrench.value, wrench.rate, settings))
+        how = f"{settings}" + (f"; {raw} samples between gaps left unfiltered" if raw else "")
+    if markers is None:
+        return replace(plate, wrench=wrench, decisions=(*plate.decisions, f"{how}; no markers, own times kept."))
+    value, sampled = _sample(wrench, markers.time)
+    return replace(plate, wrench=Wrench(markers.time, value), decisions=(*plate.decisions, f"{how}; {sampled}."))
+
+
+def _sample(wrench: Wrench, time: Array) -> tuple[Array, str]:
+    """Return the wrench (T, 6) at marker times: exact where samples lie there, otherwise by a cubic spline (NaN beside unknown samples)."""
+    after = np.clip(np.searchsorted(wrench.time, time), 0, wrench.time.size - 1)
+    before = np.maximum(after - 1, 0)
+    nearest = np.where(time - wrench.time[before] < wrench.time[after] - time, before, after)
+    if wrench.time.size == 1 or np.allclose(wrench.time[nearest], time, rtol=0, atol=1e-6):
+        return wrench.value[nearest], "sampled at the marker frames"
+    from scipy.interpolate import make_interp_spline
+
+    known = np.logical_not(np.isnan(wrench.value).any(axis=1))
+    if known.sum() < 2:
+        return np.full((time.size, 6), np.nan), "nothing known at the marker frames"
+    spline = make_interp_spline(wrench.time[known], wrench.value[known], k=min(3, int(known.sum()) - 1))
+    value = spline(np.clip(time, wrench.time[0], wrench.time[-1]))
+    value[~(known[before] & known[after])] = np.nan
+    return value, "interpolated at the marker frames"
