@@ -1,0 +1,74 @@
+"""Mass, centre of mass and inertia of lumps, and their ten parameters about a joint.
+
+Pseudo-inertia (Wensing, Kim and Slotine 2018, doi:10.1109/LRA.2017.2729659): P = [[0.5 tr(I) 1 - I, m c], [m c', m]] about the joint; a
+lump is made of real (positive) mass if and only if P is positive semi-definite.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance.records import Array
+
+TENSOR = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
+"""Row and column of Ixx, Ixy, Iyy, Ixz, Iyz, Izz in Pinocchio's order of the ten parameters."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lump:
+    """A rigid lump: ``mass`` kg, ``com`` (3,) m in some frame, ``inertia`` (3, 3) kg·m² about the CoM, axes of that frame."""
+
+    mass: float
+    com: Array
+    inertia: Array
+
+
+def merge(*lumps: Lump) -> Lump:
+    """Return several lumps given in one frame as one rigid lump."""
+    mass = sum(lump.mass for lump in lumps)
+    com = sum((lump.mass * lump.com for lump in lumps), np.zeros(3)) / mass
+    inertia = sum((lump.inertia + lump.mass * _steiner(lump.com - com) for lump in lumps), np.zeros((3, 3)))
+    return Lump(mass, com, inertia)
+
+
+def _steiner(arm: Array) -> Array:
+    """Return the inertia (3, 3) m² of a unit point mass at ``arm`` (3,) m about the origin."""
+    return float(arm @ arm) * np.eye(3) - np.outer(arm, arm)
+
+
+def parameters(lump: Lump) -> Array:
+    """Return [m, mc, Ixx, Ixy, Iyy, Ixz, Iyz, Izz] (10,), inertia about the origin of the lump's frame."""
+    about_origin = lump.inertia + lump.mass * _steiner(lump.com)
+    return np.array([lump.mass, *(lump.mass * lump.com), *(about_origin[i, j] for i, j in TENSOR)])
+
+
+def lump_of(phi: Array) -> Lump:
+    """Return the lump of ten parameters; the inverse of ``parameters`` for a positive mass."""
+    com = phi[1:4] / phi[0]
+    about_origin = np.zeros((3, 3))
+    for value, (i, j) in zip(phi[4:], TENSOR, strict=True):
+        about_origin[i, j] = about_origin[j, i] = value
+    return Lump(float(phi[0]), com, about_origin - phi[0] * _steiner(com))
+
+
+def pseudo_inertia(phi: Array) -> Array:
+    """Return the pseudo-inertia (4, 4) of ten parameters: second moments kg·m², first moments kg·m, mass kg."""
+    inertia = np.zeros((3, 3))
+    for value, (i, j) in zip(phi[4:], TENSOR, strict=True):
+        inertia[i, j] = inertia[j, i] = value
+    out = np.zeros((4, 4))
+    out[:3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    out[:3, 3] = out[3, :3] = phi[1:4]
+    out[3, 3] = phi[0]
+    return out
+
+
+def turned(lump: Lump, rotation: Array) -> Lump:
+    """Return the lump in another frame with the same origin: ``rotation`` (3, 3) is new_R_old."""
+    return Lump(lump.mass, rotation @ lump.com, rotation @ lump.inertia @ rotation.T)
+
+
+def mirrored(lump: Lump) -> Lump:
+    """Return the lump of the other body side: reflected at the plane z = 0."""
+    flip = np.diag([1.0, 1.0, -1.0])
+    return Lump(lump.mass, flip @ lump.com, flip @ lump.inertia @ flip)
