@@ -19,7 +19,7 @@ from biodance.lab.c3d_parameters import BLOCK, RESAVE, Header, Parameters, Value
 
 @dataclass(frozen=True)
 class Layout:
-    """Data section: byte ``start``, counts of points, channels, analog samples per frame and frames, kind of numbers, rates in Hz (NaN = none).
+    """Data section: byte ``start``, counts of points, channels, analog samples per frame and frames, rates in Hz (NaN = none).
 
     ``scale`` turns integer points into file units; ``gain`` (C,) and ``offset`` (C,) turn analog numbers into units:
     ``(number - offset) * gain``; ``notes`` say in sentences what was decided.
@@ -170,9 +170,7 @@ def _counts(size: int, header: Header, parameters: Parameters, word: int, where:
             f"data from byte {starts}) and the file's length does not decide. {RESAVE}"
         )
     start, p, c, n, f = full[0]
-    notes.append(
-        f"Header and parameters disagree on the counts; the file's length decides: {p} points, {c} channels x {n} samples, {f} frames."
-    )
+    notes.append(f"Header and parameters disagree; the file's length decides: {p} points, {c} channels x {n} samples, {f} frames.")
     return full[0]
 
 

@@ -67,7 +67,7 @@ def read_header(content: bytes, where: str) -> Header:
         raise FileRefused(f"{where}: the file is empty (0 bytes). {RESAVE}")
     if len(content) < 2 * BLOCK or content[1] != 0x50:
         raise FileRefused(
-            f"{where}: this is not a C3D file: it has {len(content)} bytes and its second byte is not 80 (at least 1024 bytes, 80 expected). "
+            f"{where}: this is not a C3D file: of its {len(content)} bytes the second is not 80 (80, and at least 1024 bytes, expected). "
             "Check that the file is a C3D export and not another format with that name."
         )
     start = (content[0] - 1) * BLOCK
