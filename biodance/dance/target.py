@@ -57,7 +57,11 @@ def target(
     return Target(columns, blocks, body.sip.mass if weights is None else weights, prior_factor(body.sip))
 
 
-def spectrum(gram: Array, columns: tuple[int, ...]) -> tuple[Array, Array]:
-    """Return eigenvalues (ascending, floored at 1e-16 of the largest) and eigenvectors of the block ``columns`` of ``gram``."""
-    value, vector = np.linalg.eigh(gram[np.ix_(columns, columns)])
-    return np.maximum(value, 1e-16 * max(value[-1], 1e-300)), vector
+def spectrum(triangle: Array, columns: tuple[int, ...]) -> tuple[Array, Array]:
+    """Return eigenvalues (descending, floored at 1e-30 of the largest) and eigenvectors of the Gram matrix of the chosen ``columns``.
+
+    Taken from the singular values of the triangle, so that condition numbers up to 1e15 are seen, not only up to 1e8.
+    """
+    _, singular, right = np.linalg.svd(triangle[:, columns], full_matrices=False)
+    value = singular**2
+    return np.maximum(value, 1e-30 * max(float(value[0]), 1e-300)), right.T

@@ -8,16 +8,16 @@ from biodance.records import Array
 NAME = "condition"
 
 
-def block_condition(gram: Array, columns: tuple[int, ...]) -> tuple[float, Array]:
+def block_condition(triangle: Array, columns: tuple[int, ...]) -> tuple[float, Array]:
     """Return cond = sqrt(largest / smallest eigenvalue of the block) and its gradient (p, p), zero outside the block."""
-    value, vector = spectrum(gram, columns)
-    condition = float(np.sqrt(value[-1] / value[0]))
-    high, low = vector[:, -1], vector[:, 0]
-    gradient = np.zeros_like(gram)
-    gradient[np.ix_(columns, columns)] = 0.5 * condition * (np.outer(high, high) / value[-1] - np.outer(low, low) / value[0])
+    value, vector = spectrum(triangle, columns)
+    condition = float(np.sqrt(value[0] / value[-1]))
+    high, low = vector[:, 0], vector[:, -1]
+    gradient = np.zeros((triangle.shape[1],) * 2)
+    gradient[np.ix_(columns, columns)] = 0.5 * condition * (np.outer(high, high) / value[0] - np.outer(low, low) / value[-1])
     return condition, gradient
 
 
-def evaluate(gram: Array, target: Target) -> tuple[float, Array]:
+def evaluate(triangle: Array, target: Target) -> tuple[float, Array]:
     """Return cond(W_b) and its gradient."""
-    return block_condition(gram, target.columns)
+    return block_condition(triangle, target.columns)

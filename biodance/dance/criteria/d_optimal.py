@@ -8,9 +8,9 @@ from biodance.records import Array
 NAME = "d_optimal"
 
 
-def evaluate(gram: Array, target: Target) -> tuple[float, Array]:
-    """Return -log det(W_b'W_b) and its gradient; a singular block is floored at 1e-16 of its largest eigenvalue."""
-    value, vector = spectrum(gram, target.columns)
-    gradient = np.zeros_like(gram)
+def evaluate(triangle: Array, target: Target) -> tuple[float, Array]:
+    """Return -log det(W_b'W_b) and its gradient; a singular block is floored at 1e-30 of its largest eigenvalue."""
+    value, vector = spectrum(triangle, target.columns)
+    gradient = np.zeros((triangle.shape[1],) * 2)
     gradient[np.ix_(target.columns, target.columns)] = -(vector / value) @ vector.T
     return -float(np.sum(np.log(value))), gradient

@@ -9,7 +9,7 @@ from biodance.records import Array
 NAME = "log_condition"
 
 
-def evaluate(gram: Array, target: Target) -> tuple[float, Array]:
+def evaluate(triangle: Array, target: Target) -> tuple[float, Array]:
     """Return log cond(W_b) and its gradient."""
-    value, gradient = block_condition(gram, target.columns)
+    value, gradient = block_condition(triangle, target.columns)
     return float(np.log(value)), gradient / value

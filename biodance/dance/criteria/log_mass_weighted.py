@@ -9,7 +9,7 @@ from biodance.records import Array
 NAME = "log_mass_weighted"
 
 
-def evaluate(gram: Array, target: Target) -> tuple[float, Array]:
+def evaluate(triangle: Array, target: Target) -> tuple[float, Array]:
     """Return log(sum_i M_i cond(W_bi)) and its gradient."""
-    value, gradient = mass_weighted.evaluate(gram, target)
+    value, gradient = mass_weighted.evaluate(triangle, target)
     return float(np.log(value)), gradient / value

@@ -9,12 +9,12 @@ from biodance.records import Array
 NAME = "mass_weighted"
 
 
-def evaluate(gram: Array, target: Target) -> tuple[float, Array]:
+def evaluate(triangle: Array, target: Target) -> tuple[float, Array]:
     """Return sum_i M_i cond(W_bi), kg, and its gradient; a segment whose block is empty does not count."""
-    total, slope = 0.0, np.zeros_like(gram)
+    total, slope = 0.0, np.zeros((triangle.shape[1],) * 2)
     for weight, block in zip(target.weights, target.blocks, strict=True):
         if block and weight > 0:
-            value, gradient = block_condition(gram, block)
+            value, gradient = block_condition(triangle, block)
             total += weight * value
             slope += weight * gradient
     return total, slope

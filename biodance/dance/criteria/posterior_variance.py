@@ -1,6 +1,6 @@
 """What will we know afterwards: logarithm of the summed posterior variances, each in units of its variance in the table.
 
-Posterior covariance C = S (1 + S'GS)^-1 S' for a table covariance S S' and a Gram matrix G whitened by the noise of the lab.
+Posterior covariance C = S (1 + S'GS)^-1 S' for a table covariance S S' and a Gram matrix G = R'R whitened by the noise of the lab.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ from biodance.records import Array
 NAME = "posterior_variance"
 
 
-def evaluate(gram: Array, target: Target) -> tuple[float, Array]:
+def evaluate(triangle: Array, target: Target) -> tuple[float, Array]:
     """Return log sum_k weight_k C_kk / P_kk over the parameters of the weighted blocks, and its gradient."""
     S = target.prior_factor
     before = np.sum(S**2, axis=1)
@@ -19,6 +19,7 @@ def evaluate(gram: Array, target: Target) -> tuple[float, Array]:
     for segment, block in zip(target.weights, target.blocks, strict=True):
         weight[list(block)] = segment
     relative = np.where(before > 0, weight / np.where(before > 0, before, 1.0), 0.0)
-    after = S @ np.linalg.solve(np.eye(S.shape[1]) + S.T @ gram @ S, S.T)
+    known = triangle @ S
+    after = S @ np.linalg.solve(np.eye(S.shape[1]) + known.T @ known, S.T)
     total = float(relative @ np.diag(after))
     return float(np.log(total)), -(after * relative) @ after / total
