@@ -1,0 +1,74 @@
+"""Find the recordings in a folder: which files are one, which belong to another, and what Vicon wrote beside them."""
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+from biodance.errors import BiodanceError
+from biodance.lab.read import FORMATS, forces_beside, format_of
+from biodance.lab.vicon import EclipseNotes, read_enf, read_mp, read_vsk
+
+TEXT = (".txt", ".csv")
+PART_FOLDERS = re.compile(r"static|cal|dynamic|trials?|fit|validat|squat|walk|movement|recordings?", flags=re.IGNORECASE)
+
+
+def find_recordings(folder: Path) -> tuple[list[Path], list[str]]:
+    """Return the recordings of a session, sorted by name, and notes on what was left aside.
+
+    They lie in the folder itself, else in its parts (folders such as ``static`` and ``dynamic``). A table of forces that belongs to a .trc
+    file is no recording of its own; of one trial in several formats the C3D file is taken; text that holds no table of numbers is none.
+    """
+    files = recordings_in(folder)
+    if not files:
+        parts = [part for part in sorted(folder.iterdir()) if part.is_dir() and PART_FOLDERS.match(part.name)]
+        files = [file for part in parts for file in recordings_in(part)]
+    companions = {forces for file in files if file.suffix.lower() == ".trc" and (forces := _forces(file))}
+    notes: list[str] = []
+    kept: dict[tuple[Path, str], Path] = {}
+    for file in sorted((f for f in files if f not in companions), key=lambda f: (list(FORMATS).index(f.suffix.lower()), str(f))):
+        trial = (file.parent, file.stem.lower())
+        if trial in kept:
+            notes.append(f"{file.name} was left aside: it is the same trial as {kept[trial].name}.")
+        else:
+            kept[trial] = file
+    return sorted(kept.values()), notes
+
+
+def recordings_in(folder: Path) -> list[Path]:
+    """Return the files directly in a folder whose extension or content says that they are recordings, sorted by name."""
+    files = (path for path in sorted(folder.iterdir()) if path.is_file() and not path.name.startswith("."))
+    return [path for path in files if path.suffix.lower() in FORMATS and _is_data(path)]
+
+
+def vicon_notes(folders: Iterable[Path]) -> tuple[dict[str, EclipseNotes], dict[str, dict[str, float]], dict[str, str]]:
+    """Return the Eclipse notes by trial name (lower case), the measurements (m, kg) by file name, and the refused files with the reason."""
+    eclipse: dict[str, EclipseNotes] = {}
+    measurements: dict[str, dict[str, float]] = {}
+    refused: dict[str, str] = {}
+    for file in (path for folder in sorted(folders) for path in sorted(folder.iterdir()) if path.is_file()):
+        try:
+            if re.search(r"\.trial\d*\.enf$", file.name, flags=re.IGNORECASE):
+                notes = read_enf(file)
+                eclipse[notes.trial.lower()] = notes
+            elif file.suffix.lower() in (".mp", ".vsk"):
+                measurements[file.name] = read_mp(file) if file.suffix.lower() == ".mp" else read_vsk(file)
+        except BiodanceError as error:
+            refused[file.name] = str(error)
+    return eclipse, dict(sorted(measurements.items(), key=lambda item: not item[0].lower().endswith(".mp"))), refused
+
+
+def _is_data(file: Path) -> bool:
+    """Return False for .txt and .csv files whose content is no recording: notes, exports for people."""
+    if file.suffix.lower() not in TEXT:
+        return True
+    try:
+        return format_of(file) != file.suffix.lower()
+    except BiodanceError:
+        return False
+
+
+def _forces(file: Path) -> Path | None:
+    try:
+        return forces_beside(file)
+    except BiodanceError:
+        return None

@@ -1,0 +1,141 @@
+"""``session.toml``: what the analyst says about the subject and the trials, with inheritance subject > session > trial.
+
+```toml
+[subject]
+mass_kg = 66.2        # all keys may be left out
+height_m = 1.75
+sex = "F"             # or "M"
+age = 33
+name = "S01"
+
+[trials."static*"]    # file name without extension, * and ? allowed; the exact name wins over a pattern
+role = "static"       # static, fit, validate, check or skip
+```
+
+A ``subject.toml`` or ``session.toml`` in the folder above (the subject's folder) has the same keys and fills in what the session's own
+file leaves out.
+"""
+
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_args
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from biodance.errors import SessionRefused
+from biodance.library import read_toml
+from biodance.records import Role
+
+FILES = ("subject.toml", "session.toml")
+
+
+class _Entry(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class SubjectEntry(_Entry):
+    """The table ``[subject]``; None = not said. The bounds catch grams, millimetres and centimetres."""
+
+    mass_kg: Annotated[float, Field(ge=5, le=400)] | None = None
+    height_m: Annotated[float, Field(ge=0.4, le=2.6)] | None = None
+    sex: Literal["F", "M"] | None = None
+    age: Annotated[float, Field(ge=0, le=120)] | None = None
+    name: str | None = None
+
+
+class TrialEntry(_Entry):
+    """One table ``[trials.NAME]``."""
+
+    role: Role | None = None
+
+
+class _Contents(_Entry):
+    subject: SubjectEntry = SubjectEntry()
+    trials: dict[str, TrialEntry] = {}
+
+
+@dataclass(frozen=True)
+class SessionFile:
+    """What all files of the chain say together: ``subject``, ``trials`` by name or pattern (the innermost file first), ``read`` paths."""
+
+    subject: SubjectEntry = field(default_factory=SubjectEntry)
+    trials: tuple[tuple[str, TrialEntry], ...] = ()
+    read: tuple[Path, ...] = field(default=())
+
+    def role(self, name: str) -> Role | None:
+        """Return the role of a trial: by its exact name, else by the first pattern that fits; upper and lower case count the same."""
+        exact = [entry.role for key, entry in self.trials if key.lower() == name.lower()]
+        similar = [entry.role for key, entry in self.trials if fnmatchcase(name.lower(), key.lower())]
+        return next((role for role in exact + similar if role), None)
+
+    def unused(self, names: list[str]) -> list[str]:
+        """Return the keys of ``[trials]`` that fit no trial, each with the closest name: most often a slip of the pen."""
+        said = []
+        for key, _ in self.trials:
+            if not any(fnmatchcase(name.lower(), key.lower()) for name in names):
+                close = get_close_matches(key, names, n=1)
+                hint = f" Did you mean {close[0]!r}?" if close else ""
+                said.append(f"[trials.{key}] fits no recording of the session.{hint}")
+        return said
+
+
+def read_session_file(folder: Path) -> SessionFile:
+    """Return what ``session.toml`` (and ``subject.toml`` or ``session.toml`` in the folder above) says; empty where there is none.
+
+    Raises
+    ------
+    SessionRefused
+        A file is not TOML, has an unknown key (the closest legal one is named) or a value out of bounds.
+    """
+    folder = folder.resolve()
+    paths = [place / name for place in (folder.parent, folder) for name in FILES if (place / name).is_file()]
+    contents = [_read(path) for path in paths]
+    said: dict[str, Any] = {}
+    for content in contents:
+        said |= content.subject.model_dump(exclude_none=True)
+    trials = tuple((key, entry) for content in reversed(contents) for key, entry in content.trials.items())
+    return SessionFile(SubjectEntry(**said), trials, tuple(paths))
+
+
+def _read(path: Path) -> _Contents:
+    raw = read_toml(path)
+    try:
+        return _Contents.model_validate(_whole_numbers_are_numbers(raw))
+    except ValidationError as error:
+        raise SessionRefused(" ".join(_sentence(path, fault) for fault in error.errors())) from None
+
+
+def _whole_numbers_are_numbers(raw: Any) -> Any:
+    """Return the tables with ``70`` read as ``70.0`` (strict pydantic keeps text and truth values apart from numbers)."""
+    if isinstance(raw, dict):
+        return {key: _whole_numbers_are_numbers(value) for key, value in raw.items()}
+    return float(raw) if isinstance(raw, int) and not isinstance(raw, bool) else raw
+
+
+def _sentence(path: Path, fault: Any) -> str:
+    """Return one fault that pydantic found as a sentence for the analyst."""
+    *table, key = (str(part) for part in fault["loc"]) if fault["loc"] else ("",)
+    where = f"[{'.'.join(table)}]" if table else "the top level"
+    if fault["type"] == "extra_forbidden":
+        legal = _legal_keys(table)
+        close = get_close_matches(key, legal, n=1, cutoff=0.3)
+        hint = f" Did you mean {close[0]!r}?" if close else ""
+        return f"{path}: {where} has the unknown key {key!r}.{hint} Legal: {', '.join(legal)}."
+    wrong = f"{path}: {key} = {fault['input']!r} in {where} is not legal: {fault['msg'][0].lower()}{fault['msg'][1:]}."
+    return f"{wrong} {_HELP.get(key, '')}".rstrip()
+
+
+def _legal_keys(table: list[str]) -> list[str]:
+    models: dict[str, type[BaseModel]] = {"subject": SubjectEntry, "trials": TrialEntry}
+    return list(models.get(table[0] if table else "", _Contents).model_fields)
+
+
+_HELP = {
+    "mass_kg": "Give the body mass in kg.",
+    "height_m": "Give the stature in m.",
+    "sex": 'Write "F" or "M".',
+    "age": "Give the age in years.",
+    "role": f"Legal are {', '.join(get_args(Role))}.",
+}

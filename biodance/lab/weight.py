@@ -1,0 +1,65 @@
+"""Does somebody stand still in a trial, and which mass do the plates carry then? Needed before anything is known about the person."""
+
+import numpy as np
+
+from biodance.errors import TrialRefused
+from biodance.records import Array, Markers, Trial
+
+STANDARD_GRAVITY = 9.80665  # m/s²
+STILL = 0.03  # m, a marker that stays within this counts as still
+LOADED = 100.0  # N, nobody stands on plates that carry less
+SWAY = 0.03  # share of the weight by which the vertical force may sway in quiet standing
+BLOCK = 0.05  # s, the force is averaged over blocks of this length before it is judged
+SHORTEST = 0.4  # s of quiet standing
+
+
+def movement(markers: Markers) -> float:
+    """Return how far the typical marker travels in the trial, m: the median over markers of the diagonal of the box it stays in.
+
+    The box is taken between the 2nd and 98th percentile of each coordinate, so that a flickering marker does not count as movement.
+    NaN if no marker was ever seen.
+    """
+    seen = markers.seen.any(axis=0)
+    if not seen.any():
+        return float("nan")
+    low, high = np.nanpercentile(markers.xyz[:, seen], [2, 98], axis=0)
+    return float(np.median(np.linalg.norm(high - low, axis=1)))
+
+
+def is_still(trial: Trial) -> bool:
+    """Return True if the trial has markers and the typical one stays within 3 cm."""
+    return trial.markers is not None and movement(trial.markers) <= STILL
+
+
+def standing_mass(trial: Trial) -> float | None:
+    """Return the mass in kg that the plates carry in the longest quiet part (vertical force within 3 %, at least 0.4 s); None without one.
+
+    Only for trials in which the markers are still or that have no markers: a walker may have one foot beside the plates.
+    """
+    if not trial.plates or (trial.markers is not None and not is_still(trial)):
+        return None
+    try:
+        wrench = trial.wrench
+    except TrialRefused:
+        return None
+    quiet = _longest_steady(_blocks(wrench.force[:, 2], wrench.rate))
+    return float(quiet.mean() / STANDARD_GRAVITY) if quiet is not None else None
+
+
+def _blocks(vertical: Array, rate: float) -> Array:
+    """Return the vertical force averaged over blocks of 0.05 s."""
+    size = max(1, round(BLOCK * rate)) if np.isfinite(rate) else 1
+    count = vertical.size // size
+    return vertical[: count * size].reshape(count, size).mean(axis=1)
+
+
+def _longest_steady(blocks: Array) -> Array | None:
+    """Return the longest run of blocks that stay within the sway of their median; None if it is too short or carries nobody."""
+    middle = float(np.median(blocks)) if blocks.size else 0.0
+    if not middle >= LOADED:
+        return None
+    steady = np.concatenate([[0], np.abs(blocks - middle) <= SWAY * middle, [0]]).astype(int)
+    starts, ends = np.flatnonzero(np.diff(steady) == 1), np.flatnonzero(np.diff(steady) == -1)
+    longest = int(np.argmax(ends - starts))
+    run = blocks[starts[longest] : ends[longest]]
+    return run if run.size * BLOCK >= SHORTEST - 1e-9 else None

@@ -1,0 +1,48 @@
+"""Small session folders as text, for tests of the session room: somebody of known mass and stature who stands or walks."""
+
+import numpy as np
+
+from biodance.lab.ground_forces import table_of
+from biodance.lab.mot import write_mot
+from biodance.lab.trc import write_trc
+from biodance.records import Markers, Plate, Wrench
+
+STATURE, MASS, GRAVITY = 1.70, 62.0, 9.80665
+PLUG_IN_GAIT = {
+    "LFHD": (0.08, 0.07, 0.945), "RFHD": (0.08, -0.07, 0.945), "LBHD": (-0.10, 0.07, 0.939), "RBHD": (-0.10, -0.07, 0.939),
+    "C7": (-0.06, 0.0, 0.840), "T10": (-0.09, 0.0, 0.72), "CLAV": (0.06, 0.0, 0.79), "STRN": (0.09, 0.0, 0.71),
+    "LSHO": (0.0, 0.17, 0.82), "RSHO": (0.0, -0.17, 0.82), "LELB": (0.0, 0.28, 0.63), "RELB": (0.0, -0.28, 0.63),
+    "LWRA": (0.03, 0.30, 0.49), "RWRA": (0.03, -0.30, 0.49), "LWRB": (-0.03, 0.30, 0.49), "RWRB": (-0.03, -0.30, 0.49),
+    "LFIN": (0.0, 0.31, 0.44), "RFIN": (0.0, -0.31, 0.44), "LASI": (0.10, 0.12, 0.56), "RASI": (0.10, -0.12, 0.56),
+    "LPSI": (-0.09, 0.05, 0.57), "RPSI": (-0.09, -0.05, 0.57), "LTHI": (0.0, 0.17, 0.40), "RTHI": (0.0, -0.17, 0.40),
+    "LKNE": (0.0, 0.15, 0.27), "RKNE": (0.0, -0.15, 0.27), "LTIB": (0.0, 0.13, 0.17), "RTIB": (0.0, -0.13, 0.17),
+    "LANK": (0.0, 0.12, 0.05), "RANK": (0.0, -0.12, 0.05), "LHEE": (-0.06, 0.10, 0.03), "RHEE": (-0.06, -0.10, 0.03),
+    "LTOE": (0.15, 0.10, 0.03), "RTOE": (0.15, -0.10, 0.03),
+}  # fmt: skip
+
+
+def person(*, frames=100, rate=100.0, speed=0.0, seed=1):
+    """Markers of somebody who walks along x at ``speed`` m/s (0: stands), with 0.5 mm of noise."""
+    time = np.arange(frames) / rate
+    xyz = np.array(list(PLUG_IN_GAIT.values())) * [1, 1, STATURE] + np.random.default_rng(seed).normal(
+        0, 5e-4, (frames, len(PLUG_IN_GAIT), 3)
+    )
+    xyz[..., 0] += (speed * time)[:, None]
+    return Markers(tuple(PLUG_IN_GAIT), time, xyz)
+
+
+def plate(*, frames=1000, rate=1000.0, mass=MASS, seed=2):
+    """One plate that carries ``mass``, with 1 N of noise."""
+    force = np.random.default_rng(seed).normal(0, 1.0, (frames, 3)) + [0, 0, mass * GRAVITY]
+    moment = np.cross([0.02, 0.01, 0.0], force)
+    corners = np.array([[0.3, 0.2, 0], [-0.3, 0.2, 0], [-0.3, -0.2, 0], [0.3, -0.2, 0]])
+    return Plate("plate1", 2, corners, Wrench(np.arange(frames) / rate, np.hstack([force, moment])))
+
+
+def write_trial(folder, name, *, mass=MASS, **kind):
+    """Write one trial as .trc, with its forces as .mot beside it unless ``mass`` is None; return the path of the markers."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = write_trc(folder / f"{name}.trc", person(**kind))
+    if mass is not None:
+        write_mot(folder / f"{name}.mot", table_of((plate(mass=mass),)))
+    return path
