@@ -33,7 +33,7 @@ def person(*, frames=100, rate=100.0, speed=0.0, seed=1):
 
 def plate(*, frames=1000, rate=1000.0, mass=MASS, seed=2):
     """One plate that carries ``mass``, with 1 N of noise."""
-    force = np.random.default_rng(seed).normal(0, 1.0, (frames, 3)) + [0, 0, mass * GRAVITY]
+    force = np.array([0, 0, mass * GRAVITY]) + np.random.default_rng(seed).normal(0, 1.0, (frames, 3))
     moment = np.cross([0.02, 0.01, 0.0], force)
     corners = np.array([[0.3, 0.2, 0], [-0.3, 0.2, 0], [-0.3, -0.2, 0], [0.3, -0.2, 0]])
     return Plate("plate1", 2, corners, Wrench(np.arange(frames) / rate, np.hstack([force, moment])))
