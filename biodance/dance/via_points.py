@@ -1,8 +1,8 @@
 """Optimise the via points of one trajectory so that the regressor it adds to the history reveals the most.
 
-For bodies with few joints and any criterion: the regressor of the trajectory and its derivative with respect to every via point come from
-one batched regressor call on centrally perturbed trajectories, the criterion's own gradient is analytic, joint ranges are linear constraints
-on the samples, and SLSQP does the rest. The paper's planar example (III.C) is solved with it.
+For bodies with few joints and any criterion: the regressor of the trajectory and its derivative with respect to every via point come
+from one batched call on centrally perturbed trajectories, the criterion's own gradient is analytic, joint ranges are linear constraints on
+the samples, and SLSQP does the rest. The paper's planar example (III.C) is solved with it.
 """
 
 from dataclasses import dataclass
@@ -84,5 +84,5 @@ def design(problem: Excitation, start: Array, history: Array, *, iterations: int
         constraints=[ranges],
         options={"maxiter": iterations},
     )
-    best = found.x if found.fun < problem.value_and_gradient(start.ravel(), history)[0] else start.ravel()
+    best = found.x if found.fun < judge(start.ravel(), history)[0] else start.ravel()
     return best.reshape(start.shape)
