@@ -5,7 +5,8 @@ import pytest
 from random_bodies import random_body, random_motion
 
 from biodance.identify.base_parameters import estimate_base, structural_base
-from biodance.identify.information import Noise, information, merge
+from biodance.identify.information import information, merge
+from biodance.identify.noise import Noise
 from biodance.motion.regressor import predict_wrench, regressor
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from random_bodies import random_body, random_motion
 
-from biodance.identify.information import Noise, information
+from biodance.identify.information import information
+from biodance.identify.noise import Noise
 from biodance.identify.physical import physical_fit, pseudo_inertia, smallest_eigenvalues
 from biodance.identify.posterior import posterior
 from biodance.motion.regressor import predict_wrench, regressor
@@ -31,8 +32,8 @@ def drawn(seed: int, frames: int = 300):
 def test_posterior_equals_the_textbook_formula() -> None:
     body, prior, motion, wrench, _ = drawn(0)
     found = posterior(information(body, motion, wrench, NOISE), prior)
-    W = (NOISE.whitener @ regressor(body, motion)).reshape(-1, 40)
-    y = (wrench.value @ NOISE.whitener.T).ravel()
+    W = NOISE.whiten(regressor(body, motion)).reshape(-1, 40)
+    y = NOISE.whiten(wrench.value[:, :, None]).ravel()
     precision = np.linalg.inv(prior.covariance) + W.T @ W
     covariance = np.linalg.inv(precision)
     mean = covariance @ (np.linalg.inv(prior.covariance) @ prior.phi + W.T @ y)

@@ -75,14 +75,7 @@ def design(problem: Excitation, start: Array, history: Array, *, iterations: int
     rows = np.einsum("nk,ij->nikj", samples, np.eye(joints)).reshape(len(samples) * joints, -1)
     low, high = np.tile(limits.lower, len(samples)), np.tile(limits.upper, len(samples))
     ranges = {"type": "ineq", "fun": lambda x: np.concatenate([rows @ x - low, high - rows @ x]), "jac": lambda _: np.vstack([rows, -rows])}
-    found = minimize(
-        problem.value_and_gradient,
-        start.ravel(),
-        args=(history,),
-        jac=True,
-        method="SLSQP",
-        constraints=[ranges],
-        options={"maxiter": iterations},
-    )
+    judge, options = problem.value_and_gradient, {"maxiter": iterations}
+    found = minimize(judge, start.ravel(), args=(history,), jac=True, method="SLSQP", constraints=[ranges], options=options)
     best = found.x if found.fun < judge(start.ravel(), history)[0] else start.ravel()
     return best.reshape(start.shape)

@@ -5,7 +5,7 @@ that a trial of any length needs constant memory, trials merge, and a recursive 
 The wrench is taken about a point near the feet, where its noise has the covariance that the whitening assumes.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,49 +13,18 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, TrialRefused
+from biodance.identify.noise import Noise, blocks
 from biodance.motion.kinematics import segment_motion
 from biodance.motion.regressor import regressor_of
-from biodance.records import Array, Motion, Wrench, frozen_array
-
-BLOCK = 512
-"""Frames folded in at once: small enough for the cache, large enough for LAPACK."""
-
-
-@dataclass(frozen=True, eq=False)
-class Noise:
-    """Noise of the wrench residual: ``covariance`` (6, 6) N², N²·m, N²·m² of one frame about ``about`` (3,) m (lab frame).
-
-    ``inflation`` >= 1 is the number of consecutive frames that say one thing (the integrated autocorrelation time in frames): rows are
-    divided by its root, so that coloured residuals do not count as independent.
-    """
-
-    covariance: Array
-    about: Array
-    inflation: float = 1.0
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "covariance", frozen_array(self.covariance, (6, 6), "Noise.covariance"))
-        object.__setattr__(self, "about", frozen_array(self.about, (3,), "Noise.about"))
-        if self.inflation < 1:
-            raise BiodanceError(f"Noise.inflation is {self.inflation:g}; it counts frames and must be at least 1.")
-
-    @classmethod
-    def of_sd(cls, force: float, moment: float, about: Array) -> "Noise":
-        """Return white noise with standard deviations ``force`` N and ``moment`` N·m, the same on all axes."""
-        return cls(np.diag([force**2] * 3 + [moment**2] * 3), about)
-
-    @property
-    def whitener(self) -> Array:
-        """(6, 6) L with ``L @ covariance @ L.T * inflation = 1``, to be applied to a wrench about the lab origin (shift included)."""
-        x, y, z = self.about
-        shift = np.eye(6)
-        shift[3:, :3] = -np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-        return np.linalg.solve(np.linalg.cholesky(self.covariance * self.inflation), shift)
+from biodance.records import Array, Motion, Wrench
 
 
 @dataclass(frozen=True, eq=False)
 class Information:
-    """The triangle of [W y]: ``R`` (p + 1, p + 1) upper triangular, whitened (rows in units of noise sd); ``frames`` folded in."""
+    """The triangle of [W y]: ``R`` (p + 1, p + 1) upper triangular, whitened (rows in units of noise sd).
+
+    ``frames`` counts the samples or transform coefficients folded in.
+    """
 
     R: Array
     frames: int
@@ -98,23 +67,28 @@ def information(body: Body, motion: Motion, wrench: Wrench, noise: Noise, *, use
     TrialRefused
         Motion and wrench have different lengths, a used wrench is NaN, or no frame is to be used.
     """
-    frames = np.arange(motion.time.size) if use is None else np.flatnonzero(use)
+    used = np.ones(motion.time.size, dtype=bool) if use is None else use
     if wrench.time.size != motion.time.size:
         raise TrialRefused(f"The wrench has {wrench.time.size} samples, the motion {motion.time.size}; prepare the trial first.")
-    if frames.size == 0:
+    if not used.any():
         raise TrialRefused("No frame of this trial may be used: all are masked (ground contact not measured, or markers hidden).")
-    if np.isnan(wrench.value[frames]).any():
+    if np.isnan(wrench.value[used]).any():
         raise TrialRefused("The wrench is NaN in a frame that is to be used; mask the frame.")
-    whiten = noise.whitener
+    count = 0
     R: Array | None = None
-    for start in range(0, frames.size, BLOCK):
-        pick = frames[start : start + BLOCK]
-        part = Motion(motion.time[pick], motion.q[pick], motion.v[pick], motion.a[pick])
-        W = whiten @ regressor_of(segment_motion(body, part))
-        y = wrench.value[pick] @ whiten.T
-        R = fold(np.concatenate([W.reshape(-1, W.shape[2]), y.reshape(-1, 1)], axis=1), R)
+    for rows in whitened_rows(body, motion, wrench, noise, used):
+        R = fold(rows.reshape(-1, rows.shape[2]), R)
+        count += len(rows)
     assert R is not None
-    return Information(R, int(frames.size))
+    return Information(R, count)
+
+
+def whitened_rows(body: Body, motion: Motion, wrench: Wrench, noise: Noise, used: NDArray[np.bool_]) -> Iterator[Array]:
+    """Yield whitened rows (m, 6, 10N + 1) of [W y], block by block."""
+    for pick in blocks(used, motion.rate, noise):
+        part = Motion(motion.time[pick], motion.q[pick], motion.v[pick], motion.a[pick])
+        W = regressor_of(segment_motion(body, part))
+        yield noise.whiten(np.concatenate([W, wrench.value[pick][:, :, None]], axis=2))
 
 
 def merge(parts: Iterable[Information]) -> Information:
