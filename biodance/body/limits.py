@@ -28,8 +28,8 @@ _ANDERSON = {
 def joint_limits(subject: Subject, *, within: Range = "anatomical") -> JointLimits:
     """Return the limits of the 23 joints of a person.
 
-    ``within="anatomical"`` is what a healthy adult's joint allows (for inverse kinematics), ``"comfortable"`` what he or she reaches without
-    effort (for designed motions). Speed 4 rad/s (Bonnet 2016). Torques: hip flexion, knee and ankle dorsiflexion from Anderson 2007
+    ``within="anatomical"`` is what a healthy adult's joint allows (for inverse kinematics), ``"comfortable"`` what he or she reaches
+    without effort (for designed motions). Speed 4 rad/s (Bonnet 2016). Torques: hip flexion, knee and ankle dorsiflexion from Anderson 2007
     (C1 * mass * g * stature) by sex and age; all others from ``joints_23.csv`` in proportion to body mass, times the same age factor
     (mean over Anderson's six torques against 18-25 years). Unknown age counts as 25.
     """

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from biodance.body.body import Joint
-from biodance.body.segment_tables import KINDS, Reference, proportion
+from biodance.body.reference import KINDS, Reference, proportion
 from biodance.body.tables import numbers, read_table
 from biodance.records import Array, Subject
 
@@ -38,13 +38,14 @@ class Skeleton:
 
     ``lengths`` by segment: thigh, shank, upper_arm, forearm_hand (to the wrist) between joint centres, foot heel to toe tip, pelvis mid hip
     centres to trunk joint, trunk_head mid hip to mid shoulder centres. ``origins`` by joint: (3,) m in the parent segment's frame.
-    ``turns`` by joint: (3, 3) constant rotation parent_R_child at zero angle (varus, tibial torsion, carrying angle), identity where absent.
-    ``ankle_height`` m over the sole by side. ``asis_width``, ``stature`` m.
+    ``turns`` by joint: (3, 3) constant rotation parent_R_child at zero angle (varus, tibial torsion, carrying angle), identity if absent.
+    ``ankle_height`` m over the sole and ``heel_behind_ankle`` m by side. ``asis_width``, ``stature`` m.
     """
 
     lengths: Mapping[str, float]
     origins: Mapping[str, Array]
     ankle_height: Mapping[str, float]
+    heel_behind_ankle: Mapping[str, float]
     asis_width: float
     stature: float
     turns: Mapping[str, Array] = field(default_factory=dict)
@@ -64,7 +65,9 @@ def generic_skeleton(reference: Reference, subject: Subject) -> Skeleton:
             origins[f"{side}_{joint}"] = np.array([0.0, -kinds[kind], 0.0])
     ankle = proportion("ankle_height", sex) * stature
     lengths = {segment: kinds[kind_of(segment)] for segment in SEGMENTS}
-    return Skeleton(lengths, origins, dict.fromkeys(SIDES, ankle), proportion("asis_width", sex) * stature, stature)
+    heel = proportion("heel_behind_ankle", sex) * kinds["foot"]
+    asis = proportion("asis_width", sex) * stature
+    return Skeleton(lengths, origins, dict.fromkeys(SIDES, ankle), dict.fromkeys(SIDES, heel), asis, stature)
 
 
 def joint_tree(skeleton: Skeleton) -> tuple[Joint, ...]:

@@ -1,6 +1,7 @@
 """Read one anthropometric table: a tidy CSV with the numbers and a TOML of the same name with their provenance."""
 
 import csv
+import functools
 import hashlib
 import io
 from collections.abc import Mapping
@@ -46,6 +47,7 @@ def numbers(row: Row, columns: str) -> tuple[float, ...]:
     return tuple(float(row[column]) for column in columns.split())
 
 
+@functools.cache
 def read_table(family: str, name: str) -> Table:
     """Read ``anthropometry/<family>/<name>.csv`` and its provenance, for example ``read_table("segments", "de_leva_1996")``.
 
