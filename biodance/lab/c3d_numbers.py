@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from biodance.errors import FileRefused
 from biodance.lab.c3d_layout import Layout
-from biodance.lab.c3d_parameters import MIPS, PROCESSORS, RESAVE, Parameters
+from biodance.lab.c3d_parameters import MIPS, PROCESSORS, RESAVE
 
 Numbers = tuple[NDArray[Any], NDArray[Any]]
 """Points (T, K, 3) in file units with NaN = not seen, analog (T * samples, C) in units."""
@@ -23,10 +23,10 @@ LEAP = 1.0
 """m; no marker on a person moves further between two frames, at any rate in use."""
 
 
-def read_numbers(path: Path, layout: Layout, parameters: Parameters, *, metre: float) -> tuple[Numbers, str, tuple[str, ...]]:
+def read_numbers(path: Path, layout: Layout, *, judged: tuple[int, ...], metre: float) -> tuple[Numbers, str, tuple[str, ...]]:
     """Return the numbers, the name of the library that read them, and the reasons in sentences where it was not the first choice.
 
-    ``metre`` is the length of one metre in file units, for the judgement of jumps.
+    ``judged`` are the points that are markers and ``metre`` is the length of one metre in file units: markers that jump smell of a misread.
 
     Raises
     ------
@@ -34,11 +34,12 @@ def read_numbers(path: Path, layout: Layout, parameters: Parameters, *, metre: f
         Neither library reads the file.
     """
     notes: list[str] = []
-    reason = _beyond_ezc3d(layout, parameters)
+    columns, limit = list(judged), LEAP * metre
+    reason = _beyond_ezc3d(layout)
     first: Numbers | None = None
     if not reason:
         first, reason = _attempt(_with_ezc3d, path, layout)
-    if first is not None and not (leaps := _leaps(first[0], LEAP * metre)):
+    if first is not None and not (leaps := _leaps(first[0][:, columns], limit)):
         return first, "ezc3d", ()
     second, fault = _attempt(_with_c3d, path, layout)
     if first is None:
@@ -51,12 +52,12 @@ def read_numbers(path: Path, layout: Layout, parameters: Parameters, *, metre: f
         notes.append(
             f"Markers jump by more than {LEAP:g} m between frames in {leaps} places; a second reader finds the same: it is in the data."
         )
-    elif _leaps(second[0], LEAP * metre) < leaps:
+    elif _leaps(second[0][:, columns], limit) < leaps:
         return second, "c3d", (f"ezc3d reads {leaps} jumps of more than {LEAP:g} m, the package c3d fewer: its reading is taken.",)
     return first, "ezc3d", tuple(notes)
 
 
-def _beyond_ezc3d(layout: Layout, parameters: Parameters) -> str:
+def _beyond_ezc3d(layout: Layout) -> str:
     """Return why ezc3d is not asked; "" if it is."""
     if layout.processor == MIPS:
         return f"{PROCESSORS[MIPS]} byte order is not read"

@@ -11,6 +11,7 @@ from biodance.errors import FileRefused
 from biodance.lab.c3d_layout import read_layout, texts
 from biodance.lab.c3d_numbers import read_numbers
 from biodance.lab.c3d_parameters import Parameters, read_header, read_parameters
+from biodance.lab.model_outputs import model_outputs, unlabelled
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,14 +60,17 @@ def read_raw(path: str | Path) -> RawC3d:
     parameters = read_parameters(content, header, path.name)
     layout = read_layout(len(content), header, parameters, path.name)
     metre = {"m": 1.0, "cm": 100.0}.get("".join(texts(parameters, "POINT", "UNITS")[:1]).lower(), 1000.0)
-    (points, analog), reader, notes = read_numbers(path, layout, parameters, metre=metre)
+    labels = _fit(texts(parameters, "POINT", "LABELS"), layout.points)
+    no_markers = {*model_outputs(labels, parameters), *unlabelled(labels)}
+    judged = tuple(column for column in range(layout.points) if column not in no_markers)
+    (points, analog), reader, notes = read_numbers(path, layout, judged=judged, metre=metre)
     for values in (points, analog):
         values.setflags(write=False)
     return RawC3d(
         path=path,
         sha256=hashlib.sha256(content).hexdigest(),
         reader=reader,
-        labels=_fit(texts(parameters, "POINT", "LABELS"), layout.points),
+        labels=labels,
         points=points,
         rate=layout.rate,
         first_frame=layout.first_frame,
