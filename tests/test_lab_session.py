@@ -150,6 +150,15 @@ def test_markers_and_forces_of_one_stem_are_one_trial(folder):
     assert len(alone.plates) == 1
 
 
+def test_damaged_forces_leave_the_markers(folder):
+    (folder / "static01.mot").write_text("nonsense")
+    session = read_session(folder)
+    trial = next(t for t in session.trials if t.name == "static01")
+    assert trial.plates == ()
+    assert "forces beside the markers were left out" in " ".join(trial.warnings)
+    assert dict(session.refused) == {}
+
+
 def test_forces_of_another_time_are_said(folder):
     (folder / "static01.mot").unlink()
     from biodance.lab.ground_forces import table_of

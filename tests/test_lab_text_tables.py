@@ -145,7 +145,7 @@ def test_untrustworthy_forces_are_refused(row, sentence):
 
 def test_coordinates_are_no_plates():
     table = Table("t", ("hip_flexion_r", "pelvis_tx"), [0.0], [[1.0, 2.0]])
-    assert not has_plates(table)
+    assert not has_plates(table.columns)
     with pytest.raises(FileRefused, match="no force plate"):
         plates_of(table, where="q.mot")
     with pytest.raises(UnknownName, match="hip_flexion_r"):
@@ -172,6 +172,7 @@ def test_cut_file_is_said(tmp_path):
     [
         ("time\ta\n0\t1\n", "no row 'endheader'"),
         ("x\nendheader\ntime\ta\n", "no row of numbers"),
+        ("x\nendheader\n", "the first column is missing"),
         ("x\nendheader\nframe\ta\n0\t1\n", "must be 'time'"),
         ("x\nendheader\ntime\ta\n0\t1\t2\n", "row 4: holds 3 cells, 2 are expected"),
         ("x\nendheader\ntime\ta\n0\tone\n", "row 4: 'one' is not a number"),

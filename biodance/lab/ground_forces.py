@@ -19,9 +19,9 @@ FARTHEST = 50.0  # m
 AXES = "xyz"
 
 
-def has_plates(table: Table) -> bool:
-    """Return True if at least one plate has its three force and three point columns."""
-    return bool(_groups(table.columns))
+def has_plates(columns: tuple[str, ...]) -> bool:
+    """Return True if the column labels hold the three forces and three points of at least one plate."""
+    return bool(_groups(columns))
 
 
 def plates_of(table: Table, *, where: str) -> tuple[tuple[Plate, ...], tuple[str, ...]]:

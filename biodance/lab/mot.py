@@ -63,26 +63,23 @@ def read_mot(path: str | Path) -> Table:
         No ``endheader``, no ``time`` column, rows of the wrong length, a cell that is no number, a time that does not increase.
     """
     path = Path(path)
-    rows = read_text(path).splitlines()
-    start = next((i for i, row in enumerate(rows[:LONGEST_HEADER]) if row.strip().lower() == "endheader"), None)
-    if start is None:
-        raise FileRefused(f"{path}: has no row 'endheader', so it is not a .mot or .sto file. Export it again.")
-    header = _header(rows[:start])
-    body = [(i, row) for i, row in enumerate(rows[start + 1 :], start=start + 2) if row.strip()]
-    if len(body) < 2:
+    header, labels, body = _parts(path)
+    if not body:
         raise FileRefused(f"{path}: holds no row of numbers. Export it again.")
-    labels = [cell for cell in cells(body[0][1]) if cell]
-    if labels[0].lower() != "time":
-        raise FileRefused(f"{path}: the first column is {labels[0]!r}, it must be 'time'. Export it again.")
-    table = np.array([_numbers(row, len(labels), f"{path}, row {i}") for i, row in body[1:]])
+    table = np.array([_numbers(row, len(labels), f"{path}, row {i}") for i, row in body])
     time = table[:, 0]
     if np.isnan(time).any() or np.any(np.diff(time) <= 0):
         at = int(np.argmax(np.isnan(time))) if np.isnan(time).any() else int(np.argmax(np.diff(time) <= 0)) + 1
-        raise FileRefused(f"{path}: the time does not increase at row {body[at + 1][0]} ({time[at]:g} s). Export it again.")
+        raise FileRefused(f"{path}: the time does not increase at row {body[at][0]} ({time[at]:g} s). Export it again.")
     announced = header.get("nrows", header.get("datarows", ""))
     warnings = [f"The header announces {announced} rows, the file holds {len(table)}."] if _differs(announced, len(table)) else []
     degrees = header.get("indegrees", "no").lower() in ("yes", "true", "1")
-    return Table(rows[0].strip() if start else path.stem, tuple(labels[1:]), time, table[:, 1:], degrees, tuple(warnings))
+    return Table(header.get("", path.stem), tuple(labels[1:]), time, table[:, 1:], degrees, tuple(warnings))
+
+
+def columns_of(path: str | Path) -> tuple[str, ...]:
+    """Return the column labels of a .mot or .sto file without ``time``; raises FileRefused as `read_mot` does for a wrong header."""
+    return tuple(_parts(Path(path))[1][1:])
 
 
 def write_mot(path: str | Path, table: Table) -> Path:
@@ -120,10 +117,22 @@ def write_mot(path: str | Path, table: Table) -> Path:
     return path
 
 
-def _header(rows: list[str]) -> dict[str, str]:
-    """Return the header's keys (lower case) and values; ``key=value``, or ``key value`` as old files have it."""
-    pairs = (re.split(r"\s*=\s*|\s+", row.strip(), maxsplit=1) for row in rows)
-    return {pair[0].lower(): pair[1].strip() for pair in pairs if len(pair) == 2}
+def _parts(path: Path) -> tuple[dict[str, str], list[str], list[tuple[int, str]]]:
+    """Return the header (keys in lower case, the name of the table under ""), the column labels, and the numbered rows below them."""
+    rows = read_text(path).splitlines()
+    start = next((i for i, row in enumerate(rows[:LONGEST_HEADER]) if row.strip().lower() == "endheader"), None)
+    if start is None:
+        raise FileRefused(f"{path}: has no row 'endheader', so it is not a .mot or .sto file. Export it again.")
+    pairs = (re.split(r"\s*=\s*|\s+", row.strip(), maxsplit=1) for row in rows[:start])
+    header = {pair[0].lower(): pair[1].strip() for pair in pairs if len(pair) == 2}
+    if start:
+        header[""] = rows[0].strip()
+    body = [(i, row) for i, row in enumerate(rows[start + 1 :], start=start + 2) if row.strip()]
+    labels = [cell for cell in cells(body[0][1]) if cell] if body else []
+    if not labels or labels[0].lower() != "time":
+        found = repr(labels[0]) if labels else "missing"
+        raise FileRefused(f"{path}: the first column is {found}, it must be 'time'. Export it again.")
+    return header, labels, body[1:]
 
 
 def _numbers(row: str, width: int, where: str) -> list[float]:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from biodance.errors import FileRefused
 from biodance.lab.ground_forces import has_plates, plates_of
-from biodance.lab.mot import Table, read_mot
+from biodance.lab.mot import Table, columns_of, read_mot
 from biodance.lab.plain_text import decode, read_bytes, sha256
 from biodance.lab.trc import read_trc
-from biodance.records import Role, Source, Trial
+from biodance.records import Plate, Role, Source, Trial
 
 FORMATS = {
     ".c3d": "C3D",
@@ -81,24 +81,29 @@ def read_trial(path: str | Path, *, role: Role = "fit", subject: str | None = No
 
 
 def forces_beside(trc: Path) -> Path | None:
-    """Return the .mot or .sto file with plate columns that belongs to a .trc file; None if there is none."""
-    for ending in FORCES_BESIDE:
-        for suffix in (".mot", ".sto"):
-            candidate = trc.with_name(f"{trc.stem}{ending}{suffix}")
-            if candidate.is_file() and has_plates(read_mot(candidate)):
+    """Return the .mot or .sto file with plate columns that belongs to a .trc file (or should, but is damaged); None if there is none."""
+    for candidate in (trc.with_name(f"{trc.stem}{ending}{suffix}") for ending in FORCES_BESIDE for suffix in (".mot", ".sto")):
+        if candidate.is_file():
+            try:
+                if has_plates(columns_of(candidate)):
+                    return candidate
+            except FileRefused:
                 return candidate
     return None
 
 
 def _with_forces(trial: Trial, path: Path) -> Trial:
-    """Return the trial of a .trc file with the plates of the table beside it."""
-    table = read_mot(path)
-    plates, said = plates_of(table, where=str(path))
+    """Return the trial of a .trc file with the plates of the table beside it; a damaged table is a warning, the markers stay."""
+    try:
+        table = read_mot(path)
+        plates, said = plates_of(table, where=str(path))
+    except FileRefused as error:
+        return replace(trial, warnings=(*trial.warnings, f"The forces beside the markers were left out. {error}"))
     digest = sha256((trial.source.sha256 + sha256(read_bytes(path))).encode())
     return replace(
         trial,
         plates=plates,
-        source=replace(trial.source, format="TRC + MOT", sha256=digest, analog_rate=_rate(plates, table)),
+        source=replace(trial.source, format="TRC + MOT", sha256=digest, analog_rate=_rate(plates)),
         history=(*trial.history, f"Forces were read from {path.name} beside it.", *said),
         warnings=(*trial.warnings, *table.warnings, *_out_of_step(trial, table)),
     )
@@ -108,13 +113,12 @@ def _forces_alone(path: Path, role: Role) -> Trial:
     """Return the trial of a table with plate columns: plates, no markers."""
     table = read_mot(path)
     plates, said = plates_of(table, where=str(path))
-    source = Source(path, sha256(read_bytes(path)), "MOT", analog_rate=_rate(plates, table))
+    source = Source(path, sha256(read_bytes(path)), "MOT", analog_rate=_rate(plates))
     return Trial(path.stem, role, None, plates, source, history=said, warnings=table.warnings)
 
 
-def _rate(plates: tuple[object, ...], table: Table) -> float:
-    first = plates[0] if plates else None
-    return float(getattr(getattr(first, "wrench", None), "rate", float("nan")))
+def _rate(plates: tuple[Plate, ...]) -> float:
+    return plates[0].wrench.rate if plates else float("nan")
 
 
 def _out_of_step(trial: Trial, table: Table) -> list[str]:

@@ -22,10 +22,9 @@ def find_recordings(folder: Path) -> tuple[list[Path], list[str]]:
     if not files:
         parts = [part for part in sorted(folder.iterdir()) if part.is_dir() and PART_FOLDERS.match(part.name)]
         files = [file for part in parts for file in recordings_in(part)]
-    companions = {forces for file in files if file.suffix.lower() == ".trc" and (forces := _forces(file))}
     notes: list[str] = []
     kept: dict[tuple[Path, str], Path] = {}
-    for file in sorted((f for f in files if f not in companions), key=lambda f: (list(FORMATS).index(f.suffix.lower()), str(f))):
+    for file in sorted(_without_companions(files), key=lambda f: (list(FORMATS).index(f.suffix.lower()), str(f))):
         trial = (file.parent, file.stem.lower())
         if trial in kept:
             notes.append(f"{file.name} was left aside: it is the same trial as {kept[trial].name}.")
@@ -38,6 +37,12 @@ def recordings_in(folder: Path) -> list[Path]:
     """Return the files directly in a folder whose extension or content says that they are recordings, sorted by name."""
     files = (path for path in sorted(folder.iterdir()) if path.is_file() and not path.name.startswith("."))
     return [path for path in files if path.suffix.lower() in FORMATS and _is_data(path)]
+
+
+def recordings_below(folder: Path) -> list[Path]:
+    """Return the recordings in a folder and all folders below it, sorted by path; tables that belong to a .trc file are left out."""
+    folders = [folder, *(path for path in sorted(folder.rglob("*")) if path.is_dir() and not path.name.startswith("."))]
+    return sorted(_without_companions([file for place in folders for file in recordings_in(place)]))
 
 
 def vicon_notes(folders: Iterable[Path]) -> tuple[dict[str, EclipseNotes], dict[str, dict[str, float]], dict[str, str]]:
@@ -55,6 +60,11 @@ def vicon_notes(folders: Iterable[Path]) -> tuple[dict[str, EclipseNotes], dict[
         except BiodanceError as error:
             refused[file.name] = str(error)
     return eclipse, dict(sorted(measurements.items(), key=lambda item: not item[0].lower().endswith(".mp"))), refused
+
+
+def _without_companions(files: list[Path]) -> list[Path]:
+    companions = {forces for file in files if file.suffix.lower() == ".trc" and (forces := _forces(file))}
+    return [file for file in files if file not in companions]
 
 
 def _is_data(file: Path) -> bool:

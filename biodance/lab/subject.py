@@ -63,6 +63,16 @@ def identify_subject(
     return Subject(mass, stature, sex, age, typed.name or name, measures), tuple(notes)
 
 
+def declared_mass(measurements: Mapping[str, float]) -> float:
+    """Return the body mass (kg) among the measurements of one file; NaN if it is not there or outside 5 to 400 kg."""
+    return next((d.value for d in _declared({"": measurements}, MASS_NAMES, LEGAL_MASS)), math.nan)
+
+
+def declared_stature(measurements: Mapping[str, float]) -> float:
+    """Return the stature (m) among the measurements of one file; NaN if it is not there or outside 0.4 to 2.6 m."""
+    return next((d.value for d in _declared({"": measurements}, STATURE_NAMES, LEGAL_STATURE)), math.nan)
+
+
 def _typed(value: float | None) -> list[Declared]:
     return [] if value is None else [Declared(value, "session.toml")]
 

@@ -1,0 +1,155 @@
+"""Say what is in a recording: all that a person wants to know before trusting it, as plain values ready for JSON."""
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from biodance.errors import BiodanceError
+from biodance.lab.gaps import report_gaps
+from biodance.lab.marker_sets import canonical, read_marker_set
+from biodance.lab.read import format_of, read_trial
+from biodance.lab.recordings import recordings_below
+from biodance.lab.subject import declared_mass, declared_stature
+from biodance.lab.weight import standing_mass
+from biodance.records import Markers, Plate, Trial
+
+LOADED = 20.0
+"""Vertical force in N from which on the centre of pressure counts."""
+
+
+def inspect_paths(paths: Sequence[str | Path], *, tell: Callable[[str], None] | None = None) -> list[dict[str, Any]]:
+    """Return one record (see `inspect_file`) for each file, and for each recording in each folder and below it.
+
+    Raises
+    ------
+    BiodanceError
+        No path is given.
+    """
+    if not paths:
+        raise BiodanceError("There is nothing to inspect: name files, or folders with recordings.")
+    records = []
+    for path in map(Path, paths):
+        files = recordings_below(path) if path.is_dir() else [path]
+        if not files:
+            records.append(_refused(path, "holds no recording."))
+        for file in files:
+            if tell:
+                tell(file.name)
+            records.append(inspect_file(file))
+    return records
+
+
+def inspect_file(path: str | Path) -> dict[str, Any]:
+    """Return what is in one recording; a file that cannot be read gives the status "refused" and the reason.
+
+    Keys: ``file``; ``status`` "ok", "warning" or "refused"; ``reason`` (None if ok); ``format``; ``frames``, ``rate_hz``,
+    ``analog_rate_hz``; ``markers`` names; ``marker_set``; ``gaps_percent`` of the set's markers (of all, without a set); ``subjects`` names in the file;
+    ``plates`` with ``type``, ``corners_m``, ``mean_force_n`` (3), ``mean_vertical_n``, ``cop_m`` (2, mean while loaded, lab frame) and
+    ``decisions``; ``mean_vertical_n`` of all plates together; ``mass_on_plates_kg`` in quiet standing; ``declared_mass_kg``,
+    ``declared_height_m``; ``history``; ``warnings``. What is not there is None; no number is NaN.
+    """
+    path = Path(path)
+    try:
+        trial = read_trial(path)
+    except BiodanceError as error:
+        return _refused(path, str(error))
+    warnings = [*trial.warnings, *_never_seen(trial)]
+    plates = [_plate(plate) for plate in trial.plates]
+    time = trial.markers.time if trial.markers is not None else trial.plates[0].wrench.time if trial.plates else np.empty(0)
+    vertical = [plate["mean_vertical_n"] for plate in plates]
+    return {
+        "file": str(path),
+        "status": "warning" if warnings else "ok",
+        "reason": warnings[0] if warnings else None,
+        "format": trial.source.format,
+        "frames": int(time.size),
+        "rate_hz": _number(trial.source.rate),
+        "analog_rate_hz": _number(trial.source.analog_rate),
+        "markers": list(trial.markers.names) if trial.markers is not None else [],
+        "marker_set": trial.marker_set or None,
+        "gaps_percent": _gaps(trial),
+        "subjects": _subjects(path),
+        "plates": plates,
+        "mean_vertical_n": float(sum(vertical)) if vertical else None,
+        "mass_on_plates_kg": standing_mass(trial),
+        "declared_mass_kg": _number(declared_mass(trial.measurements)),
+        "declared_height_m": _number(declared_stature(trial.measurements)),
+        "history": list(trial.history),
+        "warnings": warnings,
+    }
+
+
+def _refused(path: Path, reason: str) -> dict[str, Any]:
+    """Return the record of a file that cannot be read, with all keys."""
+    nothing = dict.fromkeys(("format", "frames", "rate_hz", "analog_rate_hz"))
+    unknown = dict.fromkeys(("mean_vertical_n", "mass_on_plates_kg", "declared_mass_kg", "declared_height_m"))
+    return {
+        "file": str(path),
+        "status": "refused",
+        "reason": reason,
+        **nothing,
+        "markers": [],
+        "marker_set": None,
+        "gaps_percent": None,
+        "subjects": [],
+        "plates": [],
+        **unknown,
+        "history": [],
+        "warnings": [],
+    }
+
+
+def _subjects(path: Path) -> list[str]:
+    """Return the names of the people in a C3D file: SUBJECTS:NAMES and the prefixes of the labels; none for other formats."""
+    if format_of(path) != ".c3d":
+        return []
+    from biodance.lab.raw_c3d import read_raw
+
+    raw = read_raw(path)
+    names = raw.parameters.get("SUBJECTS", {}).get("NAMES", [])
+    prefixes = [label.split(":", 1)[0] for label in raw.labels if ":" in label]
+    return list(dict.fromkeys([name for name in names if name] + prefixes))
+
+
+def _plate(plate: Plate) -> dict[str, Any]:
+    force = plate.wrench.force.mean(axis=0) if plate.wrench.time.size else np.full(3, math.nan)
+    cop = plate.wrench.cop(height=plate.height, threshold=LOADED)[:, :2]
+    loaded = cop[np.isfinite(cop).all(axis=1)]
+    return {
+        "name": plate.name,
+        "type": plate.type,
+        "corners_m": [[_number(x) for x in corner] for corner in plate.corners],
+        "mean_force_n": [_number(f) for f in force],
+        "mean_vertical_n": _number(force[2]),
+        "cop_m": [_number(x) for x in loaded.mean(axis=0)] if len(loaded) else None,
+        "decisions": list(plate.decisions),
+    }
+
+
+def _of_the_set(trial: Trial) -> Markers | None:
+    """Return the markers that belong to the recognised set; all of them where no set was recognised."""
+    if trial.markers is None or not trial.marker_set:
+        return trial.markers
+    return canonical(trial.markers, read_marker_set(trial.marker_set))
+
+
+def _gaps(trial: Trial) -> float | None:
+    """Return the percentage of marker positions that were not seen, of the markers that were seen at least once."""
+    markers = _of_the_set(trial)
+    if markers is None:
+        return None
+    hidden = [gap.percent for gap in report_gaps(markers) if gap.percent < 100.0]
+    return float(np.mean(hidden)) if hidden else None
+
+
+def _never_seen(trial: Trial) -> list[str]:
+    markers = _of_the_set(trial)
+    names = [gap.label for gap in report_gaps(markers) if gap.percent >= 100.0] if markers is not None else []
+    return [f"Never seen: {', '.join(names[:12])}{' ...' if len(names) > 12 else ''}."] if names else []
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
