@@ -1,9 +1,9 @@
 """FAMILY: one excitation criterion per file, found automatically.
 
 A criterion judges the information G = R'R = W'W (p, p) of the whitened regressor over the SIP, accumulated over a whole movement and
-given as its triangle R (or any rows with the same G). It has a ``NAME`` and one function ``evaluate(triangle, target)`` that returns
-(value, gradient) with ``gradient`` (p, p) symmetric, dJ = <gradient, dG>; smaller is better. So every criterion works for every body, posture set and
-trajectory, and its derivative with respect to a motion is the chain rule through W.
+given as its triangle R (or any rows with the same G). It has a ``NAME`` and one function ``evaluate(triangle, target)``, which returns
+(value, gradient) with ``gradient`` (p, p) symmetric, dJ = <gradient, dG>; smaller is better. So every criterion works for every body,
+posture set and trajectory, and its derivative with respect to a motion is the chain rule through W.
 """
 
 import importlib

@@ -1,0 +1,113 @@
+"""Sufficient statistics of a session: all that any noise, prior or programme needs from the data, in constant memory.
+
+Per frequency band the second moments of the transform coefficients X = [W y] of all six channels together, G_b = sum_k X_k' X_k with X_k
+flattened to 6 (p + 1). For any noise covariance S_b the information is sum_b sum_cd (S_b^-1)_cd G_b[c, :, d, :], and the residual
+covariance at any phi is a quadratic form of G_b: noise is learned, trials are added and frames are streamed without going back to the data.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.body.body import Body
+from biodance.errors import BiodanceError, TrialRefused
+from biodance.identify.information import Information
+from biodance.identify.noise import BANDS, Noise, blocks
+from biodance.motion.kinematics import segment_motion
+from biodance.motion.regressor import regressor_of
+from biodance.records import Array, Motion, Wrench
+
+RATE = 25.0
+"""Hz at which low-passed recordings are sampled for identification: more than twice the highest band."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """One trial to identify from: ``motion`` and ``wrench`` (about the lab origin) at the same times, ``use`` (T,) True where both hold."""
+
+    name: str
+    motion: Motion
+    wrench: Wrench
+    use: NDArray[np.bool_]
+
+    def __post_init__(self) -> None:
+        frames = self.motion.time.size
+        if self.wrench.time.size != frames or self.use.shape != (frames,):
+            raise TrialRefused(
+                f"Trial {self.name}: motion has {frames} frames, wrench {self.wrench.time.size}, mask {self.use.size}; prepare it first."
+            )
+        if np.isnan(self.wrench.value[self.use]).any():
+            raise TrialRefused(f"Trial {self.name}: the wrench is NaN in a frame that is to be used; mask the frame.")
+
+
+@dataclass(frozen=True, eq=False)
+class Statistics:
+    """``gram`` (B, 6, p + 1, 6, p + 1) second moments of [W y] per band, wrench about ``layout.about``; ``count`` (B,) coefficients.
+
+    ``layout`` carries bands, rate and point; its covariance is the identity (nothing is whitened yet).
+    """
+
+    gram: Array
+    count: NDArray[np.intp]
+    layout: Noise
+
+    def __add__(self, other: "Statistics") -> "Statistics":
+        """Return the statistics of both; they must have the same layout."""
+        if self.layout.edges != other.layout.edges or not np.array_equal(self.layout.about, other.layout.about):
+            raise BiodanceError("Statistics with different bands or points cannot be added; use one layout for all trials of a session.")
+        return Statistics(self.gram + other.gram, self.count + other.count, self.layout)
+
+    def information(self, noise: Noise) -> Information:
+        """Return the R factor of the data whitened by ``noise`` (same bands)."""
+        weight = np.linalg.inv(noise.covariance)
+        H = np.einsum("bcd,bcidj->ij", weight, self.gram)
+        scale = np.sqrt(np.maximum(np.diag(H), 1e-300))
+        value, vector = np.linalg.eigh(H / np.outer(scale, scale))
+        rows = np.sqrt(np.maximum(value, 0.0))[:, None] * vector.T * scale
+        return Information(np.asarray(np.linalg.qr(rows, mode="r")), int(self.count.sum()))
+
+    def residual_covariance(self, phi: Array, covariance: Array) -> Array:
+        """Return (B, 6, 6): mean square of y - W phi per band, plus what the ``covariance`` (p, p) of phi adds (E step of EM)."""
+        z = np.append(-phi, 1.0)
+        square = np.einsum("i,bcidj,j->bcd", z, self.gram, z, optimize=True)
+        spread = np.einsum("bcidj,ij->bcd", self.gram[:, :, :-1, :, :-1], covariance, optimize=True)
+        total = (square + spread) / np.maximum(self.count, 1)[:, None, None]
+        return 0.5 * (total + np.swapaxes(total, 1, 2))
+
+
+def layout_for(about: Array, *, edges: tuple[float, ...] = BANDS, rate: float = RATE) -> Noise:
+    """Return the layout of bands about a point: the noise of unit covariance that Statistics are built on."""
+    return Noise(np.tile(np.eye(6), (len(edges) - 1, 1, 1)), about, edges, rate)
+
+
+def empty(parameters: int, layout: Noise) -> Statistics:
+    """Return the statistics of no data for ``parameters`` unknowns."""
+    bands, size = len(layout.edges) - 1, parameters + 1
+    return Statistics(np.zeros((bands, 6, size, 6, size)), np.zeros(bands, dtype=np.intp), layout)
+
+
+def statistics(body: Body, fit: Fit, layout: Noise) -> Statistics:
+    """Return the statistics of one trial; memory does not grow with its length.
+
+    Raises
+    ------
+    TrialRefused
+        No frame of the trial may be used.
+    """
+    if not fit.use.any():
+        raise TrialRefused(f"Trial {fit.name}: no frame may be used (ground contact not measured, or markers hidden in all frames).")
+    total = empty(10 * len(body.segments), layout)
+    gram, count = total.gram.copy(), total.count.copy()
+    size = gram.shape[2]
+    for pick in blocks(fit.use, fit.motion.rate, layout):
+        part = Motion(fit.motion.time[pick], fit.motion.q[pick], fit.motion.v[pick], fit.motion.a[pick])
+        W = regressor_of(segment_motion(body, part))
+        rows = np.concatenate([W, fit.wrench.value[pick][:, :, None]], axis=2)
+        X = layout.coefficients(layout.shift @ rows)
+        band = layout.bands_of(len(X))
+        for b in np.unique(band[band >= 0]):
+            flat = X[band == b].reshape(-1, 6 * size)
+            gram[b] += (flat.T @ flat).reshape(6, size, 6, size)
+            count[b] += len(flat)
+    return Statistics(gram, count, layout)
