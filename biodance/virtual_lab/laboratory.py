@@ -1,0 +1,139 @@
+"""The laboratory of a virtual session: what stands where, what it records, and what it writes to disk."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from biodance.errors import BiodanceError
+from biodance.lab.write_c3d import PlateRecording, write_c3d
+from biodance.records import Array, Markers, Role, frozen_array
+from biodance.virtual_lab.cameras import film
+from biodance.virtual_lab.performance import Performance
+from biodance.virtual_lab.person import Person
+from biodance.virtual_lab.placement import MARKER_RADIUS
+from biodance.virtual_lab.plates import HALF_SIZE, TruePlate, digitise, lay_plate, measure
+from biodance.virtual_lab.randomness import stream
+from biodance.virtual_lab.skeleton import small_rotation
+from biodance.virtual_lab.soft_tissue import SoftTissue, draw_soft_tissue
+from biodance.virtual_lab.tolerances import Tolerances
+
+
+@dataclass(frozen=True, eq=False)
+class Laboratory:
+    """``centre`` (2,) m where the subject stands; ``heading`` rad from lab x that the subject faces; ``plates`` 1, or 2 = one under each
+    foot; ``plate_type`` 2 or 4; ``camera_rate`` Hz, ``samples`` of force per camera frame, ``bits`` of the converter.
+    """
+
+    centre: tuple[float, float] = (0.3, 0.2)
+    heading: float = 0.0
+    plates: int = 1
+    plate_type: int = 2
+    camera_rate: float = 100.0
+    samples: int = 10
+    bits: int = 16
+
+    def __post_init__(self) -> None:
+        if self.plates not in (1, 2) or self.plate_type not in (2, 4):
+            raise BiodanceError(f"Laboratory: {self.plates} plates of TYPE {self.plate_type}; legal are 1 or 2 plates of TYPE 2 or 4.")
+        if self.camera_rate <= 0 or self.samples < 1:
+            raise BiodanceError(f"Laboratory: {self.camera_rate} Hz with {self.samples} force samples per frame; both must be positive.")
+
+
+@dataclass(frozen=True, eq=False)
+class Instruments:
+    """What is true of a laboratory on one day with one person: plates, the cameras' ``tilt`` (3, 3) from true vertical, the skin."""
+
+    laboratory: Laboratory
+    plates: tuple[TruePlate, ...]
+    tilt: Array
+    tissue: SoftTissue
+    tolerances: Tolerances
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One trial as the instruments deliver it, before it is written; ``parameters`` of the C3D file. Faults are functions of this
+    record.
+    """
+
+    name: str
+    role: Role
+    markers: Markers
+    plates: tuple[PlateRecording, ...]
+    analog_rate: float
+    parameters: dict[str, dict[str, list[float] | list[str] | float | str]]
+
+
+Fault = Callable[[Recording], Recording]
+
+
+def set_up(laboratory: Laboratory, person: Person, session: int, tolerances: Tolerances) -> Instruments:
+    """Draw the instruments of one session."""
+    rng = stream(person.seed, "instruments", str(session))
+    tilt = np.array([*(tolerances.lab_tilt * rng.normal(size=2)), 0.0])
+    middle = np.array([*laboratory.centre, 0.0])
+    leftward = np.array([-np.sin(laboratory.heading), np.cos(laboratory.heading), 0.0]) * HALF_SIZE[0]
+    sides = [("both", 0.0)] if laboratory.plates == 1 else [("right", -1.0), ("left", 1.0)]
+    plates = tuple(lay_plate(middle + sign * leftward, laboratory.heading, side, tolerances, rng) for side, sign in sides)
+    return Instruments(
+        laboratory, plates, frozen_array(small_rotation(tilt), (3, 3), "tilt"), draw_soft_tissue(person, session, tolerances), tolerances
+    )
+
+
+def record(performance: Performance, instruments: Instruments, session: int) -> Recording:
+    """Return what the instruments deliver of one performance: markers at the camera rate, plates at ``samples`` times that rate."""
+    lab, tolerances, plan = instruments.laboratory, instruments.tolerances, performance.plan
+    seed = performance.person.seed
+    frames = round(plan.duration * lab.camera_rate) + 1
+    time = np.arange(frames) / lab.camera_rate
+    analog_rate = lab.camera_rate * lab.samples
+    fine = np.arange(frames * lab.samples) / analog_rate
+    markers = film(performance, instruments.tissue, time, instruments.tilt, tolerances, stream(seed, "cameras", str(session), plan.name))
+    noise = stream(seed, "plates", str(session), plan.name)
+    plates = tuple(
+        digitise(measure(performance, plate, fine, instruments.tilt, tolerances, noise), plate, kind=lab.plate_type, bits=lab.bits)
+        for plate in instruments.plates
+    )
+    return Recording(plan.name, plan.role, markers, plates, analog_rate, measurements(performance.person, session, tolerances))
+
+
+def measurements(person: Person, session: int, tolerances: Tolerances) -> dict[str, dict[str, list[float] | list[str] | float | str]]:
+    """Return the C3D groups with the subject's typed measurements, as Vicon stores them (mm, kg), with errors of tape and calliper."""
+    rng = stream(person.seed, "measurements", str(session))
+    size = person.size
+    sided = {
+        "LegLength": size["thigh"] + size["shank"] + 0.054 * size["stature"],
+        "KneeWidth": size["knee_width"],
+        "AnkleWidth": size["ankle_width"],
+        "ShoulderOffset": 0.0335 * size["stature"],
+        "ElbowWidth": size["elbow_width"],
+        "WristWidth": size["wrist_width"],
+        "HandThickness": size["hand_thickness"],
+    }
+    processing: dict[str, list[float] | list[str] | float | str] = {
+        "Bodymass": declared_mass(person, session, tolerances),
+        "Height": 1000.0 * person.subject.stature,
+        "InterAsisDistance": 1000.0 * size["asis"] + 1000.0 * tolerances.measure * rng.normal(),
+        "MarkerDiameter": 2000.0 * MARKER_RADIUS,
+    }
+    for name, true in sided.items():
+        error = tolerances.measure * rng.normal(size=2) * (1.0 if name == "LegLength" else 0.5)
+        processing |= {letter + name: 1000.0 * (true + e) for letter, e in zip("RL", error, strict=True)}
+    return {"PROCESSING": processing, "SUBJECTS": {"NAMES": [person.subject.name or "virtual"]}}
+
+
+def declared_mass(person: Person, session: int, tolerances: Tolerances) -> float:
+    """Return the body mass kg that the scale showed, in steps of 0.1 kg, without loads."""
+    error = tolerances.scale * stream(person.seed, "scale", str(session)).normal()
+    return round(person.subject.mass + error, 1) if tolerances.scale else person.subject.mass
+
+
+def write(recording: Recording, folder: Path) -> Path:
+    """Write one recording as ``folder/NAME.c3d`` and return the path; an existing file is never overwritten."""
+    path = folder / f"{recording.name}.c3d"
+    write_c3d(
+        path, markers=recording.markers, plates=recording.plates, analog_rate=recording.analog_rate, parameters=dict(recording.parameters)
+    )
+    return path

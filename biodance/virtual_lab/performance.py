@@ -1,0 +1,173 @@
+"""Perform a trial: the true motion and the true ground wrench of a virtual person, by pinocchio's own dynamics.
+
+The path of the pelvis is what keeps the balance: the zero-moment point of the full body is brought to where the posture asks for it.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from biodance.body.pinocchio_model import load_pinocchio
+from biodance.motion.kinematics import quaternion_matrix
+from biodance.motion.regressor import GRAVITY
+from biodance.records import Array, Motion, Wrench
+from biodance.virtual_lab.choreography import Curves, choreograph
+from biodance.virtual_lab.person import Person
+from biodance.virtual_lab.posing import Pose, Stance, stand_on_feet, take_stance, upper_body
+from biodance.virtual_lab.protocol import TrialPlan
+from biodance.virtual_lab.randomness import smooth_noise, stream
+from biodance.virtual_lab.tolerances import REALISTIC, Tolerances
+
+NODE_RATE = 100.0
+"""Hz of the nodes of the motion's spline; the instruments sample the spline at their own rates."""
+MARGIN = 0.1
+"""s of motion before and after the recording, for late force samples."""
+ROUNDS = 12
+"""Largest number of balance corrections; 5 to 8 suffice."""
+SETTLED = 0.004
+"""m: the balance is settled when the zero-moment point is everywhere this close to the place wanted."""
+
+
+@dataclass(frozen=True, eq=False)
+class Performance:
+    """One trial as it truly happened: the motion is a quintic spline through ``nodes`` (T, 46) at ``node_time`` (T,) s.
+
+    ``plan`` what was asked; ``stance`` where the feet stood; ``curves`` the postures; ``balance_error`` m: the farthest that the
+    zero-moment point was from the place wanted.
+    """
+
+    plan: TrialPlan
+    person: Person
+    stance: Stance
+    curves: Curves
+    node_time: Array
+    nodes: Array
+    balance_error: float = 0.0
+
+    @cached_property
+    def _splines(self) -> tuple[Any, Any, Any]:
+        return _splines(self.node_time, self.nodes)
+
+    def motion(self, time: Array) -> Motion:
+        """Return the true q, v, a at ``time`` (T,) s, of the true body with its 16 segments."""
+        return _motion(self._splines, time)
+
+    @cached_property
+    def _wrench_spline(self) -> Any:
+        from scipy.interpolate import make_interp_spline
+
+        time = np.arange(self.node_time[0], self.node_time[-1] + 1e-9, 0.5 / NODE_RATE)
+        time = time[time <= self.node_time[-1]]
+        return make_interp_spline(time, true_wrench(self.person, self.motion(time)).value, k=5)
+
+    def wrench(self, time: Array) -> Wrench:
+        """Return the true ground wrench on the person about the lab origin at ``time`` (T,) s, all contacts together."""
+        return Wrench(time, self._wrench_spline(time))
+
+    def share_right(self, time: Array) -> Array:
+        """Return the share (T,) of the weight on the right foot."""
+        return np.clip(np.interp(time, self.curves.time, self.curves["shift"][:, 0]), 0.0, 1.0)
+
+
+def perform(
+    person: Person, plan: TrialPlan, session: int, *, tolerances: Tolerances = REALISTIC, centre: Array, heading: float = 0.0
+) -> Performance:
+    """Let ``person`` perform one trial around ``centre`` (2,) m of the lab floor, facing ``heading`` rad from lab x (anticlockwise).
+
+    ``session`` decides what differs from day to day and from trial to trial; the same arguments give the same motion, bit for bit.
+    """
+    rng = stream(person.seed, "performance", str(session), plan.name)
+    count = round((plan.duration + 2 * MARGIN) * NODE_RATE) + 1
+    time = -MARGIN + np.arange(count) / NODE_RATE
+    curves = choreograph(plan, time, rng, sloppiness=tolerances.performance)
+    stance = take_stance(person, plan.stance, centre, heading, rng)
+    pose = upper_body(person, curves, stance, tolerances, rng)
+    target = wanted_pressure(curves, stance) + tolerances.sway * smooth_noise(rng, time, columns=2, cutoff=0.5)
+    nodes, error = keep_balance(person, pose, curves, stance, target)
+    return Performance(plan, person, stance, curves, time, nodes, error)
+
+
+def wanted_pressure(curves: Curves, stance: Stance) -> Array:
+    """Return where the centre of pressure should be (T, 2) m: between the feet by the share of weight, plus the posture's lean."""
+    right = curves["shift"]
+    forward, sideways = curves["lean"][:, :1], curves["lean"][:, 1:]
+    ahead = np.array([np.cos(stance.heading), np.sin(stance.heading)])
+    rightwards = np.array([np.sin(stance.heading), -np.cos(stance.heading)])
+    middle = right * stance.pressure["right"] + (1 - right) * stance.pressure["left"]
+    return middle + forward * ahead + sideways * rightwards
+
+
+def keep_balance(person: Person, pose: Pose, curves: Curves, stance: Stance, target: Array) -> tuple[Array, float]:
+    """Return the configurations (T, 46) whose zero-moment point follows ``target`` (T, 2) m, and the largest distance left, m.
+
+    Each round moves the pelvis by the bounded solution of  d - h d'' = -(error), the linear pendulum with h = height of the centre of mass
+    over (g + its vertical acceleration); the legs, the arms' momentum and all else are in the error.
+    """
+    time = curves.time
+    xy = target.copy()
+    q = stand_on_feet(person, pose, curves, stance, xy)
+    for _ in range(ROUNDS):
+        motion = _motion(_splines(time, q), time)
+        value = true_wrench(person, motion).value
+        vertical = value[:, 2]
+        error = np.stack([-value[:, 4], value[:, 3]], axis=1) / vertical[:, None] - target
+        if np.abs(error).max() < SETTLED:
+            break
+        pendulum = person.mass * 0.56 * person.subject.stature / vertical
+        xy = xy - 0.95 * _pendulum(error, pendulum, 1.0 / NODE_RATE)
+        q = stand_on_feet(person, pose, curves, stance, xy)
+    return q, float(np.abs(error).max())
+
+
+def _pendulum(right: Array, h: Array, step: float) -> Array:
+    """Solve d - h d'' = right (T, 2) for d with d' = 0 at both ends; ``h`` (T,) s², ``step`` s."""
+    from scipy.linalg import solve_banded
+
+    k = h / step**2
+    bands = np.stack([np.roll(-k, 1), 1 + 2 * k, np.roll(-k, -1)])
+    bands[0, 1], bands[2, -2] = -2 * k[0], -2 * k[-1]
+    return solve_banded((1, 1), bands, right)
+
+
+def _splines(time: Array, q: Array) -> tuple[Any, Any, Any]:
+    """Return the quintic spline through q and its first two derivatives."""
+    from scipy.interpolate import make_interp_spline
+
+    spline = make_interp_spline(time, q, k=5)
+    return spline, spline.derivative(1), spline.derivative(2)
+
+
+def _motion(splines: tuple[Any, Any, Any], time: Array) -> Motion:
+    """Return the motion of splines through [position, quaternion, angles]; velocities of the root in its own frame."""
+    value, rate, rate2 = (spline(time) for spline in splines)
+    norm = np.linalg.norm(value[:, 3:7], axis=1, keepdims=True)
+    quaternion = value[:, 3:7] / norm
+    turn = np.swapaxes(quaternion_matrix(quaternion), 1, 2)
+    angular = _twice_conjugate_times(quaternion, rate[:, 3:7] / norm)
+    angular_rate = _twice_conjugate_times(quaternion, rate2[:, 3:7] / norm)
+    linear = np.einsum("tij,tj->ti", turn, rate[:, :3])
+    linear_rate = np.einsum("tij,tj->ti", turn, rate2[:, :3]) - np.cross(angular, linear)
+    q = np.concatenate([value[:, :3], quaternion, value[:, 7:]], axis=1)
+    v = np.concatenate([linear, angular, rate[:, 7:]], axis=1)
+    a = np.concatenate([linear_rate, angular_rate, rate2[:, 7:]], axis=1)
+    return Motion(time, q, v, a)
+
+
+def _twice_conjugate_times(quaternion: Array, rate: Array) -> Array:
+    """Return the vector part (T, 3) of 2 q* r: the angular velocity for r = q', its derivative for r = q'' (unit q, x y z w)."""
+    vector, scalar = quaternion[:, :3], quaternion[:, 3:]
+    return 2 * (scalar * rate[:, :3] - rate[:, 3:] * vector - np.cross(vector, rate[:, :3]))
+
+
+def true_wrench(person: Person, motion: Motion) -> Wrench:
+    """Return the ground wrench about the lab origin that ``motion`` of the loaded true body needs, by pinocchio's RNEA."""
+    pin = load_pinocchio()
+    model = person.loaded_body.model.copy()
+    model.gravity = pin.Motion(np.array(GRAVITY), np.zeros(3))
+    data = model.createData()
+    root = np.array([pin.rnea(model, data, q, v, a)[:6] for q, v, a in zip(motion.q, motion.v, motion.a, strict=True)])
+    turn = quaternion_matrix(motion.q[:, 3:7])
+    force, moment = np.einsum("tij,tj->ti", turn, root[:, :3]), np.einsum("tij,tj->ti", turn, root[:, 3:])
+    return Wrench(motion.time, np.concatenate([force, moment + np.cross(motion.q[:, :3], force)], axis=1))

@@ -1,0 +1,148 @@
+"""A virtual person: the true body, its habits and the loads it carries."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from biodance.body.body import Body, Foot, JointLimits
+from biodance.errors import BiodanceError, UnknownName
+from biodance.records import Array, Sip, Subject, frozen_array
+from biodance.virtual_lab.flesh import draw_sip, of_parameters, parameters, pseudo_inertia
+from biodance.virtual_lab.placement import glue_markers
+from biodance.virtual_lab.proportions import Proportions, draw_proportions
+from biodance.virtual_lab.randomness import stream
+from biodance.virtual_lab.skeleton import LIMITS_DEGREES, SEGMENTS, build_joints, mirrored
+from biodance.virtual_lab.tolerances import REALISTIC, Tolerances
+
+
+@dataclass(frozen=True, eq=False)
+class AddedLoad:
+    """A load fixed to a segment of the true body: ``mass`` kg, ``place`` (3,) m its CoM in the segment's frame, ``radii`` (3,) m of
+    gyration.
+    """
+
+    segment: str
+    mass: float
+    place: Array
+    radii: Array = field(default_factory=lambda: np.full(3, 0.03))
+
+    def __post_init__(self) -> None:
+        if self.segment not in SEGMENTS:
+            raise UnknownName.of("segment of the true body", self.segment, SEGMENTS)
+        if not 0 < self.mass < 30:
+            raise BiodanceError(f"AddedLoad on {self.segment}: mass = {self.mass} kg; legal: above 0 and below 30 kg.")
+        for name in ("place", "radii"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), (3,), f"AddedLoad.{name}"))
+
+
+@dataclass(frozen=True)
+class Habits:
+    """How a person stands, drawn once: ``angles`` rad added to true joints by name; ``stance`` m between the ankles; ``toe_out`` rad
+    (right, left).
+    """
+
+    angles: dict[str, float]
+    stance: float
+    toe_out: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Person:
+    """A subject whose truth is known: ``body`` of 16 segments with its true SIP WITHOUT ``loads``, markers as glued in the present
+    session.
+    """
+
+    subject: Subject
+    seed: int
+    size: Proportions
+    body: Body
+    habits: Habits
+    loads: tuple[AddedLoad, ...] = ()
+
+    @property
+    def loaded_body(self) -> Body:
+        """The true body with its loads: the one that moves on the plate."""
+        phi = np.array(self.body.sip.phi)
+        for load in self.loads:
+            i = 10 * SEGMENTS.index(load.segment)
+            phi[i : i + 10] += parameters(pseudo_inertia(load.mass, load.place, load.radii))
+        return replace(self.body, name="virtual person with loads", sip=Sip(SEGMENTS, phi, self.body.sip.covariance))
+
+    @property
+    def mass(self) -> float:
+        """True mass with loads, kg."""
+        return float(self.loaded_body.sip.mass.sum())
+
+
+def make_person(
+    subject: Subject, seed: int, *, tolerances: Tolerances = REALISTIC, loads: tuple[AddedLoad, ...] = (), session: int = 0
+) -> Person:
+    """Return the virtual person number ``seed`` of the given mass (kg), stature (m) and sex.
+
+    The same ``seed`` is the same body for ever; ``session`` only moves the markers as another day does. ``loads`` come on top of the
+    subject's mass.
+    """
+    t = tolerances
+    size = draw_proportions(subject, seed, length_sd=t.segment_length, centre_sd=t.joint_centre, tilt_sd=t.joint_axis)
+    sip = draw_sip(
+        size, subject.mass, subject.sex, seed, mass_sd=t.segment_mass, side_sd=t.side_mass, shape_sd=t.segment_shape, com_sd=t.com
+    )
+    joints = build_joints(size)
+    lower, upper = np.radians([LIMITS_DEGREES[j.name.removeprefix("right_").removeprefix("left_")] for j in joints]).T
+    limits = JointLimits(lower, upper, np.full(len(joints), 15.0), np.full(len(joints), -400.0), np.full(len(joints), 400.0))
+    boxes = np.stack([_box(sip.of(segment)) for segment in SEGMENTS])
+    body = Body(
+        "virtual person",
+        SEGMENTS,
+        joints,
+        sip,
+        limits,
+        glue_markers(size, seed, session, error=t.marker_placement),
+        boxes,
+        boxes,
+        {side: _sole(size, side) for side in ("right", "left")},
+    )
+    return Person(subject, seed, size, body, _habits(size, seed), tuple(loads))
+
+
+def _box(phi: Array) -> Array:
+    """Return the box (2, 3) m about the CoM that has the segment's second moments, for drawing only."""
+    J = of_parameters(phi)
+    com = J[:3, 3] / J[3, 3]
+    half = np.sqrt(3.0 * np.clip(np.diag(J)[:3] / J[3, 3] - com**2, 1e-6, None))
+    return np.stack([com - half, com + half])
+
+
+def _sole(size: Proportions, side: str) -> Foot:
+    """Return the outline of a foot on the ground: heel 27 % of its length behind the ankle (mesh of Millard et al. 2017)."""
+    back, front, half = -0.27 * size["sole"], 0.73 * size["sole"], size["sole_breadth"] / 2
+    corners = [
+        (back, 0.6 * half),
+        (0.55 * front, half),
+        (front, 0.5 * half),
+        (front, -0.5 * half),
+        (0.55 * front, -half),
+        (back, -0.6 * half),
+    ]
+    outline = [mirrored(np.array([x, -size["ankle_height"], z]), side) for x, z in corners]
+    return Foot(SEGMENTS.index(f"{side}_foot"), np.array(outline if side == "right" else outline[::-1]))
+
+
+def _habits(size: Proportions, seed: int) -> Habits:
+    """Draw how the person stands and carries head, trunk and arms."""
+    rng = stream(seed, "habits")
+    mean_sd = {
+        "lumbar_flexion": (2.0, 2.0),
+        "thorax_flexion": (3.0, 2.0),
+        "neck_flexion": (-4.0, 4.0),
+        "wrist_flexion": (8.0, 4.0),
+        "forearm_pronation": (50.0, 8.0),
+    }
+    angles: dict[str, float] = {}
+    for name, (mean, sd) in mean_sd.items():
+        value = float(np.radians(mean + sd * rng.normal()))
+        both = name.startswith(("wrist", "forearm"))
+        angles |= {f"{side}_{name}": value for side in ("right", "left")} if both else {name: value}
+    stance = 0.115 * size["stature"] * (1 + 0.08 * rng.normal())
+    right, left = np.radians(7.0 + 2.5 * rng.normal(size=2))
+    return Habits(angles, float(stance), (float(right), float(left)))

@@ -1,0 +1,156 @@
+"""From curves to the true configuration: posture in, 46 coordinates out, feet exactly where they stand."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import logsumexp
+
+from biodance.body.body import UPRIGHT
+from biodance.motion.kinematics import axis_rotation
+from biodance.records import Array
+from biodance.virtual_lab.choreography import SIDES, Curves
+from biodance.virtual_lab.legs import LEG, Leg, soft_limit
+from biodance.virtual_lab.person import Person
+from biodance.virtual_lab.randomness import smooth_noise
+from biodance.virtual_lab.tolerances import Tolerances
+
+X, Y, Z = np.eye(3)
+SHARPNESS = 250.0
+"""1/m: the height of the pelvis turns from one leg's limit to the other's within some millimetres."""
+CLEARANCE = np.radians([14.0, 0.0, 0.0, 28.0, 8.0, 0.0])
+"""Extra leg angles halfway up and down, so that the toes clear the ground (order of ``legs.LEG``)."""
+STRAIGHT = np.radians(11.0)
+"""Least knee flexion of a planted leg: nobody is asked to lock the knees."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stance:
+    """Where the feet stand in one trial: ``heading`` rad from lab x; per side ``ankle`` (3,) m, ``foot_turn`` (3, 3), ``pressure`` (2,)
+    m where the foot presses when it carries the weight.
+    """
+
+    heading: float
+    ankle: dict[str, Array]
+    foot_turn: dict[str, Array]
+    pressure: dict[str, Array]
+
+
+def take_stance(person: Person, kind: str, centre: Array, heading: float, rng: np.random.Generator) -> Stance:
+    """Return the feet of a trial around ``centre`` (2,) m: parallel, or the right foot 0.1 m in front; re-placed by about 5 mm and 1
+    degree.
+    """
+    heading = heading + float(np.radians(1.0) * rng.normal())
+    forward, left = np.array([np.cos(heading), np.sin(heading)]), np.array([-np.sin(heading), np.cos(heading)])
+    ahead = {"right": 0.05, "left": -0.05} if kind == "right_forward" else dict.fromkeys(SIDES, 0.0)
+    ankle, turn, pressure = {}, {}, {}
+    for side, sign, out in zip(SIDES, (-1.0, 1.0), person.habits.toe_out, strict=True):
+        xy = (
+            centre
+            + (ahead[side] - 0.23 * person.size["sole"]) * forward
+            + sign * 0.5 * person.habits.stance * left
+            + 0.005 * rng.normal(size=2)
+        )
+        yaw = heading + sign * out
+        ankle[side] = np.array([*xy, person.size["ankle_height"]])
+        turn[side] = axis_rotation(Z, np.array([yaw]))[0] @ UPRIGHT
+        pressure[side] = xy + 0.19 * person.size["sole"] * np.array([np.cos(yaw), np.sin(yaw)])
+    return Stance(heading, ankle, turn, pressure)
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """All that is known before the feet and the balance are: ``q`` (T, 46) with upper body and pelvis rotation, ``pelvis_turn`` (T, 3,
+    3).
+    """
+
+    q: Array
+    pelvis_turn: Array
+
+
+def upper_body(person: Person, curves: Curves, stance: Stance, tolerances: Tolerances, rng: np.random.Generator) -> Pose:
+    """Return the pose above the legs: the posture's angles, shared out over the true joints, with what no instruction asks for."""
+    body, t, time = person.body, tolerances, curves.time
+    angle = np.zeros((time.size, len(body.joints)))
+    unasked = dict(zip(_UNASKED, smooth_noise(rng, time, columns=len(_UNASKED), cutoff=0.8).T, strict=True))
+    tremor = t.tremor * smooth_noise(rng, time, columns=len(body.joints) + 3, cutoff=1.0)
+
+    def add(name: str, value: Array | float) -> None:
+        angle[:, body.joint_index(name)] += value
+
+    for name, value in person.habits.angles.items():
+        add(name, value)
+    trunk, head = np.radians(curves["trunk"]), np.radians(curves["head"])
+    for k, motion in enumerate(("flexion", "bending", "rotation")):
+        add(f"lumbar_{motion}", (1 - t.thorax_share) * trunk[:, k])
+        add(f"thorax_{motion}", t.thorax_share * trunk[:, k])
+        add(f"neck_{motion}", head[:, k])
+    for name, curve in unasked.items():
+        rms = t.head_motion if name.startswith("neck") else t.thorax_motion if name.startswith("thorax") else t.wrist_motion
+        add(name, rms * curve)
+    add("thorax_flexion", -t.breathing * np.sin(2 * np.pi * 0.25 * time + rng.uniform(0, 2 * np.pi)))
+    for side in SIDES:
+        arm = np.radians(curves[f"{side}_arm"])
+        for name, column in zip(("shoulder_flexion", "shoulder_adduction", "shoulder_rotation", "elbow_flexion"), arm.T, strict=True):
+            add(f"{side}_{name}", column)
+        add(f"{side}_clavicle_elevation", t.clavicle_rhythm * np.sqrt(arm[:, 0] ** 2 + arm[:, 1] ** 2 + 0.01))
+    turn = _pelvis_turn(np.radians(curves["pelvis"]) + tremor[:, -3:], stance.heading)
+    upper = ~np.isin(np.arange(angle.shape[1]), [body.joint_index(f"{side}_{name}") for side in SIDES for name in LEG])
+    angle[:, upper] += tremor[:, :-3][:, upper]
+    q = np.zeros((time.size, body.nq))
+    q[:, 7:] = -soft_limit(-soft_limit(angle, body.limits.upper, 0.1), -body.limits.lower, 0.1)
+    q[:, 3:7] = _quaternion(turn)
+    return Pose(q, turn)
+
+
+_UNASKED = (
+    "neck_flexion",
+    "neck_rotation",
+    "thorax_flexion",
+    "thorax_bending",
+    *(f"{side}_{name}" for side in SIDES for name in ("wrist_flexion", "wrist_deviation", "forearm_pronation")),
+)
+
+
+def _pelvis_turn(angle: Array, heading: float) -> Array:
+    """Return lab_R_pelvis (T, 3, 3) of forward tilt, right drop and left turn (T, 3) rad."""
+    tilt, drop, turn = angle.T
+    return axis_rotation(Z, heading + turn) @ UPRIGHT @ axis_rotation(X, drop) @ axis_rotation(-Z, tilt)
+
+
+def _quaternion(turn: Array) -> Array:
+    """Return unit quaternions x y z w (T, 4) of rotations, without jumps of sign."""
+    from scipy.spatial.transform import Rotation
+
+    xyzw = Rotation.from_matrix(turn).as_quat()
+    flips = np.cumprod(np.where(np.sum(xyzw[1:] * xyzw[:-1], axis=1) < 0, -1.0, 1.0))
+    xyzw[1:] *= flips[:, None]
+    return xyzw
+
+
+def pelvis_height(person: Person, pose: Pose, curves: Curves, stance: Stance, xy: Array) -> Array:
+    """Return the height (T,) m of the pelvis origin over ``xy`` (T, 2): as high as the planted legs allow, minus the posture's depth."""
+    tops, lengths = [], []
+    for side in SIDES:
+        leg = Leg.of(person.body, side)
+        hip = pose.pelvis_turn @ leg.hip
+        reach = float(leg.length(STRAIGHT))
+        across = np.sum((xy + hip[:, :2] - stance.ankle[side][:2]) ** 2, axis=1)
+        tops.append(stance.ankle[side][2] + np.sqrt(np.maximum(reach**2 - across, (0.5 * reach) ** 2)) - hip[:, 2])
+        lengths.append(reach)
+    weight = np.array([1.0 - curves.raised(side) for side in SIDES])
+    height = -logsumexp(-SHARPNESS * np.array(tops), axis=0, b=weight) / SHARPNESS
+    return height - curves["depth"][:, 0] * np.mean(lengths)
+
+
+def stand_on_feet(person: Person, pose: Pose, curves: Curves, stance: Stance, xy: Array) -> Array:
+    """Return q (T, 46) with the pelvis over ``xy`` (T, 2) m and the legs that hold the planted feet exactly still."""
+    q = pose.q.copy()
+    q[:, :2], q[:, 2] = xy, pelvis_height(person, pose, curves, stance, xy)
+    frames = q.shape[0]
+    for side in SIDES:
+        leg, raised = Leg.of(person.body, side), curves.raised(side)[:, None]
+        turn, ankle = np.broadcast_to(stance.foot_turn[side], (frames, 3, 3)), np.broadcast_to(stance.ankle[side], (frames, 3))
+        planted = leg.solve(pose.pelvis_turn, q[:, :3], turn, ankle)
+        free = np.concatenate([np.radians(curves[f"{side}_leg"]), np.zeros((frames, 1))], axis=1)
+        q[:, [7 + c for c in leg.columns]] = (1 - raised) * planted + raised * free + 4 * raised * (1 - raised) * CLEARANCE
+    return q

@@ -1,0 +1,98 @@
+"""Simulate a whole session: a folder of C3D files that passes through the same door as a real one, and its truth apart.
+
+OUT/static.c3d, OUT/dance_1.c3d, ...   what the laboratory recorded
+OUT/session.toml                       what the analyst would write down: mass, height, sex, roles
+OUT/truth/truth.json                   what only the simulation knows; no other command looks into this folder
+"""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from biodance.errors import BiodanceError
+from biodance.records import Subject
+from biodance.virtual_lab.laboratory import Fault, Instruments, Laboratory, declared_mass, record, set_up, write
+from biodance.virtual_lab.performance import Performance, perform
+from biodance.virtual_lab.person import AddedLoad, Person, make_person
+from biodance.virtual_lab.protocol import Protocol
+from biodance.virtual_lab.protocol_file import read_protocol
+from biodance.virtual_lab.tolerances import REALISTIC, Tolerances
+from biodance.virtual_lab.truth import truth
+
+TRUTH = "truth"
+"""Name of the folder inside a simulated session that holds the truth."""
+LEGAL = {"mass": (30.0, 200.0, "kg"), "stature": (1.2, 2.2, "m")}
+
+
+def simulate(
+    subject: Subject,
+    protocol: Protocol | str | Path,
+    out: Path,
+    *,
+    seed: int,
+    session: int = 0,
+    loads: tuple[AddedLoad, ...] = (),
+    laboratory: Laboratory | None = None,
+    tolerances: Tolerances = REALISTIC,
+    faults: tuple[Fault, ...] = (),
+) -> Path:
+    """Write a simulated session into ``out`` (made here, must be empty or absent) and return that folder.
+
+    ``subject`` mass kg, stature m, sex. ``seed`` is the person: the same seed is the same body on every ``session``, on which markers are
+    placed, postures performed and instruments drawn anew. ``loads`` are carried on top of the subject's mass. ``faults`` change each
+    recording (markers, raw analog samples, parameters) before it is written. The same arguments write the same bytes.
+
+    Raises
+    ------
+    BiodanceError
+        The folder is not empty, or the subject is outside the range that the virtual body covers.
+    UnknownName
+        There is no such protocol.
+    """
+    plan = protocol if isinstance(protocol, Protocol) else read_protocol(protocol)
+    _check(subject, out)
+    person = make_person(subject, seed, tolerances=tolerances, loads=loads, session=session)
+    instruments = set_up(laboratory or Laboratory(), person, session, tolerances)
+    out.mkdir(parents=True, exist_ok=True)
+    performances = []
+    for trial in plan.trials:
+        performance = perform_in(instruments, person, trial.name, plan, session)
+        recording = record(performance, instruments, session)
+        for fault in faults:
+            recording = fault(recording)
+        write(recording, out)
+        performances.append(performance)
+    (out / "session.toml").write_text(_session_toml(person, plan, declared_mass(person, session, tolerances)))
+    (out / TRUTH).mkdir()
+    document = truth(person, session, plan.name, instruments, performances)
+    (out / TRUTH / "truth.json").write_text(json.dumps(document, indent=1) + "\n")
+    return out
+
+
+def perform_in(instruments: Instruments, person: Person, trial: str, protocol: Protocol, session: int) -> Performance:
+    """Let the person perform one trial of a protocol, by name, where the laboratory's plates are."""
+    plan = next(t for t in protocol.trials if t.name == trial)
+    lab = instruments.laboratory
+    return perform(person, plan, session, tolerances=instruments.tolerances, centre=np.array(lab.centre), heading=lab.heading)
+
+
+def _check(subject: Subject, out: Path) -> None:
+    for name, (low, high, unit) in LEGAL.items():
+        value = getattr(subject, name)
+        if not low <= value <= high:
+            raise BiodanceError(f"Simulated subject: {name} = {value:g} {unit}; the virtual body covers {low:g} to {high:g} {unit}.")
+    if subject.sex not in ("F", "M"):
+        raise BiodanceError(f"Simulated subject: sex = {subject.sex!r}; legal are 'F' and 'M', whose proportions differ.")
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise BiodanceError(f"{out}: exists and is not an empty folder; nothing was written. Choose another --out.")
+
+
+def _session_toml(person: Person, protocol: Protocol, mass: float) -> str:
+    """Return what an analyst would have written down about the session."""
+    lines = ["[subject]", f"mass_kg = {float(mass)}", f"height_m = {float(person.subject.stature)}", f'sex = "{person.subject.sex}"']
+    if np.isfinite(person.subject.age):
+        lines.append(f"age = {float(person.subject.age)}")
+    for trial in protocol.trials:
+        lines += ["", f'[trials."{trial.name}"]', f'role = "{trial.role}"']
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,118 @@
+"""The true skeleton: 16 segments, 39 joint angles - more than any model that will read the recording has.
+
+Beyond the 12 segments and 23 angles of the reading model: lumbar and thoracic trunk, head, clavicles (massless), forearm pronation, wrists.
+Frames as everywhere: x anterior, y up, z right at zero angles; origin at the joint next to the pelvis.
+"""
+
+import numpy as np
+
+from biodance.body.body import Joint
+from biodance.records import Array
+from biodance.virtual_lab.proportions import Proportions
+
+ARM_AND_LEG = ("upper_arm", "forearm", "hand", "thigh", "shank", "foot")
+SEGMENTS = ("pelvis", "lumbar", "thorax", "head", *(f"{side}_{part}" for side in ("right", "left") for part in ARM_AND_LEG))
+X, Y, Z = np.eye(3)
+
+LIMITS_DEGREES = {
+    "hip_flexion": (-25, 125),
+    "hip_adduction": (-45, 30),
+    "hip_rotation": (-45, 45),
+    "knee_flexion": (0, 145),
+    "ankle_dorsiflexion": (-50, 38),
+    "ankle_inversion": (-25, 35),
+    "lumbar_flexion": (-25, 80),
+    "lumbar_bending": (-35, 35),
+    "lumbar_rotation": (-40, 40),
+    "thorax_flexion": (-20, 35),
+    "thorax_bending": (-20, 20),
+    "thorax_rotation": (-25, 25),
+    "neck_flexion": (-60, 60),
+    "neck_bending": (-45, 45),
+    "neck_rotation": (-75, 75),
+    "clavicle_elevation": (-10, 30),
+    "clavicle_protraction": (-20, 25),
+    "shoulder_flexion": (-50, 170),
+    "shoulder_adduction": (-165, 35),
+    "shoulder_rotation": (-85, 75),
+    "elbow_flexion": (0, 145),
+    "forearm_pronation": (-10, 170),
+    "wrist_flexion": (-70, 80),
+    "wrist_deviation": (-25, 40),
+}
+"""Hard anatomical ranges, young adults (Norkin & White, AAOS/AMA tables); dorsiflexion as in the weight-bearing lunge."""
+
+Chain = tuple[tuple[str, Array], ...]
+ROTATIONS: dict[str, Chain] = {
+    "lumbar": (("flexion", -Z), ("bending", X), ("rotation", Y)),
+    "thorax": (("flexion", -Z), ("bending", X), ("rotation", Y)),
+    "neck": (("flexion", -Z), ("bending", X), ("rotation", Y)),
+    "hip": (("flexion", Z), ("adduction", X), ("rotation", Y)),
+    "knee": (("flexion", -Z),),
+    "ankle": (("dorsiflexion", Z), ("inversion", X)),
+    "clavicle": (("elevation", -X), ("protraction", Y)),
+    "shoulder": (("flexion", Z), ("adduction", X), ("rotation", Y)),
+    "elbow": (("flexion", Z),),
+    "forearm": (("pronation", Y),),
+    "wrist": (("flexion", Z), ("deviation", X)),
+}
+"""Rotations of every joint in order, axes for the right side; on the left the x and y axes change sign."""
+
+
+def mirrored(vector: Array, side: str) -> Array:
+    """Return a place on the right side (3,) as the same place on ``side``."""
+    return vector * np.array([1.0, 1.0, -1.0 if side == "left" else 1.0])
+
+
+def small_rotation(vector: Array) -> Array:
+    """Return the rotation matrix (3, 3) of a rotation vector (3,) rad."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_rotvec(vector).as_matrix()
+
+
+class _Builder:
+    """Collects the joints of a skeleton in topological order."""
+
+    def __init__(self, proportions: Proportions) -> None:
+        self.proportions = proportions
+        self.joints: list[Joint] = []
+
+    def add(self, joint: str, segment: str, parent: int, place: Array, *, side: str = "") -> int:
+        """Append one anatomical joint (a chain of rotations) at ``place`` (3,) m in the parent's frame; return its last index."""
+        rotations = ROTATIONS[joint]
+        row = SEGMENTS.index(segment) if segment else -1
+        for k, (motion, axis) in enumerate(rotations):
+            axis = axis * ([-1.0, -1.0, 1.0] if side == "left" else [1.0, 1.0, 1.0])
+            turn, shift = np.eye(3), np.zeros(3)
+            if k == 0:
+                shift = np.array(place)
+                if segment:
+                    shift = shift + self.proportions.centre_shift[row]
+                    turn = small_rotation(self.proportions.axis_tilt[row])
+            name = f"{side}_{joint}_{motion}" if side else f"{joint}_{motion}"
+            carried = row if k == len(rotations) - 1 and segment else -1
+            self.joints.append(Joint(name, parent, axis, turn, shift, carried))
+            parent = len(self.joints) - 1
+        return parent
+
+
+def build_joints(size: Proportions) -> tuple[Joint, ...]:
+    """Return the 39 joints of a person of the given proportions."""
+    build, stature = _Builder(size), size["stature"]
+    for side in ("right", "left"):
+        hip = build.add("hip", f"{side}_thigh", -1, mirrored(np.array([0, 0, size["hips"] / 2]), side), side=side)
+        knee = build.add("knee", f"{side}_shank", hip, -size["thigh"] * Y, side=side)
+        build.add("ankle", f"{side}_foot", knee, -size["shank"] * Y, side=side)
+    lumbar = build.add("lumbar", "lumbar", -1, np.array([-0.012 * stature, size["pelvis"], 0]))
+    thorax = build.add("thorax", "thorax", lumbar, np.array([0.004 * stature, size["lumbar"], 0]))
+    build.add("neck", "head", thorax, size["thorax"] * Y)
+    for side in ("right", "left"):
+        sternum = np.array([0.025 * stature, size["thorax"] - 0.042 * stature, 0.012 * stature])
+        shoulder = np.array([0.0, size["thorax"] - size["shoulder_drop"], size["shoulders"] / 2])
+        clavicle = build.add("clavicle", "", thorax, mirrored(sternum, side), side=side)
+        arm = build.add("shoulder", f"{side}_upper_arm", clavicle, mirrored(shoulder - sternum, side), side=side)
+        elbow = build.add("elbow", "", arm, -size["upper_arm"] * Y, side=side)
+        forearm = build.add("forearm", f"{side}_forearm", elbow, np.zeros(3), side=side)
+        build.add("wrist", f"{side}_hand", forearm, -size["forearm"] * Y, side=side)
+    return tuple(build.joints)
