@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from biodance.errors import BiodanceError, TrialRefused, UnknownName
+from biodance.errors import BiodanceError, SessionRefused, TrialRefused, UnknownName
 
 Array = NDArray[np.float64]
 Role = Literal["static", "fit", "validate", "check", "skip"]
@@ -261,7 +261,11 @@ class Trial:
 
 @dataclass(frozen=True)
 class Subject:
-    """The person: body mass kg, stature m, sex "F" or "M", age years (NaN = not known); ``measurements`` in m and kg by name."""
+    """The person: body mass kg, stature m, sex "F" or "M", age years; ``measurements`` in m and kg by name.
+
+    NaN = not known: always possible for the age; for mass and stature where nobody declared them and no recording tells them (a note in the
+    session says so). A step that needs them calls `require` first.
+    """
 
     mass: float
     stature: float
@@ -269,6 +273,14 @@ class Subject:
     age: float = float("nan")
     name: str = ""
     measurements: Mapping[str, float] = field(default_factory=dict)
+
+    def require(self, *quantities: Literal["mass", "stature", "age"]) -> None:
+        """Raise SessionRefused if one of the named quantities is not known; the message says which key of session.toml helps."""
+        keys = {"mass": "mass_kg", "stature": "height_m", "age": "age"}
+        unknown = [quantity for quantity in quantities if np.isnan(getattr(self, quantity))]
+        if unknown:
+            verb, wanted = "is" if len(unknown) == 1 else "are", " and ".join(keys[quantity] for quantity in unknown)
+            raise SessionRefused(f"{self.name or 'Subject'}: the {' and '.join(unknown)} {verb} not known. Set {wanted} in session.toml.")
 
 
 @dataclass(frozen=True, eq=False)
