@@ -104,11 +104,12 @@ def test_biomechzoo_static(data, subject, mass, declared, stature):
 
 def test_pycgm_stairs(data):
     record = inspect_file(data / "pycgm" / "Movement_trial.c3d")
-    assert record["mean_vertical_n"] == pytest.approx(725, abs=3)
+    assert record["mean_vertical_n"] == pytest.approx(725 - 36, abs=5)  # 725 N as stored; the four plates show 36 N when unloaded
     heights = [np.mean([corner[2] for corner in plate["corners_m"]]) for plate in record["plates"]]
     np.testing.assert_allclose(sorted(heights), [0, 0.195, 0.389, 0.584], atol=1e-3)
     static = inspect_file(data / "pycgm" / "Static_trial.c3d")
     assert abs(static["mean_vertical_n"]) < 20
+    assert [plate["cop_m"] for plate in static["plates"]] == [None] * 4
     assert static["mass_on_plates_kg"] is None
     assert static["declared_mass_kg"] == pytest.approx(85)
 

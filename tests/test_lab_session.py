@@ -208,13 +208,22 @@ def test_unknown_mass_and_stature_stay_nan_and_are_said(tmp_path):
     assert np.isnan([session.subject.mass, session.subject.stature]).all()
     assert "Set mass_kg" in said(session)
     assert "Set height_m" in said(session)
+    with pytest.raises(SessionRefused, match="the mass and stature are not known"):
+        session.subject.require("mass", "stature")
 
 
 def test_plates_that_contradict_the_declared_mass_are_said(folder):
     (folder / "session.toml").write_text("[subject]\nmass_kg = 70\n")
     session = read_session(folder)
     assert session.subject.mass == 70
-    assert "kg in quiet standing in static01, but 70 kg were declared" in said(session)
+    assert "kg in quiet standing in static01, but the body mass is 70.00 kg" in said(session)
+
+
+def test_trials_of_two_people_are_said(tmp_path):
+    write_trial(tmp_path, "static1")
+    write_trial(tmp_path, "static2", mass=80)
+    notes = said(read_session(tmp_path))
+    assert "in static2, but the body mass is" in notes
 
 
 def trial(markers=None, plates=(), tmp="x.c3d"):

@@ -19,6 +19,9 @@ from biodance.records import Markers, Plate, Trial
 LOADED = 20.0
 """Vertical force in N from which on the centre of pressure counts."""
 
+SHORTEST_STEP = 0.05
+"""Seconds under load from which on a plate has a centre of pressure; less is noise."""
+
 
 def inspect_paths(paths: Sequence[str | Path], *, tell: Callable[[str], None] | None = None) -> list[dict[str, Any]]:
     """Return one record (see `inspect_file`) for each file, and for each recording in each folder and below it.
@@ -46,10 +49,10 @@ def inspect_file(path: str | Path) -> dict[str, Any]:
     """Return what is in one recording; a file that cannot be read gives the status "refused" and the reason.
 
     Keys: ``file``; ``status`` "ok", "warning" or "refused"; ``reason`` (None if ok); ``format``; ``frames``, ``rate_hz``,
-    ``analog_rate_hz``; ``markers`` names; ``marker_set``; ``gaps_percent`` of the set's markers (of all, without a set); ``subjects`` names in the file;
-    ``plates`` with ``type``, ``corners_m``, ``mean_force_n`` (3), ``mean_vertical_n``, ``cop_m`` (2, mean while loaded, lab frame) and
-    ``decisions``; ``mean_vertical_n`` of all plates together; ``mass_on_plates_kg`` in quiet standing; ``declared_mass_kg``,
-    ``declared_height_m``; ``history``; ``warnings``. What is not there is None; no number is NaN.
+    ``analog_rate_hz``; ``markers`` names; ``marker_set``; ``gaps_percent`` of the set's markers that were seen at all (of all markers,
+    without a set); ``subjects`` names in the file; ``plates`` with ``type``, ``corners_m``, ``mean_force_n`` (3), ``mean_vertical_n``,
+    ``cop_m`` (2, mean while loaded, lab frame) and ``decisions``; ``mean_vertical_n`` of all plates together; ``mass_on_plates_kg`` in
+    quiet standing; ``declared_mass_kg``, ``declared_height_m``; ``history``; ``warnings``. What is not there is None; no number is NaN.
     """
     path = Path(path)
     try:
@@ -103,28 +106,27 @@ def _refused(path: Path, reason: str) -> dict[str, Any]:
 
 
 def _subjects(path: Path) -> list[str]:
-    """Return the names of the people in a C3D file: SUBJECTS:NAMES and the prefixes of the labels; none for other formats."""
+    """Return the names of the people in a C3D file; none for the other formats, which hold none."""
     if format_of(path) != ".c3d":
         return []
+    from biodance.lab.labels import subjects_of
     from biodance.lab.raw_c3d import read_raw
 
-    raw = read_raw(path)
-    names = raw.parameters.get("SUBJECTS", {}).get("NAMES", [])
-    prefixes = [label.split(":", 1)[0] for label in raw.labels if ":" in label]
-    return list(dict.fromkeys([name for name in names if name] + prefixes))
+    return list(subjects_of(read_raw(path)))
 
 
 def _plate(plate: Plate) -> dict[str, Any]:
     force = plate.wrench.force.mean(axis=0) if plate.wrench.time.size else np.full(3, math.nan)
     cop = plate.wrench.cop(height=plate.height, threshold=LOADED)[:, :2]
     loaded = cop[np.isfinite(cop).all(axis=1)]
+    stepped_on = loaded.size > 0 and len(loaded) >= SHORTEST_STEP * plate.wrench.rate
     return {
         "name": plate.name,
         "type": plate.type,
         "corners_m": [[_number(x) for x in corner] for corner in plate.corners],
         "mean_force_n": [_number(f) for f in force],
         "mean_vertical_n": _number(force[2]),
-        "cop_m": [_number(x) for x in loaded.mean(axis=0)] if len(loaded) else None,
+        "cop_m": [_number(x) for x in loaded.mean(axis=0)] if stepped_on else None,
         "decisions": list(plate.decisions),
     }
 

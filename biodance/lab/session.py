@@ -99,10 +99,12 @@ def _settle_static(trials: list[Trial], settings: SessionFile, reasons: dict[str
         return trials
     guess = guess_static([trial for trial in trials if settings.role(trial.source.path.stem) is None])
     if guess is None or guess.markers is None:
-        notes.append("There is no static trial: none is called so and every trial moves. Record one, or set its role in session.toml.")
+        notes.append(
+            "There is no static trial: none is called so, and in none do markers stand still. Record one, or name it in session.toml."
+        )
         return trials
     frames = guess.markers.time.size
-    why = "it has a single frame" if frames == 1 else f"its markers stay within {1000 * movement(guess.markers):.0f} mm for {frames} frames"
+    why = "it has a single frame" if frames == 1 else f"its markers stay within {1000 * movement(guess.markers):.1f} mm"
     reasons[guess.name] = f"guessed, no trial is called static and {why}; set its role in session.toml if this is wrong"
     return [replace(trial, role="static") if trial is guess else trial for trial in trials]
 

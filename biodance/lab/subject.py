@@ -50,7 +50,7 @@ def identify_subject(
     notes: list[str] = []
     mass = _choose("body mass", "kg", [*_typed(typed.mass_kg), *_declared(sources, MASS_NAMES, LEGAL_MASS)], notes)
     stature = _choose("stature", "m", [*_typed(typed.height_m), *_declared(sources, STATURE_NAMES, LEGAL_STATURE)], notes)
-    on_plates = next(((trial, found) for trial in ordered if (found := standing_mass(trial)) is not None), None)
+    on_plates = [Declared(found, trial.name) for trial in ordered if (found := standing_mass(trial)) is not None]
     mass = _check_mass(mass, on_plates, notes)
     stature = stature if math.isfinite(stature) else _stature_of_markers(ordered, notes)
     age = _choose("age", "years", [*_typed(typed.age), *_declared(sources, AGE_NAMES, (0.0, 120.0))], [])
@@ -102,20 +102,21 @@ def _choose(quantity: str, unit: str, declared: list[Declared], notes: list[str]
     return first.value
 
 
-def _check_mass(mass: float, on_plates: tuple[Trial, float] | None, notes: list[str]) -> float:
-    """Return the declared mass, else the one on the plates; note the guess, or that the plates contradict the declared mass."""
-    if on_plates is None:
+def _check_mass(mass: float, on_plates: list[Declared], notes: list[str]) -> float:
+    """Return the declared mass, else the one on the plates; note the guess, and what contradicts the mass that is used."""
+    if not on_plates:
         if math.isnan(mass):
             notes.append("The body mass is not known: not declared, and nobody stands still on the plates. Set mass_kg in session.toml.")
         return mass
-    trial, found = on_plates
+    first = on_plates[0]
     if math.isnan(mass):
-        notes.append(f"The body mass was not declared: {found:.2f} kg were read from quiet standing on the plates in {trial.name}.")
-        return found
-    if abs(found - mass) > MASS_ON_PLATES * mass:
+        mass = first.value
+        notes.append(f"The body mass was not declared: {mass:.2f} kg were read from quiet standing on the plates in {first.source}.")
+    other = next((found for found in on_plates if abs(found.value - mass) > MASS_ON_PLATES * mass), None)
+    if other:
         notes.append(
-            f"The plates carry {found:.2f} kg in quiet standing in {trial.name}, but {mass:g} kg were declared. Check the entry, "
-            "the plates, and whether both feet stand on them."
+            f"The plates carry {other.value:.2f} kg in quiet standing in {other.source}, but the body mass is {mass:.2f} kg. Check the "
+            "entry, the plates, whether both feet stand on them, and whether it is the same person."
         )
     return mass
 
