@@ -1,0 +1,211 @@
+"""Ground contact of constructed trials whose truth is known, and of real ones."""
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from walkers import WEIGHT, Stand, plate, walker
+
+from biodance.errors import BiodanceError, TrialRefused
+from biodance.lab.marker_sets import read_marker_set
+from biodance.motion.contact import foot_wrenches, ground_contact
+from biodance.motion.footing import inside
+from biodance.motion.soles import Soles, soles_from_markers
+from biodance.records import Markers, Plate, Wrench
+
+MASS = WEIGHT / 9.80665
+TWO = [plate("plate1", (0.0, 0.5), (-0.3, 0.3)), plate("plate2", (0.5, 1.0), (-0.3, 0.3))]
+
+
+def walk(gap: float = 0.0) -> tuple:
+    """Return floor, plate1, plate2, floor, floor as in level walking; plate2 begins ``gap`` m behind plate1."""
+    plates = [TWO[0], plate("plate2", (0.5 + gap, 1.0 + gap), (-0.3, 0.3))]
+    right = [Stand(0.0, 0.7, (-0.5, -0.1, 0)), Stand(1.1, 1.8, (0.58 + gap, -0.1, 0)), Stand(2.2, 3.0, (1.6, -0.1, 0))]
+    left = [Stand(0.0, 0.2, (-1.0, 0.1, 0)), Stand(0.6, 1.25, (0.05, 0.1, 0)), Stand(1.7, 3.0, (1.2, 0.1, 0))]
+    return walker(right, left, plates, duration=3.0)
+
+
+def test_walking_over_two_plates_leaves_only_frames_on_the_plates() -> None:
+    trial, soles, true, carried = walk()
+    contact = ground_contact(trial, soles, mass=MASS)
+    unmeasured = (true & ~carried).any(axis=1) | ~true.any(axis=1)
+    assert not (contact.measured & unmeasured).any()
+    assert contact.measured.sum() > 0.75 * (~unmeasured).sum()
+    assert np.all(contact.touching[true])
+    assert contact.notes[0] == f"{contact.measured.sum()} of 301 frames are fully measured by the plates."
+    assert any("the right foot may touch the ground beside the plates" in note for note in contact.notes)
+
+
+def test_centres_of_pressure_are_inside_the_feet_and_a_mirrored_plate_is_noticed() -> None:
+    trial, soles, *_ = walk()
+    contact = ground_contact(trial, soles)
+    known = contact.cop_outside[~np.isnan(contact.cop_outside)]
+    assert known.size > 50
+    assert known.max() == 0
+    value = trial.plates[0].wrench.value.copy()
+    middle = np.cross(trial.plates[0].centre, value[:, :3])
+    value[:, 3:] = middle - (value[:, 3:] - middle)
+    mirrored = replace(trial, plates=(replace(trial.plates[0], wrench=Wrench(soles.time, value)), trial.plates[1]))
+    notes = ground_contact(mirrored, soles).notes
+    assert any("plate1: the centre of pressure lies" in note and "outside the foot" in note for note in notes)
+
+
+@pytest.mark.parametrize(("gap", "measured"), [(0.0, True), (0.07, False)])
+def test_a_foot_across_two_plates_is_measured_if_there_is_no_gap(gap: float, measured: bool) -> None:
+    plates = [TWO[0], plate("plate2", (0.5 + gap, 1.0 + gap), (-0.3, 0.3))]
+    trial, soles, *_ = walker([Stand(0, 1, (0.42, -0.1, 0))], [Stand(0, 1, (0.1, 0.1, 0))], plates, duration=1.0)
+    assert ground_contact(trial, soles).measured.all() == measured
+
+
+@pytest.mark.parametrize(("heel", "measured"), [(0.1, True), (0.2, True), (0.3, False), (-0.1, False)])
+def test_a_foot_half_on_the_edge_is_not_measured(heel: float, measured: bool) -> None:
+    trial, soles, *_ = walker([Stand(0, 1, (heel, -0.1, 0))], [Stand(0, 1, (0.1, 0.1, 0))], TWO[:1], duration=1.0)
+    contact = ground_contact(trial, soles)
+    assert contact.measured.all() == measured
+    assert any("right foot may stand partly" in note for note in contact.notes) != measured
+
+
+def test_stairs_hang_over_the_edges_of_raised_plates() -> None:
+    steps = [plate(f"plate{i + 1}", (0.3 * i, 0.3 * (i + 1)), (-0.3, 0.3), 0.19 * (i + 1)) for i in range(3)]
+    right = [Stand(0.0, 1.0, (-0.6, -0.1, 0)), Stand(1.4, 2.6, (0.33, -0.1, 0.38)), Stand(3.0, 4.0, (1.0, -0.1, 0.76))]
+    left = [
+        Stand(0.0, 0.2, (-0.9, 0.1, 0)),
+        Stand(0.6, 1.8, (0.1, 0.1, 0.19)),
+        Stand(2.2, 3.4, (0.62, 0.1, 0.57)),
+        Stand(3.8, 4.0, (1.1, 0.1, 0.76)),
+    ]
+    trial, soles, true, carried = walker(right, left, steps, duration=4.0)
+    contact = ground_contact(trial, soles, mass=MASS)
+    unmeasured = (true & ~carried).any(axis=1) | ~true.any(axis=1)
+    assert not (contact.measured & unmeasured).any()
+    assert contact.measured.sum() > 0.75 * (~unmeasured).sum()
+    assert any("on a surface at 0.76 m" in note for note in contact.notes)
+
+
+def one_leg(air: tuple[str, ...]) -> tuple:
+    right = [Stand(0, 3, (0.1, -0.1, 0))]
+    left = [Stand(0, 0.5, (0.1, 0.1, 0)), Stand(1.2, 2.0, (-0.4, 0.2, 0.35)), Stand(2.6, 3.0, (0.1, 0.1, 0))]
+    trial, soles, *_ = walker(right, left, TWO[:1], duration=3.0)
+    if air:
+        force = np.tile(trial.plates[0].wrench.value[:1], (301, 1))
+        force[:, 2] = WEIGHT
+        held = replace(trial, plates=(replace(trial.plates[0], wrench=Wrench(soles.time, force)),))
+        return held, soles
+    return trial, soles
+
+
+def test_a_foot_held_in_the_air_is_told_from_a_foot_on_a_box_by_the_weight() -> None:
+    held = slice(125, 195)
+    trial, soles = one_leg(("left",))
+    contact = ground_contact(trial, soles, mass=MASS)
+    assert contact.measured.all()
+    assert "The left foot rests 1 times in the air: the plates carry the weight meanwhile." in contact.notes
+    assert not ground_contact(trial, soles).measured[held].any()
+    trial, soles = one_leg(())
+    boxed = ground_contact(trial, soles, mass=MASS)
+    assert not boxed.measured[held].any()
+    assert boxed.measured[:40].all()
+    assert any("on a surface at 0.35 m" in note for note in boxed.notes)
+
+
+def test_a_plate_that_reads_nothing_is_not_trusted() -> None:
+    trial, soles, *_ = walk()
+    dead = replace(trial.plates[1], wrench=Wrench(soles.time, np.zeros((301, 6))))
+    contact = ground_contact(replace(trial, plates=(trial.plates[0], dead)), soles, mass=MASS)
+    assert not contact.measured[112:180].any()
+    assert any("plate2, which reads nothing" in note or "no plate is loaded" in note for note in contact.notes)
+
+
+def test_a_plate_loaded_by_nobody_is_not_trusted() -> None:
+    trial, soles, *_ = walker([Stand(0, 1, (0.1, -0.1, 0))], [Stand(0, 1, (0.1, 0.1, 0))], TWO, duration=1.0)
+    other = replace(trial.plates[1], wrench=trial.plates[0].wrench)
+    contact = ground_contact(replace(trial, plates=(trial.plates[0], other)), soles)
+    assert not contact.measured.any()
+    assert any("plate2 is loaded but no foot is over it" in note for note in contact.notes)
+
+
+def test_unseen_feet_and_unknown_forces_are_left_out() -> None:
+    trial, soles, *_ = walker([Stand(0, 1, (0.1, -0.1, 0))], [Stand(0, 1, (0.1, 0.1, 0))], TWO[:1], duration=1.0)
+    outline = soles.outline.copy()
+    outline[20:30, 1] = np.nan
+    contact = ground_contact(trial, Soles(soles.time, outline))
+    assert np.flatnonzero(~contact.measured).tolist() == list(range(20, 30))
+    assert "10 frames left out: the left foot was not seen." in contact.notes
+    value = trial.plates[0].wrench.value.copy()
+    value[50] = np.nan
+    unknown = replace(trial, plates=(replace(trial.plates[0], wrench=Wrench(soles.time, value)),))
+    assert 50 in np.flatnonzero(~ground_contact(unknown, soles).measured)
+
+
+def test_a_single_frame_is_enough() -> None:
+    trial, soles, *_ = walker([Stand(0, 0, (0.1, -0.1, 0))], [Stand(0, 0, (0.1, 0.1, 0))], TWO[:1], duration=0.0)
+    assert ground_contact(trial, soles).measured.tolist() == [True]
+
+
+def test_what_cannot_be_done_is_refused() -> None:
+    trial, soles, *_ = walk()
+    with pytest.raises(TrialRefused, match="no force plate"):
+        ground_contact(replace(trial, plates=()), soles)
+    with pytest.raises(BiodanceError, match="Prepare the trial first"):
+        ground_contact(trial, Soles(soles.time[:50], soles.outline[:50]))
+    with pytest.raises(TrialRefused, match="left foot has no heel or no toe"):
+        soles_from_markers(trial.markers.select(("RHEE", "RTOE", "LHEE")), read_marker_set("plug_in_gait"))
+
+
+def test_the_feet_share_what_the_plates_measure() -> None:
+    trial, soles, *_ = walk()
+    contact = ground_contact(trial, soles, mass=MASS)
+    right, left = foot_wrenches(trial, contact, soles)
+    assert right.value + left.value == pytest.approx(trial.wrench.value, abs=1e-9)
+    assert left.value[80:100] == pytest.approx(trial.plates[0].wrench.value[80:100])
+    assert right.value[115:124] == pytest.approx(trial.plates[1].wrench.value[115:124])
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.7, 3.0])
+@pytest.mark.parametrize("order", [1, -1])
+def test_inside_is_the_distance_to_the_nearest_edge(turn: float, order: int) -> None:
+    rotation = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
+    corners = np.array([[0.2, 0.3, 0], [-0.2, 0.3, 0], [-0.2, -0.3, 0], [0.2, -0.3, 0]])[::order] @ rotation.T
+    one = Plate("plate1", 2, corners, Wrench(np.zeros(1), np.zeros((1, 6))))
+    points = np.array([[0, 0, 0.0], [0.15, 0, 9], [0.25, 0, 0], [0, 0.29, 0]]) @ rotation.T
+    assert inside(one, points) == pytest.approx([0.2, 0.05, -0.05, 0.01])
+
+
+def test_soles_point_from_heel_to_toe() -> None:
+    xyz = np.array([[[0, 0, 0.03], [0.2, 0, 0.04], [0, 1, 0.03], [0, 1.2, 0.04]]])
+    soles = soles_from_markers(Markers(("RHEE", "RTOE", "LHEE", "LTOE"), np.zeros(1), xyz), read_marker_set("plug_in_gait"))
+    right, left = soles.outline[0]
+    assert right[:, 0].max() == pytest.approx(0.25)
+    assert np.abs(right[:, 1]).max() == pytest.approx(0.046)
+    assert right[:, 2].max() == pytest.approx(0.04)
+    assert left[:, 1].max() == pytest.approx(1.25)
+    assert right[1, 1] < 0 < right[0, 1]
+
+
+@pytest.mark.parametrize(
+    ("file", "mass", "least"),
+    [
+        ("pycgm/Movement_trial.c3d", 85.0, 150),
+        ("adl_gait/2014001_C1_01.c3d", 67.0, 150),
+        ("biomechzoo/HC030A/HC030A05.c3d", 45.8, 70),
+        ("biomechzoo/HC032A/HC032A03.c3d", 60.3, 70),
+        ("biomechzoo/HC038A/HC038A11.c3d", 56.8, 70),
+        ("biomechzoo/HC032A/HC032A01.c3d", 60.3, 300),
+    ],
+)
+def test_real_trials(file: str, mass: float, least: int) -> None:
+    if "BIODANCE_DATA" not in os.environ:
+        pytest.skip("BIODANCE_DATA is not set: no real recordings")
+    from biodance.lab.prepare import prepare
+    from biodance.lab.read import read_trial
+
+    trial = prepare(read_trial(Path(os.environ["BIODANCE_DATA"]) / file))
+    assert trial.markers is not None
+    contact = ground_contact(trial, soles_from_markers(trial.markers, read_marker_set(trial.marker_set)), mass=mass)
+    assert least <= contact.measured.sum()
+    assert not any("no foot is over it" in note for note in contact.notes)
+    outside = contact.cop_outside[contact.measured]
+    assert np.nanpercentile(outside, 95) < 0.02
+    assert trial.wrench.force[contact.measured, 2].min() > 0.5 * mass * 9.8
