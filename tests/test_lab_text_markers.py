@@ -74,6 +74,16 @@ def test_metres_windows_line_ends_and_trailing_tabs(tmp_path):
     assert np.isnan(trial.markers["B"][1]).all()
 
 
+def test_header_values_between_two_tabs(tmp_path):
+    path = handmade(tmp_path, ["1\t0\t10\t20\t30\t40\t50\t60"])
+    rows = path.read_text().split("\n")
+    rows[0], rows[2] = "PathFileType  4\t(X/Y/Z) C:\\data\\", "  100.0\t\t  100.0\t\t    1\t\t     2\t\t mm\t  100.0\t      1\t    1"
+    path.write_text("\n".join(rows))
+    trial = read_trc(path)
+    np.testing.assert_allclose(trial.markers["A"][0], [0.01, -0.03, 0.02])
+    assert trial.warnings == ()
+
+
 def test_exact_zeros_are_a_missing_marker(tmp_path):
     trial = read_trc(handmade(tmp_path, ["1\t0\t10\t20\t30\t0\t0\t0"]))
     assert trial.markers.seen.tolist() == [[True, False]]

@@ -51,15 +51,16 @@ def test_opensim_reads_the_same_table(tmp_path):
 def test_opensim_writes_what_we_read(tmp_path):
     opensim = pytest.importorskip("opensim", reason="OpenSim, the second writer of .sto files, is not installed")
     theirs = opensim.TimeSeriesTable(
-        [0.0, 0.01, 0.025], opensim.Matrix.createFromMat(np.arange(6.0).reshape(3, 2)), ["hip_flexion_r", "pelvis_tx"]
+        [0.0, 0.01, 0.03], opensim.Matrix.createFromMat(np.arange(6.0).reshape(3, 2)), ["hip_flexion_r", "pelvis_tx"]
     )
     theirs.addTableMetaDataString("inDegrees", "yes")
     opensim.STOFileAdapter.write(theirs, str(tmp_path / "q.sto"))
     table = read_mot(tmp_path / "q.sto")
     assert table.columns == ("hip_flexion_r", "pelvis_tx")
     assert table.in_degrees
+    assert table.name == "q"
     assert not table.has_equal_steps
-    np.testing.assert_allclose(table.time, [0.0, 0.01, 0.025])
+    np.testing.assert_allclose(table.time, [0.0, 0.01, 0.03])
     np.testing.assert_allclose(table["pelvis_tx"], [1.0, 3.0, 5.0])
 
 
@@ -128,6 +129,14 @@ def test_unequal_steps_are_interpolated_and_said():
     np.testing.assert_allclose(np.diff(plate.wrench.time), 0.01)
     assert plate.wrench.time[-1] == pytest.approx(0.06)
     assert any("not equal" in sentence for sentence in said)
+
+
+def test_time_that_is_rounded_still_has_equal_steps():
+    time = np.round(np.arange(600) / 600, 4)
+    (plate,), said = plates_of(one_plate([0.0, 700.0, 0.0, 0.4, 0.0, 0.1, 0.0, 0.0, 0.0], time=tuple(time)), where="f")
+    assert plate.wrench.rate == pytest.approx(600, rel=1e-4)
+    np.testing.assert_allclose(np.diff(plate.wrench.time), 1 / 600, rtol=1e-3)
+    assert not any("not equal" in sentence for sentence in said)
 
 
 @pytest.mark.parametrize(

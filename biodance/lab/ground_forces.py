@@ -42,10 +42,10 @@ def plates_of(table: Table, *, where: str) -> tuple[tuple[Plate, ...], tuple[str
             "ground_force_px and ground_torque_x are needed."
         )
     raw = {name: _wrench(table, columns, f"{where}, plate {name}") for name, columns in groups.items()}
-    time = table.time
+    time = np.linspace(table.time[0], table.time[-1], table.time.size) if table.time.size else table.time
     history: list[str] = []
     if not table.has_equal_steps:
-        time, raw = _equal_steps(time, raw)
+        time, raw = _equal_steps(table.time, raw)
         history.append(f"The time steps are not equal: the forces were interpolated linearly to {1 / (time[1] - time[0]):.6g} Hz.")
     turn, sign, decided = _upright(np.sum([value[:, :3].mean(axis=0) for value in raw.values()], axis=0))
     history += decided

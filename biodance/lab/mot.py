@@ -15,7 +15,7 @@ from biodance.lab.plain_text import cells, number, read_text
 from biodance.records import Array, frozen_array
 
 LONGEST_HEADER = 200
-EQUAL = 0.05  # largest difference of two time steps, as part of a step, that counts as equal
+JITTER = 0.2  # how far a time may lie from equal steps, as part of a step: writers round the time column
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,9 +49,9 @@ class Table:
 
     @property
     def has_equal_steps(self) -> bool:
-        """True if all time steps are equal within 5 %."""
-        steps = np.diff(self.time)
-        return bool(steps.size == 0 or np.ptp(steps) <= EQUAL * np.median(steps))
+        """True if every time lies within a fifth of a step of equal steps (writers round the time column)."""
+        even = np.linspace(self.time[0], self.time[-1], self.time.size) if self.time.size else self.time
+        return bool(self.time.size < 3 or np.abs(self.time - even).max() <= JITTER * (even[1] - even[0]))
 
 
 def read_mot(path: str | Path) -> Table:
@@ -125,7 +125,7 @@ def _parts(path: Path) -> tuple[dict[str, str], list[str], list[tuple[int, str]]
         raise FileRefused(f"{path}: has no row 'endheader', so it is not a .mot or .sto file. Export it again.")
     pairs = (re.split(r"\s*=\s*|\s+", row.strip(), maxsplit=1) for row in rows[:start])
     header = {pair[0].lower(): pair[1].strip() for pair in pairs if len(pair) == 2}
-    if start:
+    if start and "=" not in rows[0]:
         header[""] = rows[0].strip()
     body = [(i, row) for i, row in enumerate(rows[start + 1 :], start=start + 2) if row.strip()]
     labels = [cell for cell in cells(body[0][1]) if cell] if body else []

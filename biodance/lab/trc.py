@@ -115,7 +115,8 @@ def _header(rows: list[str], path: Path) -> dict[str, str]:
         raise FileRefused(f"{path}: does not begin with 'PathFileType', so it is not a .trc file. Export the markers again.")
     if len(rows) <= HEADER_ROWS:
         raise FileRefused(f"{path}: ends after {len(rows)} rows; a .trc file has five header rows and the frames. Export it again.")
-    return dict(zip(cells(rows[1]), cells(rows[2]), strict=False))
+    names, values = ([cell for cell in cells(row) if cell] for row in rows[1:3])  # some writers put two tabs between values
+    return dict(zip(names, values, strict=False))
 
 
 def _rate(header: dict[str, str], path: Path) -> float:
