@@ -16,6 +16,9 @@ from numpy.typing import NDArray
 from biodance.errors import FileRefused
 from biodance.lab.c3d_parameters import BLOCK, RESAVE, Header, Parameters, Value
 
+CLIPPED = 65535
+"""What the 16-bit frame numbers hold in a recording that is longer; the full number then stands in the TRIAL group or LONG_FRAMES."""
+
 
 @dataclass(frozen=True)
 class Layout:
@@ -72,16 +75,12 @@ def read_layout(size: int, header: Header, parameters: Parameters, where: str) -
         The file is cut off, holds no data, or its header, parameters and length contradict each other without a decision.
     """
     notes: list[str] = []
-    if not np.isfinite(header.scale) or header.scale == 0:
-        raise FileRefused(
-            f"{where}: the header's scale is {header.scale:g}, so points have no size (a finite number but 0 expected). {RESAVE}"
-        )
     scale = _agreed_scale(header, parameters, where)
     floating = scale < 0
     start, points, channels, samples, frames = _counts(size, header, parameters, 4 if floating else 2, where, notes)
     rate, analog_rate = _rates(header, parameters, samples if channels else 0, notes)
     unsigned = "UNSIGNED" in (text.upper() for text in texts(parameters, "ANALOG", "FORMAT"))
-    gain, offset = _analog_transform(parameters, channels, floating, unsigned, where, notes)
+    gain, offset = _analog_transform(parameters, channels, unsigned, where)
     first = _first_frame(header, parameters, frames, notes)
     kind = (floating, unsigned, abs(scale), rate, analog_rate, gain, offset)
     return Layout(header.processor, start, points, channels, samples, frames, first, *kind, tuple(notes))
@@ -108,11 +107,12 @@ def _unsigned(value: float) -> float:
 
 def _frame_counts(header: Header, parameters: Parameters) -> list[int]:
     """Return all frame counts that the file declares: header, TRIAL fields, POINT:FRAMES, POINT:LONG_FRAMES."""
-    declared = [float(header.last_frame - header.first_frame + 1)]
+    declared = [float(header.last_frame - header.first_frame + 1) if header.last_frame < CLIPPED else math.nan]
     first, last = (_field(parameters, name) for name in ("ACTUAL_START_FIELD", "ACTUAL_END_FIELD"))
     declared.append(last - first + 1)
     declared += [_unsigned(scalar(parameters, "POINT", name)) for name in ("FRAMES", "LONG_FRAMES")]
-    return [count for count in _distinct(declared) if count > 0]
+    counts = [count for count in _distinct(declared) if count > 0]
+    return [count for count in counts if count != CLIPPED] or counts
 
 
 def _field(parameters: Parameters, name: str) -> float:
@@ -161,17 +161,24 @@ def _counts(size: int, header: Header, parameters: Parameters, word: int, where:
         start, p, c, n, f = readings[0]
         held = max(0, size - start) // (word * (4 * p + c * n))
         raise FileRefused(f"{where}: the file is cut off: it declares {f} frames and holds {held}. {RESAVE}")
-    if len(readings) == 1:
-        return fitting[0]
     full = [reading for reading in fitting if rest(reading) < BLOCK]
+    if len(readings) == 1 and (full or _all_told_twice(header, parameters)):
+        return fitting[0]
     if len(full) != 1:
         raise FileRefused(
-            f"{where}: header and parameters contradict each other (points {points}, channels and samples per frame {analog}, frames {frames}, "
-            f"data from byte {starts}) and the file's length does not decide. {RESAVE}"
+            f"{where}: header and parameters contradict each other (points {points}, channels and samples per frame {analog}, "
+            f"frames {frames}, data from byte {starts}) and the file's length does not decide. {RESAVE}"
         )
     start, p, c, n, f = full[0]
     notes.append(f"Header and parameters disagree; the file's length decides: {p} points, {c} channels x {n} samples, {f} frames.")
     return full[0]
+
+
+def _all_told_twice(header: Header, parameters: Parameters) -> bool:
+    """Return whether every count stands in the header and in the parameters, so that bytes behind the data are believed to be padding."""
+    points = not header.points or "USED" in parameters.get("POINT", {})
+    analog = not header.analog_values or {"USED", "RATE"} <= parameters.get("ANALOG", {}).keys()
+    return points and analog and {"FRAMES", "DATA_START"} <= parameters.get("POINT", {}).keys()
 
 
 def _rates(header: Header, parameters: Parameters, samples: int, notes: list[str]) -> tuple[float, float]:
@@ -190,23 +197,17 @@ def _rates(header: Header, parameters: Parameters, samples: int, notes: list[str
     return told[best], told[best] * samples if samples else math.nan
 
 
-def _analog_transform(
-    parameters: Parameters, channels: int, floating: bool, unsigned: bool, where: str, notes: list[str]
-) -> tuple[NDArray[Any], NDArray[Any]]:
+def _analog_transform(parameters: Parameters, channels: int, unsigned: bool, where: str) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return gain (C,) and offset (C,) of the analog channels."""
     general, gain, offset = (numbers(parameters, "ANALOG", name) for name in ("GEN_SCALE", "SCALE", "OFFSET"))
     needed = {"GEN_SCALE": (general, min(1, channels)), "SCALE": (gain, channels), "OFFSET": (offset, channels)}
     for name, (values, count) in needed.items():
-        if values.size >= count and np.all(np.isfinite(values[:count])):
-            continue
-        if not floating or values.size:
+        if values.size < count or not np.all(np.isfinite(values[:count])):
             raise FileRefused(
                 f"{where}: ANALOG:{name} has {values.size} usable values for {channels} channels: the numbers have no scale. {RESAVE}"
             )
-        notes.append(f"ANALOG:{name} is missing; {0 if name == 'OFFSET' else 1} assumed, as for values stored in their units.")
-    one = np.ones(channels)
-    gain = (gain[:channels] if gain.size else one) * (general[0] if general.size else 1.0)
-    offset = np.array(offset[:channels] if offset.size else 0 * one, dtype=float)
+    gain = gain[:channels] * (general[0] if channels else 1.0)
+    offset = np.array(offset[:channels], dtype=float)
     return gain, np.where((offset < 0) & unsigned, offset + 65536, offset)
 
 

@@ -1,11 +1,13 @@
 """Read the data section of a C3D file whose layout is known, with either of two libraries.
 
 ezc3d is the first choice. The pure-Python package ``c3d`` takes what ezc3d refuses (SGI/MIPS byte order, OFFSET not an integer, unsigned
-analog numbers) or reads to another size than the layout, and is the second opinion on a file that smells of a misread.
+analog numbers), misreads (negative offsets: it drops their sign) or reads to another size than the layout, and is the second opinion on a
+file that smells of a misread.
 """
 
 import warnings
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +25,19 @@ LEAP = 1.0
 """m; no marker on a person moves further between two frames, at any rate in use."""
 
 
-def read_numbers(path: Path, layout: Layout, *, judged: tuple[int, ...], metre: float) -> tuple[Numbers, str, tuple[str, ...]]:
-    """Return the numbers, the name of the library that read them, and the reasons in sentences where it was not the first choice.
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """The numbers of a data section and the library that read them; ``notes``: why not the first choice; ``warnings``: what smells."""
+
+    points: NDArray[Any]
+    analog: NDArray[Any]
+    reader: str
+    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+def read_numbers(path: Path, layout: Layout, *, judged: tuple[int, ...], metre: float) -> Reading:
+    """Return the numbers of the data section.
 
     ``judged`` are the points that are markers and ``metre`` is the length of one metre in file units: markers that jump smell of a misread.
 
@@ -33,28 +46,29 @@ def read_numbers(path: Path, layout: Layout, *, judged: tuple[int, ...], metre: 
     FileRefused
         Neither library reads the file.
     """
-    notes: list[str] = []
-    columns, limit = list(judged), LEAP * metre
-    reason = _beyond_ezc3d(layout)
-    first: Numbers | None = None
-    if not reason:
-        first, reason = _attempt(_with_ezc3d, path, layout)
-    if first is not None and not (leaps := _leaps(first[0][:, columns], limit)):
-        return first, "ezc3d", ()
-    second, fault = _attempt(_with_c3d, path, layout)
-    if first is None:
-        if second is None:
-            raise FileRefused(f"{path.name}: neither reader takes the file (ezc3d: {reason}; c3d: {fault}). {RESAVE}")
-        return second, "c3d", (f"Read with the package c3d, because of ezc3d: {reason}.",)
-    if second is None:
-        notes.append(f"Markers jump by more than {LEAP:g} m in {leaps} places and no second reader could confirm it ({fault}).")
-    elif _same(first, second):
-        notes.append(
-            f"Markers jump by more than {LEAP:g} m between frames in {leaps} places; a second reader finds the same: it is in the data."
-        )
-    elif _leaps(second[0][:, columns], limit) < leaps:
-        return second, "c3d", (f"ezc3d reads {leaps} jumps of more than {LEAP:g} m, the package c3d fewer: its reading is taken.",)
-    return first, "ezc3d", tuple(notes)
+
+    def leaps(numbers: Numbers) -> int:
+        return _leaps(numbers[0][:, list(judged)], LEAP * metre)
+
+    refusal = _beyond_ezc3d(layout)
+    first, fault = (None, refusal) if refusal else _attempt(_with_ezc3d, path, layout)
+    if first is not None and not leaps(first):
+        return Reading(*first, "ezc3d")
+    second, objection = _attempt(_with_c3d, path, layout)
+    if first is None and second is None:
+        raise FileRefused(f"{path}: neither reader takes the file (ezc3d: {fault}; c3d: {objection}). {RESAVE}")
+    if first is None and second is not None:
+        return Reading(*second, "c3d", (f"Read with the package c3d, because of ezc3d: {fault}.",), _jumps(leaps(second)))
+    assert first is not None  # for the type checker: both None was refused
+    if second is not None and leaps(second) < leaps(first):
+        said = f"ezc3d reads {leaps(first)} jumps of more than {LEAP:g} m, the package c3d {leaps(second)}: its reading is taken."
+        return Reading(*second, "c3d", (), (said,))
+    confirmed = "a second reader finds the same" if second is not None and _same(first, second) else "a second reader could not confirm it"
+    return Reading(*first, "ezc3d", (), _jumps(leaps(first), confirmed))
+
+
+def _jumps(count: int, confirmed: str = "only one reader takes this file") -> tuple[str, ...]:
+    return (f"Markers jump by more than {LEAP:g} m between two frames in {count} places; {confirmed}.",) if count else ()
 
 
 def _beyond_ezc3d(layout: Layout) -> str:
@@ -63,6 +77,8 @@ def _beyond_ezc3d(layout: Layout) -> str:
         return f"{PROCESSORS[MIPS]} byte order is not read"
     if layout.unsigned and not layout.floating:
         return "unsigned analog numbers are read as signed"
+    if (layout.offset < 0).any():
+        return "negative analog offsets are read without their sign"
     if layout.channels > 255 or layout.points > 65535:
         return "more than 255 analog channels"
     return ""

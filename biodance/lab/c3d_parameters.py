@@ -17,6 +17,9 @@ from biodance.errors import FileRefused
 BLOCK = 512
 INTEL, DEC, MIPS = 84, 85, 86
 PROCESSORS = {INTEL: "Intel", DEC: "DEC", MIPS: "SGI/MIPS"}
+SCALES, RATES = (1e-9, 1e6), (1e-3, 1e6)
+"""Believable magnitudes of the header's scale and rate (Hz): numbers of the wrong processor type are outside by far."""
+
 RESAVE = "Export the trial again from the recording software, or copy the file again from its source."
 
 Value = NDArray[Any] | list[str]
@@ -84,6 +87,11 @@ def read_header(content: bytes, where: str) -> Header:
             f"{where}: the header puts the data into block {words[8]}, but the file has only {len(content) // BLOCK} blocks: "
             f"it is damaged or was cut off. {RESAVE}"
         )
+    if not (SCALES[0] < abs(scale) < SCALES[1] and (rate == 0 or RATES[0] < rate < RATES[1])):
+        raise FileRefused(
+            f"{where}: read as {PROCESSORS[processor]} numbers, the header has a scale of {scale:g} and a rate of {rate:g} Hz, "
+            f"which no lab has: it is damaged or its processor type is wrong. {RESAVE}"
+        )
     return Header(processor, words[1], words[2], words[3], words[4], scale, words[9], rate, start, data_start)
 
 
@@ -113,7 +121,9 @@ def read_parameters(content: bytes, header: Header, where: str) -> Parameters:
     for group, name, value in records:
         if group not in names:
             raise FileRefused(f"{where}: parameter {name} belongs to group number {group}, which the file does not define. {RESAVE}")
-        groups[names[group]].setdefault(name, value)
+        if name in groups[names[group]]:
+            raise FileRefused(f"{where}: parameter {names[group]}:{name} is there twice. {RESAVE}")
+        groups[names[group]][name] = value
     return MappingProxyType({name: MappingProxyType(group) for name, group in groups.items()})
 
 

@@ -21,7 +21,8 @@ class RawC3d:
     ``points`` (T, K, 3) in file units and file axes, NaN = not seen; ``rate`` Hz, NaN = none; ``first_frame`` number of the first frame;
     ``analog`` (S, C) scaled as the file says, ``(number - OFFSET) * SCALE * GEN_SCALE``; ``analog_rate`` Hz, NaN = none;
     ``analog_units`` (C) as written ("" = none). ``parameters[GROUP][NAME]`` (upper case): arrays with the file's own dimensions, first
-    dimension fastest, or lists of stripped strings. ``reader`` names the library that read the numbers, ``notes`` the decisions.
+    dimension fastest, or lists of stripped strings. ``reader`` names the library that read the numbers, ``notes`` why it was chosen;
+    ``warnings`` say where the file contradicts itself and how that was decided.
     """
 
     path: Path
@@ -37,6 +38,7 @@ class RawC3d:
     analog_rate: float
     parameters: Parameters
     notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
 def read_raw(path: str | Path) -> RawC3d:
@@ -56,30 +58,31 @@ def read_raw(path: str | Path) -> RawC3d:
         raise FileRefused(f"{path}: there is no such file. Check the path.") from error
     except OSError as error:
         raise FileRefused(f"{path}: the file cannot be opened ({error.strerror}). Check the permissions.") from error
-    header = read_header(content, path.name)
-    parameters = read_parameters(content, header, path.name)
-    layout = read_layout(len(content), header, parameters, path.name)
+    header = read_header(content, str(path))
+    parameters = read_parameters(content, header, str(path))
+    layout = read_layout(len(content), header, parameters, str(path))
     metre = {"m": 1.0, "cm": 100.0}.get("".join(texts(parameters, "POINT", "UNITS")[:1]).lower(), 1000.0)
     labels = _fit(texts(parameters, "POINT", "LABELS"), layout.points)
     no_markers = {*model_outputs(labels, parameters), *unlabelled(labels)}
     judged = tuple(column for column in range(layout.points) if column not in no_markers)
-    (points, analog), reader, notes = read_numbers(path, layout, judged=judged, metre=metre)
-    for values in (points, analog):
+    reading = read_numbers(path, layout, judged=judged, metre=metre)
+    for values in (reading.points, reading.analog):
         values.setflags(write=False)
     return RawC3d(
         path=path,
         sha256=hashlib.sha256(content).hexdigest(),
-        reader=reader,
+        reader=reading.reader,
         labels=labels,
-        points=points,
+        points=reading.points,
         rate=layout.rate,
         first_frame=layout.first_frame,
-        analog=analog,
+        analog=reading.analog,
         analog_labels=_fit(texts(parameters, "ANALOG", "LABELS"), layout.channels),
         analog_units=_fit(texts(parameters, "ANALOG", "UNITS"), layout.channels),
         analog_rate=layout.analog_rate,
         parameters=parameters,
-        notes=(*layout.notes, *notes),
+        notes=reading.notes,
+        warnings=(*layout.notes, *reading.warnings),
     )
 
 
