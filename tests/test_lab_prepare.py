@@ -61,7 +61,7 @@ def test_gaps_are_said() -> None:
     xyz[50:55, LABELS.index("C7")] = np.nan
     xyz[100:160, LABELS.index("LTOE")] = np.nan
     ready = prepare(replace(given, markers=Markers(LABELS, given.markers.time, xyz)))
-    assert "1 short gaps bridged by a spline: C7." in ready.history
+    assert "Short gaps bridged by a spline (1): C7." in ready.history
     assert any(line.startswith("LTOE 1.00 to 1.59 s left unseen: fewer than three") for line in ready.history)
     assert ready.warnings == ("LTOE was not seen in 30 % of the frames (longest gap 0.60 s).",)
     assert ready.markers["C7"] == pytest.approx(given.markers["C7"], abs=1e-9)

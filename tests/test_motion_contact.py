@@ -11,7 +11,7 @@ from walkers import WEIGHT, Stand, plate, walker
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab.marker_sets import read_marker_set
 from biodance.motion.contact import foot_wrenches, ground_contact
-from biodance.motion.footing import inside
+from biodance.motion.footing import distance_to_hull, inside
 from biodance.motion.soles import Soles, soles_from_markers
 from biodance.records import Markers, Plate, Wrench
 
@@ -101,7 +101,7 @@ def test_a_foot_held_in_the_air_is_told_from_a_foot_on_a_box_by_the_weight() -> 
     trial, soles = one_leg(("left",))
     contact = ground_contact(trial, soles, mass=MASS)
     assert contact.measured.all()
-    assert "The left foot rests 1 times in the air: the plates carry the weight meanwhile." in contact.notes
+    assert "The left foot rests in the air (1 times): the plates carry the weight meanwhile." in contact.notes
     assert not ground_contact(trial, soles).measured[held].any()
     trial, soles = one_leg(())
     boxed = ground_contact(trial, soles, mass=MASS)
@@ -132,7 +132,7 @@ def test_unseen_feet_and_unknown_forces_are_left_out() -> None:
     outline[20:30, 1] = np.nan
     contact = ground_contact(trial, Soles(soles.time, outline))
     assert np.flatnonzero(~contact.measured).tolist() == list(range(20, 30))
-    assert "10 frames left out: the left foot was not seen." in contact.notes
+    assert "Left out, 10 of 101: the left foot was not seen." in contact.notes
     value = trial.plates[0].wrench.value.copy()
     value[50] = np.nan
     unknown = replace(trial, plates=(replace(trial.plates[0], wrench=Wrench(soles.time, value)),))
@@ -171,6 +171,12 @@ def test_inside_is_the_distance_to_the_nearest_edge(turn: float, order: int) -> 
     one = Plate("plate1", 2, corners, Wrench(np.zeros(1), np.zeros((1, 6))))
     points = np.array([[0, 0, 0.0], [0.15, 0, 9], [0.25, 0, 0], [0, 0.29, 0]]) @ rotation.T
     assert inside(one, points) == pytest.approx([0.2, 0.05, -0.05, 0.01])
+
+
+def test_distance_to_a_hull() -> None:
+    square = np.array([[0, 0], [1, 1], [1, 0], [0, 1], [0.5, 0.5]], dtype=float)
+    points = np.array([[0.2, 0.7], [1.5, 0.5], [-3, -4], [0.5, -0.1], [0.99, 0.98]])
+    assert distance_to_hull(points, np.tile(square, (5, 1, 1))) == pytest.approx([0, 0.5, 5, 0.1, 0])
 
 
 def test_soles_point_from_heel_to_toe() -> None:

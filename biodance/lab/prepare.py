@@ -49,7 +49,8 @@ def prepare(trial: Trial, *, low_pass: LowPass | None = None, short_gap: float =
         raise
     except BiodanceError as error:
         raise TrialRefused(f"Trial {trial.name}: {error}") from error
-    history += [f"{plate.name}: {plate.decisions[-1]}" for plate in plates]
+    done = {plate.decisions[-1]: [p.name for p in plates if p.decisions[-1] == plate.decisions[-1]] for plate in plates}
+    history += [f"{', '.join(same)}: {how}" for how, same in done.items()]
     return replace(trial, markers=markers, plates=plates, history=(*trial.history, *history), warnings=(*trial.warnings, *warnings))
 
 
@@ -95,7 +96,7 @@ def _sentences(gaps: tuple[Gap, ...], time: Array) -> list[str]:
     """Return one sentence for all bridged gaps and one for every other gap."""
     bridged = sorted({gap.label for gap in gaps if gap.how.startswith("bridged")})
     count = sum(gap.how.startswith("bridged") for gap in gaps)
-    said = [f"{count} short gaps bridged by a spline: {', '.join(bridged)}."] if bridged else []
+    said = [f"Short gaps bridged by a spline ({count}): {', '.join(bridged)}."] if bridged else []
     others = [gap for gap in gaps if not gap.how.startswith("bridged")]
     said += [f"{gap.label} {time[gap.start]:.2f} to {time[gap.stop - 1]:.2f} s {gap.how}." for gap in others]
     return said or ["No marker has a gap."]

@@ -125,7 +125,7 @@ def _faults(trial: Trial, place: Footing, touching: Mask, rests: Mask, load: Mas
 def _notes(measured: Mask, faults: list[tuple[str, Mask]]) -> tuple[str, ...]:
     counts = Counter({text: int(mask.sum()) for text, mask in faults if mask.any()})
     first = f"{int(measured.sum())} of {measured.size} frames are fully measured by the plates."
-    return (first, *(f"{count} frames left out: {text}." for text, count in counts.most_common()))
+    return (first, *(f"Left out, {count} of {measured.size}: {text}." for text, count in counts.most_common()))
 
 
 def _cop_notes(trial: Trial, outside: Array, measured: Mask, rules: ContactRules) -> tuple[str, ...]:

@@ -82,24 +82,29 @@ def cop_outside(plates: tuple[Plate, ...], soles: Soles, place: Footing, pressed
 
     With both feet on a plate, the area between them counts as inside.
     """
-    from scipy.spatial import ConvexHull
-
     found = np.full(pressed.shape, np.nan)
     for index, plate in enumerate(plates):
-        cop = plate.wrench.cop(height=plate.height)
-        for frame in np.flatnonzero(pressed[:, index] & place.on_plate[:, :, index].any(axis=1) & ~np.isnan(cop[:, 0])):
-            feet = place.on_plate[frame, :, index]
-            points = soles.outline[frame, feet, :, :2].reshape(-1, 2)
-            found[frame, index] = _distance(cop[frame, :2], points[ConvexHull(points).vertices])
+        cop = plate.wrench.cop(height=plate.height)[:, :2]
+        known = pressed[:, index] & np.isfinite(cop).all(axis=1)
+        for feet in ([0], [1], [0, 1]):
+            here = known & (place.on_plate[:, :, index] == np.isin([0, 1], feet)).all(axis=1)
+            points = soles.outline[here][:, feet, :, :2].reshape(int(here.sum()), -1, 2)
+            found[here, index] = distance_to_hull(cop[here], points)
     return found
 
 
-def _distance(point: Array, polygon: Array) -> float:
-    """Return the distance of a point (2,) from a convex polygon (n, 2) in counter-clockwise order; 0 inside."""
-    edges = np.roll(polygon, -1, axis=0) - polygon
-    to_point = point - polygon
-    cross = edges[:, 0] * to_point[:, 1] - edges[:, 1] * to_point[:, 0]
-    if np.all(cross >= 0):
-        return 0.0
-    along = np.clip(np.sum(edges * to_point, axis=1) / np.sum(edges**2, axis=1), 0, 1)[:, None]
-    return float(np.linalg.norm(to_point - along * edges, axis=1).min())
+def distance_to_hull(point: Array, points: Array) -> Array:
+    """Return the distance (n,) of each ``point`` (n, 2) from the convex hull of its ``points`` (n, P, 2); 0 inside.
+
+    A point is outside if all others are seen from it within half a turn; then the nearest of all chords between them is the hull's edge.
+    """
+    towards = points - point[:, None]
+    angle = np.sort(np.arctan2(towards[..., 1], towards[..., 0]), axis=1)
+    widest = np.max(np.diff(angle, axis=1, append=angle[:, :1] + 2 * np.pi), axis=1)
+    distance = np.zeros(len(point))
+    for row in np.flatnonzero(widest > np.pi):
+        i, j = np.triu_indices(points.shape[1], k=1)
+        start, chord = towards[row, i], towards[row, j] - towards[row, i]
+        along = np.clip(-np.sum(chord * start, axis=1) / np.maximum(np.sum(chord**2, axis=1), 1e-18), 0, 1)[:, None]
+        distance[row] = np.linalg.norm(start + along * chord, axis=1).min()
+    return distance

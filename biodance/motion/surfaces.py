@@ -81,12 +81,12 @@ def find_surfaces(trial: Trial, soles: Soles, rests: Mask, load: Mask, *, weight
                 continue
             bare.append(known[0] if known else level)
             when = f"{soles.time[start]:.2f} to {soles.time[stop - 1]:.2f} s"
-            notes.append(f"The {side} foot stands beside the plates on a surface at {level:.2f} m, {when}.")
+            notes.append(f"The {side} foot stands beside the plates on a surface at {level:z.2f} m, {when}.")
         if lifted:
-            notes.append(f"The {side} foot rests {lifted} times in the air: the plates carry the weight meanwhile.")
+            notes.append(f"The {side} foot rests in the air ({lifted} times): the plates carry the weight meanwhile.")
     lowest = float(np.nanmin(low, initial=plates[0]))
     if lowest < min([*bare, plates[0]]) - SAME_LEVEL:
-        notes.append(f"A foot goes down to {lowest:.2f} m: the floor is at least that far below the lowest plate ({plates[0]:.2f} m).")
+        notes.append(f"A foot goes down to {lowest:z.2f} m: the floor is at least that far below the lowest plate ({plates[0]:z.2f} m).")
         bare.append(lowest)
     bare = sorted({min([*bare, plates[0]]), *bare})
     return Surfaces(offset, tuple(sorted({*plates, *bare})), tuple(bare), tuple(notes))
