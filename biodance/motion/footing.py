@@ -88,7 +88,7 @@ def cop_outside(plates: tuple[Plate, ...], soles: Soles, place: Footing, pressed
         known = pressed[:, index] & np.isfinite(cop).all(axis=1)
         for feet in ([0], [1], [0, 1]):
             here = known & (place.on_plate[:, :, index] == np.isin([0, 1], feet)).all(axis=1)
-            points = soles.outline[here][:, feet, :, :2].reshape(int(here.sum()), -1, 2)
+            points = np.concatenate([soles.outline[here, foot, :, :2] for foot in feet], axis=1)
             found[here, index] = distance_to_hull(cop[here], points)
     return found
 
