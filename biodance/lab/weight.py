@@ -3,7 +3,7 @@
 import numpy as np
 
 from biodance.errors import TrialRefused
-from biodance.records import Array, Markers, Trial
+from biodance.records import Array, Markers, Trial, Wrench
 
 STANDARD_GRAVITY = 9.80665  # m/s²
 STILL = 0.03  # m, a marker that stays within this counts as still
@@ -39,9 +39,13 @@ def standing_mass(trial: Trial) -> float | None:
     if not trial.plates or (trial.markers is not None and not is_still(trial)):
         return None
     try:
-        wrench = trial.wrench
+        return steady_mass(trial.wrench)
     except TrialRefused:
         return None
+
+
+def steady_mass(wrench: Wrench) -> float | None:
+    """Return the mass in kg that a wrench carries in its longest quiet part (within 3 %, at least 0.4 s); None without one."""
     quiet = _longest_steady(_blocks(wrench.force[:, 2], wrench.rate))
     return float(quiet.mean() / STANDARD_GRAVITY) if quiet is not None else None
 
@@ -60,6 +64,8 @@ def _longest_steady(blocks: Array) -> Array | None:
         return None
     steady = np.concatenate([[0], np.abs(blocks - middle) <= SWAY * middle, [0]]).astype(int)
     starts, ends = np.flatnonzero(np.diff(steady) == 1), np.flatnonzero(np.diff(steady) == -1)
+    if not starts.size:
+        return None
     longest = int(np.argmax(ends - starts))
     run = blocks[starts[longest] : ends[longest]]
     return run if run.size * BLOCK >= SHORTEST - 1e-9 else None

@@ -1,0 +1,131 @@
+"""The outline of a force plate: whether it is a plate at all, and which way its axes point."""
+
+import numpy as np
+
+from biodance.errors import TrialRefused
+from biodance.records import Array
+
+SHORTEST_SIDE, LONGEST_SIDE = 0.2, 2.0  # m
+NOT_CLOSED, CROOKED = 0.02, 0.005  # m: refused from here on; worth a sentence from here on
+STEEPEST = 0.7  # the plate's normal must have at least this vertical share (45 degrees)
+SWAPS = {(0, 1, 3, 2): "3 and 4 (or 1 and 2)", (0, 2, 1, 3): "2 and 3 (or 1 and 4)"}
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+
+
+def corners_in_lab(corners: Array, *, metres: float, turn: Array) -> tuple[Array, tuple[str, ...]]:
+    """Return the corners (4, 3) in m in the lab frame after checking that they are a lying rectangle of 0.2-2 m, and what was decided.
+
+    ``corners`` in file units and axes, ``metres`` the file's length unit in m, ``turn`` (3, 3) from file axes to the lab. Corners in
+    another decimal unit than the points are converted where exactly one unit gives a legal size.
+
+    Raises
+    ------
+    TrialRefused
+        The corners are garbage, out of order (a bow-tie), no rectangle, of impossible size, or the surface is steeper than 45 degrees.
+    """
+    if not np.isfinite(corners).all() or np.abs(corners).max() > 1e6:
+        raise TrialRefused(
+            f"CORNERS hold values up to {np.abs(corners).max():.3g}, which is no place in a laboratory. Enter the corners again."
+        )
+    if np.ptp(corners, axis=0).max() == 0:
+        raise TrialRefused(f"all four CORNERS are {_point(corners[0])}. Enter the corners in the lab frame.")
+    unit, decisions = _unit(corners, metres)
+    lab = corners @ turn.T * unit
+    _refuse_disorder(lab)
+    _refuse_size(lab, corners)
+    gap = float(np.linalg.norm(lab[0] - lab[1] + lab[2] - lab[3]))
+    skew = _skew(lab)
+    if gap > NOT_CLOSED or skew > NOT_CLOSED:
+        raise TrialRefused(
+            f"CORNERS are no rectangle: opposite sides differ by {1000 * gap:.0f} mm and the angles by {1000 * skew:.0f} mm at "
+            f"a side's end "
+            f"(legal: {1000 * NOT_CLOSED:.0f} mm). Measure the corners again."
+        )
+    if gap > CROOKED or skew > CROOKED:
+        decisions.append(f"CORNERS deviate from a rectangle by {1000 * max(gap, skew):.0f} mm; the best-fitting axes were used.")
+    axes = plate_axes(lab)
+    if abs(axes[2, 2]) < STEEPEST:
+        raise TrialRefused(
+            f"CORNERS make a surface {np.degrees(np.arccos(abs(axes[2, 2]))):.0f} degrees steep (legal: up to 45). Check "
+            f"corners and lab axes."
+        )
+    return lab, tuple(decisions)
+
+
+def plate_axes(corners: Array) -> Array:
+    """Return lab_R_plate (3, 3) from corners (4, 3) in the order +x+y, -x+y, -x-y, +x-y of the plate axes.
+
+    x and y are the mean directions of opposite sides, made orthogonal without preferring one; z = x × y (it points down on most plates).
+    """
+    x = corners[0] + corners[3] - corners[1] - corners[2]
+    y = corners[0] + corners[1] - corners[2] - corners[3]
+    u, _, v = np.linalg.svd(np.column_stack([x / np.linalg.norm(x), y / np.linalg.norm(y)]), full_matrices=False)
+    x, y = (u @ v).T
+    return np.column_stack([x, y, np.cross(x, y)])
+
+
+def half_sides(corners: Array) -> Array:
+    """Return half the side lengths (2,) m along the plate's x and y."""
+    return (
+        np.array(
+            [
+                np.linalg.norm(corners[0] + corners[3] - corners[1] - corners[2]),
+                np.linalg.norm(corners[0] + corners[1] - corners[2] - corners[3]),
+            ]
+        )
+        / 4
+    )
+
+
+def _unit(corners: Array, metres: float) -> tuple[float, list[str]]:
+    """Return the metres per unit of the corners: the file's own, or the only decimal one that gives a legal size."""
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)
+    fits = [name for name, unit in UNITS.items() if unit * sides.min() >= SHORTEST_SIDE and unit * sides.max() <= LONGEST_SIDE]
+    if any(np.isclose(UNITS[name], metres) for name in fits) or len(fits) != 1:
+        return metres, []
+    said = (
+        f"CORNERS would be {sides.max() * metres:.4g} m long in the file's unit; they were taken as {fits[0]}, the only unit "
+        f"that fits a plate."
+    )
+    return UNITS[fits[0]], [said]
+
+
+def _refuse_disorder(lab: Array) -> None:
+    """Refuse four corners whose sides cross."""
+    sides = lab - np.roll(lab, -1, axis=0)
+    if sides[0] @ sides[2] < 0 and sides[1] @ sides[3] < 0:
+        return
+    for order, which in SWAPS.items():
+        fixed = lab[list(order)]
+        if np.linalg.norm(fixed[0] - fixed[1] + fixed[2] - fixed[3]) < NOT_CLOSED:
+            raise TrialRefused(
+                f"CORNERS are out of order: the outline is a bow-tie; corners {which} are exchanged. The legal order is +x+y, "
+                f"-x+y, -x-y, +x-y "
+                "of the plate axes. Correct FORCE_PLATFORM:CORNERS."
+            )
+    raise TrialRefused(
+        f"CORNERS {', '.join(_point(p) for p in lab)} m are no rectangle: the outline crosses itself. Enter the corners in the order "
+        "+x+y, -x+y, -x-y, +x-y of the plate axes."
+    )
+
+
+def _refuse_size(lab: Array, corners: Array) -> None:
+    sides = np.linalg.norm(lab - np.roll(lab, -1, axis=0), axis=1)
+    if sides.min() < SHORTEST_SIDE or sides.max() > LONGEST_SIDE:
+        raise TrialRefused(
+            f"CORNERS make a plate of {sides[:2].min():.3g} x {sides[:2].max():.3g} m (first corner as written: "
+            f"{_point(corners[0])}); legal are "
+            f"sides of {SHORTEST_SIDE:g} to {LONGEST_SIDE:g} m. Check CORNERS and POINT:UNITS."
+        )
+
+
+def _skew(lab: Array) -> float:
+    """Return by how many metres the end of a side misses its place because the angle at the corner is not a right one (the worst)."""
+    sides = np.roll(lab, -1, axis=0) - lab
+    lengths = np.linalg.norm(sides, axis=1)
+    cosines = np.abs(np.sum(sides * np.roll(sides, -1, axis=0), axis=1)) / (lengths * np.roll(lengths, -1))
+    return float((cosines * np.minimum(lengths, np.roll(lengths, -1))).max())
+
+
+def _point(p: Array) -> str:
+    return "(" + ", ".join(f"{c:.4g}" for c in p) + ")"

@@ -1,0 +1,127 @@
+"""Turn a plate's reading into the lab frame: which way its axes lie, and whether the load or the reaction was recorded."""
+
+import numpy as np
+
+from biodance.errors import TrialRefused
+from biodance.lab.plate_corners import plate_axes
+from biodance.lab.plate_feet import distance_to_feet
+from biodance.lab.plate_reading import PlateReading
+from biodance.lab.plate_signs import gravity_sign, sway_sign
+from biodance.lab.plate_types import centre_of_pressure
+from biodance.records import Array, Markers, Plate, Wrench
+
+UNDER_THE_FOOT, NOT_UNDER = 0.06, 0.15  # m from the feet: believed; contradicted
+Said = tuple[str, ...]
+
+
+def oriented(reading: PlateReading, time: Array, *, markers: Markers | None, alone: bool, otherwise: int) -> tuple[Plate, Said]:
+    """Return the plate with the ground's wrench ON the subject about the lab origin, and warnings.
+
+    ``time`` (S,) s; ``markers`` are asked where the feet are; ``alone`` says that no other plate is loaded, so that the sway of a
+    standing person can be used; ``otherwise`` (+1 or -1) is the sign for a plate that never carries anything.
+
+    Raises
+    ------
+    TrialRefused
+        The corners contradict the recorded forces and the markers do not decide between the two possible corrections.
+    """
+    axes = plate_axes(reading.corners)
+    wrench, said = reading.at_surface(axes)
+    sign = gravity_sign(wrench, axes, reading.rate)
+    sway = sway_sign(wrench, reading.rate) if alone and sign else 0
+    warnings: Said = ()
+    if sway and sway != sign and axes[2, 2] > 0:
+        axes, turned = _unmirrored(reading, time, axes, markers)
+        wrench, said = reading.at_surface(axes)
+        sign, said, warnings = sway, (*said, turned), (f"Plate {reading.plate.number}: {turned}",)
+    elif sway:
+        seen, warnings = _sway_said(reading, sway == sign)
+        said = (*said, seen)
+    if markers is not None and sign:
+        axes, checked, warned = _under_feet(reading, wrench, time, axes, markers)
+        said, warnings = (*said, *checked), (*warnings, *warned)
+    value = _in_lab(wrench, axes, sign or otherwise, reading.corners.mean(axis=0))
+    decisions = (*reading.decisions, *said, _sign_said(sign, otherwise))
+    return Plate(reading.plate.name, reading.plate.type, reading.corners, Wrench(time, value), decisions), (*reading.warnings, *warnings)
+
+
+def _in_lab(wrench: Array, axes: Array, sign: int, centre: Array) -> Array:
+    """Return the wrench about the lab origin; a mirrored ``axes`` (determinant -1) turns moments the other way round than forces."""
+    force = sign * wrench[:, :3] @ axes.T
+    moment = sign * np.linalg.det(axes) * wrench[:, 3:] @ axes.T
+    return np.hstack([force, moment + np.cross(centre, force)])
+
+
+def _unmirrored(reading: PlateReading, time: Array, axes: Array, markers: Markers | None) -> tuple[Array, str]:
+    """Return the axes of a plate whose corners run the wrong way round: its z points down, so x or y must be turned too.
+
+    The markers say which; without markers both stay as the corners have them, so the lab frame of such a file is a mirror image, in which
+    forces, centre of pressure and weight still fit together.
+    """
+    why = (
+        "CORNERS make the plate's z point up, but the sway of the standing person shows that its z points down: the corners "
+        "run the wrong way round"
+    )
+    choices = {"y": axes * [1, -1, -1], "x": axes * [-1, 1, -1]}
+    if markers is not None:
+        found = {name: _distance(reading, time, choice, markers) for name, choice in choices.items()}
+        good = [name for name, distance in found.items() if distance is not None and distance <= UNDER_THE_FOOT]
+        if len(good) == 1:
+            return choices[good[0]], f"{why}; {good[0]} was turned, which puts the load under the feet."
+        raise TrialRefused(f"{why}, and the foot markers do not tell which axis to turn. Correct FORCE_PLATFORM:CORNERS.")
+    return axes * [
+        1,
+        1,
+        -1,
+    ], f"{why}; x and y were kept as the corners have them. Check the corner order before joining this file with markers."
+
+
+def _under_feet(reading: PlateReading, wrench: Array, time: Array, axes: Array, markers: Markers) -> tuple[Array, Said, Said]:
+    """Return the axes after asking the foot markers: as they are, or by quarter turns where only that puts the load under them."""
+    distance = _distance(reading, time, axes, markers)
+    if distance is None:
+        return axes, (), ()
+    if distance <= NOT_UNDER:
+        return axes, (f"The centre of pressure lies {1000 * distance:.0f} mm (median) from the feet that the markers show.",), ()
+    turns = {90 * k: axes @ _quarter_turns(k) for k in (1, 2, 3)}
+    found = {angle: _distance(reading, time, turned, markers) for angle, turned in turns.items()}
+    good = [angle for angle, d in found.items() if d is not None and d <= UNDER_THE_FOOT]
+    number = reading.plate.number
+    if len(good) == 1 and all(d is None or d > NOT_UNDER for angle, d in found.items() if angle != good[0]):
+        said = (
+            f"The load lies {distance:.2f} m from the feet that the markers show, and under them when the corners are counted "
+            f"from another one: the plate "
+            f"axes were turned by {good[0]} degrees."
+        )
+        return turns[good[0]], (said,), (f"Plate {number}: {said} Correct the order of FORCE_PLATFORM:CORNERS.",)
+    said = f"The load lies {distance:.2f} m (median) from the feet that the markers show"
+    return axes, (f"{said}.",), (f"Plate {number}: {said}: check CORNERS, ORIGIN and whether a foot without markers stood there.",)
+
+
+def _distance(reading: PlateReading, time: Array, axes: Array, markers: Markers) -> float | None:
+    """Return the median distance in m of the load to the feet if the plate's axes were ``axes``."""
+    point = centre_of_pressure(reading.at_surface(axes)[0])
+    return distance_to_feet(reading.corners.mean(axis=0)[:2] + point @ axes[:2, :2].T, time, reading.corners, markers)
+
+
+def _quarter_turns(count: int) -> Array:
+    """Return the rotation about z by ``count`` times 90 degrees."""
+    c, s = ((1, 0), (0, 1), (-1, 0), (0, -1))[count]
+    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]], dtype=float)
+
+
+def _sway_said(reading: PlateReading, agrees: bool) -> tuple[str, Said]:
+    if agrees:
+        return "The sway of the standing person confirms the sign of the shear.", ()
+    said = "Weight and sway contradict each other: the shear channels seem to have the wrong sign"
+    return f"{said}.", (f"Plate {reading.plate.number}: {said}. Check the cabling and the corner order.",)
+
+
+def _sign_said(sign: int, otherwise: int) -> str:
+    if not sign:
+        taken = "reaction" if otherwise > 0 else "load"
+        return f"Never loaded, so gravity cannot tell the sign; taken as the {taken}, like the other plates." if otherwise else ""
+    return (
+        f"Sign: the file holds the {'reaction on the subject; kept' if sign > 0 else 'load on the plate; turned round'} (the "
+        f"weight must point up)."
+    )

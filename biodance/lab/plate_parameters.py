@@ -1,0 +1,159 @@
+"""What the FORCE_PLATFORM group of a C3D file says about each plate, brought into one shape; nothing computed yet."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from biodance.errors import TrialRefused
+from biodance.lab.raw_c3d import RawC3d
+from biodance.records import Array
+
+CHANNELS_OF_TYPE = {1: 6, 2: 6, 3: 8, 4: 6, 5: 8, 6: 12, 7: 8}
+MATRIX_OF_TYPE = {4: (6, 6), 5: (6, 8), 6: (12, 12), 7: (8, 8)}
+NAMES_OF_TYPE = {8: "not defined", 11: "a Kistler split-belt treadmill", 12: "a Kistler split-belt treadmill", 21: "AMTI stairs"}
+
+
+@dataclass(frozen=True, eq=False)
+class PlateParameters:
+    """One plate as the file describes it, in file units and file axes.
+
+    ``number`` from 1; ``type`` the C3D TYPE; ``channels`` columns of the analog data, from 0; ``corners`` (4, 3); ``origin`` (3,);
+    ``calibration`` (rows, columns), output = calibration @ channels, None where the type has none; ``polynomial`` (2, 6) Kistler's
+    correction of the centre of pressure in millimetres, None = none.
+    """
+
+    number: int
+    type: int
+    channels: tuple[int, ...]
+    corners: Array
+    origin: Array
+    calibration: Array | None = None
+    polynomial: Array | None = None
+
+    @property
+    def name(self) -> str:
+        """The lab's name of the plate, ``plate1`` ..."""
+        return f"plate{self.number}"
+
+
+def count_plates(raw: RawC3d) -> tuple[int, tuple[str, ...]]:
+    """Return how many plates the file declares, and a sentence where its counts contradict each other."""
+    group = raw.parameters.get("FORCE_PLATFORM", {})
+    types = _numbers(group, "TYPE").size
+    used = _numbers(group, "USED")
+    if not used.size:
+        said = f"FORCE_PLATFORM:USED is missing; {types} plates were taken from TYPE." if types else ""
+        return types, (said,) if said else ()
+    declared = int(used[0]) if np.isfinite(used[0]) and 0 <= used[0] <= 255 else 0
+    if declared != used[0]:
+        return 0, (f"FORCE_PLATFORM:USED is {used[0]:g}, legal is a whole number from 0 to 255; no plate was read. Correct the file.",)
+    if declared < types:
+        return declared, (f"FORCE_PLATFORM:USED says {declared} plates, TYPE lists {types}; the first {declared} were read.",)
+    return declared, ()
+
+
+def zero_window(raw: RawC3d) -> tuple[int, int] | None:
+    """Return FORCE_PLATFORM:ZERO as written (first, last), or None if it is missing or not two numbers."""
+    values = _numbers(raw.parameters.get("FORCE_PLATFORM", {}), "ZERO")
+    if values.size < 2 or not np.isfinite(values[:2]).all():
+        return None
+    return int(values[0]), int(values[1])
+
+
+def plate_parameters(raw: RawC3d, number: int) -> PlateParameters:
+    """Return the parameters of plate ``number`` (from 1).
+
+    Raises
+    ------
+    TrialRefused
+        An entry is missing, not finite or out of range, or the TYPE is not one that can be computed.
+    """
+    group = raw.parameters.get("FORCE_PLATFORM", {})
+    kind = int(_of_plate(group, "TYPE", (), number))
+    if kind not in CHANNELS_OF_TYPE:
+        known = ", ".join(map(str, CHANNELS_OF_TYPE))
+        what = f" ({NAMES_OF_TYPE[kind]})" if kind in NAMES_OF_TYPE else ""
+        raise TrialRefused(f"TYPE {kind}{what} cannot be computed; legal are {known}. Export the plate as TYPE 2.")
+    rows = _numbers(group, "CHANNEL", keep=True).shape[:1]
+    listed = _of_plate(group, "CHANNEL", rows or (0,), number)
+    return PlateParameters(
+        number=number,
+        type=kind,
+        channels=_channels(listed, kind, raw.analog.shape[1]),
+        corners=_of_plate(group, "CORNERS", (3, 4), number).T,
+        origin=_of_plate(group, "ORIGIN", (3,), number),
+        calibration=_calibration(group, kind, number),
+        polynomial=_polynomial(group, number),
+    )
+
+
+def _channels(listed: Array, kind: int, available: int) -> tuple[int, ...]:
+    """Return the columns (from 0) of the plate's channels after checking their number and range."""
+    need = CHANNELS_OF_TYPE[kind]
+    if listed.size < need:
+        raise TrialRefused(f"CHANNEL lists {listed.size} channels, TYPE {kind} needs {need}. Correct the file or export it again.")
+    used = listed[:need]
+    bad = [f"{c:g}" for c in used if c != round(c) or not 1 <= c <= available]
+    if bad:
+        raise TrialRefused(
+            f"CHANNEL names analog channel {', '.join(bad)}, but the file holds {available} channels (legal: 1 to {available}). "
+            f"Export it again."
+        )
+    if len(set(used)) < need:
+        raise TrialRefused(f"CHANNEL names an analog channel twice: {', '.join(f'{c:g}' for c in used)}. Correct the file.")
+    return tuple(int(c) - 1 for c in used)
+
+
+def _calibration(group: Mapping[str, Any], kind: int, number: int) -> Array | None:
+    """Return the plate's CAL_MATRIX (stored column by column unless MATRIX_STORE says BYROW), None for types without one."""
+    if kind not in MATRIX_OF_TYPE:
+        return None
+    rows, columns = MATRIX_OF_TYPE[kind]
+    stored = _numbers(group, "CAL_MATRIX", keep=True)
+    by_row = "BYROW" in "".join(str(text) for text in group.get("MATRIX_STORE", [])).replace(" ", "").upper()
+    shape = stored.shape[:2] if stored.ndim >= 2 else (rows, columns)
+    if not stored.size or shape[0] < rows or shape[1] < columns:
+        found = " x ".join(map(str, stored.shape)) if stored.size else "nothing"
+        raise TrialRefused(
+            f"TYPE {kind} needs a CAL_MATRIX of {rows} x {columns}, the file holds {found}. Export the plate with its "
+            f"calibration matrix or as TYPE 2."
+        )
+    matrix = _of_plate(group, "CAL_MATRIX", shape, number)
+    matrix = (matrix.T if by_row and shape[0] == shape[1] else matrix)[:rows, :columns]
+    if not matrix.any(axis=1).all():
+        raise TrialRefused(
+            f"CAL_MATRIX holds a row of zeros; legal is a full {rows} x {columns} matrix. Enter the calibration sheet again."
+        )
+    return matrix
+
+
+def _polynomial(group: Mapping[str, Any], number: int) -> Array | None:
+    """Return Kistler's FPCOPPOLY (2, 6) of the plate, None if the file has none or only zeros."""
+    stored = _numbers(group, "FPCOPPOLY")
+    if stored.size < 12 * number:
+        return None
+    block = stored[12 * (number - 1) : 12 * number]
+    return block.reshape(6, 2, order="F").T if np.isfinite(block).all() and block.any() else None
+
+
+def _numbers(group: Mapping[str, Any], name: str, *, keep: bool = False) -> Array:
+    """Return a parameter as floats, flat in the file's order (``keep``: with its dimensions); empty if missing or text."""
+    value = group.get(name)
+    if not isinstance(value, np.ndarray) or value.dtype.kind not in "iufb":
+        return np.empty(0)
+    return value.astype(float) if keep else value.astype(float).ravel(order="F")
+
+
+def _of_plate(group: Mapping[str, Any], name: str, shape: tuple[int, ...], number: int) -> Array:
+    """Return the block of ``shape`` that belongs to plate ``number``; TrialRefused if it is missing or not finite."""
+    values = _numbers(group, name)
+    size = int(np.prod(shape, dtype=int))
+    block = values[size * (number - 1) : size * number]
+    if not size or block.size < size:
+        held = values.size // size if size else 0
+        raise TrialRefused(f"FORCE_PLATFORM:{name} holds values for {held} plates, none for this one. Correct USED or export it again.")
+    if not np.isfinite(block).all():
+        raise TrialRefused(f"FORCE_PLATFORM:{name} holds a value that is not a number. Correct the file or export it again.")
+    return block.reshape(shape, order="F")
