@@ -9,7 +9,11 @@ import pytest
 from lab_sessions import GRAVITY, MASS, write_trial
 
 from biodance.errors import BiodanceError
+from biodance.lab.ground_forces import table_of
 from biodance.lab.inspect import inspect_file, inspect_paths
+from biodance.lab.mot import write_mot
+from biodance.lab.read import read_trial
+from biodance.lab.trc import write_trc
 
 KEYS = {
     "file", "status", "reason", "format", "frames", "rate_hz", "analog_rate_hz", "markers", "marker_set", "gaps_percent", "subjects",
@@ -137,3 +141,16 @@ def test_amti_file(data):
     record = inspect_file(data / "amti" / "AMTIdata.bsf")
     assert record["analog_rate_hz"] == pytest.approx(500)
     assert record["mean_vertical_n"] == pytest.approx(211.8, abs=0.5)
+
+
+def test_real_recording_survives_the_text_formats(data, tmp_path):
+    """Markers and wrench of a walk, through .trc and .mot and back."""
+    real = read_trial(data / "biomechzoo" / "HC030A" / "HC030A05.c3d")
+    path = write_trc(tmp_path / "walk.trc", real.markers)
+    write_mot(tmp_path / "walk.mot", table_of(real.plates))
+    again = read_trial(path)
+    assert again.marker_set == real.marker_set
+    np.testing.assert_allclose(again.markers.xyz, real.markers.xyz, atol=1e-9)
+    for plate, original in zip(again.plates, real.plates, strict=True):
+        np.testing.assert_allclose(plate.wrench.value, original.wrench.value, atol=1e-5)
+        np.testing.assert_allclose(plate.wrench.time, original.wrench.time, atol=1e-8)

@@ -1,5 +1,8 @@
 """The session folder: which files, which roles, who it is; everything guessed is said and one bad file never stops the rest."""
 
+import os
+from pathlib import Path
+
 import numpy as np
 import pytest
 from lab_sessions import GRAVITY, MASS, STATURE, person, plate, write_trial
@@ -315,6 +318,15 @@ def test_missing_file_and_folder_are_refused(tmp_path):
         read_trial(tmp_path)
 
 
+def test_fault_in_a_reader_is_a_refusal_of_that_file(folder, monkeypatch):
+    def broken(path, *, role):
+        raise IndexError("index 3 is out of bounds")
+
+    monkeypatch.setattr("biodance.lab.read.read_trc", broken)
+    with pytest.raises(FileRefused, match=r"IndexError: index 3 .* Please report this file"):
+        read_trial(folder / "static01.trc")
+
+
 def test_content_counts_more_than_the_name(tmp_path, folder):
     path = tmp_path / "renamed.c3d"
     path.write_bytes((folder / "static01.trc").read_bytes())
@@ -323,6 +335,31 @@ def test_content_counts_more_than_the_name(tmp_path, folder):
     table = tmp_path / "numbers.dat"
     table.write_text("1,2,3,4,5,6\n-1,2.5,3e-1,4,5,6\n")
     assert format_of(table) == ".asc"
+
+
+# --- real sessions -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("place", "static", "subject"),
+    [
+        ("biomechzoo/HC030A", "HC030A01", (45.8, 1.48, "F")),
+        ("biomechzoo/HC038A", "HC038A01", (56.8, 1.74, "M")),
+        ("pycgm", "Static_trial", (85.0, 1.679, "F")),
+        ("adl_gait", "2014001_ST", (67.0, 1.655, "M")),
+        ("c3d_parser", "CB_Static0001", (36.3, np.nan, "F")),
+    ],
+)
+def test_real_session_finds_static_and_subject(place, static, subject):
+    folder = os.environ.get("BIODANCE_DATA")
+    if not folder:
+        pytest.skip("BIODANCE_DATA is not set: no real recordings here")
+    session = read_session(Path(folder) / place)
+    assert [trial.name for trial in session.of_role("static")] == [static]
+    assert len(session.of_role("fit")) == 1
+    assert dict(session.refused) == {}
+    np.testing.assert_allclose([session.subject.mass, session.subject.stature], subject[:2], rtol=1e-3)
+    assert session.subject.sex == subject[2]
 
 
 # --- where results go --------------------------------------------------------------------------------------------------------

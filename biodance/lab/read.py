@@ -5,7 +5,7 @@ import struct
 from dataclasses import replace
 from pathlib import Path
 
-from biodance.errors import FileRefused
+from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.ground_forces import has_plates, plates_of
 from biodance.lab.mot import Table, columns_of, read_mot
 from biodance.lab.plain_text import decode, read_bytes, sha256
@@ -65,6 +65,18 @@ def read_trial(path: str | Path, *, role: Role = "fit", subject: str | None = No
     """
     path = Path(path)
     kind = format_of(path)
+    try:
+        return _read(path, kind, role, subject)
+    except BiodanceError:
+        raise
+    except (ArithmeticError, LookupError, TypeError, ValueError, MemoryError, struct.error) as error:
+        raise FileRefused(
+            f"{path}: a reader of biodance failed on it ({type(error).__name__}: {error}). Please report this file; others are not concerned."
+        ) from error
+
+
+def _read(path: Path, kind: str, role: Role, subject: str | None) -> Trial:
+    """Hand the file to the reader of its format."""
     if kind == ".c3d":
         from biodance.lab.c3d import read_c3d
 
