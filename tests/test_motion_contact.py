@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from walkers import WEIGHT, Stand, plate, walker
 
+from biodance.body.human import human
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab.marker_sets import read_marker_set
 from biodance.motion.contact import foot_wrenches, ground_contact
 from biodance.motion.footing import distance_to_hull, inside
-from biodance.motion.soles import Soles, soles_from_markers
-from biodance.records import Markers, Plate, Wrench
+from biodance.motion.soles import Soles, soles_from_body, soles_from_markers
+from biodance.records import Markers, Motion, Plate, Subject, Wrench
 
 MASS = WEIGHT / 9.80665
 TWO = [plate("plate1", (0.0, 0.5), (-0.3, 0.3)), plate("plate2", (0.5, 1.0), (-0.3, 0.3))]
@@ -188,6 +189,23 @@ def test_soles_point_from_heel_to_toe() -> None:
     assert right[:, 2].max() == pytest.approx(0.04)
     assert left[:, 1].max() == pytest.approx(1.25)
     assert right[1, 1] < 0 < right[0, 1]
+
+
+def test_the_soles_of_a_tracked_body_serve_as_well() -> None:
+    body = human(Subject(65.0, 1.75, "F"))
+    q = np.tile(body.neutral, (50, 1))
+    q[:, :3] = [0.1, 0.0, 0.95]
+    still = np.zeros((50, body.nv))
+    soles = soles_from_body(body, Motion(np.arange(50) / 100, q, still, still))
+    assert soles.centre[0, 0, 1] < 0 < soles.centre[0, 1, 1]
+    force = np.tile([0, 0, WEIGHT, 0, -WEIGHT * 0.15, 0], (50, 1))
+    trial, *_ = walk()
+    on = replace(trial, plates=(replace(TWO[0], wrench=Wrench(soles.time, force)),))
+    contact = ground_contact(on, soles)
+    assert contact.measured.all()
+    assert contact.cop_outside.max() == 0
+    with pytest.raises(TrialRefused, match="lacks two feet"):
+        soles_from_body(replace(body, feet={}), Motion(soles.time, q, still, still))
 
 
 @pytest.mark.parametrize(
