@@ -71,7 +71,7 @@ def read_trial(path: str | Path, *, role: Role = "fit", subject: str | None = No
         raise
     except (ArithmeticError, LookupError, TypeError, ValueError, MemoryError, struct.error) as error:
         raise FileRefused(
-            f"{path}: a reader of biodance failed on it ({type(error).__name__}: {error}). Please report this file; others are not concerned."
+            f"{path}: a reader failed on it ({type(error).__name__}: {error}). Please report this file; others are not affected."
         ) from error
 
 
