@@ -62,7 +62,7 @@ class Leg:
         hip = pelvis + pelvis_turn @ self.hip
         away = hip - ankle
         distance = np.linalg.norm(away, axis=1)
-        length = soft_limit(distance, float(self.length(np.radians(1.0))), 0.003)
+        length = soft_limit(distance, float(self.length(np.radians(0.3))), 0.002)
         knee = self._knee(length)
         local = np.einsum("tji,tj->ti", foot_turn, away * (length / distance)[:, None])
         bend = axis_rotation(np.array([0.0, 0.0, -1.0]), knee)

@@ -17,9 +17,9 @@ from biodance.virtual_lab.tolerances import Tolerances
 X, Y, Z = np.eye(3)
 SHARPNESS = 250.0
 """1/m: the height of the pelvis turns from one leg's limit to the other's within some millimetres."""
-CLEARANCE = np.radians([14.0, 0.0, 0.0, 28.0, 8.0, 0.0])
+CLEARANCE = np.radians([18.0, 0.0, 0.0, 34.0, 12.0, 0.0])
 """Extra leg angles halfway up and down, so that the toes clear the ground (order of ``legs.LEG``)."""
-STRAIGHT = np.radians(11.0)
+STRAIGHT = np.radians(9.0)
 """Least knee flexion of a planted leg: nobody is asked to lock the knees."""
 
 

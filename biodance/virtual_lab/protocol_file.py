@@ -9,7 +9,7 @@ A protocol file says in words what a trainer would say. Angles in degrees, posit
     trunk = [flexion, right bending, left rotation]      pelvis to chest
     head = [flexion, right bending, left rotation]       chest to head
     right_arm = [shoulder flexion, adduction, internal rotation, elbow flexion]       also left_arm
-    right_leg = [hip flexion, adduction, internal rotation, knee flexion, ankle dorsiflexion]       also left_leg; that foot is off the ground
+    right_leg = [hip flexion, adduction, internal rotation, knee flexion, dorsiflexion]       also left_leg; that foot is off the ground
     depth = 0.2                the hips come down by this fraction of the leg's length
     lean = [0.02, 0.0]         m, the centre of pressure moves forward and right of the middle of the support
     shift = 0.5                share of the weight on the right foot (both feet down; 0 or 1 beside a raised foot)
@@ -114,7 +114,7 @@ def _trial(path: Path, number: int, given: Any, postures: dict[str, Posture]) ->
     steps = tuple(_step(path, name, step, postures) for step in given.get("steps", []))
     _check_feet(path, name, steps)
     if steps and (steps[-1].to.raised or not steps[-1].cycles) and steps[-1].to.name != "stand":
-        steps = (*steps, Step(STAND, move=1.0, hold=0.0))
+        steps = (*steps, Step(STAND, move=1.3, hold=0.0))
     if lead < 0 or (not steps and lead == 0):
         raise BiodanceError(f"{path}: trial {name!r} lasts no time; give steps or a lead in seconds.")
     return TrialPlan(name, role, stance, steps, lead)

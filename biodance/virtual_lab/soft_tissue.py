@@ -20,16 +20,16 @@ from biodance.virtual_lab.skeleton import ARM_AND_LEG, SEGMENTS
 from biodance.virtual_lab.tolerances import Tolerances
 
 PULL: dict[str, dict[str, float]] = {
-    "pelvis": {"right_hip_flexion": 4, "left_hip_flexion": 4, "lumbar_flexion": 3},
+    "pelvis": {"right_hip_flexion": 6, "left_hip_flexion": 6, "lumbar_flexion": 4},
     "lumbar": {},
-    "thorax": {"lumbar_flexion": 5, "lumbar_rotation": 5, "right_shoulder_adduction": 3, "left_shoulder_adduction": 3},
-    "head": {"neck_flexion": 2},
-    "thigh": {"hip_flexion": 8, "hip_rotation": 8, "knee_flexion": 8},
-    "shank": {"knee_flexion": 4, "ankle_dorsiflexion": 6},
-    "foot": {"ankle_dorsiflexion": 4},
-    "upper_arm": {"shoulder_flexion": 5, "shoulder_adduction": 5, "elbow_flexion": 5},
-    "forearm": {"elbow_flexion": 3, "forearm_pronation": 5},
-    "hand": {"wrist_flexion": 3},
+    "thorax": {"lumbar_flexion": 7, "lumbar_rotation": 7, "right_shoulder_adduction": 4, "left_shoulder_adduction": 4},
+    "head": {"neck_flexion": 3},
+    "thigh": {"hip_flexion": 11, "hip_rotation": 8, "knee_flexion": 11},
+    "shank": {"knee_flexion": 7, "ankle_dorsiflexion": 8},
+    "foot": {"ankle_dorsiflexion": 5},
+    "upper_arm": {"shoulder_flexion": 7, "shoulder_adduction": 7, "elbow_flexion": 6},
+    "forearm": {"elbow_flexion": 5, "forearm_pronation": 7},
+    "hand": {"wrist_flexion": 4},
 }
 """mm per rad, rms length of the pull of each joint on a marker: a deep squat moves thigh markers 18 mm, shank markers 8 mm (Lahkar 2021;
 thigh and shank in gait 18 and 17 mm, PMC8631460; back 9-10 mm, Zemp 2014; foot < 9 mm)."""

@@ -1,0 +1,206 @@
+"""Simulated sessions pass through the same door as real ones, and what was hidden comes out again."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from biodance.errors import BiodanceError
+from biodance.lab.c3d import read_c3d
+from biodance.lab.session import read_session
+from biodance.motion.kinematics import poses
+from biodance.records import Subject
+from biodance.virtual_lab.laboratory import Laboratory, record, set_up
+from biodance.virtual_lab.person import AddedLoad, make_person
+from biodance.virtual_lab.protocol import Protocol
+from biodance.virtual_lab.protocol_file import read_protocol
+from biodance.virtual_lab.simulate import perform_in, simulate
+from biodance.virtual_lab.tolerances import REALISTIC, instruments_perfect
+
+SUBJECT = Subject(58.0, 1.66, "F", 28.0, "S07")
+FAITHFUL = instruments_perfect()
+
+
+@pytest.fixture(scope="module")
+def protocol():
+    short = read_protocol("short")
+    return Protocol("shorter", "", (short.trials[0], short.trials[2]), short.postures)
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory, protocol):
+    return simulate(SUBJECT, protocol, tmp_path_factory.mktemp("lab") / "S07", seed=11)
+
+
+def test_a_simulated_session_is_read_like_a_real_one(session):
+    found = read_session(session)
+    assert not found.refused
+    assert {t.name: t.role for t in found.trials} == {"static": "static", "squat_1": "validate"}
+    assert (found.subject.sex, found.subject.stature) == ("F", 1.66)
+    assert found.subject.mass == pytest.approx(58.0, abs=0.2)
+    for trial in found.trials:
+        assert trial.marker_set == "plug_in_gait"
+        assert len(trial.markers.names) == 39
+        assert (trial.markers.rate, trial.plates[0].wrench.rate) == (pytest.approx(100), pytest.approx(1000))
+        assert not trial.warnings
+
+
+def test_the_static_trial_weighs_the_subject(session):
+    static = read_c3d(session / "static.c3d")
+    assert static.wrench.force[:, 2].mean() / 9.80665 == pytest.approx(58.0, rel=0.01)
+    xyz = static.markers.xyz
+    assert np.isfinite(xyz).all()
+    assert 0.0 < xyz[..., 2].min() < 0.1
+    assert 1.5 < xyz[..., 2].max() < 1.7
+
+
+def test_the_truth_lies_apart_and_adds_up(session):
+    truth = json.loads((session / "truth" / "truth.json").read_text())
+    for key in ("segments_12", "segments_16"):
+        assert sum(s["mass_kg"] for s in truth[key]) == pytest.approx(58.0)
+    assert [s["name"] for s in truth["segments_12"]][7] == "trunk_head"
+    assert truth["joint_centres"]["right_hip"]["segment"] == "pelvis"
+    assert truth["joint_centres"]["left_elbow"]["segment"] == "left_upper_arm"
+    assert [t["name"] for t in truth["trials"]] == ["static", "squat_1"]
+
+
+def test_the_same_seed_writes_the_same_bytes_and_another_day_does_not(tmp_path, protocol, session):
+    again = simulate(SUBJECT, protocol, tmp_path / "again", seed=11)
+    for path in sorted(session.rglob("*.*")):
+        if path.is_file():
+            assert (again / path.relative_to(session)).read_bytes() == path.read_bytes(), path.name
+    other = simulate(SUBJECT, protocol, tmp_path / "other", seed=11, session=1)
+    assert (other / "static.c3d").read_bytes() != (session / "static.c3d").read_bytes()
+    one, two = (json.loads((s / "truth" / "truth.json").read_text()) for s in (session, other))
+    assert one["segments_16"] == two["segments_16"]
+    assert one["markers"] != two["markers"]
+
+
+@pytest.mark.parametrize("laboratory", [Laboratory(bits=32), Laboratory(bits=32, plate_type=4, heading=1.2), Laboratory(bits=32, plates=2)])
+def test_a_perfect_laboratory_gives_the_truth_back(tmp_path, protocol, laboratory):
+    out = simulate(SUBJECT, protocol, tmp_path / "S", seed=3, laboratory=laboratory, tolerances=FAITHFUL)
+    person = make_person(SUBJECT, 3, tolerances=FAITHFUL)
+    act = perform_in(set_up(laboratory, person, 0, FAITHFUL), person, "squat_1", protocol, 0)
+    trial = read_c3d(out / "squat_1.c3d")
+    assert len(trial.plates) == laboratory.plates
+    wanted = act.wrench(trial.plates[0].wrench.time).value
+    np.testing.assert_allclose(trial.wrench.value, wanted, atol=2e-3)
+    pose = poses(person.body, act.motion(trial.markers.time).q)
+    bone = pose.points(person.body.markers.segment, np.array(person.body.markers.position))
+    order = [trial.markers.names.index(name) for name in person.body.markers.names]
+    np.testing.assert_allclose(trial.markers.xyz[:, order], bone, atol=1e-6)
+
+
+def test_the_two_plates_carry_the_two_feet(tmp_path):
+    short = read_protocol("short")
+    one_leg = Protocol("one leg", "", (short.trials[0], short.trials[1]), short.postures)
+    out = simulate(SUBJECT, one_leg, tmp_path / "S", seed=3, laboratory=Laboratory(plates=2), tolerances=FAITHFUL)
+    trial = read_c3d(out / "dance_1.c3d")
+    right, left = sorted(trial.plates, key=lambda plate: plate.centre[1])
+    time = trial.plates[0].wrench.time
+    mean = {}
+    for name, start in (("right_leg_up", 8.8), ("left_leg_up", 13.0)):
+        frames = (time > start) & (time < start + 0.3)
+        mean[name] = [p.wrench.force[frames, 2].mean() for p in (right, left)]
+    assert mean["right_leg_up"][0] == pytest.approx(0, abs=1)
+    assert mean["right_leg_up"][1] == pytest.approx(58 * 9.80665, rel=0.05)
+    assert mean["left_leg_up"][1] == pytest.approx(0, abs=1)
+
+
+def test_each_instrument_fault_is_where_it_was_put(protocol):
+    """One tolerance at a time: what the channels then say differs from the truth in the way its name promises."""
+    person = make_person(SUBJECT, 3, tolerances=FAITHFUL)
+    lab = Laboratory(bits=32)
+
+    def channels(**changed):
+        tolerances = replace(FAITHFUL, **changed)
+        instruments = set_up(lab, person, 0, tolerances)
+        act = perform_in(instruments, person, "squat_1", protocol, 0)
+        return record(act, instruments, 0).plates[0].channels, instruments
+
+    clean, _ = channels()
+    late, _ = channels(plate_delay=0.005)
+    np.testing.assert_allclose(late[5:], clean[:-5], atol=1e-4)
+    gained, instruments = channels(plate_gain=0.003)
+    np.testing.assert_allclose(gained, clean * np.diag(instruments.plates[0].mixing), atol=1e-3)
+    assert 0.0005 < np.abs(np.diag(instruments.plates[0].mixing) - 1).max() < 0.01
+    moved, instruments = channels(plate_position=0.01)
+    shift = instruments.plates[0].centre - np.array([0.3, 0.2, 0.0])
+    plate_shift = instruments.plates[0].turn.T @ shift
+    np.testing.assert_allclose(moved[:, 3:] - clean[:, 3:], -np.cross(plate_shift, clean[:, :3]), atol=1e-3)
+    noisy, _ = channels(plate_noise=0.7)
+    assert (noisy - clean)[:, 2].std() == pytest.approx(0.7, rel=0.05)
+    offset, instruments = channels(plate_offset=2.0)
+    np.testing.assert_allclose(offset - clean, np.tile(instruments.plates[0].offset, (len(clean), 1)), atol=1e-3)
+
+
+def test_markers_wander_on_the_skin_by_some_millimetres(protocol):
+    person = make_person(SUBJECT, 3)
+    wander = replace(REALISTIC, camera_noise=0.0, gaps_per_minute=0.0, lab_tilt=0.0)
+    instruments = set_up(Laboratory(), person, 0, wander)
+    act = perform_in(instruments, person, "squat_1", protocol, 0)
+    markers = record(act, instruments, 0).markers
+    pose = poses(person.body, act.motion(markers.time).q)
+    apart = markers.xyz - pose.points(person.body.markers.segment, np.array(person.body.markers.position))
+    local = np.einsum("tkji,tkj->tki", pose.rotation[:, list(person.body.markers.segment)], apart)
+    rms = np.sqrt(np.mean(np.sum((local - local.mean(axis=0)) ** 2, axis=2), axis=0))
+    thigh = [k for k, name in enumerate(markers.names) if name.endswith(("THI", "KNE"))]
+    assert 0.004 < rms[thigh].mean() < 0.02
+    assert 0.001 < np.median(rms) < 0.01
+
+
+def test_loads_weigh_on_the_plate_but_not_in_what_the_analyst_declares(tmp_path, protocol):
+    load = AddedLoad("left_forearm", 2.4, np.array([0.0, -0.1, 0.0]))
+    out = simulate(SUBJECT, protocol, tmp_path / "loaded", seed=11, session=1, loads=(load,))
+    assert read_session(out).subject.mass == pytest.approx(58.0, abs=0.2)
+    static = read_c3d(out / "static.c3d")
+    assert static.wrench.force[:, 2].mean() / 9.80665 == pytest.approx(60.4, rel=0.01)
+    truth = json.loads((out / "truth" / "truth.json").read_text())
+    arm, loaded = (next(s for s in truth[key] if s["name"] == "left_forearm_hand") for key in ("segments_12", "segments_12_with_loads"))
+    assert loaded["mass_kg"] - arm["mass_kg"] == pytest.approx(2.4)
+
+
+def test_a_fault_changes_the_raw_recording_before_it_is_written(tmp_path, protocol):
+    def dead_channel(recording):
+        plate = recording.plates[0]
+        channels = np.array(plate.channels)
+        channels[:, 4] = 0.0
+        return replace(recording, plates=(replace(plate, channels=channels),))
+
+    out = simulate(SUBJECT, protocol, tmp_path / "S", seed=11, faults=(dead_channel,))
+    from biodance.lab.raw_c3d import read_raw
+
+    assert not read_raw(out / "static.c3d").analog[:, 4].any()
+
+
+def test_what_cannot_be_simulated_is_refused_before_anything_is_written(tmp_path, protocol):
+    with pytest.raises(BiodanceError, match=r"mass = 20 kg"):
+        simulate(Subject(20, 1.2, "F"), protocol, tmp_path / "S", seed=1)
+    with pytest.raises(BiodanceError, match=r"stature = 175 m"):
+        simulate(Subject(60, 175, "F"), protocol, tmp_path / "S", seed=1)
+    assert not (tmp_path / "S").exists()
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "notes.txt").write_text("mine")
+    with pytest.raises(BiodanceError, match="not an empty folder"):
+        simulate(SUBJECT, protocol, tmp_path / "full", seed=1)
+    with pytest.raises(BiodanceError, match="TYPE 3"):
+        Laboratory(plate_type=3)
+
+
+def test_the_generator_does_not_lean_on_what_it_is_to_test():
+    from pathlib import Path
+
+    import biodance.virtual_lab as room
+
+    forbidden = (
+        "biodance.effects",
+        "biodance.identify",
+        "biodance.diagnose",
+        "inverse_kinematics",
+        "biodance.body.tables",
+        "biodance.body.prior",
+    )
+    for path in Path(room.__file__).parent.glob("*.py"):
+        text = path.read_text()
+        assert not [word for word in forbidden if word in text], path.name
