@@ -17,6 +17,8 @@ from biodance import __version__
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from biodance.pipeline.results import SessionResult
+
 DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED = 0, 1, 2, 130
 
 app = App(
@@ -46,9 +48,49 @@ def _print(document: object) -> None:
 def _progress() -> "Iterator[Callable[[str], None]]":
     """Yield a function that shows on stderr what is being done: one changing line on a terminal, nothing elsewhere."""
     from rich.console import Console
+    from rich.markup import escape
 
     with Console(stderr=True).status("") as status:
-        yield lambda text: status.update(text)
+        yield lambda text: status.update(escape(text))
+
+
+def _reported(session: Path, out: Path, force: bool, tell: "Callable[[str], None]") -> "tuple[SessionResult, Path, dict[str, Any]]":
+    """Read, examine and report one session; return the result, the folder written to and the content of results.json."""
+    from biodance.lab.results_folder import results_folder
+    from biodance.lab.session import read_session
+    from biodance.pipeline.session import examine
+    from biodance.report.write import write_report
+
+    recording = read_session(session, tell=tell)
+    folder = results_folder(out, session, force=force)
+    result = examine(recording, tell=tell)
+    tell("writing the page")
+    return result, folder, write_report(result, folder)
+
+
+def _told(result: "SessionResult", folder: Path, found: "dict[str, Any]", json: bool) -> int:
+    """Print what was reported and return the exit code."""
+    from rich.console import Console
+
+    from biodance.report.terminal import print_session
+
+    if json:
+        _print(found)
+    else:
+        print_session(result, Console())
+        sys.stdout.write(f"{folder / 'report.html'}\n")
+    if result.stopped:
+        say(f"Stopped by Ctrl-C: {folder} holds the trials that were done, and names the others.")
+        return STOPPED
+    return NEEDS_A_PERSON if result.needs_a_person else DONE
+
+
+def _forget_simulated(folder: Path) -> None:
+    """Remove a folder that holds a simulated session, and no other one."""
+    import shutil
+
+    if (folder / "truth" / "truth.json").is_file() and (folder / "session.toml").is_file():
+        shutil.rmtree(folder)
 
 
 @app.command
@@ -73,6 +115,66 @@ def inspect(*paths: Path, json: Json = False) -> int:
         print_inspected(records, Console())
     states = {record["status"] for record in records}
     return NOT_DONE if states == {"refused"} else NEEDS_A_PERSON if states - {"ok"} else DONE
+
+
+@app.command
+def report(session: Path, *, out: Out, json: Json = False, force: Force = False) -> int:
+    """Take a session through all stages and write report.html and results.json.
+
+    Parameters
+    ----------
+    session
+        Folder with the static trial and the other trials.
+    """
+    with _progress() as tell:
+        result, folder, found = _reported(session, out, force, tell)
+    return _told(result, folder, found, json)
+
+
+@app.command
+def simulate(
+    *,
+    protocol: str,
+    sex: Literal["F", "M"],
+    height: Annotated[float, Parameter(help="Stature, m.")],
+    mass: Annotated[float, Parameter(help="Body mass, kg.")],
+    age: Annotated[float, Parameter(help="Age, years.")] = float("nan"),
+    seed: Annotated[int, Parameter(help="The same seed gives the same person and the same files.")],
+    out: Out,
+    force: Force = False,
+) -> int:
+    """Write a simulated session: C3D files and session.toml as a lab would, and the truth apart in truth/truth.json.
+
+    Parameters
+    ----------
+    protocol
+        Name of a protocol: dance, short, squat, standing ...; a wrong name lists all.
+    """
+    from biodance.records import Subject
+    from biodance.virtual_lab.simulate import simulate as write_session
+
+    if force:
+        _forget_simulated(out)
+    with _progress() as tell:
+        tell(f"simulating {protocol}")
+        folder = write_session(Subject(mass, height, sex, age), protocol, out, seed=seed)
+    sys.stdout.write(f"{folder}\n")
+    return DONE
+
+
+@app.command
+def demo(*, out: Out = Path("demo"), force: Force = False) -> int:
+    """Simulate a short session of a person whose truth is known, and report it like a real one."""
+    from biodance.records import Subject
+    from biodance.virtual_lab.simulate import simulate as write_session
+
+    if force:
+        _forget_simulated(out / "simulated_session")
+    with _progress() as tell:
+        tell("simulating a session")
+        session = write_session(Subject(62.0, 1.70, "F", 31.0), "short", out / "simulated_session", seed=1)
+        result, folder, found = _reported(session, out / "report", force, tell)
+    return _told(result, folder, found, False)
 
 
 @app.command
@@ -106,6 +208,10 @@ def run(tokens: Sequence[str] | None = None) -> int:
         say(str(error))
     except OSError as error:
         say(f"{error.filename or 'biodance'}: {error.strerror or error}.")
+    except Exception as error:
+        if "BIODANCE_TRACEBACK" in os.environ:
+            raise
+        say(f"biodance itself failed ({type(error).__name__}: {error}). Please report this; BIODANCE_TRACEBACK=1 shows where.")
     except KeyboardInterrupt:
         say("Stopped before the command was done; what was already written is complete.")
         return STOPPED

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
+from biodance.lab.gaps import MarkerGaps
 from biodance.pipeline.results import (
     Check,
-    Gaps,
     MarkerFit,
     SessionResult,
     Standing,
@@ -60,7 +60,7 @@ def still() -> Still:
     bones = np.array([[[0, 0, 0.9], [0, 0, 1.5]], [[0, 0.1, 0.9], [0, 0.1, 0.05]], [[0, -0.1, 0.9], [0, -0.1, 0.05]]])
     markers = np.concatenate([bones.reshape(-1, 3) + 0.05, [[np.nan] * 3]])
     com, force, cop = np.array([0, 0, 1.0]), np.array([0, 0, 640.0]), np.array([0.01, 0, 0])
-    return Still("static", 1.0, bones, ("middle", "left", "right"), markers, SQUARE[None], com, force, cop)
+    return Still("static", 1.0, bones, ("middle", "left", "right"), markers, SQUARE[None], com, force, cop, np.array([1.0, 0.0]))
 
 
 def trial(name: str, *, warnings: tuple[str, ...] = ()) -> Trial:
@@ -77,12 +77,11 @@ def full_session() -> SessionResult:
     rms = np.sort(rng.uniform(0.003, 0.02, len(NAMES)))
     rms[5] = np.nan
     fit = MarkerFit(NAMES, rms, 2.2 * rms, 0.011, 0.044)
-    percent = np.zeros(len(NAMES))
-    percent[[3, 5]] = 2.5, 100.0
+    gaps = tuple(MarkerGaps(name, *{3: (2.5, 0.075), 5: (100.0, 3.0)}.get(i, (0.0, 0.0))) for i, name in enumerate(NAMES))
     result = TrialResult(
         trial("walk <1>"),
         (Step("prepare", "done"), Step("track", "done"), Step("compare", "done")),
-        Gaps(NAMES, percent, percent * 0.03, float(percent.mean())),
+        gaps,
         fit,
         None,
         comparison(rng),

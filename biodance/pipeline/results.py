@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
+from biodance.lab.gaps import MarkerGaps
 from biodance.records import Array, Motion, Session, Subject, Trial
 
 Status = Literal["ok", "warning", "refused"]
@@ -26,16 +27,6 @@ class Step:
     name: str
     status: Literal["done", "refused", "failed"]
     text: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class Gaps:
-    """Unseen frames as recorded: per marker ``names`` (K) the share ``percent`` (K,) % and the ``longest`` (K,) s; ``total`` % of all."""
-
-    names: tuple[str, ...]
-    percent: Array
-    longest: Array
-    total: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +87,8 @@ class Still:
     """One instant to draw in 3-D.
 
     ``bones`` (B, 2, 3) m lines with ``sides`` (B) "left", "right" or "middle"; ``markers`` (K, 3) m as measured; ``plates`` (P, 4, 3) m
-    corners; ``com`` (3,) m; ``force`` and ``cop`` (3,) N, m of the total wrench (NaN = unloaded).
+    corners; ``com`` (3,) m; ``force`` and ``cop`` (3,) N, m of the total wrench (NaN = unloaded); ``forward`` (2,) unit vector the
+    subject faces.
     """
 
     trial: str
@@ -108,6 +100,7 @@ class Still:
     com: Array
     force: Array
     cop: Array
+    forward: Array
 
 
 @dataclass(frozen=True)
@@ -124,15 +117,23 @@ class Check:
 
 @dataclass(frozen=True, eq=False)
 class TrialResult:
-    """One trial after all steps: ``trial`` prepared (as read where preparing was refused); None where the data could not carry a result."""
+    """One trial after all steps: ``trial`` prepared (as read where preparing was refused); ``gaps`` as recorded, before any was filled.
+
+    None where the data could not carry a result.
+    """
 
     trial: Trial
     steps: tuple[Step, ...]
-    gaps: Gaps | None = None
+    gaps: tuple[MarkerGaps, ...] = ()
     fit: MarkerFit | None = None
     motion: Motion | None = None
     comparison: WrenchComparison | None = None
     standing: Standing | None = None
+
+    @property
+    def gaps_percent(self) -> float:
+        """Share of all marker samples that were not seen, %; NaN without markers."""
+        return float(np.mean([gap.percent for gap in self.gaps])) if self.gaps else float("nan")
 
     @property
     def status(self) -> Status:
@@ -178,7 +179,17 @@ class SessionResult:
         return 100 * (self.standing.mass / self.subject.mass - 1) if self.standing else float("nan")
 
     @property
+    def stopped(self) -> bool:
+        """Whether Ctrl-C ended the run before all trials were done."""
+        return any(step.name == "stop" for trial in self.trials for step in trial.steps)
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What the body's notes warn about: contradictory measures, improbable lengths, misplaced markers."""
+        return tuple(note for note in (self.body.notes if self.body else ()) if note.startswith("Warning"))
+
+    @property
     def needs_a_person(self) -> bool:
         """Whether anything was refused, warned about or outside its limit."""
         trouble = any(step.status != "done" for step in self.steps) or any(t.status != "ok" for t in self.trials)
-        return trouble or bool(self.session.refused) or any(not check.inside for check in self.checks)
+        return trouble or bool(self.session.refused or self.doubts) or any(not check.inside for check in self.checks)

@@ -4,8 +4,7 @@ import math
 from dataclasses import dataclass
 from importlib.resources import files
 
-import numpy as np
-
+from biodance.lab.gaps import MarkerGaps
 from biodance.pipeline.provenance import Provenance
 from biodance.pipeline.results import SessionResult, TrialResult
 from biodance.records import CHANNELS
@@ -40,13 +39,18 @@ class TrialPart:
     wrench: str
 
     @property
-    def gaps(self) -> list[tuple[str, float, float]]:
-        """Marker, percent, longest s of every marker with a gap, the worst first."""
-        gaps = self.result.gaps
-        if gaps is None:
-            return []
-        order = np.argsort(-gaps.percent, kind="stable")
-        return [(gaps.names[i], float(gaps.percent[i]), float(gaps.longest[i])) for i in order if gaps.percent[i] > 0]
+    def gaps(self) -> list[MarkerGaps]:
+        """The markers with a gap, the worst first."""
+        return sorted((gap for gap in self.result.gaps if gap.percent > 0), key=lambda gap: -gap.percent)
+
+    @property
+    def said(self) -> list[str]:
+        """What was decided when the trial was read and prepared, each sentence once."""
+        trial = self.result.trial
+        plates = [
+            f"{plate.name}: {line}" for plate in trial.plates for line in plate.decisions if not any(line in h for h in trial.history)
+        ]
+        return [*trial.history, *plates]
 
     @property
     def channels(self) -> list[tuple[str, str, float, float]]:
@@ -70,10 +74,11 @@ def _attention(result: SessionResult) -> list[tuple[str, str]]:
     """Return (where, sentence) of all that a person must look at: files refused, steps refused, warnings, checks outside their limit."""
     found = [(file, why) for file, why in result.session.refused.items()]
     found += [("Session", step.text) for step in result.steps if step.status != "done"]
+    found += [("Body", text.removeprefix("Warning: ")) for text in result.doubts]
     for trial in result.trials:
         found += [(f"Trial {trial.trial.name}", text) for text in trial.reasons]
     outside = [check for check in result.checks if not check.inside]
-    return found + [(f"{check.what}, {check.where}", f"{check.value}, limit {check.limit}. {check.advice}") for check in outside]
+    return found + [(f"{check.what}, {check.where}", f"{check.value}, should be {check.limit}. {check.advice}") for check in outside]
 
 
 def page(result: SessionResult, provenance: Provenance) -> str:

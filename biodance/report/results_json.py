@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -60,7 +59,7 @@ def _standing(standing: Standing) -> dict[str, Any]:
 
 
 def _trial(result: TrialResult) -> dict[str, Any]:
-    trial, fit, gaps = result.trial, result.fit, result.gaps
+    trial, fit = result.trial, result.fit
     return {
         "name": trial.name,
         "role": trial.role,
@@ -70,8 +69,8 @@ def _trial(result: TrialResult) -> dict[str, Any]:
         "marker_set": trial.marker_set,
         "frames": 0 if trial.markers is None else trial.markers.time.size,
         "rate_hz": None if trial.markers is None else trial.markers.rate,
-        "gaps_percent": None if gaps is None else gaps.total,
-        "gaps": [] if gaps is None else [{"marker": n, "percent": p} for n, p in zip(gaps.names, gaps.percent, strict=True) if p > 0],
+        "gaps_percent": result.gaps_percent,
+        "gaps": [{"marker": g.label, "percent": g.percent, "longest_s": g.longest} for g in result.gaps if g.percent > 0],
         "marker_rms_m": None if fit is None else fit.total_rms,
         "marker_max_m": None if fit is None else fit.total_max,
         "markers": []
@@ -124,9 +123,3 @@ def document(result: SessionResult, provenance: Provenance) -> dict[str, Any]:
         "diagnosis": None,
         "provenance": provenance.as_dict(),
     }
-
-
-def write_text(path: Path, text: str) -> Path:
-    """Write ``text`` as UTF-8 with Unix line ends and return the path."""
-    path.write_text(text, encoding="utf-8", newline="\n")
-    return path

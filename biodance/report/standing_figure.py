@@ -6,11 +6,14 @@ import numpy as np
 
 from biodance.pipeline.results import Standing
 from biodance.records import Array
-from biodance.report.style import BLACK, BLUE, GREY, SIDES, figure, look
+from biodance.report.style import BLACK, GREEN, GREY, SIDES, figure, look
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+AROUND = 200.0
+"""mm that the wide view shows around the feet."""
 
 
 def _turned(points: Array, standing: Standing) -> Array:
@@ -45,10 +48,14 @@ def standing_figure(standing: Standing) -> "Figure":
         for axes in (wide, near):
             _path(axes, _turned(standing.cop, standing), colour=BLACK, marker="o", label="centre of pressure (plates)")
             if standing.com.size:
-                _path(axes, _turned(standing.com, standing), colour=BLUE, marker="D", label="centre of mass (table)")
+                _path(axes, _turned(standing.com, standing), colour=GREEN, marker="D", label="centre of mass (table)")
             axes.set_aspect("equal")
             axes.set_xlabel("to the subject's right (mm)")
         _surroundings(wide, standing)
+        shown = _turned(np.concatenate([standing.feet, standing.cop]), standing)
+        (left, back), (right, front) = np.nanmin(shown, axis=0) - AROUND, np.nanmax(shown, axis=0) + AROUND
+        wide.set_xlim(left, right)
+        wide.set_ylim(back, front)
         wide.set_ylabel("ahead (mm)")
         reach = 1.4 * max(20.0, *(np.nanmax(np.abs(_turned(p, standing))) for p in (standing.cop, standing.com) if p.size))
         near.set_xlim(-reach, reach)

@@ -14,18 +14,23 @@ if TYPE_CHECKING:
 FORCE_SCALE = 0.001
 """Length of the drawn force, m per N."""
 
-VIEWS = ((10.0, -60.0, "from the front right"), (5.0, 0.0, "along lab x"))
+VIEWS = ((12.0, -35.0, "from the front, right"), (0.0, -90.0, "from the right"))
+"""Elevation and azimuth in degrees, the latter from where the subject looks, and title of each view."""
 
 
 def _frame(axes: "Axes3D", still: Still) -> None:
-    """Give all three axes one scale around the body."""
+    """Give all three axes one scale around the body, which stands in the middle."""
     points = np.concatenate([still.bones.reshape(-1, 3), still.markers.reshape(-1, 3)])
-    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
-    middle, reach = (low + high) / 2, np.max(high - low) / 2
-    for place, axis in zip(middle, "xyz", strict=True):
-        axes.set(**{f"{axis}lim": (place - reach, place + reach)})
-    axes.set_box_aspect((1, 1, 1))
-    axes.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
+    low, high = np.nanmin(points, axis=0) - 0.05, np.nanmax(points, axis=0) + 0.05
+    reach = np.max((high - low)[:2]) / 2 + 0.1
+    middle = (low + high) / 2
+    axes.set_xlim(middle[0] - reach, middle[0] + reach)
+    axes.set_ylim(middle[1] - reach, middle[1] + reach)
+    axes.set_zlim(low[2], high[2])
+    axes.set_box_aspect((2 * reach, 2 * reach, high[2] - low[2]), zoom=1.12)
+    axes.set_proj_type("ortho")
+    axes.set(xticklabels=[], yticklabels=[], xlabel="x", ylabel="y", zlabel="z (m)")
+    axes.xaxis.labelpad = axes.yaxis.labelpad = -12.0
     axes.tick_params(labelsize=6.5)
 
 
@@ -45,18 +50,18 @@ def _plates(axes: "Axes3D", still: Still) -> None:
 
 
 def still_figure(still: Still) -> "Figure":
-    """Draw the body, its markers, the plates and the ground force from two sides, all axes to one scale."""
+    """Draw the body, its markers, the plates and the ground force from two sides, all axes to one scale (grid lines in m)."""
     from matplotlib.lines import Line2D
 
     with look():
-        drawn = figure(4.3)
+        drawn = figure(4.8)
         for i, (elevation, azimuth, title) in enumerate(VIEWS):
             axes = cast("Axes3D", drawn.add_subplot(1, 2, i + 1, projection="3d"))
             _body(axes, still)
             _plates(axes, still)
             _frame(axes, still)
-            axes.view_init(elevation, azimuth)
-            axes.set_title(title)
+            axes.view_init(elevation, azimuth + np.degrees(np.arctan2(still.forward[1], still.forward[0])))
+            axes.set_title(title, y=1.03)
         handles = [Line2D([], [], color=colour, linestyle=line, linewidth=2.2, label=side) for side, (colour, line) in SIDES.items()]
         handles.append(Line2D([], [], linestyle="", marker="o", markersize=3, color=BLACK, label="measured marker"))
         handles.append(Line2D([], [], linestyle="", marker="D", color=GREEN, label="centre of mass"))

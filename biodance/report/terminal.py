@@ -22,7 +22,7 @@ def _inspected_lines(record: dict[str, Any]) -> list[str]:
         known = record.get("marker_set") or "no known set"
         lines.append(f"{len(record['markers'])} markers ({known}), {_text(record.get('gaps_percent'))} % not seen")
     for plate in record.get("plates") or ():
-        lines.append(f"plate TYPE {plate['type']}: {_text(plate.get('mean_vertical_n'))} N vertical on average")
+        lines.append(f"{plate.get('name', 'plate')}, TYPE {plate['type']}: {_text(plate.get('mean_vertical_n'))} N vertical on average")
         lines += [f"  {decision}" for decision in plate.get("decisions", ())]
     if record.get("plates"):
         on_plates, declared = _text(record.get("mass_on_plates_kg"), 2), _text(record.get("declared_mass_kg"), 2)

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from biodance.lab.filters import runs
 from biodance.pipeline.results import WrenchComparison
 from biodance.records import CHANNELS
 from biodance.report.style import BLACK, GREY, RED, figure, look
@@ -15,17 +16,14 @@ if TYPE_CHECKING:
 
 TITLES = ("Fx (N)", "Fy (N)", "Fz (N)", "Mx (N·m)", "My (N·m)", "Mz (N·m)")
 
-
-def _runs(mask: np.ndarray) -> list[tuple[int, int]]:
-    """Return first and last index of every run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
-    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+LEAST = (10.0, 10.0, 10.0, 4.0, 4.0, 4.0)
+"""N, N·m: the least that an axis spans, so that the noise of quiet standing is not blown up."""
 
 
 def _shade(axes: "Axes", comparison: WrenchComparison) -> None:
     """Hatch the frames that are left out of every number."""
-    for first, last in _runs(np.logical_not(comparison.used)):
-        axes.axvspan(comparison.time[first], comparison.time[last], facecolor="#EDEDED", edgecolor="#C4C4C4", hatch="////", linewidth=0)
+    for first, stop in runs(np.logical_not(comparison.used)):
+        axes.axvspan(comparison.time[first], comparison.time[stop - 1], facecolor="#EDEDED", edgecolor="#C4C4C4", hatch="////", linewidth=0)
 
 
 def _curves(axes: "Axes", comparison: WrenchComparison, channel: int) -> None:
@@ -35,8 +33,8 @@ def _curves(axes: "Axes", comparison: WrenchComparison, channel: int) -> None:
     axes.plot(time, comparison.simulated[:, channel], color=RED, linestyle=(0, (4, 2)))
     shown = np.concatenate([comparison.measured[:, channel], comparison.simulated[used, channel] if used.any() else np.empty(0)])
     low, high = np.nanmin(shown), np.nanmax(shown)
-    margin = 0.06 * (high - low) or 1.0
-    axes.set_ylim(low - margin, high + margin)
+    half = max(0.56 * (high - low), LEAST[channel] / 2)
+    axes.set_ylim((low + high) / 2 - half, (low + high) / 2 + half)
     axes.set_ylabel(TITLES[channel])
     axes.tick_params(labelbottom=False)
 
@@ -46,8 +44,9 @@ def _residual(axes: "Axes", comparison: WrenchComparison, channel: int) -> None:
     _shade(axes, comparison)
     axes.axhline(0.0, color=GREY, linewidth=0.6)
     axes.plot(comparison.time, difference, color=BLACK, linestyle="-", linewidth=0.9)
-    largest = np.nanmax(np.abs(difference)) if comparison.used.any() else 1.0
-    axes.set_ylim(-1.15 * largest, 1.15 * largest)
+    largest = np.nanmax(np.abs(difference)) if comparison.used.any() else 0.0
+    half = max(1.15 * largest, LEAST[channel] / 4)
+    axes.set_ylim(-half, half)
     axes.set_ylabel("diff.", fontsize=7.5)
 
 

@@ -1,0 +1,90 @@
+"""A whole session through all stages. One trial that fails never stops the others."""
+
+from collections.abc import Callable
+
+from biodance.body.human import DEFAULT_TABLE
+from biodance.errors import TrialRefused
+from biodance.lab.filters import LowPass
+from biodance.lab.weight import SHORTEST, SWAY
+from biodance.motion.contact import ContactRules
+from biodance.motion.regressor import GRAVITY
+from biodance.pipeline.body import body_of
+from biodance.pipeline.checks import mass_check, standing_check, trial_checks
+from biodance.pipeline.results import Check, SessionResult, Standing, Step, TrialResult
+from biodance.pipeline.steps import attempt
+from biodance.pipeline.still import still_of
+from biodance.pipeline.trial import examine_trial, prepared
+from biodance.records import Session
+
+STOPPED = Step("stop", "refused", "Not done: the run was stopped by Ctrl-C before this trial.")
+
+
+def examine(session: Session, *, tell: Callable[[str], None] = lambda _: None) -> SessionResult:
+    """Take a session through all stages and return all that was found; ``tell`` is called with what is being done.
+
+    Ctrl-C ends the work after the trials that are done; the others say so (``SessionResult.stopped``).
+    """
+    steps: list[Step] = []
+    read = []
+    for trial in session.trials:
+        tell(f"preparing {trial.name}")
+        read.append(prepared(trial))
+    tell("scaling the body")
+    body, source = body_of(session.subject, tuple(read), steps)
+    results: list[TrialResult] = []
+    try:
+        for one in read:
+            tell(f"tracking {one.trial.name}")
+            results.append(examine_trial(one, body, mass=session.subject.mass))
+    except KeyboardInterrupt:
+        results += [TrialResult(one.trial, (*one.steps, STOPPED), one.gaps) for one in read[len(results) :]]
+    done = tuple(results)
+    standing = attempt(steps, "standing", lambda: best_standing(done))
+    return SessionResult(
+        session=session,
+        subject=session.subject,
+        body=body,
+        body_source=source,
+        steps=tuple(steps),
+        trials=done,
+        checks=checks(session, done, standing),
+        standing=standing,
+        still=attempt(steps, "still", lambda: still_of(body, done)) if body else None,
+        settings=settings(),
+    )
+
+
+def best_standing(results: tuple[TrialResult, ...]) -> Standing:
+    """Return the quiet standing of a static trial, else of a check, else the longest of all.
+
+    Raises
+    ------
+    TrialRefused
+        Nobody stands still on the plates in any trial.
+    """
+    found = [(result.trial.role, result.standing) for result in results if result.standing is not None]
+    if not found:
+        raise TrialRefused(
+            f"Nobody stands still for {SHORTEST:g} s with both feet on the plates in any trial, so the declared mass cannot be checked. "
+            "Record a few seconds of quiet standing on the plates."
+        )
+    order = {"static": 0, "check": 1}
+    return min(found, key=lambda pair: (order.get(pair[0], 2), pair[1].start - pair[1].end))[1]
+
+
+def checks(session: Session, results: tuple[TrialResult, ...], standing: Standing | None) -> tuple[Check, ...]:
+    """Return the rows of the quality table: the session's, then those of every trial."""
+    rows = [*mass_check(session.subject, standing), *standing_check(standing)]
+    return (*rows, *(row for result in results for row in trial_checks(result, session.subject.mass)))
+
+
+def settings() -> dict[str, str]:
+    """Return every number that shaped the results and is no property of the data, as text."""
+    rules = ContactRules()
+    return {
+        "low-pass of forces and joint coordinates": str(LowPass()),
+        "gravity": f"{-GRAVITY[2]:g} m/s²",
+        "table": DEFAULT_TABLE,
+        "a foot may touch": f"lower than {1000 * rules.height:g} mm over a surface and slower than {rules.speed:g} m/s",
+        "quiet standing": f"at least {SHORTEST:g} s with the vertical force within {100 * SWAY:g} % of its median",
+    }

@@ -1,0 +1,84 @@
+"""Quiet standing on the plates: the mass they carry, and the centre of mass beside the centre of pressure.
+
+Standing still, the mean centre of mass lies over the mean centre of pressure, and the mean vertical force is the weight: two checks
+that need no model of motion. Quiet is the longest run in which the vertical force stays within `SWAY` of its median.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.body.body import Body
+from biodance.lab.filters import runs
+from biodance.lab.marker_sets import landmark, read_marker_set
+from biodance.lab.weight import LOADED, SHORTEST, SWAY
+from biodance.motion.kinematics import poses
+from biodance.motion.regressor import GRAVITY
+from biodance.pipeline.results import Standing
+from biodance.records import Array, Motion, Trial
+
+FOOT_LANDMARKS = tuple(f"{side}_{place}" for side in ("left", "right") for place in ("heel", "toe", "ankle_lateral", "toe_lateral"))
+
+
+def quiet_run(vertical: Array, used: NDArray[np.bool_], rate: float) -> slice | None:
+    """Return the longest run of ``used`` frames (T,) in which the ``vertical`` force (T,) N is steady; None if it is too short."""
+    if not used.any() or np.median(vertical[used]) < LOADED:
+        return None
+    middle = float(np.median(vertical[used]))
+    steady = runs((np.abs(vertical - middle) <= SWAY * middle) & used)
+    first, stop = max(steady, key=lambda run: run[1] - run[0], default=(0, 0))
+    return slice(first, stop) if stop - first >= SHORTEST * rate else None
+
+
+def centre_of_mass(body: Body, motion: Motion) -> Array:
+    """Return the centre of mass (T, 3) m of ``body`` with its own parameters during ``motion``."""
+    mass = body.sip.mass
+    carried = np.flatnonzero(mass > 0)
+    points = poses(body, motion.q).points(carried.tolist(), body.sip.com[carried])
+    return np.einsum("k,tkj->tj", mass[carried], points) / mass[carried].sum()
+
+
+def facing(body: Body, motion: Motion) -> Array:
+    """Return the horizontal unit vector (2,) along which the pelvis faces on average (its x axis, anterior)."""
+    ahead = poses(body, motion.q).rotation[:, 0, :2, 0].mean(axis=0)
+    return ahead / np.linalg.norm(ahead)
+
+
+def _feet(trial: Trial, run: slice) -> tuple[tuple[str, ...], Array]:
+    """Return names and mean horizontal places (F, 2) m of the foot landmarks that the marker set knows."""
+    if trial.markers is None or not trial.marker_set:
+        return (), np.empty((0, 2))
+    marker_set = read_marker_set(trial.marker_set)
+    found = {name: landmark(trial.markers, marker_set, name) for name in FOOT_LANDMARKS}
+    places = {name: np.nanmean(path[run, :2], axis=0) for name, path in found.items() if path is not None and np.isfinite(path[run]).any()}
+    return tuple(places), np.array(list(places.values())).reshape(-1, 2)
+
+
+def quiet_standing(trial: Trial, used: NDArray[np.bool_], body: Body | None, motion: Motion | None) -> Standing | None:
+    """Return the quiet standing of a prepared trial, over the longest steady run of the frames ``used`` (T,); None without one."""
+    wrench = trial.wrench
+    run = quiet_run(wrench.force[:, 2], used, wrench.rate)
+    if run is None:
+        return None
+    height = float(np.mean([plate.height for plate in trial.plates]))
+    cop = wrench.cop(height=height)[run, :2]
+    com, ahead = np.empty((0, 2)), np.array([1.0, 0.0])
+    if body is not None and motion is not None:
+        com, ahead = centre_of_mass(body, motion)[run, :2], facing(body, motion)
+    arm = com.mean(axis=0) - cop.mean(axis=0) if com.size else np.full(2, np.nan)
+    mass = wrench.force[run, 2] / -GRAVITY[2]
+    names, feet = _feet(trial, run)
+    return Standing(
+        trial=trial.name,
+        start=float(wrench.time[run][0]),
+        end=float(wrench.time[run][-1]),
+        mass=float(mass.mean()),
+        mass_sd=float(mass.std()),
+        cop=cop,
+        com=com,
+        forward=ahead,
+        com_ahead=float(arm @ ahead),
+        com_left=float(arm @ np.array([-ahead[1], ahead[0]])),
+        feet=feet,
+        foot_names=names,
+        plates=np.array([plate.corners[:, :2] for plate in trial.plates]),
+    )

@@ -1,0 +1,140 @@
+"""One trial through all its steps: gaps, motion, contact, simulated wrench beside the measured one, quiet standing."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.errors import TrialRefused
+from biodance.lab.gaps import MarkerGaps, report_gaps
+from biodance.lab.marker_sets import canonical, read_marker_set
+from biodance.lab.prepare import prepare
+from biodance.motion.comparison import compare
+from biodance.motion.contact import Contact, ground_contact
+from biodance.motion.regressor import predict_wrench
+from biodance.motion.soles import Soles, soles_from_body, soles_from_markers
+from biodance.motion.track import track
+from biodance.pipeline.results import MarkerFit, Step, TrialResult, WrenchComparison
+from biodance.pipeline.standing import quiet_standing
+from biodance.pipeline.steps import attempt
+from biodance.records import Motion, Trial
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A trial after preparing (as read where that was refused), the steps so far and the gaps as recorded."""
+
+    trial: Trial
+    steps: tuple[Step, ...]
+    gaps: tuple[MarkerGaps, ...] = ()
+
+    @property
+    def usable(self) -> bool:
+        """Whether preparing was done."""
+        return all(step.status == "done" for step in self.steps)
+
+
+def gaps_of(trial: Trial) -> tuple[MarkerGaps, ...]:
+    """Return the gaps of the trial's own marker set, as recorded; of all markers where no set is known."""
+    if trial.markers is None:
+        return ()
+    markers = canonical(trial.markers, read_marker_set(trial.marker_set)) if trial.marker_set else trial.markers
+    return report_gaps(markers)
+
+
+def prepared(trial: Trial) -> Prepared:
+    """Prepare one trial; a refusal is a step, and the trial stays as it was read."""
+    steps: list[Step] = []
+    done = attempt(steps, "prepare", lambda: prepare(trial))
+    return Prepared(done or trial, tuple(steps), gaps_of(trial))
+
+
+def marker_fit(motion: Motion) -> MarkerFit:
+    """Return the distances (m) of a motion's markers to the model: RMS and largest per marker and of all together."""
+    squares = motion.residual**2
+    seen = np.isfinite(squares)
+    count = seen.sum(axis=0)
+    total = np.where(seen, squares, 0.0)
+    rms = np.sqrt(np.divide(total.sum(axis=0), count, out=np.full(count.shape, np.nan), where=count > 0))
+    largest = np.where(count > 0, np.where(seen, motion.residual, -np.inf).max(axis=0, initial=-np.inf), np.nan)
+    overall = np.sqrt(total.sum() / count.sum()) if count.any() else np.nan
+    return MarkerFit(motion.marker_names, rms, largest, float(overall), float(np.nanmax(largest)) if count.any() else np.nan)
+
+
+def feet(trial: Trial, body: Body | None, motion: Motion | None) -> Soles:
+    """Return the soles of the moving body, else of the foot markers.
+
+    Raises
+    ------
+    TrialRefused
+        Neither a motion nor a known marker set tells where the feet are.
+    """
+    if body is not None and motion is not None:
+        return soles_from_body(body, motion)
+    if trial.markers is None or not trial.marker_set:
+        raise TrialRefused(f"Trial {trial.name}: no markers of a known set, so nobody knows where the feet are.")
+    return soles_from_markers(trial.markers, read_marker_set(trial.marker_set))
+
+
+def compare_wrenches(trial: Trial, body: Body, motion: Motion, contact: Contact) -> WrenchComparison:
+    """Compare the measured wrench of a prepared trial with the one that ``motion`` needs, over the fully measured frames.
+
+    Raises
+    ------
+    TrialRefused
+        No frame is fully measured; the message says why.
+    """
+    measured, simulated = trial.wrench, predict_wrench(body, motion)
+    if not contact.measured.any():
+        raise TrialRefused(f"Trial {trial.name}: {' '.join(contact.notes)} So measured and simulated wrench cannot be compared.")
+    agreement = compare(measured, simulated, contact.measured)
+    known = np.isfinite(measured.value).all(axis=1) & np.isfinite(simulated.value).all(axis=1)
+    correlation = np.array([np.nan if value is None else value for value in agreement.correlation])
+    notes = (*contact.notes, *agreement.notes)
+    return WrenchComparison(measured.time, measured.value, simulated.value, contact.measured & known, agreement.rms, correlation, notes)
+
+
+def tracked(trial: Trial, body: Body | None) -> Motion:
+    """Return the motion of ``body`` under the trial's markers.
+
+    Raises
+    ------
+    TrialRefused
+        There are no markers, no known marker set, no body, or the markers do not determine the posture.
+    """
+    if trial.markers is None:
+        raise TrialRefused(f"Trial {trial.name}: it has no markers, so no motion; only its plates are reported.")
+    if not trial.marker_set:
+        raise TrialRefused(
+            f"Trial {trial.name}: its {len(trial.markers.names)} labels are of no known marker set, so no body can follow them. "
+            "Label them as in anthropometry/marker_sets, or describe your own set in a TOML file of that form."
+        )
+    if body is None:
+        raise TrialRefused(f"Trial {trial.name}: there is no body to follow the markers (see the session).")
+    return track(body, trial)
+
+
+def examine_trial(read: Prepared, body: Body | None, *, mass: float) -> TrialResult:
+    """Take a prepared trial through the remaining steps; ``mass`` kg of the body, NaN = unknown.
+
+    What has no markers or no body is not tracked, what has no plates is not compared: each is a step with its reason.
+    """
+    trial, steps = read.trial, list(read.steps)
+    if not read.usable:
+        return TrialResult(trial, read.steps, read.gaps)
+    motion = attempt(steps, "track", lambda: tracked(trial, body))
+    fit = marker_fit(motion) if motion else None
+    if not trial.plates:
+        steps.append(Step("wrench", "refused", f"Trial {trial.name}: no force plate was recorded, so there is no wrench to compare with."))
+        return TrialResult(trial, tuple(steps), read.gaps, fit, motion)
+    if trial.markers is None:
+        everything = np.ones(trial.wrench.time.size, dtype=bool)
+        return TrialResult(trial, tuple(steps), read.gaps, standing=quiet_standing(trial, everything, None, None))
+    contact = attempt(steps, "contact", lambda: ground_contact(trial, feet(trial, body, motion), mass=mass))
+    if contact is None:
+        return TrialResult(trial, tuple(steps), read.gaps, fit, motion)
+    comparison = None
+    if body is not None and motion is not None:
+        comparison = attempt(steps, "compare", lambda: compare_wrenches(trial, body, motion, contact))
+    standing = attempt(steps, "standing", lambda: quiet_standing(trial, contact.measured, body, motion))
+    return TrialResult(trial, tuple(steps), read.gaps, fit, motion, comparison, standing)
