@@ -7,12 +7,12 @@ from biodance.errors import BiodanceError, UnknownName
 from biodance.motion.kinematics import poses
 from biodance.records import Subject
 from biodance.virtual_lab.flesh import FEMALE, of_parameters, parameters, placed, pseudo_inertia
+from biodance.virtual_lab.merge import MERGED, load_on, merged_sip, place_in_12
 from biodance.virtual_lab.person import AddedLoad, make_person
 from biodance.virtual_lab.proportions import UPRIGHT_CHAIN
 from biodance.virtual_lab.skeleton import SEGMENTS
 from biodance.virtual_lab.soft_tissue import reference_angles
 from biodance.virtual_lab.tolerances import PERFECT
-from biodance.virtual_lab.truth import MERGED, merged_sip
 
 SUBJECTS = [Subject(45, 1.50, "F"), Subject(65, 1.75, "F"), Subject(80, 1.70, "M"), Subject(110, 1.95, "M")]
 
@@ -93,3 +93,20 @@ def test_the_merge_to_12_segments_keeps_mass_centre_and_kinetic_energy():
         place = pose.joint_position[0, index] if joint else pose.root_position[0]
         coarse += placed(of_parameters(merged.of(segment)), turn, place)
     np.testing.assert_allclose(coarse, fine, atol=1e-10)
+
+
+@pytest.mark.parametrize("segment", list(MERGED))
+def test_a_load_can_be_put_on_each_of_the_12_segments(segment):
+    bare = make_person(SUBJECTS[1], 5)
+    load = load_on(bare, segment, 1.0)
+    loaded = make_person(SUBJECTS[1], 5, loads=(load,))
+    change = (merged_sip(loaded, loaded.loaded_body).phi - merged_sip(bare, bare.body).phi).reshape(-1, 10)
+    row = change[list(MERGED).index(segment)]
+    assert row[0] == pytest.approx(1.0)
+    named, place = place_in_12(loaded, load)
+    assert named == segment
+    np.testing.assert_allclose(row[1:4], place, atol=1e-12)
+    away = np.linalg.norm(place - merged_sip(bare, bare.body).com[list(MERGED).index(segment)])
+    assert away == pytest.approx(0.10 if segment in ("pelvis", "trunk_head") else 0.06)
+    with pytest.raises(UnknownName, match="left_foot"):
+        load_on(bare, "left_foott", 1.0)

@@ -11,11 +11,11 @@ from biodance.lab.c3d import read_c3d
 from biodance.lab.session import read_session
 from biodance.motion.kinematics import poses
 from biodance.records import Subject
-from biodance.virtual_lab.laboratory import Laboratory, record, set_up
+from biodance.virtual_lab.laboratory import Laboratory, Visit, perform_in, record, set_up
 from biodance.virtual_lab.person import AddedLoad, make_person
 from biodance.virtual_lab.protocol import Protocol
 from biodance.virtual_lab.protocol_file import read_protocol
-from biodance.virtual_lab.simulate import perform_in, simulate
+from biodance.virtual_lab.simulate import simulate
 from biodance.virtual_lab.tolerances import REALISTIC, instruments_perfect
 
 SUBJECT = Subject(58.0, 1.66, "F", 28.0, "S07")
@@ -70,7 +70,7 @@ def test_the_same_seed_writes_the_same_bytes_and_another_day_does_not(tmp_path, 
     for path in sorted(session.rglob("*.*")):
         if path.is_file():
             assert (again / path.relative_to(session)).read_bytes() == path.read_bytes(), path.name
-    other = simulate(SUBJECT, protocol, tmp_path / "other", seed=11, session=1)
+    other = simulate(SUBJECT, protocol, tmp_path / "other", seed=11, visit=Visit(1))
     assert (other / "static.c3d").read_bytes() != (session / "static.c3d").read_bytes()
     one, two = (json.loads((s / "truth" / "truth.json").read_text()) for s in (session, other))
     assert one["segments_16"] == two["segments_16"]
@@ -79,9 +79,9 @@ def test_the_same_seed_writes_the_same_bytes_and_another_day_does_not(tmp_path, 
 
 @pytest.mark.parametrize("laboratory", [Laboratory(bits=32), Laboratory(bits=32, plate_type=4, heading=1.2), Laboratory(bits=32, plates=2)])
 def test_a_perfect_laboratory_gives_the_truth_back(tmp_path, protocol, laboratory):
-    out = simulate(SUBJECT, protocol, tmp_path / "S", seed=3, laboratory=laboratory, tolerances=FAITHFUL)
+    out = simulate(SUBJECT, protocol, tmp_path / "S", seed=3, visit=Visit(0, laboratory, FAITHFUL))
     person = make_person(SUBJECT, 3, tolerances=FAITHFUL)
-    act = perform_in(set_up(laboratory, person, 0, FAITHFUL), person, "squat_1", protocol, 0)
+    act = perform_in(set_up(person, Visit(0, laboratory, FAITHFUL)), person, protocol.trials[1])
     trial = read_c3d(out / "squat_1.c3d")
     assert len(trial.plates) == laboratory.plates
     wanted = act.wrench(trial.plates[0].wrench.time).value
@@ -95,7 +95,7 @@ def test_a_perfect_laboratory_gives_the_truth_back(tmp_path, protocol, laborator
 def test_the_two_plates_carry_the_two_feet(tmp_path):
     short = read_protocol("short")
     one_leg = Protocol("one leg", "", (short.trials[0], short.trials[1]), short.postures)
-    out = simulate(SUBJECT, one_leg, tmp_path / "S", seed=3, laboratory=Laboratory(plates=2), tolerances=FAITHFUL)
+    out = simulate(SUBJECT, one_leg, tmp_path / "S", seed=3, visit=Visit(0, Laboratory(plates=2), FAITHFUL))
     trial = read_c3d(out / "dance_1.c3d")
     right, left = sorted(trial.plates, key=lambda plate: plate.centre[1])
     time = trial.plates[0].wrench.time
@@ -115,9 +115,9 @@ def test_each_instrument_fault_is_where_it_was_put(protocol):
 
     def channels(**changed):
         tolerances = replace(FAITHFUL, **changed)
-        instruments = set_up(lab, person, 0, tolerances)
-        act = perform_in(instruments, person, "squat_1", protocol, 0)
-        return record(act, instruments, 0).plates[0].channels, instruments
+        instruments = set_up(person, Visit(0, lab, tolerances))
+        act = perform_in(instruments, person, protocol.trials[1])
+        return record(act, instruments).plates[0].channels, instruments
 
     clean, _ = channels()
     late, _ = channels(plate_delay=0.005)
@@ -138,9 +138,9 @@ def test_each_instrument_fault_is_where_it_was_put(protocol):
 def test_markers_wander_on_the_skin_by_some_millimetres(protocol):
     person = make_person(SUBJECT, 3)
     wander = replace(REALISTIC, camera_noise=0.0, gaps_per_minute=0.0, lab_tilt=0.0)
-    instruments = set_up(Laboratory(), person, 0, wander)
-    act = perform_in(instruments, person, "squat_1", protocol, 0)
-    markers = record(act, instruments, 0).markers
+    instruments = set_up(person, Visit(tolerances=wander))
+    act = perform_in(instruments, person, protocol.trials[1])
+    markers = record(act, instruments).markers
     pose = poses(person.body, act.motion(markers.time).q)
     apart = markers.xyz - pose.points(person.body.markers.segment, np.array(person.body.markers.position))
     local = np.einsum("tkji,tkj->tki", pose.rotation[:, list(person.body.markers.segment)], apart)
@@ -152,7 +152,7 @@ def test_markers_wander_on_the_skin_by_some_millimetres(protocol):
 
 def test_loads_weigh_on_the_plate_but_not_in_what_the_analyst_declares(tmp_path, protocol):
     load = AddedLoad("left_forearm", 2.4, np.array([0.0, -0.1, 0.0]))
-    out = simulate(SUBJECT, protocol, tmp_path / "loaded", seed=11, session=1, loads=(load,))
+    out = simulate(SUBJECT, protocol, tmp_path / "loaded", seed=11, loads=(load,), visit=Visit(1))
     assert read_session(out).subject.mass == pytest.approx(58.0, abs=0.2)
     static = read_c3d(out / "static.c3d")
     assert static.wrench.force[:, 2].mean() / 9.80665 == pytest.approx(60.4, rel=0.01)
@@ -168,7 +168,7 @@ def test_a_fault_changes_the_raw_recording_before_it_is_written(tmp_path, protoc
         channels[:, 4] = 0.0
         return replace(recording, plates=(replace(plate, channels=channels),))
 
-    out = simulate(SUBJECT, protocol, tmp_path / "S", seed=11, faults=(dead_channel,))
+    out = simulate(SUBJECT, protocol, tmp_path / "S", seed=11, visit=Visit(faults=(dead_channel,)))
     from biodance.lab.raw_c3d import read_raw
 
     assert not read_raw(out / "static.c3d").analog[:, 4].any()

@@ -1,7 +1,7 @@
 """The laboratory of a virtual session: what stands where, what it records, and what it writes to disk."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -10,14 +10,15 @@ from biodance.errors import BiodanceError
 from biodance.lab.write_c3d import PlateRecording, write_c3d
 from biodance.records import Array, Markers, Role, frozen_array
 from biodance.virtual_lab.cameras import film
-from biodance.virtual_lab.performance import Performance
+from biodance.virtual_lab.performance import Performance, perform
 from biodance.virtual_lab.person import Person
 from biodance.virtual_lab.placement import MARKER_RADIUS
 from biodance.virtual_lab.plates import HALF_SIZE, TruePlate, digitise, lay_plate, measure
+from biodance.virtual_lab.protocol import TrialPlan
 from biodance.virtual_lab.randomness import stream
 from biodance.virtual_lab.skeleton import small_rotation
 from biodance.virtual_lab.soft_tissue import SoftTissue, draw_soft_tissue
-from biodance.virtual_lab.tolerances import Tolerances
+from biodance.virtual_lab.tolerances import REALISTIC, Tolerances
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,17 +43,6 @@ class Laboratory:
 
 
 @dataclass(frozen=True, eq=False)
-class Instruments:
-    """What is true of a laboratory on one day with one person: plates, the cameras' ``tilt`` (3, 3) from true vertical, the skin."""
-
-    laboratory: Laboratory
-    plates: tuple[TruePlate, ...]
-    tilt: Array
-    tissue: SoftTissue
-    tolerances: Tolerances
-
-
-@dataclass(frozen=True, eq=False)
 class Recording:
     """One trial as the instruments deliver it, before it is written; ``parameters`` of the C3D file. Faults are functions of this
     record.
@@ -69,23 +59,56 @@ class Recording:
 Fault = Callable[[Recording], Recording]
 
 
-def set_up(laboratory: Laboratory, person: Person, session: int, tolerances: Tolerances) -> Instruments:
-    """Draw the instruments of one session."""
+@dataclass(frozen=True, eq=False)
+class Visit:
+    """The day of a session: its ``number`` (another day: markers glued, postures performed, instruments drawn anew), the ``laboratory``,
+    the ``tolerances`` of everything, and ``faults`` that change each recording (markers, raw analog samples, parameters) before it is
+    written.
+    """
+
+    number: int = 0
+    laboratory: Laboratory = field(default_factory=Laboratory)
+    tolerances: Tolerances = REALISTIC
+    faults: tuple[Fault, ...] = ()
+
+
+FIRST_VISIT = Visit()
+"""One plate, realistic tolerances, no fault."""
+
+
+@dataclass(frozen=True, eq=False)
+class Instruments:
+    """What is true of a visit's instruments: plates, the cameras' ``tilt`` (3, 3) from true vertical, the skin under the markers."""
+
+    visit: Visit
+    plates: tuple[TruePlate, ...]
+    tilt: Array
+    tissue: SoftTissue
+
+
+def set_up(person: Person, visit: Visit) -> Instruments:
+    """Draw the instruments of one visit."""
+    laboratory, tolerances, session = visit.laboratory, visit.tolerances, visit.number
     rng = stream(person.seed, "instruments", str(session))
     tilt = np.array([*(tolerances.lab_tilt * rng.normal(size=2)), 0.0])
     middle = np.array([*laboratory.centre, 0.0])
     leftward = np.array([-np.sin(laboratory.heading), np.cos(laboratory.heading), 0.0]) * HALF_SIZE[0]
     sides = [("both", 0.0)] if laboratory.plates == 1 else [("right", -1.0), ("left", 1.0)]
     plates = tuple(lay_plate(middle + sign * leftward, laboratory.heading, side, tolerances, rng) for side, sign in sides)
-    return Instruments(
-        laboratory, plates, frozen_array(small_rotation(tilt), (3, 3), "tilt"), draw_soft_tissue(person, session, tolerances), tolerances
-    )
+    return Instruments(visit, plates, frozen_array(small_rotation(tilt), (3, 3), "tilt"), draw_soft_tissue(person, session, tolerances))
 
 
-def record(performance: Performance, instruments: Instruments, session: int) -> Recording:
+def perform_in(instruments: Instruments, person: Person, plan: TrialPlan) -> Performance:
+    """Let the person perform one trial where the laboratory's plates are."""
+    visit = instruments.visit
+    lab = visit.laboratory
+    return perform(person, plan, visit.number, tolerances=visit.tolerances, centre=np.array(lab.centre), heading=lab.heading)
+
+
+def record(performance: Performance, instruments: Instruments) -> Recording:
     """Return what the instruments deliver of one performance: markers at the camera rate, plates at ``samples`` times that rate."""
-    lab, tolerances, plan = instruments.laboratory, instruments.tolerances, performance.plan
-    seed = performance.person.seed
+    visit, plan, seed = instruments.visit, performance.plan, performance.person.seed
+    lab, tolerances, session = visit.laboratory, visit.tolerances, visit.number
     frames = round(plan.duration * lab.camera_rate) + 1
     time = np.arange(frames) / lab.camera_rate
     analog_rate = lab.camera_rate * lab.samples

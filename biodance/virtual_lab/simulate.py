@@ -12,12 +12,10 @@ import numpy as np
 
 from biodance.errors import BiodanceError
 from biodance.records import Subject
-from biodance.virtual_lab.laboratory import Fault, Instruments, Laboratory, declared_mass, record, set_up, write
-from biodance.virtual_lab.performance import Performance, perform
+from biodance.virtual_lab.laboratory import FIRST_VISIT, Visit, declared_mass, perform_in, record, set_up, write
 from biodance.virtual_lab.person import AddedLoad, Person, make_person
 from biodance.virtual_lab.protocol import Protocol
 from biodance.virtual_lab.protocol_file import read_protocol
-from biodance.virtual_lab.tolerances import REALISTIC, Tolerances
 from biodance.virtual_lab.truth import truth
 
 TRUTH = "truth"
@@ -31,17 +29,13 @@ def simulate(
     out: Path,
     *,
     seed: int,
-    session: int = 0,
     loads: tuple[AddedLoad, ...] = (),
-    laboratory: Laboratory | None = None,
-    tolerances: Tolerances = REALISTIC,
-    faults: tuple[Fault, ...] = (),
+    visit: Visit = FIRST_VISIT,
 ) -> Path:
     """Write a simulated session into ``out`` (made here, must be empty or absent) and return that folder.
 
-    ``subject`` mass kg, stature m, sex. ``seed`` is the person: the same seed is the same body on every ``session``, on which markers are
-    placed, postures performed and instruments drawn anew. ``loads`` are carried on top of the subject's mass. ``faults`` change each
-    recording (markers, raw analog samples, parameters) before it is written. The same arguments write the same bytes.
+    ``subject`` mass kg, stature m, sex. ``seed`` is the person: the same seed is the same body on every ``visit``. ``loads`` are carried on
+    top of the subject's mass. The same arguments write the same bytes.
 
     Raises
     ------
@@ -52,29 +46,22 @@ def simulate(
     """
     plan = protocol if isinstance(protocol, Protocol) else read_protocol(protocol)
     _check(subject, out)
-    person = make_person(subject, seed, tolerances=tolerances, loads=loads, session=session)
-    instruments = set_up(laboratory or Laboratory(), person, session, tolerances)
+    person = make_person(subject, seed, tolerances=visit.tolerances, loads=loads, session=visit.number)
+    instruments = set_up(person, visit)
     out.mkdir(parents=True, exist_ok=True)
     performances = []
     for trial in plan.trials:
-        performance = perform_in(instruments, person, trial.name, plan, session)
-        recording = record(performance, instruments, session)
-        for fault in faults:
+        performance = perform_in(instruments, person, trial)
+        recording = record(performance, instruments)
+        for fault in visit.faults:
             recording = fault(recording)
         write(recording, out)
         performances.append(performance)
-    (out / "session.toml").write_text(_session_toml(person, plan, declared_mass(person, session, tolerances)))
+    (out / "session.toml").write_text(_session_toml(person, plan, declared_mass(person, visit.number, visit.tolerances)))
     (out / TRUTH).mkdir()
-    document = truth(person, session, plan.name, instruments, performances)
+    document = truth(person, plan.name, instruments, performances)
     (out / TRUTH / "truth.json").write_text(json.dumps(document, indent=1) + "\n")
     return out
-
-
-def perform_in(instruments: Instruments, person: Person, trial: str, protocol: Protocol, session: int) -> Performance:
-    """Let the person perform one trial of a protocol, by name, where the laboratory's plates are."""
-    plan = next(t for t in protocol.trials if t.name == trial)
-    lab = instruments.laboratory
-    return perform(person, plan, session, tolerances=instruments.tolerances, centre=np.array(lab.centre), heading=lab.heading)
 
 
 def _check(subject: Subject, out: Path) -> None:
