@@ -43,7 +43,9 @@ def parse_amti_text(path: Path) -> AmtiText:
     beside = path.with_suffix(".toml")
     given = _given(beside) if beside.is_file() else {}
     columns, units = _header_columns(header)
-    columns = list(given.get("columns", columns))
+    columns = given.get("columns", columns)
+    if not isinstance(columns, list):
+        raise FileRefused(f"{beside}: columns must name the columns, such as {list(CHANNELS)}; it is {columns!r}. Correct it.")
     force_unit = given.get("force_unit", units.get("Fz"))
     moment_unit = given.get("moment_unit", units.get("Mz"))
     rate = given.get("rate_hz", _rate(values, columns))

@@ -13,6 +13,7 @@ SMALL = 30.0  # N, an offset that needs no further proof
 FLAT = 5.0  # N, spread of the block means up to which a plate counts as quiet
 SHARE = 1 / 3  # an offset of the sign of a load must stay below this share of the trial's range
 SHORTEST = 0.12  # s of unloaded signal, after one block was cut off at both ends, where the plate still rings
+DEAD, LONG = 1.5, 0.5  # N, s: a larger offset is only believed where the signal is as still as its own noise, and for longer
 FEW = 10  # samples: a shorter ZERO is only used where nothing better is found
 
 
@@ -58,9 +59,9 @@ def is_unloaded(level: float, vertical: Array) -> bool:
         return level <= low + NEAR or level >= high - NEAR
     if high - low < 5 * NEAR:
         return False
-    if level <= low + NEAR:
-        return level <= SHARE * (high - low)
-    return level >= high - NEAR and -level <= SHARE * (high - low)
+    load = level if level <= low + NEAR else -level
+    at_an_end = level <= low + NEAR or level >= high - NEAR
+    return at_an_end and -(high - low) <= load <= SHARE * (high - low)
 
 
 def block_means(values: Array, rate: float, *, length: float = BLOCK) -> tuple[Array, int]:
@@ -100,10 +101,15 @@ def _longest_unloaded(vertical: Array, rate: float) -> tuple[int, int] | None:
         spread = 1.4826 * float(np.median(np.abs(near - middle)))
         for start, stop in runs(np.abs(means - middle) <= max(FLAT, 4 * spread)):
             inner = slice(start + 1, stop - 1)
-            enough = (stop - start - 2) * size >= SHORTEST * rate
-            if enough and means[inner].std() <= FLAT and is_unloaded(float(means[inner].mean()), means):
-                found.append((stop - start, (start + 1) * size, (stop - 1) * size))
-    return max(found)[1:] if found else None
+            if stop - start < 3:
+                continue
+            level, length = float(means[inner].mean()), (stop - start - 2) * size / rate
+            small = abs(level) <= SMALL
+            noise = 1.5 * float(vertical[(start + 1) * size : (stop - 1) * size].std()) / np.sqrt(size)
+            quiet = means[inner].std() <= (FLAT if small else max(DEAD, noise)) and length >= (SHORTEST if small else LONG)
+            if quiet and is_unloaded(level, means):
+                found.append((small, length, (start + 1) * size, (stop - 1) * size))
+    return max(found)[2:] if found else None
 
 
 def _range(values: Array) -> tuple[float, float]:

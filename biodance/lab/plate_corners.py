@@ -9,14 +9,14 @@ SHORTEST_SIDE, LONGEST_SIDE = 0.2, 2.0  # m
 NOT_CLOSED, CROOKED = 0.02, 0.005  # m: refused from here on; worth a sentence from here on
 STEEPEST = 0.7  # the plate's normal must have at least this vertical share (45 degrees)
 SWAPS = {(0, 1, 3, 2): "3 and 4 (or 1 and 2)", (0, 2, 1, 3): "2 and 3 (or 1 and 4)"}
-UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+UNITS = {"m": 1.0, "mm": 0.001}
 
 
 def corners_in_lab(corners: Array, *, metres: float, turn: Array) -> tuple[Array, tuple[str, ...]]:
     """Return the corners (4, 3) in m in the lab frame after checking that they are a lying rectangle of 0.2-2 m, and what was decided.
 
-    ``corners`` in file units and axes, ``metres`` the file's length unit in m, ``turn`` (3, 3) from file axes to the lab. Corners in
-    another decimal unit than the points are converted where exactly one unit gives a legal size.
+    ``corners`` in file units and axes, ``metres`` the file's length unit in m, ``turn`` (3, 3) from file axes to the lab. Corners
+    that have an impossible size in the file's unit are taken as m or mm where that gives a legal one.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def half_sides(corners: Array) -> Array:
 
 
 def _unit(corners: Array, metres: float) -> tuple[float, list[str]]:
-    """Return the metres per unit of the corners: the file's own, or the only decimal one that gives a legal size."""
+    """Return the metres per unit of the corners: the file's own, or m or mm where only that gives a legal size."""
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)
     fits = [name for name, unit in UNITS.items() if unit * sides.min() >= SHORTEST_SIDE and unit * sides.max() <= LONGEST_SIDE]
     if any(np.isclose(UNITS[name], metres) for name in fits) or len(fits) != 1:

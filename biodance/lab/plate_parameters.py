@@ -44,13 +44,14 @@ def count_plates(raw: RawC3d) -> tuple[int, tuple[str, ...]]:
     types = _numbers(group, "TYPE").size
     used = _numbers(group, "USED")
     if not used.size:
-        said = f"FORCE_PLATFORM:USED is missing; {types} plates were taken from TYPE." if types else ""
-        return types, (said,) if said else ()
+        if not types and not _numbers(group, "CHANNEL").size:
+            return 0, ()
+        return types, (f"FORCE_PLATFORM:USED is missing; TYPE lists {types} plates, which were read.",)
     declared = int(used[0]) if np.isfinite(used[0]) and 0 <= used[0] <= 255 else 0
     if declared != used[0]:
         return 0, (f"FORCE_PLATFORM:USED is {used[0]:g}, legal is a whole number from 0 to 255; no plate was read. Correct the file.",)
     if declared < types:
-        return declared, (f"FORCE_PLATFORM:USED says {declared} plates, TYPE lists {types}; the first {declared} were read.",)
+        return declared, (f"FORCE_PLATFORM:USED says {declared} plates, TYPE lists {types}; {declared} were read.",)
     return declared, ()
 
 
@@ -130,12 +131,15 @@ def _calibration(group: Mapping[str, Any], kind: int, number: int) -> Array | No
 
 
 def _polynomial(group: Mapping[str, Any], number: int) -> Array | None:
-    """Return Kistler's FPCOPPOLY (2, 6) of the plate, None if the file has none or only zeros."""
+    """Return Kistler's FPCOPPOLY (2, 6) of the plate, stored as 2 x 6 or 6 x 2; None if the file has none or only zeros."""
     stored = _numbers(group, "FPCOPPOLY")
     if stored.size < 12 * number:
         return None
     block = stored[12 * (number - 1) : 12 * number]
-    return block.reshape(6, 2, order="F").T if np.isfinite(block).all() and block.any() else None
+    if not np.isfinite(block).all() or not block.any():
+        return None
+    by_term = _numbers(group, "FPCOPPOLY", keep=True).shape[0] == 2
+    return block.reshape(2, 6, order="F") if by_term else block.reshape(6, 2, order="F").T
 
 
 def _numbers(group: Mapping[str, Any], name: str, *, keep: bool = False) -> Array:

@@ -70,7 +70,8 @@ def read_plate_signals(raw: RawC3d, plate: PlateParameters, *, metres: float, tu
     sensor, sense, warnings = _moments_in_sense(plate, sensor, vector, corners, rate=raw.analog_rate, unsure=len(unit_said) > 1)
     first = f"TYPE {plate.type}, analog channels {', '.join(str(c + 1) for c in plate.channels)}."
     said = (first, *placed, *origin_said, *unit_said, *sense, zero.said)
-    return PlateReading(plate, corners, sensor, vector, raw.analog_rate, said, warnings)
+    odd = tuple(f"Plate {plate.number}: {sentence}" for sentence in (*placed, *origin_said))
+    return PlateReading(plate, corners, sensor, vector, raw.analog_rate, said, (*odd, *warnings))
 
 
 def _at_surface(plate: PlateParameters, sensor: Array, vector: Array, axes: Array) -> tuple[Array, tuple[str, ...]]:
@@ -85,11 +86,11 @@ def _at_surface(plate: PlateParameters, sensor: Array, vector: Array, axes: Arra
 
 
 def _origin(plate: PlateParameters, half: Array, metres: float) -> tuple[Array, tuple[str, ...]]:
-    """Return ORIGIN in m; in another decimal unit than the file's where only that one makes sense.
+    """Return ORIGIN in m; taken as m or mm instead of the file's unit where only that makes sense.
 
     Raises TrialRefused where none does.
     """
-    fits = [unit for unit in dict.fromkeys((metres, 0.001, 0.01, 1.0)) if _makes_sense(plate, plate.origin * unit, half)]
+    fits = [unit for unit in dict.fromkeys((metres, 0.001, 1.0)) if _makes_sense(plate, plate.origin * unit, half)]
     if fits and fits[0] == metres:
         return plate.origin * metres, ()
     written = ", ".join(f"{c:.4g}" for c in plate.origin)
@@ -145,7 +146,7 @@ def _moments_in_sense(
         tried = sensor * np.array([1, 1, 1, factor, factor, factor])
         point = centre_of_pressure(_at_surface(plate, tried, vector, axes)[0][loaded])
         on_it = float((np.abs(point) <= half + EDGE).all(axis=1).mean())
-        lives = float(np.percentile(np.abs(point).max(axis=1), 90)) > STILLEST
+        lives = float(np.percentile(np.abs(centre_of_pressure(tried[loaded])).max(axis=1), 90)) > STILLEST
         share[factor] = (on_it, on_it >= INSIDE and lives)
     good = [factor for factor in factors if share[factor][1]]
     if not share[1.0][1] and len(good) == 1:

@@ -10,9 +10,9 @@ from biodance.records import Array
 DEEPEST = 0.3  # m, no sensor lies farther below the surface
 LOADED, CONTACT = 30.0, 0.1  # N, s
 SWAY_BAND = (0.5, 5.0)  # Hz
-SWAY_TIME = 2.0  # s of standing that the sway test needs
+SWAY_TIME = 2.5  # s of standing that the sway test needs
 SWAY_STEADY = 0.05  # share of the weight by which the vertical force may vary
-SWAY_CORRELATION = 0.3
+SWAY_CORRELATION = 0.4
 SWAY_SLOPE = (0.25, 3.0)  # 1/m, shear over weight per metre of centre of pressure; about 1 / height of the centre of mass
 
 
@@ -55,8 +55,8 @@ def sway_sign(wrench: Array, rate: float) -> int:
     """Return +1 if a standing person's shear shows that the reaction was recorded, -1 for the load, 0 if it cannot be told.
 
     A person who stands is an inverted pendulum: the ground's shear on the person is opposite to the quick part of the centre of pressure,
-    F = -(m g / h) (CoP - CoM), whatever the sign of the vertical channel. Needs 2 s of standing on this one plate (vertical within 5 %),
-    and both axes must agree in sign, correlate by at least 0.3 and have a slope between 0.25 and 3 per metre.
+    F = -(m g / h) (CoP - CoM), whatever the sign of the vertical channel. Needs 2.5 s of standing on this one plate (vertical within 5 %),
+    and both axes must agree in sign, correlate by at least 0.4 and have a slope between 0.25 and 3 per metre.
     """
     part = _standing(wrench[:, 2], rate)
     if part is None:
@@ -77,7 +77,7 @@ def sway_sign(wrench: Array, rate: float) -> int:
 
 
 def _standing(vertical: Array, rate: float) -> slice | None:
-    """Return the longest run of whole half-seconds in which the vertical force stays near the trial's median; None below 2 s."""
+    """Return the longest run of whole half-seconds in which the vertical force stays near the trial's median; None below 2.5 s."""
     size = round(0.5 * rate)
     middle = float(np.median(vertical))
     if size < 4 or abs(middle) < 5 * LOADED:
@@ -89,9 +89,10 @@ def _standing(vertical: Array, rate: float) -> slice | None:
 
 
 def _band(values: Array, rate: float) -> Array:
-    """Return the part of a signal between 0.5 and 5 Hz, after a straight line through its ends was taken away."""
-    values = values - np.linspace(values[0], values[-1], values.size)
-    spectrum = np.fft.rfft(values)
+    """Return the part of a signal between 0.5 and 5 Hz, without its straight line and faded in and out."""
+    along = np.linspace(-1, 1, values.size)
+    values = values - values.mean() - along * (along @ values) / (along @ along)
+    spectrum = np.fft.rfft(values * np.hanning(values.size))
     frequency = np.fft.rfftfreq(values.size, 1 / rate)
     spectrum[(frequency < SWAY_BAND[0]) | (frequency > SWAY_BAND[1])] = 0
     return np.fft.irfft(spectrum, values.size)

@@ -69,6 +69,7 @@ def polynomial_corrected(wrench: Array, polynomial: Array) -> Array:
     exchanged; the correction is subtracted (Kistler 9287C manual, 8.4.3).
     """
     point = 1000 * centre_of_pressure(wrench)
+    point[np.abs(point) > 1000 * FARTHEST] = np.nan
     wrong = np.empty_like(point)
     for i, p in enumerate(polynomial):
         own, other = point[:, i], point[:, 1 - i] ** 2
