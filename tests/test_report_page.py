@@ -12,8 +12,11 @@ from example_results import full_session, refused_session
 from biodance.pipeline.provenance import provenance
 from biodance.pipeline.results import SessionResult
 from biodance.report.marker_figure import marker_figure
-from biodance.report.page import millimetres, number, page
+from biodance.report.page import page
+from biodance.report.solid import still_address
+from biodance.report.still import still_figure
 from biodance.report.style import svg_address
+from biodance.report.wording import millimetres, number, without_path
 from biodance.report.wrench_figure import wrench_figure
 
 TIME = "2026-01-01T00:00:00Z"
@@ -44,8 +47,9 @@ def outline(html: str) -> Outline:
     return parser
 
 
-def html_of(result: SessionResult) -> str:
-    return page(result, provenance(result, created=TIME))
+def html_of(result: SessionResult, created: str = TIME) -> str:
+    still = svg_address(still_figure(result.still)) if result.still else ""
+    return page(result, provenance(result, created=created), still=still)
 
 
 @pytest.fixture(scope="module")
@@ -75,9 +79,7 @@ def test_the_page_asks_nothing_of_the_network(full):
 
 def test_the_same_result_gives_the_same_characters(full):
     assert html_of(full_session()) == full
-    result = full_session()
-    later = page(result, provenance(result, created="2027-01-01T00:00:00Z"))
-    assert later.replace("2027-01-01", "2026-01-01") == full
+    assert html_of(full_session(), "2027-01-01T00:00:00Z").replace("2027-01-01", "2026-01-01") == full
 
 
 def test_names_from_files_cannot_become_markup(full):
@@ -92,7 +94,7 @@ def test_what_is_outside_its_limit_comes_first(full):
 def test_a_session_without_results_still_has_a_page_with_every_reason():
     html = html_of(refused_session())
     outline(html)
-    for sentence in ("broken.c3d: is empty.", "No stature.", "no marker is known. Name a marker set.", "No plates."):
+    for sentence in ("<strong>broken.c3d</strong>: is empty.", "No stature.", "no marker is known. Name a marker set.", "No plates."):
         assert sentence in html
     assert not re.search(r"\bnan\b", html, re.IGNORECASE)
     assert "<img" not in html
@@ -127,6 +129,13 @@ def test_a_comparison_without_a_used_frame_can_be_drawn():
     assert svg.startswith(b"<?xml")
 
 
+@pytest.mark.parametrize("child", ["false", "true", "no-such-program"])
+def test_a_child_that_dies_or_draws_nothing_leaves_the_drawing(monkeypatch, child):
+    monkeypatch.setattr("biodance.report.solid.sys.executable", child)
+    still = full_session().still
+    assert still_address(still) == svg_address(still_figure(still))
+
+
 def test_figures_carry_no_date():
     svg = base64.b64decode(svg_address(marker_figure(full_session().trials[0].fit)).split(",")[1]).decode()
     assert "<dc:date>" not in svg
@@ -135,6 +144,11 @@ def test_figures_carry_no_date():
 @pytest.mark.parametrize(("value", "text"), [(1.25, "1.2"), (-0.04, "0.0"), (-3.0, "−3.0"), (float("nan"), "–"), (None, "–")])
 def test_numbers_read_like_numbers(value, text):
     assert number(value) == text
+
+
+def test_a_file_is_named_once():
+    assert without_path("/data/S1/a.c3d: is empty.", "a.c3d") == "is empty."
+    assert without_path("The ratio is 1: 2.", "a.c3d") == "The ratio is 1: 2."
 
 
 def test_metres_are_shown_in_millimetres():

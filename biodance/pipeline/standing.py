@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.lab.filters import runs
 from biodance.lab.marker_sets import landmark, read_marker_set
-from biodance.lab.weight import LOADED, SHORTEST, SWAY
+from biodance.lab.weight import LOADED, SHORTEST, STILL, SWAY, movement
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import GRAVITY
 from biodance.pipeline.results import Standing
-from biodance.records import Array, Motion, Trial
+from biodance.records import Array, Markers, Motion, Trial
 
 FOOT_LANDMARKS = tuple(f"{side}_{place}" for side in ("left", "right") for place in ("heel", "toe", "ankle_lateral", "toe_lateral"))
 
@@ -53,11 +53,19 @@ def _feet(trial: Trial, run: slice) -> tuple[tuple[str, ...], Array]:
     return tuple(places), np.array(list(places.values())).reshape(-1, 2)
 
 
+def _still(markers: Markers | None, run: slice) -> bool:
+    """Return whether the typical marker stays within `STILL` during ``run``; True without markers."""
+    return markers is None or movement(Markers(markers.names, markers.time[run], markers.xyz[run])) <= STILL
+
+
 def quiet_standing(trial: Trial, used: NDArray[np.bool_], body: Body | None, motion: Motion | None) -> Standing | None:
-    """Return the quiet standing of a prepared trial, over the longest steady run of the frames ``used`` (T,); None without one."""
+    """Return the quiet standing of a prepared trial, over the longest steady run of the frames ``used`` (T,); None without one.
+
+    Steady means the vertical force, and the markers where there are any: walking, too, loads the plates evenly for a moment.
+    """
     wrench = trial.wrench
     run = quiet_run(wrench.force[:, 2], used, wrench.rate)
-    if run is None:
+    if run is None or not _still(trial.markers, run):
         return None
     height = float(np.mean([plate.height for plate in trial.plates]))
     cop = wrench.cop(height=height)[run, :2]

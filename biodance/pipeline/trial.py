@@ -9,6 +9,7 @@ from biodance.errors import TrialRefused
 from biodance.lab.gaps import MarkerGaps, report_gaps
 from biodance.lab.marker_sets import canonical, read_marker_set
 from biodance.lab.prepare import prepare
+from biodance.lab.weight import LOADED
 from biodance.motion.comparison import compare
 from biodance.motion.contact import Contact, ground_contact
 from biodance.motion.regressor import predict_wrench
@@ -67,13 +68,14 @@ def feet(trial: Trial, body: Body | None, motion: Motion | None) -> Soles:
     Raises
     ------
     TrialRefused
-        Neither a motion nor a known marker set tells where the feet are.
+        There is no motion, and no heel or toe marker.
     """
     if body is not None and motion is not None:
         return soles_from_body(body, motion)
-    if trial.markers is None or not trial.marker_set:
-        raise TrialRefused(f"Trial {trial.name}: no markers of a known set, so nobody knows where the feet are.")
-    return soles_from_markers(trial.markers, read_marker_set(trial.marker_set))
+    markers = trial.markers
+    if markers is None:
+        raise TrialRefused(f"Trial {trial.name}: it has no markers, so nobody knows where the feet are.")
+    return soles_from_markers(markers, read_marker_set(trial.marker_set))
 
 
 def compare_wrenches(trial: Trial, body: Body, motion: Motion, contact: Contact) -> WrenchComparison:
@@ -85,6 +87,8 @@ def compare_wrenches(trial: Trial, body: Body, motion: Motion, contact: Contact)
         No frame is fully measured; the message says why.
     """
     measured, simulated = trial.wrench, predict_wrench(body, motion)
+    if np.nanmax(measured.force[:, 2], initial=0.0) < LOADED:
+        raise TrialRefused(f"Trial {trial.name}: nobody stands on the plates, so there is no wrench to compare with.")
     if not contact.measured.any():
         raise TrialRefused(f"Trial {trial.name}: {' '.join(contact.notes)} So measured and simulated wrench cannot be compared.")
     agreement = compare(measured, simulated, contact.measured)
@@ -127,14 +131,14 @@ def examine_trial(read: Prepared, body: Body | None, *, mass: float) -> TrialRes
     if not trial.plates:
         steps.append(Step("wrench", "refused", f"Trial {trial.name}: no force plate was recorded, so there is no wrench to compare with."))
         return TrialResult(trial, tuple(steps), read.gaps, fit, motion)
-    if trial.markers is None:
+    if not trial.marker_set:
         everything = np.ones(trial.wrench.time.size, dtype=bool)
-        return TrialResult(trial, tuple(steps), read.gaps, standing=quiet_standing(trial, everything, None, None))
+        standing = attempt(steps, "standing", lambda: quiet_standing(trial, everything, None, None))
+        return TrialResult(trial, tuple(steps), read.gaps, standing=standing)
     contact = attempt(steps, "contact", lambda: ground_contact(trial, feet(trial, body, motion), mass=mass))
-    if contact is None:
-        return TrialResult(trial, tuple(steps), read.gaps, fit, motion)
-    comparison = None
-    if body is not None and motion is not None:
+    comparison = standing = None
+    if contact is not None:
+        standing = attempt(steps, "standing", lambda: quiet_standing(trial, contact.measured, body, motion))
+    if contact is not None and body is not None and motion is not None:
         comparison = attempt(steps, "compare", lambda: compare_wrenches(trial, body, motion, contact))
-    standing = attempt(steps, "standing", lambda: quiet_standing(trial, contact.measured, body, motion))
     return TrialResult(trial, tuple(steps), read.gaps, fit, motion, comparison, standing)

@@ -1,6 +1,5 @@
 """The analyst's page: one HTML file that holds all it shows and asks nothing of the network."""
 
-import math
 from dataclasses import dataclass
 from importlib.resources import files
 
@@ -8,26 +7,14 @@ from biodance.lab.gaps import MarkerGaps
 from biodance.pipeline.provenance import Provenance
 from biodance.pipeline.results import SessionResult, TrialResult
 from biodance.records import CHANNELS
+from biodance.report.attention import attention
 from biodance.report.marker_figure import marker_figure
 from biodance.report.standing_figure import standing_figure
-from biodance.report.still import still_figure
 from biodance.report.style import svg_address
+from biodance.report.wording import millimetres, number
 from biodance.report.wrench_figure import wrench_figure
 
 STATUS_WORDS = {"ok": "done", "warning": "look here", "refused": "refused"}
-
-
-def number(value: float | None, digits: int = 1) -> str:
-    """Return a number as text with a true minus sign; "–" where it is unknown."""
-    if value is None or not math.isfinite(value):
-        return "–"
-    text = f"{value:.{digits}f}"
-    return text.replace("-", "−") if float(text) else text.lstrip("-")
-
-
-def millimetres(value: float | None, digits: int = 1) -> str:
-    """Return metres as text in millimetres."""
-    return number(None if value is None else 1000 * value, digits)
 
 
 @dataclass(frozen=True)
@@ -70,19 +57,11 @@ def _trial_part(result: TrialResult) -> TrialPart:
     )
 
 
-def _attention(result: SessionResult) -> list[tuple[str, str]]:
-    """Return (where, sentence) of all that a person must look at: files refused, steps refused, warnings, checks outside their limit."""
-    found = [(file, why) for file, why in result.session.refused.items()]
-    found += [("Session", step.text) for step in result.steps if step.status != "done"]
-    found += [("Body", text.removeprefix("Warning: ")) for text in result.doubts]
-    for trial in result.trials:
-        found += [(f"Trial {trial.trial.name}", text) for text in trial.reasons]
-    outside = [check for check in result.checks if not check.inside]
-    return found + [(f"{check.what}, {check.where}", f"{check.value}, should be {check.limit}. {check.advice}") for check in outside]
+def page(result: SessionResult, provenance: Provenance, *, still: str = "") -> str:
+    """Return the page of ``result`` as HTML text; ``still`` is the address of its 3-D image, "" for none.
 
-
-def page(result: SessionResult, provenance: Provenance) -> str:
-    """Return the page of ``result`` as HTML text; the same result and provenance give the same characters."""
+    The same arguments give the same characters.
+    """
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
@@ -91,11 +70,11 @@ def page(result: SessionResult, provenance: Provenance) -> str:
     folder = files("biodance.report") / "templates"
     return environment.from_string((folder / "page.html.j2").read_text(encoding="utf-8")).render(
         style=Markup((folder / "page.css").read_text(encoding="utf-8")),
-        attention=_attention(result),
+        attention=attention(result),
         result=result,
         provenance=provenance,
         parts=[_trial_part(trial) for trial in result.trials],
         standing=svg_address(standing_figure(result.standing)) if result.standing else "",
-        still=svg_address(still_figure(result.still)) if result.still else "",
+        still=still,
         words=STATUS_WORDS,
     )

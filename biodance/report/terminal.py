@@ -9,10 +9,8 @@ from rich.table import Table
 
 from biodance.doctor import Finding
 from biodance.pipeline.results import SessionResult
-
-
-def _text(value: float | None, digits: int = 1) -> str:
-    return "–" if value is None or value != value else f"{value:.{digits}f}"
+from biodance.report.attention import attention
+from biodance.report.wording import millimetres, number, without_path
 
 
 def _inspected_lines(record: dict[str, Any]) -> list[str]:
@@ -20,12 +18,12 @@ def _inspected_lines(record: dict[str, Any]) -> list[str]:
     lines = []
     if record.get("markers"):
         known = record.get("marker_set") or "no known set"
-        lines.append(f"{len(record['markers'])} markers ({known}), {_text(record.get('gaps_percent'))} % not seen")
+        lines.append(f"{len(record['markers'])} markers ({known}), {number(record.get('gaps_percent'))} % not seen")
     for plate in record.get("plates") or ():
-        lines.append(f"{plate.get('name', 'plate')}, TYPE {plate['type']}: {_text(plate.get('mean_vertical_n'))} N vertical on average")
+        lines.append(f"{plate.get('name', 'plate')}, TYPE {plate['type']}: {number(plate.get('mean_vertical_n'))} N vertical on average")
         lines += [f"  {decision}" for decision in plate.get("decisions", ())]
     if record.get("plates"):
-        on_plates, declared = _text(record.get("mass_on_plates_kg"), 2), _text(record.get("declared_mass_kg"), 2)
+        on_plates, declared = number(record.get("mass_on_plates_kg"), 2), number(record.get("declared_mass_kg"), 2)
         lines.append(f"mass on the plates {on_plates} kg, declared {declared} kg")
     return lines + [f"look: {warning}" for warning in record.get("warnings") or ()]
 
@@ -33,25 +31,29 @@ def _inspected_lines(record: dict[str, Any]) -> list[str]:
 def print_inspected(records: Sequence[dict[str, Any]], console: Console) -> None:
     """Print what `biodance inspect` read of every file."""
     for record in records:
-        rates = f"{record.get('frames') or 0} frames, {_text(record.get('rate_hz'), 0)} / {_text(record.get('analog_rate_hz'), 0)} Hz"
+        rates = f"{record.get('frames') or 0} frames, {number(record.get('rate_hz'), 0)} / {number(record.get('analog_rate_hz'), 0)} Hz"
         facts = f" {record.get('format') or ''}, {rates}" if record["status"] != "refused" else ""
         console.print(f"[bold]{escape(str(record['file']))}[/]: {record['status']}{escape(facts)}", soft_wrap=True)
-        lines = _inspected_lines(record) if record["status"] != "refused" else [str(record.get("reason"))]
+        lines = (
+            _inspected_lines(record) if record["status"] != "refused" else [without_path(str(record.get("reason")), str(record["file"]))]
+        )
         for line in lines:
             console.print(f"  {escape(line)}", soft_wrap=True)
 
 
 def print_session(result: SessionResult, console: Console) -> None:
     """Print one line a trial, then all that needs a person."""
-    table = Table("trial", "role", "state", "marker RMS mm", "compared frames", "Fz RMS N", "Fz correlation", box=None, pad_edge=False)
+    table = Table(box=None, pad_edge=False)
+    for heading in ("trial", "role", "state", "markers RMS", "frames", "Fz RMS", "Fz cc"):
+        table.add_column(heading, overflow="fold")
     for trial in result.trials:
-        rms = _text(1000 * trial.fit.total_rms) if trial.fit else "–"
+        rms = f"{millimetres(trial.fit.total_rms)} mm" if trial.fit else "–"
         c = trial.comparison
-        wrench = (str(int(c.used.sum())), _text(float(c.rms[2])), _text(float(c.correlation[2]), 3)) if c else ("–", "–", "–")
+        wrench = (str(int(c.used.sum())), f"{number(float(c.rms[2]))} N", number(float(c.correlation[2]), 3)) if c else ("–", "–", "–")
         table.add_row(escape(trial.trial.name), trial.trial.role, trial.status, rms, *wrench)
     console.print(table)
-    for file, why in result.session.refused.items():
-        console.print(f"refused {escape(file)}: {escape(why)}", soft_wrap=True)
+    for where, sentence in attention(result):
+        console.print(f"look: [bold]{escape(where)}[/]: {escape(sentence)}", soft_wrap=True)
 
 
 def print_findings(findings: Sequence[Finding], console: Console) -> None:

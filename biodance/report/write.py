@@ -7,6 +7,7 @@ from biodance.pipeline.provenance import now, provenance
 from biodance.pipeline.results import SessionResult
 from biodance.report.page import page
 from biodance.report.results_json import document, plain, to_text
+from biodance.report.solid import still_address
 
 PAGE, NUMBERS = "report.html", "results.json"
 
@@ -18,7 +19,8 @@ def write_report(result: SessionResult, folder: Path) -> dict[str, Any]:
     """
     made = provenance(result, created=now())
     found = document(result, made)
-    for name, text in ((NUMBERS, to_text(found)), (PAGE, page(result, made))):
+    still = still_address(result.still) if result.still else ""
+    for name, text in ((NUMBERS, to_text(found)), (PAGE, page(result, made, still=still))):
         part = folder / f".{name}.part"
         part.write_text(text, encoding="utf-8", newline="\n")
         part.replace(folder / name)
