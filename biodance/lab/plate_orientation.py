@@ -37,6 +37,9 @@ def oriented(reading: PlateReading, time: Array, *, markers: Markers | None, alo
     elif sway:
         seen, warnings = _sway_said(reading, sway == sign)
         said = (*said, seen)
+    elif sign and axes[2, 2] > 0:
+        seen, warnings = _upwards_said(reading)
+        said = (*said, seen)
     if markers is not None and sign:
         axes, checked, warned = _under_feet(reading, wrench, time, axes, markers)
         said, warnings = (*said, *checked), (*warnings, *warned)
@@ -117,10 +120,19 @@ def _sway_said(reading: PlateReading, agrees: bool) -> tuple[str, Said]:
     return f"{said}.", (f"Plate {reading.plate.number}: {said}. Check the cabling and the corner order.",)
 
 
+def _upwards_said(reading: PlateReading) -> tuple[str, Said]:
+    """Return the sentence about a plate whose z points up, and a warning where the maker's own axes have z down (eight channels)."""
+    said = "CORNERS make the plate's z point up; the file's axes were used as they are"
+    if reading.plate.type not in (3, 7):
+        return f"{said}.", ()
+    doubt = f"{said}, but an eight-channel plate has z down: the shear may have the wrong sign. Check the corner order"
+    return f"{doubt}.", (f"Plate {reading.plate.number}: {doubt}.",)
+
+
 def _sign_said(sign: int, otherwise: int) -> str:
     if not sign:
         taken = "reaction" if otherwise > 0 else "load"
-        return f"Never loaded, so gravity cannot tell the sign; taken as the {taken}, like the other plates." if otherwise else ""
+        return f"Never loaded, so gravity cannot tell the sign; taken as the {taken}."
     return (
         f"Sign: the file holds the {'reaction on the subject; kept' if sign > 0 else 'load on the plate; turned round'} (the "
         f"weight must point up)."
