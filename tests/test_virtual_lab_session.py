@@ -11,12 +11,15 @@ from biodance.lab.c3d import read_c3d
 from biodance.lab.session import read_session
 from biodance.motion.kinematics import poses
 from biodance.records import Subject
+from biodance.virtual_lab.flesh import of_parameters, placed
 from biodance.virtual_lab.laboratory import Laboratory, Visit, perform_in, record, set_up
 from biodance.virtual_lab.person import AddedLoad, make_person
 from biodance.virtual_lab.protocol import Protocol
 from biodance.virtual_lab.protocol_file import read_protocol
 from biodance.virtual_lab.simulate import simulate
+from biodance.virtual_lab.skeleton import small_rotation
 from biodance.virtual_lab.tolerances import REALISTIC, instruments_perfect
+from biodance.virtual_lab.truth import sip_in_frames
 
 SUBJECT = Subject(58.0, 1.66, "F", 28.0, "S07")
 FAITHFUL = instruments_perfect()
@@ -63,6 +66,23 @@ def test_the_truth_lies_apart_and_adds_up(session):
     assert truth["joint_centres"]["right_hip"]["segment"] == "pelvis"
     assert truth["joint_centres"]["left_elbow"]["segment"] == "left_upper_arm"
     assert [t["name"] for t in truth["trials"]] == ["static", "squat_1"]
+
+
+def test_the_truth_can_be_told_in_another_model_s_frames(session):
+    truth = json.loads((session / "truth" / "truth.json").read_text())
+    own = truth["static_pose"]["segments_12"]
+    turn, place = np.array([s["rotation"] for s in own]), np.array([s["position_m"] for s in own])
+    same = sip_in_frames(truth, turn, place)
+    np.testing.assert_allclose(same.com, [s["com_m"] for s in truth["segments_12"]], atol=1e-12)
+    np.testing.assert_allclose(same.phi.reshape(-1, 10)[:, 4:], [s["inertia_kgm2"] for s in truth["segments_12"]], atol=1e-12)
+    rng = np.random.default_rng(0)
+    other_turn = np.stack([small_rotation(r) for r in 0.2 * rng.normal(size=(12, 3))]) @ turn
+    other_place = place + 0.03 * rng.normal(size=(12, 3))
+    other = sip_in_frames(truth, other_turn, other_place)
+    for i in range(12):
+        one = placed(of_parameters(same.phi[10 * i : 10 * i + 10]), turn[i], place[i])
+        two = placed(of_parameters(other.phi[10 * i : 10 * i + 10]), other_turn[i], other_place[i])
+        np.testing.assert_allclose(two, one, atol=1e-12)
 
 
 def test_the_same_seed_writes_the_same_bytes_and_another_day_does_not(tmp_path, protocol, session):
@@ -137,7 +157,7 @@ def test_each_instrument_fault_is_where_it_was_put(protocol):
 
 def test_markers_wander_on_the_skin_by_some_millimetres(protocol):
     person = make_person(SUBJECT, 3)
-    wander = replace(REALISTIC, camera_noise=0.0, gaps_per_minute=0.0, lab_tilt=0.0)
+    wander = replace(REALISTIC, camera_noise=0.0, camera_wander=0.0, gaps_per_minute=0.0, lab_tilt=0.0)
     instruments = set_up(person, Visit(tolerances=wander))
     act = perform_in(instruments, person, protocol.trials[1])
     markers = record(act, instruments).markers
@@ -146,7 +166,7 @@ def test_markers_wander_on_the_skin_by_some_millimetres(protocol):
     local = np.einsum("tkji,tkj->tki", pose.rotation[:, list(person.body.markers.segment)], apart)
     rms = np.sqrt(np.mean(np.sum((local - local.mean(axis=0)) ** 2, axis=2), axis=0))
     thigh = [k for k, name in enumerate(markers.names) if name.endswith(("THI", "KNE"))]
-    assert 0.004 < rms[thigh].mean() < 0.02
+    assert 0.003 < rms[thigh].mean() < 0.02
     assert 0.001 < np.median(rms) < 0.01
 
 

@@ -5,6 +5,7 @@ import numpy as np
 from biodance.motion.kinematics import poses
 from biodance.records import Array, Markers
 from biodance.virtual_lab.performance import Performance
+from biodance.virtual_lab.randomness import smooth_noise
 from biodance.virtual_lab.soft_tissue import SoftTissue, displaced
 from biodance.virtual_lab.tolerances import Tolerances
 
@@ -33,7 +34,8 @@ def film(
     Gaps come in every trial except the static one, which every laboratory repeats until it is complete.
     """
     xyz = true_markers(performance, tissue, time, rng) @ tilt.T
-    xyz = xyz + tolerances.camera_noise * rng.normal(size=xyz.shape)
+    wander = smooth_noise(rng, time, columns=3 * xyz.shape[1], cutoff=0.6).reshape(xyz.shape)
+    xyz = xyz + tolerances.camera_wander * wander + tolerances.camera_noise * rng.normal(size=xyz.shape)
     if performance.plan.role != "static":
         step = time[1] - time[0]
         for _ in range(rng.poisson(tolerances.gaps_per_minute * (time[-1] - time[0]) / 60.0)):

@@ -31,10 +31,11 @@ CARRIERS = {"trunk_head": "thorax", "right_forearm_hand": "right_forearm", "left
 Frames = dict[str, tuple[Array, Array]]
 
 
-def _frames(person: Person, body: Body) -> tuple[Frames, Frames]:
-    """Return the poses (3, 3), (3,) m of the 12 frames and of the 16 segments in the posture in which the markers were glued."""
-    q = body.neutral
-    q[7:] = reference_angles(person)
+def _frames(person: Person, body: Body, q: Array | None = None) -> tuple[Frames, Frames]:
+    """Return the poses (3, 3), (3,) m of the 12 frames and of the 16 segments at ``q`` (46,), by default as the markers were glued."""
+    if q is None:
+        q = body.neutral
+        q[7:] = reference_angles(person)
     pose = poses(body, q)
     merged = {}
     for segment, (joint, _) in MERGED.items():
@@ -91,3 +92,8 @@ def place_in_12(person: Person, load: AddedLoad) -> tuple[str, Array]:
     merged, true = _frames(person, person.body)
     (turn, origin), (part_turn, part_origin) = merged[segment], true[load.segment]
     return segment, turn.T @ (part_origin + part_turn @ load.place - origin)
+
+
+def poses_12(person: Person, q: Array) -> Frames:
+    """Return the lab poses (3, 3), (3,) m of the 12 true joint frames at the true configuration ``q`` (46,)."""
+    return _frames(person, person.body, q)[0]

@@ -20,9 +20,9 @@ from biodance.virtual_lab.skeleton import ARM_AND_LEG, SEGMENTS
 from biodance.virtual_lab.tolerances import Tolerances
 
 PULL: dict[str, dict[str, float]] = {
-    "pelvis": {"right_hip_flexion": 6, "left_hip_flexion": 6, "lumbar_flexion": 4},
+    "pelvis": {"right_hip_flexion": 4, "left_hip_flexion": 4, "lumbar_flexion": 4},
     "lumbar": {},
-    "thorax": {"lumbar_flexion": 7, "lumbar_rotation": 7, "right_shoulder_adduction": 4, "left_shoulder_adduction": 4},
+    "thorax": {"lumbar_flexion": 5, "lumbar_rotation": 5, "right_shoulder_adduction": 4, "left_shoulder_adduction": 4},
     "head": {"neck_flexion": 3},
     "thigh": {"hip_flexion": 11, "hip_rotation": 8, "knee_flexion": 11},
     "shank": {"knee_flexion": 7, "ankle_dorsiflexion": 8},
@@ -35,19 +35,12 @@ PULL: dict[str, dict[str, float]] = {
 thigh and shank in gait 18 and 17 mm, PMC8631460; back 9-10 mm, Zemp 2014; foot < 9 mm)."""
 SHOULDER_PULL = {"shoulder_flexion": 12.0, "shoulder_adduction": 12.0}
 """mm per rad for SHO and RBAK: the shoulder blade slides on the thorax."""
-SWING = {
-    "pelvis": 9.0,
-    "lumbar": 9.0,
-    "thorax": 10.0,
-    "head": 15.0,
-    "thigh": 7.0,
-    "shank": 9.0,
-    "foot": 20.0,
-    "upper_arm": 8.0,
-    "forearm": 11.0,
-    "hand": 15.0,
-}
-"""Hz, natural frequency of flesh and marker; 7 Hz sags by 5 mm under gravity."""
+SWING = {"THI": 9.0, "UPA": 10.0, "TIB": 12.0, "FRM": 14.0}
+"""Hz, natural frequency of flesh and marker where muscle lies under the skin: 9 Hz sags by 3 mm under gravity. Judgement, set so that
+fast squats leave residuals of the size of those in Jovic et al. (Table II).
+"""
+BONY = 16.0
+"""Hz, the same where bone lies under the skin: all other markers."""
 DRIFT = 0.0005
 """m rms per axis, slower than 0.5 Hz."""
 
@@ -74,7 +67,7 @@ def draw_soft_tissue(person: Person, session: int, tolerances: Tolerances) -> So
         for joint, millimetres in pulls.items():
             full = joint if joint in joints else f"{side}_{joint}"
             scale[joints.index(full), k] = 0.001 * millimetres / np.sqrt(3.0)
-        swing[k] = 2 * np.pi * SWING[kind]
+        swing[k] = 2 * np.pi * SWING.get(name[1:], BONY)
     own, day = stream(person.seed, "soft tissue"), stream(person.seed, "soft tissue", str(session))
     share = tolerances.soft_tissue_day
     shape = (*scale.shape, 3)

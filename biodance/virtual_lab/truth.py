@@ -3,11 +3,14 @@
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
+
 from biodance import __version__
 from biodance.body.body import Body
 from biodance.records import Array, Sip
+from biodance.virtual_lab.flesh import of_parameters, parameters, placed
 from biodance.virtual_lab.laboratory import Instruments
-from biodance.virtual_lab.merge import merged_sip, place_in_12
+from biodance.virtual_lab.merge import merged_sip, place_in_12, poses_12
 from biodance.virtual_lab.performance import Performance
 from biodance.virtual_lab.person import AddedLoad, Person
 from biodance.virtual_lab.skeleton import SEGMENTS
@@ -43,6 +46,7 @@ def truth(person: Person, protocol: str, instruments: Instruments, performances:
         "subject": {"mass_kg": person.subject.mass, "height_m": person.subject.stature, "sex": person.subject.sex},
         "mass_with_loads_kg": person.mass,
         "loads": [_load(person, load) for load in person.loads],
+        "static_pose": _static_pose(person, instruments, performances),
         "segments_12": _segments(merged_sip(person, bare)),
         "segments_12_with_loads": _segments(merged_sip(person, loaded)),
         "segments_16": _segments(bare.sip),
@@ -73,6 +77,34 @@ def _plate(corners: Array, plate: Any) -> dict[str, Any]:
         "mixing": plate.mixing.tolist(),
         "offset": plate.offset.tolist(),
     }
+
+
+def _static_pose(person: Person, instruments: Instruments, performances: list[Performance]) -> dict[str, Any] | None:
+    """Return where the 12 true frames were in the middle of the static trial (cameras' axes, marker time); None without such a trial."""
+    static = next((p for p in performances if p.plan.role == "static"), None)
+    if static is None:
+        return None
+    time = round(0.5 * static.plan.duration, 2)
+    frames = poses_12(person, static.motion(np.array([time])).q[0])
+    tilt = instruments.tilt
+    segments = [{"name": n, "rotation": (tilt @ turn).tolist(), "position_m": (tilt @ at).tolist()} for n, (turn, at) in frames.items()]
+    return {"trial": static.plan.name, "time_s": time, "segments_12": segments}
+
+
+def sip_in_frames(document: dict[str, Any], rotation: Array, position: Array, *, key: str = "segments_12") -> Sip:
+    """Return the true parameters of the 12 segments in ANOTHER model's frames: what a perfect identification of that model would find.
+
+    ``document`` is a truth; ``rotation`` (12, 3, 3), ``position`` (12, 3) m are the lab poses of the other model's segments, in the same
+    order, at the marker time ``document["static_pose"]["time_s"]`` of the static trial; ``key`` "segments_12" or "segments_12_with_loads".
+    Joint centres and axes differ between truth and model, so the numbers do; the body is the same.
+    """
+    phi = []
+    for segment, pose, turn, place in zip(document[key], document["static_pose"]["segments_12"], rotation, position, strict=True):
+        own = np.array([segment["mass_kg"], *(segment["mass_kg"] * np.array(segment["com_m"])), *segment["inertia_kgm2"]])
+        there = turn.T @ np.array(pose["rotation"]), turn.T @ (np.array(pose["position_m"]) - place)
+        phi.append(parameters(placed(of_parameters(own), *there)))
+    flat = np.concatenate(phi)
+    return Sip(tuple(segment["name"] for segment in document[key]), flat, np.zeros((flat.size, flat.size)))
 
 
 def _load(person: Person, load: AddedLoad) -> dict[str, Any]:
