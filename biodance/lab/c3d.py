@@ -31,7 +31,7 @@ def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None
     raw = read_raw(path)
     labels = marker_labels(raw, subject=subject)
     points = raw.points[:, list(labels.columns)]
-    metres, unit_history, unit_warnings = metres_per_unit(raw, points)
+    metres, unit_history, unit_warnings = metres_per_unit(raw.parameters, points, where=str(raw.path))
     in_file_axes = _markers(raw, labels, points)
     turn, turn_history, turn_warnings = turn_to_z_up(raw, in_file_axes)
     markers = None if in_file_axes is None else replace(in_file_axes, xyz=metres * in_file_axes.xyz @ turn.T)
@@ -56,7 +56,7 @@ def _read(raw: RawC3d) -> tuple[str, ...]:
     rate = f" at {raw.rate:g} Hz" if math.isfinite(raw.rate) else ""
     analog = f", {raw.analog.shape[1]} analog channels at {raw.analog_rate:g} Hz" if raw.analog.size else ", no analog channels"
     frames = f"{len(raw.points)} frames{rate} from frame {raw.first_frame} on"
-    return (f"Read with {raw.reader}: {frames}, {raw.points.shape[1]} points{analog}.", *raw.notes)
+    return (f"Read {frames}, {raw.points.shape[1]} points{analog}.",)
 
 
 def _markers(raw: RawC3d, labels: MarkerLabels, points: Array) -> Markers | None:

@@ -87,8 +87,10 @@ def read_layout(size: int, header: Header, parameters: Parameters, where: str) -
 
 
 def _agreed_scale(header: Header, parameters: Parameters, where: str) -> float:
-    scale = scalar(parameters, "POINT", "SCALE")
-    if math.isfinite(scale) and scale != 0 and not math.isclose(scale, header.scale, rel_tol=1e-5):
+    """Return the header's scale; its sign tells floats (< 0) from integers, where its size counts too."""
+    written = numbers(parameters, "POINT", "SCALE")
+    scale = float(written[0]) if written.size else header.scale
+    if not (math.isclose(scale, header.scale, rel_tol=1e-6) or (scale < 0 and header.scale < 0)):
         raise FileRefused(
             f"{where}: the header's scale is {header.scale:g}, POINT:SCALE is {scale:g}: the points' size is not known. {RESAVE}"
         )
@@ -214,7 +216,11 @@ def _analog_transform(parameters: Parameters, channels: int, unsigned: bool, whe
 def _first_frame(header: Header, parameters: Parameters, frames: int, notes: list[str]) -> int:
     """Return the number of the first frame."""
     first = _field(parameters, "ACTUAL_START_FIELD")
-    if not math.isfinite(first) or int(first) == header.first_frame:
+    spans = header.last_frame - header.first_frame + 1 == frames or header.last_frame == CLIPPED
+    if int(first) == header.first_frame if math.isfinite(first) else spans:
+        return header.first_frame
+    if not math.isfinite(first):
+        notes.append(f"The first frame's number, {header.first_frame} in the header, does not fit its last one, {header.last_frame}.")
         return header.first_frame
     last = _field(parameters, "ACTUAL_END_FIELD")
     if last - first + 1 == frames and header.last_frame - header.first_frame + 1 != frames:

@@ -4,6 +4,7 @@ Layout: header of 512 bytes; parameter section of groups and parameters, each ``
 data section. Three byte orders: Intel (84), DEC (85) and SGI/MIPS (86). Source: C3D user guide (www.c3d.org/docs), "parameter format".
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -48,14 +49,16 @@ def integers(content: bytes, processor: int, kind: str = "u2") -> NDArray[Any]:
 
 
 def floats(content: bytes, processor: int) -> NDArray[Any]:
-    """Return the bytes as 32-bit floats (n,) in the number format of the processor; DEC (VAX F) values are converted to IEEE."""
+    """Return the bytes as 64-bit floats (n,) from the 32-bit number format of the processor; DEC (VAX F) values are converted to IEEE."""
     if processor != DEC:
-        return np.frombuffer(content, dtype=">f4" if processor == MIPS else "<f4").astype(np.float32)
+        with np.errstate(invalid="ignore"):  # bits that are no number
+            return np.frombuffer(content, dtype=">f4" if processor == MIPS else "<f4").astype(np.float64)
     words = np.frombuffer(content, dtype="<u2").reshape(-1, 2).astype(np.uint32)
     exponent = (words[:, 0] >> 7) & 0xFF
     ieee = ((words[:, 0] << 16) | words[:, 1]).view(np.float32)
     with np.errstate(invalid="ignore"):
-        return np.where(exponent == 0, np.float32(0), ieee * np.float32(0.25)).astype(np.float32)
+        reserved = np.where(words[:, 0] >> 15, np.float32(np.nan), np.float32(0))
+        return np.where(exponent == 0, reserved, ieee * np.float32(0.25)).astype(np.float64)
 
 
 def read_header(content: bytes, where: str) -> Header:
@@ -129,7 +132,7 @@ def read_parameters(content: bytes, header: Header, where: str) -> Parameters:
 
 def _record(section: bytes, at: int, processor: int, where: str) -> tuple[int, int, str, Value | None]:
     """Return position of the next record (0 = none), group number, name and value (None = a group) of the record at ``at``."""
-    length, group = np.frombuffer(section[at : at + 2], dtype=np.int8).astype(int)
+    length, group = (int(byte) for byte in np.frombuffer(section[at : at + 2], dtype=np.int8))
     body = at + 2 + abs(length)
     name = section[at + 2 : body].decode("utf-8", "replace").strip().upper()
     damaged = FileRefused(f"{where}: the parameter section is damaged at byte {at} (record {name!r}). {RESAVE}")
@@ -146,7 +149,7 @@ def _record(section: bytes, at: int, processor: int, where: str) -> tuple[int, i
     following = body + offset if offset else 0
     if end > len(section) or (following and not (end <= following <= len(section) and not any(section[end:following]))):
         raise damaged
-    return following, abs(int(group)), name, value
+    return following, abs(group), name, value
 
 
 def _value(section: bytes, at: int, processor: int, damaged: FileRefused) -> tuple[Value, int]:
@@ -154,7 +157,7 @@ def _value(section: bytes, at: int, processor: int, damaged: FileRefused) -> tup
     kind = int(np.frombuffer(section[at : at + 1], dtype=np.int8)[0])
     first = at + 2 + (section[at + 1] if at + 1 < len(section) else 255)
     shape = tuple(section[at + 2 : first])
-    count = int(np.prod(shape, dtype=np.int64)) if shape else 1
+    count = math.prod(shape)
     end = first + count * abs(kind)
     if kind not in (-1, 1, 2, 4) or len(shape) > 7 or end > len(section):
         raise damaged
@@ -166,7 +169,7 @@ def _value(section: bytes, at: int, processor: int, damaged: FileRefused) -> tup
     elif kind == 2:
         numbers = integers(raw, processor, "i2").astype(np.int64)
     else:
-        numbers = floats(raw, processor).astype(np.float64)
+        numbers = floats(raw, processor)
     numbers = numbers.reshape(shape or (1,), order="F")
     numbers.setflags(write=False)
     return numbers, end

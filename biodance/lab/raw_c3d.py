@@ -5,13 +5,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from biodance.errors import FileRefused
-from biodance.lab.c3d_layout import read_layout, texts
-from biodance.lab.c3d_numbers import read_numbers
-from biodance.lab.c3d_parameters import Parameters, read_header, read_parameters
+from biodance.lab.c3d_layout import Layout, read_layout, texts
+from biodance.lab.c3d_numbers import Numbers, read_numbers, second_opinion
+from biodance.lab.c3d_parameters import RESAVE, Parameters, read_header, read_parameters
 from biodance.lab.model_outputs import model_outputs, unlabelled
+from biodance.lab.units import metres_per_unit
+from biodance.records import Array
+
+LEAP = 1.0
+"""m along one axis; no marker on a person moves further between two frames, at any rate in use."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,8 +27,8 @@ class RawC3d:
     ``points`` (T, K, 3) in file units and file axes, NaN = not seen; ``rate`` Hz, NaN = none; ``first_frame`` number of the first frame;
     ``analog`` (S, C) scaled as the file says, ``(number - OFFSET) * SCALE * GEN_SCALE``; ``analog_rate`` Hz, NaN = none;
     ``analog_units`` (C) as written ("" = none). ``parameters[GROUP][NAME]`` (upper case): arrays with the file's own dimensions, first
-    dimension fastest, or lists of stripped strings. ``reader`` names the library that read the numbers, ``notes`` why it was chosen;
-    ``warnings`` say where the file contradicts itself and how that was decided.
+    dimension fastest, or lists of stripped strings. ``reader`` names the readers that agree on the numbers, "biodance" or "biodance, c3d";
+    ``warnings`` say where the file contradicts itself or smells of a misread, and how that was decided.
     """
 
     path: Path
@@ -37,7 +43,6 @@ class RawC3d:
     analog_units: tuple[str, ...]
     analog_rate: float
     parameters: Parameters
-    notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 
 
@@ -61,29 +66,53 @@ def read_raw(path: str | Path) -> RawC3d:
     header = read_header(content, str(path))
     parameters = read_parameters(content, header, str(path))
     layout = read_layout(len(content), header, parameters, str(path))
-    metre = {"m": 1.0, "cm": 100.0}.get("".join(texts(parameters, "POINT", "UNITS")[:1]).lower(), 1000.0)
+    points, analog = numbers = read_numbers(content, layout)
     labels = _fit(texts(parameters, "POINT", "LABELS"), layout.points)
-    no_markers = {*model_outputs(labels, parameters), *unlabelled(labels)}
-    judged = tuple(column for column in range(layout.points) if column not in no_markers)
-    reading = read_numbers(path, layout, judged=judged, metre=metre)
-    for values in (reading.points, reading.analog):
+    smells, reader = _smells(content, numbers, labels, layout, parameters, path)
+    for values in numbers:
         values.setflags(write=False)
     return RawC3d(
         path=path,
         sha256=hashlib.sha256(content).hexdigest(),
-        reader=reading.reader,
+        reader=reader,
         labels=labels,
-        points=reading.points,
+        points=points,
         rate=layout.rate,
         first_frame=layout.first_frame,
-        analog=reading.analog,
+        analog=analog,
         analog_labels=_fit(texts(parameters, "ANALOG", "LABELS"), layout.channels),
         analog_units=_fit(texts(parameters, "ANALOG", "UNITS"), layout.channels),
         analog_rate=layout.analog_rate,
         parameters=parameters,
-        notes=reading.notes,
-        warnings=(*layout.notes, *reading.warnings),
+        warnings=(*layout.notes, *smells),
     )
+
+
+def _smells(
+    content: bytes, numbers: Numbers, labels: tuple[str, ...], layout: Layout, parameters: Parameters, path: Path
+) -> tuple[tuple[str, ...], str]:
+    """Have suspicious numbers judged by a second reader; return what it says and who agrees; refuse the file if it reads others."""
+    no_markers = {*model_outputs(labels, parameters), *unlabelled(labels)}
+    leaps = _leaps(numbers[0][:, [column for column in range(layout.points) if column not in no_markers]], parameters)
+    if not leaps and not layout.notes:
+        return (), "biodance"
+    opinion = second_opinion(content, numbers)
+    smell = f"Markers jump by more than {LEAP:g} m between two frames in {leaps} places" if leaps else "Header and parameters disagree"
+    if opinion == "refuted":
+        raise FileRefused(f"{path}: {smell[0].lower()}{smell[1:]}, and the package c3d reads other numbers than biodance. {RESAVE}")
+    if opinion == "confirmed":
+        return (f"{smell}; a second reader finds the same numbers.",), "biodance, c3d"
+    return (f"{smell}; {opinion}.",), "biodance"
+
+
+def _leaps(points: Array, parameters: Parameters) -> int:
+    """Return how often a marker moves by more than a metre between two frames in which it is seen; 0 if the unit is not known."""
+    try:
+        metre = 1.0 / metres_per_unit(parameters, points, where="")[0]
+    except FileRefused:
+        return 0
+    step = np.abs(np.diff(points, axis=0)).max(axis=2, initial=0.0)
+    return int(np.count_nonzero(step > LEAP * metre))
 
 
 def _fit(names: list[str], count: int) -> tuple[str, ...]:
