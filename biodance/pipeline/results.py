@@ -137,8 +137,8 @@ class TrialResult:
 
     @property
     def status(self) -> Status:
-        """State of the trial: "refused" where no step after reading was done, "warning" where a person must look, "ok" otherwise."""
-        if all(step.status != "done" for step in self.steps):
+        """State of the trial: "refused" where no step after preparing was done, "warning" where a person must look, "ok" otherwise."""
+        if all(step.status != "done" or step.name == "prepare" for step in self.steps):
             return "refused"
         return "warning" if self.reasons else "ok"
 

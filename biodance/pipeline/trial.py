@@ -129,7 +129,7 @@ def examine_trial(read: Prepared, body: Body | None, *, mass: float) -> TrialRes
     motion = attempt(steps, "track", lambda: tracked(trial, body))
     fit = marker_fit(motion) if motion else None
     if not trial.plates:
-        steps.append(Step("wrench", "refused", f"Trial {trial.name}: no force plate was recorded, so there is no wrench to compare with."))
+        steps.append(Step("wrench", "refused", f"Trial {trial.name}: it has no force plate that can be used, so there is no wrench to compare with."))
         return TrialResult(trial, tuple(steps), read.gaps, fit, motion)
     if not trial.marker_set:
         everything = np.ones(trial.wrench.time.size, dtype=bool)

@@ -1,0 +1,180 @@
+"""The command line: exit codes, one sentence instead of a traceback, JSON alone on stdout, nothing overwritten, nothing heavy imported."""
+
+import json
+import shutil
+import subprocess
+import sys
+
+import pytest
+from bad_sessions import UNREADABLE, bad_session
+
+from biodance.cli import DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED, run
+
+
+def biodance(*words):
+    """Run the command in a process of its own."""
+    return subprocess.run([sys.executable, "-m", "biodance", *map(str, words)], capture_output=True, text=True, timeout=120, check=False)
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory):
+    return bad_session(tmp_path_factory.mktemp("lab") / "bad")
+
+
+@pytest.fixture(scope="module")
+def reported(session):
+    """Return the process that reported the bad session, and the folder it wrote to."""
+    out = session.parent / "report"
+    return biodance("report", session, "--out", out, "--json"), out
+
+
+@pytest.fixture
+def no_stills(monkeypatch):
+    monkeypatch.setattr("biodance.report.solid.solid_png", lambda _: None)
+
+
+def test_help_names_every_command_and_imports_nothing_heavy():
+    heavy = "{'numpy', 'scipy', 'ezc3d', 'matplotlib', 'pydantic'}"
+    code = f"import sys; from biodance.cli import run; run(['--help']); print(sorted({heavy} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+    assert all(f"│ {command} " in done.stdout for command in ("demo", "doctor", "inspect", "report", "simulate"))
+
+
+def test_a_bad_session_is_reported_all_the_same(reported):
+    done, out = reported
+    assert done.returncode == NEEDS_A_PERSON, done.stderr
+    assert "Traceback" not in done.stderr
+    assert json.loads(done.stdout) == json.loads((out / "results.json").read_text())
+    assert sorted(path.name for path in out.iterdir()) == ["report.html", "results.json"]
+
+
+def test_every_bad_file_has_its_sentence_and_the_good_ones_their_numbers(reported):
+    found = json.loads(reported[0].stdout)
+    assert sorted(found["refused"]) == sorted(f"{name}.c3d" for name in UNREADABLE)
+    trials = {trial["name"]: trial for trial in found["trials"]}
+    expected = {
+        "no_plates": "no force plate",
+        "no_markers": "no markers",
+        "unknown_set": "no known marker set",
+        "bow_tie": "bow-tie",
+    }
+    for name, words in expected.items():
+        assert trials[name]["status"] == "warning"
+        assert words in trials[name]["reason"]
+        assert trials[name]["wrench"] is None
+    for name in ("static", "walk"):
+        assert trials[name]["wrench"]["frames_used"] == 100
+        assert trials[name]["marker_rms_m"] < 0.005
+    steps = [step for trial in found["trials"] for step in trial["steps"]] + found["steps"]
+    assert not [step for step in steps if step["status"] == "failed"]
+    assert found["mass_check"]["difference_percent"] == pytest.approx(0, abs=0.3)
+
+
+@pytest.mark.parametrize("name", UNREADABLE)
+def test_an_unreadable_file_alone_is_not_done(session, tmp_path, capsys, name):
+    shutil.copy(session / f"{name}.c3d", tmp_path)
+    assert run(["inspect", str(tmp_path / f"{name}.c3d")]) == NOT_DONE
+    assert run(["report", str(tmp_path), "--out", str(tmp_path / "out")]) == NOT_DONE
+    sentence = capsys.readouterr().err.strip()
+    assert f"{name}.c3d" in sentence
+    assert len(sentence.splitlines()) == 1
+    assert not (tmp_path / "out" / "results.json").exists()
+
+
+def test_inspect_prints_one_json_document(session, capsys):
+    code = run(["inspect", str(session), "--json"])
+    printed = capsys.readouterr()
+    records = {record["file"].rpartition("/")[2]: record for record in json.loads(printed.out)}
+    assert code == NEEDS_A_PERSON
+    assert len(records) == 9
+    assert [name for name, record in sorted(records.items()) if record["status"] == "refused"] == sorted(f"{n}.c3d" for n in UNREADABLE)
+    assert run(["inspect", str(session / "static.c3d"), "--json"]) == DONE
+
+
+def test_nothing_is_overwritten_without_force(session, tmp_path, capsys, no_stills):
+    small, out = tmp_path / "small", tmp_path / "out"
+    small.mkdir()
+    for name in ("static.c3d", "session.toml"):
+        shutil.copy(session / name, small)
+    assert run(["report", str(small), "--out", str(out)]) in (DONE, NEEDS_A_PERSON)
+    before = (out / "results.json").stat().st_mtime_ns
+    assert run(["report", str(small), "--out", str(out)]) == NOT_DONE
+    assert "--force" in capsys.readouterr().err
+    assert (out / "results.json").stat().st_mtime_ns == before
+    assert run(["report", str(small), "--out", str(small)]) == NOT_DONE
+    assert run(["report", str(small), "--out", str(out), "--force"]) in (DONE, NEEDS_A_PERSON)
+    assert (out / "results.json").stat().st_mtime_ns > before
+
+
+def test_a_session_without_static_is_reported_from_stature_alone(session, tmp_path, capsys, no_stills):
+    folder = tmp_path / "session"
+    folder.mkdir()
+    shutil.copy(session / "walk.c3d", folder)
+    text = (session / "session.toml").read_text() + '\n[trials.walk]\nrole = "fit"\n'
+    (folder / "session.toml").write_text(text)
+    assert run(["report", str(folder), "--out", str(tmp_path / "out"), "--json"]) == NEEDS_A_PERSON
+    found = json.loads(capsys.readouterr().out)
+    assert "stature alone" in found["body"]["source"]
+    assert any("Record a static trial" in step["reason"] for step in found["steps"])
+    assert found["trials"][0]["wrench"]["frames_used"] == 100
+
+
+def test_ctrl_c_keeps_the_trials_that_are_done_and_says_so(session, tmp_path, capsys, monkeypatch, no_stills):
+    import biodance.pipeline.session as room
+
+    whole = room.examine_trial
+
+    def stopping(read, body, *, mass):
+        if read.trial.name == "static":
+            raise KeyboardInterrupt
+        return whole(read, body, mass=mass)
+
+    monkeypatch.setattr(room, "examine_trial", stopping)
+    assert run(["report", str(session), "--out", str(tmp_path / "out")]) == STOPPED
+    assert "holds the trials that were done" in capsys.readouterr().err
+    states = {trial["name"]: trial["status"] for trial in json.loads((tmp_path / "out" / "results.json").read_text())["trials"]}
+    assert states["no_plates"] == "warning"
+    assert states["static"] == states["walk"] == "refused"
+
+
+def test_ctrl_c_before_anything_was_done_writes_nothing(tmp_path, capsys, monkeypatch):
+    def stopping(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("biodance.lab.session.read_session", stopping)
+    assert run(["report", str(tmp_path), "--out", str(tmp_path / "out")]) == STOPPED
+    assert "Stopped" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["reprot"], "report"),
+        (["inspect"], "nothing to inspect"),
+        (["inspect", "no-such-file.c3d"], "no-such-file.c3d"),
+        (["report", "no-such-folder", "--out", "x"], "no-such-folder"),
+        (["report", "."], "--out"),
+        (["simulate", "--protocol", "short", "--sex", "F", "--height", "170", "--mass", "62", "--seed", "1", "--out", "x"], "stature"),
+        (["simulate", "--protocol", "waltz", "--sex", "F", "--height", "1.7", "--mass", "62", "--seed", "1", "--out", "x"], "waltz"),
+    ],
+)
+def test_a_wrong_call_is_one_sentence(words, says, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert run(words) == NOT_DONE
+    printed = capsys.readouterr()
+    sentence = (printed.err.strip() or printed.out.strip()).splitlines()
+    assert says in " ".join(sentence)
+    assert "Traceback" not in printed.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_fault_of_biodance_is_named_as_such(tmp_path, capsys, monkeypatch):
+    def faulty(*_, **__):
+        raise ZeroDivisionError("oops")
+
+    monkeypatch.setattr("biodance.lab.session.read_session", faulty)
+    monkeypatch.delenv("BIODANCE_TRACEBACK", raising=False)
+    assert run(["report", str(tmp_path), "--out", str(tmp_path / "out")]) == NOT_DONE
+    assert "ZeroDivisionError: oops" in capsys.readouterr().err
