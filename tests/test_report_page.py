@@ -2,6 +2,8 @@
 
 import base64
 import re
+import shutil
+import subprocess
 from dataclasses import replace
 from html.parser import HTMLParser
 
@@ -9,6 +11,7 @@ import numpy as np
 import pytest
 from example_results import full_session, refused_session
 
+from biodance.doctor import BROWSERS
 from biodance.pipeline.provenance import provenance
 from biodance.pipeline.results import SessionResult
 from biodance.report.marker_figure import marker_figure
@@ -153,3 +156,15 @@ def test_a_file_is_named_once():
 
 def test_metres_are_shown_in_millimetres():
     assert millimetres(0.0123) == "12.3"
+
+
+def test_a_browser_shows_the_page_without_a_complaint(full, tmp_path):
+    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if browser is None:
+        pytest.skip("no chromium on this machine; biodance doctor says how to get it")
+    (tmp_path / "page.html").write_text(full, encoding="utf-8")
+    flags = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--enable-logging=stderr", "--v=0"]
+    words = [browser, *flags, f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom", f"file://{tmp_path / 'page.html'}"]
+    shown = subprocess.run(words, capture_output=True, text=True, timeout=60, check=True)
+    assert shown.stdout.count("<img") == full.count("<img")
+    assert "CONSOLE" not in shown.stderr
