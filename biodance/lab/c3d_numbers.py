@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.lab.c3d_layout import Layout
-from biodance.lab.c3d_parameters import MIPS, floats
+from biodance.lab.c3d_parameters import MIPS, doubles, floats
 
 Numbers = tuple[NDArray[Any], NDArray[Any]]
 """Points (T, K, 3) in file units with NaN = not seen, analog (T * samples, C) in units."""
@@ -23,7 +23,7 @@ def read_numbers(content: bytes, layout: Layout) -> Numbers:
     """
     words = layout.frames * (4 * layout.points + layout.channels * layout.samples)
     size = 4 if layout.floating else 2
-    section = content[layout.start : layout.start + size * words]
+    section = memoryview(content)[layout.start : layout.start + size * words]
     if layout.floating:
         rows = analog_rows = floats(section, layout.processor).reshape(layout.frames, -1)
     else:
@@ -31,12 +31,17 @@ def read_numbers(content: bytes, layout: Layout) -> Numbers:
         rows = np.frombuffer(section, dtype=order + "i2").reshape(layout.frames, -1)
         analog_rows = rows.view(order + "u2") if layout.unsigned else rows
     quads = rows[:, : 4 * layout.points].reshape(layout.frames, layout.points, 4)
-    points = quads[..., :3] * (1.0 if layout.floating else layout.scale)
+    points = doubles(quads[..., :3])
+    if not layout.floating:
+        points *= layout.scale
     seen = (quads[..., 3] >= 0) & np.isfinite(points).all(axis=2) & (points != 0).any(axis=2)
     points[~seen] = np.nan
+    rest = doubles(analog_rows[:, 4 * layout.points :])
     with np.errstate(invalid="ignore", over="ignore"):
-        analog = (analog_rows[:, 4 * layout.points :].reshape(-1, layout.channels or 1) - layout.offset) * layout.gain
-    return points, analog if layout.channels else np.empty((0, 0))
+        analog = rest.reshape(layout.frames * layout.samples, layout.channels) if layout.channels else np.empty((0, 0))
+        analog -= layout.offset
+        analog *= layout.gain
+    return points, analog
 
 
 def second_opinion(content: bytes, numbers: Numbers) -> str:
@@ -60,4 +65,5 @@ def second_opinion(content: bytes, numbers: Numbers) -> str:
 
 
 def _same(one: NDArray[Any], other: NDArray[Any]) -> bool:
-    return one.shape == other.shape and np.allclose(one, other, rtol=1e-5, atol=1e-6 * np.abs(one).max(initial=1.0), equal_nan=True)
+    size = np.abs(one[np.isfinite(one)]).max(initial=1.0)
+    return one.shape == other.shape and np.allclose(one, other, rtol=1e-5, atol=1e-6 * size, equal_nan=True)

@@ -43,22 +43,27 @@ class Header:
     data_start: int
 
 
-def integers(content: bytes, processor: int, kind: str = "u2") -> NDArray[Any]:
+def integers(content: bytes | memoryview, processor: int, kind: str = "u2") -> NDArray[Any]:
     """Return the bytes as integers of ``kind`` (``u2`` or ``i2``) in the byte order of the processor."""
     return np.frombuffer(content, dtype=(">" if processor == MIPS else "<") + kind)
 
 
-def floats(content: bytes, processor: int) -> NDArray[Any]:
-    """Return the bytes as 64-bit floats (n,) from the 32-bit number format of the processor; DEC (VAX F) values are converted to IEEE."""
+def floats(content: bytes | memoryview, processor: int) -> NDArray[Any]:
+    """Return the bytes as 32-bit floats (n,) from the number format of the processor; DEC (VAX F) values are converted to IEEE."""
     if processor != DEC:
-        with np.errstate(invalid="ignore"):  # bits that are no number
-            return np.frombuffer(content, dtype=">f4" if processor == MIPS else "<f4").astype(np.float64)
+        return np.frombuffer(content, dtype=">f4" if processor == MIPS else "<f4")
     words = np.frombuffer(content, dtype="<u2").reshape(-1, 2).astype(np.uint32)
-    exponent = (words[:, 0] >> 7) & 0xFF
+    exponent = (words[:, 0] >> 7) & 0xFF  # 0: the value zero, or with a sign no number
     ieee = ((words[:, 0] << 16) | words[:, 1]).view(np.float32)
     with np.errstate(invalid="ignore"):
         reserved = np.where(words[:, 0] >> 15, np.float32(np.nan), np.float32(0))
-        return np.where(exponent == 0, reserved, ieee * np.float32(0.25)).astype(np.float64)
+        return np.where(exponent == 0, reserved, ieee * np.float32(0.25))
+
+
+def doubles(values: NDArray[Any]) -> NDArray[np.float64]:
+    """Return the values as 64-bit floats; bits that are no number become NaN without a warning."""
+    with np.errstate(invalid="ignore"):
+        return values.astype(np.float64)
 
 
 def read_header(content: bytes, where: str) -> Header:
@@ -169,7 +174,7 @@ def _value(section: bytes, at: int, processor: int, damaged: FileRefused) -> tup
     elif kind == 2:
         numbers = integers(raw, processor, "i2").astype(np.int64)
     else:
-        numbers = floats(raw, processor)
+        numbers = doubles(floats(raw, processor))
     numbers = numbers.reshape(shape or (1,), order="F")
     numbers.setflags(write=False)
     return numbers, end
