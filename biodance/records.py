@@ -140,7 +140,8 @@ class Plate:
 
     ``name`` as in the lab's numbering (``plate1``); ``type`` C3D TYPE, 0 for native files; ``corners`` (4, 3) m lab frame, in file
     order; ``wrench`` ground-on-subject about the LAB origin, at analog rate as read, at marker times once prepared;
-    ``decisions`` plain sentences: sign, zero, units, corner order - what was decided and why.
+    ``decisions`` plain sentences: sign, zero, units, corner order - what was decided and why; ``zero`` (3,) N the force that the EMPTY
+    plate read and that was subtracted, lab frame, as if it acted on the subject.
     """
 
     name: str
@@ -148,9 +149,11 @@ class Plate:
     corners: Array
     wrench: Wrench
     decisions: tuple[str, ...] = ()
+    zero: Array = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
-        _set(self, corners=frozen_array(self.corners, (4, 3), f"{self.name}.corners"), decisions=tuple(self.decisions))
+        corners, zero = frozen_array(self.corners, (4, 3), f"{self.name}.corners"), frozen_array(self.zero, (3,), f"{self.name}.zero")
+        _set(self, corners=corners, zero=zero, decisions=tuple(self.decisions))
 
     @property
     def centre(self) -> Array:
@@ -169,7 +172,8 @@ class Motion:
 
     A free-flyer root comes first: q = [x y z, quaternion x y z w, joint angles]; v and a of the root are linear then angular,
     expressed in the root's own frame. ``residual`` (T, K) m is the distance of every marker to the model, NaN = not seen;
-    ``marker_names`` (K).
+    ``marker_names`` (K). ``determined`` (T,) is False where a frame's own markers did not give its posture (default: all True);
+    ``notes`` say in plain sentences how the motion was found.
     """
 
     time: Array
@@ -178,15 +182,23 @@ class Motion:
     a: Array
     residual: Array = field(default_factory=lambda: np.empty((0, 0)))
     marker_names: tuple[str, ...] = ()
+    determined: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=bool))
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         time = _check_time(self.time, "Motion")
         frames = time.size
         v = frozen_array(self.v, (frames, None), "Motion.v")
         residual = self.residual if np.size(self.residual) else np.empty((frames, 0))
+        determined = np.array(self.determined, dtype=bool) if np.size(self.determined) else np.ones(frames, dtype=bool)
+        if determined.shape != (frames,):
+            raise BiodanceError(f"Motion.determined has shape {determined.shape}, expected ({frames},).")
+        determined.setflags(write=False)
         _set(
             self,
             time=time,
+            determined=determined,
+            notes=tuple(self.notes),
             q=frozen_array(self.q, (frames, None), "Motion.q"),
             v=v,
             a=frozen_array(self.a, (frames, v.shape[1]), "Motion.a"),

@@ -51,7 +51,8 @@ def inspect_file(path: str | Path) -> dict[str, Any]:
     Keys: ``file``; ``status`` "ok", "warning" or "refused"; ``reason`` (None if ok); ``format``; ``frames``, ``rate_hz``,
     ``analog_rate_hz``; ``markers`` names; ``marker_set``; ``gaps_percent`` of the set's markers that were seen at all (of all markers,
     without a set); ``subjects`` names in the file; ``plates`` with ``type``, ``corners_m``, ``mean_force_n`` (3), ``mean_vertical_n``,
-    ``cop_m`` (2, mean while loaded, lab frame) and ``decisions``; ``mean_vertical_n`` of all plates together; ``mass_on_plates_kg`` in
+    ``zero_n`` (3, what the empty plate read and was taken off), ``cop_m`` (2, mean while loaded, lab frame) and ``decisions``;
+    ``mean_vertical_n`` of all plates together as the file stores it, before their zeros are taken off; ``mass_on_plates_kg`` in
     quiet standing; ``declared_mass_kg``, ``declared_height_m``; ``history``; ``warnings``. What is not there is None; no number is NaN.
     """
     path = Path(path)
@@ -62,7 +63,7 @@ def inspect_file(path: str | Path) -> dict[str, Any]:
     warnings = [*trial.warnings, *_never_seen(trial)]
     plates = [_plate(plate) for plate in trial.plates]
     time = trial.markers.time if trial.markers is not None else trial.plates[0].wrench.time if trial.plates else np.empty(0)
-    vertical = [plate["mean_vertical_n"] for plate in plates]
+    vertical = [plate["mean_vertical_n"] + plate["zero_n"][2] for plate in plates]  # as the plates read, their zero still in it
     return {
         "file": str(path),
         "status": "warning" if warnings else "ok",
@@ -126,6 +127,7 @@ def _plate(plate: Plate) -> dict[str, Any]:
         "corners_m": [[_number(x) for x in corner] for corner in plate.corners],
         "mean_force_n": [_number(f) for f in force],
         "mean_vertical_n": _number(force[2]),
+        "zero_n": [float(f) for f in plate.zero],
         "cop_m": [_number(x) for x in loaded.mean(axis=0)] if stepped_on else None,
         "decisions": list(plate.decisions),
     }

@@ -45,7 +45,9 @@ def oriented(reading: PlateReading, time: Array, *, markers: Markers | None, alo
         said, warnings = (*said, *checked), (*warnings, *warned)
     value = _in_lab(wrench, axes, sign or otherwise, reading.corners.mean(axis=0))
     decisions = (*reading.decisions, *said, _sign_said(sign, otherwise))
-    return Plate(reading.plate.name, reading.plate.type, reading.corners, Wrench(time, value), decisions), (*reading.warnings, *warnings)
+    zero = (sign or otherwise) * axes @ reading.empty
+    plate = Plate(reading.plate.name, reading.plate.type, reading.corners, Wrench(time, value), decisions, zero)
+    return plate, (*reading.warnings, *warnings)
 
 
 def _in_lab(wrench: Array, axes: Array, sign: int, centre: Array) -> Array:

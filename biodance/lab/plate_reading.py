@@ -33,7 +33,8 @@ MOMENT_UNITS = (1.0, 1000.0, 0.001)
 class PlateReading:
     """A plate before its directions are decided: ``sensor`` (S, 6) N, N·m about the sensor origin, plate axes, sign as recorded.
 
-    ``vector`` (3,) m from there to the centre of the surface as the file says; ``corners`` (4, 3) m lab; ``rate`` Hz of the samples.
+    ``vector`` (3,) m from there to the centre of the surface as the file says; ``corners`` (4, 3) m lab; ``rate`` Hz of the samples;
+    ``empty`` (3,) N is the force that the empty plate read and that was subtracted, plate axes, sign as recorded.
     """
 
     plate: PlateParameters
@@ -43,6 +44,7 @@ class PlateReading:
     rate: float
     decisions: tuple[str, ...]
     warnings: tuple[str, ...]
+    empty: Array
 
     def at_surface(self, axes: Array) -> tuple[Array, tuple[str, ...]]:
         """Return the wrench (S, 6) about the centre of the surface in plate axes, and what was decided, for lab_R_plate ``axes``."""
@@ -65,13 +67,15 @@ def read_plate_signals(raw: RawC3d, plate: PlateParameters, *, metres: float, tu
     factors, unit_said = unit_factors(plate, units, metres=metres)
     vertical = (calibrated(plate, channels) * factors)[:, [k for k, kind in enumerate(CONTENT[plate.type]) if kind == "F"]]
     zero = find_baseline(_vertical(plate, vertical), zero=zero_window(raw), rate=raw.analog_rate)
-    signals = calibrated(plate, channels - _offsets(plate, channels, zero.start, zero.stop)) * factors
+    offsets = _offsets(plate, channels, zero.start, zero.stop)
+    signals = calibrated(plate, channels - offsets) * factors
     sensor, vector = sensor_wrench(plate, signals, origin), surface_vector(plate, origin)
+    empty = sensor_wrench(plate, calibrated(plate, offsets[None]) * factors, origin)[0, :3]
     sensor, sense, warnings = _moments_in_sense(plate, sensor, vector, corners, rate=raw.analog_rate, unsure=len(unit_said) > 1)
     first = f"TYPE {plate.type}, analog channels {', '.join(str(c + 1) for c in plate.channels)}."
     said = (first, *placed, *origin_said, *unit_said, *sense, zero.said)
     odd = tuple(f"Plate {plate.number}: {sentence}" for sentence in (*placed, *origin_said))
-    return PlateReading(plate, corners, sensor, vector, raw.analog_rate, said, (*odd, *warnings))
+    return PlateReading(plate, corners, sensor, vector, raw.analog_rate, said, (*odd, *warnings), empty)
 
 
 def _at_surface(plate: PlateParameters, sensor: Array, vector: Array, axes: Array) -> tuple[Array, tuple[str, ...]]:
