@@ -158,6 +158,14 @@ def test_a_point_count_that_the_parameters_contradict_is_decided_by_the_length(t
     assert "length decides" in raw.warnings[0]
 
 
+def test_channels_that_are_declared_but_not_stored(tmp_path):
+    points = np.ones((200, 4, 4))
+    channels = {"USED": whole(2), "RATE": real(1000.0), "SCALE": real(1, 1), "OFFSET": whole(0, 0)}
+    raw = read_raw(save(tmp_path, File(points, header={"samples": 10}, parameters={"ANALOG": channels})))
+    assert (raw.points.shape, raw.analog.shape) == ((200, 4, 3), (0, 0))
+    assert "length decides" in raw.warnings[0]
+
+
 def test_jumps_of_a_metre_are_confirmed_by_the_second_reader_and_said(tmp_path, numbers):
     points, analog = numbers
     points[3, 0, 0] += 5000

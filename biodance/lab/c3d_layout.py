@@ -137,9 +137,11 @@ def _analog_counts(header: Header, parameters: Parameters) -> list[tuple[int, in
     votes = {
         (c, s): sum(w for w in (c != used and not math.isnan(used), s != samples, s != ratio and not math.isnan(ratio), c * s != values))
         for c, s in product(channels, rows)
+        if c * s > 0
     }
-    least = min(votes.values())
-    return [pair for pair, against in votes.items() if against == least and against <= 1]
+    least = min(votes.values(), default=0)
+    none = [(0, 0)] if used == 0 or values == 0 else []  # one statement says that there are no analog data
+    return none + [pair for pair, against in votes.items() if against == least and against <= 1]
 
 
 def _counts(size: int, header: Header, parameters: Parameters, word: int, where: str, notes: list[str]) -> tuple[int, int, int, int, int]:
