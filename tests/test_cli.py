@@ -54,7 +54,7 @@ def test_every_bad_file_has_its_sentence_and_the_good_ones_their_numbers(reporte
     assert sorted(found["refused"]) == sorted(f"{name}.c3d" for name in UNREADABLE)
     trials = {trial["name"]: trial for trial in found["trials"]}
     expected = {
-        "no_plates": "no force plate",
+        "no_plates": "no usable force plate",
         "no_markers": "no markers",
         "unknown_set": "no known marker set",
         "bow_tie": "bow-tie",

@@ -17,6 +17,8 @@ RMS, LARGEST = 0.020, 0.040
 """m, distance of the markers to the model."""
 GAPS = 5.0
 """% of marker samples not seen."""
+OPEN = 1.0
+"""% of frames in which the markers seen do not fix the posture."""
 SECONDS = 0.5
 """s of a trial in which the plates measure all ground contact."""
 FORCE = 5.0
@@ -53,6 +55,11 @@ def trial_checks(result: TrialResult, mass: float) -> list[Check]:
         advice = "See the worst marker in the trial's figure: placed, labelled and filled rightly?"
         found.append(_upper("marker distance, RMS", name, 1000 * result.fit.total_rms, 1000 * RMS, "mm", advice))
         found.append(_upper("marker distance, largest", name, 1000 * result.fit.total_max, 1000 * LARGEST, "mm", advice))
+    if result.motion is not None:
+        share = 100 * float(np.mean(~result.motion.determined))
+        found.append(
+            _upper("frames whose markers leave the posture open", name, share, OPEN, "%", "See the gaps: which segment lost its markers?")
+        )
     if result.gaps:
         found.append(_upper("marker samples not seen", name, result.gaps_percent, GAPS, "%", "Fill the gaps in the capture software."))
     comparison = result.comparison

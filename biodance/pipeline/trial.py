@@ -91,11 +91,14 @@ def compare_wrenches(trial: Trial, body: Body, motion: Motion, contact: Contact)
         raise TrialRefused(f"Trial {trial.name}: nobody stands on the plates, so there is no wrench to compare with.")
     if not contact.measured.any():
         raise TrialRefused(f"Trial {trial.name}: {' '.join(contact.notes)} So measured and simulated wrench cannot be compared.")
-    agreement = compare(measured, simulated, contact.measured)
+    chosen = contact.measured & motion.determined
+    if not chosen.any():
+        raise TrialRefused(f"Trial {trial.name}: in no fully measured frame do the markers fix the posture. See the gaps of the trial.")
+    agreement = compare(measured, simulated, chosen)
     known = np.isfinite(measured.value).all(axis=1) & np.isfinite(simulated.value).all(axis=1)
     correlation = np.array([np.nan if value is None else value for value in agreement.correlation])
     notes = (*contact.notes, *agreement.notes)
-    return WrenchComparison(measured.time, measured.value, simulated.value, contact.measured & known, agreement.rms, correlation, notes)
+    return WrenchComparison(measured.time, measured.value, simulated.value, chosen & known, agreement.rms, correlation, notes)
 
 
 def tracked(trial: Trial, body: Body | None) -> Motion:
@@ -129,7 +132,7 @@ def examine_trial(read: Prepared, body: Body | None, *, mass: float) -> TrialRes
     motion = attempt(steps, "track", lambda: tracked(trial, body))
     fit = marker_fit(motion) if motion else None
     if not trial.plates:
-        steps.append(Step("wrench", "refused", f"Trial {trial.name}: it has no force plate that can be used, so there is no wrench to compare with."))
+        steps.append(Step("wrench", "refused", f"Trial {trial.name}: it has no usable force plate, so there is no wrench to compare with."))
         return TrialResult(trial, tuple(steps), read.gaps, fit, motion)
     if not trial.marker_set:
         everything = np.ones(trial.wrench.time.size, dtype=bool)
