@@ -166,6 +166,12 @@ def test_channels_that_are_declared_but_not_stored(tmp_path):
     assert "length decides" in raw.warnings[0]
 
 
+def test_a_header_that_is_silent_on_analog_data(tmp_path, numbers):
+    points, analog = numbers
+    raw = read_raw(save(tmp_path, File(np.tile(points, (9, 1, 1)), np.tile(analog, (9, 1)), header={"values": 0, "samples": 0})))
+    np.testing.assert_array_equal(raw.analog, np.tile(analog, (9, 1)))
+
+
 def test_jumps_of_a_metre_are_confirmed_by_the_second_reader_and_said(tmp_path, numbers):
     points, analog = numbers
     points[3, 0, 0] += 5000

@@ -132,6 +132,8 @@ def _analog_counts(header: Header, parameters: Parameters) -> list[tuple[int, in
     ratio = round(ratio) if math.isfinite(ratio) and ratio > 0.5 else math.nan
     if not (used > 0 or values > 0):
         return [(0, 0)]
+    if values == 0 and samples == 0:  # a header that is silent on analog data
+        return [(0, 0), (int(used), int(ratio))] if math.isfinite(ratio) else [(0, 0)]
     channels = _distinct([used, *(values / s for s in (samples, ratio) if s > 0 and values % s == 0)])
     rows = _distinct([samples, ratio, *(values / c for c in channels if c and values % c == 0)])
     votes = {
@@ -179,9 +181,10 @@ def _counts(size: int, header: Header, parameters: Parameters, word: int, where:
 
 
 def _all_told_twice(header: Header, parameters: Parameters) -> bool:
-    """Return whether every count stands in the header and in the parameters, so that bytes behind the data are believed to be padding."""
+    """Return whether every count stands in the header and, without contradiction, in the parameters, so that bytes behind the data are believed to be padding."""
     points = not header.points or "USED" in parameters.get("POINT", {})
-    analog = not header.analog_values or {"USED", "RATE"} <= parameters.get("ANALOG", {}).keys()
+    channels = scalar(parameters, "ANALOG", "USED")
+    analog = (header.analog_values > 0) == (channels > 0)
     return points and analog and {"FRAMES", "DATA_START"} <= parameters.get("POINT", {}).keys()
 
 
