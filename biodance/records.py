@@ -276,7 +276,7 @@ class Subject:
     """The person: body mass kg, stature m, sex "F" or "M", age years; ``measurements`` in m and kg by name.
 
     NaN = not known: always possible for the age; for mass and stature where nobody declared them and no recording tells them (a note in the
-    session says so). A step that needs them calls `require` first.
+    session says so). A step that needs them calls `require` first. ``guessed`` names what nobody declared ("mass", "stature", "sex").
     """
 
     mass: float
@@ -285,6 +285,7 @@ class Subject:
     age: float = float("nan")
     name: str = ""
     measurements: Mapping[str, float] = field(default_factory=dict)
+    guessed: tuple[str, ...] = ()
 
     def require(self, *quantities: Literal["mass", "stature", "age"]) -> None:
         """Raise SessionRefused if one of the named quantities is not known; the message says which key of session.toml helps."""

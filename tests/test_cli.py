@@ -126,7 +126,7 @@ def test_ctrl_c_keeps_the_trials_that_are_done_and_says_so(session, tmp_path, ca
     whole = room.examine_trial
 
     def stopping(read, body, *, mass):
-        if read.trial.name == "static":
+        if read.trial.name == "unknown_set":
             raise KeyboardInterrupt
         return whole(read, body, mass=mass)
 
@@ -135,7 +135,7 @@ def test_ctrl_c_keeps_the_trials_that_are_done_and_says_so(session, tmp_path, ca
     assert "holds the trials that were done" in capsys.readouterr().err
     states = {trial["name"]: trial["status"] for trial in json.loads((tmp_path / "out" / "results.json").read_text())["trials"]}
     assert states["no_plates"] == "warning"
-    assert states["static"] == states["walk"] == "refused"
+    assert states["unknown_set"] == states["walk"] == "refused"
 
 
 def test_ctrl_c_before_anything_was_done_writes_nothing(tmp_path, capsys, monkeypatch):

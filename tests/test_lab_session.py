@@ -203,6 +203,7 @@ def test_mass_and_stature_are_estimated_last_and_said(folder):
     assert subject.stature == pytest.approx(STATURE, abs=0.01)
     assert "read from quiet standing on the plates in static01" in notes
     assert "guessed from the height of C7 in static01" in notes
+    assert subject.guessed == ("mass", "stature", "sex")
 
 
 def test_unknown_mass_and_stature_stay_nan_and_are_said(tmp_path):

@@ -156,6 +156,7 @@ def test_the_mass_check_allows_two_percent(mass, inside):
 
 def test_what_is_not_known_is_not_checked():
     assert mass_check(Subject(float("nan"), 1.7, "F"), standing(60.0)) == []
+    assert mass_check(Subject(60.0, 1.7, "F", guessed=("mass",)), standing(60.0)) == []
     assert mass_check(SUBJECT, None) == []
     assert standing_check(None) == []
 

@@ -50,17 +50,19 @@ def identify_subject(
     notes: list[str] = []
     mass = _choose("body mass", "kg", [*_typed(typed.mass_kg), *_declared(sources, MASS_NAMES, LEGAL_MASS)], notes)
     stature = _choose("stature", "m", [*_typed(typed.height_m), *_declared(sources, STATURE_NAMES, LEGAL_STATURE)], notes)
+    sex = typed.sex or _declared_sex(sources)
+    known = {"mass": math.isfinite(mass), "stature": math.isfinite(stature), "sex": sex is not None}
     on_plates = [Declared(found, trial.name) for trial in ordered if (found := standing_mass(trial)) is not None]
     mass = _check_mass(mass, on_plates, notes)
     stature = stature if math.isfinite(stature) else _stature_of_markers(ordered, notes)
     age = _choose("age", "years", [*_typed(typed.age), *_declared(sources, AGE_NAMES, (0.0, 120.0))], [])
     if math.isnan(age):
         notes.append("The age is not given: adult tables and limits are used. Set age in session.toml.")
-    sex = typed.sex or _declared_sex(sources) or _likely_sex(stature, notes)
+    sex = sex or _likely_sex(stature, notes)
     measures: dict[str, float] = {}
     for values in sources.values():
         measures = {**values, **measures}
-    return Subject(mass, stature, sex, age, typed.name or name, measures), tuple(notes)
+    return Subject(mass, stature, sex, age, typed.name or name, measures, tuple(what for what in known if not known[what])), tuple(notes)
 
 
 def declared_mass(measurements: Mapping[str, float]) -> float:

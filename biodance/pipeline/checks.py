@@ -33,7 +33,7 @@ def _upper(what: str, where: str, value: float, limit: float, unit: str, advice:
 
 def mass_check(subject: Subject, standing: Standing | None) -> list[Check]:
     """Compare the mass on the plates with the declared mass, where both are known."""
-    if standing is None or not np.isfinite(subject.mass):
+    if standing is None or not np.isfinite(subject.mass) or "mass" in subject.guessed:
         return []
     difference = abs(100 * (standing.mass / subject.mass - 1))
     return [_upper("mass on the plates against declared", standing.trial, difference, MASS, "%", "Weigh again, or check the plates' zero.")]

@@ -176,7 +176,12 @@ class SessionResult:
     @property
     def mass_difference(self) -> float:
         """Mass on the plates minus declared mass in % of the declared; NaN where either is unknown."""
-        return 100 * (self.standing.mass / self.subject.mass - 1) if self.standing else float("nan")
+        return 100 * (self.standing.mass / self.declared_mass - 1) if self.standing else float("nan")
+
+    @property
+    def declared_mass(self) -> float:
+        """The declared body mass, kg; NaN where nobody declared it."""
+        return float("nan") if "mass" in self.subject.guessed else self.subject.mass
 
     @property
     def stopped(self) -> bool:

@@ -26,7 +26,7 @@ def examine(session: Session, *, tell: Callable[[str], None] = lambda _: None) -
     """
     steps: list[Step] = []
     read = []
-    for trial in session.trials:
+    for trial in sorted(session.trials, key=lambda trial: trial.role != "static"):
         tell(f"preparing {trial.name}")
         read.append(prepared(trial))
     tell("scaling the body")

@@ -16,7 +16,7 @@ def marker_figure(fit: MarkerFit) -> "Figure":
     seen = np.flatnonzero(np.isfinite(fit.rms))
     order = seen[np.argsort(-fit.rms[seen], kind="stable")]
     with look():
-        drawn = figure(2.6)
+        drawn = figure(2.2)
         axes = drawn.subplots()
         place = np.arange(order.size)
         axes.bar(place, 1000 * fit.rms[order], width=0.75, color=SKY, edgecolor=BLACK, linewidth=0.5, label="RMS over the trial")
@@ -24,6 +24,7 @@ def marker_figure(fit: MarkerFit) -> "Figure":
         axes.set_xticks(place, [fit.names[i] for i in order], rotation=90, fontsize=7)
         axes.set_xlim(-0.6, max(order.size, 1) - 0.4)
         axes.grid(visible=False, axis="x")
+        axes.set_ylim(0.0, max(1.0, 1050 * float(np.max(fit.max[order], initial=0.0))))
         axes.set_ylabel("distance (mm)")
         axes.legend(loc="upper right", ncols=2)
     return drawn

@@ -91,7 +91,7 @@ def _mass_check(result: SessionResult) -> dict[str, Any]:
         "trial": standing.trial if standing else None,
         "mass_on_plates_kg": standing.mass if standing else None,
         "mass_on_plates_sd_kg": standing.mass_sd if standing else None,
-        "declared_mass_kg": result.subject.mass,
+        "declared_mass_kg": result.declared_mass,
         "difference_percent": result.mass_difference,
     }
 
@@ -107,6 +107,7 @@ def document(result: SessionResult, provenance: Provenance) -> dict[str, Any]:
             "height_m": subject.stature,
             "sex": subject.sex,
             "age": subject.age,
+            "guessed": subject.guessed,
         },
         "trials": [_trial(trial) for trial in result.trials],
         "refused": dict(result.session.refused),

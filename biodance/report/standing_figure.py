@@ -50,13 +50,13 @@ def standing_figure(standing: Standing) -> "Figure":
             if standing.com.size:
                 _path(axes, _turned(standing.com, standing), colour=GREEN, marker="D", label="centre of mass (table)")
             axes.set_aspect("equal")
-            axes.set_xlabel("to the subject's right (mm)")
+            axes.set_xlabel("to the subject's right (mm)" if standing.com.size else "along lab −y (mm)")
         _surroundings(wide, standing)
         shown = _turned(np.concatenate([standing.feet, standing.cop]), standing)
         (left, back), (right, front) = np.nanmin(shown, axis=0) - AROUND, np.nanmax(shown, axis=0) + AROUND
         wide.set_xlim(left, right)
         wide.set_ylim(back, front)
-        wide.set_ylabel("ahead (mm)")
+        wide.set_ylabel("ahead (mm)" if standing.com.size else "along lab x (mm)")
         reach = 1.4 * max(20.0, *(np.nanmax(np.abs(_turned(p, standing))) for p in (standing.cop, standing.com) if p.size))
         near.set_xlim(-reach, reach)
         near.set_ylim(-reach, reach)
