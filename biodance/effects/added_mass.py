@@ -1,0 +1,43 @@
+"""Something heavy is carried on a segment: a cuff, an orthosis, a bag.
+
+Signature: the ten columns of that segment's regressor in the proportions of a point mass; it depends on posture, speed and acceleration of
+the segment. Look-alikes: an error of the table for that segment; near the body's centre a wrong body mass; on the foot, the shank.
+Separated by moving that segment alone, by a reference session without the load, and by the scale.
+"""
+
+import numpy as np
+
+from biodance.effects.case import Case
+from biodance.effects.effect import Effect, Parameter
+from biodance.records import Array
+
+
+def point_mass(mass: float, place: Array) -> Array:
+    """Return the ten parameters of a point ``mass`` kg at ``place`` (3,) m in a segment frame."""
+    x, y, z = place
+    return mass * np.array([1, x, y, z, y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y])
+
+
+class AddedMass(Effect):
+    """A point ``mass`` (kg) at ``place`` (x, y, z: m from the CoM of the segment in the table, segment axes) on segment ``target``."""
+
+    name = "added_mass"
+    parameters = (
+        Parameter("mass", "kg", 1.0, "0.5-8 kg loads; 2.4 kg on the arm in Bonnet 2016"),
+        *(Parameter(f"place_{axis}", "m", 0.05, "half the width of a limb (segment boxes)") for axis in "xyz"),
+    )
+
+    @classmethod
+    def targets(cls, case: Case) -> tuple[str, ...]:
+        """Return every segment."""
+        return case.body.segments
+
+    def transform(self, case: Case, theta: Array) -> Case:
+        """Return the case whose plates also carry the load (the first plate takes it when there are several)."""
+        index = case.body.segment_index(self.target)
+        table = case.phi[10 * index : 10 * index + 10]
+        load = point_mass(theta[0], table[1:4] / table[0] + np.asarray(theta[1:4]))
+        return case.with_added(case.trial.plates[0], case.regressor[:, :, 10 * index : 10 * index + 10] @ load)
+
+
+EFFECT = AddedMass

@@ -1,0 +1,24 @@
+"""The declared body mass is wrong: clothes, shoes, an old entry, another scale.
+
+Signature: the whole residual is a share of the whole wrench, in all channels alike.
+Look-alikes: all six gains together (exactly), a load near the body's centre (pelvis, trunk, thighs), another value of gravity. Separated by
+weighing the person on the plate and on a scale.
+"""
+
+from biodance.effects.case import Case
+from biodance.effects.effect import Effect, Parameter
+from biodance.records import Array
+
+
+class BodyMass(Effect):
+    """An ``error`` (kg): the person weighs this much more than declared, in proportion everywhere."""
+
+    name = "body_mass"
+    parameters = (Parameter("error", "kg", 1.5, "1-4 % of body mass for clothes and shoes"),)
+
+    def columns(self, case: Case) -> Array:
+        """Return the predicted wrench per kilogram of body mass."""
+        return (case.predicted / case.phi[::10].sum())[:, :, None]
+
+
+EFFECT = BodyMass

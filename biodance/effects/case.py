@@ -1,0 +1,80 @@
+"""One tracked trial as the effects see it: what was measured, how the body moved, and which wrench that motion needs."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.errors import TrialRefused, UnknownName
+from biodance.motion.regressor import regressor
+from biodance.records import Array, Motion, Plate, Trial, Wrench, frozen_array
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A prepared ``trial`` (plates at marker times) with the ``motion`` of ``body`` in it and the parameters ``phi`` (10N,) in use.
+
+    ``session_time`` (T,) runs from 0 at the start of the session to 1 at its end, for causes that grow with time.
+    """
+
+    body: Body
+    trial: Trial
+    motion: Motion
+    phi: Array
+    session_time: Array
+
+    def __post_init__(self) -> None:
+        frames = self.motion.time.size
+        object.__setattr__(self, "phi", frozen_array(self.phi, (10 * len(self.body.segments),), "Case.phi"))
+        object.__setattr__(self, "session_time", frozen_array(self.session_time, (frames,), "Case.session_time"))
+        if self.trial.wrench.time.size != frames:
+            raise TrialRefused(f"Trial {self.trial.name}: {frames} frames of motion, other samples of force; prepare the trial first.")
+
+    @cached_property
+    def regressor(self) -> Array:
+        """(T, 6, 10N) root regressor about the lab origin."""
+        return regressor(self.body, self.motion)
+
+    @cached_property
+    def predicted(self) -> Array:
+        """(T, 6) N, N·m wrench about the lab origin that the motion needs. Candidate causes are built from this one, never from the
+        measured wrench: columns of measured channels reproduce any residual exactly.
+        """
+        return self.regressor @ self.phi
+
+    @property
+    def residual(self) -> Array:
+        """(T, 6) N, N·m measured minus predicted wrench about the lab origin."""
+        return self.trial.wrench.value - self.predicted
+
+    def plate(self, name: str) -> Plate:
+        """Return a plate by name; UnknownName lists the trial's plates."""
+        for plate in self.trial.plates:
+            if plate.name == name:
+                return plate
+        raise UnknownName.of("force plate of this trial", name, [plate.name for plate in self.trial.plates])
+
+    def predicted_on(self, plate: Plate) -> Array:
+        """Return the predicted wrench (T, 6) of one plate about its centre, lab axes: its share of the vertical force times the whole."""
+        total = self.trial.wrench.value[:, 2]
+        safe = np.where(np.abs(total) > 1.0, total, 1.0)
+        share = np.where(np.abs(total) > 1.0, plate.wrench.value[:, 2] / safe, 1.0 / len(self.trial.plates))
+        value = self.predicted * (np.ones_like(share) if len(self.trial.plates) == 1 else share)[:, None]
+        return at_point(value, plate.centre)
+
+    def with_added(self, plate: Plate, change: Array) -> "Case":
+        """Return the case with ``change`` (T, 6) about the lab origin added to what ``plate`` measured."""
+        changed = replace(plate, wrench=Wrench(plate.wrench.time, plate.wrench.value + change))
+        plates = tuple(changed if p.name == plate.name else p for p in self.trial.plates)
+        return replace(self, trial=replace(self.trial, plates=plates))
+
+
+def at_point(wrench: Array, point: Array) -> Array:
+    """Return wrenches (T, 6) about the lab origin as wrenches about ``point`` (3,) m."""
+    return np.concatenate([wrench[:, :3], wrench[:, 3:] - np.cross(point, wrench[:, :3])], axis=1)
+
+
+def at_origin(wrench: Array, point: Array) -> Array:
+    """Return wrenches (T, 6) about ``point`` (3,) m as wrenches about the lab origin."""
+    return at_point(wrench, -np.asarray(point))

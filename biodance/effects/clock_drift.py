@@ -1,0 +1,28 @@
+"""The clocks of forces and markers run at different rates.
+
+Signature: a delay that grows during the session, zero in its middle.
+Look-alikes: a delay in one trial only; drift of the plate. Separated by a long session and by a trial repeated at the end.
+"""
+
+import numpy as np
+
+from biodance.effects.case import Case
+from biodance.effects.effect import Effect, Parameter
+from biodance.effects.time_delay import moved_in_time
+from biodance.records import Array
+
+
+class ClockDrift(Effect):
+    """A ``stretch`` (s over the session): forces this much later at the end than at the start, against the markers."""
+
+    name = "clock_drift"
+    parameters = (Parameter("stretch", "s", 0.01, "1-2.5 % rate errors of older video systems (ISBS 1723); a few ms in synchronised labs"),)
+
+    def transform(self, case: Case, theta: Array) -> Case:
+        """Return the case whose forces are late by stretch times (session time - 1/2)."""
+        delay = float(np.ravel(theta)[0]) * (case.session_time - 0.5)
+        late = moved_in_time(case.motion.time, case.predicted, delay)
+        return case.with_added(case.trial.plates[0], late - case.predicted)
+
+
+EFFECT = ClockDrift

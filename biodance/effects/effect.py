@@ -1,0 +1,91 @@
+"""The contract of an effect: one candidate cause of disagreement between the simulated and the measured wrench.
+
+The author of an effect writes its parameters and ONE of two methods; the other one is derived:
+
+- linear in its parameters: ``columns(case)``, what one unit of each parameter adds to the MEASURED wrench; ``transform`` adds them;
+- otherwise: ``transform(case, theta)``, the case that this cause would have produced; ``columns`` is its central difference at zero.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from biodance.effects.case import Case
+from biodance.errors import BiodanceError, UnknownName
+from biodance.records import CHANNELS, Array
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """``name``, ``unit`` as printed, ``typical`` size in that unit and the ``source`` of that size."""
+
+    name: str
+    unit: str
+    typical: float
+    source: str
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One cause at one ``target``: a segment, a channel (``Fz``), a pair (``Fz->My``), a plate and axis (``plate1:x``), or "" for none."""
+
+    target: str
+    name: ClassVar[str] = ""
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
+
+    @classmethod
+    def targets(cls, case: Case) -> tuple[str, ...]:
+        """Return the legal targets in ``case``."""
+        return ("",)
+
+    @classmethod
+    def at(cls, target: str, case: Case) -> "Effect":
+        """Return the effect at ``target``; UnknownName lists the legal targets."""
+        legal = cls.targets(case)
+        if target not in legal:
+            raise UnknownName.of(f"target of {cls.name}", target, legal)
+        return cls(target)
+
+    @property
+    def typical(self) -> Array:
+        """(p,) typical sizes, in the parameters' units."""
+        return np.array([parameter.typical for parameter in self.parameters])
+
+    def columns(self, case: Case) -> Array:
+        """Return (T, 6, p): what one unit of each parameter adds to the measured wrench minus the predicted one, about the lab origin."""
+        steps = 1e-3 * np.diag(self.typical)
+        return np.stack([(self.transform(case, s).residual - self.transform(case, -s).residual) / (2 * s.max()) for s in steps], axis=2)
+
+    def transform(self, case: Case, theta: Array) -> Case:
+        """Return the case that this cause of size ``theta`` (p,) would have produced."""
+        if type(self).columns is Effect.columns:
+            raise BiodanceError(f"Effect {self.name} defines neither columns nor transform; write one of them.")
+        return case.with_added(self.plate_of(case), self.columns(case) @ np.asarray(theta, dtype=float))
+
+    def plate_of(self, case: Case):  # type: ignore[no-untyped-def]
+        """Return the plate that the target names, or the first one."""
+        name = self.target.partition(":")[0]
+        return case.plate(name) if name.startswith("plate") else case.trial.plates[0]
+
+
+def plate_channels(case: Case, channels: tuple[str, ...] = CHANNELS) -> tuple[str, ...]:
+    """Return the targets ``Fx`` ... for one plate, ``plate2:Fx`` ... for several."""
+    if len(case.trial.plates) == 1:
+        return channels
+    return tuple(f"{plate.name}:{channel}" for plate in case.trial.plates for channel in channels)
+
+
+def channel_index(target: str) -> int:
+    """Return the index 0..5 of the channel that a target names last (``Fz``, ``plate2:Fz``)."""
+    return CHANNELS.index(target.rpartition(":")[2])
+
+
+def plate_axes(case: Case) -> tuple[str, ...]:
+    """Return the targets ``plate1:x``, ``plate1:y``, ``plate1:z`` of every plate."""
+    return tuple(f"{plate.name}:{axis}" for plate in case.trial.plates for axis in "xyz")
+
+
+def axis_vector(target: str) -> Array:
+    """Return the unit vector (3,) of the axis that a target ends with."""
+    return np.eye(3)["xyz".index(target[-1])]

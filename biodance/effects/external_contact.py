@@ -1,0 +1,48 @@
+"""The person touches something that no plate measures: a rail, a helper's hand, the floor with the second foot.
+
+Signature: a force at one moving point of the body, so that only three of the six channels are free: the moment is the point times the
+force. Look-alikes: contact at a neighbouring segment; for a steady touch, offsets. Separated by the video, and by the rank of the residual.
+"""
+
+import numpy as np
+
+from biodance.effects.case import Case
+from biodance.effects.effect import Effect, Parameter
+from biodance.motion.kinematics import poses
+from biodance.records import Array
+
+
+class ExternalContact(Effect):
+    """A steady ``force`` (x, y, z: N, lab axes) ON the person at the far end of segment ``target``, which the plates lack."""
+
+    name = "external_contact"
+    parameters = tuple(Parameter(f"force_{axis}", "N", 10.0, "light touch of 1 N to tens of newtons (IJmker 2015)") for axis in "xyz")
+
+    @classmethod
+    def targets(cls, case: Case) -> tuple[str, ...]:
+        """Return the segments that can touch something: those without a further segment, and the pelvis."""
+        carried = {case.body.joints[j].segment for j in case.body.segment_joint if j >= 0}
+        inner = {_parent_segment(case, j) for j in case.body.segment_joint if j >= 0}
+        return tuple(name for i, name in enumerate(case.body.segments) if (i in carried and i not in inner) or i == 0)
+
+    def columns(self, case: Case) -> Array:
+        """Return minus the wrench of a unit force at the contact point: what another support carries, the plates miss."""
+        index = case.body.segment_index(self.target)
+        low, high = case.body.boxes[index]
+        far = 0.5 * (low + high)
+        far[1] = low[1] if index else 0.0
+        point = poses(case.body, case.motion.q).points([index], far[None])[:, 0]
+        moment = np.stack([np.cross(point, axis) for axis in np.eye(3)], axis=2)
+        force = np.broadcast_to(np.eye(3), moment.shape)
+        return -np.concatenate([force, moment], axis=1)
+
+
+def _parent_segment(case: Case, joint: int) -> int:
+    """Return the segment that carries the chain of ``joint``; 0 for the root."""
+    parent = case.body.joints[joint].parent
+    while parent >= 0 and case.body.joints[parent].segment < 0:
+        parent = case.body.joints[parent].parent
+    return 0 if parent < 0 else case.body.joints[parent].segment
+
+
+EFFECT = ExternalContact

@@ -1,0 +1,34 @@
+"""The laboratory's vertical, as the cameras were calibrated, is not gravity's.
+
+Signature: a constant horizontal force of body weight times the tilt, and its moment, which follows the height of the centre of mass.
+Look-alikes: offset of Fx with My, or Fy with Mx; pitch or roll of the plate. Separated by squats (the centre of mass changes height) and
+by a plumb line with two markers.
+"""
+
+import numpy as np
+
+from biodance.effects.case import Case
+from biodance.effects.effect import Effect, Parameter, axis_vector
+from biodance.motion.regressor import GRAVITY, regressor
+from biodance.records import Array
+
+
+class LabTilt(Effect):
+    """An ``angle`` (rad) about lab axis ``target`` ("x" or "y") by which gravity is turned in the lab frame."""
+
+    name = "lab_tilt"
+    parameters = (Parameter("angle", "rad", 0.005, "0.1-1 deg after an L-frame calibration on an uneven floor"),)
+
+    @classmethod
+    def targets(cls, case: Case) -> tuple[str, ...]:
+        """Return the two horizontal axes."""
+        return ("x", "y")
+
+    def columns(self, case: Case) -> Array:
+        """Return the change of the predicted wrench per radian: gravity enters linearly, and turns by axis x gravity."""
+        turned = np.cross(axis_vector(self.target), GRAVITY)
+        still = regressor(case.body, case.motion, gravity=GRAVITY)
+        return ((regressor(case.body, case.motion, gravity=GRAVITY + turned) - still) @ case.phi)[:, :, None]
+
+
+EFFECT = LabTilt

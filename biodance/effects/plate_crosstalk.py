@@ -1,0 +1,37 @@
+"""A load on one channel of a force plate shows in another channel.
+
+Signature: the residual of the second channel follows the first one (nearly always Fz, the largest).
+Look-alikes: a tilted plate or laboratory (Fz into Fx, Fy), a shifted plate or an offset (Fz into Mx, My while Fz hardly changes). Separated
+by movements that change Fz much and by standing at other places of the plate.
+"""
+
+import numpy as np
+
+from biodance.effects.case import Case, at_origin
+from biodance.effects.effect import Effect, Parameter
+from biodance.records import CHANNELS, Array
+
+
+class PlateCrosstalk(Effect):
+    """``ratio`` of the second channel to the first (1, or m for a moment from a force) about the plate's centre; target ``Fz->My``."""
+
+    name = "plate_crosstalk"
+    parameters = (Parameter("ratio", "1 or m or 1/m", 0.01, "maker's limit of 2 % for classic strain-gauge plates"),)
+
+    @classmethod
+    def targets(cls, case: Case) -> tuple[str, ...]:
+        """Return every ordered pair of different channels, of every plate when there are several."""
+        pairs = tuple(f"{a}->{b}" for a in CHANNELS for b in CHANNELS if a != b)
+        if len(case.trial.plates) == 1:
+            return pairs
+        return tuple(f"{plate.name}:{pair}" for plate in case.trial.plates for pair in pairs)
+
+    def columns(self, case: Case) -> Array:
+        """Return the predicted first channel in the place of the second, moved to the lab origin."""
+        plate = self.plate_of(case)
+        first, _, second = self.target.rpartition(":")[2].partition("->")
+        change = case.predicted_on(plate)[:, CHANNELS.index(first), None] * np.eye(6)[CHANNELS.index(second)]
+        return at_origin(change, plate.centre)[:, :, None]
+
+
+EFFECT = PlateCrosstalk

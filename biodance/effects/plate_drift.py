@@ -1,0 +1,34 @@
+"""The zero of a force-plate channel wanders during the session.
+
+Signature: an offset that grows from trial to trial, minus half at the start, plus half at the end.
+Look-alikes: a posture that changes with fatigue; a drifting clock. Separated by repeating the first trial at the end and by unloaded
+recordings before and after.
+"""
+
+import numpy as np
+
+from biodance.effects.case import Case, at_origin
+from biodance.effects.effect import Effect, Parameter, channel_index, plate_channels
+from biodance.records import Array
+
+
+class PlateDrift(Effect):
+    """A ``drift`` (N or N·m over the whole session) about the plate's centre in channel ``target``, zero in the middle of the session."""
+
+    name = "plate_drift"
+    parameters = (
+        Parameter("drift", "N or N·m", 3.0, "a few newtons per session (laboratory experience; acceptance limit 1 N of one lab)"),
+    )
+
+    @classmethod
+    def targets(cls, case: Case) -> tuple[str, ...]:
+        """Return every channel of every plate."""
+        return plate_channels(case)
+
+    def columns(self, case: Case) -> Array:
+        """Return session time minus one half in the channel, moved to the lab origin."""
+        change = (case.session_time - 0.5)[:, None] * np.eye(6)[channel_index(self.target)]
+        return at_origin(change, self.plate_of(case).centre)[:, :, None]
+
+
+EFFECT = PlateDrift

@@ -1,0 +1,37 @@
+"""A force plate is turned against what the laboratory's file says.
+
+Signature: forces and moments turned about one axis: for yaw, Fx follows -Fy and Mx follows -My; for pitch and roll, Fx or Fy follows Fz.
+Look-alikes: pitch and roll look like cross-talk from Fz and like a tilted laboratory; yaw has none. Separated by lunges, arm swings and
+the plate's corners measured with markers.
+"""
+
+import numpy as np
+
+from biodance.effects.case import Case, at_origin
+from biodance.effects.effect import Effect, Parameter, axis_vector, plate_axes
+from biodance.motion.kinematics import axis_rotation
+from biodance.records import Array
+
+
+class PlateRotation(Effect):
+    """An ``angle`` (rad) about a lab axis through the plate's centre by which the recorded wrench is turned; target ``plate1:z`` for
+    yaw."""
+
+    name = "plate_rotation"
+    parameters = (Parameter("angle", "rad", 0.02, "about 0.2 deg in a CalTester example report; 1 deg and more when corners are typed"),)
+
+    @classmethod
+    def targets(cls, case: Case) -> tuple[str, ...]:
+        """Return every axis of every plate."""
+        return plate_axes(case)
+
+    def transform(self, case: Case, theta: Array) -> Case:
+        """Return the case whose plate wrench is turned by ``theta``: exact for any angle."""
+        plate = self.plate_of(case)
+        turn = axis_rotation(axis_vector(self.target), np.atleast_1d(theta))[0]
+        local = case.predicted_on(plate)
+        turned = np.concatenate([local[:, :3] @ turn.T, local[:, 3:] @ turn.T], axis=1)
+        return case.with_added(plate, at_origin(turned - local, plate.centre))
+
+
+EFFECT = PlateRotation

@@ -1,0 +1,122 @@
+"""One contract for every file in effects/: identity at zero, columns equal to differences, units, sources, signature and look-alikes."""
+
+import importlib
+
+import numpy as np
+import pytest
+from random_bodies import random_body
+from scipy.interpolate import CubicSpline
+
+from biodance.effects import effect, effects
+from biodance.effects.case import Case, at_origin, at_point
+from biodance.effects.effect import Effect
+from biodance.errors import UnknownName
+from biodance.motion.regressor import predict_wrench
+from biodance.records import Motion, Plate, Source, Trial, Wrench
+
+SECTIONS = ("Signature:", "Look-alikes:", "Separated by")
+
+
+def example(plates: int = 1) -> Case:
+    """Return a smooth trial of a random tree on one or two plates."""
+    rng = np.random.default_rng(0)
+    body = random_body(rng, n_segments=4)
+    time = np.arange(120) / 100
+    curve = CubicSpline(np.arange(0, 2.5, 0.5), rng.normal(0, 0.5, (5, len(body.joints))))
+    q = np.tile(body.neutral, (120, 1))
+    q[:, :3] += [0.4, 0.2, 1.0]
+    v, a = np.zeros((120, body.nv)), np.zeros((120, body.nv))
+    q[:, 7:], v[:, 6:], a[:, 6:] = curve(time), curve(time, 1), curve(time, 2)
+    motion = Motion(time, q, v, a)
+    value = predict_wrench(body, motion).value + rng.normal(0, 1.0, (120, 6))
+    corners = np.array([[0.6, 0.5, 0], [0.2, 0.5, 0], [0.2, -0.1, 0], [0.6, -0.1, 0]])
+    share = [1.0] if plates == 1 else [0.7, 0.3]
+    made = tuple(Plate(f"plate{i + 1}", 2, corners + np.array([0.5 * i, 0, 0]), Wrench(time, s * value)) for i, s in enumerate(share))
+    trial = Trial("t", "fit", None, made, Source(__file__, "", "test"))
+    return Case(body, trial, motion, body.sip.phi, time / time[-1])
+
+
+CASES = {1: example(1), 2: example(2)}
+ALL = [(name, plates) for name in sorted(effects()) for plates in CASES]
+
+
+@pytest.mark.parametrize(("name", "plates"), ALL)
+def test_zero_changes_nothing(name: str, plates: int) -> None:
+    case = CASES[plates]
+    for target in effect(name).targets(case):
+        found = effect(name).at(target, case)
+        still = found.transform(case, np.zeros(len(found.parameters)))
+        np.testing.assert_allclose(still.residual, case.residual, atol=1e-9)
+
+
+@pytest.mark.parametrize(("name", "plates"), ALL)
+def test_columns_are_the_differences_of_transform(name: str, plates: int) -> None:
+    case = CASES[plates]
+    for target in effect(name).targets(case)[:12]:
+        found = effect(name).at(target, case)
+        columns = found.columns(case)
+        assert columns.shape == (120, 6, len(found.parameters))
+        for k, size in enumerate(found.typical):
+            step = 1e-3 * size * np.eye(len(found.parameters))[k]
+            slope = (found.transform(case, step).residual - found.transform(case, -step).residual) / (2e-3 * size)
+            scale = np.abs(columns).max()
+            np.testing.assert_allclose(columns[:, :, k], slope, atol=2e-4 * max(scale, 1e-9))
+
+
+@pytest.mark.parametrize("name", sorted(effects()))
+def test_every_effect_says_what_it_is(name: str) -> None:
+    kind = effect(name)
+    assert kind.name == name
+    assert issubclass(kind, Effect)
+    assert kind.parameters
+    for parameter in kind.parameters:
+        assert parameter.unit
+        assert parameter.typical > 0
+        assert len(parameter.source) > 10
+    text = " ".join((importlib.import_module(f"biodance.effects.{name}").__doc__ or "").split())
+    for section in SECTIONS:
+        assert section in text, f"{name} lacks {section}"
+
+
+@pytest.mark.parametrize("name", sorted(effects()))
+def test_typical_size_is_seen_in_the_residual(name: str) -> None:
+    case = CASES[1]
+    found = effect(name).at(effect(name).targets(case)[-1], case)
+    change = found.transform(case, found.typical).residual - case.residual
+    assert np.abs(change).max() > 1e-3
+
+
+def test_shifted_plate_moves_the_centre_of_pressure() -> None:
+    case = CASES[1]
+    moved = effect("plate_position").at("plate1:x", case).transform(case, np.array([0.02]))
+    shift = (moved.trial.wrench.cop() - case.trial.wrench.cop())[:, 0]
+    np.testing.assert_allclose(np.nanmedian(shift), 0.02, atol=1e-3)
+
+
+def test_late_forces_are_late() -> None:
+    case = CASES[1]
+    late = effect("time_delay").at("", case).transform(case, np.array([0.05]))
+    added = late.residual - case.residual + case.predicted
+    np.testing.assert_allclose(added[5:], case.predicted[:-5], atol=1e-8 * np.abs(case.predicted).max())
+
+
+def test_added_mass_weighs_what_it_says() -> None:
+    case = CASES[1]
+    loaded = effect("added_mass").at("s2", case).transform(case, np.array([2.4, 0, 0, 0]))
+    still = Motion(case.motion.time, case.motion.q, 0 * case.motion.v, 0 * case.motion.a)
+    standing = Case(case.body, case.trial, still, case.phi, case.session_time)
+    change = effect("added_mass").at("s2", standing).transform(standing, np.array([2.4, 0, 0, 0])).residual - standing.residual
+    np.testing.assert_allclose(change[:, 2], 2.4 * 9.80665, rtol=1e-9)
+    assert np.abs((loaded.residual - case.residual)[:, 2]).max() > 2.4 * 9.8
+
+
+def test_wrong_target_lists_the_legal_ones() -> None:
+    with pytest.raises(UnknownName, match="plate1:z"):
+        effect("plate_position").at("plate9:x", CASES[1])
+    with pytest.raises(UnknownName, match="plate_gain"):
+        effect("plate_gian")
+
+
+def test_moving_a_wrench_there_and_back_is_nothing() -> None:
+    value, point = CASES[1].predicted, np.array([1.0, -2.0, 0.5])
+    np.testing.assert_allclose(at_origin(at_point(value, point), point), value, atol=1e-9)
