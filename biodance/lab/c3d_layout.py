@@ -181,7 +181,7 @@ def _counts(size: int, header: Header, parameters: Parameters, word: int, where:
 
 
 def _all_told_twice(header: Header, parameters: Parameters) -> bool:
-    """Return whether every count stands in the header and, without contradiction, in the parameters, so that bytes behind the data are believed to be padding."""
+    """Return whether header and parameters both tell every count, without contradiction: then bytes behind the data are padding."""
     points = not header.points or "USED" in parameters.get("POINT", {})
     channels = scalar(parameters, "ANALOG", "USED")
     analog = (header.analog_values > 0) == (channels > 0)
