@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from biodance.pipeline.results import SessionResult
+    from biodance.records import Session
 
 DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED = 0, 1, 2, 130
 
@@ -54,18 +55,14 @@ def _progress() -> "Iterator[Callable[[str], None]]":
         yield lambda text: status.update(escape(text))
 
 
-def _reported(session: Path, out: Path, force: bool, tell: "Callable[[str], None]") -> "tuple[SessionResult, Path, dict[str, Any]]":
-    """Read, examine and report one session; return the result, the folder written to and the content of results.json."""
-    from biodance.lab.results_folder import results_folder
-    from biodance.lab.session import read_session
+def _reported(recording: "Session", folder: Path, tell: "Callable[[str], None]") -> "tuple[SessionResult, dict[str, Any]]":
+    """Examine a session and report it into ``folder``; return the result and the content of results.json."""
     from biodance.pipeline.session import examine
     from biodance.report.write import write_report
 
-    recording = read_session(session, tell=tell)
-    folder = results_folder(out, session, force=force)
     result = examine(recording, tell=tell)
     tell("writing the page")
-    return result, folder, write_report(result, folder)
+    return result, write_report(result, folder)
 
 
 def _told(result: "SessionResult", folder: Path, found: "dict[str, Any]", json: bool) -> int:
@@ -86,10 +83,11 @@ def _told(result: "SessionResult", folder: Path, found: "dict[str, Any]", json: 
 
 
 def _forget_simulated(folder: Path) -> None:
-    """Remove a folder that holds a simulated session, and no other one."""
+    """Remove a folder that holds a simulated session and nothing else; leave every other one alone."""
     import shutil
 
-    if (folder / "truth" / "truth.json").is_file() and (folder / "session.toml").is_file():
+    simulated = (folder / "truth" / "truth.json").is_file() and (folder / "session.toml").is_file()
+    if simulated and all(path.suffix == ".c3d" or path.name in ("session.toml", "truth") for path in folder.iterdir()):
         shutil.rmtree(folder)
 
 
@@ -118,16 +116,23 @@ def inspect(*paths: Path, json: Json = False) -> int:
 
 
 @app.command
-def report(session: Path, *, out: Out, json: Json = False, force: Force = False) -> int:
+def report(session: Path, *, out: Out, subject: str | None = None, json: Json = False, force: Force = False) -> int:
     """Take a session through all stages and write report.html and results.json.
 
     Parameters
     ----------
     session
         Folder with the static trial and the other trials.
+    subject
+        The person to report where C3D files hold several; without it a file with several persons is refused and names them.
     """
+    from biodance.lab.results_folder import results_folder
+    from biodance.lab.session import read_session
+
     with _progress() as tell:
-        result, folder, found = _reported(session, out, force, tell)
+        recording = read_session(session, subject_name=subject, tell=tell)
+        folder = results_folder(out, session, force=force)
+        result, found = _reported(recording, folder, tell)
     return _told(result, folder, found, json)
 
 
@@ -140,6 +145,7 @@ def simulate(
     mass: Annotated[float, Parameter(help="Body mass, kg.")],
     age: Annotated[float, Parameter(help="Age, years.")] = float("nan"),
     seed: Annotated[int, Parameter(help="The same seed gives the same person and the same files.")],
+    effect: Annotated[tuple[str, ...], Parameter(negative=(), help="Hide a cause: plate_gain:target=Fz,gain=0.04; may be repeated.")] = (),
     out: Out,
     force: Force = False,
 ) -> int:
@@ -151,13 +157,17 @@ def simulate(
         Name of a protocol: dance, short, squat, standing ...; a wrong name lists all.
     """
     from biodance.records import Subject
+    from biodance.virtual_lab.hide import hide, parse
+    from biodance.virtual_lab.protocol_file import read_protocol
     from biodance.virtual_lab.simulate import simulate as write_session
 
     if force:
         _forget_simulated(out)
     with _progress() as tell:
         tell(f"simulating {protocol}")
-        folder = write_session(Subject(mass, height, sex, age), protocol, out, seed=seed)
+        subject, plan = Subject(mass, height, sex, age), read_protocol(protocol)
+        visit, loads = hide(tuple(parse(text) for text in effect), subject, plan, seed=seed)
+        folder = write_session(subject, plan, out, seed=seed, loads=loads, visit=visit)
     sys.stdout.write(f"{folder}\n")
     return DONE
 
@@ -165,6 +175,8 @@ def simulate(
 @app.command
 def demo(*, out: Out = Path("demo"), force: Force = False) -> int:
     """Simulate a short session of a person whose truth is known, and report it like a real one."""
+    from biodance.lab.results_folder import results_folder
+    from biodance.lab.session import read_session
     from biodance.records import Subject
     from biodance.virtual_lab.simulate import simulate as write_session
 
@@ -173,7 +185,8 @@ def demo(*, out: Out = Path("demo"), force: Force = False) -> int:
     with _progress() as tell:
         tell("simulating a session")
         session = write_session(Subject(62.0, 1.70, "F", 31.0), "short", out / "simulated_session", seed=1)
-        result, folder, found = _reported(session, out / "report", force, tell)
+        folder = results_folder(out / "report", session, force=force)
+        result, found = _reported(read_session(session, tell=tell), folder, tell)
     return _told(result, folder, found, False)
 
 

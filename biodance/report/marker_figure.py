@@ -16,7 +16,7 @@ def marker_figure(fit: MarkerFit) -> "Figure":
     seen = np.flatnonzero(np.isfinite(fit.rms))
     order = seen[np.argsort(-fit.rms[seen], kind="stable")]
     with look():
-        drawn = figure(2.2)
+        drawn = figure(2.0)
         axes = drawn.subplots()
         place = np.arange(order.size)
         axes.bar(place, 1000 * fit.rms[order], width=0.75, color=SKY, edgecolor=BLACK, linewidth=0.5, label="RMS over the trial")

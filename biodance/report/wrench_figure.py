@@ -56,7 +56,7 @@ def wrench_figure(comparison: WrenchComparison) -> "Figure":
     from matplotlib.patches import Patch
 
     with look():
-        drawn = figure(6.6)
+        drawn = figure(5.7)
         grid = drawn.subplots(6, 2, sharex=True, height_ratios=[3, 1] * 3)
         for channel in range(len(CHANNELS)):
             row, column = 2 * (channel % 3), channel // 3

@@ -1,0 +1,149 @@
+"""The whole pipeline: a session that obeys the model exactly, and real sessions against what is known of them."""
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from biodance.body.human import human
+from biodance.lab.session import read_session
+from biodance.motion.kinematics import poses
+from biodance.motion.regressor import predict_wrench
+from biodance.pipeline.session import examine
+from biodance.records import Markers, Motion, Plate, Session, Source, Subject, Trial, Wrench
+
+SUBJECT = Subject(62.0, 1.70, "F", 30.0, "S01")
+PLATE = np.array([[0.5, 0.5, 0.0], [-0.5, 0.5, 0.0], [-0.5, -0.5, 0.0], [0.5, -0.5, 0.0]])
+RATE = 100.0
+
+
+def arm_swing(body, *, frames: int, angle: float) -> Motion:
+    """Return somebody who stands and raises both arms by ``angle`` rad and lowers them, with exact derivatives."""
+    time = np.arange(frames) / RATE
+    rate = 2 * np.pi / time[-1]
+    course = angle * (1 - np.cos(rate * time)) / 2
+    q, v, a = np.tile(body.neutral, (frames, 1)), np.zeros((frames, body.nv)), np.zeros((frames, body.nv))
+    q[:, 2] = -poses(body, body.neutral).points([body.feet["left"].segment], body.feet["left"].outline[:1])[0, 0, 2]
+    for side in ("left", "right"):
+        i = body.joint_index(f"{side}_shoulder_flexion")
+        q[:, 7 + i] = course
+        v[:, 6 + i], a[:, 6 + i] = angle * rate * np.sin(rate * time) / 2, angle * rate**2 * np.cos(rate * time) / 2
+    return Motion(time, q, v, a)
+
+
+def recorded(body, name: str, motion: Motion) -> Trial:
+    """Return what a perfect laboratory records of ``motion``: the markers of the body and the wrench it needs, on one large plate."""
+    xyz = poses(body, motion.q).points(list(body.markers.segment), body.markers.position)
+    wrench = predict_wrench(body, motion)
+    fine = np.arange(10 * (motion.time.size - 1) + 1) / (10 * RATE)
+    value = np.stack([np.interp(fine, motion.time, column) for column in wrench.value.T], axis=1)
+    source = Source(Path(f"/lab/S01/{name}.c3d"), "00" * 32, "C3D", RATE, 10 * RATE)
+    role = "check" if name == "standing" else "fit"
+    plates = (Plate("plate1", 2, PLATE, Wrench(fine, value)),)
+    return Trial(name, role, Markers(body.markers.names, motion.time, xyz), plates, source, "plug_in_gait")
+
+
+@pytest.fixture(scope="module")
+def perfect():
+    """Return the result of a session without a static trial in which body, markers and plates agree exactly."""
+    body = human(SUBJECT)
+    stand = recorded(body, "standing", arm_swing(body, frames=150, angle=0.0))
+    swing = recorded(body, "swing", arm_swing(body, frames=300, angle=1.0))
+    return examine(Session(SUBJECT, (stand, swing), Path("/lab/S01")))
+
+
+def test_a_body_that_is_true_follows_its_markers_and_needs_the_measured_wrench(perfect):
+    for trial in perfect.trials:
+        assert [step.status for step in trial.steps] == ["done"] * len(trial.steps)
+        assert trial.fit.total_max < 1e-4
+        assert trial.comparison.used.all()
+    swing = perfect.trials[1].comparison
+    inner = slice(30, -30)
+    difference = (swing.measured - swing.simulated)[inner]
+    assert np.sqrt(np.mean(difference**2, axis=0)).max() < 0.2
+    assert swing.correlation[[0, 2, 4]].min() > 0.98
+
+
+def test_standing_still_the_centre_of_mass_is_over_the_centre_of_pressure(perfect):
+    assert perfect.standing.trial == "standing"
+    assert perfect.standing.mass == pytest.approx(62.0, abs=1e-3)
+    assert abs(perfect.standing.com_ahead) < 1e-4
+    assert abs(perfect.standing.com_left) < 1e-4
+    np.testing.assert_allclose(perfect.standing.forward, [1, 0], atol=1e-6)
+    assert all(check.inside for check in perfect.checks)
+
+
+def test_without_a_static_trial_the_session_says_so(perfect):
+    assert [step.name for step in perfect.steps if step.status == "refused"] == ["scale"]
+    assert perfect.needs_a_person
+
+
+def test_a_heavier_load_on_the_plates_is_seen_in_mass_and_wrench():
+    body = human(SUBJECT)
+    stand = recorded(body, "standing", arm_swing(body, frames=150, angle=0.0))
+    plate = stand.plates[0]
+    loaded = replace(stand, plates=(replace(plate, wrench=Wrench(plate.wrench.time, 1.05 * plate.wrench.value)),))
+    result = examine(Session(SUBJECT, (loaded,), Path("/lab/S01")))
+    assert result.mass_difference == pytest.approx(5.0, abs=0.01)
+    assert [check.what for check in result.checks if not check.inside] == ["mass on the plates against declared"]
+
+
+def test_the_same_session_gives_the_same_numbers(perfect):
+    again = examine(perfect.session)
+    np.testing.assert_array_equal(again.trials[1].comparison.simulated, perfect.trials[1].comparison.simulated)
+
+
+def recording(name: str):
+    """Return the result of a real session, or skip where the recordings are not on this machine."""
+    folder = os.environ.get("BIODANCE_DATA")
+    if not folder:
+        pytest.skip("BIODANCE_DATA does not name the folder of real recordings")
+    result = examine(read_session(Path(folder) / name))
+    failed = [step.text for trial in result.trials for step in trial.steps if step.status == "failed"]
+    assert failed == []
+    return result
+
+
+@pytest.mark.parametrize(("name", "declared"), [("HC030A", 45.80), ("HC032A", 60.30), ("HC038A", 56.80)])
+def test_the_weight_of_real_statics_is_the_declared_one(name, declared):
+    result = recording(f"biomechzoo/{name}")
+    assert result.subject.mass == pytest.approx(declared, abs=0.01)
+    assert abs(result.mass_difference) < 0.3
+    static, walk = result.trials
+    assert static.trial.role == "static"
+    assert static.fit.total_rms < 0.002
+    assert 0.3 < walk.comparison.used.sum() / RATE < 1.5
+    assert walk.comparison.correlation[3] > 0.5
+
+
+def test_a_static_off_the_plates_is_refused_and_the_stairs_are_compared():
+    result = recording("pycgm")
+    static, stairs = result.trials
+    assert "nobody stands on the plates" in static.reason
+    assert static.fit is not None
+    assert result.standing is None
+    assert stairs.comparison.used.sum() > 150
+    assert stairs.comparison.correlation[2] > 0.9
+
+
+def test_a_static_of_one_frame_scales_the_body():
+    result = recording("adl_gait")
+    assert "static trial 2014001_ST" in result.body_source
+    walk = result.trials[1]
+    assert walk.fit.total_rms < 0.025
+    assert walk.comparison.correlation.min() > 0.8
+
+
+def test_plates_alone_are_weighed():
+    result = recording("biomdp")
+    weights = {trial.trial.name: trial.standing.mass for trial in result.trials}
+    assert weights["kistler_COP"] == pytest.approx(666 / 9.80665, abs=0.5)
+    assert all("no markers" in trial.reason for trial in result.trials)
+
+
+def test_labels_of_no_known_set_are_refused_and_the_weight_is_read():
+    result = recording("c3d_parser")
+    assert all("no known marker set" in trial.reason for trial in result.trials)
+    assert result.standing.mass == pytest.approx(36.3, abs=0.1)
