@@ -1,0 +1,180 @@
+"""Added mass: which segment carries a load, how heavy, where on it, how sure - against an earlier session or against the table.
+
+Hypotheses "a load sits on segment s" are compared with "no load" by Bayes factors under one linear Gaussian model: the body as known before
+(the posterior of the reference session, or the table), plus the ten parameters of a load whose mass and place inside the segment's box are
+unknown. The load's prior is the second moment of such loads, so that light and heavy ones both fit. The smallest load that the session
+could have found is computed from its information alone.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from biodance.body.body import Body
+from biodance.identify.identification import Identification
+from biodance.identify.information import Information
+from biodance.identify.knowledge import SIGMAS
+from biodance.identify.posterior import prior_factor
+from biodance.records import Array, Sip
+
+SCALE = 2.0
+"""kg: typical size of a load; the answer changes little between half and twice of it."""
+RADIUS = 0.04
+"""m: radius of gyration of a compact load."""
+THRESHOLD = 0.05
+"""p of "no load" below which a load is announced."""
+NEAR = 0.5
+"""A load may lie this share of the box beyond the box (straps, wrist weights)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Suspect:
+    """The hypothesis of a load on one segment.
+
+    ``mass`` kg with ``sd``; ``place`` (3,) m of its CoM in the segment's joint frame with ``place_sd`` (3,), NaN where the mass is less
+    than twice its sd; ``log_bayes_factor`` against no load; ``probability`` among all hypotheses; ``smallest`` kg, the load on this segment that
+    this session would find in half of the cases.
+    """
+
+    segment: str
+    mass: float
+    sd: float
+    place: Array
+    place_sd: Array
+    log_bayes_factor: float
+    probability: float
+    smallest: float
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval of the mass, kg."""
+        return self.mass - SIGMAS * self.sd, self.mass + SIGMAS * self.sd
+
+
+@dataclass(frozen=True, eq=False)
+class AddedMass:
+    """All hypotheses, most probable first; ``p_no_load`` probability that nothing was added; ``reference`` in words."""
+
+    suspects: tuple[Suspect, ...]
+    p_no_load: float
+    reference: str
+
+    @property
+    def found(self) -> bool:
+        """Whether a load is announced."""
+        return self.p_no_load < THRESHOLD and self.suspects[0].mass > 0
+
+    @property
+    def best(self) -> Suspect:
+        """The most probable hypothesis."""
+        return self.suspects[0]
+
+    @property
+    def set(self) -> tuple[str, ...]:
+        """Segments, most probable first, that hold 95 % of the probability of a load."""
+        share = np.cumsum([s.probability for s in self.suspects]) / sum(s.probability for s in self.suspects)
+        return tuple(s.segment for s in self.suspects[: int(np.searchsorted(share, 0.95)) + 1])
+
+
+def added_mass(session: Identification, *, reference: Identification | None = None) -> AddedMass:
+    """Return where and how much mass ``session`` carries beyond ``reference`` (an unloaded session of the same person) or the table.
+
+    Against the table alone, a load on pelvis, trunk or thigh cannot be told from a wrong table or a wrong scale: ``set`` then holds several
+    segments.
+    """
+    before = session.belief.prior if reference is None else expected(reference, session)
+    base = _evidence(session.data, before, np.zeros((before.phi.size, 0)))[0]
+    found = [_suspect(session, before, i, base) for i in range(len(before.segments))]
+    weight = np.array([f.log_bayes_factor for f in found]) - np.log(len(found))
+    top = max(0.0, float(weight.max()))
+    total = np.exp(-top) + np.exp(weight - top).sum()
+    chance = np.exp(weight - top) / total
+    order = np.argsort(-chance)
+    suspects = tuple(_with_probability(found[i], float(chance[i])) for i in order)
+    words = "the table" if reference is None else f"the session with {', '.join(reference.trials)}"
+    return AddedMass(suspects, float(np.exp(-top) / total), words)
+
+
+def expected(reference: Identification, session: Identification) -> Sip:
+    """Return what ``reference`` lets expect of the unloaded body in ``session``, with covariance.
+
+    The belief of the reference, moved by what the table itself changed between the sessions (another static trial, other lengths).
+    """
+    shift = session.belief.prior.phi - reference.belief.prior.phi
+    return Sip(reference.sip.segments, reference.belief.mean + shift, reference.belief.covariance)
+
+
+def load_moments(body: Body, segment: int) -> Array:
+    """Return U (10, k): U U' is the second moment of the parameters of a load of typical mass in or near the segment's box."""
+    low, high = body.boxes[segment]
+    margin = NEAR * (high - low)
+    rng = np.random.default_rng(segment)
+    place = rng.uniform(low - margin, high + margin, (2000, 3))
+    loads = np.array([point_mass(p) for p in place]) * SCALE
+    moment = loads.T @ loads / len(loads)
+    value, vector = np.linalg.eigh(moment)
+    keep = value > 1e-12 * value.max()
+    return np.asarray(vector[:, keep] * np.sqrt(value[keep]))
+
+
+def point_mass(place: Array, radius: float = RADIUS) -> Array:
+    """Return the ten parameters per kg of a compact load with CoM at ``place`` (3,) m and radius of gyration ``radius`` m."""
+    x, y, z = place
+    r = radius**2
+    return np.array([1.0, x, y, z, y * y + z * z + r, -x * y, x * x + z * z + r, -x * z, -y * z, x * x + y * y + r])
+
+
+def _evidence(data: Information, before: Sip, wide: Array) -> tuple[float, Array, Array]:
+    """Return the log evidence of ``data`` for a body N(before) + ``wide`` @ N(0, 1), and mean (k,) and factor (k, k) of the latter."""
+    S = np.concatenate([prior_factor(before), wide], axis=1)
+    A, b = data.triangle @ S, data.target - data.triangle @ before.phi
+    n, k = S.shape[1], wide.shape[1]
+    stacked = np.zeros((len(A) + n, n + 1))
+    stacked[: len(A), :n], stacked[: len(A), n], stacked[len(A) :, :n] = A, b, np.eye(n)
+    triangle = np.asarray(np.linalg.qr(stacked, mode="r"))
+    U = triangle[:n, :n]
+    evidence = -0.5 * float(np.sum(triangle[n:, n] ** 2)) - float(np.sum(np.log(np.abs(np.diag(U)))))
+    tail = U[n - k :, n - k :]
+    return (
+        evidence,
+        (solve_triangular(tail, triangle[n - k : n, n]) if k else np.zeros(0)),
+        (solve_triangular(tail, np.eye(k)) if k else tail),
+    )
+
+
+def _suspect(session: Identification, before: Sip, i: int, base: float) -> Suspect:
+    """Return the hypothesis of a load on segment ``i``; its probability is filled in later."""
+    U = load_moments(session.body, i)
+    wide = np.zeros((before.phi.size, U.shape[1]))
+    wide[10 * i : 10 * i + 10] = U
+    evidence, mean, factor = _evidence(session.data, before, wide)
+    load, spread = U @ mean, U @ factor
+    covariance = spread @ spread.T
+    mass, sd = float(load[0]), float(np.sqrt(covariance[0, 0]))
+    place, place_sd = np.full(3, np.nan), np.full(3, np.nan)
+    if mass > 2 * sd:
+        place = load[1:4] / mass
+        slope = np.column_stack([-place / mass, np.eye(3) / mass])
+        place_sd = np.sqrt(np.diag(slope @ covariance[:4, :4] @ slope.T))
+    middle = point_mass(session.body.boxes[i].mean(axis=0))
+    return Suspect(
+        before.segments[i], mass, sd, place, place_sd, evidence - base, 0.0, _smallest(session.data, before, wide, 10 * i, middle)
+    )
+
+
+def _with_probability(s: Suspect, chance: float) -> Suspect:
+    return Suspect(s.segment, s.mass, s.sd, s.place, s.place_sd, s.log_bayes_factor, chance, s.smallest)
+
+
+def _smallest(data: Information, before: Sip, wide: Array, first: int, per_kg: Array) -> float:
+    """Return the mass kg of a load at ``per_kg`` (10,) whose expected log Bayes factor reaches the threshold."""
+    H = data.triangle
+    noise_free = Information(np.block([[H, (H[:, first : first + 10] @ per_kg)[:, None]], [np.zeros((1, H.shape[1] + 1))]]), data.frames)
+    centred = Sip(before.segments, np.zeros(before.phi.size), before.covariance)
+    silent = Information(np.block([[H, np.zeros((len(H), 1))], [np.zeros((1, H.shape[1] + 1))]]), data.frames)
+    none = np.zeros((before.phi.size, 0))
+    penalty = _evidence(silent, centred, wide)[0] - _evidence(silent, centred, none)[0]
+    slope = _evidence(noise_free, centred, wide)[0] - _evidence(noise_free, centred, none)[0] - penalty
+    wanted = np.log((1 - THRESHOLD) / THRESHOLD * len(before.segments)) - penalty
+    return float(np.sqrt(max(wanted, 0.0) / slope)) if slope > 0 else float("inf")

@@ -1,0 +1,117 @@
+"""From the trials of a session to what the subject weighs, segment by segment, with an interval for every number.
+
+The steps: band-wise statistics of every trial, noise and parameters learned together, kinematic errors discounted, the table as
+prior (maximum a posteriori: its standard deviations and the noise of the data decide, no weight is tuned), then the nearest body that
+can exist. A session that cannot tell a parameter leaves it at the table's value with the table's interval, and says so.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.errors import TrialRefused
+from biodance.identify.base_parameters import BaseEstimate, estimate_base, structural_base
+from biodance.identify.information import Information
+from biodance.identify.knowledge import Known, knowledge
+from biodance.identify.learning import learn
+from biodance.identify.noise import Noise
+from biodance.identify.physical import PhysicalFit, physical_fit
+from biodance.identify.posterior import Posterior, posterior
+from biodance.identify.statistics import Fit, Statistics, empty, layout_for, statistics
+from biodance.records import Array, Sip
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """What a session says about a body.
+
+    ``body`` as given, with the table as its SIP; ``sip`` the identified parameters, physically consistent, with their covariance;
+    ``belief`` the Gaussian posterior before the consistency constraint; ``data`` what the trials alone say (whitened); ``base`` the
+    weighted least-squares estimate of the base parameters; ``noise`` as learned; ``fit`` what the constraint did; ``trials`` used, ``frames``
+    coefficients counted; ``known`` every quantity with interval and verdict; ``status``, with ``cause`` and cure in words; ``notes`` what a
+    person should know.
+    """
+
+    body: Body
+    sip: Sip
+    belief: Posterior
+    data: Information
+    base: BaseEstimate
+    noise: Noise
+    fit: PhysicalFit
+    trials: tuple[str, ...]
+    frames: int
+    known: tuple[Known, ...]
+    status: Literal["solved", "failed"]
+    cause: str
+    notes: tuple[str, ...]
+
+    @property
+    def identified(self) -> Body:
+        """The body with the identified parameters."""
+        return replace(self.body, sip=self.sip, notes=(*self.body.notes, f"SIP identified from {', '.join(self.trials)}."))
+
+    @property
+    def unknown(self) -> tuple[Known, ...]:
+        """The quantities that this session cannot know: the table's."""
+        return tuple(k for k in self.known if k.verdict == "cannot be known")
+
+
+def identify(body: Body, fits: tuple[Fit, ...], *, prior: Sip | None = None) -> Identification:
+    """Return the identified parameters of ``body`` from the trials ``fits``; ``prior`` (default ``body.sip``) is what is known before.
+
+    Trials without a usable frame are left out and named in the notes.
+
+    Raises
+    ------
+    TrialRefused
+        There is no trial, or none has a usable frame.
+    """
+    used = tuple(fit for fit in fits if fit.use.any())
+    if not used:
+        raise TrialRefused(
+            f"None of {len(fits)} trials has a frame to identify from: ground contact not measured or no motion. Record trials to fit."
+        )
+    layout = layout_for(standing_point(used))
+    total: Statistics = empty(10 * len(body.segments), layout)
+    for fit in used:
+        total = total + statistics(body, fit, layout)
+    left_out = [fit.name for fit in fits if not fit.use.any()]
+    notes = (f"Left out, no usable frame: {', '.join(left_out)}.",) if left_out else ()
+    return conclude(body, total, tuple(fit.name for fit in used), prior=prior, notes=notes)
+
+
+def conclude(
+    body: Body, total: Statistics, trials: tuple[str, ...], *, prior: Sip | None = None, notes: tuple[str, ...] = ()
+) -> Identification:
+    """Return the identification from statistics that were gathered already (several trials, or a stream of frames)."""
+    before = prior or body.sip
+    noise, _ = learn(total, before)
+    data = total.information(noise)
+    belief = posterior(data, before)
+    fit = physical_fit(belief, body)
+    base = estimate_base(data, structural_base(body))
+    known = knowledge(fit.sip, before)
+    return Identification(
+        body, fit.sip, belief, data, base, noise, fit, trials, data.frames, known, fit.status, fit.cause, (*notes, *_notes(known, fit))
+    )
+
+
+def standing_point(fits: tuple[Fit, ...]) -> Array:
+    """Return the mean centre of pressure (3,) m of all used frames: the point about which the wrench's noise is described."""
+    points = np.concatenate([fit.wrench.cop()[fit.use] for fit in fits])
+    loaded = points[np.isfinite(points).all(axis=1)]
+    return loaded.mean(axis=0) if len(loaded) else np.zeros(3)
+
+
+def _notes(known: tuple[Known, ...], fit: PhysicalFit) -> tuple[str, ...]:
+    notes = []
+    lost = [f"{k.segment} {k.quantity}" for k in known if k.verdict == "cannot be known" and not k.quantity.startswith("I")]
+    if lost:
+        notes.append(f"Cannot be known from this session (the table's value stands): {', '.join(lost)}.")
+    moved = [name for name, acts in zip(fit.sip.segments, fit.moved, strict=True) if acts]
+    if moved and fit.status == "solved":
+        notes.append(f"At the edge of what a body can be: {', '.join(moved)}.")
+    return tuple(notes)

@@ -1,0 +1,84 @@
+"""What a session can know: every quantity with its interval before and after the data, and a verdict in words.
+
+Quantities are those an analyst asks for: mass, centre of mass and inertia about it, per segment. Their standard deviations follow from
+the covariance of the ten parameters by the first derivative.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from biodance.motion.regressor import PHI_TENSOR
+from biodance.records import Array, Sip
+
+QUANTITIES = ("mass", "com x", "com y", "com z", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
+UNITS = ("kg", "m", "m", "m", *("kg·m²",) * 6)
+KNOWN, PARTLY = 0.75, 0.3
+"""Share of the prior variance that the data must remove for "known" (standard deviation halved) and for "partly"."""
+SIGMAS = 1.959964
+"""Half width of a 95 % interval in standard deviations."""
+
+Verdict = Literal["known", "partly known", "cannot be known"]
+
+
+@dataclass(frozen=True)
+class Known:
+    """One quantity of one segment: ``value`` with ``sd`` after the data, ``table`` with ``table_sd`` before, in ``unit``.
+
+    ``from_data`` is the share of the table's variance that the data removed (0 = all from the table); ``verdict`` in words: a quantity that
+    "cannot be known" from this session has the table's value and interval, whatever digits are printed.
+    """
+
+    segment: str
+    quantity: str
+    unit: str
+    value: float
+    sd: float
+    table: float
+    table_sd: float
+    from_data: float
+    verdict: Verdict
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval."""
+        return self.value - SIGMAS * self.sd, self.value + SIGMAS * self.sd
+
+
+def segment_quantities(phi: Array) -> tuple[Array, Array]:
+    """Return the ten quantities (10,) of one segment and their derivative (10, 10) to ``phi`` (10,): m, CoM, inertia about the CoM."""
+    mass, h = phi[0], phi[1:4]
+    com = h / mass
+    value = np.concatenate([[mass], com, np.empty(6)])
+    slope = np.eye(10)
+    slope[1:4, 1:4] = np.eye(3) / mass
+    slope[1:4, 0] = -com / mass
+    for row, (i, j) in enumerate(PHI_TENSOR, start=4):
+        same = float(i == j)
+        value[row] = phi[row] - (same * (h @ com) - h[i] * com[j])
+        slope[row, 0] = same * (com @ com) - com[i] * com[j]
+        slope[row, 1:4] = -2 * same * com
+        slope[row, 1 + i] += com[j]
+        slope[row, 1 + j] += com[i]
+    return value, slope
+
+
+def knowledge(after: Sip, before: Sip) -> tuple[Known, ...]:
+    """Return all quantities of all segments, in order; ``before`` is the table."""
+    rows = []
+    for i, segment in enumerate(after.segments):
+        cut = slice(10 * i, 10 * i + 10)
+        value, slope = segment_quantities(after.phi[cut])
+        table, table_slope = segment_quantities(before.phi[cut])
+        sd = np.sqrt(np.diag(slope @ after.covariance[cut, cut] @ slope.T))
+        table_sd = np.sqrt(np.diag(table_slope @ before.covariance[cut, cut] @ table_slope.T))
+        share = np.clip(1 - np.divide(sd**2, table_sd**2, out=np.ones(10), where=table_sd > 0), 0.0, 1.0)
+        for k, (quantity, unit) in enumerate(zip(QUANTITIES, UNITS, strict=True)):
+            numbers = [float(column[k]) for column in (value, sd, table, table_sd, share)]
+            rows.append(Known(segment, quantity, unit, numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], _verdict(numbers[4])))
+    return tuple(rows)
+
+
+def _verdict(share: float) -> Verdict:
+    return "known" if share >= KNOWN else "partly known" if share >= PARTLY else "cannot be known"
