@@ -1,0 +1,65 @@
+"""The doctor: a library that is missing, raises, crashes the process or hangs is a finding that says how to mend it."""
+
+import json
+
+import pytest
+
+from biodance import doctor
+from biodance.cli import DONE, NEEDS_A_PERSON, run
+from biodance.doctor import Finding, Probe, run_probe
+
+MEND = "apt-get install it."
+
+
+def test_what_works_says_its_version():
+    assert run_probe(Probe("x", "print('noise'); print('1.2')", MEND)) == Finding("x", True, True, "1.2")
+
+
+@pytest.mark.parametrize(
+    ("code", "why"),
+    [
+        ("import no_such_library", "No module named 'no_such_library'"),
+        ("import os; os.abort()", "the process died (code -6)"),
+        ("raise ImportError('libgomp.so.1: cannot open shared object file')", "libgomp.so.1"),
+    ],
+)
+def test_what_fails_says_why_and_how_to_mend_it(code, why):
+    finding = run_probe(Probe("x", code, MEND, needed=False))
+    assert not finding.works
+    assert not finding.needed
+    assert why in finding.text
+    assert finding.text.endswith(MEND)
+
+
+def test_what_hangs_is_given_up(monkeypatch):
+    monkeypatch.setattr(doctor, "PATIENCE", 0.5)
+    assert "no answer within 0.5 s" in run_probe(Probe("x", "import time; time.sleep(30)", MEND)).text
+
+
+@pytest.mark.parametrize(("needed", "code"), [(True, NEEDS_A_PERSON), (False, DONE)])
+def test_only_what_is_needed_changes_the_exit_code(needed, code, monkeypatch, capsys):
+    found = (Finding("python", True, True, "3.12"), Finding("x", False, needed, MEND))
+    monkeypatch.setattr(doctor, "examine", lambda **_: found)
+    assert run(["doctor", "--json"]) == code
+    assert json.loads(capsys.readouterr().out)[1] == {"name": "x", "works": False, "needed": needed, "text": MEND}
+    assert run(["doctor"]) == code
+    assert ("MISSING" in capsys.readouterr().out) is needed
+
+
+def test_everything_that_biodance_is_made_of_is_looked_at(monkeypatch):
+    monkeypatch.setattr(doctor, "run_probe", lambda probe: Finding(probe.name, True, probe.needed, ""))
+    names = " ".join(finding.name for finding in doctor.examine())
+    for part in (
+        "python",
+        "anthropometry",
+        "protocols",
+        "pinocchio",
+        "ezc3d",
+        "cvxpy",
+        "GL stills",
+        "opensim",
+        "mujoco",
+        "chromium",
+        "writable",
+    ):
+        assert part in names
