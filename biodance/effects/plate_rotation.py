@@ -15,7 +15,8 @@ from biodance.records import Array
 
 class PlateRotation(Effect):
     """An ``angle`` (rad) about a lab axis through the plate's centre by which the recorded wrench is turned; target ``plate1:z`` for
-    yaw."""
+    yaw.
+    """
 
     name = "plate_rotation"
     parameters = (Parameter("angle", "rad", 0.02, "about 0.2 deg in a CalTester example report; 1 deg and more when corners are typed"),)

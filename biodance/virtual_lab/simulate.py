@@ -50,14 +50,16 @@ def simulate(
     instruments = set_up(person, visit)
     out.mkdir(parents=True, exist_ok=True)
     performances = []
+    declared = declared_mass(person, visit.number, visit.tolerances)
     for trial in plan.trials:
         performance = perform_in(instruments, person, trial)
         recording = record(performance, instruments)
         for fault in visit.faults:
             recording = fault(recording)
+        declared = float(recording.parameters["PROCESSING"]["Bodymass"])  # type: ignore[arg-type]
         write(recording, out)
         performances.append(performance)
-    (out / "session.toml").write_text(_session_toml(person, plan, declared_mass(person, visit.number, visit.tolerances)))
+    (out / "session.toml").write_text(_session_toml(person, plan, declared))
     (out / TRUTH).mkdir()
     document = truth(person, plan.name, instruments, performances)
     (out / TRUTH / "truth.json").write_text(json.dumps(document, indent=1) + "\n")
