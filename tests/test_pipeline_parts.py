@@ -168,7 +168,7 @@ def test_the_standing_check_is_in_millimetres():
 
 def test_the_checks_of_a_trial_name_what_is_outside():
     rng = np.random.default_rng(3)
-    fit = MarkerFit(("A",), np.array([0.01]), np.array([0.05]), 0.01, 0.05)
+    fit = MarkerFit(("A",), np.array([0.01]), np.array([0.09]), 0.01, 0.09)
     gaps = (MarkerGaps("A", 4.0, 0.1), MarkerGaps("B", 8.0, 0.1))
     result = TrialResult(trial("walk"), (Step("compare", "done"),), gaps, fit, None, comparison(rng))
     rows = {check.what: check for check in trial_checks(result, 60.0)}

@@ -1,8 +1,9 @@
 """The quality table: a few numbers of a session beside the limits they are held against.
 
-Limits: marker distances after the advice of OpenSim's user guide (RMS below 2 cm, largest below 4 cm); forces after Hicks et al. 2015
-(doi:10.1115/1.4029304: residual forces below 5 % of the external force); the mass limit is shoes, clothes and a meal; the gap, frame and
-standing limits are the house's own.
+Limits: the RMS marker distance after the advice of OpenSim's user guide (below 2 cm); the largest one is a hand's breadth, which a swapped
+or lost label exceeds and a head that turns on the trunk (one segment here) does not; forces after Hicks et al. 2015
+(doi:10.1115/1.4029304: residual forces below 5 % of the external force); the mass limit is shoes, clothes and a meal; the others are the
+house's own.
 """
 
 import numpy as np
@@ -13,7 +14,7 @@ from biodance.records import Subject
 
 MASS = 2.0
 """% between the mass on the plates and the declared mass."""
-RMS, LARGEST = 0.020, 0.040
+RMS, LARGEST = 0.020, 0.080
 """m, distance of the markers to the model."""
 GAPS = 5.0
 """% of marker samples not seen."""
