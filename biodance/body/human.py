@@ -54,7 +54,7 @@ def _prior_notes(subject: Subject, table: str) -> tuple[str, ...]:
     joint = "L5/S1" if table in ("dumas_2018", "winter_2009") else "the navel"
     sex = {"F": "woman", "M": "man"}[subject.sex]
     notes = [
-        f"Prior SIP: {table} for a {sex} of {subject.mass:.2f} kg; standard deviations from the spread between tables; trunk joint at {joint}."
+        f"Prior SIP: {table} for a {sex} of {subject.mass:.2f} kg, standard deviations from the spread of tables; trunk joint at {joint}."
     ]
     if table in ("de_leva_1996", "dumas_2018") and not (np.isnan(subject.age) or ADULT[0] <= subject.age <= ADULT[1]):
         groups = {row["study"] for row in read_table("segments", "mass_studies").rows if row["group"] in ("child", "older")}

@@ -26,8 +26,8 @@ def pelvis_frame(right_asis: Array, left_asis: Array, mid_psis: Array) -> tuple[
 def davis_hip(pelvis_width: float, leg_length: float, asis_to_trochanter: float, marker_radius: float) -> Array:
     """Return the RIGHT hip centre (3,) m from the middle of the ASIS in the pelvis frame (left: z negated).
 
-    Davis et al. 1991, doi:10.1016/0167-9457(91)90046-Z, as in Vicon plug-in gait: C = 0.115 leg - 15.3 mm, theta = 0.5 rad, beta = 0.314 rad.
-    ``leg_length`` is the mean of both legs, ``asis_to_trochanter`` (0.1288 leg - 48.56 mm) of this side; all m.
+    Davis et al. 1991, doi:10.1016/0167-9457(91)90046-Z, as in Vicon plug-in gait: C = 0.115 leg - 15.3 mm, theta = 0.5 rad,
+    beta = 0.314 rad. ``leg_length`` is the mean of both legs, ``asis_to_trochanter`` (0.1288 leg - 48.56 mm) of this side; all m.
     """
     theta, beta = 0.5, 0.314
     c, depth = 0.115 * leg_length - 15.3 * MM, asis_to_trochanter + marker_radius
@@ -68,7 +68,7 @@ def shoulder(trunk_origin: Array, forward: Array, acromion: Array, offset: float
 
 
 def elbow(shoulder_centre: Array, lateral: Array, mid_wrist: Array, distance: float, *, side: float) -> Array:
-    """Return the elbow centre (3,) m from the lateral epicondyle alone: the axis is taken square to the plane of shoulder, marker and wrist.
+    """Return the elbow centre (3,) m from the lateral epicondyle alone: its axis is square to the plane of shoulder, marker and wrist.
 
     As in plug-in gait; wrong by centimetres where the arm hangs straight. With a medial marker use the middle instead.
     """

@@ -30,7 +30,7 @@ class Reference:
 
 
 def normalised(table: str, stature: float, lengths: Mapping[str, float], lumps: Mapping[str, Lump]) -> Reference:
-    """Return the reference person of lumps with masses in any unit and their own inertia: fractions that sum to 1, inertia per unit mass."""
+    """Return the reference person of lumps with masses in any unit: fractions that sum to 1, inertia per unit mass."""
     total = sum(COUNT[kind] * lumps[kind].mass for kind in KINDS)
     segments = {kind: Lump(lumps[kind].mass / total, lumps[kind].com, lumps[kind].inertia / lumps[kind].mass) for kind in KINDS}
     return Reference(table, stature, lengths, segments)

@@ -9,7 +9,7 @@ Two independent contributions, added as variances:
 """
 
 import functools
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,9 +31,9 @@ _AXES = ("sagittal", "longitudinal", "transverse")
 class Spread:
     """Standard deviations of one kind of segment.
 
-    ``mass`` relative; ``com`` (3,) in units of the length; ``radii`` (3,) relative, of the radii of gyration about x, y, z; ``products`` (3,)
-    of xy, xz, yz of the inertia per unit mass, in units of the length squared. The length is the segment's own; for pelvis and trunk_head it
-    is mid hip to mid shoulder.
+    ``mass`` relative; ``com`` (3,) in units of the length; ``radii`` (3,) relative, of the radii of gyration about x, y, z;
+    ``products`` (3,) of xy, xz, yz of the inertia per unit mass, in units of the length squared. The length is the segment's own; for
+    pelvis and trunk_head it is mid hip to mid shoulder.
     """
 
     mass: float
@@ -94,5 +94,5 @@ def _within(kind: str) -> Spread:
 
 
 def _radius_sd(part: str, axis: str) -> float:
-    relative: Callable[[str], float] = lambda quantity: np.divide(*regression(part, quantity, MAN)[::-1])  # noqa: E731
-    return 0.5 * float(np.sqrt(max(relative(f"inertia_{axis}") ** 2 - relative("mass") ** 2, 0.0)))
+    (moment, moment_sd), (mass, mass_sd) = regression(part, f"inertia_{axis}", MAN), regression(part, "mass", MAN)
+    return 0.5 * float(np.sqrt(max((moment_sd / moment) ** 2 - (mass_sd / mass) ** 2, 0.0)))

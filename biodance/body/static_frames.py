@@ -1,0 +1,152 @@
+"""Joint centres and segment frames of a standing person from landmarks and measures."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from biodance.body.joint_centres import chord, davis_hip, elbow, harrington_hip, pelvis_frame, shoulder, unit, wrist
+from biodance.body.measures import Measures
+from biodance.records import Array
+
+Hip = Literal["harrington", "davis"]
+SIGN = {"right": 1.0, "left": -1.0}
+UP = np.array([0.0, 0.0, 1.0])
+Places = Mapping[str, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """Segment frames in the lab: ``rotation`` segment -> (3, 3) lab_R_segment, ``origin`` segment -> (3,) m (the proximal joint centre);
+    ``ends`` side_wrist -> (3,) m; ``notes`` what was assumed.
+    """
+
+    rotation: Places
+    origin: Places
+    ends: Places
+    notes: tuple[str, ...]
+
+
+def static_frames(place: Places, sizes: Measures, *, hip: Hip, trunk_fraction: float) -> Frames:
+    """Return the 12 segment frames.
+
+    Pelvis: ISB axes, origin in the middle of the hip centres. Trunk joint: on the line from mid hip to mid shoulder, at ``trunk_fraction`` of
+    it; trunk_head: y along that line. Thigh, upper arm: y to the proximal joint, z in the plane of the flexion axis. Shank, forearm: y to
+    the proximal joint, flexed about the parent's z and tilted by a constant varus. Foot: flat on the ground, x from heel to toe.
+    """
+    rotation: dict[str, Array] = {}
+    origin: dict[str, Array] = {}
+    ends: dict[str, Array] = {}
+    rotation["pelvis"], hips = hip_centres(place, sizes, hip=hip)
+    origin["pelvis"] = (hips["right"] + hips["left"]) / 2
+    shoulders = shoulder_centres(place, sizes, origin["pelvis"])
+    axis = (shoulders["right"] + shoulders["left"]) / 2 - origin["pelvis"]
+    origin["trunk_head"] = origin["pelvis"] + trunk_fraction * axis
+    rotation["trunk_head"] = frame_yz(axis, shoulders["right"] - shoulders["left"])
+    notes: list[str] = []
+    for side in SIGN:
+        knee, note = knee_centre(place, sizes, hips[side], rotation["pelvis"][:, 2], side)
+        notes += [note] if note else []
+        ankle = ankle_centre(place, sizes, knee, side)
+        outwards = SIGN[side] * (place[f"{side}_knee_lateral"] - knee)
+        _chain(rotation, origin, (f"{side}_thigh", f"{side}_shank"), (hips[side], knee, ankle), outwards)
+        origin[f"{side}_foot"] = ankle
+        rotation[f"{side}_foot"] = frame_yz(UP, np.cross(place[f"{side}_toe"] - place[f"{side}_heel"], UP))
+        elbow_at, wrist_at = arm_centres(place, sizes, shoulders[side], side)
+        outwards = SIGN[side] * (place[f"{side}_elbow_lateral"] - elbow_at)
+        _chain(rotation, origin, (f"{side}_upper_arm", f"{side}_forearm_hand"), (shoulders[side], elbow_at, wrist_at), outwards)
+        ends[f"{side}_wrist"] = wrist_at
+    return Frames(rotation, origin, ends, tuple(notes))
+
+
+def frame_yz(up: Array, right: Array) -> Array:
+    """Return (3, 3) with y along ``up``, z as near to ``right`` as it can be, x forwards."""
+    y = unit(up)
+    x = unit(np.cross(y, right))
+    return np.stack([x, y, np.cross(x, y)], axis=1)
+
+
+def _chain(rotation: dict[str, Array], origin: dict[str, Array], names: tuple[str, str], centres: tuple[Array, ...], right: Array) -> None:
+    """Fill in the two segments of a limb: the second flexes about z of the first and is tilted about its own x (varus)."""
+    (upper, lower), (top, middle, end) = names, centres
+    rotation[upper], origin[upper], origin[lower] = frame_yz(top - middle, right), top, middle
+    direction = rotation[upper].T @ unit(middle - end)
+    flexion, varus = np.arctan2(-direction[0], direction[1]), np.arcsin(direction[2])
+    rotation[lower] = rotation[upper] @ turn(2, flexion) @ turn(0, varus)
+
+
+def turn(axis: int, angle: float) -> Array:
+    """Return the rotation (3, 3) about x, y or z (0, 1, 2) by ``angle`` rad."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    out = np.eye(3)
+    out[i, i] = out[j, j] = np.cos(angle)
+    out[j, i], out[i, j] = np.sin(angle), -np.sin(angle)
+    return out
+
+
+def hip_centres(place: Places, sizes: Measures, *, hip: Hip) -> tuple[Array, dict[str, Array]]:
+    """Return lab_R_pelvis (3, 3) and the hip centres by side, m."""
+    rotation, middle = pelvis_frame(place["right_asis"], place["left_asis"], place["mid_psis"])
+    legs = float(np.mean(list(sizes.leg_length.values())))
+    centres = {}
+    for side, sign in SIGN.items():
+        local = (
+            harrington_hip(sizes.pelvis_width, sizes.pelvis_depth)
+            if hip == "harrington"
+            else davis_hip(sizes.pelvis_width, legs, sizes.asis_to_trochanter[side], sizes.marker_radius)
+        )
+        centres[side] = middle + rotation @ (local * [1.0, 1.0, sign])
+    return rotation, centres
+
+
+def shoulder_centres(place: Places, sizes: Measures, mid_hip: Array) -> dict[str, Array]:
+    """Return the shoulder centres by side, m: chord from the jugular notch, or straight under the acromion where that has no marker."""
+    right, left = place["right_acromion"], place["left_acromion"]
+    if all(name in place for name in ("c7", "t10", "jugular_notch", "xiphoid")):
+        up = (place["c7"] + place["jugular_notch"]) - (place["t10"] + place["xiphoid"])
+        ahead = (place["jugular_notch"] + place["xiphoid"]) - (place["c7"] + place["t10"])
+        forward = unit(np.cross(np.cross(up, ahead), up))
+    else:
+        up = (right + left) / 2 - mid_hip
+        forward = unit(np.cross(up, right - left))
+    offset = {side: sizes.shoulder_offset[side] + sizes.marker_radius for side in SIGN}
+    if "jugular_notch" not in place:
+        return {side: place[f"{side}_acromion"] - offset[side] * unit(up) for side in SIGN}
+    base = place["jugular_notch"] - sizes.marker_radius * forward
+    return {side: shoulder(base, forward, place[f"{side}_acromion"], offset[side], side=SIGN[side]) for side in SIGN}
+
+
+def knee_centre(place: Places, sizes: Measures, hip: Array, pelvis_right: Array, side: str) -> tuple[Array, str]:
+    """Return the knee centre, m: middle of the epicondyles, or chord with the thigh marker; and what was assumed without either."""
+    lateral = place[f"{side}_knee_lateral"]
+    if f"{side}_knee_medial" in place:
+        return (lateral + place[f"{side}_knee_medial"]) / 2, ""
+    outside, note = lateral + 0.1 * SIGN[side] * pelvis_right, f"{side} knee: no medial or thigh marker, axis taken parallel to the pelvis."
+    wand = place.get(f"{side}_thigh_wand")
+    distance = sizes.widths[f"{side}_knee"] / 2 + sizes.marker_radius
+    return chord(hip, lateral, distance, outside if wand is None else wand), "" if wand is not None else note.capitalize()
+
+
+def ankle_centre(place: Places, sizes: Measures, knee: Array, side: str) -> Array:
+    """Return the ankle centre, m: middle of the malleoli, or chord with the shank marker, or with the knee's axis where there is neither."""
+    lateral = place[f"{side}_ankle_lateral"]
+    if f"{side}_ankle_medial" in place:
+        return np.asarray((lateral + place[f"{side}_ankle_medial"]) / 2)
+    outside = place.get(f"{side}_shank_wand", lateral + place[f"{side}_knee_lateral"] - knee)
+    return chord(knee, lateral, sizes.widths[f"{side}_ankle"] / 2 + sizes.marker_radius, outside)
+
+
+def arm_centres(place: Places, sizes: Measures, shoulder_at: Array, side: str) -> tuple[Array, Array]:
+    """Return elbow and wrist centre, m: middles where there is a medial epicondyle marker, else the plug-in-gait construction.
+
+    A wrist whose width was not typed is the middle of its two markers (they then sit on the styloids, not on a bar).
+    """
+    lateral, radial, ulnar = (place[f"{side}_{name}"] for name in ("elbow_lateral", "wrist_radial", "wrist_ulnar"))
+    middle = (radial + ulnar) / 2
+    if f"{side}_elbow_medial" in place:
+        return (lateral + place[f"{side}_elbow_medial"]) / 2, middle
+    at = elbow(shoulder_at, lateral, middle, sizes.widths[f"{side}_elbow"] / 2 + sizes.marker_radius, side=SIGN[side])
+    if f"{side}_wrist" not in sizes.typed:
+        return at, middle
+    return at, wrist(at, radial, ulnar, sizes.widths[f"{side}_wrist"] / 2 + sizes.marker_radius, side=SIGN[side])

@@ -1,0 +1,124 @@
+"""Positions, velocities and accelerations of a body from the noisy postures of its frames, consistent on the manifold of postures.
+
+The smooth coordinates of ``chart`` (root position, quaternions of the root and of every ball joint, other angles) pass the same low-pass
+as the forces, the quaternions are made unit again, and a quintic spline through the samples gives the derivatives in closed form; nothing
+is differenced. With u a unit quaternion, P = u^-1 u' is half the angular velocity in the turned frame, and half its derivative is the
+vector part of u^-1 u'' - P² (docs/derivations.md, "Smoothing").
+"""
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from biodance.body.body import Body
+from biodance.errors import TrialRefused
+from biodance.lab.filters import LowPass, low_pass
+from biodance.motion.ball import Balls
+from biodance.motion.chart import Smooth, chart_of
+from biodance.motion.quaternion import conjugate, continuous, matrix, normalised, product
+from biodance.records import Array, Motion
+
+DEGREE = 5
+"""Degree of the spline: continuous acceleration and jerk."""
+
+LEAST_COSINE = 1e-3
+"""Smallest |cos| of a ball joint's second angle that rates are divided by: nearer to the singularity the rates are bounded, not exact."""
+
+
+def smooth(body: Body, time: Array, q: Array, *, settings: LowPass | None = None) -> Motion:
+    """Return the smoothed motion of ``body`` from the postures ``q`` (T, nq) at the times ``time`` (T,) s, evenly spaced.
+
+    ``settings`` None: the default low-pass. A single frame is a pose at rest: v and a are zero. Joint angles may leave their limits by
+    what the filter rounds off; in the first and last period of the cut-off v and a are less certain. Root v and a: linear, angular, in the root's own frame, a = dv/dt (Pinocchio's convention).
+
+    Raises
+    ------
+    TrialRefused
+        The frames are unevenly spaced, hold NaN, or are too few for the low-pass.
+    """
+    settings = settings or LowPass()
+    _check(time, q, settings)
+    if len(time) == 1:
+        return Motion(time, q, np.zeros((1, body.nv)), np.zeros((1, body.nv)))
+    chart = chart_of(body)
+    rough = np.asarray(q).T
+    filtered = chart.split(low_pass(chart.smooth(rough).stacked().T, _rate(time), settings).T)
+    even = Smooth(filtered.place, continuous(normalised(filtered.root)), continuous(normalised(filtered.ball)), filtered.angle)
+    first, second = (chart.split(d) for d in _derivatives(time, even.stacked()))
+    posture = chart.posture(even, rough[len(rough) - chart.joint_count :])
+    v, a = np.empty((2, body.nv, len(time)))
+    v[body.n_root + chart.single], a[body.n_root + chart.single] = first.angle, second.angle
+    angles = chart.joints.angles_of(posture[len(posture) - chart.joint_count :])
+    rates = _ball_rates(chart.joints, angles, even.ball, first.ball, second.ball)
+    for k in range(3):
+        v[body.n_root + chart.joints.first + k], a[body.n_root + chart.joints.first + k] = rates[0][k], rates[1][k]
+    if body.n_root:
+        v[:6], a[:6] = _root_rates(even, first, second)
+    return Motion(time, posture.T, v.T, a.T)
+
+
+def _derivatives(time: Array, values: Array) -> tuple[Array, Array]:
+    """Return the first and second derivatives (m, T) of the quintic spline through ``values`` (m, T), free at both ends."""
+    free = np.zeros(len(values))
+    ends = [(3, free), (4, free)]
+    spline = make_interp_spline(time, values.T, k=DEGREE, bc_type=(ends, ends))
+    return spline(time, nu=1).T, spline(time, nu=2).T
+
+
+def _rate(time: Array) -> float:
+    return float((len(time) - 1) / (time[-1] - time[0]))
+
+
+def _check(time: Array, q: Array, settings: LowPass) -> None:
+    """Refuse what cannot be smoothed."""
+    bad = np.isnan(q).any(axis=1)
+    if bad.any():
+        raise TrialRefused(f"Frame {int(bad.argmax())} has no posture (NaN); smooth only frames that the inverse kinematics gave.")
+    if len(time) < 2:
+        return
+    steps = np.diff(time)
+    if np.ptp(steps) > 0.01 * steps.mean():
+        frame = int(np.abs(steps - np.median(steps)).argmax())
+        raise TrialRefused(f"The frames are not evenly spaced: {steps[frame]:g} s after frame {frame}, {np.median(steps):g} s usually.")
+    need = max(settings.shortest(_rate(time)), DEGREE + 1)
+    if len(time) < need:
+        raise TrialRefused(
+            f"{len(time)} frames at {_rate(time):g} Hz are too few for velocities behind a low-pass at {settings.cutoff:g} Hz: "
+            f"at least {need} are needed. Record longer, or use one frame as a static pose."
+        )
+
+
+def _root_rates(at: Smooth, first: Smooth, second: Smooth) -> tuple[Array, Array]:
+    """Return v and a (6, T) of the root: linear, angular, in its own frame."""
+    turn = matrix(at.root)
+    half = product(conjugate(at.root), first.root)
+    omega = 2 * half[:3]
+    alpha = 2 * product(conjugate(at.root), second.root)[:3] - 4 * half[3] * half[:3]
+    linear = np.einsum("jit,jt->it", turn, first.place)
+    acceleration = np.einsum("jit,jt->it", turn, second.place) - np.cross(omega, linear, axis=0)
+    return np.concatenate([linear, omega]), np.concatenate([acceleration, alpha])
+
+
+def _ball_rates(joints: Balls, angles: Array, at: Array, first: Array, second: Array) -> tuple[Array, Array]:
+    """Return the rates and accelerations (3, G, T) of the ball joints' angles from their quaternions (4, G, T) and the derivatives.
+
+    In the frame after the first angle, with b the second one (all times the sign): w1 = t1' + sin(b) t3', w2 = t2', w3 = cos(b) t3'.
+    """
+    sign = joints.sign
+    half = product(first, conjugate(at))
+    omega = 2 * half[:3]
+    alpha = 2 * product(second, conjugate(at))[:3] - 4 * half[3] * half[:3]
+    sine, cosine = np.sin(sign * angles[1]), np.cos(sign * angles[1])
+    cosine = np.where(np.abs(cosine) < LEAST_COSINE, np.copysign(LEAST_COSINE, cosine), cosine)
+    w, dw = _before_first(sign * angles[0], omega), _before_first(sign * angles[0], alpha)
+    rate3 = w[2] / cosine
+    rate1 = w[0] - sine * rate3
+    dw = dw - rate1 * np.stack([np.zeros_like(rate1), -w[2], w[1]])
+    second3 = (dw[2] + sine * w[1] * rate3) / cosine
+    second1 = dw[0] - cosine * w[1] * rate3 - sine * second3
+    return sign * np.stack([rate1, w[1], rate3]), sign * np.stack([second1, dw[1], second3])
+
+
+def _before_first(angle: Array, vector: Array) -> Array:
+    """Return vectors (3, G, T) written in the frame that is turned about the first axis by ``angle`` (G, T) rad."""
+    sine, cosine = np.sin(angle), np.cos(angle)
+    return np.stack([vector[0], cosine * vector[1] + sine * vector[2], cosine * vector[2] - sine * vector[1]])

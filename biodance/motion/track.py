@@ -1,0 +1,61 @@
+"""From the markers of a trial to the motion of a body: inverse kinematics frame by frame, then smoothing."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.errors import TrialRefused
+from biodance.lab.filters import LowPass
+from biodance.motion.inverse_kinematics import FrameStatus, InverseKinematics, solve_ik
+from biodance.motion.smoothing import smooth
+from biodance.records import Motion, Trial
+
+
+def track(body: Body, trial: Trial, *, settings: LowPass | None = None) -> Motion:
+    """Return the motion of ``body`` under the markers of ``trial``, matched by name; ``settings`` None: the default low-pass.
+
+    ``residual`` (T, K) m are the distances before smoothing, of the markers that body and trial share. ``determined`` (T,) is False
+    where a frame's own markers leave its posture open or do not let it settle; ``notes`` say so in plain sentences.
+
+    Raises
+    ------
+    TrialRefused
+        The trial has no markers, no frame with enough of them (the missing ones are named), or too few or uneven frames to smooth.
+    """
+    if trial.markers is None or not trial.markers.time.size:
+        raise TrialRefused(f"Trial {trial.name}: no markers were recorded, so there is no motion. Export the trial with its markers.")
+    try:
+        found = solve_ik(body, trial.markers)
+        motion = smooth(body, trial.markers.time, found.q, settings=settings)
+    except TrialRefused as error:
+        raise TrialRefused(f"Trial {trial.name}: {error}") from error
+    return replace(
+        motion,
+        residual=found.residual,
+        marker_names=found.marker_names,
+        determined=found.status == FrameStatus.SOLVED,
+        notes=_notes(body, found),
+    )
+
+
+def _notes(body: Body, found: InverseKinematics) -> tuple[str, ...]:
+    frames, names = len(found.q), found.marker_names
+    seen = ~np.isnan(found.residual)
+    rms = np.sqrt(np.mean(found.residual[seen] ** 2))
+    frame, marker = np.unravel_index(np.where(seen, found.residual, -1.0).argmax(), found.residual.shape)
+    notes = [
+        f"Inverse kinematics: {frames} frames, {len(names)} markers, RMS distance {1e3 * rms:.1f} mm, "
+        f"largest {1e3 * found.residual[frame, marker]:.1f} mm ({names[marker]}, frame {frame})."
+    ]
+    absent = [name for name in body.markers.names if name not in names]
+    if absent:
+        notes.append(f"Markers of the body that the trial does not have: {', '.join(absent)}.")
+    for status, text in (
+        (FrameStatus.LEANING, "lean on their neighbours, because their own markers leave the posture open"),
+        (FrameStatus.STOPPED, "did not settle at a minimum; look at their residuals"),
+    ):
+        count = int((found.status == status).sum())
+        if count:
+            notes.append(f"{count} of {frames} frames {text} (first: frame {int((found.status == status).argmax())}).")
+    return tuple(notes)
