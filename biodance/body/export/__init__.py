@@ -1,0 +1,69 @@
+"""FAMILY: one model format per file, found automatically.
+
+A format has a ``FORMAT`` name, the usual ``SUFFIX`` of its files and one function ``text(body, source)``, which returns the whole file:
+the joints of the body, its inertial parameters and, where the format knows them, markers, limits and boxes. ``source`` is one line that
+says where the parameters come from. All lengths in m, angles in rad, masses in kg.
+"""
+
+import importlib
+import pkgutil
+from pathlib import Path
+from types import MappingProxyType, ModuleType
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.body.inertia import pseudo_inertia
+from biodance.errors import BiodanceError, FileRefused, UnknownName
+
+ROUNDING = 1e-9
+"""Share of a pseudo-inertia's largest eigenvalue by which its smallest may be negative from rounding alone."""
+
+
+def formats() -> MappingProxyType[str, ModuleType]:
+    """Return the modules of this folder by the name of their format."""
+    modules = [importlib.import_module(f"{__name__}.{info.name}") for info in pkgutil.iter_modules(__path__)]
+    return MappingProxyType({module.FORMAT: module for module in modules})
+
+
+def refuse_impossible(body: Body) -> None:
+    """Raise BiodanceError if a segment's parameters belong to no mass distribution (pseudo-inertia not positive, no mass)."""
+    for name in body.segments:
+        phi = body.sip.of(name)
+        if not np.isfinite(phi).all():
+            raise BiodanceError(f"Segment {name}: an inertial parameter is not a number, so no model can be written. Identify again.")
+        if phi[0] <= 0:
+            raise BiodanceError(f"Segment {name}: a mass of {phi[0]:g} kg cannot exist, so no model is written. Masses must be positive.")
+        value = np.linalg.eigvalsh(pseudo_inertia(phi))
+        if value[0] < -ROUNDING * value[-1]:
+            raise BiodanceError(
+                f"Segment {name}: no body has this mass, centre and inertia (pseudo-inertia eigenvalue {value[0]:.3g}, must be >= 0), so "
+                "no model is written. Use physically consistent parameters."
+            )
+
+
+def write_model(body: Body, path: str | Path, *, format: str, source: str = "") -> Path:
+    """Write ``body`` as a model file and return the path.
+
+    Raises
+    ------
+    UnknownName
+        There is no such format.
+    BiodanceError
+        The inertia of a segment cannot exist, or the format cannot hold the joints of this body.
+    FileRefused
+        The file exists (nothing is overwritten), or cannot be written.
+    """
+    family, path = formats(), Path(path)
+    if format not in family:
+        raise UnknownName.of("model format", format, tuple(family))
+    refuse_impossible(body)
+    content = family[format].text(body, source)
+    try:
+        with open(path, "x", encoding="utf-8", newline="\n") as stream:
+            stream.write(content)
+    except FileExistsError:
+        raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.") from None
+    except OSError as error:
+        raise FileRefused(f"{path}: cannot be written ({error.strerror or error}). Choose a place where you may write.") from error
+    return path

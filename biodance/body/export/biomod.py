@@ -1,0 +1,76 @@
+"""bioMod (version 4), the model format of biorbd and bioptim.
+
+biorbd turns segments about their own x, y or z only, so that every degree of freedom is a segment without mass, named as the joint, whose
+x axis lies along the joint's axis; the segment with the mass follows it, back in the body's own frame. The root moves by translations
+x y z and rotations x y z (body-fixed) in the lab frame, z up.
+"""
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.body.inertia import lump_of
+from biodance.body.xml_text import plain, row
+from biodance.records import Array
+
+FORMAT = "biomod"
+SUFFIX = ".bioMod"
+
+
+def text(body: Body, source: str) -> str:
+    """Return the .bioMod of ``body``."""
+    lines = ["version 4", "", *([f"// {source}", ""] if source else []), "gravity 0 0 -9.80665", ""]
+    if body.n_root:
+        ranges = ["rangesQ", *["  -100 100"] * 3, *["  -10 10"] * 3]
+        lines += _segment(body.segments[0], ["translations xyz", "rotations xyz", *ranges, *_mass(body, 0)])
+    for i, joint in enumerate(body.joints):
+        turn = _x_along(joint.axis)
+        limits = f"rangesQ {row([body.limits.lower[i], body.limits.upper[i]])}"
+        lines += _segment(
+            joint.name, [*_parent(body, joint.parent), *_placed(joint.rotation @ turn, joint.translation), "rotations x", limits]
+        )
+        if joint.segment >= 0:
+            back = [f"parent {joint.name}", *_placed(turn.T, np.zeros(3))]
+            lines += _segment(body.segments[joint.segment], [*back, *_mass(body, joint.segment)])
+        else:
+            lines += _segment(f"{joint.name}_link", [f"parent {joint.name}", *_placed(turn.T, np.zeros(3))])
+    markers = body.markers
+    for name, segment, position in zip(markers.names, markers.segment, markers.position, strict=True):
+        lines += [
+            f"marker {plain(name)}",
+            f"  parent {body.segments[segment]}",
+            f"  position {row(position)}",
+            "  technical 1",
+            "endmarker",
+            "",
+        ]
+    return "\n".join(lines)
+
+
+def _segment(name: str, lines: list[str]) -> list[str]:
+    return [f"segment {name}", *(f"  {line}" for line in lines), "endsegment", ""]
+
+
+def _parent(body: Body, parent: int) -> list[str]:
+    """Return the parent's line: the segment, or the link, in whose frame the joint is placed."""
+    if parent < 0:
+        return [f"parent {body.segments[0]}"] if body.n_root else []
+    joint = body.joints[parent]
+    return [f"parent {body.segments[joint.segment] if joint.segment >= 0 else f'{joint.name}_link'}"]
+
+
+def _placed(rotation: Array, translation: Array) -> list[str]:
+    rows = [f"  {row([*rotation[i], translation[i]])}" for i in range(3)]
+    return ["RTinMatrix 1", "RT", *rows, "  0 0 0 1"]
+
+
+def _mass(body: Body, segment: int) -> list[str]:
+    lump = lump_of(body.sip.of(body.segments[segment]))
+    return [f"mass {row([lump.mass])}", "inertia", *(f"  {row(line)}" for line in lump.inertia), f"com {row(lump.com)}"]
+
+
+def _x_along(axis: Array) -> Array:
+    """Return a rotation (3, 3) whose first column is the unit vector ``axis``."""
+    other = np.eye(3)[np.argmin(np.abs(axis))]
+    y = np.cross(other, axis)
+    y = y / np.linalg.norm(y)
+    return np.stack([axis, y, np.cross(axis, y)], axis=1)

@@ -1,0 +1,88 @@
+"""Tidy CSV: one number a row, with unit, standard deviation, frame and source; for spreadsheets, R and pandas.
+
+The ten standard parameters of every segment (mass, first_moment_*, inertia_* about the joint) are the record and read back exactly; the
+centre of mass (com_*) and the inertia about it (central_inertia_*) are derived, with standard deviations to first order.
+"""
+
+import csv
+import io
+from pathlib import Path
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.body.inertia import lump_of
+from biodance.errors import FileRefused
+from biodance.records import Array, Sip
+
+FORMAT = "csv"
+SUFFIX = ".csv"
+HEADER = ("segment", "quantity", "value", "unit", "sd", "frame", "source")
+TENSOR = ("xx", "xy", "yy", "xz", "yz", "zz")
+STANDARD = ("mass", *(f"first_moment_{a}" for a in "xyz"), *(f"inertia_{t}" for t in TENSOR))
+DERIVED = (*(f"com_{a}" for a in "xyz"), *(f"central_inertia_{t}" for t in TENSOR))
+JOINT_FRAME = "segment axes (x anterior, y up, z right), about the proximal joint centre"
+COM_FRAME = "segment axes (x anterior, y up, z right), about the centre of mass"
+
+
+def text(body: Body, source: str) -> str:
+    """Return the table of ``body.sip``."""
+    stream = io.StringIO()
+    write = csv.writer(stream, lineterminator="\n")
+    write.writerow(HEADER)
+    sd = np.sqrt(np.diag(body.sip.covariance)).reshape(-1, 10)
+    for i, name in enumerate(body.segments):
+        phi, block = body.sip.of(name), slice(10 * i, 10 * i + 10)
+        spread = _derived_sd(phi, body.sip.covariance[block, block])
+        quantities = (*zip(STANDARD, phi, sd[i], strict=True), *zip(DERIVED, _derived(phi), spread, strict=True))
+        for quantity, value, deviation in quantities:
+            frame = COM_FRAME if quantity.startswith("central") else "" if quantity == "mass" else JOINT_FRAME
+            write.writerow([name, quantity, repr(float(value)), _unit(quantity), repr(float(deviation)), frame, source])
+    return stream.getvalue()
+
+
+def read_sip(path: str | Path) -> Sip:
+    """Return the parameters of a file that ``text`` wrote; the covariance is diagonal, since the table holds standard deviations only.
+
+    Raises
+    ------
+    FileRefused
+        The file cannot be read, misses a column or a parameter, or holds something that is no number.
+    """
+    try:
+        with open(path, encoding="utf-8", newline="") as stream:
+            rows = list(csv.DictReader(stream))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise FileRefused(f"{path}: cannot be read as CSV ({error}).") from error
+    if not rows or not set(HEADER[:5]) <= set(rows[0]):
+        raise FileRefused(f"{path}: is no table of inertial parameters. It needs the columns {', '.join(HEADER)}.")
+    found = {(row["segment"], row["quantity"]): row for row in rows}
+    segments = tuple(dict.fromkeys(row["segment"] for row in rows))
+    phi, sd = [], []
+    for key in ((segment, quantity) for segment in segments for quantity in STANDARD):
+        if key not in found:
+            raise FileRefused(f"{path}: {key[1]} of {key[0]} is missing. Every segment needs {', '.join(STANDARD)}.")
+        try:
+            phi.append(float(found[key]["value"]))
+            sd.append(float(found[key]["sd"]))
+        except (TypeError, ValueError):
+            raise FileRefused(f"{path}: {key[1]} of {key[0]} has a value or sd that is no number.") from None
+    return Sip(segments, np.array(phi), np.diag(np.square(sd)))
+
+
+def _unit(quantity: str) -> str:
+    if quantity == "mass":
+        return "kg"
+    return "m" if quantity.startswith("com_") else "kg·m" if quantity.startswith("first") else "kg·m²"
+
+
+def _derived(phi: Array) -> Array:
+    lump = lump_of(phi)
+    return np.concatenate([lump.com, lump.inertia[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]])
+
+
+def _derived_sd(phi: Array, covariance: Array) -> Array:
+    """Return (9,) standard deviations of the derived quantities, propagated by central differences."""
+    step = 1e-6 * np.maximum(np.abs(phi), 1e-6)
+    slope = np.stack([(_derived(phi + h) - _derived(phi - h)) / (2 * s) for h, s in zip(np.diag(step), step, strict=True)], axis=1)
+    return np.sqrt(np.maximum(np.diag(slope @ covariance @ slope.T), 0.0))

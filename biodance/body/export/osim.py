@@ -1,0 +1,143 @@
+"""OpenSim 4 model (.osim): bodies, custom joints, coordinates with ranges, markers; no muscles.
+
+OpenSim's ground has y up, as the .trc and .mot files that ``lab`` writes. The free root has six coordinates, in the order and with the
+signs that OpenSim's own gait models use: <root>_tilt about z, _list about x, _rotation about y (body-fixed, in this order), _tx, _ty, _tz.
+A body with a fixed root keeps the frame of its first joint, z up.
+"""
+
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.body.inertia import lump_of
+from biodance.body.segment_tree import WORLD, Branch, segment_tree
+from biodance.body.xml_text import add, document, plain, row, six
+from biodance.errors import BiodanceError
+from biodance.records import Array
+
+FORMAT = "osim"
+SUFFIX = ".osim"
+ROOT_ROTATIONS = ("tilt", "list", "rotation")
+ROOT_AXES = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+ROOT_TRANSLATIONS = ("tx", "ty", "tz")
+
+
+def text(body: Body, source: str) -> str:
+    """Return the .osim of ``body``.
+
+    Raises
+    ------
+    BiodanceError
+        The axes of one joint do not meet in one point or are more than three: OpenSim's custom joint cannot hold them.
+    """
+    root = Element("OpenSimDocument", Version="40000")
+    model = add(root, "Model", name=plain(body.name))
+    add(model, "credits", source or "written by biodance")
+    add(model, "gravity", "0 -9.80665 0" if body.n_root else "0 0 -9.80665")
+    bodies = add(add(model, "BodySet", name="bodyset"), "objects")
+    joints = add(add(model, "JointSet", name="jointset"), "objects")
+    for branch in segment_tree(body):
+        _body(bodies, body, branch.segment)
+        _joint(joints, body, branch)
+    markers = add(add(model, "MarkerSet", name="markerset"), "objects")
+    for name, segment, position in zip(body.markers.names, body.markers.segment, body.markers.position, strict=True):
+        marker = add(markers, "Marker", name=plain(name))
+        add(marker, "socket_parent_frame", f"/bodyset/{body.segments[segment]}")
+        add(marker, "location", row(position))
+        add(marker, "fixed", "true")
+    return document(root, source)
+
+
+def _body(bodies: Element, body: Body, segment: int) -> None:
+    lump = lump_of(body.sip.of(body.segments[segment]))
+    element = add(bodies, "Body", name=body.segments[segment])
+    low, high = body.boxes[segment]
+    if np.all(high > low):
+        _box(element, body.segments[segment], low, high)
+    add(element, "mass", row([lump.mass]))
+    add(element, "mass_center", row(lump.com))
+    add(element, "inertia", six(lump.inertia))
+
+
+def _box(element: Element, name: str, low: Array, high: Array) -> None:
+    """Attach a box to see, at its place in the segment."""
+    frame = add(add(element, "components"), "PhysicalOffsetFrame", name="box")
+    brick = add(add(frame, "attached_geometry"), "Brick", name=f"{name}_box")
+    add(brick, "socket_frame", "..")
+    add(add(brick, "Appearance"), "opacity", "0.4")
+    add(brick, "half_lengths", row((high - low) / 2))
+    add(frame, "socket_parent", "..")
+    add(frame, "translation", row((low + high) / 2))
+
+
+def _joint(joints: Element, body: Body, branch: Branch) -> None:
+    name, on_world = body.segments[branch.segment], branch.parent == WORLD
+    free = on_world and body.n_root
+    element = add(joints, "CustomJoint", name=f"{name}_joint")
+    add(element, "socket_parent_frame", "parent_offset")
+    add(element, "socket_child_frame", f"/bodyset/{name}")
+    coordinates = add(element, "coordinates")
+    frame = add(add(element, "frames"), "PhysicalOffsetFrame", name="parent_offset")
+    add(frame, "socket_parent", "/ground" if on_world else f"/bodyset/{body.segments[branch.parent]}")
+    add(frame, "translation", row(branch.translation))
+    add(frame, "orientation", row(_body_fixed_xyz(branch.rotation)))
+    transform = add(element, "SpatialTransform")
+    if free:
+        turns, names = ROOT_AXES, [f"{name}_{word}" for word in ROOT_ROTATIONS]
+        shifts = [f"{name}_{word}" for word in ROOT_TRANSLATIONS]
+        for word in (*names, *shifts):
+            _coordinate(coordinates, word, (-10.0, 10.0))
+    else:
+        turns, shifts = _axes(body, branch), []
+        names = [body.joints[hinge.joint].name for hinge in branch.hinges]
+        for hinge, word in zip(branch.hinges, names, strict=True):
+            _coordinate(coordinates, word, (body.limits.lower[hinge.joint], body.limits.upper[hinge.joint]))
+    for i in range(3):
+        _axis(transform, f"rotation{i + 1}", names[i : i + 1], turns[i])
+    for i in range(3):
+        _axis(transform, f"translation{i + 1}", shifts[i : i + 1], np.eye(3)[i])
+
+
+def _coordinate(parent: Element, name: str, limits: tuple[float, float]) -> None:
+    element = add(parent, "Coordinate", name=name)
+    add(element, "default_value", "0")
+    add(element, "default_speed_value", "0")
+    add(element, "range", row(limits))
+    for word in ("clamped", "locked"):
+        add(element, word, "false")
+
+
+def _axis(parent: Element, name: str, coordinate: list[str], axis: Array) -> None:
+    element = add(parent, "TransformAxis", name=name)
+    add(element, "coordinates", "".join(coordinate))
+    add(element, "axis", row(axis))
+    if coordinate:
+        add(add(element, "LinearFunction", name="function"), "coefficients", "1 0")
+    else:
+        add(add(element, "Constant", name="function"), "value", "0")
+
+
+def _axes(body: Body, branch: Branch) -> Array:
+    """Return three independent axes (3, 3), rows, the hinges' first; refuse what a custom joint cannot hold."""
+    name = body.segments[branch.segment]
+    if len(branch.hinges) > 3:
+        raise BiodanceError(f"Segment {name} has {len(branch.hinges)} axes in one joint; an OpenSim custom joint holds three rotations.")
+    if any(np.linalg.norm(hinge.place) > 1e-9 for hinge in branch.hinges):
+        raise BiodanceError(f"The axes of the joint of {name} do not meet in its origin; an OpenSim custom joint cannot hold them.")
+    axes = [hinge.axis for hinge in branch.hinges]
+    while len(axes) < 3:
+        spanned = np.array(axes).reshape(-1, 3)
+        rest = np.eye(3) - spanned.T @ np.linalg.pinv(spanned.T)
+        value, vector = np.linalg.eigh(rest @ rest.T)
+        axes.append(vector[:, np.argmax(value)])
+    return np.array(axes)
+
+
+def _body_fixed_xyz(rotation: Array) -> Array:
+    """Return (3,) rad with ``rotation = Rx Ry Rz``, the orientation of an OpenSim frame; z is zero at y = +-90 deg."""
+    across = np.hypot(rotation[0, 0], rotation[0, 1])
+    y = np.arctan2(rotation[0, 2], across)
+    if across < 1e-9:
+        return np.array([np.arctan2(rotation[2, 1], rotation[1, 1]), y, 0.0])
+    return np.array([np.arctan2(-rotation[1, 2], rotation[2, 2]), y, np.arctan2(-rotation[0, 1], rotation[0, 0])])

@@ -1,0 +1,65 @@
+"""URDF: one link per degree of freedom, signed axes; read by pinocchio, ROS and most robotics tools.
+
+The root link is free: readers add the free-flyer themselves. Links between the axes of one anatomical joint have no inertia.
+"""
+
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.body.inertia import lump_of
+from biodance.body.xml_text import add, document, row
+from biodance.records import Array
+
+FORMAT = "urdf"
+SUFFIX = ".urdf"
+
+
+def roll_pitch_yaw(rotation: Array) -> Array:
+    """Return (3,) rad with ``rotation = Rz(yaw) Ry(pitch) Rx(roll)``; exact also at pitch = +-90 deg, where yaw is set to zero."""
+    across = np.hypot(rotation[0, 0], rotation[1, 0])
+    pitch = np.arctan2(-rotation[2, 0], across)
+    if across < 1e-9:
+        return np.array([np.arctan2(-rotation[1, 2], rotation[1, 1]), pitch, 0.0])
+    return np.array([np.arctan2(rotation[2, 1], rotation[2, 2]), pitch, np.arctan2(rotation[1, 0], rotation[0, 0])])
+
+
+def text(body: Body, source: str) -> str:
+    """Return the URDF of ``body``."""
+    root = Element("robot", name=body.name)
+    if body.n_root:
+        _link(root, body, body.segments[0], 0)
+    else:
+        add(root, "link", name="world")
+    names = [body.segments[joint.segment] if joint.segment >= 0 else f"{joint.name}_link" for joint in body.joints]
+    limits = body.limits
+    for i, joint in enumerate(body.joints):
+        _link(root, body, names[i], joint.segment)
+        element = add(root, "joint", name=joint.name, type="revolute")
+        first = body.segments[0] if body.n_root else "world"
+        add(element, "parent", link=names[joint.parent] if joint.parent >= 0 else first)
+        add(element, "child", link=names[i])
+        add(element, "origin", xyz=row(joint.translation), rpy=row(roll_pitch_yaw(joint.rotation)))
+        add(element, "axis", xyz=row(joint.axis))
+        effort = max(-limits.torque_lower[i], limits.torque_upper[i])
+        ranges = {"lower": limits.lower[i], "upper": limits.upper[i], "velocity": limits.velocity[i], "effort": effort}
+        add(element, "limit", **{name: row([value]) for name, value in ranges.items()})
+    return document(root, source)
+
+
+def _link(root: Element, body: Body, name: str, segment: int) -> None:
+    """Append one link; with inertia and box if it is a segment."""
+    link = add(root, "link", name=name)
+    if segment < 0:
+        return
+    lump = lump_of(body.sip.of(body.segments[segment]))
+    inertial = add(link, "inertial")
+    add(inertial, "origin", xyz=row(lump.com), rpy="0 0 0")
+    add(inertial, "mass", value=row([lump.mass]))
+    pairs = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
+    add(inertial, "inertia", **{key: row([lump.inertia[pair]]) for key, pair in pairs.items()})
+    low, high = body.boxes[segment]
+    visual = add(link, "visual")
+    add(visual, "origin", xyz=row((low + high) / 2), rpy="0 0 0")
+    add(add(visual, "geometry"), "box", size=row(high - low))
