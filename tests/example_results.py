@@ -78,6 +78,10 @@ def full_session() -> SessionResult:
     rms[5] = np.nan
     fit = MarkerFit(NAMES, rms, 2.2 * rms, 0.011, 0.044)
     gaps = tuple(MarkerGaps(name, *{3: (2.5, 0.075), 5: (100.0, 3.0)}.get(i, (0.0, 0.0))) for i, name in enumerate(NAMES))
+    checks = (
+        Check("marker distance, RMS", "walk <1>", "11.0 mm", "at most 20 mm", True),
+        Check("gaps", "walk <1>", "3.1 %", "at most 2 %", False, "Fill."),
+    )
     result = TrialResult(
         trial("walk <1>"),
         (Step("prepare", "done"), Step("track", "done"), Step("compare", "done")),
@@ -86,14 +90,12 @@ def full_session() -> SessionResult:
         None,
         comparison(rng),
         standing(rng),
+        checks,
     )
-    checks = (
-        Check("marker distance, RMS", "walk <1>", "11.0 mm", "20 mm", True),
-        Check("gaps", "walk <1>", "3.1 %", "2 %", False, "Fill."),
-    )
+    mass = Check("mass on the plates against declared", "walk <1>", "0.3 %", "at most 2 %", True)
     session = Session(Subject(65.0, 1.7, "F", 31.0, "S01"), (result.trial,), Path("/sessions/S01"), notes=("Sex guessed.",))
     return SessionResult(
-        session, session.subject, None, "Scaled on static.", (), (result,), checks, result.standing, still(), {"low-pass": "10 Hz"}
+        session, session.subject, None, "Scaled on static.", (), (result,), (mass,), result.standing, still(), {"low-pass": "10 Hz"}
     )
 
 

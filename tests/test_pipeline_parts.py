@@ -172,6 +172,6 @@ def test_the_checks_of_a_trial_name_what_is_outside():
     gaps = (MarkerGaps("A", 4.0, 0.1), MarkerGaps("B", 8.0, 0.1))
     result = TrialResult(trial("walk"), (Step("compare", "done"),), gaps, fit, None, comparison(rng))
     rows = {check.what: check for check in trial_checks(result, 60.0)}
-    assert [name for name, check in rows.items() if not check.inside] == ["marker distance, largest", "marker samples not seen"]
-    assert rows["marker samples not seen"].value == "6.0 %"
-    assert rows["time fully measured"].value == "2.09 s"
+    assert [name for name, check in rows.items() if not check.inside] == ["marker distance, largest", "markers not seen"]
+    assert rows["markers not seen"].value == "6.0 %"
+    assert rows["fully measured"].value == "2.09 s"

@@ -72,7 +72,7 @@ def test_standing_still_the_centre_of_mass_is_over_the_centre_of_pressure(perfec
     assert abs(perfect.standing.com_ahead) < 1e-4
     assert abs(perfect.standing.com_left) < 1e-4
     np.testing.assert_allclose(perfect.standing.forward, [1, 0], atol=1e-6)
-    assert all(check.inside for check in perfect.checks)
+    assert all(check.inside for check in perfect.all_checks)
 
 
 def test_without_a_static_trial_the_session_says_so(perfect):
@@ -87,7 +87,7 @@ def test_a_heavier_load_on_the_plates_is_seen_in_mass_and_wrench():
     loaded = replace(stand, plates=(replace(plate, wrench=Wrench(plate.wrench.time, 1.05 * plate.wrench.value)),))
     result = examine(Session(SUBJECT, (loaded,), Path("/lab/S01")))
     assert result.mass_difference == pytest.approx(5.0, abs=0.01)
-    assert [check.what for check in result.checks if not check.inside] == ["mass on the plates against declared"]
+    assert [check.what for check in result.all_checks if not check.inside] == ["mass on the plates against declared"]
 
 
 def test_the_same_session_gives_the_same_numbers(perfect):

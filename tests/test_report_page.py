@@ -15,7 +15,7 @@ from biodance.doctor import BROWSERS
 from biodance.pipeline.provenance import provenance
 from biodance.pipeline.results import SessionResult
 from biodance.report.marker_figure import marker_figure
-from biodance.report.page import page
+from biodance.report.page import check_table, page
 from biodance.report.solid import still_address
 from biodance.report.still import still_figure
 from biodance.report.style import svg_address
@@ -67,7 +67,7 @@ def test_the_page_is_well_formed_and_labelled_for_a_screen_reader(full):
     assert len(images) == 4
     assert all(len(image["alt"]) > 40 for image in images)
     tables = sum(tag == "table" for tag, _ in elements)
-    assert tables == sum(tag == "caption" for tag, _ in elements) == 6
+    assert tables == sum(tag == "caption" for tag, _ in elements) == 7
     assert all(attributes.get("scope") in ("col", "row") for tag, attributes in elements if tag == "th")
 
 
@@ -92,6 +92,14 @@ def test_names_from_files_cannot_become_markup(full):
 
 def test_what_is_outside_its_limit_comes_first(full):
     assert full.index("What needs a person") < full.index("<strong>gaps, walk &lt;1&gt;</strong>") < full.index("Quality checks")
+
+
+def test_a_trial_without_a_check_has_a_gap_in_the_table_of_checks():
+    result = full_session()
+    bare = replace(result.trials[0], checks=result.trials[0].checks[:1])
+    columns, rows = check_table(replace(result, trials=(result.trials[0], bare)))
+    assert columns == [("marker distance, RMS", "at most 20 mm"), ("gaps", "at most 2 %")]
+    assert [[check and check.inside for check in checks] for _, checks in rows] == [[True, False], [True, None]]
 
 
 def test_a_session_without_results_still_has_a_page_with_every_reason():

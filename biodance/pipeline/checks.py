@@ -58,18 +58,16 @@ def trial_checks(result: TrialResult, mass: float) -> list[Check]:
         found.append(_upper("marker distance, largest", name, 1000 * result.fit.total_max, 1000 * LARGEST, "mm", advice))
     if result.motion is not None:
         share = 100 * float(np.mean(~result.motion.determined))
-        found.append(
-            _upper("frames whose markers leave the posture open", name, share, OPEN, "%", "See the gaps: which segment lost its markers?")
-        )
+        found.append(_upper("posture left open", name, share, OPEN, "%", "See the gaps: which segment lost its markers?"))
     if result.gaps:
-        found.append(_upper("marker samples not seen", name, result.gaps_percent, GAPS, "%", "Fill the gaps in the capture software."))
+        found.append(_upper("markers not seen", name, result.gaps_percent, GAPS, "%", "Fill the gaps in the capture software."))
     comparison = result.comparison
     if comparison and result.trial.role != "static":
         seconds = comparison.used.sum() * float(np.median(np.diff(comparison.time)))
         advice = "Step onto the plates only, or record more of the trial on them."
-        found.append(Check("time fully measured", name, f"{seconds:.2f} s", f"at least {SECONDS:g} s", seconds >= SECONDS, advice))
+        found.append(Check("fully measured", name, f"{seconds:.2f} s", f"at least {SECONDS:g} s", seconds >= SECONDS, advice))
     if comparison and comparison.used.any():
         share = 100 * float(np.max(comparison.rms[:3])) / (mass * -GRAVITY[2])
         advice = "See the trial's wrench figure: is it an offset, a delay or a scale?"
-        found.append(_upper("force difference, worst axis, RMS", name, share, FORCE, "% of weight", advice))
+        found.append(_upper("force difference, worst axis", name, share, FORCE, "% of weight", advice))
     return found

@@ -129,6 +129,7 @@ class TrialResult:
     motion: Motion | None = None
     comparison: WrenchComparison | None = None
     standing: Standing | None = None
+    checks: tuple[Check, ...] = ()
 
     @property
     def gaps_percent(self) -> float:
@@ -174,6 +175,11 @@ class SessionResult:
     settings: Mapping[str, str]
 
     @property
+    def all_checks(self) -> tuple[Check, ...]:
+        """The session's own checks, then those of every trial."""
+        return (*self.checks, *(check for trial in self.trials for check in trial.checks))
+
+    @property
     def mass_difference(self) -> float:
         """Mass on the plates minus declared mass in % of the declared; NaN where either is unknown."""
         return 100 * (self.standing.mass / self.declared_mass - 1) if self.standing else float("nan")
@@ -197,4 +203,4 @@ class SessionResult:
     def needs_a_person(self) -> bool:
         """Whether anything was refused, warned about or outside its limit."""
         trouble = any(step.status != "done" for step in self.steps) or any(t.status != "ok" for t in self.trials)
-        return trouble or bool(self.session.refused or self.doubts) or any(not check.inside for check in self.checks)
+        return trouble or bool(self.session.refused or self.doubts) or any(not check.inside for check in self.all_checks)

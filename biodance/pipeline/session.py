@@ -1,6 +1,7 @@
 """A whole session through all stages. One trial that fails never stops the others."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from biodance.body.human import DEFAULT_TABLE
 from biodance.errors import TrialRefused
@@ -10,7 +11,7 @@ from biodance.motion.contact import ContactRules
 from biodance.motion.regressor import GRAVITY
 from biodance.pipeline.body import body_of
 from biodance.pipeline.checks import mass_check, standing_check, trial_checks
-from biodance.pipeline.results import Check, SessionResult, Standing, Step, TrialResult
+from biodance.pipeline.results import SessionResult, Standing, Step, TrialResult
 from biodance.pipeline.steps import attempt
 from biodance.pipeline.still import still_of
 from biodance.pipeline.trial import examine_trial, prepared
@@ -38,7 +39,7 @@ def examine(session: Session, *, tell: Callable[[str], None] = lambda _: None) -
             results.append(examine_trial(one, body, mass=session.subject.mass))
     except KeyboardInterrupt:
         results += [TrialResult(one.trial, (*one.steps, STOPPED), one.gaps) for one in read[len(results) :]]
-    done = tuple(results)
+    done = tuple(replace(result, checks=tuple(trial_checks(result, session.subject.mass))) for result in results)
     standing = attempt(steps, "standing", lambda: best_standing(done))
     return SessionResult(
         session=session,
@@ -47,7 +48,7 @@ def examine(session: Session, *, tell: Callable[[str], None] = lambda _: None) -
         body_source=source,
         steps=tuple(steps),
         trials=done,
-        checks=checks(session, done, standing),
+        checks=(*mass_check(session.subject, standing), *standing_check(standing)),
         standing=standing,
         still=attempt(steps, "still", lambda: still_of(body, done)) if body else None,
         settings=settings(),
@@ -70,12 +71,6 @@ def best_standing(results: tuple[TrialResult, ...]) -> Standing:
         )
     order = {"static": 0, "check": 1}
     return min(found, key=lambda pair: (order.get(pair[0], 2), pair[1].start - pair[1].end))[1]
-
-
-def checks(session: Session, results: tuple[TrialResult, ...], standing: Standing | None) -> tuple[Check, ...]:
-    """Return the rows of the quality table: the session's, then those of every trial."""
-    rows = [*mass_check(session.subject, standing), *standing_check(standing)]
-    return (*rows, *(row for result in results for row in trial_checks(result, session.subject.mass)))
 
 
 def settings() -> dict[str, str]:

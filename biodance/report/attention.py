@@ -12,5 +12,5 @@ def attention(result: SessionResult) -> list[tuple[str, str]]:
     for trial in result.trials:
         name = trial.trial.name
         found += [(f"Trial {name}", text.removeprefix(f"Trial {name}: ")) for text in trial.reasons]
-    outside = [check for check in result.checks if not check.inside]
+    outside = [check for check in result.all_checks if not check.inside]
     return found + [(f"{check.what}, {check.where}", f"{check.value}, should be {check.limit}. {check.advice}") for check in outside]

@@ -5,7 +5,7 @@ from importlib.resources import files
 
 from biodance.lab.gaps import MarkerGaps
 from biodance.pipeline.provenance import Provenance
-from biodance.pipeline.results import SessionResult, TrialResult
+from biodance.pipeline.results import Check, SessionResult, TrialResult
 from biodance.records import CHANNELS
 from biodance.report.attention import attention
 from biodance.report.marker_figure import marker_figure
@@ -15,6 +15,16 @@ from biodance.report.wording import millimetres, number
 from biodance.report.wrench_figure import wrench_figure
 
 STATUS_WORDS = {"ok": "done", "warning": "look here", "refused": "refused"}
+
+
+def check_table(result: SessionResult) -> tuple[list[tuple[str, str]], list[tuple[str, list[Check | None]]]]:
+    """Return the trials' checks as a table: its columns (what, limit), and per trial its name and one check or None a column."""
+    columns = list(dict.fromkeys((check.what, check.limit) for trial in result.trials for check in trial.checks))
+    rows = []
+    for trial in result.trials:
+        found = {(check.what, check.limit): check for check in trial.checks}
+        rows.append((trial.trial.name, [found.get(column) for column in columns]))
+    return columns, rows
 
 
 @dataclass(frozen=True)
@@ -71,6 +81,7 @@ def page(result: SessionResult, provenance: Provenance, *, still: str = "") -> s
     return environment.from_string((folder / "page.html.j2").read_text(encoding="utf-8")).render(
         style=Markup((folder / "page.css").read_text(encoding="utf-8")),
         attention=attention(result),
+        check_table=check_table(result),
         result=result,
         provenance=provenance,
         parts=[_trial_part(trial) for trial in result.trials],

@@ -116,7 +116,7 @@ def document(result: SessionResult, provenance: Provenance) -> dict[str, Any]:
         "steps": [{"step": s.name, "status": s.status, "reason": s.text} for s in result.steps],
         "checks": [
             {"what": c.what, "where": c.where, "value": c.value, "limit": c.limit, "inside": c.inside, "advice": c.advice}
-            for c in result.checks
+            for c in result.all_checks
         ],
         "mass_check": _mass_check(result),
         "identification": None,
