@@ -66,7 +66,9 @@ class SegmentMarkers:
 
 @dataclass(frozen=True, eq=False)
 class JointLimits:
-    """Per joint (n,), along its positive sense: ``lower``, ``upper`` rad; ``velocity`` rad/s > 0; ``torque_lower`` <= 0 <= ``torque_upper`` N·m."""
+    """Per joint (n,), along its positive sense: ``lower``, ``upper`` rad; ``velocity`` rad/s > 0;
+    ``torque_lower`` <= 0 <= ``torque_upper`` N·m.
+    """
 
     lower: Array
     upper: Array
@@ -99,8 +101,8 @@ class Body:
 
     ``segments`` (N) names, the first is the root's; ``joints`` (n) in topological order = Pinocchio's order; ``sip`` prior with covariance;
     ``limits`` per joint; ``markers`` on segments; ``boxes`` (N, 2, 3) m, lower and upper corner of the shape box in the segment frame;
-    ``com_boxes`` (N, 2, 3) m, where the CoM may be; ``feet`` soles by side ("left", "right"); ``root`` "free_flyer" (nq = 7 + n, nv = 6 + n)
-    or "fixed" (nq = nv = n; the root joint carries no segment then); ``notes`` how the body was made: table, scaling, warnings.
+    ``com_boxes`` (N, 2, 3) m, where the CoM may be; ``feet`` soles by side ("left", "right"); ``root`` "free_flyer" (nq = 7 + n, nv =
+    6 + n) or "fixed" (nq = nv = n; the root joint carries no segment then); ``notes`` how the body was made: table, scaling, warnings.
     """
 
     name: str

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from biodance.body.body import Body, JointLimits, SegmentMarkers
+from biodance.body.body import Body, Joint, JointLimits, SegmentMarkers
 from biodance.body.human import DEFAULT_TABLE, assemble
 from biodance.body.measures import Measures, measures
 from biodance.body.reference import Reference, proportion
@@ -24,7 +24,13 @@ SPARE = np.radians(5.0)
 """rad: how far a joint range is widened beyond the angle of the static trial."""
 TILT = {"knee": 15.0, "elbow": 25.0, "ankle": 40.0}
 """deg: larger constant tilts of a joint point to a misplaced marker."""
-LENGTH_RATIO = {"thigh": (0.19, 0.29), "shank": (0.19, 0.29), "upper_arm": (0.12, 0.22), "forearm_hand": (0.10, 0.20), "trunk_head": (0.2, 0.36)}
+LENGTH_RATIO = {
+    "thigh": (0.19, 0.29),
+    "shank": (0.19, 0.29),
+    "upper_arm": (0.12, 0.22),
+    "forearm_hand": (0.10, 0.20),
+    "trunk_head": (0.2, 0.36),
+}
 """of stature: the lengths that adults and children have."""
 
 
@@ -78,16 +84,20 @@ def static_skeleton(frames: Frames, posture: Standing, sizes: Measures, subject:
     shoulders = (frames.origin["right_upper_arm"] + frames.origin["left_upper_arm"]) / 2
     origins = {"trunk": local("pelvis", frames.origin["trunk_head"])}
     lengths = {"pelvis": float(np.linalg.norm(origins["trunk"])), "trunk_head": float(np.linalg.norm(shoulders - frames.origin["pelvis"]))}
-    turns, height, behind = {}, {}, {}
+    turns: dict[str, Array] = {}
+    height: dict[str, float] = {}
+    behind: dict[str, float] = {}
     for side in SIDES:
         thigh, shank, foot, arm, forearm = (f"{side}_{kind}" for kind in ("thigh", "shank", "foot", "upper_arm", "forearm_hand"))
         for joint, parent, child in (("hip", "pelvis", thigh), ("knee", thigh, shank), ("ankle", shank, foot), ("elbow", arm, forearm)):
             origins[f"{side}_{joint}"] = local(parent, frames.origin[child])
         origins[f"{side}_shoulder"] = local("trunk_head", frames.origin[arm])
-        lengths |= {segment: float(np.linalg.norm(origins[f"{side}_{end}"])) for segment, end in ((thigh, "knee"), (shank, "ankle"), (arm, "elbow"))}
+        for segment, end in ((thigh, "knee"), (shank, "ankle"), (arm, "elbow")):
+            lengths[segment] = float(np.linalg.norm(origins[f"{side}_{end}"]))
         lengths[forearm] = float(np.linalg.norm(local(forearm, frames.ends[f"{side}_wrist"])))
         lengths[foot], height[side], behind[side] = _foot(frames, posture, sizes, subject, side)
-        turns |= {f"{side}_{joint}": _turn(frames, *pair) for joint, pair in (("knee", (thigh, shank)), ("ankle", (shank, foot)), ("elbow", (arm, forearm)))}
+        for joint, pair in (("knee", (thigh, shank)), ("ankle", (shank, foot)), ("elbow", (arm, forearm))):
+            turns[f"{side}_{joint}"] = _turn(frames, *pair)
     return Skeleton(lengths, origins, height, behind, sizes.pelvis_width, subject.stature, turns)
 
 
@@ -113,7 +123,7 @@ def static_posture(body: Body, frames: Frames) -> Array:
     """Return q (30,) of the body in the static trial."""
     from scipy.spatial.transform import Rotation
 
-    angles = {}
+    angles: dict[str, list[Joint]] = {}
     for joint in body.joints:
         group = joint.name.rsplit("_", 1)[0]
         angles.setdefault(group, []).append(joint)
@@ -157,7 +167,8 @@ def widen(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:
     angle, limits = q[body.nq - len(body.joints) :], body.limits
     lower, upper = np.minimum(limits.lower, angle - SPARE), np.maximum(limits.upper, angle + SPARE)
     notes = tuple(
-        f"Range of {joint.name} widened to {np.degrees(lower[i]):.0f} .. {np.degrees(upper[i]):.0f} deg: {np.degrees(angle[i]):.0f} deg when standing."
+        f"Range of {joint.name} widened to {np.degrees(lower[i]):.0f} .. {np.degrees(upper[i]):.0f} deg: "
+        f"{np.degrees(angle[i]):.0f} deg when standing."
         for i, joint in enumerate(body.joints)
         if lower[i] < limits.lower[i] or upper[i] > limits.upper[i]
     )
@@ -176,9 +187,10 @@ def _doubts(skeleton: Skeleton, subject: Subject, model: Reference) -> list[str]
             )
         other = segment.replace("right_", "left_")
         if other != segment and abs(skeleton.lengths[segment] - skeleton.lengths[other]) > 0.02:
-            notes.append(f"Warning: {segment} is {1e3 * (skeleton.lengths[segment] - skeleton.lengths[other]):+.0f} mm longer than {other}: check the markers.")
+            more = 1e3 * (skeleton.lengths[segment] - skeleton.lengths[other])
+            notes.append(f"Warning: {segment} is {more:+.0f} mm longer than {other}: check the markers.")
     for joint, rotation in skeleton.turns.items():
         tilt = np.degrees(np.arccos((np.trace(rotation) - 1) / 2))
         if tilt > TILT[joint.split("_")[1]]:
-            notes.append(f"Warning: {joint} stands {tilt:.0f} deg away from its axes: check the markers beside the joint and the wand above it.")
+            notes.append(f"Warning: {joint} stands {tilt:.0f} deg away from its axes: check the markers beside it and the wand above it.")
     return notes

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.errors import TrialRefused
 from biodance.lab.marker_sets import MarkerSet, canonical, landmark, read_marker_set
@@ -42,7 +43,7 @@ def standing(static: Trial) -> Standing:
     """
     where = f"Static trial {static.name}"
     if static.markers is None:
-        raise TrialRefused(f"{where}: it has no markers, so no body can be scaled on it. Record the person standing still with all markers.")
+        raise TrialRefused(f"{where}: it has no markers, so no body can be scaled on it. Record the person standing still.")
     if not static.marker_set:
         raise TrialRefused(
             f"{where}: its {len(static.markers.names)} labels are of no known marker set. Label them as in anthropometry/marker_sets, "
@@ -52,7 +53,8 @@ def standing(static: Trial) -> Standing:
     markers = canonical(static.markers, marker_set)
     chosen = quietest(markers)
     points = {}
-    elsewhere, missing = [], []
+    elsewhere: list[str] = []
+    missing: list[str] = []
     for label in markers.names:
         track, near = markers[label], markers[label][chosen]
         near, track = near[np.isfinite(near).all(axis=1)], track[np.isfinite(track).all(axis=1)]
@@ -68,10 +70,10 @@ def standing(static: Trial) -> Standing:
     return Standing(marker_set, points, landmarks, tuple(notes))
 
 
-def quietest(markers: Markers) -> Array:
+def quietest(markers: Markers) -> NDArray[np.bool_]:
     """Return (T,) True for the ``WINDOW`` s in which the markers move least while most of them are seen; all frames of a shorter trial."""
     frames = markers.time.size
-    length = frames if frames < 3 else int(round(WINDOW * markers.rate))
+    length = frames if frames < 3 else round(WINDOW * markers.rate)
     if frames <= max(length, 2):
         return np.ones(frames, dtype=bool)
     step = np.linalg.norm(np.diff(markers.xyz, axis=0), axis=2)

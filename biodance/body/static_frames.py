@@ -31,9 +31,10 @@ class Frames:
 def static_frames(place: Places, sizes: Measures, *, hip: Hip, trunk_fraction: float) -> Frames:
     """Return the 12 segment frames.
 
-    Pelvis: ISB axes, origin in the middle of the hip centres. Trunk joint: on the line from mid hip to mid shoulder, at ``trunk_fraction`` of
-    it; trunk_head: y along that line. Thigh, upper arm: y to the proximal joint, z in the plane of the flexion axis. Shank, forearm: y to
-    the proximal joint, flexed about the parent's z and tilted by a constant varus. Foot: flat on the ground, x from heel to toe.
+    Pelvis: ISB axes, origin in the middle of the hip centres. Trunk joint: on the line from mid hip to mid shoulder, at
+    ``trunk_fraction`` of it; trunk_head: y along that line. Thigh, upper arm: y to the proximal joint, z in the plane of the flexion
+    axis. Shank, forearm: y to the proximal joint, flexed about the parent's z and tilted by a constant varus. Foot: flat on the ground, x
+    from heel to toe.
     """
     rotation: dict[str, Array] = {}
     origin: dict[str, Array] = {}
@@ -129,7 +130,7 @@ def knee_centre(place: Places, sizes: Measures, hip: Array, pelvis_right: Array,
 
 
 def ankle_centre(place: Places, sizes: Measures, knee: Array, side: str) -> Array:
-    """Return the ankle centre, m: middle of the malleoli, or chord with the shank marker, or with the knee's axis where there is neither."""
+    """Return the ankle centre, m: middle of the malleoli, or chord with the shank marker, or with the knee's axis without either."""
     lateral = place[f"{side}_ankle_lateral"]
     if f"{side}_ankle_medial" in place:
         return np.asarray((lateral + place[f"{side}_ankle_medial"]) / 2)

@@ -51,35 +51,6 @@ def quaternion_of(angles: Array, sign: Array) -> Array:
     return np.stack([s1 * c23 + c1 * s23, c1 * sc - s1 * cs, c1 * cs + s1 * sc, c1 * c23 - s1 * s23])
 
 
-def angles_of(self, angles: Array) -> Array:
-    """Return (3, G, B) rad from the angles of all joints (n, B)."""
-    return np.stack([angles[self.first + k] for k in range(3)])
-
-
-def balls(body: Body) -> Balls:
-    """Return the ball joints of ``body``."""
-    first, sign = [], []
-    parents = [joint.parent for joint in body.joints]
-    for i in range(len(body.joints) - 2):
-        one, two, three = body.joints[i : i + 3]
-        axes = np.array([joint.axis for joint in (one, two, three)])
-        in_a_row = two.parent == i and three.parent == i + 1 and parents.count(i) == parents.count(i + 1) == 1
-        one_point = all(np.allclose(j.translation, 0) and np.allclose(j.rotation, np.eye(3)) for j in (two, three))
-        bare = one.segment == two.segment == NO_SEGMENT
-        if in_a_row and one_point and bare and np.allclose(axes @ axes.T, np.eye(3), atol=1e-9):
-            first.append(i)
-            sign.append(np.linalg.det(axes))
-    return Balls(np.array(first, dtype=np.intp), np.round(np.array(sign).reshape(-1, 1)))
-
-
-def quaternion_of(angles: Array, sign: Array) -> Array:
-    """Return the quaternion (4, G, B) of Cardan angles (3, G, B) rad."""
-    turn = np.zeros((3, 4, *angles.shape[1:]))
-    half = 0.5 * sign * angles
-    turn[range(3), range(3)], turn[:, 3] = np.sin(half), np.cos(half)
-    return product(product(turn[0], turn[1]), turn[2])
-
-
 def angles_of(quaternion: Array, sign: Array, near: Array, lower: Array, upper: Array) -> Array:
     """Return the Cardan angles (3, G, B) rad of unit quaternions (4, G, B).
 

@@ -17,7 +17,7 @@ from biodance.records import Array
 
 @dataclass(frozen=True, eq=False)
 class Smooth:
-    """B postures: ``place`` (3, B) m and ``root`` (4, B) quaternion, both (0, B) for a fixed root; ``ball`` (4, G, B); ``angle`` (m, B) rad."""
+    """B postures: ``place`` (3, B) m and ``root`` (4, B) quaternion, (0, B) for a fixed root; ``ball`` (4, G, B); ``angle`` (m, B) rad."""
 
     place: Array
     root: Array
@@ -31,7 +31,7 @@ class Smooth:
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """Maps q to smooth coordinates and back: ``joints`` the ball joints, ``single`` (m,) the other joints, limits (3, G, 1) rad of the balls."""
+    """Maps q to smooth coordinates and back: ``joints`` the ball joints, ``single`` (m,) the others, limits (3, G, 1) rad of the balls."""
 
     joints: Balls
     single: Index

@@ -103,6 +103,7 @@ def _too_few(body: Body, markers: Markers, open_coordinates: tuple[str, ...]) ->
     best = markers.seen.sum(axis=1).max(initial=0)
     never = [name for name in body.markers.names if name not in markers or not markers.seen[:, markers.names.index(name)].any()]
     return (
-        f"No frame shows enough markers for the posture of {body.name}: at best {best} of its {len(body.markers.names)} markers are seen, which "
-        f"leaves open: {', '.join(open_coordinates)}. Never seen: {', '.join(never) or 'none'}. Label them, or use a body without those joints."
+        f"No frame shows enough markers for the posture of {body.name}: at best {best} of its {len(body.markers.names)} markers are seen, "
+        f"which leaves open: {', '.join(open_coordinates)}. Never seen: {', '.join(never) or 'none'}. "
+        "Label them, or use a body without those joints."
     )

@@ -20,7 +20,7 @@ from biodance.motion.quaternion import matrix
 from biodance.motion.tree import Tree
 from biodance.records import Array
 
-Batch = TypeVar("Batch", "Measured", "Fit")
+Batch = TypeVar("Batch")
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,10 +39,10 @@ class Measured:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """The cost at one posture per frame: ``cost`` (B,) m²; ``twist`` (n, 6, B) linear, angular of every joint at the root's origin, ``third``
-    (G, 6, B) of every ball joint's third axis at zero second angle; sums below every slot: ``wrench`` (n + 1, 6, B) of the residuals,
-    ``weight`` (n + 1, B), ``model`` S and ``seen`` a (n + 1, 3, B), ``cross`` M (n + 1, 3, 3, B); ``rotation`` (N, 3, 3, B) and ``place``
-    (N, 3, B) of the segments from the root's origin.
+    """The cost at one posture per frame: ``cost`` (B,) m²; ``twist`` (n, 6, B) linear, angular of every joint at the root's origin,
+    ``third`` (G, 6, B) of every ball joint's third axis at zero second angle; sums below every slot: ``wrench`` (n + 1, 6, B) of the
+    residuals, ``weight`` (n + 1, B), ``model`` S and ``seen`` a (n + 1, 3, B), ``cross`` M (n + 1, 3, 3, B); ``rotation`` (N, 3, 3, B)
+    and ``place`` (N, 3, B) of the segments from the root's origin.
     """
 
     cost: Array
@@ -59,7 +59,7 @@ class Fit:
 
 def take(batch: Batch, frames: NDArray[np.intp] | slice) -> Batch:
     """Return the batch of some of its frames."""
-    return type(batch)(*(getattr(batch, f.name)[..., frames] for f in fields(batch)))
+    return type(batch)(*(getattr(batch, f.name)[..., frames] for f in fields(batch)))  # type: ignore[arg-type]
 
 
 def merge(chosen: NDArray[np.bool_], new: Fit, old: Fit) -> Fit:
@@ -67,7 +67,7 @@ def merge(chosen: NDArray[np.bool_], new: Fit, old: Fit) -> Fit:
     return new if chosen.all() else Fit(*(np.where(chosen, getattr(new, f.name), getattr(old, f.name)) for f in fields(Fit)))
 
 
-def design(segment: list[int], local: Array, count: int) -> Array:
+def design(segment: list[int] | NDArray[np.intp], local: Array, count: int) -> Array:
     """Return (13, count, K): what each marker at ``local`` (K, 3) m in ``segment`` (K) adds to 1, l and l l' of its segment."""
     terms = np.concatenate([np.ones((1, len(local))), local.T, np.einsum("ki,kj->ijk", local, local).reshape(9, -1)])
     return terms[:, None] * (np.array(segment)[None, :] == np.arange(count)[:, None])

@@ -24,8 +24,8 @@ ROUNDS = (3, 5, 20, 200)
 
 @dataclass(frozen=True, eq=False)
 class MarkerProblem:
-    """A body's tree and markers against T frames of measured ones: ``segment`` (K), ``local`` (K, 3) m, ``xyz`` (T, K, 3) m (anything finite
-    where hidden), ``weight`` (T, K) >= 0, zero where hidden; ``sums`` the design of ``marker_moments``; ``tolerance`` m.
+    """A body's tree and markers against T frames of measured ones: ``segment`` (K), ``local`` (K, 3) m, ``xyz`` (T, K, 3) m (anything
+    finite where hidden), ``weight`` (T, K) >= 0, zero where hidden; ``sums`` the design of ``marker_moments``; ``tolerance`` m.
     """
 
     tree: Tree
@@ -48,7 +48,7 @@ def marker_problem(body: Body, columns: list[int], xyz: Array, *, tolerance: flo
     """Return the problem of the body's markers ``columns`` (K) against ``xyz`` (T, K, 3) m, NaN = hidden."""
     segment = np.array([body.markers.segment[c] for c in columns], dtype=np.intp)
     local = body.markers.position[columns]
-    seen = ~np.isnan(xyz).any(axis=2)
+    seen = np.logical_not(np.isnan(xyz).any(axis=2))
     return MarkerProblem(
         tree=tree_of(body),
         chart=chart_of(body),

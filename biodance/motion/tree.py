@@ -35,7 +35,8 @@ class Tree:
 
     ``turn`` (n, 9, 3): local rotation of a joint = turn @ [1, sin, 1 - cos] (rows of the 3 x 3 matrix); ``translation`` (n, 3) m;
     ``axis`` (n, 3); ``levels``: (slots, parents' slots) per depth; ``carrier`` (N) slot that carries each segment; ``below`` (n + 1, N)
-    1 where a segment moves with a slot; ``branches`` carriers first; ``balls`` the ball joints; ``lower``, ``upper`` (n, 1) rad; ``n_root`` 6 or 0.
+    1 where a segment moves with a slot; ``branches`` carriers first; ``balls`` the ball joints; ``lower``, ``upper`` (n, 1) rad;
+    ``n_root`` 6 or 0.
     """
 
     turn: Array

@@ -136,7 +136,7 @@ def _root_front(model: Quadratic) -> Array:
 
 
 def _eliminate(front: Array, first: int, scale: Array, convex: NDArray[np.bool_]) -> list[Array]:
-    """Eliminate the rows of ``front`` from the last down to ``first``; return their multipliers (k, G, B); clear ``convex`` at bad pivots."""
+    """Eliminate the rows of ``front`` from the last down to ``first``; return multipliers (k, G, B); clear ``convex`` at bad pivots."""
     rows = []
     for k in range(len(front) - 1, first - 1, -1):
         pivot = front[k, k]
