@@ -20,6 +20,9 @@ from biodance.records import Array, Subject, Trial
 
 ANKLE_HEIGHT = (0.04, 0.12)
 """m: an ankle centre so high over z = 0 of the lab is taken to stand on that floor."""
+HAND_TURN = np.radians(120.0)
+"""rad either way: the model has no pronation, so with a straight elbow a turning hand is seen as a turning shoulder; a narrower limit makes
+the arm jump to the other set of angles that reaches the same hand (seen in a real walk)."""
 SPARE = np.radians(5.0)
 """rad: how far a joint range is widened beyond the angle of the static trial."""
 TILT = {"knee": 15.0, "elbow": 25.0, "ankle": 40.0}
@@ -163,8 +166,13 @@ def chain_angles(relative: Array, axes: Array) -> Array:
 
 
 def widen(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:
-    """Return the limits widened so that the static posture lies ``SPARE`` inside them, and a note per joint that needed it."""
+    """Return the limits widened for tracking: the static posture lies ``SPARE`` inside them, the shoulder turns as far as the hand does.
+
+    The notes name every joint that the static posture needed wider.
+    """
     angle, limits = q[body.nq - len(body.joints) :], body.limits
+    turning = np.array([joint.name.endswith("_shoulder_rotation") for joint in body.joints])
+    limits = replace(limits, lower=np.where(turning, -HAND_TURN, limits.lower), upper=np.where(turning, HAND_TURN, limits.upper))
     lower, upper = np.minimum(limits.lower, angle - SPARE), np.maximum(limits.upper, angle + SPARE)
     notes = tuple(
         f"Range of {joint.name} widened to {np.degrees(lower[i]):.0f} .. {np.degrees(upper[i]):.0f} deg: "
