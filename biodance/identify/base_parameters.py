@@ -147,7 +147,7 @@ def estimate_base(data: Information, base: BaseParameters, *, tolerance: float =
     columns = list(base.columns)
     Wb = data.triangle[:, columns]
     scale = np.linalg.norm(Wb, axis=0)
-    scale[scale == 0] = 1.0
+    scale[scale <= tolerance**2 * scale.max(initial=0.0)] = 1.0  # never moved: an unknown direction, not a tiny one
     U, s, Vt = np.linalg.svd(Wb / scale, full_matrices=False)
     good = s > tolerance * s.max(initial=0.0)
     rank = int(good.sum())
