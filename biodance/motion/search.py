@@ -67,7 +67,7 @@ def from_markers(problem: MarkerProblem, frames: Index, shares: tuple[float | No
 def retry(problem: MarkerProblem, frames: Index, found: Minimum) -> Minimum:
     """Return ``found`` with the doubtful frames tried again: from their markers, and from the nearest sound frames on both sides."""
     rms = np.sqrt(np.maximum(2 * found.cost, 0.0) / problem.weight[frames].sum(axis=1))
-    doubtful = rms > DOUBT[0] * median_filter(rms, min(NEIGHBOURS, len(rms)), mode="nearest") + DOUBT[1]
+    doubtful = rms > DOUBT[0] * median_filter(rms, min(NEIGHBOURS, len(rms)), mode="mirror") + DOUBT[1]
     sound, bad = np.flatnonzero(~doubtful), np.flatnonzero(doubtful)
     if not (bad.size and sound.size):
         return found
