@@ -13,12 +13,21 @@ COM_SIGMAS = 3.0
 """Half width of a CoM box in prior standard deviations."""
 
 
+LUMBAR_HEIGHT = 0.112 / 1.755
+"""Stature: height over the hip centres of the lumbar joint from which ``boxes.csv`` measures the trunk (ANSUR II man of 1.755 m)."""
+
+
 def shape_boxes(skeleton: Skeleton) -> Array:
-    """Return the boxes (12, 2, 3) m of ``boxes.csv`` at the person's stature: lower and upper corners in the segment frames."""
+    """Return the boxes (12, 2, 3) m of ``boxes.csv`` at the person's stature: lower and upper corners in the segment frames.
+
+    The trunk's box ends at the vertex wherever this skeleton has its trunk joint.
+    """
     table = read_table("human", "boxes")
     columns = "x_min y_min z_min x_max y_max z_max"
     corners = np.array([numbers(table.row(segment=kind_of(s)), columns) for s in SEGMENTS])
-    return corners.reshape(-1, 2, 3) * skeleton.stature
+    boxes = corners.reshape(-1, 2, 3) * skeleton.stature
+    boxes[SEGMENTS.index("trunk_head"), 1, 1] -= skeleton.origins["trunk"][1] - LUMBAR_HEIGHT * skeleton.stature
+    return boxes
 
 
 def com_boxes(sip: Sip, skeleton: Skeleton, boxes: Array) -> Array:

@@ -27,7 +27,10 @@ def human(subject: Subject, *, table: str = DEFAULT_TABLE, markers: str = "plug_
     ------
     UnknownName
         There is no such table for this sex, or no such marker set.
+    SessionRefused
+        The mass or the stature is not known.
     """
+    subject.require("mass", "stature")
     skeleton = generic_skeleton(reference(table, subject), subject)
     note = f"Segment lengths: table {table} at stature {subject.stature:.3f} m; nobody was measured. Markers: usual places of {markers}."
     return assemble(subject, skeleton, table=table, markers=generic_markers(skeleton, read_marker_set(markers)), notes=(note,))

@@ -49,7 +49,10 @@ def scale(subject: Subject, static: Trial, *, hip: Hip = "harrington", table: st
         The static trial has no markers, no known marker set, or misses a landmark; all missing ones are named.
     UnknownName
         There is no such table.
+    SessionRefused
+        The mass or the stature of the subject is not known.
     """
+    subject.require("mass", "stature")
     return scale_with_posture(subject, static, hip=hip, table=table)[0]
 
 

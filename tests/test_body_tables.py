@@ -1,0 +1,98 @@
+"""The shipped tables: unchanged, consistent, with provenance, and the prior made from them."""
+
+import numpy as np
+import pytest
+
+from biodance.body.human import human
+from biodance.body.skeleton import SEGMENTS
+from biodance.body.tables import read_table
+from biodance.errors import BiodanceError, UnknownName
+from biodance.identify.physical import smallest_eigenvalues
+from biodance.library import folder, names, read_toml
+from biodance.records import Subject
+
+FAMILIES = ("segments", "human")
+TABLES = [(family, name) for family in FAMILIES for name in names(f"anthropometry/{family}", ".csv")]
+PEOPLE = [("F", 1.50, 45.0), ("F", 1.75, 65.0), ("F", 1.62, 90.0), ("M", 1.60, 55.0), ("M", 1.77, 75.0), ("M", 1.95, 110.0)]
+
+
+@pytest.mark.parametrize(("family", "name"), TABLES)
+def test_every_table_says_where_it_comes_from_and_is_unchanged(family: str, name: str) -> None:
+    table = read_table(family, name)  # refuses a changed csv by its sha256
+    assert table.rows
+    for key in ("title", "source", "units", "sd", "population", "sha256"):
+        assert str(table.provenance[key]).strip(), key
+
+
+def test_a_changed_table_is_refused(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import shutil
+
+    import biodance.body.tables as tables
+
+    shutil.copytree(folder("anthropometry") / "segments", tmp_path / "segments")
+    path = tmp_path / "segments" / "de_leva_1996.csv"
+    path.write_text(path.read_text().replace("0.0668", "0.0669"))
+    monkeypatch.setattr(tables, "locate", lambda family, name, suffix: tmp_path / "segments" / f"{name}{suffix}")
+    tables.read_table.cache_clear()
+    with pytest.raises(BiodanceError, match="numbers were changed"):
+        tables.read_table("segments", "de_leva_1996")
+    tables.read_table.cache_clear()
+
+
+@pytest.mark.parametrize("table", ["de_leva_1996", "dumas_2018"])
+@pytest.mark.parametrize(("sex", "stature", "mass"), PEOPLE)
+def test_a_person_from_a_table_weighs_the_body_mass_and_can_exist(table: str, sex: str, stature: float, mass: float) -> None:
+    body = human(Subject(mass, stature, sex, 30.0), table=table)
+    assert body.segments == SEGMENTS
+    assert body.sip.mass.sum() == pytest.approx(mass, rel=1e-9)
+    assert smallest_eigenvalues(body.sip.phi).min() > 0
+    assert np.all(body.sip.com >= body.com_boxes[:, 0])
+    assert np.all(body.sip.com <= body.com_boxes[:, 1])
+
+
+@pytest.mark.parametrize(("sex", "stature", "mass"), PEOPLE)
+def test_the_covariance_is_one(sex: str, stature: float, mass: float) -> None:
+    body = human(Subject(mass, stature, sex, 30.0))
+    covariance = body.sip.covariance
+    np.testing.assert_allclose(covariance, covariance.T)
+    scale = np.sqrt(np.diag(covariance))
+    assert np.linalg.eigvalsh(covariance / np.outer(scale, scale)).min() > -1e-9
+    masses = np.arange(0, 120, 10)
+    relative = scale[masses] / body.sip.mass
+    assert np.all((relative > 0.04) & (relative < 0.35))
+    total = np.sqrt(covariance[np.ix_(masses, masses)].sum())
+    assert total < 0.5, "the scale pins the sum of the masses"
+
+
+# Merged reference values: de Leva 1996, woman 1.75 m, 65 kg; man 1.77 m, 75 kg (kg)
+REFERENCE = {
+    "F": {"pelvis": 8.1055, "right_thigh": 9.607, "left_shank": 3.1265, "right_foot": 0.8385, "trunk_head": 23.907, "left_upper_arm": 1.6575},
+    "M": {"pelvis": 8.3775, "right_thigh": 10.62, "left_shank": 3.2475, "right_foot": 1.0275, "trunk_head": 29.4225, "left_upper_arm": 2.0325},
+}
+
+
+@pytest.mark.parametrize(("sex", "stature", "mass"), [("F", 1.75, 65.0), ("M", 1.77, 75.0)])
+def test_masses_of_de_leva(sex: str, stature: float, mass: float) -> None:
+    body = human(Subject(mass, stature, sex, 30.0))
+    for segment, expected in REFERENCE[sex].items():
+        assert body.sip.of(segment)[0] == pytest.approx(expected, rel=2e-3), segment
+
+
+def test_left_mirrors_right() -> None:
+    body = human(Subject(70.0, 1.72, "M", 40.0))
+    mirror = np.array([1, 1, 1, -1, 1, 1, 1, -1, -1, 1])
+    for segment in SEGMENTS:
+        if segment.startswith("right_"):
+            np.testing.assert_allclose(body.sip.of(segment.replace("right_", "left_")), mirror * body.sip.of(segment), atol=1e-12)
+
+
+def test_women_have_no_zatsiorsky_regressions_and_unknown_tables_are_refused() -> None:
+    with pytest.raises(UnknownName, match="de_leva_1996"):
+        human(Subject(70.0, 1.7, "F", 30.0), table="nobody_1900")
+    with pytest.raises(BiodanceError):
+        human(Subject(70.0, 1.7, "F", 30.0), table="zatsiorsky_2002")
+
+
+def test_marker_sets_are_readable_toml() -> None:
+    for name in names("anthropometry/marker_sets"):
+        assert read_toml(folder("anthropometry") / "marker_sets" / f"{name}.toml")["source"]
