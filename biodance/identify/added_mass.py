@@ -1,9 +1,9 @@
 """Added mass: which segment carries a load, how heavy, where on it, how sure - against an earlier session or against the table.
 
-Hypotheses "a load sits on segment s" are compared with "no load" by Bayes factors under one linear Gaussian model: the body as known before
-(the posterior of the reference session, or the table), plus the ten parameters of a load whose mass and place inside the segment's box are
-unknown. The load's prior is the second moment of such loads, so that light and heavy ones both fit. The smallest load that the session
-could have found is computed from its information alone.
+Hypotheses "a load sits on segment s" are compared with "no load" by Bayes factors under one linear Gaussian model: the body as known
+before (the posterior of the reference session, or the table), plus the ten parameters of a load whose mass and place inside the segment's
+box are unknown. The load's prior is the second moment of such loads, so that light and heavy ones both fit. The smallest load that the
+session could have found is computed from its information alone.
 """
 
 from dataclasses import dataclass
@@ -33,8 +33,8 @@ class Suspect:
     """The hypothesis of a load on one segment.
 
     ``mass`` kg with ``sd``; ``place`` (3,) m of its CoM in the segment's joint frame with ``place_sd`` (3,), NaN where the mass is less
-    than twice its sd; ``log_bayes_factor`` against no load; ``probability`` among all hypotheses; ``smallest`` kg, the load on this segment that
-    this session would find in half of the cases.
+    than twice its sd; ``log_bayes_factor`` against no load; ``probability`` among all hypotheses; ``smallest`` kg, the load on this
+    segment that this session would find in half of the cases.
     """
 
     segment: str
@@ -80,8 +80,8 @@ class AddedMass:
 def added_mass(session: Identification, *, reference: Identification | None = None) -> AddedMass:
     """Return where and how much mass ``session`` carries beyond ``reference`` (an unloaded session of the same person) or the table.
 
-    Against the table alone, a load on pelvis, trunk or thigh cannot be told from a wrong table or a wrong scale: ``set`` then holds several
-    segments.
+    Against the table alone, a load on pelvis, trunk or thigh cannot be told from a wrong table or a wrong scale: ``set`` then holds
+    several segments.
     """
     before = session.belief.prior if reference is None else expected(reference, session)
     base = _evidence(session.data, before, np.zeros((before.phi.size, 0)))[0]

@@ -1,6 +1,6 @@
 """From the trials of a session to what the subject weighs, segment by segment, with an interval for every number.
 
-The steps: band-wise statistics of every trial, noise and parameters learned together, kinematic errors discounted, the table as
+The steps: band-wise statistics of every trial, noise learned, what wrong kinematics and plates could do discounted (twins), the table as
 prior (maximum a posteriori: its standard deviations and the noise of the data decide, no weight is tuned), then the nearest body that
 can exist. A session that cannot tell a parameter leaves it at the table's value with the table's interval, and says so.
 """
@@ -16,11 +16,14 @@ from biodance.identify.base_parameters import BaseEstimate, estimate_base, struc
 from biodance.identify.information import Information
 from biodance.identify.knowledge import Known, knowledge
 from biodance.identify.learning import learn
+from biodance.identify.mismatch import Mismatch, Sizes, evident_sizes, mismatch, temper
 from biodance.identify.noise import Noise
 from biodance.identify.physical import PhysicalFit, physical_fit
 from biodance.identify.posterior import Posterior, posterior
 from biodance.identify.statistics import Fit, Statistics, empty, layout_for, statistics
 from biodance.records import Array, Sip
+
+NOISE_ALONE = "The intervals count the noise alone, not soft tissue, joint centres and plates: they are several times too short."
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,10 +31,10 @@ class Identification:
     """What a session says about a body.
 
     ``body`` as given, with the table as its SIP; ``sip`` the identified parameters, physically consistent, with their covariance;
-    ``belief`` the Gaussian posterior before the consistency constraint; ``data`` what the trials alone say (whitened); ``base`` the
-    weighted least-squares estimate of the base parameters; ``noise`` as learned; ``fit`` what the constraint did; ``trials`` used, ``frames``
-    coefficients counted; ``known`` every quantity with interval and verdict; ``status``, with ``cause`` and cure in words; ``notes`` what a
-    person should know.
+    ``belief`` the Gaussian posterior before the consistency constraint; ``data`` what the trials alone say (whitened, disturbances
+    discounted); ``base`` the weighted least-squares estimate of the base parameters; ``noise`` as learned; ``sizes`` of the disturbances;
+    ``fit`` what the constraint did; ``trials`` used, ``frames`` coefficients counted; ``known`` every quantity with interval and verdict;
+    ``status``, with ``cause`` and cure in words; ``notes`` what a person should know.
     """
 
     body: Body
@@ -40,6 +43,7 @@ class Identification:
     data: Information
     base: BaseEstimate
     noise: Noise
+    sizes: Sizes
     fit: PhysicalFit
     trials: tuple[str, ...]
     frames: int
@@ -80,23 +84,37 @@ def identify(body: Body, fits: tuple[Fit, ...], *, prior: Sip | None = None) -> 
         total = total + statistics(body, fit, layout)
     left_out = [fit.name for fit in fits if not fit.use.any()]
     notes = (f"Left out, no usable frame: {', '.join(left_out)}.",) if left_out else ()
-    return conclude(body, total, tuple(fit.name for fit in used), prior=prior, notes=notes)
+    noise, _ = learn(total, prior or body.sip)
+    found = conclude(body, total, tuple(fit.name for fit in used), noise=noise, found=mismatch(body, used, noise), prior=prior)
+    return replace(found, notes=(*notes, *found.notes))
 
 
 def conclude(
-    body: Body, total: Statistics, trials: tuple[str, ...], *, prior: Sip | None = None, notes: tuple[str, ...] = ()
+    body: Body,
+    total: Statistics,
+    trials: tuple[str, ...],
+    *,
+    noise: Noise | None = None,
+    found: Mismatch | None = None,
+    prior: Sip | None = None,
 ) -> Identification:
-    """Return the identification from statistics that were gathered already (several trials, or a stream of frames)."""
+    """Return the identification from statistics that were gathered already, of several trials or of a stream of frames.
+
+    ``noise`` as learned (learned here if None); ``found`` what twins and plates disturb: without it the intervals count noise alone, far
+    too short, and the notes say so.
+    """
     before = prior or body.sip
-    noise, _ = learn(total, before)
-    data = total.information(noise)
+    noise = noise or learn(total, before)[0]
+    data, sizes = total.information(noise), Sizes(0.0, 1.0)
+    if found is not None:
+        sizes = evident_sizes(data, found, before)
+        data = temper(data, found, sizes)
     belief = posterior(data, before)
     fit = physical_fit(belief, body)
     base = estimate_base(data, structural_base(body))
     known = knowledge(fit.sip, before)
-    return Identification(
-        body, fit.sip, belief, data, base, noise, fit, trials, data.frames, known, fit.status, fit.cause, (*notes, *_notes(known, fit))
-    )
+    words = (*(() if found else (NOISE_ALONE,)), *_notes(known, fit))
+    return Identification(body, fit.sip, belief, data, base, noise, sizes, fit, trials, data.frames, known, fit.status, fit.cause, words)
 
 
 def standing_point(fits: tuple[Fit, ...]) -> Array:

@@ -1,0 +1,202 @@
+"""Twins of a subject: the same motion and masses, but skin that slides, joints that sit elsewhere, hinges that are tilted, flesh that
+shifts.
+
+A person is not the model. The tracked coordinates err coherently with the motion, the parameters absorb much of it, and the wrench
+residual hides it. Every twin draws such errors once for a whole session; they pass through the inverse kinematics to first order - model
+markers moved by dx are answered by dq = -(J'DJ)^-1 J'D dx, D marker weights - and change the wrench (docs/derivations.md, section 8).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.motion.kinematics import Poses, poses, segment_motion
+from biodance.motion.regressor import GRAVITY, PHI_TENSOR
+from biodance.records import Array, Motion
+
+SLIDE = 0.006
+"""m/rad per axis: skin and flesh over bone per angle of a neighbouring joint; the session's own marker residuals rescale it."""
+JOINT_CENTRE = 0.010
+"""m per axis: errors of predicted hip, knee, ankle, shoulder and elbow centres are 5 to 15 mm."""
+HINGE_TILT = 0.05
+"""rad: tilt of a knee or elbow axis against the bone's own."""
+
+
+@dataclass(frozen=True, eq=False)
+class Twins:
+    """The errors of K twins: ``slide`` (n, M, 3, K) m/rad per joint and marker, ``flesh`` (n, N, 3, K) m/rad per joint and segment,
+    ``centre`` (n, 3, K) m of the first axis of every joint, in its parent's frame, ``tilt`` (n, 3, K) of the axes of hinges.
+    """
+
+    slide: Array
+    flesh: Array
+    centre: Array
+    tilt: Array
+
+
+def below(body: Body) -> Array:
+    """Return (n, N) 1 where a segment hangs on a joint."""
+    table = np.zeros((len(body.joints), len(body.segments)))
+    for s, j in enumerate(body.segment_joint):
+        while j >= 0:
+            table[j, s] = 1.0
+            j = body.joints[j].parent
+    return table
+
+
+def chains(body: Body) -> tuple[tuple[int, ...], ...]:
+    """Return the axes of every anatomical joint, first to last."""
+    found = []
+    for last in body.segment_joint:
+        chain: list[int] = []
+        while last >= 0:
+            chain.append(last)
+            last = body.joints[last].parent
+            if last < 0 or body.joints[last].segment >= 0:
+                break
+        if chain:
+            found.append(tuple(reversed(chain)))
+    return tuple(found)
+
+
+def neighbours(body: Body) -> Array:
+    """Return (n, N) 1 where an anatomical joint (all its axes) is at an end of a segment."""
+    table = np.zeros((len(body.joints), len(body.segments)))
+    for chain in chains(body):
+        child, above = body.joints[chain[-1]].segment, body.joints[chain[0]].parent
+        table[np.ix_(chain, (child, 0 if above < 0 else body.joints[above].segment))] = 1.0
+    return table
+
+
+def draw_twins(body: Body, count: int, rng: np.random.Generator) -> Twins:
+    """Draw the errors of ``count`` twins of ``body``."""
+    beside, segment = neighbours(body), list(body.markers.segment)
+    n = len(body.joints)
+    centre, tilt = np.zeros((n, 3, count)), np.zeros((n, 3, count))
+    for chain in chains(body):
+        centre[chain[0]] = JOINT_CENTRE * rng.normal(size=(3, count))
+        if len(chain) == 1:
+            axis = body.joints[chain[0]].axis
+            tilt[chain[0]] = HINGE_TILT * (np.eye(3) - np.outer(axis, axis)) @ rng.normal(size=(3, count))
+    slide = SLIDE * beside[:, segment, None, None] * rng.normal(size=(n, len(segment), 3, count))
+    flesh = SLIDE * beside[:, :, None, None] * rng.normal(size=(n, len(body.segments), 3, count))
+    return Twins(slide, flesh, centre, tilt)
+
+
+@dataclass(frozen=True, eq=False)
+class Disturbance:
+    """Errors of K twins over T frames at unchanged coordinates, lab frame: ``markers`` (T, M, 3, K) m, model less measured; ``places``
+    (T, N, 3, K) m of the segments' centres of mass; ``turns`` (T, N, 3, K) rad of the segments.
+    """
+
+    markers: Array
+    places: Array
+    turns: Array
+
+
+def disturbance(body: Body, motion: Motion, pose: Poses, twins: Twins) -> Disturbance:
+    """Return what the twins' errors do before the coordinates answer; a joint centre is recalibrated away in the neutral posture."""
+    angles = motion.q[:, body.nq - len(body.joints) :]
+    segment, hangs = list(body.markers.segment), below(body)
+    com = pose.points(list(range(len(body.segments))), body.sip.com)
+    marker = pose.points(segment, body.markers.position)
+    drift = _drift(body, pose, twins, hangs)
+    places = drift + pose.rotation @ _pulled(angles, twins.flesh)
+    markers = drift[:, segment] - pose.rotation[:, segment] @ _pulled(angles, twins.slide)
+    turns = np.zeros_like(places)
+    for j in np.flatnonzero(np.any(twins.tilt, axis=(1, 2))):
+        on, carried = np.flatnonzero(hangs[j]), np.flatnonzero(hangs[j][segment])
+        rho = (angles[:, j, None, None] * (pose.joint_rotation[:, j] @ twins.tilt[j]))[:, None]
+        origin = pose.joint_position[:, j, None]
+        turns[:, on] += rho
+        places[:, on] -= skew(com[:, on] - origin) @ rho
+        markers[:, carried] -= skew(marker[:, carried] - origin) @ rho
+    return Disturbance(markers, places, turns)
+
+
+def _pulled(angles: Array, pull: Array) -> Array:
+    """Return (T, S, 3, K): the sum over joints of angle times ``pull`` (n, S, 3, K)."""
+    return np.asarray((angles @ pull.reshape(len(pull), -1)).reshape(len(angles), *pull.shape[1:]))
+
+
+def _drift(body: Body, pose: Poses, twins: Twins, hangs: Array) -> Array:
+    """Return (T, N, 3, K) m: how displaced joint centres carry the segments, less what the neutral posture calibrates away."""
+    rest = poses(body, body.neutral)
+    first = [chain[0] for chain in chains(body)]
+    count = twins.centre.shape[2]
+
+    def carried(at: Poses) -> Array:
+        moved = np.stack([_parent_turn(at, body.joints[j].parent) @ twins.centre[j] for j in first], axis=1)
+        return np.asarray((hangs[first].T @ moved.reshape(len(moved), len(first), -1)).reshape(len(moved), -1, 3, count))
+
+    return np.asarray(carried(pose) - pose.rotation @ (np.swapaxes(rest.rotation, -1, -2) @ carried(rest)))
+
+
+def _parent_turn(pose: Poses, parent: int) -> Array:
+    return pose.root_rotation if parent < 0 else pose.joint_rotation[:, parent]
+
+
+def skew(vector: Array) -> Array:
+    """Return the cross-product matrices (..., 3, 3) of vectors (..., 3)."""
+    out = np.zeros((*vector.shape, 3))
+    x, y, z = np.moveaxis(vector, -1, 0)
+    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -z, y, -x
+    out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = z, -y, x
+    return out
+
+
+def jacobian(body: Body, pose: Poses, segment: list[int], points: Array) -> tuple[Array, Array]:
+    """Return (T, 3S, nv) of points (T, S, 3) on segments and of their turn, per unit of the lab-frame tangent [root place, root turn,
+    angles].
+    """
+    frames, count = points.shape[:2]
+    place, turn = np.zeros((2, frames, count, 3, body.nv))
+    if body.n_root:
+        place[..., :3] = np.eye(3)
+        turn[..., 3:6] = np.eye(3)
+        place[..., 3:6] = -skew(points - pose.root_position[:, None])
+    hangs = below(body)[:, segment]
+    for j, joint in enumerate(body.joints):
+        on = np.flatnonzero(hangs[j])
+        axis = (pose.joint_rotation[:, j] @ joint.axis)[:, None]
+        place[..., body.n_root + j][:, on] = np.cross(axis, points[:, on] - pose.joint_position[:, j, None])
+        turn[..., body.n_root + j][:, on] = axis
+    return place.reshape(frames, 3 * count, body.nv), turn.reshape(frames, 3 * count, body.nv)
+
+
+def wrench_change(body: Body, motion: Motion, places: Array, turns: Array) -> Array:
+    """Return the change (T, 6, K) of the table's wrench about the lab origin when centres of mass move by ``places`` and segments turn by
+    ``turns`` (T, N, 3, K), lab frame: the rate of change of momentum and angular momentum, less the moment of gravity.
+    """
+    move = segment_motion(body, motion)
+    step = 1.0 / motion.rate
+    mass = body.sip.mass
+    com = (move.rotation @ body.sip.com[..., None])[..., 0] + move.position
+    momentum = mass[:, None] * np.gradient(com, step, axis=0)
+    inertia = move.rotation @ _central(body) @ np.swapaxes(move.rotation, -1, -2)
+    spin = (inertia @ move.angular_velocity[..., None])[..., 0]
+    rate = mass[:, None, None] * np.gradient(places, step, axis=0)
+    angular = _summed(-skew(momentum), places) + _summed(skew(com), rate) - _summed(skew(spin), turns)
+    angular += _summed(inertia, np.gradient(turns, step, axis=0))
+    force = np.gradient(rate.sum(axis=1), step, axis=0)
+    weight = mass[:, None] * GRAVITY
+    moment = np.gradient(angular, step, axis=0) + np.tensordot(places, skew(weight), axes=([1, 2], [0, 2])).swapaxes(1, 2)
+    return np.concatenate([force, moment], axis=1)
+
+
+def _summed(matrix: Array, vectors: Array) -> Array:
+    """Return sum over segments of matrix (T, N, 3, 3) times vectors (T, N, 3, K)."""
+    frames, count = matrix.shape[:2]
+    wide = np.swapaxes(matrix, 1, 2).reshape(frames, 3, 3 * count)
+    return np.asarray(wide @ vectors.reshape(frames, 3 * count, -1))
+
+
+def _central(body: Body) -> Array:
+    """Return the inertia tensors (N, 3, 3) about the centres of mass."""
+    table, com = body.sip.phi.reshape(-1, 10), body.sip.com
+    tensor = np.empty((len(table), 3, 3))
+    for column, (i, j) in enumerate(PHI_TENSOR, start=4):
+        tensor[:, i, j] = tensor[:, j, i] = table[:, column]
+    square = np.sum(com**2, axis=1)[:, None, None] * np.eye(3) - com[:, :, None] * com[:, None]
+    return np.asarray(tensor - table[:, 0, None, None] * square)
