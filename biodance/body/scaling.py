@@ -52,12 +52,12 @@ def scale(subject: Subject, static: Trial, *, hip: Hip = "harrington", table: st
     SessionRefused
         The mass or the stature of the subject is not known.
     """
-    subject.require("mass", "stature")
     return scale_with_posture(subject, static, hip=hip, table=table)[0]
 
 
 def scale_with_posture(subject: Subject, static: Trial, *, hip: Hip = "harrington", table: str = DEFAULT_TABLE) -> tuple[Body, Array]:
     """Return the scaled body and its posture q (30,) in the static trial, at which all calibrated markers are met exactly."""
+    subject.require("mass", "stature")
     posture = standing(static)
     sizes = measures(posture, static, subject)
     model = reference(table, subject)

@@ -1,0 +1,143 @@
+"""Scaling on a static trial: joint centres against formulas and Vicon's own, bodies that stand under their markers, clear refusals."""
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from biodance.body.human import human
+from biodance.body.joint_centres import chord, davis_hip, harrington_hip, pelvis_frame
+from biodance.body.scaling import scale_with_posture
+from biodance.errors import SessionRefused, TrialRefused
+from biodance.identify.physical import smallest_eigenvalues
+from biodance.lab.prepare import prepare
+from biodance.lab.raw_c3d import read_raw
+from biodance.lab.session import read_session
+from biodance.motion.kinematics import poses
+from biodance.records import Markers, Source, Subject, Trial
+
+SUBJECT = Subject(65.0, 1.75, "F", 33.0)
+DATA = os.environ.get("BIODANCE_DATA")
+needs_data = pytest.mark.skipif(not DATA, reason="BIODANCE_DATA is not set: the folder of real recordings")
+STATICS = {"pycgm": "Static_trial", "biomechzoo/HC030A": "HC030A01", "biomechzoo/HC032A": "HC032A01", "biomechzoo/HC038A": "HC038A01"}
+
+
+def standing_trial(*, drop: tuple[str, ...] = (), measurements: dict[str, float] | None = None, frames: int = 60) -> Trial:
+    """Return a static trial of the generic person: every marker at its usual place, standing on the floor."""
+    body = human(SUBJECT)
+    q = np.tile(body.neutral, (frames, 1))
+    q[:, 2] = 0.95
+    for joint, degrees in (("right_shoulder_adduction", -25), ("left_shoulder_adduction", -25), ("right_elbow_flexion", 25),
+                           ("left_elbow_flexion", 25), ("right_knee_flexion", 5), ("left_knee_flexion", 5)):  # fmt: skip
+        q[:, 7 + body.joint_index(joint)] = np.radians(degrees)
+    keep = [i for i, name in enumerate(body.markers.names) if name not in drop]
+    xyz = poses(body, q).points([body.markers.segment[i] for i in keep], body.markers.position[keep])
+    markers = Markers(tuple(body.markers.names[i] for i in keep), np.arange(frames) / 100, xyz)
+    return Trial("static", "static", markers, (), Source(Path("static.c3d"), "", "test", 100.0), "plug_in_gait", measurements or {})
+
+
+def test_the_body_stands_exactly_under_its_markers() -> None:
+    trial = standing_trial()
+    body, q = scale_with_posture(SUBJECT, trial)
+    found = poses(body, q[None]).points(body.markers.segment, body.markers.position)[0]
+    expected = np.stack([trial.markers[name][0] for name in body.markers.names])
+    np.testing.assert_allclose(found, expected, atol=1e-5)
+
+
+def test_the_generic_person_is_found_again() -> None:
+    body, _ = scale_with_posture(SUBJECT, standing_trial())
+    generic = human(SUBJECT)
+    for name in ("right_knee_flexion", "left_knee_flexion", "right_ankle_dorsiflexion", "right_elbow_flexion"):
+        i = body.joint_index(name)
+        assert np.linalg.norm(body.joints[i].translation) == pytest.approx(np.linalg.norm(generic.joints[i].translation), rel=0.12), name
+    assert body.sip.mass.sum() == pytest.approx(65.0)
+    assert smallest_eigenvalues(body.sip.phi).min() > 0
+
+
+@pytest.mark.parametrize("drop", [("LUPA", "RUPA", "LFRM", "RFRM"), ("LFHD", "RFHD", "LBHD", "RBHD", "RBAK"), ("T10", "STRN")])
+def test_fewer_markers_still_make_a_body(drop: tuple[str, ...]) -> None:
+    body, _ = scale_with_posture(SUBJECT, standing_trial(drop=drop))
+    assert not set(drop) & set(body.markers.names)
+
+
+def test_missing_landmarks_are_named() -> None:
+    with pytest.raises(TrialRefused, match=r"knee|KNE"):
+        scale_with_posture(SUBJECT, standing_trial(drop=("RKNE",)))
+
+
+def test_unknown_labels_no_markers_and_unknown_mass_are_refused() -> None:
+    trial = standing_trial()
+    with pytest.raises(TrialRefused, match="no known marker set"):
+        scale_with_posture(SUBJECT, replace(trial, marker_set=""))
+    with pytest.raises(TrialRefused, match="no markers"):
+        scale_with_posture(SUBJECT, replace(trial, markers=None))
+    with pytest.raises(SessionRefused, match="mass_kg"):
+        scale_with_posture(replace(SUBJECT, mass=float("nan")), trial)
+
+
+def test_a_typed_width_that_contradicts_the_markers_is_warned_about() -> None:
+    true = 2 * 0.5 * 0.13 * 1.75
+    body, _ = scale_with_posture(SUBJECT, standing_trial(measurements={"InterAsisDistance": true - 0.08}))
+    assert any("InterAsisDistance" in note and note.startswith("Warning") for note in body.notes)
+
+
+def test_hidden_frames_of_the_static_do_no_harm() -> None:
+    trial = standing_trial()
+    xyz = trial.markers.xyz.copy()
+    xyz[10:40, 3] = np.nan
+    hidden = replace(trial, markers=Markers(trial.markers.names, trial.markers.time, xyz))
+    a, b = scale_with_posture(SUBJECT, trial)[0], scale_with_posture(SUBJECT, hidden)[0]
+    np.testing.assert_allclose(a.markers.position, b.markers.position, atol=1e-9)
+
+
+def test_chord_gives_the_distance_and_lies_in_the_plane() -> None:
+    rng = np.random.default_rng(0)
+    hip, knee_marker, wand = rng.normal(size=(3, 3))
+    centre = chord(hip, knee_marker, 0.05, wand)
+    assert np.linalg.norm(centre - knee_marker) == pytest.approx(0.05)
+    assert (centre - hip) @ (centre - knee_marker) == pytest.approx(0.0, abs=1e-9)
+    assert abs(np.linalg.det(np.stack([centre - hip, knee_marker - hip, wand - hip]))) < 1e-9
+
+
+def test_hip_formulas_at_round_numbers() -> None:
+    # Davis 1991 with LL 900, PW 240, AsisTroc 70, r 7 mm; Harrington 2007 with PW 240, PD 150 mm; ISB axes: x ahead, y up, z right
+    c, theta, beta = 0.115 * 900 - 15.3, 0.5, 0.314
+    ahead = c * np.cos(theta) * np.sin(beta) - 77 * np.cos(beta)
+    up = -c * np.cos(theta) * np.cos(beta) - 77 * np.sin(beta)
+    np.testing.assert_allclose(1e3 * davis_hip(0.240, 0.900, 0.070, 0.007), [ahead, up, -(c * np.sin(theta) - 120)], atol=1e-6)
+    np.testing.assert_allclose(1e3 * harrington_hip(0.240, 0.150), [-0.24 * 150 - 9.9, -0.30 * 240 - 10.9, 0.33 * 240 + 7.3], atol=1e-6)
+
+
+@needs_data
+@pytest.mark.parametrize("folder", sorted(STATICS))
+def test_davis_is_vicons_own_hip_centre(folder: str) -> None:
+    """With the measures that Vicon used, our formula gives Vicon's hip centre (LFEP, RFEP) in its own static file."""
+    raw = read_raw(Path(str(DATA)) / folder / f"{STATICS[folder]}.c3d")
+    typed = {name: float(np.ravel(value)[0]) / 1e3 for name, value in raw.parameters["PROCESSING"].items() if np.size(value) == 1}
+
+    def point(label: str) -> np.ndarray:
+        return np.nanmean(raw.points[:, raw.labels.index(label)], axis=0) / 1e3
+
+    back = point("SACR") if "SACR" in raw.labels else (point("LPSI") + point("RPSI")) / 2
+    rotation, middle = pelvis_frame(point("RASI"), point("LASI"), back)
+    width = typed.get("INTERASISDISTANCE", float(np.linalg.norm(point("RASI") - point("LASI"))))
+    legs, radius = (typed["LLEGLENGTH"] + typed["RLEGLENGTH"]) / 2, typed.get("MARKERDIAMETER", 0.014) / 2
+    for side, sign in (("R", 1.0), ("L", -1.0)):
+        local = davis_hip(width, legs, typed[f"{side}ASISTROCANTERDISTANCE"], radius) * [1, 1, sign]
+        distance = np.linalg.norm(middle + rotation @ local - point(f"{side}FEP"))
+        assert distance < 1e-5
+
+
+@needs_data
+@pytest.mark.parametrize("folder", [*sorted(STATICS), "adl_gait"])
+def test_real_people_are_scaled_and_stand_under_their_markers(folder: str) -> None:
+    session = read_session(Path(str(DATA)) / folder)
+    (static,) = session.of_role("static")
+    body, q = scale_with_posture(session.subject, prepare(static))
+    found = poses(body, q[None]).points(body.markers.segment, body.markers.position)[0]
+    measured = np.stack([np.nanmedian(prepare(static).markers[name], axis=0) for name in body.markers.names])
+    assert np.median(np.linalg.norm(found - measured, axis=1)) < 0.003
+    assert smallest_eigenvalues(body.sip.phi).min() > 0
+    assert body.sip.mass.sum() == pytest.approx(session.subject.mass)
