@@ -9,8 +9,8 @@ from random_bodies import random_body
 from scipy.interpolate import CubicSpline
 
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.identify.identification import conclude, standing_point
-from biodance.identify.statistics import Fit, empty, layout_for, statistics
+from biodance.identify.identification import identify, standing_point
+from biodance.identify.statistics import Fit, layout_for, statistics
 from biodance.identify.streaming import about, begin
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Motion, Sip, Wrench
@@ -76,12 +76,13 @@ def test_the_identification_is_that_of_the_batch() -> None:
     sd = 0.2 * np.abs(body.sip.phi) + 0.01
     wrong = body.sip.phi + sd * np.random.default_rng(1).normal(size=sd.size)
     body = replace(body, sip=Sip(body.segments, wrong, np.diag(sd**2)))
-    ours = streamed(body, fit, [*range(0, 9000, 501), 9000]).identification()
-    batch = conclude(
-        body, empty(30, layout_for(standing_point((fit,)))) + statistics(body, fit, layout_for(standing_point((fit,)))), ("t",)
-    )
-    assert ours.sip.phi == pytest.approx(batch.sip.phi, abs=1e-7)
-    assert np.sqrt(np.diag(ours.sip.covariance)) == pytest.approx(np.sqrt(np.diag(batch.sip.covariance)), rel=1e-6)
+    stream, batch = streamed(body, fit, [*range(0, 9000, 501), 9000]), identify(body, (fit,))
+    ours = stream.identification((fit,))
+    sd = np.sqrt(np.diag(batch.sip.covariance))
+    assert ours.trials == batch.trials
+    assert np.abs((ours.sip.phi - batch.sip.phi) / sd).max() < 1e-5
+    assert np.sqrt(np.diag(ours.sip.covariance)) == pytest.approx(sd, rel=1e-5)
+    assert any("noise alone" in note for note in stream.identification().notes)
 
 
 def test_two_trials_in_a_row_are_two_runs() -> None:

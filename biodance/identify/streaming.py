@@ -15,6 +15,7 @@ from biodance.errors import BiodanceError, TrialRefused
 from biodance.identify.identification import Identification, conclude
 from biodance.identify.knowledge import Known, knowledge
 from biodance.identify.learning import learn
+from biodance.identify.mismatch import mismatch
 from biodance.identify.noise import BLOCK, blocks
 from biodance.identify.statistics import Fit, Statistics, empty, layout_for, statistics
 from biodance.records import Array, Motion, Wrench
@@ -75,7 +76,7 @@ class Stream:
         return stream
 
     def progress(self) -> "Progress":
-        """Return what is known after the frames so far.
+        """Return what is known after the frames so far, by the noise alone: what is missing here is missing in the end, too.
 
         Raises
         ------
@@ -92,9 +93,16 @@ class Stream:
         }
         return Progress(known, tuple(name for name, all_known in verdicts.items() if all(all_known)))
 
-    def identification(self, trials: tuple[str, ...] = ("stream",)) -> Identification:
-        """Return the identification from all frames so far, equal to the batch's; ``trials`` are names for the record."""
-        return conclude(self.body, self.statistics, trials)
+    def identification(self, fits: tuple[Fit, ...] = ()) -> Identification:
+        """Return the identification from all frames so far: the batch's.
+
+        ``fits`` are the recorded trials, for the disturbances that twins and plates make over them (see `mismatch`); without them the
+        intervals count the noise alone, and the notes say so.
+        """
+        found = self.statistics
+        noise, _ = learn(found, self.body.sip)
+        disturbed = mismatch(self.body, fits, noise) if fits else None
+        return conclude(self.body, found, tuple(fit.name for fit in fits) or ("stream",), noise=noise, found=disturbed)
 
 
 @dataclass(frozen=True)
