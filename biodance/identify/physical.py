@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 RELATIVE_FLOOR = 1e-3
 """Smallest eigenvalue allowed, as a share of the prior segment's own smallest eigenvalue (an absolute floor contradicts the tables)."""
 
+MARGIN, INSIDE = 1.01, 1e-7
+"""How far inside the floor (factor) and the box (m, per unit of the prior's mass) the programme stays, for the solver's own tolerance."""
+
 
 def _pseudo_inertia_map() -> Array:
     """Return M (16, 10) with ``J = (M @ phi).reshape(4, 4)``."""
@@ -57,8 +60,8 @@ def smallest_eigenvalues(phi: Array) -> Array:
 class PhysicalFit:
     """A physically consistent estimate.
 
-    ``sip`` with the posterior's covariance; ``moved`` (N,) True where the consistency constraint acts; ``distance`` from the unconstrained
-    mean in posterior standard deviations; ``status``, and in words its ``cause`` and cure when it is not "solved".
+    ``sip`` with the posterior's covariance; ``moved`` (N,) True for the segments that had to be constrained; ``distance`` from the
+    unconstrained mean in posterior standard deviations; ``status``, and in words its ``cause`` and cure when it is not "solved".
     """
 
     sip: Sip
@@ -68,52 +71,70 @@ class PhysicalFit:
     cause: str = ""
 
 
-def _inside(phi: Array, body: "Body", floor: Array) -> bool:
+def _outside(phi: Array, body: "Body", floor: Array) -> NDArray[np.bool_]:
+    """Return (N,) True for the segments that are no possible body, or whose CoM is not in its box."""
     table = phi.reshape(-1, 10)
     low, high = body.com_boxes[:, 0] * table[:, :1], body.com_boxes[:, 1] * table[:, :1]
-    return bool(np.all(smallest_eigenvalues(phi) >= floor) and np.all(table[:, 1:4] >= low) and np.all(table[:, 1:4] <= high))
+    place = (table[:, 1:4] < low).any(axis=1) | (table[:, 1:4] > high).any(axis=1)
+    return np.asarray((smallest_eigenvalues(phi) < floor) | place)
 
 
 def physical_fit(belief: Posterior, body: "Body") -> PhysicalFit:
     """Return the physically consistent parameters nearest to the posterior mean, CoM inside ``body.com_boxes``.
 
-    When the mean is consistent already it is returned as it is. A solver that stops gives the status "failed" and the prior.
+    Only segments that violate are constrained, until none does: what a constraint that is not listed would not change is already nearest.
+    When the mean is consistent it is returned as it is. A solver that stops gives the status "failed" and the prior.
     """
     prior = belief.prior
     floor = RELATIVE_FLOOR * np.maximum(smallest_eigenvalues(prior.phi), 0.0)
-    count = len(prior.segments)
-    if _inside(belief.mean, body, floor):
-        return PhysicalFit(belief.sip, np.zeros(count, dtype=bool), 0.0, "solved")
-    x, status = _solve(belief, body, floor)
-    if x is None:
-        cause = f"The solver stopped with {status!r}: the data contradict every body that fits the boxes. Check scaling and force plates."
-        return PhysicalFit(prior, np.ones(count, dtype=bool), float("inf"), "failed", cause)
-    phi = belief.mean + belief.factor @ x
-    acting = smallest_eigenvalues(phi) < 2 * floor + 1e-9
-    return PhysicalFit(Sip(prior.segments, phi, belief.covariance), acting, float(np.linalg.norm(x)), "solved")
+    bound = np.zeros(len(prior.segments), dtype=bool)
+    phi, distance = belief.mean, 0.0
+    while True:
+        outside = _outside(phi, body, floor)
+        if not outside.any():
+            return PhysicalFit(Sip(prior.segments, phi, belief.covariance), bound, distance, "solved")
+        if not np.any(outside & ~bound):
+            return _failed(prior, "a body that is still impossible")
+        bound = bound | outside
+        x, status = _solve(belief, body, floor, np.flatnonzero(bound))
+        if x is None:
+            return _failed(prior, status)
+        phi, distance = belief.mean + belief.factor @ x, float(np.linalg.norm(x))
 
 
-def _solve(belief: Posterior, body: "Body", floor: Array) -> tuple[Array | None, str]:
-    """Solve min |x|² s.t. J_i(mean + factor x) >= floor, CoM in box; return x (k,) and the solver's word."""
+def _failed(prior: Sip, word: str) -> PhysicalFit:
+    cause = f"The solver stopped with {word!r}: the data contradict every body that fits the boxes. Check scaling and force plates."
+    return PhysicalFit(prior, np.ones(len(prior.segments), dtype=bool), float("inf"), "failed", cause)
+
+
+def _solve(belief: Posterior, body: "Body", floor: Array, bound: NDArray[np.intp]) -> tuple[Array | None, str]:
+    """Solve min |x|² s.t. J_i(mean + factor x) >= floor, CoM in box, for the segments ``bound``; return x (k,) and the solver's word.
+
+    x lies in the span of those segments' rows of the factor, so that the programme has ten unknowns per segment.
+    """
     import cvxpy as cp
 
-    x = cp.Variable(belief.factor.shape[1])
-    constraints = []
-    for i, J0 in enumerate(pseudo_inertia(belief.prior.phi)):
-        rows = slice(10 * i, 10 * i + 10)
+    rows = (10 * bound[:, None] + np.arange(10)).ravel()
+    span = np.linalg.qr(belief.factor[rows].T)[0]
+    z = cp.Variable(span.shape[1])
+    constraints, sides, levels = [], [], []
+    for i in bound:
+        cut = slice(10 * i, 10 * i + 10)
+        factor, J0 = belief.factor[cut] @ span, pseudo_inertia(belief.prior.phi[cut])[0]
         scale = 1 / np.sqrt(np.maximum(np.diag(J0), 1e-12))
         weight = np.outer(scale, scale).ravel()[:, None]
-        slope = weight * (PSEUDO_INERTIA @ belief.factor[rows])
-        level = (weight[:, 0] * (PSEUDO_INERTIA @ belief.mean[rows])).reshape(4, 4) - floor[i] * np.diag(scale**2) * 1.01
-        constraints.append(cp.reshape(slope @ x, (4, 4), order="C") + level >> 0)
+        level = (weight[:, 0] * (PSEUDO_INERTIA @ belief.mean[cut])).reshape(4, 4) - floor[i] * np.diag(scale**2) * MARGIN
+        constraints.append(cp.reshape((weight * (PSEUDO_INERTIA @ factor)) @ z, (4, 4), order="C") + level >> 0)
         for side, sign in ((body.com_boxes[i, 0], 1.0), (body.com_boxes[i, 1], -1.0)):
             pick = sign * (np.eye(10)[1:4] - np.outer(side, np.eye(10)[0])) / max(J0[3, 3], 1e-9)
-            constraints.append((pick @ belief.factor[rows]) @ x + pick @ belief.mean[rows] >= 0)
-    problem = cp.Problem(cp.Minimize(cp.sum_squares(x)), constraints)
+            sides.append(pick @ factor)
+            levels.append(pick @ belief.mean[cut])
+    constraints.append(np.concatenate(sides) @ z + np.concatenate(levels) >= INSIDE)
+    problem = cp.Problem(cp.Minimize(cp.sum_squares(z)), constraints)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # an inaccurate solve is not taken: its word is returned
-            problem.solve(solver=cp.CLARABEL)
+            problem.solve(solver=cp.CLARABEL, ignore_dpp=True)
     except cp.error.SolverError as error:
         return None, str(error)
-    return (np.asarray(x.value) if problem.status == "optimal" else None), str(problem.status)
+    return (span @ np.asarray(z.value) if problem.status == "optimal" else None), str(problem.status)
