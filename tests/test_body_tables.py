@@ -11,7 +11,7 @@ from biodance.identify.physical import smallest_eigenvalues
 from biodance.library import folder, names, read_toml
 from biodance.records import Subject
 
-FAMILIES = ("segments", "human")
+FAMILIES = ("segments", "human", "robots")
 TABLES = [(family, name) for family in FAMILIES for name in names(f"anthropometry/{family}", ".csv")]
 PEOPLE = [("F", 1.50, 45.0), ("F", 1.75, 65.0), ("F", 1.62, 90.0), ("M", 1.60, 55.0), ("M", 1.77, 75.0), ("M", 1.95, 110.0)]
 
