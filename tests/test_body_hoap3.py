@@ -25,6 +25,8 @@ def test_axis_turn_is_a_rotation() -> None:
 def test_it_weighs_what_the_paper_says_and_can_exist() -> None:
     assert BODY.sip.mass.sum() == pytest.approx(7.942, abs=0.001)
     assert smallest_eigenvalues(BODY.sip.phi).min() > 0
+    assert np.all(BODY.sip.com > BODY.com_boxes[:, 0])
+    assert np.all(BODY.sip.com < BODY.com_boxes[:, 1])
     assert (len(BODY.segments), len(BODY.joints), BODY.nv) == (12, 21, 27)
 
 

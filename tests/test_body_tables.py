@@ -66,8 +66,8 @@ def test_the_covariance_is_one(sex: str, stature: float, mass: float) -> None:
 
 # Merged reference values: de Leva 1996, woman 1.75 m, 65 kg; man 1.77 m, 75 kg (kg)
 REFERENCE = {
-    "F": {"pelvis": 8.1055, "right_thigh": 9.607, "left_shank": 3.1265, "right_foot": 0.8385, "trunk_head": 23.907, "left_upper_arm": 1.6575},
-    "M": {"pelvis": 8.3775, "right_thigh": 10.62, "left_shank": 3.2475, "right_foot": 1.0275, "trunk_head": 29.4225, "left_upper_arm": 2.0325},
+    "F": {"pelvis": 8.1055, "right_thigh": 9.607, "left_shank": 3.1265, "right_foot": 0.8385, "trunk_head": 23.907, "left_foot": 0.8385},
+    "M": {"pelvis": 8.3775, "right_thigh": 10.62, "left_shank": 3.2475, "right_foot": 1.0275, "trunk_head": 29.4225, "left_foot": 1.0275},
 }
 
 
