@@ -5,7 +5,7 @@ All records are frozen; arrays are in SI units in the lab frame (z up); a wrench
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.lab.gaps import MarkerGaps
 from biodance.records import Array, Motion, Session, Subject, Trial
+
+if TYPE_CHECKING:
+    from biodance.pipeline.identification import SessionIdentification
 
 Status = Literal["ok", "warning", "refused"]
 
@@ -160,7 +163,8 @@ class SessionResult:
     """The whole session.
 
     ``body`` that moved (None: no markers or no stature) and ``body_source`` in words; ``standing`` the one whose weight is compared with
-    the declared mass; ``settings`` name -> value of every number that shaped the result.
+    the declared mass; ``settings`` name -> value of every number that shaped the result; ``identification`` None where no trial is to be
+    identified from, or it was refused.
     """
 
     session: Session
@@ -173,6 +177,7 @@ class SessionResult:
     standing: Standing | None
     still: Still | None
     settings: Mapping[str, str]
+    identification: "SessionIdentification | None" = None
 
     @property
     def all_checks(self) -> tuple[Check, ...]:

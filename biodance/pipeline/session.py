@@ -2,15 +2,18 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 from biodance.body.human import DEFAULT_TABLE
 from biodance.errors import TrialRefused
+from biodance.identify.identification import Identification
 from biodance.lab.filters import LowPass
 from biodance.lab.weight import SHORTEST, SWAY
 from biodance.motion.contact import ContactRules
 from biodance.motion.regressor import GRAVITY
 from biodance.pipeline.body import body_of
 from biodance.pipeline.checks import mass_check, standing_check, trial_checks
+from biodance.pipeline.identification import can_identify, identify_trials
 from biodance.pipeline.results import SessionResult, Standing, Step, TrialResult
 from biodance.pipeline.steps import attempt
 from biodance.pipeline.still import still_of
@@ -20,8 +23,10 @@ from biodance.records import Session
 STOPPED = Step("stop", "refused", "Not done: the run was stopped by Ctrl-C before this trial.")
 
 
-def examine(session: Session, *, tell: Callable[[str], None] = lambda _: None) -> SessionResult:
+def examine(session: Session, *, reference: Identification | None = None, tell: Callable[[str], None] = lambda _: None) -> SessionResult:
     """Take a session through all stages and return all that was found; ``tell`` is called with what is being done.
+
+    ``reference`` is what an earlier, unloaded session of the same person said: a load is then looked for against it, not the table.
 
     Ctrl-C ends the work after the trials that are done; the others say so (``SessionResult.stopped``).
     """
@@ -41,6 +46,10 @@ def examine(session: Session, *, tell: Callable[[str], None] = lambda _: None) -
         results += [TrialResult(one.trial, (*one.steps, STOPPED), one.gaps) for one in read[len(results) :]]
     done = tuple(replace(result, checks=tuple(trial_checks(result, session.subject.mass))) for result in results)
     standing = attempt(steps, "standing", lambda: best_standing(done))
+    identification = None
+    if body is not None and can_identify(done):
+        tell("identifying the segments")
+        identification = attempt(steps, "identify", partial(identify_trials, body, done, reference=reference))
     return SessionResult(
         session=session,
         subject=session.subject,
@@ -52,6 +61,7 @@ def examine(session: Session, *, tell: Callable[[str], None] = lambda _: None) -
         standing=standing,
         still=attempt(steps, "still", lambda: still_of(body, done)) if body else None,
         settings=settings(),
+        identification=identification,
     )
 
 

@@ -8,6 +8,7 @@ from biodance.pipeline.provenance import Provenance
 from biodance.pipeline.results import Check, SessionResult, TrialResult
 from biodance.records import CHANNELS
 from biodance.report.attention import attention
+from biodance.report.identification_page import identification_section
 from biodance.report.marker_figure import marker_figure
 from biodance.report.standing_figure import standing_figure
 from biodance.report.style import svg_address
@@ -87,5 +88,6 @@ def page(result: SessionResult, provenance: Provenance, *, still: str = "") -> s
         parts=[_trial_part(trial) for trial in result.trials],
         standing=svg_address(standing_figure(result.standing)) if result.standing else "",
         still=still,
+        identification=Markup(identification_section(result.identification)) if result.identification else "",
         words=STATUS_WORDS,
     )

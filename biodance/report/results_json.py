@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from biodance.motion.comparison import Agreement
 from biodance.pipeline.provenance import Provenance
 from biodance.pipeline.results import SessionResult, Standing, TrialResult, WrenchComparison
 from biodance.records import CHANNELS, Plate
+from biodance.report.identification_json import added_mass_document, agreement, identification_document
 
 
 def plain(value: object) -> Any:
@@ -35,13 +37,13 @@ def _plate(plate: Plate) -> dict[str, Any]:
     return {"name": plate.name, "type": plate.type, "corners_m": plate.corners, "decisions": plate.decisions}
 
 
-def _wrench(comparison: WrenchComparison) -> dict[str, Any]:
+def _wrench(comparison: WrenchComparison, identified: Agreement | None) -> dict[str, Any]:
     return {
         "channels": CHANNELS,
         "frames_used": int(comparison.used.sum()),
         "frames": comparison.used.size,
         "table": {"rms": comparison.rms, "cc": comparison.correlation},
-        "identified": None,
+        "identified": None if identified is None else agreement(identified),
         "notes": comparison.notes,
     }
 
@@ -58,7 +60,7 @@ def _standing(standing: Standing) -> dict[str, Any]:
     }
 
 
-def _trial(result: TrialResult) -> dict[str, Any]:
+def _trial(result: TrialResult, identified: Agreement | None) -> dict[str, Any]:
     trial, fit = result.trial, result.fit
     return {
         "name": trial.name,
@@ -76,7 +78,7 @@ def _trial(result: TrialResult) -> dict[str, Any]:
         "markers": []
         if fit is None
         else [{"name": n, "rms_m": r, "max_m": m} for n, r, m in zip(fit.names, fit.rms, fit.max, strict=True)],
-        "wrench": None if result.comparison is None else _wrench(result.comparison),
+        "wrench": None if result.comparison is None else _wrench(result.comparison, identified),
         "standing": None if result.standing is None else _standing(result.standing),
         "plates": [_plate(plate) for plate in trial.plates],
         "steps": [{"step": s.name, "status": s.status, "reason": s.text} for s in result.steps],
@@ -98,7 +100,7 @@ def _mass_check(result: SessionResult) -> dict[str, Any]:
 
 def document(result: SessionResult, provenance: Provenance) -> dict[str, Any]:
     """Return all of ``result`` as one JSON document; null where a step was refused or does not exist in this version."""
-    subject = result.subject
+    subject, found = result.subject, result.identification
     return {
         "session": result.session.folder.name,
         "subject": {
@@ -109,7 +111,7 @@ def document(result: SessionResult, provenance: Provenance) -> dict[str, Any]:
             "age": subject.age,
             "guessed": subject.guessed,
         },
-        "trials": [_trial(trial) for trial in result.trials],
+        "trials": [_trial(trial, found.agreements.get(trial.trial.name) if found else None) for trial in result.trials],
         "refused": dict(result.session.refused),
         "notes": result.session.notes,
         "body": {"source": result.body_source, "notes": result.body.notes if result.body else ()},
@@ -119,8 +121,8 @@ def document(result: SessionResult, provenance: Provenance) -> dict[str, Any]:
             for c in result.all_checks
         ],
         "mass_check": _mass_check(result),
-        "identification": None,
-        "added_mass": None,
+        "identification": None if found is None else identification_document(found),
+        "added_mass": None if found is None else added_mass_document(found.search),
         "diagnosis": None,
         "provenance": provenance.as_dict(),
     }

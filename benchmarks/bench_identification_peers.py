@@ -1,0 +1,189 @@
+"""figaroh 1.0.2, the paper's quadratic programme and biodance on the same synthetic wrench, default settings: error and time.
+
+    python benchmarks/bench_identification_peers.py --figaroh /path/to/venv/bin/python [--subjects 4]
+
+The venv holds ``pip install figaroh==1.0.2``. Every subject: 12 segments whose true parameters differ from the table (masses 15 %, centres
+and shapes 10 % of the body's size), a smooth whole-body motion of 60 s, plate noise of 5 N and 2 N·m; once with exact kinematics, once with
+joint angles as a gait laboratory has them (2 deg of offset, 3 % of the angle from moving skin). Prints two tables.
+"""
+
+import argparse
+import json
+import subprocess
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from biodance.body.body import Body
+from biodance.body.export import write_model
+from biodance.body.human import human
+from biodance.identify.identification import identify
+from biodance.identify.information import information
+from biodance.identify.knowledge import segment_quantities
+from biodance.identify.noise import Noise
+from biodance.identify.paper_programme import paper_programme
+from biodance.identify.physical import smallest_eigenvalues
+from biodance.identify.statistics import Fit
+from biodance.motion.regressor import regressor
+from biodance.records import Array, Motion, Subject, Wrench
+from biodance.virtual_lab.flesh import of_parameters, parameters, placed
+
+SUBJECTS = (Subject(52.0, 1.58, "F"), Subject(66.0, 1.71, "F"), Subject(78.0, 1.80, "M"), Subject(97.0, 1.88, "M"))
+SECONDS, RATE, NOISE = 60.0, 100.0, (5.0, 2.0)
+THINNED = 4
+
+
+@dataclass(frozen=True)
+class Score:
+    """Errors: mass, RMS and largest kg; CoM and inertia about it, median mm and %; wrench N, N·m; segments that cannot exist."""
+
+    mass: float
+    largest: float
+    com: float
+    inertia: float
+    force: float
+    moment: float
+    impossible: int
+    seconds: float
+
+
+def true_parameters(body: Body, rng: np.random.Generator) -> Array:
+    """Return a person of the same mass whose segments are stretched, shifted and heavier or lighter than the table's."""
+    bodies = []
+    for phi in body.sip.phi.reshape(-1, 10):
+        J = of_parameters(phi)
+        com = J[:3, 3] / J[3, 3]
+        centred = placed(J, np.eye(3), -com)
+        size = np.sqrt(np.abs(np.diag(centred)[:3]) / J[3, 3])
+        shift = com + 0.1 * size * rng.normal(size=3)
+        bodies.append(np.exp(0.15 * rng.normal()) * placed(centred, np.eye(3) + 0.1 * rng.normal(size=(3, 3)), shift))
+    total = sum(J[3, 3] for J in bodies)
+    return np.concatenate([parameters(J * body.sip.mass.sum() / total) for J in bodies])
+
+
+def dance(body: Body, rng: np.random.Generator) -> Motion:
+    """Return a smooth random motion of all joints over most of their range, with the pelvis swaying."""
+    time_ = np.arange(0, SECONDS, 1 / RATE)
+    knots = np.arange(0, SECONDS + 2, 0.8)
+    middle, half = (body.limits.lower + body.limits.upper) / 2, 0.35 * (body.limits.upper - body.limits.lower)
+    curve = CubicSpline(knots, rng.uniform(-1, 1, (knots.size, len(body.joints))) * half + 0.5 * middle)
+    place = CubicSpline(knots, rng.normal([0.0, 0.0, 0.9], 0.1, (knots.size, 3)))
+    q, v, a = np.tile(body.neutral, (time_.size, 1)), np.zeros((time_.size, body.nv)), np.zeros((time_.size, body.nv))
+    q[:, :3], q[:, 7:], v[:, 6:], a[:, 6:] = place(time_), curve(time_), curve(time_, 1), curve(time_, 2)
+    turn = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # root from lab, upright
+    v[:, :3], a[:, :3] = place(time_, 1) @ turn.T, place(time_, 2) @ turn.T
+    return Motion(time_, q, v, a)
+
+
+def measured(motion: Motion, rng: np.random.Generator) -> Motion:
+    """Return the motion as a laboratory finds it: every joint angle with a constant offset and a gain that is a little wrong."""
+    q, v, a = np.array(motion.q), np.array(motion.v), np.array(motion.a)
+    gain = 1 + 0.03 * rng.normal(size=v.shape[1] - 6)
+    q[:, 7:] = q[:, 7:] * gain + np.radians(2.0) * rng.normal(size=gain.size)
+    v[:, 6:], a[:, 6:] = v[:, 6:] * gain, a[:, 6:] * gain
+    return Motion(motion.time, q, v, a)
+
+
+def score(phi: Array, truth: Array, W: Array, seconds: float) -> Score:
+    """Judge parameters against the true ones and their wrench against the noise-free one."""
+    found, right = (np.array([segment_quantities(row)[0] for row in x.reshape(-1, 10)]) for x in (phi, truth))
+    mass = found[:, 0] - right[:, 0]
+    com = np.linalg.norm(found[:, 1:4] - right[:, 1:4], axis=1)
+    double = np.array([1, 2, 1, 2, 2, 1.0])
+    inertia = np.sqrt(((found[:, 4:] - right[:, 4:]) ** 2 @ double) / (right[:, 4:] ** 2 @ double))
+    residual = np.sqrt(np.mean((W @ (phi - truth)) ** 2, axis=0))
+    return Score(
+        float(np.sqrt(np.mean(mass**2))),
+        float(np.abs(mass).max()),
+        1000 * float(np.median(com)),
+        100 * float(np.median(inertia)),
+        float(np.sqrt(np.mean(residual[:3] ** 2))),
+        float(np.sqrt(np.mean(residual[3:] ** 2))),
+        int(np.sum(smallest_eigenvalues(phi) < -1e-8)),
+        seconds,
+    )
+
+
+def ours_and_the_papers(body: Body, motion: Motion, wrench: Wrench, truth: Array, W: Array) -> dict[str, Score]:
+    """Return the scores of the table, the paper's programme and biodance."""
+    start = time.perf_counter()
+    result = identify(body, (Fit("dance", motion, wrench, np.ones(motion.time.size, dtype=bool)),))
+    ours = score(result.sip.phi, truth, W, time.perf_counter() - start)
+    start = time.perf_counter()
+    paper = paper_programme(information(body, motion, wrench, Noise.of_sd(1.0, 1.0, np.zeros(3))), body)
+    papers = score(paper.phi, truth, W, time.perf_counter() - start)
+    return {"table, nothing identified": score(body.sip.phi, truth, W, 0.0), "paper's programme": papers, "biodance": ours}
+
+
+def figaroh(python: str, body: Body, motion: Motion, wrench: Wrench, truth: Array, W: Array) -> tuple[dict[str, Score | str], str]:
+    """Return figaroh's scores (or its word where it gives no answer) and what its own regressor says about a free-flyer."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write_model(body, folder / "model.urdf", format="urdf")
+        thin = slice(None, None, THINNED)
+        rows = {"W": regressor(body, motion)[thin].reshape(-1, W.shape[2]), "wrench": wrench.value[thin].ravel(), "prior": body.sip.phi}
+        np.savez(folder / "problem.npz", **rows, segments=np.array(body.segments), q=motion.q[:5], v=motion.v[:5], a=motion.a[:5])
+        worker = Path(__file__).with_name("figaroh_worker.py")
+        subprocess.run([python, str(worker), str(folder)], check=True, capture_output=True)
+        answer = json.loads((folder / "answer.json").read_text(encoding="utf-8"))
+    scores = {
+        f"figaroh 1.0.2, {label}": fit["status"] if fit["phi"] is None else score(np.array(fit["phi"]), truth, W, fit["seconds"])
+        for label, fit in answer["fits"].items()
+    }
+    return scores, answer["workflow"]
+
+
+def table(rows: dict[str, list[Score | str]]) -> str:
+    """Return the medians over the subjects as Markdown (largest mass error and impossible segments: the worst)."""
+    lines = [
+        "| method | mass RMS (kg) | mass, largest (kg) | CoM (mm) | inertia (%) | residual (N) | residual (N·m) | impossible | time (s) |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for label, all_scores in rows.items():
+        scores = [s for s in all_scores if isinstance(s, Score)]
+        if not scores:
+            lines.append(f"| {label} | no answer: {all_scores[0]} |||||||||")
+            continue
+        of = {name: np.array([getattr(s, name) for s in scores]) for name in Score.__dataclass_fields__}
+        middle = [float(np.median(of[name])) for name in ("com", "inertia", "force", "moment")]
+        mass, seconds = float(np.median(of["mass"])), float(np.median(of["seconds"]))
+        numbers = f"{mass:.2f} | {of['largest'].max():.2f} | " + " | ".join(f"{x:.2f}" for x in middle)
+        answers = "" if len(scores) == len(all_scores) else f" ({len(all_scores) - len(scores)} of {len(all_scores)} without answer)"
+        lines.append(f"| {label}{answers} | {numbers} | {int(of['impossible'].max())} of 12 | {seconds:.2f} |")
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Run all methods on all subjects and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--figaroh", default="", help="Python of a venv with figaroh 1.0.2; left out without it")
+    parser.add_argument("--subjects", type=int, default=len(SUBJECTS))
+    options = parser.parse_args()
+    for title in ("Exact kinematics", "Kinematics of a gait laboratory"):
+        rows: dict[str, list[Score | str]] = {}
+        workflow = ""
+        for seed, subject in enumerate(SUBJECTS[: options.subjects]):
+            rng = np.random.default_rng(seed)
+            body = human(subject)
+            truth, motion = true_parameters(body, rng), dance(body, rng)
+            noise = rng.normal(size=(motion.time.size, 6)) * np.repeat(NOISE, 3)
+            W = regressor(body, motion)
+            wrench = Wrench(motion.time, W @ truth + noise)
+            seen = motion if title.startswith("Exact") else measured(motion, rng)
+            found: dict[str, Score | str] = dict(ours_and_the_papers(body, seen, wrench, truth, W))
+            if options.figaroh:
+                theirs, workflow = figaroh(options.figaroh, body, seen, wrench, truth, W)
+                found |= theirs
+            for label, value in found.items():
+                rows.setdefault(label, []).append(value)
+        print(f"\n{title}\n\n{table(rows)}")
+    if options.figaroh:
+        print(f"\nfigaroh's default regressor on a person with a free-flyer: {workflow or 'works'}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,58 @@
+"""A Body as a JSON file, without loss: what `biodance identify` keeps for `biodance export`."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from biodance.body.body import Body, Foot, Joint, JointLimits, SegmentMarkers
+from biodance.errors import BiodanceError, FileRefused
+from biodance.records import Sip
+
+VERSION = 1
+
+
+def body_text(body: Body, source: str) -> str:
+    """Return the file's text; ``source`` says in a sentence where the parameters come from."""
+    return json.dumps({"biodance_body": VERSION, "source": source, **asdict(body)}, default=np.ndarray.tolist) + "\n"
+
+
+def read_body(path: str | Path) -> tuple[Body, str]:
+    """Return the body of a file that ``body_text`` made, and its source.
+
+    Raises
+    ------
+    FileRefused
+        The file cannot be read, is of another version, or is not such a file.
+    """
+    try:
+        found: dict[str, Any] = json.loads(Path(path).read_text(encoding="utf-8"))
+        if found.get("biodance_body") != VERSION:
+            raise FileRefused(f"{path}: is no body of version {VERSION}. Run biodance identify again.")
+        return _body(found), str(found["source"])
+    except OSError as error:
+        raise FileRefused(f"{path}: cannot be read ({error.strerror or error}).") from error
+    except FileRefused:
+        raise
+    except (ValueError, KeyError, TypeError, AttributeError, BiodanceError) as error:
+        raise FileRefused(f"{path}: is not a body that biodance wrote ({error}). Run biodance identify again.") from error
+
+
+def _body(found: dict[str, Any]) -> Body:
+    return Body(
+        name=found["name"],
+        segments=tuple(found["segments"]),
+        joints=tuple(Joint(**joint) for joint in found["joints"]),
+        sip=Sip(**{**found["sip"], "segments": tuple(found["sip"]["segments"])}),
+        limits=JointLimits(**found["limits"]),
+        markers=SegmentMarkers(
+            tuple(found["markers"]["names"]), tuple(found["markers"]["segment"]), found["markers"]["position"], found["markers"]["weight"]
+        ),
+        boxes=found["boxes"],
+        com_boxes=found["com_boxes"],
+        feet={side: Foot(**foot) for side, foot in found["feet"].items()},
+        root=found["root"],
+        notes=tuple(found["notes"]),
+    )

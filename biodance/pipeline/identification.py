@@ -1,0 +1,94 @@
+"""What the session says about the body: identification from the fit trials, validation on the others, search for a load."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.errors import BiodanceError, TrialRefused
+from biodance.identify.added_mass import AddedMass, added_mass
+from biodance.identify.identification import Identification, identify, standing_point
+from biodance.identify.statistics import Fit
+from biodance.identify.validation import Gain, TrialValidation, gain, validate
+from biodance.motion.comparison import Agreement
+from biodance.pipeline.results import TrialResult
+from biodance.records import ROLES, Role, Wrench
+
+FITTED: tuple[Role, ...] = ("fit",)
+KEPT: tuple[Role, ...] = ("validate", "check")
+
+
+@dataclass(frozen=True, eq=False)
+class SessionIdentification:
+    """All that identification found in a session.
+
+    ``fitted`` and ``validations`` compare the trials used and the trials kept, about the mean centre of pressure; ``agreements`` the
+    identified body on every compared trial by name, about the lab origin; ``gain`` table / identified over the validations (None without
+    an interval); ``search`` the loads looked for, against ``search.reference``; ``notes`` what a person should know.
+    """
+
+    identification: Identification
+    fitted: tuple[TrialValidation, ...]
+    validations: tuple[TrialValidation, ...]
+    agreements: Mapping[str, Agreement]
+    gain: Gain | None
+    search: AddedMass
+    notes: tuple[str, ...] = ()
+
+
+def fit_of(result: TrialResult) -> Fit | None:
+    """Return what a trial gives to identify from or to validate on; None without motion, wrench or a frame to compare."""
+    found = result.comparison
+    if found is None or result.motion is None or not found.used.any():
+        return None
+    return Fit(result.trial.name, result.motion, Wrench(found.time, found.measured), found.used)
+
+
+def can_identify(results: tuple[TrialResult, ...]) -> bool:
+    """Whether any trial with role fit can be identified from."""
+    return any(result.trial.role in FITTED and fit_of(result) is not None for result in results)
+
+
+def identify_trials(
+    body: Body, results: tuple[TrialResult, ...], *, reference: Identification | None = None, where: str = "This session"
+) -> SessionIdentification:
+    """Identify ``body`` from the trials with role fit, validate on those kept, and look for a load.
+
+    ``reference`` an earlier, unloaded session of the same person; without it the load is looked for against the table.
+
+    Raises
+    ------
+    TrialRefused
+        No trial with role fit has motion and fully measured ground contact.
+    """
+    fits = _fits(results, FITTED)
+    if not fits:
+        raise TrialRefused(
+            f"{where} has no trial with role fit in which markers and plates measure all, so nothing can be identified. "
+            "Record movement on the plates, or set roles in session.toml."
+        )
+    found = identify(body, fits)
+    about = standing_point(fits)
+    identified = found.identified
+    fitted, kept = (tuple(validate(body, identified, fit, about=about) for fit in some) for some in (fits, _fits(results, KEPT)))
+    agreements = {fit.name: validate(body, identified, fit, about=np.zeros(3)).identified_agreement for fit in _fits(results, ROLES)}
+    notes = list(found.notes)
+    if not kept:
+        notes.append("No trial was kept for validation, so the gain is not proven. Record squats, or give a trial the role validate.")
+    return SessionIdentification(found, fitted, kept, agreements, _gain(kept, notes), added_mass(found, reference=reference), tuple(notes))
+
+
+def _fits(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[Fit, ...]:
+    found = [fit_of(result) for result in results if result.trial.role in roles]
+    return tuple(fit for fit in found if fit is not None)
+
+
+def _gain(kept: tuple[TrialValidation, ...], notes: list[str]) -> Gain | None:
+    if not kept:
+        return None
+    try:
+        return gain(kept)
+    except BiodanceError as error:
+        notes.append(str(error))
+        return None

@@ -1,0 +1,127 @@
+"""What identification found, under keys whose unit is their suffix; channels in the order Fx Fy Fz Mx My Mz."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from biodance.identify.added_mass import AddedMass
+from biodance.identify.identification import Identification
+from biodance.identify.knowledge import Known
+from biodance.identify.validation import Gain, TrialValidation
+from biodance.motion.comparison import Agreement
+from biodance.pipeline.identification import SessionIdentification
+
+TENSOR = ("xx", "xy", "yy", "xz", "yz", "zz")
+ASKED = ("mass", "com x", "com y", "com z")
+"""Quantities whose shares from the data are averaged into a segment's ``information``."""
+
+
+def agreement(found: Agreement) -> dict[str, Any]:
+    """Return RMS and correlation of six channels; null where a correlation is not defined."""
+    return {"rms": found.rms, "cc": found.correlation, "frames": found.frames}
+
+
+def segment_rows(found: Identification, name: str) -> tuple[Known, ...]:
+    """Return the ten quantities of one segment in order."""
+    return tuple(known for known in found.known if known.segment == name)
+
+
+def information(rows: Sequence[Known]) -> float:
+    """Return the share of a segment's mass and centre of mass that comes from the data, 0 to 1."""
+    return float(np.mean([row.from_data for row in rows if row.quantity in ASKED]))
+
+
+def _segment(found: Identification, name: str) -> dict[str, Any]:
+    rows = segment_rows(found, name)
+    mass, com, inertia = rows[0], rows[1:4], rows[4:]
+    return {
+        "name": name,
+        "mass_kg": mass.value,
+        "mass_sd_kg": mass.sd,
+        "mass_prior_kg": mass.table,
+        "mass_prior_sd_kg": mass.table_sd,
+        "com_m": [row.value for row in com],
+        "com_sd_m": [row.sd for row in com],
+        "com_prior_m": [row.table for row in com],
+        "inertia_kgm2": [row.value for row in inertia],
+        "inertia_sd_kgm2": [row.sd for row in inertia],
+        "inertia_prior_kgm2": [row.table for row in inertia],
+        "information": information(rows),
+        "from_data": {row.quantity: row.from_data for row in rows},
+        "verdict": {row.quantity: row.verdict for row in rows},
+    }
+
+
+def _validation(trial: TrialValidation) -> dict[str, Any]:
+    return {
+        "trial": trial.name,
+        "about_m": trial.about,
+        "table": agreement(trial.table_agreement),
+        "identified": agreement(trial.identified_agreement),
+    }
+
+
+def _gain(found: Gain | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    return {"force": found.force, "force_ci95": found.force_interval, "moment": found.moment, "moment_ci95": found.moment_interval}
+
+
+def added_mass_document(search: AddedMass) -> dict[str, Any] | None:
+    """Return the load that is announced; None where none is."""
+    if not search.found:
+        return None
+    best = search.best
+    return {
+        "segment": best.segment,
+        "kg": best.mass,
+        "sd_kg": best.sd,
+        "ci95_kg": best.interval,
+        "place_m": best.place,
+        "place_sd_m": best.place_sd,
+        "p_none": search.p_no_load,
+        "smallest_detectable_kg": best.smallest,
+        "reference": search.reference,
+        "set": search.set,
+    }
+
+
+def _search(search: AddedMass) -> dict[str, Any]:
+    rows = [
+        {
+            "segment": suspect.segment,
+            "kg": suspect.mass,
+            "sd_kg": suspect.sd,
+            "probability": suspect.probability,
+            "log_bayes_factor": suspect.log_bayes_factor,
+            "smallest_detectable_kg": suspect.smallest,
+        }
+        for suspect in search.suspects
+    ]
+    return {"reference": search.reference, "p_none": search.p_no_load, "announced": search.found, "segments": rows}
+
+
+def identification_document(found: SessionIdentification) -> dict[str, Any]:
+    """Return all that identification found.
+
+    CoM in the segment's axes from its proximal joint centre; inertia about the CoM, order xx xy yy xz yz zz; validation moments about
+    ``about_m``, the mean centre of pressure. ``added_mass`` null: no load is announced; ``added_mass_search`` says what was looked for.
+    """
+    one = found.identification
+    return {
+        "status": one.status,
+        "cause": one.cause,
+        "trials": one.trials,
+        "frames": one.frames,
+        "segments": [_segment(one, name) for name in one.sip.segments],
+        "inertia_order": TENSOR,
+        "base_parameters": {"count": one.base.base.count, "well_known": len(one.base.well_known), "rank": one.base.rank},
+        "disturbances": {"kinematics": one.sizes.kinematics, "noise_variance": one.sizes.noise},
+        "validation": [_validation(trial) for trial in found.validations],
+        "fitted": [_validation(trial) for trial in found.fitted],
+        "gain": _gain(found.gain),
+        "added_mass": added_mass_document(found.search),
+        "added_mass_search": _search(found.search),
+        "notes": found.notes,
+    }

@@ -1,0 +1,50 @@
+"""The pages of the report on what the body weighs: figures, tables and sentences; computes nothing."""
+
+from importlib.resources import files
+
+from biodance.identify.knowledge import QUANTITIES
+from biodance.pipeline.identification import SessionIdentification
+from biodance.records import CHANNELS
+from biodance.report.forest_figure import forest_figure
+from biodance.report.identification_json import information, segment_rows
+from biodance.report.style import svg_address
+from biodance.report.validation_figure import validation_figure
+from biodance.report.wording import millimetres, number
+
+MARKS = {"known": "●", "partly known": "◐", "cannot be known": "○"}
+UNITS = ("N",) * 3 + ("N·m",) * 3
+
+
+def spaced(name: str) -> str:
+    """Return a segment's name as words."""
+    return name.replace("_", " ")
+
+
+def small(value: float) -> str:
+    """Return a probability as text, however small."""
+    return number(value, 3) if value >= 0.001 else "below 0.001"
+
+
+def identification_section(found: SessionIdentification) -> str:
+    """Return the sections as HTML text; the same argument gives the same characters."""
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters.update(number=number, mm=millimetres, spaced=spaced, small=small)
+    template = (files("biodance.report") / "templates" / "identification.html.j2").read_text(encoding="utf-8")
+    one = found.identification
+    rows = [(name, segment_rows(one, name)) for name in one.sip.segments]
+    shown = found.validations or found.fitted[:1]
+    return environment.from_string(template).render(
+        one=one,
+        notes=found.notes,
+        forest=svg_address(forest_figure(one)),
+        segments=[(name, known, information(known)) for name, known in rows],
+        quantities=QUANTITIES,
+        marks=MARKS,
+        gain=found.gain,
+        trials=[(trial, "kept") for trial in found.validations] + [(trial, "fitted") for trial in found.fitted],
+        channels=list(zip(CHANNELS, UNITS, strict=True)),
+        figures=[(trial, svg_address(validation_figure(trial))) for trial in shown],
+        search=found.search,
+    )

@@ -1,0 +1,38 @@
+"""A body survives its file without loss; what is no such file is refused in a sentence."""
+
+import numpy as np
+import pytest
+
+from biodance.body.body_file import body_text, read_body
+from biodance.body.human import human
+from biodance.errors import FileRefused
+from biodance.records import Subject
+
+WOMAN = human(Subject(58.3, 1.64, "F", 31.0))
+
+
+def test_a_body_reads_back_exactly(tmp_path) -> None:
+    path = tmp_path / "body.json"
+    path.write_text(body_text(WOMAN, "identified from dance"), encoding="utf-8")
+    back, source = read_body(path)
+    assert source == "identified from dance"
+    assert (back.segments, back.notes, back.root) == (WOMAN.segments, WOMAN.notes, WOMAN.root)
+    assert np.array_equal(back.sip.phi, WOMAN.sip.phi)
+    assert np.array_equal(back.sip.covariance, WOMAN.sip.covariance)
+    assert [j.name for j in back.joints] == [j.name for j in WOMAN.joints]
+    assert all(np.array_equal(a.rotation, b.rotation) for a, b in zip(back.joints, WOMAN.joints, strict=True))
+    assert np.array_equal(back.markers.position, WOMAN.markers.position)
+    assert np.array_equal(back.feet["left"].outline, WOMAN.feet["left"].outline)
+    assert np.array_equal(back.limits.torque_upper, WOMAN.limits.torque_upper)
+
+
+@pytest.mark.parametrize(
+    ("text", "word"), [("{", "not a body"), ("[]", "not a body"), ("{}", "version"), ('{"biodance_body": 1}', "not a body")]
+)
+def test_another_file_is_refused(text: str, word: str, tmp_path) -> None:
+    path = tmp_path / "body.json"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(FileRefused, match=word):
+        read_body(path)
+    with pytest.raises(FileRefused, match="cannot be read"):
+        read_body(tmp_path / "none.json")
