@@ -22,6 +22,9 @@ from biodance.records import Array, Motion
 
 STEP = 1e-5
 """rad, central difference of the regressor (error of second order: 1e-10 relative)."""
+ALL_POINTS = slice(None)
+EVERY = 4
+"""Samples from one to the next at which the optimiser sees the joint ranges."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,27 +40,37 @@ class Excitation:
     criterion: Criterion
     gravity: Array
 
+    def samples(self, points: Array) -> tuple[Array, Array, Array]:
+        """Return position rad, velocity rad/s and acceleration rad/s² (n, joints) of the trajectory through ``points`` (k, joints) rad."""
+        basis = self.basis
+        return basis.position @ points, basis.velocity @ points, basis.acceleration @ points
+
+    def rows(self, q: Array, v: Array, a: Array) -> Array:
+        """Return W (..., channels, 10N) at the states ``q``, ``v``, ``a`` (..., joints)."""
+        flat = [state.reshape(-1, state.shape[-1]) for state in (q, v, a)]
+        W = regressor_of(segment_motion(self.body, Motion(np.arange(len(flat[0]), dtype=float), *flat)), gravity=self.gravity)
+        return W[:, list(self.channels)].reshape(*q.shape[:-1], len(self.channels), -1)
+
     def regressor(self, points: Array) -> Array:
-        """Return W (..., n channels, 10N) of trajectories through ``points`` (..., k, joints) rad."""
-        samples = [np.einsum("nk,...kj->...nj", m, points) for m in (self.basis.position, self.basis.velocity, self.basis.acceleration)]
-        q, v, a = (s.reshape(-1, s.shape[-1]) for s in samples)
-        motion = Motion(np.arange(len(q), dtype=float), q, v, a)
-        W = regressor_of(segment_motion(self.body, motion), gravity=self.gravity)[:, list(self.channels)]
-        return W.reshape(*points.shape[:-2], -1, W.shape[2])
+        """Return W (n channels, 10N) of the trajectory through ``points`` (k, joints) rad."""
+        W = self.rows(*self.samples(points))
+        return W.reshape(-1, W.shape[-1])
 
     def extend(self, history: Array, points: Array) -> Array:
         """Return the triangle (10N, 10N) of ``history`` (m, 10N) together with one trajectory."""
         return fold(self.regressor(points), history)
 
-    def value_and_gradient(self, flat: Array, history: Array) -> tuple[float, Array]:
-        """Return the criterion of ``history`` plus this trajectory, and its gradient with respect to the via points, flattened."""
-        points = flat.reshape(self.basis.position.shape[1], -1)
-        W = self.regressor(points)
-        value, slope = self.criterion(fold(W, history), self.target)
-        steps = STEP * np.eye(flat.size).reshape(-1, *points.shape)
-        both = self.regressor(np.concatenate([points + steps, points - steps]))
-        dW = (both[: flat.size] - both[flat.size :]) / (2 * STEP)
-        return value, 2 * np.einsum("irp,rp->i", dW, W @ slope)
+    def value_and_gradient(self, points: Array, history: Array) -> tuple[float, Array]:
+        """Return the criterion of ``history`` plus this trajectory, and its gradient (k, joints) with respect to the points."""
+        states = np.stack(self.samples(points))
+        value, slope = self.criterion(fold(self.regressor(points), history), self.target)
+        kinds, frames, joints = states.shape
+        steps = STEP * np.eye(kinds * joints).reshape(kinds * joints, kinds, 1, joints)
+        ahead, behind = (self.rows(*np.moveaxis(states + sign * steps, 1, 0)) for sign in (1, -1))
+        W = (ahead[0] + behind[0]) / 2
+        by_state = 2 * np.einsum("itcp,tcp->it", (ahead - behind) / (2 * STEP), W @ slope).reshape(kinds, joints, frames)
+        matrices = (self.basis.position, self.basis.velocity, self.basis.acceleration)
+        return value, sum((m.T @ g.T for m, g in zip(matrices, by_state, strict=True)), np.zeros_like(points))
 
 
 def interpolating_basis(duration: float, *, via: int, rate: float = 50.0) -> Basis:
@@ -68,14 +81,40 @@ def interpolating_basis(duration: float, *, via: int, rate: float = 50.0) -> Bas
     return Basis(time, *(spline(time, nu=nu) for nu in range(3)))
 
 
-def design(problem: Excitation, start: Array, history: Array, *, iterations: int = 200) -> Array:
-    """Return via points (k, joints) rad that minimise the criterion within the joint ranges, from ``start`` (k, joints)."""
-    limits, samples = problem.body.limits, problem.basis.position
+def design(problem: Excitation, start: Array, history: Array, *, movable: slice = ALL_POINTS, iterations: int = 200) -> Array:
+    """Return points (k, joints) rad that minimise the criterion within the joint ranges, from ``start`` (k, joints).
+
+    Only the ``movable`` points move, the others (ends that are given) stay. The optimiser sees the ranges at every fourth sample; what it
+    finds is then shrunk towards mid-range until every sample respects them.
+    """
+    limits = problem.body.limits
+    samples = problem.basis.position[::EVERY, movable]
     joints = start.shape[1]
     rows = np.einsum("nk,ij->nikj", samples, np.eye(joints)).reshape(len(samples) * joints, -1)
-    low, high = np.tile(limits.lower, len(samples)), np.tile(limits.upper, len(samples))
+    given = (problem.basis.position[::EVERY] @ start).ravel() - rows @ start[movable].ravel()
+    low, high = (np.tile(limit, len(samples)) - given for limit in (limits.lower, limits.upper))
     ranges = {"type": "ineq", "fun": lambda x: np.concatenate([rows @ x - low, high - rows @ x]), "jac": lambda _: np.vstack([rows, -rows])}
-    judge, options = problem.value_and_gradient, {"maxiter": iterations}
-    found = minimize(judge, start.ravel(), args=(history,), jac=True, method="SLSQP", constraints=[ranges], options=options)
-    best = found.x if found.fun < judge(start.ravel(), history)[0] else start.ravel()
-    return best.reshape(start.shape)
+
+    def points(x: Array) -> Array:
+        moved = start.copy()
+        moved[movable] = x.reshape(-1, joints)
+        return moved
+
+    def judge(x: Array) -> tuple[float, Array]:
+        value, gradient = problem.value_and_gradient(points(x), history)
+        return value, gradient[movable].ravel()
+
+    found = minimize(judge, start[movable].ravel(), jac=True, method="SLSQP", constraints=[ranges], options={"maxiter": iterations})
+    candidates = [within_ranges(problem, p) for p in (points(found.x), start)]
+    return min(candidates, key=lambda p: problem.value_and_gradient(p, history)[0])
+
+
+def within_ranges(problem: Excitation, points: Array) -> Array:
+    """Return ``points`` (k, joints) rad shrunk towards mid-range, joint by joint, so that no sample leaves its range.
+
+    Exact because a spline is affine in its points; a given end at the limit of its joint moves only where a sample beyond it forces it.
+    """
+    limits = problem.body.limits
+    middle, half = (limits.upper + limits.lower) / 2, (limits.upper - limits.lower) / 2
+    reach = np.max(np.abs(problem.basis.position @ (points - middle)), axis=0)
+    return middle + (points - middle) * np.minimum(1.0, half / np.maximum(reach, 1e-12))
