@@ -2,14 +2,15 @@
 
 Hypotheses "a load sits on segment s" are compared with "no load" by Bayes factors under one linear Gaussian model: the body as known
 before (the posterior of the reference session, or the table), plus the ten parameters of a load whose mass and place inside the segment's
-box are unknown. The load's prior is the second moment of such loads, so that light and heavy ones both fit. The smallest load that the
-session could have found is computed from its information alone.
+box are unknown. The load's prior is the second moment of such loads, so that light and heavy ones both fit; a load is positive. The
+smallest load that the session could have found is computed from its information alone.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solve_triangular
+from scipy.stats import norm
 
 from biodance.body.body import Body
 from biodance.identify.identification import Identification
@@ -80,18 +81,17 @@ class AddedMass:
 def added_mass(session: Identification, *, reference: Identification | None = None) -> AddedMass:
     """Return where and how much mass ``session`` carries beyond ``reference`` (an unloaded session of the same person) or the table.
 
-    Against the table alone, a load on pelvis, trunk or thigh cannot be told from a wrong table or a wrong scale: ``set`` then holds
-    several segments.
+    Against the table alone, a load on pelvis, trunk or thigh cannot be told from a wrong table or a wrong scale: ``set`` then holds several
+    segments.
     """
     before = session.belief.prior if reference is None else expected(reference, session)
-    base = _evidence(session.data, before, np.zeros((before.phi.size, 0)))[0]
-    found = [_suspect(session, before, i, base) for i in range(len(before.segments))]
+    rows, surprise = surprised(session.data, before)
+    found = [_suspect(session.body, i, rows[:, 10 * i : 10 * i + 10], surprise) for i in range(len(before.segments))]
     weight = np.array([f.log_bayes_factor for f in found]) - np.log(len(found))
     top = max(0.0, float(weight.max()))
     total = np.exp(-top) + np.exp(weight - top).sum()
     chance = np.exp(weight - top) / total
-    order = np.argsort(-chance)
-    suspects = tuple(_with_probability(found[i], float(chance[i])) for i in order)
+    suspects = tuple(replace(found[i], probability=float(chance[i])) for i in np.argsort(-chance))
     words = "the table" if reference is None else f"the session with {', '.join(reference.trials)}"
     return AddedMass(suspects, float(np.exp(-top) / total), words)
 
@@ -125,56 +125,35 @@ def point_mass(place: Array, radius: float = RADIUS) -> Array:
     return np.array([1.0, x, y, z, y * y + z * z + r, -x * y, x * x + z * z + r, -x * z, -y * z, x * x + y * y + r])
 
 
-def _evidence(data: Information, before: Sip, wide: Array) -> tuple[float, Array, Array]:
-    """Return the log evidence of ``data`` for a body N(before) + ``wide`` @ N(0, 1), and mean (k,) and factor (k, k) of the latter."""
-    S = np.concatenate([prior_factor(before), wide], axis=1)
-    A, b = data.triangle @ S, data.target - data.triangle @ before.phi
-    n, k = S.shape[1], wide.shape[1]
-    stacked = np.zeros((len(A) + n, n + 1))
-    stacked[: len(A), :n], stacked[: len(A), n], stacked[len(A) :, :n] = A, b, np.eye(n)
-    triangle = np.asarray(np.linalg.qr(stacked, mode="r"))
-    U = triangle[:n, :n]
-    evidence = -0.5 * float(np.sum(triangle[n:, n] ** 2)) - float(np.sum(np.log(np.abs(np.diag(U)))))
-    tail = U[n - k :, n - k :]
-    return (
-        evidence,
-        (solve_triangular(tail, triangle[n - k : n, n]) if k else np.zeros(0)),
-        (solve_triangular(tail, np.eye(k)) if k else tail),
-    )
+def surprised(data: Information, before: Sip) -> tuple[Array, Array]:
+    """Return the data's rows (r, p) and what they show beyond ``before`` (r,), whitened by noise and by the uncertainty of ``before``.
+
+    With R phi = y + noise and phi ~ N(before): y - R before has the covariance 1 + R P R'.
+    """
+    A = data.triangle @ prior_factor(before)
+    L = np.linalg.cholesky(np.eye(len(A)) + A @ A.T)
+    both = np.column_stack([data.triangle, data.target - data.triangle @ before.phi])
+    white = solve_triangular(L, both, lower=True)
+    return white[:, :-1], white[:, -1]
 
 
-def _suspect(session: Identification, before: Sip, i: int, base: float) -> Suspect:
-    """Return the hypothesis of a load on segment ``i``; its probability is filled in later."""
-    U = load_moments(session.body, i)
-    wide = np.zeros((before.phi.size, U.shape[1]))
-    wide[10 * i : 10 * i + 10] = U
-    evidence, mean, factor = _evidence(session.data, before, wide)
-    load, spread = U @ mean, U @ factor
-    covariance = spread @ spread.T
+def _suspect(body: Body, i: int, rows: Array, surprise: Array) -> Suspect:
+    """Return the hypothesis of a load on segment ``i`` whose columns are ``rows`` (r, 10); its probability is filled in later."""
+    U = load_moments(body, i)
+    B = rows @ U
+    S, t = B.T @ B, B.T @ surprise
+    inner = np.linalg.inv(np.eye(len(S)) + S)
+    load, covariance = U @ inner @ t, U @ inner @ U.T
     mass, sd = float(load[0]), float(np.sqrt(covariance[0, 0]))
+    occam = -0.5 * float(np.linalg.slogdet(np.eye(len(S)) + S)[1])
+    bayes = occam + 0.5 * float(t @ inner @ t) + float(norm.logcdf(mass / sd) + np.log(2.0))
     place, place_sd = np.full(3, np.nan), np.full(3, np.nan)
     if mass > 2 * sd:
         place = load[1:4] / mass
         slope = np.column_stack([-place / mass, np.eye(3) / mass])
         place_sd = np.sqrt(np.diag(slope @ covariance[:4, :4] @ slope.T))
-    middle = point_mass(session.body.boxes[i].mean(axis=0))
-    return Suspect(
-        before.segments[i], mass, sd, place, place_sd, evidence - base, 0.0, _smallest(session.data, before, wide, 10 * i, middle)
-    )
-
-
-def _with_probability(s: Suspect, chance: float) -> Suspect:
-    return Suspect(s.segment, s.mass, s.sd, s.place, s.place_sd, s.log_bayes_factor, chance, s.smallest)
-
-
-def _smallest(data: Information, before: Sip, wide: Array, first: int, per_kg: Array) -> float:
-    """Return the mass kg of a load at ``per_kg`` (10,) whose expected log Bayes factor reaches the threshold."""
-    H = data.triangle
-    noise_free = Information(np.block([[H, (H[:, first : first + 10] @ per_kg)[:, None]], [np.zeros((1, H.shape[1] + 1))]]), data.frames)
-    centred = Sip(before.segments, np.zeros(before.phi.size), before.covariance)
-    silent = Information(np.block([[H, np.zeros((len(H), 1))], [np.zeros((1, H.shape[1] + 1))]]), data.frames)
-    none = np.zeros((before.phi.size, 0))
-    penalty = _evidence(silent, centred, wide)[0] - _evidence(silent, centred, none)[0]
-    slope = _evidence(noise_free, centred, wide)[0] - _evidence(noise_free, centred, none)[0] - penalty
-    wanted = np.log((1 - THRESHOLD) / THRESHOLD * len(before.segments)) - penalty
-    return float(np.sqrt(max(wanted, 0.0) / slope)) if slope > 0 else float("inf")
+    shown = B.T @ (rows @ point_mass(body.boxes[i].mean(axis=0)))
+    per_kg = 0.5 * float(shown @ inner @ shown)
+    wanted = np.log((1 - THRESHOLD) / THRESHOLD * len(body.segments)) - np.log(2.0) - occam - 0.5 * float(np.trace(S @ inner))
+    smallest = float(np.sqrt(max(wanted, 0.0) / per_kg)) if per_kg > 0 else float("inf")
+    return Suspect(body.segments[i], mass, sd, place, place_sd, bayes, 0.0, smallest)

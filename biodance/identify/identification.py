@@ -13,6 +13,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.errors import TrialRefused
 from biodance.identify.base_parameters import BaseEstimate, estimate_base, structural_base
+from biodance.identify.caution import widened
 from biodance.identify.information import Information
 from biodance.identify.knowledge import Known, knowledge
 from biodance.identify.learning import learn
@@ -64,7 +65,8 @@ class Identification:
 
 
 def identify(body: Body, fits: tuple[Fit, ...], *, prior: Sip | None = None) -> Identification:
-    """Return the identified parameters of ``body`` from the trials ``fits``; ``prior`` (default ``body.sip``) is what is known before.
+    """Return the identified parameters of ``body`` from the trials ``fits``; ``prior`` is what is known before (by default the table
+    in ``body.sip``, its standard deviations widened for frames that marker placement turns).
 
     Trials without a usable frame are left out and named in the notes.
 
@@ -84,7 +86,7 @@ def identify(body: Body, fits: tuple[Fit, ...], *, prior: Sip | None = None) -> 
         total = total + statistics(body, fit, layout)
     left_out = [fit.name for fit in fits if not fit.use.any()]
     notes = (f"Left out, no usable frame: {', '.join(left_out)}.",) if left_out else ()
-    noise, _ = learn(total, prior or body.sip)
+    noise, _ = learn(total, prior or widened(body.sip))
     found = conclude(body, total, tuple(fit.name for fit in used), noise=noise, found=mismatch(body, used, noise), prior=prior)
     return replace(found, notes=(*notes, *found.notes))
 
@@ -103,7 +105,7 @@ def conclude(
     ``noise`` as learned (learned here if None); ``found`` what twins and plates disturb: without it the intervals count noise alone, far
     too short, and the notes say so.
     """
-    before = prior or body.sip
+    before = prior or widened(body.sip)
     noise = noise or learn(total, before)[0]
     data, sizes = total.information(noise), Sizes(0.0, 1.0)
     if found is not None:

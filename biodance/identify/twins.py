@@ -17,10 +17,13 @@ from biodance.records import Array, Motion
 
 SLIDE = 0.006
 """m/rad per axis: skin and flesh over bone per angle of a neighbouring joint; the session's own marker residuals rescale it."""
-JOINT_CENTRE = 0.010
-"""m per axis: errors of predicted hip, knee, ankle, shoulder and elbow centres are 5 to 15 mm."""
-HINGE_TILT = 0.05
-"""rad: tilt of a knee or elbow axis against the bone's own."""
+JOINT_CENTRE = {"hip": 0.012, "knee": 0.008, "ankle": 0.008, "trunk": 0.040, "shoulder": 0.012, "elbow": 0.020}
+"""m per axis. Regressions miss hip and shoulder by 5 to 25 mm (Harrington 2007, Mantovani 2016); the level at which a one-piece trunk bends
+differs by 5 to 8 cm between tables; the elbow of a nearly straight arm is found through a plane that is hardly defined."""
+HINGE_TILT = {"knee": 0.07, "elbow": 0.35}
+"""rad: tilt of a hinge's axis against the bone's own, for the same reason."""
+OTHER_CENTRE, OTHER_TILT = 0.010, 0.05
+"""m, rad: joints of other bodies."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,10 +78,12 @@ def draw_twins(body: Body, count: int, rng: np.random.Generator) -> Twins:
     n = len(body.joints)
     centre, tilt = np.zeros((n, 3, count)), np.zeros((n, 3, count))
     for chain in chains(body):
-        centre[chain[0]] = JOINT_CENTRE * rng.normal(size=(3, count))
+        kind = body.joints[chain[0]].name.rsplit("_", 1)[0].removeprefix("right_").removeprefix("left_")
+        centre[chain[0]] = JOINT_CENTRE.get(kind, OTHER_CENTRE) * rng.normal(size=(3, count))
         if len(chain) == 1:
             axis = body.joints[chain[0]].axis
-            tilt[chain[0]] = HINGE_TILT * (np.eye(3) - np.outer(axis, axis)) @ rng.normal(size=(3, count))
+            across = np.eye(3) - np.outer(axis, axis)
+            tilt[chain[0]] = HINGE_TILT.get(kind, OTHER_TILT) * across @ rng.normal(size=(3, count))
     slide = SLIDE * beside[:, segment, None, None] * rng.normal(size=(n, len(segment), 3, count))
     flesh = SLIDE * beside[:, :, None, None] * rng.normal(size=(n, len(body.segments), 3, count))
     return Twins(slide, flesh, centre, tilt)
