@@ -82,6 +82,20 @@ def _told(result: "SessionResult", folder: Path, found: "dict[str, Any]", json: 
     return NEEDS_A_PERSON if result.needs_a_person else DONE
 
 
+def _told_identified(result: "SessionResult", folder: Path, found: "dict[str, Any]", json: bool) -> int:
+    """Print what was identified and return the exit code."""
+    from rich.console import Console
+
+    from biodance.report.terminal import print_identification
+
+    if json:
+        _print(found)
+    else:
+        print_identification(found, Console())
+        sys.stdout.write(f"{folder / 'report.html'}\n")
+    return NEEDS_A_PERSON if result.needs_a_person or found["status"] != "solved" else DONE
+
+
 def _forget_simulated(folder: Path) -> None:
     """Remove a folder that holds a simulated session and nothing else; leave every other one alone."""
     import shutil
@@ -134,6 +148,59 @@ def report(session: Path, *, out: Out, subject: str | None = None, json: Json = 
         folder = results_folder(out, session, force=force)
         result, found = _reported(recording, folder, tell)
     return _told(result, folder, found, json)
+
+
+@app.command
+def identify(session: Path, *, out: Out, reference: Path | None = None, json: Json = False, force: Force = False) -> int:
+    """Identify what every segment weighs, with intervals, validate it on the trials kept, and look for an added mass.
+
+    Parameters
+    ----------
+    session
+        Folder with the static trial and the other trials.
+    reference
+        An earlier session of the same person without load: a load is then looked for against it instead of the table.
+    """
+    from biodance.lab.results_folder import results_folder
+    from biodance.lab.session import read_session
+    from biodance.pipeline.session import examine, identified
+    from biodance.report.write import write_identification
+
+    with _progress() as tell:
+        before = identified(examine(read_session(reference, tell=tell), tell=tell)) if reference else None
+        recording = read_session(session, tell=tell)
+        folder = results_folder(out, session, force=force)
+        result = examine(recording, reference=before.identification if before else None, tell=tell)
+        found = identified(result)
+        tell("writing the page")
+        document = write_identification(result, found, folder)
+    return _told_identified(result, folder, document, json)
+
+
+@app.command
+def export(
+    source: Path,
+    *,
+    format: Annotated[str, Parameter(help="osim, urdf, mjcf, biomod, csv; or trc, mot of one trial.")],
+    out: Annotated[Path, Parameter(help="The file to write.")],
+    trial: Annotated[str | None, Parameter(help="Name of the trial for trc and mot.")] = None,
+    force: Annotated[bool, Parameter(name="--force", negative="", help="Replace the file if it exists.")] = False,
+) -> int:
+    """Write a session, or the results of `biodance identify`, for another program.
+
+    Parameters
+    ----------
+    source
+        Session folder, or folder with the results of `biodance identify`.
+    """
+    from biodance.pipeline.export import export as write
+    from biodance.pipeline.export import replaceable
+
+    with _progress() as tell, replaceable(out, force=force) as place:
+        _, sentence = write(source, place, format=format, trial=trial, tell=tell)
+    say(sentence)
+    sys.stdout.write(f"{out}\n")
+    return DONE
 
 
 @app.command

@@ -5,7 +5,7 @@ from dataclasses import replace
 from functools import partial
 
 from biodance.body.human import DEFAULT_TABLE
-from biodance.errors import TrialRefused
+from biodance.errors import SessionRefused, TrialRefused
 from biodance.identify.identification import Identification
 from biodance.lab.filters import LowPass
 from biodance.lab.weight import SHORTEST, SWAY
@@ -13,7 +13,7 @@ from biodance.motion.contact import ContactRules
 from biodance.motion.regressor import GRAVITY
 from biodance.pipeline.body import body_of
 from biodance.pipeline.checks import mass_check, standing_check, trial_checks
-from biodance.pipeline.identification import can_identify, identify_trials
+from biodance.pipeline.identification import SessionIdentification, can_identify, identify_trials
 from biodance.pipeline.results import SessionResult, Standing, Step, TrialResult
 from biodance.pipeline.steps import attempt
 from biodance.pipeline.still import still_of
@@ -93,3 +93,23 @@ def settings() -> dict[str, str]:
         "a foot may touch": f"lower than {1000 * rules.height:g} mm over a surface and slower than {rules.speed:g} m/s",
         "quiet standing": f"at least {SHORTEST:g} s with the vertical force within {100 * SWAY:g} % of its median",
     }
+
+
+def identified(result: SessionResult) -> SessionIdentification:
+    """Return the identification of a session.
+
+    Raises
+    ------
+    SessionRefused
+        There is none; the message says why.
+    """
+    if result.identification is not None:
+        return result.identification
+    folder = result.session.folder
+    said = [step.text for step in result.steps if step.name in ("subject", "identify") and step.status != "done"]
+    fits = [trial for trial in result.trials if trial.trial.role == "fit"]
+    reasons = " ".join(dict.fromkeys([*said, *(reason for trial in fits for reason in trial.reasons)]))
+    why = (
+        "no trial to fit has motion and fully measured ground contact." if fits else "no trial has the role fit; set roles in session.toml."
+    )
+    raise SessionRefused(f"{folder}: nothing can be identified, {why} {reasons}".strip())

@@ -56,6 +56,28 @@ def print_session(result: SessionResult, console: Console) -> None:
         console.print(f"look: [bold]{escape(where)}[/]: {escape(sentence)}", soft_wrap=True)
 
 
+def print_identification(found: dict[str, Any], console: Console) -> None:
+    """Print one line a segment, the validation, the added mass and the notes of `biodance identify`."""
+    table = Table(box=None, pad_edge=False)
+    for heading in ("segment", "mass (kg)", "table (kg)", "from the data"):
+        table.add_column(heading)
+    for row in found["segments"]:
+        mass = f"{number(row['mass_kg'], 2)} ± {number(row['mass_sd_kg'], 2)}"
+        table.add_row(row["name"], mass, number(row["mass_prior_kg"], 2), f"{number(100 * row['information'], 0)} %")
+    console.print(table)
+    for row in found["validation"]:
+        told = ", ".join(f"{name} {' '.join(number(x) for x in row[name]['rms'])}" for name in ("table", "identified"))
+        console.print(f"{escape(row['trial'])}, RMS Fx Fy Fz Mx My Mz: {told}", soft_wrap=True)
+    load = found["added_mass"]
+    if load:
+        low, high = (number(x, 2) for x in load["ci95_kg"])
+        console.print(f"added mass: {number(load['kg'], 2)} kg ({low} to {high}) on {load['segment']}, beyond {escape(load['reference'])}")
+    else:
+        console.print(f"added mass: none found beyond {escape(found['added_mass_search']['reference'])}")
+    for note in found["notes"]:
+        console.print(f"note: {escape(note)}", soft_wrap=True)
+
+
 def print_findings(findings: Sequence[Finding], console: Console) -> None:
     """Print one line a finding of the doctor."""
     table = Table(box=None, pad_edge=False, show_header=False)

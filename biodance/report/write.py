@@ -3,8 +3,12 @@
 from pathlib import Path
 from typing import Any
 
-from biodance.pipeline.provenance import now, provenance
+from biodance.body.body_file import body_text
+from biodance.pipeline.export import BODY, body_of_result
+from biodance.pipeline.identification import SessionIdentification
+from biodance.pipeline.provenance import Provenance, now, provenance
 from biodance.pipeline.results import SessionResult
+from biodance.report.identification_json import identification_document
 from biodance.report.page import page
 from biodance.report.results_json import document, plain, to_text
 from biodance.report.solid import still_address
@@ -13,15 +17,29 @@ PAGE, NUMBERS = "report.html", "results.json"
 
 
 def write_report(result: SessionResult, folder: Path) -> dict[str, Any]:
-    """Write ``report.html`` and ``results.json`` into ``folder`` (which exists) and return the content of the latter.
-
-    Each file is written under another name first and then renamed, so that a stopped run leaves no half file.
-    """
+    """Write ``report.html`` and ``results.json`` into ``folder`` (which exists) and return the content of the latter."""
     made = provenance(result, created=now())
     found = document(result, made)
-    still = still_address(result.still) if result.still else ""
-    for name, text in ((NUMBERS, to_text(found)), (PAGE, page(result, made, still=still))):
+    _write(folder, {NUMBERS: to_text(found), PAGE: _page(result, made)})
+    return dict(plain(found))
+
+
+def write_identification(result: SessionResult, found: SessionIdentification, folder: Path) -> dict[str, Any]:
+    """Write ``report.html``, ``results.json`` with the identification alone and ``body.json``, the identified body; return the numbers."""
+    made = provenance(result, created=now())
+    numbers = {"session": result.session.folder.name, **identification_document(found), "provenance": made.as_dict()}
+    body, source = body_of_result(result)
+    _write(folder, {NUMBERS: to_text(numbers), PAGE: _page(result, made), BODY: body_text(body, source)})
+    return dict(plain(numbers))
+
+
+def _page(result: SessionResult, made: Provenance) -> str:
+    return page(result, made, still=still_address(result.still) if result.still else "")
+
+
+def _write(folder: Path, files: dict[str, str]) -> None:
+    """Write every file under another name first and then rename it, so that a stopped run leaves no half file."""
+    for name, text in files.items():
         part = folder / f".{name}.part"
         part.write_text(text, encoding="utf-8", newline="\n")
         part.replace(folder / name)
-    return dict(plain(found))
