@@ -1,0 +1,89 @@
+"""Where the feet stand and which part of the ground may carry the weight."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.records import Array, frozen_array
+
+WIDTH = 0.12
+"""Distance between the ankles, fraction of stature (about 1.3 times the width of the hips)."""
+FORWARD = 0.2
+"""m: how far the right foot stands in front (paper III.D, human subject)."""
+SINGLE = {"single_right": (0,), "single_left": (1,)}
+
+
+@dataclass(frozen=True, eq=False)
+class Stance:
+    """One foot configuration.
+
+    ``name``; ``ankle`` (2, 3) m lab frame, right and left, where each foot stands or would stand, flat and facing lab x; ``planted`` the
+    feet on the ground (0 right, 1 left); ``soles`` (2, P, 3) m their outlines; ``share`` of every half width of the support that may be
+    used (0.6 in the paper).
+    """
+
+    name: str
+    ankle: Array
+    planted: tuple[int, ...]
+    soles: Array
+    share: float = 0.6
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "ankle", frozen_array(self.ankle, (2, 3), "Stance.ankle"))
+        object.__setattr__(self, "soles", frozen_array(self.soles, (2, None, 3), "Stance.soles"))
+
+    @cached_property
+    def support(self) -> Array:
+        """(P, 2) m corners of the base of support (convex hull of the planted soles), counter-clockwise."""
+        from scipy.spatial import ConvexHull
+
+        points = np.concatenate([self.soles[side][:, :2] for side in self.planted])
+        return points[ConvexHull(points).vertices]
+
+    @cached_property
+    def centre(self) -> Array:
+        """(2,) m middle of the base of support: of its bounding box."""
+        return (self.support.min(axis=0) + self.support.max(axis=0)) / 2
+
+    @cached_property
+    def edges(self) -> tuple[Array, Array]:
+        """Unit inward normals (P, 2) and offsets (P,) m of the reduced support: ``normals @ p + offsets`` is the distance inside."""
+        corners = self.centre + self.share * (self.support - self.centre)
+        along = np.roll(corners, -1, axis=0) - corners
+        normals = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.linalg.norm(along, axis=1, keepdims=True)
+        return normals, -np.einsum("ij,ij->i", normals, corners)
+
+    @cached_property
+    def sole_centres(self) -> Array:
+        """(2, 3) m middle of each sole on the ground."""
+        return self.soles.mean(axis=1)
+
+    def on(self, *planted: int) -> "Stance":
+        """Return the stance with only these feet on the ground."""
+        return replace(self, planted=planted, name=self.name if len(planted) == 2 else ("single_right", "single_left")[planted[0]])
+
+
+def stance(
+    body: Body, name: str, *, left: float = 0.0, right: float = 0.0, planted: tuple[int, ...] = (0, 1), share: float = 0.6
+) -> Stance:
+    """Return a stance with the ankles ``left`` and ``right`` m ahead of the lab origin, side by side at the person's width."""
+    height = -float(body.feet["right"].outline[:, 1].min())
+    half = WIDTH * stature_of(body) / 2
+    ankle = np.array([[right, -half, height], [left, half, -float(body.feet["left"].outline[:, 1].min())]])
+    soles = [
+        ankle[k] + np.stack([o[:, 0], -o[:, 2], o[:, 1]], axis=1)
+        for k, o in enumerate(body.feet[side].outline for side in ("right", "left"))
+    ]
+    return Stance(name, ankle, planted, np.array(soles), share)
+
+
+def stature_of(body: Body) -> float:
+    """Return the height (m) of the upright body: top of its highest box over its soles."""
+    from biodance.motion.kinematics import poses
+
+    pose = poses(body, body.neutral[None])
+    tops = [float((pose.position[0, i] + pose.rotation[0, i] @ box[1])[2]) for i, box in enumerate(body.boxes)]
+    foot = body.feet["right"]
+    return max(tops) - float(pose.points([foot.segment], foot.outline[:1])[0, 0, 2])

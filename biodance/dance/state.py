@@ -1,0 +1,159 @@
+"""What the limits judge: positions, forces and torques of samples of a motion, with their exact derivatives.
+
+Notation: J_i (6,) is the twist of coordinate i in the lab frame (linear part at the lab origin first), V_k and A_k the spatial velocity and
+acceleration of link k, x the spatial cross product. For link n and a coordinate i that moves it
+
+    dV_n/dx_i = J_i x (V_n - V_i)                       dA_n/dx_i  = J_i x (A_n - A_i) + (V_i x J_i) x (V_n - V_i)
+    dV_n/dv_i = J_i                                     dA_n/dv_i  = V_i x J_i + J_i x (V_n - V_i)
+
+(derivation: docs/derivations.md section 8). Forces come from pinocchio's RNEA derivatives.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from biodance.body.pinocchio_model import load_pinocchio
+from biodance.dance.chain import ROOT, Chain
+from biodance.dance.feet import foot_forces
+from biodance.dance.stance import Stance
+from biodance.records import Array
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Return the spatial (6) or ordinary (3) cross product along the last axis."""
+    if a.shape[-1] == 3:
+        return np.stack(
+            [
+                a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1],
+                a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2],
+                a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0],
+            ],
+            axis=-1,
+        )
+    v1, w1, v2, w2 = a[..., :3], a[..., 3:], b[..., :3], b[..., 3:]
+    return np.concatenate([cross(w1, v2) + cross(v1, w2), cross(w1, w2)], axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """``x``, ``v``, ``a`` (T, n) coordinates of the chain and their derivatives; ``stance`` the feet, the same in all samples."""
+
+    chain: Chain
+    stance: Stance
+    x: Array
+    v: Array
+    a: Array
+
+    @cached_property
+    def _frames(self) -> tuple[Array, Array, Array]:
+        pin = load_pinocchio()
+        model, count = self.chain.model, self.chain.size
+        data = model.createData()
+        twists = np.empty((len(self.x), count, 6))
+        rotation, position = np.empty((len(self.x), count, 3, 3)), np.empty((len(self.x), count, 3))
+        links = sorted({*self.chain.carriers})
+        for t, x in enumerate(self.x):
+            twists[t] = pin.computeJointJacobians(model, data, x).T
+            for k in links:
+                place = data.oMi[k + 1]
+                rotation[t, k], position[t, k] = place.rotation, place.translation
+        return twists, rotation, position
+
+    @property
+    def twists(self) -> Array:
+        """(T, n, 6) J_i."""
+        return self._frames[0]
+
+    @cached_property
+    def rotation(self) -> Array:
+        """(T, N, 3, 3) lab_R_segment."""
+        return self._frames[1][:, list(self.chain.carriers)]
+
+    @cached_property
+    def position(self) -> Array:
+        """(T, N, 3) m origins of the segments."""
+        return self._frames[2][:, list(self.chain.carriers)]
+
+    @cached_property
+    def velocity(self) -> Array:
+        """(T, n, 6) V_k of every link."""
+        return self.chain.ancestors @ (self.twists * self.v[:, :, None])
+
+    @cached_property
+    def acceleration(self) -> Array:
+        """(T, n, 6) A_k of every link."""
+        return self.chain.ancestors @ (self.twists * self.a[:, :, None] + cross(self.velocity, self.twists) * self.v[:, :, None])
+
+    def points(self, segment: list[int], local: Array) -> tuple[Array, Array]:
+        """Return positions (T, K, 3) m of points ``local`` (K, 3) of the segments, and their slopes (T, K, 3, n)."""
+        place = np.einsum("tkij,kj->tki", self.rotation[:, segment], local) + self.position[:, segment]
+        moved = self.chain.ancestors[[self.chain.carriers[s] for s in segment]]
+        linear, angular = self.twists[:, None, :, :3], self.twists[:, None, :, 3:]
+        slope = (linear + cross(np.broadcast_to(angular, (*place.shape[:2], *angular.shape[2:])), place[:, :, None])) * moved[
+            None, :, :, None
+        ]
+        return place, np.swapaxes(slope, 2, 3)
+
+    @cached_property
+    def _dynamics(self) -> tuple[Array, Array]:
+        pin = load_pinocchio()
+        model, n = self.chain.model, self.chain.size
+        data = model.createData()
+        force, slopes = np.empty((len(self.x), n)), np.empty((3, len(self.x), n, n))
+        for t, (x, v, a) in enumerate(zip(self.x, self.v, self.a, strict=True)):
+            slopes[0, t], slopes[1, t], slopes[2, t] = pin.computeRNEADerivatives(model, data, x, v, a)
+            force[t] = data.tau
+        return force, slopes
+
+    @cached_property
+    def force(self) -> Array:
+        """(T, n) N, N·m generalised force on every coordinate without the ground."""
+        pin = load_pinocchio()
+        model = self.chain.model
+        data = model.createData()
+        return np.array([pin.rnea(model, data, x, v, a) for x, v, a in zip(self.x, self.v, self.a, strict=True)])
+
+    @cached_property
+    def wrench(self) -> Array:
+        """(T, 6) N, N·m needed from the ground, about the lab origin, force first."""
+        return np.linalg.solve(self.twists[:, :ROOT], self.force[:, :ROOT, None])[..., 0]
+
+    @cached_property
+    def wrench_slopes(self) -> Array:
+        """(3, T, 6, n) derivative of the wrench with respect to x, v, a."""
+        inner = self._dynamics[1][:, :, :ROOT].copy()
+        inner[0, :, :, :ROOT] -= self.moved_twists(list(range(ROOT)), self.wrench)[:, :, :ROOT]
+        return np.linalg.solve(self.twists[None, :, :ROOT], inner)
+
+    def moved_twists(self, columns: list[int], wrench: Array) -> Array:
+        """Return (T, k, n) derivative of J_k' F with respect to x for the coordinates ``columns`` and a fixed wrench (T, 6)."""
+        swept = self.chain.ancestors[columns] - np.eye(self.chain.size)[columns]
+        pairs = cross(self.twists[:, None], self.twists[:, columns, None])
+        return np.einsum("tkic,tc->tki", pairs, wrench) * swept
+
+    @cached_property
+    def feet(self) -> tuple[Array, Array]:
+        """Wrenches (T, 2, 6) of the ground on each foot about the lab origin, and their derivative (T, 2, 6, 6) by the total."""
+        return foot_forces(self.wrench, self.stance)
+
+    @cached_property
+    def torque(self) -> Array:
+        """(T, n - 6) N·m of the joints."""
+        out = self.force.copy()
+        for side in self.stance.planted:
+            columns = self.chain.leg_columns[side]
+            out[:, columns] -= np.einsum("tkc,tc->tk", self.twists[:, columns], self.feet[0][:, side])
+        return out[:, ROOT:]
+
+    @cached_property
+    def torque_slopes(self) -> Array:
+        """(3, T, n - 6, n) derivative of the joint torques with respect to x, v, a."""
+        slopes = self._dynamics[1].copy()
+        for side in self.stance.planted:
+            columns = self.chain.leg_columns[side]
+            share = self.feet[1][:, side] @ self.wrench_slopes
+            slopes[:, :, columns] -= self.twists[:, columns] @ share
+            slopes[0][:, columns] -= self.moved_twists(columns, self.feet[0][:, side])
+        return slopes[:, :, ROOT:]
