@@ -46,7 +46,6 @@ def _importing(module: str) -> str:
 
 PROBES = (
     Probe("pinocchio", _importing("pinocchio"), "It needs the system library libgomp: apt-get install libgomp1; then pip install pin."),
-    Probe("ezc3d", _importing("ezc3d"), "pip install ezc3d"),
     Probe("c3d (second reader)", "import c3d; print('loads')", "pip install c3d"),
     Probe("scipy", _importing("scipy"), "pip install scipy"),
     Probe("cvxpy with Clarabel", "import clarabel, cvxpy; print(cvxpy.__version__)", "pip install cvxpy clarabel"),
