@@ -54,7 +54,6 @@ def test_everything_that_biodance_is_made_of_is_looked_at(monkeypatch):
         "anthropometry",
         "protocols",
         "pinocchio",
-        "ezc3d",
         "cvxpy",
         "GL stills",
         "opensim",
