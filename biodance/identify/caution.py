@@ -16,9 +16,20 @@ ARM_TURN = np.array([0.05, 0.4, 0.05])
 """(3,) rad for upper arm and forearm: their long axis turns with a plane that a nearly straight arm hardly defines."""
 
 
+MASS_FLOOR = 0.14
+"""Relative standard deviation of a segment's mass: no table is known to fit a person better (spread between de Leva 1996, Dumas 2018 and
+Zatsiorsky, and the tables' own residuals)."""
+SIDES, SCALE_SD = 0.8, 0.2
+"""Correlation of the right and the left side; kg, how well the scale pins the total mass."""
+CENTRE = {"thigh": 0.012, "shank": 0.008, "foot": 0.008, "trunk_head": 0.030, "upper_arm": 0.012, "forearm_hand": 0.020}
+"""m per axis: how far the origin of a segment's frame may be from its true joint centre (see `twins.JOINT_CENTRE`)."""
+ROOT_CENTRE = 0.008
+"""m per axis: the same for the pelvis, and for segments of other bodies."""
+
+
 def widened(prior: Sip) -> Sip:
     """Return ``prior`` with the same values and a covariance that holds for frames that are turned and centres that are displaced."""
-    covariance = np.array(prior.covariance)
+    covariance = np.array(prior.covariance) + _mass_spread(prior)
     for i, segment in enumerate(prior.segments):
         cut = slice(10 * i, 10 * i + 10)
         phi, own = prior.phi[cut], covariance[cut, cut].copy()
@@ -28,6 +39,44 @@ def widened(prior: Sip) -> Sip:
         slope = _turn_slope(phi) * turn
         covariance[cut, cut] = own + slope @ slope.T + _displacement(phi, own)
     return Sip(prior.segments, prior.phi, covariance)
+
+
+def about_true_centres(sip: Sip) -> Sip:
+    """Return ``sip`` with a covariance that also holds about the true joint centres, which no wrench can find.
+
+    The data tell where matter is relative to the model's frames; where the person's own joint centre is stays as uncertain as the formula
+    that predicted it.
+    """
+    covariance = np.array(sip.covariance)
+    for i, segment in enumerate(sip.segments):
+        sd = next((value for kind, value in CENTRE.items() if segment.endswith(kind)), ROOT_CENTRE)
+        slope = sd * _shift_slope(sip.phi[10 * i : 10 * i + 10])
+        covariance[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] += slope @ slope.T
+    return Sip(sip.segments, sip.phi, covariance)
+
+
+def _shift_slope(phi: Array) -> Array:
+    """Return d phi / d d (10, 3) for a shift of the matter by d (3,) m."""
+    out = np.zeros((10, 3))
+    out[1:4] = phi[0] * np.eye(3)
+    for row, (i, j) in enumerate(PHI_TENSOR, start=4):
+        out[row] = 2 * phi[1:4] * (i == j)
+        out[row, i] -= phi[1 + j]
+        out[row, j] -= phi[1 + i]
+    return out
+
+
+def _mass_spread(prior: Sip) -> Array:
+    """Return the covariance (p, p) that raises every relative mass sd to the floor, sides alike, the total mass unchanged."""
+    table, variance = prior.phi.reshape(-1, 10), np.diag(prior.covariance)[::10]
+    mass = np.maximum(table[:, 0], 1e-12)
+    missing = np.sqrt(np.maximum(MASS_FLOOR**2 - variance / mass**2, 0.0)) * (table[:, 0] > 0) * (variance > 0)
+    names = [name.removeprefix("right_").removeprefix("left_") for name in prior.segments]
+    alike = np.array([[1.0 if a == b else SIDES if x == y else 0.0 for b, y in enumerate(names)] for a, x in enumerate(names)])
+    masses = alike * np.outer(missing * mass, missing * mass)
+    total = masses.sum(axis=1)
+    masses = masses - np.outer(total, total) / (total.sum() + SCALE_SD**2)
+    return np.asarray(np.kron(masses, np.ones((10, 10))) * np.outer(prior.phi / np.repeat(mass, 10), prior.phi / np.repeat(mass, 10)))
 
 
 def _turn_slope(phi: Array) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.errors import TrialRefused
 from biodance.identify.base_parameters import BaseEstimate, estimate_base, structural_base
-from biodance.identify.caution import widened
+from biodance.identify.caution import about_true_centres, widened
 from biodance.identify.information import Information
 from biodance.identify.knowledge import Known, knowledge
 from biodance.identify.learning import learn
@@ -31,7 +31,8 @@ NOISE_ALONE = "The intervals count the noise alone, not soft tissue, joint centr
 class Identification:
     """What a session says about a body.
 
-    ``body`` as given, with the table as its SIP; ``sip`` the identified parameters, physically consistent, with their covariance;
+    ``body`` as given, with the table as its SIP; ``sip`` the identified parameters, physically consistent, with their covariance
+    about the true joint centres;
     ``belief`` the Gaussian posterior before the consistency constraint; ``data`` what the trials alone say (whitened, disturbances
     discounted); ``base`` the weighted least-squares estimate of the base parameters; ``noise`` as learned; ``sizes`` of the disturbances;
     ``fit`` what the constraint did; ``trials`` used, ``frames`` coefficients counted; ``known`` every quantity with interval and verdict;
@@ -114,9 +115,10 @@ def conclude(
     belief = posterior(data, before)
     fit = physical_fit(belief, body)
     base = estimate_base(data, structural_base(body))
-    known = knowledge(fit.sip, before)
+    sip = about_true_centres(fit.sip)
+    known = knowledge(sip, about_true_centres(before), belief)
     words = (*(() if found else (NOISE_ALONE,)), *_notes(known, fit))
-    return Identification(body, fit.sip, belief, data, base, noise, sizes, fit, trials, data.frames, known, fit.status, fit.cause, words)
+    return Identification(body, sip, belief, data, base, noise, sizes, fit, trials, data.frames, known, fit.status, fit.cause, words)
 
 
 def standing_point(fits: tuple[Fit, ...]) -> Array:

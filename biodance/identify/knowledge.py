@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from biodance.identify.posterior import Posterior
 from biodance.motion.regressor import PHI_TENSOR
 from biodance.records import Array, Sip
 
@@ -64,20 +65,29 @@ def segment_quantities(phi: Array) -> tuple[Array, Array]:
     return value, slope
 
 
-def knowledge(after: Sip, before: Sip) -> tuple[Known, ...]:
-    """Return all quantities of all segments, in order; ``before`` is the table."""
+def knowledge(after: Sip, before: Sip, belief: Posterior | None = None) -> tuple[Known, ...]:
+    """Return all quantities of all segments, in order.
+
+    ``after`` and ``before`` with covariances about the true joint centres; what the data removed of the variance is judged in the model's
+    frames (``belief`` and its prior, else ``after`` and ``before``), where a misplaced joint centre is no ignorance.
+    """
+    then, first = (belief.covariance, belief.prior.covariance) if belief else (after.covariance, before.covariance)
     rows = []
     for i, segment in enumerate(after.segments):
         cut = slice(10 * i, 10 * i + 10)
         value, slope = segment_quantities(after.phi[cut])
         table, table_slope = segment_quantities(before.phi[cut])
-        sd = np.sqrt(np.diag(slope @ after.covariance[cut, cut] @ slope.T))
-        table_sd = np.sqrt(np.diag(table_slope @ before.covariance[cut, cut] @ table_slope.T))
-        share = np.clip(1 - np.divide(sd**2, table_sd**2, out=np.ones(10), where=table_sd > 0), 0.0, 1.0)
+        sd, table_sd = _deviation(slope, after.covariance[cut, cut]), _deviation(table_slope, before.covariance[cut, cut])
+        left, whole = (_deviation(table_slope, c[cut, cut]) for c in (then, first))
+        share = np.clip(1 - np.divide(left**2, whole**2, out=np.ones(10), where=whole > 0), 0.0, 1.0)
         for k, (quantity, unit) in enumerate(zip(QUANTITIES, UNITS, strict=True)):
             numbers = [float(column[k]) for column in (value, sd, table, table_sd, share)]
             rows.append(Known(segment, quantity, unit, numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], _verdict(numbers[4])))
     return tuple(rows)
+
+
+def _deviation(slope: Array, covariance: Array) -> Array:
+    return np.sqrt(np.maximum(np.diag(slope @ covariance @ slope.T), 0.0))
 
 
 def _verdict(share: float) -> Verdict:
