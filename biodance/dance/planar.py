@@ -1,4 +1,4 @@
-"""The paper's numerical example (III.C, Fig. 4): which criterion excites a planar chain of three links best?
+"""The paper's numerical example (III.C, Fig. 4), which criterion excites a planar chain of three links best.
 
 Six motions of 2 s follow each other; each is designed on top of all before it; cond(W_b) at 50 Hz judges every criterion alike. Four via
 points per joint at equal distances, so 12 variables, as printed. NOT printed, hence chosen here: joint ranges and masses (see
@@ -15,7 +15,7 @@ from biodance.body.planar import PLANAR_CHANNELS, PLANAR_GRAVITY
 from biodance.dance.criteria import criterion
 from biodance.dance.splines import rest_to_rest
 from biodance.dance.target import target
-from biodance.dance.via_points import Excitation, design
+from biodance.dance.via_points import Excitation, design, within_ranges
 from biodance.identify.base_parameters import BaseParameters, base_parameters, parameter_names
 from biodance.motion.kinematics import segment_motion
 from biodance.motion.regressor import regressor_of
@@ -25,8 +25,8 @@ MOTIONS = 6
 DURATION = 2.0
 """s, of one motion."""
 VIA = 4
-DESIGN_RATE, JUDGE_RATE = 25.0, 50.0
-"""Hz: samples that the optimiser sees, and samples on which the result is judged (the paper's)."""
+DESIGN_RATE, JUDGE_RATE, RANGE_RATE = 25.0, 50.0, 1000.0
+"""Hz: samples that the optimiser sees, on which the result is judged (the paper's), and on which the joint ranges must hold."""
 ITERATIONS = 60
 MOVABLE = slice(1, -1)
 
@@ -79,10 +79,11 @@ def seeded_series(body: Body, name: str, *, motions: int = MOTIONS, starts: int 
 def _series(body: Body, name: str, starts: list[list[Array]]) -> Series:
     """Return the best design of each motion, in order; a motion is judged together with all before it."""
     problem, judge = planar_problem(body, name), planar_problem(body, "condition", rate=JUDGE_RATE)
+    ranges = planar_problem(body, name, rate=RANGE_RATE)
     history = judged = np.zeros((problem.target.prior_factor.shape[0],) * 2)
     points, condition = [], []
     for tries in starts:
-        found = [design(problem, start, history, movable=MOVABLE, iterations=ITERATIONS) for start in tries]
+        found = [within_ranges(ranges, design(problem, start, history, movable=MOVABLE, iterations=ITERATIONS)) for start in tries]
         best = min(found, key=lambda p: problem.criterion(problem.extend(history, p), problem.target)[0])
         history, judged = problem.extend(history, best), judge.extend(judged, best)
         points.append(best)
