@@ -32,9 +32,9 @@ class PlateRecording:
 
     ``type`` 1, 2, 3 or 4 (C3D force platform TYPE); ``corners`` (4, 3) m in the lab frame, in the order of the standard (+x+y, -x+y, -x-y,
     +x-y of the plate frame); ``origin`` (3,) m in the plate frame: TYPE 1, 2, 4 from the sensor's origin to the centre of the surface,
-    TYPE 3 half the sensor distances and the depth; ``channels`` (S, C): TYPE 1 Fx Fy Fz N, Px Py m, Mz N·m; TYPE 2 Fx Fy Fz N, Mx My Mz N·m; TYPE 3
-    Fx12 Fx34 Fy14 Fy23 Fz1..4 N; TYPE 4 six V. Signs are stored as given. ``calibration`` (6, 6), TYPE 4 only: F = calibration @ V, three
-    rows of N/V and three of N·m/V. ``labels`` of the channels; without any, ``Fx1`` and so on.
+    TYPE 3 half the sensor distances and the depth; ``channels`` (S, C): TYPE 1 Fx Fy Fz N, Px Py m, Mz N·m; TYPE 2 Fx Fy Fz N, Mx My Mz
+    N·m; TYPE 3 Fx12 Fx34 Fy14 Fy23 Fz1..4 N; TYPE 4 six V. Signs are stored as given. ``calibration`` (6, 6), TYPE 4 only: F =
+    calibration @ V, three rows of N/V and three of N·m/V. ``labels`` of the channels; without any, ``Fx1`` and so on.
     """
 
     type: int
@@ -74,10 +74,10 @@ def write_c3d(
     first_frame: int = 1,
     prefix: str = "",
 ) -> None:
-    """Write markers (lab frame, m, NaN = not seen) and plates as a C3D file that ezc3d, c3d and ``read_c3d`` read back to float32 precision.
+    """Write markers (lab frame, m, NaN = not seen) and plates as a C3D file that all readers give back to float32 precision.
 
-    ``analog_rate`` Hz is a whole multiple of the markers' rate; ``markers=None`` writes plates alone. A single frame has no rate of its own:
-    it takes ``analog_rate`` over its samples. ``prefix`` is put before every label
+    ``analog_rate`` Hz is a whole multiple of the markers' rate; ``markers=None`` writes plates alone. A single frame has no rate of its
+    own: it takes ``analog_rate`` over its samples. ``prefix`` is put before every label
     (``Subject:``). ``parameters[GROUP][NAME]`` are added as they stand, in the units of the file (PROCESSING: Bodymass kg, Height mm), and
     overrule what this function would write, for example ``{"FORCE_PLATFORM": {"ZERO": [1, 100]}}``.
 

@@ -7,9 +7,9 @@ from scipy.special import logsumexp
 
 from biodance.body.body import UPRIGHT
 from biodance.motion.kinematics import axis_rotation
+from biodance.motion.legs import LEG, Leg, soft_limit
 from biodance.records import Array
 from biodance.virtual_lab.choreography import SIDES, Curves
-from biodance.motion.legs import LEG, Leg, soft_limit
 from biodance.virtual_lab.person import Person
 from biodance.virtual_lab.randomness import smooth_noise
 from biodance.virtual_lab.tolerances import Tolerances
