@@ -146,7 +146,7 @@ def table(rows: dict[str, list[Score | str]]) -> str:
     for label, all_scores in rows.items():
         scores = [s for s in all_scores if isinstance(s, Score)]
         if not scores:
-            lines.append(f"| {label} | no answer: {all_scores[0]} |||||||||")
+            lines.append(f"| {label} | no answer: {all_scores[0]}" + " | –" * 7 + " |")
             continue
         of = {name: np.array([getattr(s, name) for s in scores]) for name in Score.__dataclass_fields__}
         middle = [float(np.median(of[name])) for name in ("com", "inertia", "force", "moment")]

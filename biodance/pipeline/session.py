@@ -109,7 +109,6 @@ def identified(result: SessionResult) -> SessionIdentification:
     said = [step.text for step in result.steps if step.name in ("subject", "identify") and step.status != "done"]
     fits = [trial for trial in result.trials if trial.trial.role == "fit"]
     reasons = " ".join(dict.fromkeys([*said, *(reason for trial in fits for reason in trial.reasons)]))
-    why = (
-        "no trial to fit has motion and fully measured ground contact." if fits else "no trial has the role fit; set roles in session.toml."
-    )
+    none = "no trial has the role fit. Set roles in session.toml."
+    why = "no trial to fit has motion and fully measured ground contact." if fits else none
     raise SessionRefused(f"{folder}: nothing can be identified, {why} {reasons}".strip())

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-LIGHT = 8.0
+LIGHT = 5.0
 """kg: segments below are drawn in an axes of their own, or their intervals could not be seen beside the trunk's."""
 
 

@@ -12,6 +12,8 @@ from biodance.report.validation_figure import validation_figure
 from biodance.report.wording import millimetres, number
 
 MARKS = {"known": "●", "partly known": "◐", "cannot be known": "○"}
+LISTED = "Cannot be known"
+"""Start of the note whose content the page shows as a table."""
 UNITS = ("N",) * 3 + ("N·m",) * 3
 
 
@@ -37,7 +39,7 @@ def identification_section(found: SessionIdentification) -> str:
     shown = found.validations or found.fitted[:1]
     return environment.from_string(template).render(
         one=one,
-        notes=found.notes,
+        notes=[note for note in found.notes if not note.startswith(LISTED)],
         forest=svg_address(forest_figure(one)),
         segments=[(name, known, information(known)) for name, known in rows],
         quantities=QUANTITIES,

@@ -1,0 +1,95 @@
+"""The commands identify and export: files, JSON, exit codes, nothing overwritten; the session comes from memory, not from disk."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from identified_sessions import body, session_result
+
+from biodance.body.export.csv import read_sip
+from biodance.cli import DONE, NEEDS_A_PERSON, NOT_DONE, run
+from biodance.lab.mot import read_mot
+from biodance.pipeline.export import legal_formats
+
+
+@pytest.fixture
+def lab(monkeypatch, tmp_path):
+    """Let folder names stand for sessions: ``S01`` and ``bare`` unloaded, ``idle`` without a trial to fit."""
+    results = {"S01": session_result(), "bare": session_result(), "idle": session_result(roles=("validate",))}
+    for name in results:
+        (tmp_path / name).mkdir()
+    for room in ("biodance.lab.session", "biodance.pipeline.export"):
+        monkeypatch.setattr(f"{room}.read_session", lambda folder, **_: replace(results[folder.name].session, folder=folder))
+    for room in ("biodance.pipeline.session", "biodance.pipeline.export"):
+        monkeypatch.setattr(f"{room}.examine", lambda session, **_: results[session.folder.name])
+    return tmp_path
+
+
+@pytest.fixture
+def no_page(monkeypatch):
+    """Spare the drawing of the page."""
+    monkeypatch.setattr("biodance.report.write.page", lambda *_, **__: "a page")
+
+
+def test_identify_writes_page_numbers_and_body(lab, no_page, capsys):
+    code = run(["identify", str(lab / "S01"), "--out", str(lab / "out"), "--json"])
+    told = json.loads(capsys.readouterr().out)
+    assert code == NEEDS_A_PERSON
+    assert sorted(path.name for path in (lab / "out").iterdir()) == ["body.json", "report.html", "results.json"]
+    assert told == json.loads((lab / "out" / "results.json").read_text())
+    assert told["status"] == "solved"
+    assert run(["identify", str(lab / "S01"), "--out", str(lab / "out")]) == NOT_DONE
+    assert "--force" in capsys.readouterr().err
+    assert run(["identify", str(lab / "S01"), "--out", str(lab / "out"), "--force", "--reference", str(lab / "bare")]) == NEEDS_A_PERSON
+    assert "trunk_head" in capsys.readouterr().out
+
+
+def test_nothing_to_identify_is_one_sentence(lab, capsys):
+    assert run(["identify", str(lab / "idle"), "--out", str(lab / "out")]) == NOT_DONE
+    sentence = capsys.readouterr().err
+    assert "role fit" in sentence
+    assert "Traceback" not in sentence
+
+
+@pytest.mark.parametrize("format", [f for f in legal_formats() if f not in ("trc", "mot")])
+def test_the_identified_body_is_exported_from_session_and_from_results(format, lab, no_page, capsys):
+    run(["identify", str(lab / "S01"), "--out", str(lab / "out")])
+    files = [lab / f"{name}.{format}" for name in ("S01", "out")]
+    for file in files:
+        assert run(["export", str(lab / file.stem), "--format", format, "--out", str(file)]) == DONE
+    assert files[0].read_text() == files[1].read_text()
+    assert "identified from fit_0" in capsys.readouterr().err
+    if format == "csv":
+        assert np.array_equal(read_sip(files[0]).phi, session_result().identification.identification.sip.phi)
+
+
+def test_without_identification_the_table_is_exported_and_that_is_said(lab, capsys):
+    assert run(["export", str(lab / "idle"), "--format", "csv", "--out", str(lab / "a.csv")]) == DONE
+    assert "nothing identified" in capsys.readouterr().err
+    assert np.array_equal(read_sip(lab / "a.csv").phi, body().sip.phi)
+
+
+def test_motion_is_exported_by_trial(lab, capsys):
+    out = lab / "a.mot"
+    assert run(["export", str(lab / "S01"), "--format", "mot", "--out", str(out)]) == NOT_DONE
+    assert "--trial" in capsys.readouterr().err
+    assert run(["export", str(lab / "S01"), "--format", "mot", "--trial", "walk", "--out", str(out)]) == NOT_DONE
+    assert "Legal: fit_0, validate_1" in capsys.readouterr().err
+    assert run(["export", str(lab / "S01"), "--format", "mot", "--trial", "fit_0", "--out", str(out)]) == DONE
+    swung = read_mot(out)["left_knee_flexion"]
+    assert swung == pytest.approx(session_result().trials[0].motion.q[:, 7 + body().joint_index("left_knee_flexion")], abs=1e-8)
+    assert run(["export", str(lab / "S01"), "--format", "trc", "--trial", "fit_0", "--out", str(lab / "a.trc")]) == NOT_DONE
+    assert "no markers" in capsys.readouterr().err
+
+
+def test_an_existing_file_is_replaced_only_by_force_and_only_by_a_whole_one(lab, capsys):
+    out = lab / "a.urdf"
+    out.write_text("old")
+    assert run(["export", str(lab / "S01"), "--format", "urdf", "--out", str(out)]) == NOT_DONE
+    assert run(["export", str(lab / "S01"), "--format", "obj", "--out", str(out), "--force"]) == NOT_DONE
+    assert "Legal: biomod, csv" in capsys.readouterr().err
+    assert out.read_text() == "old"
+    assert run(["export", str(lab / "S01"), "--format", "urdf", "--out", str(out), "--force"]) == DONE
+    assert out.read_text().startswith("<?xml")
+    assert [path.name for path in lab.glob(".*")] == []

@@ -1,0 +1,116 @@
+"""Identification in the pipeline, its numbers for programs and its pages, on a session whose truth is known."""
+
+import json
+
+import numpy as np
+import pytest
+from identified_sessions import body, session_result, truth
+
+from biodance.errors import SessionRefused, TrialRefused
+from biodance.pipeline.identification import can_identify, identify_trials
+from biodance.pipeline.provenance import provenance
+from biodance.pipeline.session import identified
+from biodance.report.identification_json import identification_document
+from biodance.report.identification_page import identification_section
+from biodance.report.page import page
+from biodance.report.results_json import document, plain, to_text
+
+
+@pytest.fixture(scope="module")
+def found():
+    return session_result().identification
+
+
+@pytest.fixture(scope="module")
+def numbers(found):
+    return json.loads(to_text(identification_document(found)))
+
+
+def test_the_masses_come_nearer_to_the_truth_and_the_kept_trial_shows_it(found):
+    right, table = truth()[::10], body().sip.mass
+    assert np.linalg.norm(found.identification.sip.mass - right) < 0.5 * np.linalg.norm(table - right)
+    assert [trial.name for trial in found.validations] == ["validate_1"]
+    assert [trial.name for trial in found.fitted] == ["fit_0"]
+    assert found.gain.force_interval[0] > 1
+    assert found.gain.moment_interval[0] > 1
+    assert set(found.agreements) == {"fit_0", "validate_1"}
+    assert not found.search.found
+
+
+def test_the_document_has_the_keys_that_programs_rely_on(numbers, found):
+    assert numbers["status"] == "solved"
+    assert [row["name"] for row in numbers["segments"]] == list(body().segments)
+    for row in numbers["segments"]:
+        assert {"mass_kg", "mass_sd_kg", "mass_prior_kg", "com_m", "com_sd_m", "inertia_kgm2", "information"} <= set(row)
+        assert [len(row[key]) for key in ("com_m", "com_sd_m", "inertia_kgm2")] == [3, 3, 6]
+        assert 0 <= row["information"] <= 1
+    assert set(numbers["base_parameters"]) == {"count", "well_known", "rank"}
+    assert numbers["base_parameters"]["count"] == 101
+    (trial,) = numbers["validation"]
+    assert trial["trial"] == "validate_1"
+    assert [len(trial[who][key]) for who in ("table", "identified") for key in ("rms", "cc")] == [6] * 4
+    assert numbers["added_mass"] is None
+    assert sum(row["mass_kg"] for row in numbers["segments"]) == pytest.approx(found.identification.sip.mass.sum())
+
+
+def test_inertia_in_the_document_is_about_the_centre_of_mass(numbers, found):
+    from biodance.body.inertia import lump_of
+
+    lump = lump_of(found.identification.sip.of("left_thigh"))
+    row = numbers["segments"][body().segment_index("left_thigh")]
+    assert row["inertia_kgm2"] == pytest.approx(lump.inertia[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]], rel=1e-9)
+    assert row["com_m"] == pytest.approx(lump.com, rel=1e-9)
+
+
+def test_a_load_is_found_against_the_unloaded_session():
+    loaded, bare = session_result(load=1.5, seed=5), session_result()
+    search = identify_trials(body(), loaded.trials, reference=bare.identification.identification).search
+    assert search.found
+    assert search.best.segment == "left_forearm_hand"
+    assert search.best.interval[0] < 1.5 < search.best.interval[1]
+    told = identification_document(loaded.identification)["added_mass_search"]["segments"]
+    assert {row["segment"] for row in told} == set(body().segments)
+
+
+def test_without_a_kept_trial_the_gain_is_not_claimed(monkeypatch):
+    monkeypatch.setattr("biodance.report.identification_page.svg_address", lambda _: "data:,")
+    alone = session_result(roles=("fit",)).identification
+    assert alone.gain is None
+    assert any("not proven" in note for note in alone.notes)
+    assert "fit_0" in identification_section(alone)
+
+
+def test_nothing_to_fit_is_refused_with_what_to_do():
+    result = session_result(roles=("validate",))
+    assert not can_identify(result.trials)
+    with pytest.raises(TrialRefused, match="role fit"):
+        identify_trials(body(), result.trials)
+    with pytest.raises(SessionRefused, match=r"session\.toml"):
+        identified(result)
+
+
+def test_the_section_shows_every_segment(found):
+    text = identification_section(found)
+    assert all(f'<th scope="row">{name.replace("_", " ")}</th>' in text for name in body().segments)
+    assert text.count("<img ") == 2
+    for word in ("validate_1", "From the data", "cannot be known", "No load is found beyond the table"):
+        assert word in text
+
+
+@pytest.mark.parametrize("roles", [("fit", "validate"), ("validate",)])
+def test_the_report_holds_identification_where_there_is_one(roles, monkeypatch):
+    monkeypatch.setattr("biodance.report.page.svg_address", lambda _: "data:,")
+    monkeypatch.setattr("biodance.report.page.identification_section", lambda _: "<p>What it weighs</p>")
+    result, there = session_result(roles=roles), "fit" in roles
+    made = provenance(result, created="2026-01-01T00:00:00Z")
+    told = plain(document(result, made))
+    assert (told["identification"] is not None) is there
+    assert ("<p>What it weighs</p>" in page(result, made)) is there
+    assert all((trial["wrench"]["identified"] is not None) is there for trial in told["trials"])
+
+
+def test_a_load_on_the_page_has_segment_size_and_interval(monkeypatch):
+    monkeypatch.setattr("biodance.report.identification_page.svg_address", lambda _: "data:,")
+    text = identification_section(session_result(load=2.4, seed=5).identification)
+    assert "carries <strong>" in text
+    assert "kg on the left forearm hand</strong>" in text
