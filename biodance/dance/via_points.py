@@ -47,8 +47,9 @@ class Excitation:
 
     def rows(self, q: Array, v: Array, a: Array) -> Array:
         """Return W (..., channels, 10N) at the states ``q``, ``v``, ``a`` (..., joints)."""
-        flat = [state.reshape(-1, state.shape[-1]) for state in (q, v, a)]
-        W = regressor_of(segment_motion(self.body, Motion(np.arange(len(flat[0]), dtype=float), *flat)), gravity=self.gravity)
+        q_rows, v_rows, a_rows = (state.reshape(-1, state.shape[-1]) for state in (q, v, a))
+        motion = Motion(np.arange(len(q_rows), dtype=float), q_rows, v_rows, a_rows)
+        W = regressor_of(segment_motion(self.body, motion), gravity=self.gravity)
         return W[:, list(self.channels)].reshape(*q.shape[:-1], len(self.channels), -1)
 
     def regressor(self, points: Array) -> Array:
