@@ -15,7 +15,7 @@ from biodance.errors import BiodanceError, TrialRefused
 from biodance.motion.determination import determination
 from biodance.motion.marker_problem import MarkerProblem, descend, distances, marker_problem, points
 from biodance.motion.newton import Minimum
-from biodance.motion.search import between, search
+from biodance.motion.search import between, from_guess, search
 from biodance.motion.tree import Index
 from biodance.records import Array, Markers
 
@@ -51,7 +51,8 @@ class InverseKinematics:
 def solve_ik(body: Body, markers: Markers, *, guess: Array | None = None, tolerance: float = 1e-7) -> InverseKinematics:
     """Return the posture of ``body`` in every frame of ``markers``, matched by name; a hidden marker (NaN) has no weight in its frame.
 
-    ``guess`` (T, nq) replaces the search for a start; ``tolerance`` (m) is the largest ``slope`` of a solved frame.
+    ``guess`` (T, nq) replaces the search for a start (a root that is far off is put right first); ``tolerance`` (m) is the largest
+    ``slope`` of a solved frame.
 
     Raises
     ------
@@ -66,7 +67,7 @@ def solve_ik(body: Body, markers: Markers, *, guess: Array | None = None, tolera
         raise TrialRefused(_too_few(body, chosen, verdict.open_coordinates))
     problem = marker_problem(body, columns, chosen.xyz, tolerance=tolerance)
     own, open_frames = np.flatnonzero(verdict.determined), np.flatnonzero(~verdict.determined)
-    found = search(problem, own) if guess is None else descend(problem, own, _checked(guess, body, chosen).T[:, own])
+    found = search(problem, own) if guess is None else from_guess(problem, own, _checked(guess, body, chosen).T[:, own])
     leaning = _lean(problem, own, found, open_frames)
     order = np.argsort(np.concatenate([own, open_frames]), kind="stable")
     q, slope, steps = (

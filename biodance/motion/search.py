@@ -11,9 +11,10 @@ from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import median_filter
 
 from biodance.motion.chart import Chart
+from biodance.motion.marker_moments import fit
 from biodance.motion.marker_problem import MarkerProblem, better, descend
 from biodance.motion.newton import Minimum
-from biodance.motion.starts import start
+from biodance.motion.starts import placed, start
 from biodance.motion.tree import Index
 from biodance.records import Array
 
@@ -24,7 +25,10 @@ SHARES = (0.5, None)
 """First guesses of the angles, as shares of their range (None: zero): a bent body finds straight limbs more often than the reverse."""
 
 MORE_SHARES = (0.25, 0.75)
-"""Further guesses for doubtful frames."""
+"""Further guesses for doubtful frames, and for all first frames of a short trial."""
+
+SHORT = 640
+"""Frames below which a trial is short: it has too few neighbours to correct a frame that started wrongly."""
 
 NEIGHBOURS = 11
 """Frames whose median fit a frame is compared with."""
@@ -41,7 +45,7 @@ def search(problem: MarkerProblem, frames: Index) -> Minimum:
     for stride in STRIDES:
         level = np.setdiff1d(np.append(np.arange(0, count, stride), count - 1), known)
         if not known.size:
-            found = from_markers(problem, frames[level], SHARES)
+            found = from_markers(problem, frames[level], SHARES if count > SHORT else (*SHARES, *MORE_SHARES))
         elif level.size:
             found = descend(problem, frames[level], between(problem.chart, frames[known], out.q[:, known], frames[level]))
         else:
@@ -62,6 +66,18 @@ def from_markers(problem: MarkerProblem, frames: Index, shares: tuple[float | No
         q[: min(problem.tree.n_root, 3)] += origin[: min(problem.tree.n_root, 3)]
         found.append(descend(problem, frames, q))
     return reduce(better, found)
+
+
+def from_guess(problem: MarkerProblem, frames: Index, guess: Array) -> Minimum:
+    """Return the minima reached from the postures ``guess`` (nq, F), each root first put where the markers say if that is nearer."""
+    measured, origin = problem.measured(frames)
+    r, angles = min(problem.tree.n_root, 3), guess[len(guess) - problem.tree.joints :]
+    own, moved = guess.copy(), placed(problem.tree, measured, angles)
+    own[:r] -= origin[:r]
+    nearer = fit(problem.tree, measured, moved).cost < fit(problem.tree, measured, own).cost
+    start = np.where(nearer, moved, own)
+    start[:r] += origin[:r]
+    return retry(problem, frames, descend(problem, frames, start))
 
 
 def retry(problem: MarkerProblem, frames: Index, found: Minimum) -> Minimum:

@@ -20,10 +20,10 @@ def start(tree: Tree, measured: Measured, *, share: float | None = None) -> Arra
     if share is not None:
         bounded = np.isfinite(tree.lower) & np.isfinite(tree.upper)
         angles = np.where(bounded, (1 - share) * np.where(bounded, tree.lower, 0) + share * np.where(bounded, tree.upper, 0), angles)
-    return _placed(tree, measured, np.repeat(angles, measured.square.size, axis=1))
+    return placed(tree, measured, np.repeat(angles, measured.square.size, axis=1))
 
 
-def _placed(tree: Tree, measured: Measured, angles: Array) -> Array:
+def placed(tree: Tree, measured: Measured, angles: Array) -> Array:
     """Return q with the root's pose that fits the body, rigid at ``angles``, best to its markers: the root segment's before all others."""
     if not tree.n_root:
         return angles
