@@ -1,0 +1,30 @@
+"""Every example runs alone, says something and makes one figure."""
+
+import runpy
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("[0-9]*.py"))
+SHORTEST, LONGEST = 5, 60
+
+
+def test_there_are_examples_and_they_are_short() -> None:
+    assert len(EXAMPLES) >= 6
+    for path in EXAMPLES:
+        assert SHORTEST < len(path.read_text().splitlines()) <= LONGEST, path.name
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_example_runs_alone_and_makes_one_figure(
+    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [str(path)])
+    runpy.run_path(str(path), run_name="__main__")
+    made = [found for found in tmp_path.iterdir() if found.is_file()]
+    assert [found.name for found in made] == [f"{path.stem}.png"]
+    assert made[0].read_bytes().startswith(b"\x89PNG")
+    assert made[0].stat().st_size > 5000
+    assert len(capsys.readouterr().out.splitlines()) >= 2
