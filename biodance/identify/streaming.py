@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, TrialRefused
+from biodance.identify.caution import widened
 from biodance.identify.identification import Identification, conclude
 from biodance.identify.knowledge import Known, knowledge
 from biodance.identify.learning import learn
@@ -86,8 +87,8 @@ class Stream:
         found = self.statistics
         if not found.count.any():
             raise TrialRefused("No frame of this stream could be used yet: ground contact not measured, or markers hidden.")
-        _, belief = learn(found, self.body.sip)
-        known = knowledge(belief.sip, self.body.sip)
+        before = widened(self.body.sip)
+        known = knowledge(learn(found, before)[1].sip, before)
         verdicts = {
             name: [k.verdict == "known" for k in known if k.segment == name and k.quantity in ENOUGH] for name in self.body.segments
         }
@@ -100,7 +101,7 @@ class Stream:
         intervals count the noise alone, and the notes say so.
         """
         found = self.statistics
-        noise, _ = learn(found, self.body.sip)
+        noise, _ = learn(found, widened(self.body.sip))
         disturbed = mismatch(self.body, fits, noise) if fits else None
         return conclude(self.body, found, tuple(fit.name for fit in fits) or ("stream",), noise=noise, found=disturbed)
 
