@@ -84,7 +84,8 @@ def test_a_joint_beyond_its_limit_stays_at_it_and_the_rest_is_optimal():
     q[:, 7:] = np.where(beyond, WOMAN.limits.upper + 0.3, q[:, 7:])
     found = solve_ik(WOMAN, markers_of(WOMAN, q))
     angles = found.q[:, 7:]
-    assert (angles >= WOMAN.limits.lower).all() and (angles <= WOMAN.limits.upper).all()
+    assert (angles >= WOMAN.limits.lower).all()
+    assert (angles <= WOMAN.limits.upper).all()
     assert (np.broadcast_to(WOMAN.limits.upper, beyond.shape)[beyond] == angles[beyond]).all()
     for frame in range(6):
         near = found.q[frame] + np.concatenate([np.zeros(7), rng.uniform(-0.05, 0.05, len(WOMAN.joints))])
@@ -94,7 +95,7 @@ def test_a_joint_beyond_its_limit_stays_at_it_and_the_rest_is_optimal():
 
 
 def test_a_hidden_marker_has_no_influence():
-    q, markers = noisy_dance(60, seed=5)
+    _, markers = noisy_dance(60, seed=5)
     xyz = markers.xyz.copy()
     gone = [markers.names.index(name) for name in ("LKNE", "RELB", "C7")]
     xyz[:, gone] = np.nan
@@ -163,7 +164,8 @@ def test_a_frame_with_too_few_markers_leans_on_its_neighbours():
     xyz[10:14, legless], xyz[30], xyz[59, 3:] = np.nan, np.nan, np.nan
     found = solve_ik(WOMAN, replace(markers, xyz=xyz))
     leaning = np.isin(np.arange(60), [10, 11, 12, 13, 30, 59])
-    assert (found.status[leaning] == FrameStatus.LEANING).all() and (found.status[~leaning] == FrameStatus.SOLVED).all()
+    assert (found.status[leaning] == FrameStatus.LEANING).all()
+    assert (found.status[~leaning] == FrameStatus.SOLVED).all()
     assert np.isfinite(found.q).all()
     assert (np.isnan(found.residual) == np.isnan(xyz).any(axis=2)).all()
     assert apart(found.q, q, 6)[[10, 11, 12, 13, 30]].max() < 0.5  # near the truth, which the neighbours tell
@@ -187,7 +189,7 @@ def test_a_guess_that_does_not_fit_is_refused(guess):
 
 
 def test_one_frame_is_enough():
-    q, markers = noisy_dance(8, seed=15)
+    _, markers = noisy_dance(8, seed=15)
     together = solve_ik(WOMAN, markers)
     for frame in range(8):
         alone = solve_ik(WOMAN, Markers(markers.names, [0.0], markers.xyz[frame : frame + 1]))
