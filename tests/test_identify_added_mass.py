@@ -1,0 +1,67 @@
+"""Added mass on bodies whose load is known: which segment, how heavy, where, how sure, and silence without a load."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from identify_trials import noisy_fit, person, smooth_motion
+
+from biodance.identify.added_mass import added_mass, load_moments, point_mass, surprised
+from biodance.identify.identification import Identification, identify
+
+PLACE = np.array([0.15, -0.2, 0.2])
+
+
+def visits(seed: int, *, segment: int | None = None, mass: float = 2.0, frames: int = 1200) -> tuple[Identification, Identification]:
+    """Return a session without and one with a load on a segment (None: both without)."""
+    body, truth, rng = person(seed)
+    body = replace(body, boxes=np.tile([[-0.3] * 3, [0.3] * 3], (4, 1, 1)))
+    loaded = truth.copy()
+    if segment is not None:
+        loaded[10 * segment : 10 * segment + 10] += mass * point_mass(PLACE)
+    first, second = (identify(body, (noisy_fit(body, smooth_motion(body, rng, frames=frames), phi, rng),)) for phi in (truth, loaded))
+    return first, second
+
+
+@pytest.mark.parametrize("segment", [1, 2, 3])
+def test_a_load_is_found_where_it_is(segment: int) -> None:
+    before, after = visits(segment, segment=segment)
+    found = added_mass(after, reference=before)
+    assert found.found
+    assert found.best.segment == f"s{segment}"
+    assert found.best.interval[0] < 2.0 < found.best.interval[1]
+    assert found.best.mass == pytest.approx(2.0, abs=0.3)
+    assert np.all(np.abs(found.best.place - PLACE) < 4 * found.best.place_sd + 0.02)
+    assert sum(s.probability for s in found.suspects) + found.p_no_load == pytest.approx(1.0)
+    assert found.set[0] == found.best.segment
+
+
+def test_without_a_load_nothing_is_announced() -> None:
+    for seed in range(4):
+        before, after = visits(10 + seed)
+        found = added_mass(after, reference=before)
+        assert not found.found
+        assert found.p_no_load > 0.5
+        assert added_mass(after).reference == "the table"
+
+
+def test_the_smallest_load_is_smaller_with_a_reference() -> None:
+    before, after = visits(20)
+    with_reference = {s.segment: s.smallest for s in added_mass(after, reference=before).suspects}
+    alone = {s.segment: s.smallest for s in added_mass(after).suspects}
+    assert all(0 < with_reference[s] < alone[s] for s in alone)
+
+
+def test_surprise_has_unit_variance_when_nothing_was_added() -> None:
+    values = []
+    for seed in range(6):
+        _, after = visits(30 + seed, frames=600)
+        values.append(surprised(after.data, after.belief.prior)[1][:20])
+    assert np.sqrt(np.mean(np.square(values))) < 1.3
+
+
+def test_point_mass_and_its_moments() -> None:
+    np.testing.assert_allclose(point_mass(np.array([0.0, 2.0, 0.0]), 0.0), [1, 0, 2, 0, 4, 0, 0, 0, 0, 4])
+    U = load_moments(person(0)[0], 1)
+    assert U.shape[0] == 10
+    assert np.sqrt((U @ U.T)[0, 0]) == pytest.approx(2.0)

@@ -1,0 +1,159 @@
+"""Identification of whole sessions, knowledge, comparison and validation, on bodies whose truth is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from identify_trials import noisy_fit, person, smooth_motion
+
+from biodance.errors import BiodanceError, TrialRefused
+from biodance.identify.caution import about_true_centres, widened
+from biodance.identify.identification import NOISE_ALONE, conclude, identify, standing_point
+from biodance.identify.knowledge import knowledge, segment_quantities
+from biodance.identify.learning import learn
+from biodance.identify.physical import pseudo_inertia, smallest_eigenvalues
+from biodance.identify.sessions import differences
+from biodance.identify.statistics import layout_for, statistics
+from biodance.identify.validation import gain, validate
+from biodance.motion.regressor import predict_wrench
+from biodance.records import Motion, Sip, Wrench
+
+
+def session(seed: int, *, frames: int = 1500):
+    body, truth, rng = person(seed)
+    return body, truth, (noisy_fit(body, smooth_motion(body, rng, frames=frames), truth, rng),)
+
+
+def test_identify_beats_the_table_and_stays_possible() -> None:
+    before, after = [], []
+    for seed in range(3):
+        body, truth, fits = session(seed)
+        found = identify(body, fits)
+        assert found.status == "solved"
+        assert found.cause == ""
+        assert np.all(smallest_eigenvalues(found.sip.phi) >= 0)
+        before.append(np.abs(body.sip.phi - truth)[::10].mean())
+        after.append(np.abs(found.sip.phi - truth)[::10].mean())
+        assert found.identified.sip is found.sip
+    assert np.mean(after) < 0.8 * np.mean(before)
+
+
+def test_intervals_of_a_session_cover_the_truth() -> None:
+    inside = []
+    for seed in range(4):
+        body, truth, fits = session(seed, frames=800)
+        found = identify(body, fits)
+        inside.append(np.abs(found.sip.phi - truth) < 1.96 * np.sqrt(np.diag(found.sip.covariance)))
+    assert np.mean(inside) > 0.9
+
+
+def test_a_body_at_rest_cannot_be_known() -> None:
+    body, truth, rng = person(5)
+    frames = 1500
+    still = Motion(np.arange(frames) / 100, np.tile(body.neutral, (frames, 1)), *np.zeros((2, frames, body.nv)))
+    found = identify(body, (noisy_fit(body, still, truth, rng),))
+    inertias = [k for k in found.known if k.quantity.startswith("I")]
+    assert all(k.verdict == "cannot be known" for k in inertias)
+    assert min(k.sd / k.table_sd for k in inertias) > 0.7
+    assert any("Cannot be known from this session" in note for note in found.notes)
+
+
+def test_statistics_alone_say_that_their_intervals_are_short() -> None:
+    body, _, fits = session(1, frames=600)
+    layout = layout_for(standing_point(fits))
+    found = conclude(body, statistics(body, fits[0], layout), ("t",))
+    assert NOISE_ALONE in found.notes
+
+
+def test_a_session_without_usable_frames_is_refused() -> None:
+    body, _, fits = session(2, frames=300)
+    blind = replace(fits[0], use=np.zeros(300, dtype=bool))
+    with pytest.raises(TrialRefused, match="None of 1 trials"):
+        identify(body, (blind,))
+    assert "Left out" in identify(body, (fits[0], replace(blind, name="blind"))).notes[0]
+
+
+def test_quantities_and_their_slope() -> None:
+    body, _, _ = person(3)
+    phi = np.array(body.sip.phi[:10])
+    value, slope = segment_quantities(phi)
+    step = 1e-6
+    numeric = np.array([(segment_quantities(phi + step * e)[0] - segment_quantities(phi - step * e)[0]) / (2 * step) for e in np.eye(10)]).T
+    np.testing.assert_allclose(slope, numeric, rtol=1e-5, atol=1e-7)
+    np.testing.assert_allclose(value[1:4], phi[1:4] / phi[0])
+    rows = knowledge(body.sip, body.sip)
+    assert len(rows) == 40
+    assert all(row.verdict == "cannot be known" and row.from_data == 0 for row in rows)
+
+
+def test_caution_widens_without_moving_or_breaking_the_scale() -> None:
+    body, _, _ = person(4, spread=0.05)
+    for change in (widened, about_true_centres):
+        wide = change(body.sip)
+        np.testing.assert_array_equal(wide.phi, body.sip.phi)
+        extra = wide.covariance - body.sip.covariance
+        if change is about_true_centres:
+            assert np.linalg.eigvalsh(extra).min() > -1e-12
+        assert np.linalg.eigvalsh(wide.covariance).min() > -1e-12
+    pinned = np.array(body.sip.covariance)
+    total = np.tile(np.eye(10)[0], 4)
+    g = pinned @ total
+    pinned -= np.outer(g, g) / (total @ g + 0.01**2)
+    wide = widened(Sip(body.segments, body.sip.phi, pinned))
+    assert np.sqrt(total @ wide.covariance @ total) < 0.25
+    assert np.all(np.diag(wide.covariance)[::10] > np.diag(pinned)[::10])
+
+
+def test_a_turned_frame_and_a_shifted_centre_to_first_order() -> None:
+    from scipy.spatial.transform import Rotation
+
+    from biodance.identify.caution import _shift_slope, _turn_slope
+    from biodance.virtual_lab.flesh import of_parameters, parameters, placed
+
+    phi = np.array(person(6)[0].sip.phi[:10])
+    J, step = of_parameters(phi), 1e-6
+    turn = [(parameters(placed(J, Rotation.from_rotvec(step * e).as_matrix(), np.zeros(3))) - phi) / step for e in np.eye(3)]
+    shift = [(parameters(placed(J, np.eye(3), step * e)) - phi) / step for e in np.eye(3)]
+    np.testing.assert_allclose(_turn_slope(phi), np.array(turn).T, atol=1e-4)
+    np.testing.assert_allclose(_shift_slope(phi), np.array(shift).T, atol=1e-4)
+    np.testing.assert_allclose(pseudo_inertia(phi)[0], J, atol=1e-12)
+
+
+def test_equal_sessions_do_not_differ() -> None:
+    body, truth, rng = person(7)
+    first, second = (identify(body, (noisy_fit(body, smooth_motion(body, rng, frames=1000), truth, rng),)) for _ in range(2))
+    rows = differences(first, second)
+    assert len(rows) == 40
+    z = np.array([row.value / row.sd for row in rows if row.quantity in ("mass", "com x", "com y", "com z")])
+    assert np.mean(np.abs(z) < 1.96) > 0.9
+    assert all(row.value == 0 and row.p == 1 for row in differences(first, first))
+    changed = truth.copy()
+    changed[10:20] *= 1.5
+    third = identify(body, (noisy_fit(body, smooth_motion(body, rng, frames=1000), changed, rng),))
+    clear = min(differences(first, third), key=lambda row: row.p)
+    assert clear.segment == "s1"
+    assert clear.p < 1e-4
+
+
+def test_gain_has_the_known_ratio_in_its_interval() -> None:
+    body, truth, rng = person(8)
+    fit = noisy_fit(body, smooth_motion(body, rng, frames=2000), truth, rng, size=0.0)
+    table = predict_wrench(body, fit.motion).value - fit.wrench.value
+    halved = Wrench(fit.motion.time, predict_wrench(body, fit.motion).value - 2 * table)
+    half = replace(fit, wrench=halved)
+    assert half.wrench.value.shape == fit.wrench.value.shape
+    true_body = replace(body, sip=Sip(body.segments, truth, body.sip.covariance))
+    result = gain((validate(body, true_body, half, about=np.zeros(3)),))
+    assert result.force == pytest.approx(2.0)
+    assert result.moment == pytest.approx(2.0)
+    assert result.force_interval[0] <= 2.0 + 1e-9
+    assert result.force_interval[1] >= 2.0 - 1e-9
+    with pytest.raises(BiodanceError, match="blocks"):
+        gain((validate(body, true_body, noisy_fit(body, smooth_motion(body, rng, frames=120), truth, rng), about=np.zeros(3)),))
+
+
+def test_learned_noise_is_used_when_given() -> None:
+    body, _, fits = session(9, frames=600)
+    total = statistics(body, fits[0], layout_for(standing_point(fits)))
+    noise, _ = learn(total, widened(body.sip))
+    np.testing.assert_allclose(conclude(body, total, ("t",), noise=noise).sip.phi, conclude(body, total, ("t",)).sip.phi)
