@@ -151,7 +151,9 @@ def report(session: Path, *, out: Out, subject: str | None = None, json: Json = 
 
 
 @app.command
-def identify(session: Path, *, out: Out, reference: Path | None = None, json: Json = False, force: Force = False) -> int:
+def identify(
+    session: Path, *, out: Out, reference: Path | None = None, subject: str | None = None, json: Json = False, force: Force = False
+) -> int:
     """Identify what every segment weighs, with intervals, validate it on the trials kept, and look for an added mass.
 
     Parameters
@@ -160,6 +162,8 @@ def identify(session: Path, *, out: Out, reference: Path | None = None, json: Js
         Folder with the static trial and the other trials.
     reference
         An earlier session of the same person without load: a load is then looked for against it instead of the table.
+    subject
+        The person to identify where C3D files hold several.
     """
     from biodance.lab.results_folder import results_folder
     from biodance.lab.session import read_session
@@ -167,10 +171,10 @@ def identify(session: Path, *, out: Out, reference: Path | None = None, json: Js
     from biodance.report.write import write_identification
 
     with _progress() as tell:
-        before = identified(examine(read_session(reference, tell=tell), tell=tell)) if reference else None
-        recording = read_session(session, tell=tell)
+        before = identified(examine(read_session(reference, subject_name=subject, tell=tell), tell=tell)) if reference else None
+        recording = read_session(session, subject_name=subject, tell=tell)
         folder = results_folder(out, session, force=force)
-        result = examine(recording, reference=before.identification if before else None, tell=tell)
+        result = examine(recording, reference=before, tell=tell)
         found = identified(result)
         tell("writing the page")
         document = write_identification(result, found, folder)
@@ -184,6 +188,7 @@ def export(
     format: Annotated[str, Parameter(help="osim, urdf, mjcf, biomod, csv; or trc, mot of one trial.")],
     out: Annotated[Path, Parameter(help="The file to write.")],
     trial: Annotated[str | None, Parameter(help="Name of the trial for trc and mot.")] = None,
+    subject: Annotated[str | None, Parameter(help="The person to export where C3D files hold several.")] = None,
     force: Annotated[bool, Parameter(name="--force", negative="", help="Replace the file if it exists.")] = False,
 ) -> int:
     """Write a session, or the results of `biodance identify`, for another program.
@@ -197,7 +202,7 @@ def export(
     from biodance.pipeline.export import replaceable
 
     with _progress() as tell, replaceable(out, force=force) as place:
-        _, sentence = write(source, place, format=format, trial=trial, tell=tell)
+        _, sentence = write(source, place, format=format, trial=trial, subject=subject, tell=tell)
     say(sentence)
     sys.stdout.write(f"{out}\n")
     return DONE

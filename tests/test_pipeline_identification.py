@@ -62,9 +62,16 @@ def test_inertia_in_the_document_is_about_the_centre_of_mass(numbers, found):
     assert row["com_m"] == pytest.approx(lump.com, rel=1e-9)
 
 
-def test_a_load_is_found_against_the_unloaded_session():
+def test_a_load_is_found_against_the_unloaded_session(monkeypatch):
+    monkeypatch.setattr("biodance.report.identification_page.svg_address", lambda _: "data:,")
     loaded, bare = session_result(load=1.5, seed=5), session_result()
-    search = identify_trials(body(), loaded.trials, reference=bare.identification.identification).search
+    compared = identify_trials(body(), loaded.trials, name="S02", reference=bare.identification)
+    search = compared.search
+    assert search.reference == "session S01"
+    changes = {(row.segment, row.quantity): row for row in compared.changes}
+    assert changes["left_forearm_hand", "mass"].interval[0] > 0
+    text = identification_section(compared)
+    assert "What changed since session S01" in text
     assert search.found
     assert search.best.segment == "left_forearm_hand"
     assert search.best.interval[0] < 1.5 < search.best.interval[1]
@@ -84,7 +91,7 @@ def test_nothing_to_fit_is_refused_with_what_to_do():
     result = session_result(roles=("validate",))
     assert not can_identify(result.trials)
     with pytest.raises(TrialRefused, match="role fit"):
-        identify_trials(body(), result.trials)
+        identify_trials(body(), result.trials, name="S01")
     with pytest.raises(SessionRefused, match=r"session\.toml"):
         identified(result)
 

@@ -1,17 +1,17 @@
 """What the session says about the body: identification from the fit trials, validation on the others, search for a load."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-
-import numpy as np
+from dataclasses import dataclass, replace
 
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identify.added_mass import AddedMass, added_mass
 from biodance.identify.identification import Identification, identify, standing_point
+from biodance.identify.sessions import Difference, differences
 from biodance.identify.statistics import Fit
 from biodance.identify.validation import Gain, TrialValidation, gain, validate
-from biodance.motion.comparison import Agreement
+from biodance.motion.comparison import Agreement, compare
+from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.results import TrialResult
 from biodance.records import ROLES, Role, Wrench
 
@@ -25,8 +25,11 @@ class SessionIdentification:
 
     ``fitted`` and ``validations`` compare the trials used and the trials kept, about the mean centre of pressure; ``agreements`` the
     identified body on every compared trial by name, about the lab origin; ``gain`` table / identified over the validations (None without
-    an interval); ``search`` the loads looked for, against ``search.reference``; ``notes`` what a person should know.
+    an interval); ``search`` the loads looked for, against ``search.reference``; ``changes`` since the reference session, empty without one;
+    ``name`` of the session; ``notes`` what a person should know.
     """
+
+    name: str
 
     identification: Identification
     fitted: tuple[TrialValidation, ...]
@@ -34,6 +37,7 @@ class SessionIdentification:
     agreements: Mapping[str, Agreement]
     gain: Gain | None
     search: AddedMass
+    changes: tuple[Difference, ...] = ()
     notes: tuple[str, ...] = ()
 
 
@@ -51,32 +55,46 @@ def can_identify(results: tuple[TrialResult, ...]) -> bool:
 
 
 def identify_trials(
-    body: Body, results: tuple[TrialResult, ...], *, reference: Identification | None = None, where: str = "This session"
+    body: Body, results: tuple[TrialResult, ...], *, name: str, reference: SessionIdentification | None = None
 ) -> SessionIdentification:
     """Identify ``body`` from the trials with role fit, validate on those kept, and look for a load.
 
-    ``reference`` an earlier, unloaded session of the same person; without it the load is looked for against the table.
+    ``name`` of the session; ``reference`` an earlier, unloaded session of the same person: what changed since is told, and a load is looked
+    for against it; without it, against the table.
 
     Raises
     ------
     TrialRefused
         No trial with role fit has motion and fully measured ground contact.
     """
-    fits = _fits(results, FITTED)
+    fits, others = _fits(results, FITTED), _fits(results, KEPT)
     if not fits:
         raise TrialRefused(
-            f"{where} has no trial with role fit in which markers and plates measure all, so nothing can be identified. "
+            f"Session {name} has no trial with role fit in which markers and plates measure all, so nothing can be identified. "
             "Record movement on the plates, or set roles in session.toml."
         )
     found = identify(body, fits)
-    about = standing_point(fits)
-    identified = found.identified
-    fitted, kept = (tuple(validate(body, identified, fit, about=about) for fit in some) for some in (fits, _fits(results, KEPT)))
-    agreements = {fit.name: validate(body, identified, fit, about=np.zeros(3)).identified_agreement for fit in _fits(results, ROLES)}
+    about, identified = standing_point(fits), found.identified
+    fitted, kept = (tuple(validate(body, identified, fit, about=about) for fit in some) for some in (fits, others))
     notes = list(found.notes)
     if not kept:
         notes.append("No trial was kept for validation, so the gain is not proven. Record squats, or give a trial the role validate.")
-    return SessionIdentification(found, fitted, kept, agreements, _gain(kept, notes), added_mass(found, reference=reference), tuple(notes))
+    search = added_mass(found, reference=reference.identification if reference else None)
+    return SessionIdentification(
+        name,
+        found,
+        fitted,
+        kept,
+        agreements={fit.name: _at_origin(identified, fit) for fit in _fits(results, ROLES)},
+        gain=_gain(kept, notes),
+        search=replace(search, reference=f"session {reference.name}") if reference else search,
+        changes=differences(reference.identification, found) if reference else (),
+        notes=tuple(notes),
+    )
+
+
+def _at_origin(identified: Body, fit: Fit) -> Agreement:
+    return compare(fit.wrench, predict_wrench(identified, fit.motion), fit.use)
 
 
 def _fits(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[Fit, ...]:

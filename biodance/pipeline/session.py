@@ -6,7 +6,6 @@ from functools import partial
 
 from biodance.body.human import DEFAULT_TABLE
 from biodance.errors import SessionRefused, TrialRefused
-from biodance.identify.identification import Identification
 from biodance.lab.filters import LowPass
 from biodance.lab.weight import SHORTEST, SWAY
 from biodance.motion.contact import ContactRules
@@ -23,7 +22,12 @@ from biodance.records import Session
 STOPPED = Step("stop", "refused", "Not done: the run was stopped by Ctrl-C before this trial.")
 
 
-def examine(session: Session, *, reference: Identification | None = None, tell: Callable[[str], None] = lambda _: None) -> SessionResult:
+def examine(
+    session: Session,
+    *,
+    reference: SessionIdentification | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+) -> SessionResult:
     """Take a session through all stages and return all that was found; ``tell`` is called with what is being done.
 
     ``reference`` is what an earlier, unloaded session of the same person said: a load is then looked for against it, not the table.
@@ -49,7 +53,7 @@ def examine(session: Session, *, reference: Identification | None = None, tell: 
     identification = None
     if body is not None and can_identify(done):
         tell("identifying the segments")
-        identification = attempt(steps, "identify", partial(identify_trials, body, done, reference=reference))
+        identification = attempt(steps, "identify", partial(identify_trials, body, done, name=session.folder.name, reference=reference))
     return SessionResult(
         session=session,
         subject=session.subject,

@@ -8,6 +8,7 @@ import numpy as np
 from biodance.identify.added_mass import AddedMass
 from biodance.identify.identification import Identification
 from biodance.identify.knowledge import Known
+from biodance.identify.sessions import Difference
 from biodance.identify.validation import Gain, TrialValidation
 from biodance.motion.comparison import Agreement
 from biodance.pipeline.identification import SessionIdentification
@@ -102,11 +103,25 @@ def _search(search: AddedMass) -> dict[str, Any]:
     return {"reference": search.reference, "p_none": search.p_no_load, "announced": search.found, "segments": rows}
 
 
+def _difference(row: Difference) -> dict[str, Any]:
+    return {
+        "segment": row.segment,
+        "quantity": row.quantity,
+        "unit": row.unit,
+        "later_minus_earlier": row.value,
+        "sd": row.sd,
+        "ci95": row.interval,
+        "p": row.p,
+        "known": row.known,
+    }
+
+
 def identification_document(found: SessionIdentification) -> dict[str, Any]:
     """Return all that identification found.
 
     CoM in the segment's axes from its proximal joint centre; inertia about the CoM, order xx xy yy xz yz zz; validation moments about
-    ``about_m``, the mean centre of pressure. ``added_mass`` null: no load is announced; ``added_mass_search`` says what was looked for.
+    ``about_m``, the mean centre of pressure. ``added_mass`` null: no load is announced; ``added_mass_search`` says what was looked for;
+    ``differences`` to the reference session, empty without one.
     """
     one = found.identification
     return {
@@ -123,5 +138,6 @@ def identification_document(found: SessionIdentification) -> dict[str, Any]:
         "gain": _gain(found.gain),
         "added_mass": added_mass_document(found.search),
         "added_mass_search": _search(found.search),
+        "differences": [_difference(row) for row in found.changes],
         "notes": found.notes,
     }

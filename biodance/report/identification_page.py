@@ -49,4 +49,5 @@ def identification_section(found: SessionIdentification) -> str:
         channels=list(zip(CHANNELS, UNITS, strict=True)),
         figures=[(trial, svg_address(validation_figure(trial))) for trial in shown],
         search=found.search,
+        changes=[row for row in found.changes if row.quantity == "mass"],
     )
