@@ -3,8 +3,9 @@
     OMP_NUM_THREADS=1 python benchmarks/bench_inverse_kinematics.py [frames for biodance] [frames for OpenSim]
 
 OpenSim's InverseKinematicsSolver starts every frame from the one before; its first frame is not timed. It runs with its coordinates
-clamped to their ranges and free, at the default accuracy of its tool and at a finer one; the tool itself runs with its defaults. Process CPU
-time counts; the solvers' reading of files does not. First the models are proven equal: the same marker places at the same postures.
+clamped to their ranges and free, at the default accuracy of its tool and at a finer one; the tool itself runs with its defaults.
+Process CPU time counts; the solvers' reading of files does not. First the models are proven equal: the same marker places at the same
+postures.
 """
 
 import sys
@@ -132,11 +133,6 @@ def weighted_rms(body: Body, cost: Array) -> float:
     return float(1e3 * np.sqrt(cost.mean() / body.markers.weight.sum()))
 
 
-def weighted_rms(body: Body, cost: Array) -> float:
-    """Return mm from the weighted squared distances (T,) of the frames."""
-    return float(1e3 * np.sqrt(cost.mean() / body.markers.weight.sum()))
-
-
 def main(ours: int = 6000, theirs: int = 300) -> None:
     """Run and print."""
     body = human(Subject(58.3, 1.64, "F", 31.0))
@@ -167,7 +163,8 @@ def main(ours: int = 6000, theirs: int = 300) -> None:
                 places, each = opensim_track(opensim_model(body, path, held=held), body, trc, theirs, accuracy)
                 other = ((places - first.xyz) ** 2).sum(axis=2) @ weight
                 print(
-                    f"  OpenSim, accuracy {accuracy:g}: {1 / each:.0f} frames/s, {weighted_rms(body, other):.5f} mm; ratio {each / own:.0f}; "
+                    f"  OpenSim, accuracy {accuracy:g}: {1 / each:.0f} frames/s, {weighted_rms(body, other):.5f} mm; "
+                    f"ratio {each / own:.0f}; "
                     f"biodance lower or equal on {(best <= other * (1 + 1e-9)).sum()} of {theirs} frames"
                 )
         each = opensim_tool(folder, body, trc, theirs)
