@@ -72,6 +72,8 @@ def test_a_load_is_found_against_the_unloaded_session(monkeypatch):
     assert changes["left_forearm_hand", "mass"].interval[0] > 0
     text = identification_section(compared)
     assert "What changed since session S01" in text
+    assert any("kg more than the identified body" in note for note in compared.notes)
+    assert not any("than the identified body" in note for note in bare.identification.notes)
     assert search.found
     assert search.best.segment == "left_forearm_hand"
     assert search.best.interval[0] < 1.5 < search.best.interval[1]

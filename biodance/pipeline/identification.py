@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identify.added_mass import AddedMass, added_mass
@@ -11,10 +13,12 @@ from biodance.identify.sessions import Difference, differences
 from biodance.identify.statistics import Fit
 from biodance.identify.validation import Gain, TrialValidation, gain, validate
 from biodance.motion.comparison import Agreement, compare
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.regressor import GRAVITY, predict_wrench
 from biodance.pipeline.results import TrialResult
 from biodance.records import ROLES, Role, Wrench
 
+UNEXPLAINED = 0.5
+"""kg between plates and identified body over the fit trials: more than the scale's uncertainty, shoes and a zero allow."""
 FITTED: tuple[Role, ...] = ("fit",)
 KEPT: tuple[Role, ...] = ("validate", "check")
 
@@ -79,6 +83,7 @@ def identify_trials(
     notes = list(found.notes)
     if not kept:
         notes.append("No trial was kept for validation, so the gain is not proven. Record squats, or give a trial the role validate.")
+    notes += _weight(fitted)
     search = added_mass(found, reference=reference.identification if reference else None)
     return SessionIdentification(
         name,
@@ -91,6 +96,18 @@ def identify_trials(
         changes=differences(reference.identification, found) if reference else (),
         notes=tuple(notes),
     )
+
+
+def _weight(fitted: tuple[TrialValidation, ...]) -> list[str]:
+    """Say it where the plates carry another weight than the identified body has: the table's total is pinned to the declared mass."""
+    missing = np.concatenate([(trial.measured.force - trial.identified.force)[trial.use, 2] for trial in fitted]).mean() / -GRAVITY[2]
+    if abs(missing) <= UNEXPLAINED:
+        return []
+    return [
+        f"The plates carry {abs(missing):.2f} kg {'more' if missing > 0 else 'less'} than the identified body, whose total is tied to the "
+        "declared mass: a load, or a wrong mass_kg. Until that is settled the masses of single segments and their changes absorb it; see "
+        "Added mass."
+    ]
 
 
 def _at_origin(identified: Body, fit: Fit) -> Agreement:
