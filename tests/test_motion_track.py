@@ -85,7 +85,7 @@ def test_a_trial_that_cannot_be_followed_is_refused_by_name(markers):
     with pytest.raises(TrialRefused, match="Trial walk: no markers were recorded"):
         track(WOMAN, trial_of(None))
     legless = markers.select(name for name in markers.names if name not in LEFT_LEG)
-    with pytest.raises(TrialRefused, match="Trial walk: No frame shows enough markers .*left_knee_flexion.*LKNE"):
+    with pytest.raises(TrialRefused, match=r"Trial walk: No frame shows enough markers .*left_knee_flexion.*LKNE"):
         track(WOMAN, trial_of(legless))
     short = Markers(markers.names, markers.time[:8], markers.xyz[:8])
     with pytest.raises(TrialRefused, match="Trial walk: 8 frames at 100 Hz are too few"):
