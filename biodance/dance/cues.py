@@ -1,0 +1,138 @@
+"""The cue sheet: a dance in plain words, posture by posture, for the person who calls it and the person who performs it.
+
+Only what moves is said, largest first, pairs together, angles rounded to what a person can follow; what goes beyond ``MOST`` things is
+said after them, so that nothing is left out.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.errors import BiodanceError
+from biodance.records import Array
+
+SMALLEST = 12.0
+"""degrees: a smaller change is not called."""
+STEP = 15.0
+"""degrees to which angles are rounded."""
+MOST = 4
+"""Things that a person can begin at once."""
+ALIKE = 12.0
+"""degrees within which right and left are called as a pair."""
+WORDS = {
+    "shoulder_flexion": ("arm", "raise {} forward", "take {} back", "let {} down to the front of the body"),
+    "shoulder_adduction": ("arm", "bring {} across the body", "raise {} sideways", "bring {} in to the side"),
+    "shoulder_rotation": ("upper arm", "turn {} inwards", "turn {} outwards", "turn {} back to the middle"),
+    "elbow_flexion": ("elbow", "bend {}", "stretch {}", "straighten {}"),
+    "hip_flexion": ("thigh", "lift {} forward", "take {} back", "let {} hang straight down"),
+    "hip_adduction": ("leg", "bring {} across the other", "lift {} sideways", "bring {} in to the middle"),
+    "hip_rotation": ("leg", "turn {} inwards", "turn {} outwards", "turn {} to the front"),
+    "knee_flexion": ("knee", "bend {}", "stretch {}", "straighten {}"),
+    "ankle_dorsiflexion": ("foot", "pull {} up", "point {} down", "hold {} level"),
+    "ankle_inversion": ("foot", "turn the sole of {} inwards", "turn the sole of {} outwards", "hold {} level sideways"),
+    "trunk_flexion": ("", "lean the trunk forward", "lean the trunk back", "bring the trunk upright"),
+    "trunk_bending": ("", "lean the trunk to the right", "lean the trunk to the left", "bring the trunk to the middle"),
+    "trunk_rotation": ("", "turn the trunk to the left", "turn the trunk to the right", "turn the trunk to the front"),
+}
+"""Of each movement: the part, and what is called for a positive angle, a negative one and (nearly) none."""
+PLANTED = ("knee_flexion",)
+"""What is called of a leg that stands: its other joints follow from the feet."""
+PLURAL = {"foot": "feet"}
+
+
+@dataclass(frozen=True)
+class _Call:
+    size: float
+    text: str
+
+
+def cue_sheet(
+    body: Body, angles: Array, stances: tuple[str, ...], planted: tuple[tuple[str, ...], ...], *, move: float = 2.0, hold: float = 2.0
+) -> str:
+    """Return the cue sheet (Markdown) of postures ``angles`` (P, n) rad of the joints of ``body``.
+
+    ``stances`` (P,) say in words where the feet are; ``planted`` (P,) which feet ("right", "left") stand. ``move`` and ``hold`` s.
+
+    Raises
+    ------
+    BiodanceError
+        The postures, stances and planted feet are not equally many, or the joints are not those of the body.
+    """
+    if angles.ndim != 2 or angles.shape[1] != len(body.joints) or not len(angles) == len(stances) == len(planted):
+        raise BiodanceError(
+            f"Cue sheet: angles {angles.shape}, {len(stances)} stances, {len(planted)} planted; "
+            f"expected ({len(stances)}, {len(body.joints)}) and as many of each."
+        )
+    degrees = np.degrees(np.concatenate([np.zeros((1, angles.shape[1])), angles]))
+    lines = [
+        "# The dance, posture by posture",
+        "",
+        f"Each posture: {move:g} s to get there, counted *{_counts(move)}*, then {hold:g} s of standing still. Only what moves",
+        "is said; everything else stays as it is. Stop whenever something hurts or you lose your balance; the posture can be repeated.",
+    ]
+    for i, (stance, feet) in enumerate(zip(stances, planted, strict=True)):
+        if i == 0 or stance != stances[i - 1]:
+            lines += ["", f"## {stance[:1].upper()}{stance[1:]}"]
+        said = calls(body, degrees[i], degrees[i + 1], feet)
+        lines += ["", f"**{i + 1}.** {_sentence(said)}"]
+    return "\n".join(lines) + "\n"
+
+
+def calls(body: Body, before: Array, after: Array, planted: tuple[str, ...] = ()) -> tuple[str, ...]:
+    """Return what is called on the way from angles ``before`` to ``after`` (n,) degrees, largest change first."""
+    changes = {
+        joint.name: (float(b), float(a))
+        for joint, b, a in zip(body.joints, before, after, strict=True)
+        if abs(a - b) >= SMALLEST and _is_called(joint.name, planted)
+    }
+    found: list[_Call] = []
+    while changes:
+        name = next(iter(changes))
+        start, end = changes.pop(name)
+        side, movement = _split(name)
+        other = f"{'left' if side == 'right' else 'right'}_{movement}"
+        pair = side and other in changes and abs(changes[other][1] - end) <= ALIKE
+        if pair:
+            partner = changes.pop(other)
+            start, end = (start + partner[0]) / 2, (end + partner[1]) / 2
+        found.append(_Call(abs(end - start), _call(movement, "both" if pair else side, end)))
+    return tuple(call.text for call in sorted(found, key=lambda call: -call.size))
+
+
+def _split(name: str) -> tuple[str, str]:
+    """Return side ("" for the trunk) and movement of a joint."""
+    side = name.partition("_")[0]
+    return (side, name.removeprefix(f"{side}_")) if side in ("right", "left") else ("", name)
+
+
+def _is_called(name: str, planted: tuple[str, ...]) -> bool:
+    side, movement = _split(name)
+    return movement in WORDS and not (side in planted and _is_leg(movement) and movement not in PLANTED)
+
+
+def _is_leg(movement: str) -> bool:
+    return movement.startswith(("hip", "knee", "ankle"))
+
+
+def _call(movement: str, side: str, angle: float) -> str:
+    part, positive, negative, none = WORDS[movement]
+    whole = f"both {PLURAL.get(part, part + 's')}" if side == "both" else f"the {side} {part}"
+    rounded = STEP * round(abs(angle) / STEP)
+    if rounded == 0:
+        return none.format(whole)
+    size = "to a right angle" if rounded == 90 else f"by about {rounded:.0f}°"
+    return f"{(positive if angle > 0 else negative).format(whole)} {size}"
+
+
+def _sentence(said: tuple[str, ...]) -> str:
+    """Return the calls as text: the first ``MOST``, then the rest."""
+    if not said:
+        return "Stay as you are."
+    first, rest = "; ".join(said[:MOST]), "; ".join(said[MOST:])
+    return f"{first[:1].upper()}{first[1:]}." + (f" And also: {rest}." if rest else "")
+
+
+def _counts(seconds: float) -> str:
+    names = ("one", "two", "three", "four", "five", "six", "seven", "eight")
+    return " and ".join(names[: max(1, min(len(names), round(seconds)))])

@@ -1,0 +1,110 @@
+"""Figures of a dance: the postures as stick figures (paper Fig. 3), the criterion over the transitions (Fig. 5), the ZMP (Fig. 6)."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.motion.kinematics import poses
+from biodance.records import Array
+from biodance.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, SIDES, WIDTH, figure, look
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLUMNS = 10
+VIEW = np.array([[0.80, -0.60, 0.0], [0.18, 0.24, 0.95]])
+"""(2, 3) oblique view from the front, right: lab x, y, z to the page's right and up."""
+
+
+def bones(body: Body, q: Array) -> tuple[Array, tuple[str, ...]]:
+    """Return the line of each bone (P, B, 2, 3) m in postures ``q`` (P, nq), and its side ("right", "left", "middle")."""
+    pose = poses(body, q)
+    lines, sides = [], []
+    carrier = body.segment_joint
+    for i, name in enumerate(body.segments):
+        joint = carrier[i]
+        children = [k for k, other in enumerate(body.segments) if k != i and _parent(body, k) == i]
+        ends = [pose.position[:, k] for k in children] or [_tip(body, pose.rotation[:, i], pose.position[:, i], i)]
+        if joint >= 0 and children and name.startswith("trunk"):
+            ends.append(_tip(body, pose.rotation[:, i], pose.position[:, i], i))
+        for end in ends:
+            lines.append(np.stack([pose.position[:, i], end], axis=1))
+            sides.append(next((side for side in ("right", "left") if name.startswith(side)), "middle"))
+    return np.stack(lines, axis=1), tuple(sides)
+
+
+def _parent(body: Body, segment: int) -> int:
+    """Return the segment that carries this one, -1 for the root's."""
+    joint = body.segment_joint[segment]
+    while joint >= 0:
+        joint = body.joints[joint].parent
+        if joint < 0:
+            return 0
+        if body.joints[joint].segment >= 0:
+            return body.joints[joint].segment
+    return -1
+
+
+def _tip(body: Body, rotation: Array, position: Array, segment: int) -> Array:
+    """Return the far end (P, 3) of a segment without children: along its box from the joint, toes for a foot, crown for the trunk."""
+    low, high = body.boxes[segment]
+    reach = np.where(np.abs(high) > np.abs(low), high, low)
+    axis = int(np.argmax(np.abs(reach[:2])))
+    local = np.zeros(3)
+    local[axis] = reach[axis]
+    return np.asarray(rotation @ local + position)
+
+
+def postures_figure(body: Body, q: Array, titles: tuple[str, ...]) -> "Figure":
+    """Draw the postures ``q`` (P, nq) in rows of ten, each with its title, all to one scale; right is blue, left red and dashed."""
+    lines, sides = bones(body, q)
+    flat = lines @ VIEW.T
+    flat = flat - np.stack([flat[..., 0].mean(axis=(1, 2)), np.zeros(len(flat))], axis=1)[:, None, None]
+    low, high = flat.min(axis=(0, 1, 2)), flat.max(axis=(0, 1, 2))
+    rows = -(-len(q) // COLUMNS)
+    with look():
+        drawn = figure(rows * WIDTH / COLUMNS * 1.15 * max(1.0, (high[1] - low[1]) / (high[0] - low[0])))
+        panels = drawn.subplots(rows, COLUMNS, squeeze=False).ravel()
+        for panel in panels:
+            panel.set_axis_off()
+        for panel, posture, title in zip(panels, flat, titles, strict=False):
+            for line, side in zip(posture, sides, strict=True):
+                colour, style = SIDES[side]
+                panel.plot(*line.T, color=colour, linestyle=style, linewidth=1.3, solid_capstyle="round")
+            panel.set(xlim=(low[0] - 0.05, high[0] + 0.05), ylim=(low[1] - 0.05, high[1] + 0.05), aspect="equal")
+            panel.set_title(title, fontsize=6, pad=1)
+    return drawn
+
+
+def criterion_figure(values: Array, bound: float, *, what: str = "sum of M cond(W_bi), kg") -> "Figure":
+    """Draw the criterion (K,) after each transition, above the smallest value that it can have."""
+    with look():
+        drawn = figure(2.6)
+        axes = drawn.subplots()
+        axes.semilogy(np.arange(1, len(values) + 1), values, color=BLUE, marker="o", markersize=3, label="after the transition")
+        axes.axhline(bound, color=GREEN, linestyle="--", label=f"bound {bound:.3g}")
+        axes.set(xlabel="transition", ylabel=what)
+        axes.xaxis.get_major_locator().set_params(integer=True)
+        axes.legend()
+    return drawn
+
+
+def zmp_figure(before: Array, after: Array, support: Array, usable: Array) -> "Figure":
+    """Draw the zero-moment point before (T, 2) and after (S, 2) balancing, m, in the base of ``support`` (P, 2) and its ``usable`` part."""
+    with look():
+        drawn = figure(3.2)
+        left, right = drawn.subplots(1, 2, sharex=True, sharey=True)
+        for axes, path, colour, title in ((left, before, ORANGE, "before balancing"), (right, after, BLUE, "after balancing")):
+            _outline(axes, support, BLACK, "-", "base of support")
+            _outline(axes, usable, GREY, "--", "part that may be used")
+            axes.plot(*path.T, color=colour, label="zero-moment point")
+            axes.set(title=title, xlabel="lab x, m", aspect="equal")
+        left.set_ylabel("lab y, m")
+        drawn.legend(*right.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return drawn
+
+
+def _outline(axes: "Axes", corners: Array, colour: str, style: str, label: str) -> None:
+    axes.plot(*np.vstack([corners, corners[:1]]).T, color=colour, linestyle=style, linewidth=0.9, label=label)

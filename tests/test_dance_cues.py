@@ -1,0 +1,71 @@
+"""Cue sheet: only what moves, pairs together, planted legs by their knees, in words."""
+
+import numpy as np
+import pytest
+
+from biodance.body.human import human
+from biodance.dance.cues import MOST, WORDS, calls, cue_sheet
+from biodance.errors import BiodanceError
+from biodance.records import Array, Subject
+
+BODY = human(Subject(65.0, 1.75, "F"))
+REST = np.zeros(23)
+
+
+def posture(**degrees: float) -> Array:
+    out = np.zeros(23)
+    for name, angle in degrees.items():
+        out[BODY.joint_index(name)] = angle
+    return out
+
+
+def test_every_joint_of_the_human_has_words() -> None:
+    movements = {joint.name.removeprefix("right_").removeprefix("left_") for joint in BODY.joints}
+    assert movements == set(WORDS)
+
+
+def test_direction_size_and_order() -> None:
+    said = calls(BODY, REST, posture(right_shoulder_flexion=88, trunk_rotation=-31, left_elbow_flexion=5))
+    assert said == ("raise the right arm forward to a right angle", "turn the trunk to the right by about 30°")
+
+
+def test_pairs_are_called_together_and_only_when_alike() -> None:
+    assert calls(BODY, REST, posture(right_elbow_flexion=60, left_elbow_flexion=64)) == ("bend both elbows by about 60°",)
+    assert len(calls(BODY, REST, posture(right_elbow_flexion=60, left_elbow_flexion=100))) == 2
+
+
+def test_going_back_is_said_as_the_place_not_as_zero() -> None:
+    assert calls(BODY, posture(trunk_flexion=40), REST) == ("bring the trunk upright",)
+
+
+def test_of_a_standing_leg_only_the_knee_is_called() -> None:
+    squat = posture(right_knee_flexion=45, right_hip_flexion=40, right_ankle_dorsiflexion=20)
+    assert calls(BODY, REST, squat, ("right", "left")) == ("bend the right knee by about 45°",)
+    assert len(calls(BODY, REST, squat, ("left",))) == 3
+
+
+def test_a_planted_leg_is_never_half_of_a_pair() -> None:
+    both = posture(right_hip_rotation=-45, left_hip_rotation=-45)
+    assert calls(BODY, REST, both, ("right",)) == ("turn the left leg outwards by about 45°",)
+
+
+def test_what_is_more_than_a_person_can_begin_at_once_is_said_after() -> None:
+    moved = posture(**{joint.name: 20.0 + i for i, joint in enumerate(BODY.joints)})
+    text = cue_sheet(BODY, np.radians([moved]), ("free",), ((),))
+    first, rest = text.split("**1.** ")[1].split(" And also: ")
+    assert len(first.split(";")) == MOST
+    assert len(first.split(";")) + len(rest.split(";")) == len(calls(BODY, REST, moved)) >= 13
+
+
+def test_sheet_counts_postures_and_names_each_stance_once() -> None:
+    angles = np.radians([posture(trunk_flexion=30), posture(trunk_flexion=30), posture(right_hip_flexion=45)])
+    both = ("right", "left")
+    text = cue_sheet(BODY, angles, ("feet side by side", "feet side by side", "on the left foot"), (both, both, ("left",)))
+    assert text.count("## ") == 2
+    assert "**2.** Stay as you are." in text
+    assert "**3.** Lift the right thigh forward by about 45°; bring the trunk upright." in text
+
+
+def test_unequal_lists_are_refused() -> None:
+    with pytest.raises(BiodanceError, match="Cue sheet"):
+        cue_sheet(BODY, np.zeros((2, 23)), ("a",), ((),))

@@ -1,0 +1,47 @@
+"""Figures of a dance: bones join where joints are, every posture is drawn, outlines close."""
+
+import numpy as np
+
+from biodance.body.human import human
+from biodance.motion.kinematics import poses
+from biodance.records import Subject
+from biodance.report.dance_figures import bones, criterion_figure, postures_figure, zmp_figure
+
+BODY = human(Subject(65.0, 1.75, "F"))
+
+
+def postures(count: int) -> np.ndarray:
+    q = np.tile(BODY.neutral, (count, 1))
+    q[:, 7:] = np.random.default_rng(0).uniform(BODY.limits.lower, BODY.limits.upper, (count, 23)) * 0.6
+    return q
+
+
+def test_bones_join_joint_centres_and_keep_their_lengths() -> None:
+    q = postures(4)
+    lines, sides = bones(BODY, q)
+    length = np.linalg.norm(lines[:, :, 1] - lines[:, :, 0], axis=2)
+    np.testing.assert_allclose(length, np.tile(length[0], (4, 1)), atol=1e-12)
+    knee = poses(BODY, q).position[:, BODY.segment_index("right_shank")]
+    ends = lines[:, [i for i, side in enumerate(sides) if side == "right"], 1]
+    assert np.min(np.linalg.norm(ends - knee[:, None], axis=2), axis=1).max() < 1e-12
+    assert sides.count("right") == sides.count("left") == 5
+
+
+def test_every_posture_is_drawn_once_with_its_title() -> None:
+    drawn = postures_figure(BODY, postures(13), tuple(str(i) for i in range(1, 14)))
+    titled = [panel.get_title() for panel in drawn.axes if panel.lines]
+    assert titled == [str(i) for i in range(1, 14)]
+
+
+def test_criterion_stays_over_its_bound_line() -> None:
+    drawn = criterion_figure(np.array([90.0, 60.0, 50.0]), 34.8)
+    assert [float(line.get_ydata()[0]) for line in drawn.axes[0].lines] == [90.0, 34.8]
+
+
+def test_zmp_outlines_are_closed_in_both_panels() -> None:
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    drawn = zmp_figure(0.5 + np.zeros((5, 2)), 0.4 + np.zeros((6, 2)), square, 0.2 + 0.6 * square)
+    for axes in drawn.axes:
+        outline = axes.lines[0].get_xydata()
+        np.testing.assert_array_equal(outline[0], outline[-1])
+        assert len(outline) == 5
