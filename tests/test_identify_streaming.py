@@ -27,7 +27,6 @@ def recording(*, frames: int = 9000, rate: float = 100.0, seed: int = 0, holes: 
     q[:, 7:], v[:, 6:], a[:, 6:] = curve(time), curve(time, 1), curve(time, 2)
     motion = Motion(time, q, v, a)
     wrench = predict_wrench(body, motion).value + rng.normal(size=(frames, 6)) * [2, 2, 2, 0.5, 0.5, 0.5]
-    wrench[:, 3:] += np.cross([0.4, 0.3, 0], wrench[:, :3])
     use = np.ones(frames, dtype=bool)
     if holes:
         for first, stop in ((300, 301), (700, 950), (8701, 8705), (8706, 8707)):
@@ -73,7 +72,7 @@ def test_single_frames_give_the_batch_too() -> None:
 
 def test_the_identification_is_that_of_the_batch() -> None:
     body, fit = recording()
-    sd = 0.2 * np.abs(body.sip.phi) + 0.01
+    sd = 0.05 * np.abs(body.sip.phi) + 0.002
     wrong = body.sip.phi + sd * np.random.default_rng(1).normal(size=sd.size)
     body = replace(body, sip=Sip(body.segments, wrong, np.diag(sd**2)))
     stream, batch = streamed(body, fit, [*range(0, 9000, 501), 9000]), identify(body, (fit,))
@@ -83,6 +82,14 @@ def test_the_identification_is_that_of_the_batch() -> None:
     assert np.abs((ours.sip.phi - batch.sip.phi) / sd).max() < 1e-5
     assert np.sqrt(np.diag(ours.sip.covariance)) == pytest.approx(sd, rel=1e-5)
     assert any("noise alone" in note for note in stream.identification().notes)
+
+
+def test_verdicts_on_the_way_count_the_disturbances_of_the_batch() -> None:
+    body, fit = recording()
+    body = replace(body, sip=Sip(body.segments, body.sip.phi, np.diag((0.3 * np.abs(body.sip.phi) + 0.01) ** 2)))
+    on_the_way, batch = streamed(body, fit, [*range(0, 9000, 900), 9000]).progress(), identify(body, (fit,))
+    ratio = np.array([mine.sd / theirs.sd for mine, theirs in zip(on_the_way.known, batch.known, strict=True)])
+    assert np.median(ratio) == pytest.approx(1.0, abs=0.15)
 
 
 def test_two_trials_in_a_row_are_two_runs() -> None:

@@ -14,9 +14,9 @@ from biodance.body.body import Body
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identify.caution import widened
 from biodance.identify.identification import Identification, conclude
-from biodance.identify.knowledge import Known, knowledge
+from biodance.identify.knowledge import Known
 from biodance.identify.learning import learn
-from biodance.identify.mismatch import mismatch
+from biodance.identify.mismatch import SHORTEST, TWINS, Mismatch, mismatch
 from biodance.identify.noise import BLOCK, blocks
 from biodance.identify.statistics import Fit, Statistics, empty, layout_for, statistics
 from biodance.records import Array, Motion, Wrench
@@ -30,14 +30,16 @@ class Stream:
     """A session that is being recorded.
 
     ``body`` with the table as prior; ``rate`` Hz of the frames; ``total`` statistics of all full blocks, about the lab origin;
-    ``pending`` (n < BLOCK, 1 + nq + 2 nv + 6) thinned frames of the running block: time, q, v, a, wrench; ``pressure`` (4,) sum over the
-    loaded frames of the centre of pressure m, and their number; ``run`` frames since the run of used frames began; ``last`` s, time of the
-    last frame.
+    ``disturbed`` what twins and plates make of these blocks, each under the noise known when it was closed (so that verdicts on the way
+    are as careful as the last one); ``pending`` (n < BLOCK, 1 + nq + 2 nv + 6 + 1) thinned frames of the running block: time, q, v, a,
+    wrench, RMS marker distance; ``pressure`` (4,) sum over the loaded frames of the centre of pressure m, and their number; ``run`` frames
+    since the run of used frames began; ``last`` s, time of the last frame.
     """
 
     body: Body
     rate: float
     total: Statistics
+    disturbed: Mismatch
     pending: Array
     pressure: Array
     run: int = 0
@@ -56,7 +58,8 @@ class Stream:
     def feed(self, motion: Motion, wrench: Wrench, use: NDArray[np.bool_]) -> "Stream":
         """Return the stream after some more frames (one or many): ``motion`` and ``wrench`` (lab origin) at the same times, ``use`` (T,).
 
-        A time step unlike 1 / ``rate`` (another trial, lost frames) begins a new run.
+        A time step unlike 1 / ``rate`` (another trial, lost frames) begins a new run. What the batch leaves out by itself
+        (`believable`) must be left out of ``use`` here, too.
 
         Raises
         ------
@@ -64,31 +67,31 @@ class Stream:
             Motion, wrench and mask have different lengths, or a used wrench is NaN.
         """
         fit = Fit("stream", motion, wrench, use)
-        rows = np.column_stack([motion.time, motion.q, motion.v, motion.a, wrench.value])
+        rows = np.column_stack([motion.time, motion.q, motion.v, motion.a, wrench.value, _marker_rms(motion)])
         steps = np.diff(motion.time, prepend=self.last)
         broken = np.abs(steps * self.rate - 1) > 0.5
         stream = replace(self, pressure=self.pressure + _pressure(fit), last=float(motion.time[-1]))
         starts = np.flatnonzero(broken | ~use | np.append(True, ~use[:-1]))
         for first, stop in zip(starts, [*starts[1:], use.size], strict=True):
             if broken[first] or not use[first] or stream.run == 0:
-                stream = replace(_close(stream), run=0)
+                stream = replace(_settle(stream), run=0)
             if use[first]:
                 stream = _extended(stream, rows[first:stop])
         return stream
 
     def progress(self) -> "Progress":
-        """Return what is known after the frames so far, by the noise alone: what is missing here is missing in the end, too.
+        """Return what is known after the frames so far, disturbances counted.
 
         Raises
         ------
         TrialRefused
             No frame could be used yet.
         """
-        found = self.statistics
+        settled = _settle(self)
+        found = settled.statistics
         if not found.count.any():
             raise TrialRefused("No frame of this stream could be used yet: ground contact not measured, or markers hidden.")
-        before = widened(self.body.sip)
-        known = knowledge(learn(found, before)[1].sip, before)
+        known = conclude(self.body, found, ("stream",), found=settled.disturbed).known
         verdicts = {
             name: [k.verdict == "known" for k in known if k.segment == name and k.quantity in ENOUGH] for name in self.body.segments
         }
@@ -131,7 +134,8 @@ def begin(body: Body, *, rate: float) -> Stream:
     if not (np.isfinite(rate) and rate > 0):
         raise BiodanceError(f"A stream needs a frame rate over 0 Hz, got {rate}.")
     total = empty(10 * len(body.segments), layout_for(np.zeros(3)))
-    return Stream(body, rate, total, np.empty((0, 7 + body.nq + 2 * body.nv)), np.zeros(4))
+    nothing = np.zeros((10 * len(body.segments), TWINS))
+    return Stream(body, rate, total, Mismatch(nothing, nothing), np.empty((0, 8 + body.nq + 2 * body.nv)), np.zeros(4))
 
 
 def about(found: Statistics, point: Array) -> Statistics:
@@ -164,19 +168,40 @@ def _extended(stream: Stream, rows: Array) -> Stream:
         stream = replace(stream, pending=np.concatenate([stream.pending, thin[:room]]))
         thin = thin[room:]
         if len(stream.pending) == BLOCK:
-            stream = _close(stream)
+            stream = _settle(stream)
     return stream
+
+
+def _marker_rms(motion: Motion) -> Array:
+    """Return the RMS distance of the markers seen (T,) m; NaN where none is."""
+    seen = np.isfinite(motion.residual)
+    count, total = seen.sum(axis=1), np.where(seen, motion.residual, 0.0) ** 2
+    return np.sqrt(np.divide(total.sum(axis=1), count, out=np.full(count.shape, np.nan), where=count > 0))
+
+
+def _pending_fit(stream: Stream) -> Fit:
+    """Return the pending frames as a trial, with a last frame that does not count, so that a block of one frame has a rate."""
+    rows = np.concatenate([stream.pending, stream.pending[-1:]])
+    nq, nv = stream.body.nq, stream.body.nv
+    q, v, a, value, distance = np.split(rows[:, 1:], np.cumsum([nq, nv, nv, 6]), axis=1)
+    time = rows[0, 0] + _stride(stream) / stream.rate * np.arange(len(rows))
+    return Fit("stream", Motion(time, q, v, a, distance, ("all",)), Wrench(time, value), np.arange(len(rows)) < len(rows) - 1)
 
 
 def _close(stream: Stream) -> Stream:
     """Return the stream with its pending frames folded in as one block."""
-    rows = stream.pending
-    if not len(rows):
+    if not len(stream.pending):
         return stream
-    period = _stride(stream) / stream.rate
-    rows = np.concatenate([rows, rows[-1:]])  # a last frame that does not count, so that a block of one frame has a rate
-    nq, nv = stream.body.nq, stream.body.nv
-    q, v, a, value = np.split(rows[:, 1:], np.cumsum([nq, nv, nv]), axis=1)
-    time = rows[0, 0] + period * np.arange(len(rows))
-    fit = Fit("stream", Motion(time, q, v, a), Wrench(time, value), np.arange(len(rows)) < len(rows) - 1)
-    return replace(stream, total=stream.total + statistics(stream.body, fit, stream.total.layout), pending=rows[:0])
+    block = statistics(stream.body, _pending_fit(stream), stream.total.layout)
+    return replace(stream, total=stream.total + block, pending=stream.pending[:0])
+
+
+def _settle(stream: Stream) -> Stream:
+    """Return the closed stream, with what twins and plates make of the block."""
+    closed = _close(stream)
+    if len(stream.pending) < SHORTEST:
+        return closed
+    noise, _ = learn(closed.statistics, widened(stream.body.sip))
+    more = mismatch(stream.body, (_pending_fit(stream),), noise)
+    old = stream.disturbed
+    return replace(closed, disturbed=Mismatch(old.kinematics + more.kinematics, old.plates + more.plates))
