@@ -157,3 +157,17 @@ def test_learned_noise_is_used_when_given() -> None:
     total = statistics(body, fits[0], layout_for(standing_point(fits)))
     noise, _ = learn(total, widened(body.sip))
     np.testing.assert_allclose(conclude(body, total, ("t",), noise=noise).sip.phi, conclude(body, total, ("t",)).sip.phi)
+
+
+def test_a_posture_that_jumps_is_left_out_and_said() -> None:
+    body, truth, fits = session(11, frames=1000)
+    spoilt = np.array(fits[0].motion.a)
+    spoilt[500:510] += 400.0
+    jumping = replace(fits[0], motion=replace(fits[0].motion, a=spoilt))
+    found = identify(body, (jumping,))
+    assert any("posture that jumps" in note for note in found.notes)
+    clean = identify(body, fits)
+    assert np.abs(found.sip.phi - truth)[::10].mean() < 1.5 * np.abs(clean.sip.phi - truth)[::10].mean() + 0.05
+    assert not any("posture that jumps" in note for note in clean.notes)
+    with pytest.raises(TrialRefused, match="No frame is left"):
+        identify(body, (replace(fits[0], motion=replace(fits[0].motion, a=fits[0].motion.a + 400.0)),))

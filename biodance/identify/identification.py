@@ -14,6 +14,7 @@ from biodance.body.body import Body
 from biodance.errors import TrialRefused
 from biodance.identify.base_parameters import BaseEstimate, estimate_base, structural_base
 from biodance.identify.caution import about_true_centres, widened
+from biodance.identify.gate import believable
 from biodance.identify.information import Information
 from biodance.identify.knowledge import Known, knowledge
 from biodance.identify.learning import learn
@@ -76,20 +77,38 @@ def identify(body: Body, fits: tuple[Fit, ...], *, prior: Sip | None = None) -> 
     TrialRefused
         There is no trial, or none has a usable frame.
     """
-    used = tuple(fit for fit in fits if fit.use.any())
-    if not used:
-        raise TrialRefused(
-            f"None of {len(fits)} trials has a frame to identify from: ground contact not measured or no motion. Record trials to fit."
-        )
-    layout = layout_for(standing_point(used))
+    used, about, notes = usable(body, fits)
+    layout = layout_for(about)
     total: Statistics = empty(10 * len(body.segments), layout)
     for fit in used:
         total = total + statistics(body, fit, layout)
-    left_out = [fit.name for fit in fits if not fit.use.any()]
-    notes = (f"Left out, no usable frame: {', '.join(left_out)}.",) if left_out else ()
     noise, _ = learn(total, prior or widened(body.sip))
     found = conclude(body, total, tuple(fit.name for fit in used), noise=noise, found=mismatch(body, used, noise), prior=prior)
     return replace(found, notes=(*notes, *found.notes))
+
+
+def usable(body: Body, fits: tuple[Fit, ...]) -> tuple[tuple[Fit, ...], Array, tuple[str, ...]]:
+    """Return the trials with believable frames, the standing point (3,) m, and what was left out in words.
+
+    Raises
+    ------
+    TrialRefused
+        There is no trial, or none has a usable frame.
+    """
+    some = tuple(fit for fit in fits if fit.use.any())
+    if not some:
+        raise TrialRefused(
+            f"None of {len(fits)} trials has a frame to identify from: ground contact not measured or no motion. Record trials to fit."
+        )
+    blind = [fit.name for fit in fits if not fit.use.any()]
+    about = standing_point(some)
+    gated = tuple(believable(body, fit, about) for fit in some)
+    notes = [f"Left out, no usable frame: {', '.join(blind)}."] if blind else []
+    notes += [sentence for _, sentence in gated if sentence]
+    used = tuple(fit for fit, _ in gated if fit.use.any())
+    if not used:
+        raise TrialRefused(f"No frame is left to identify from. {' '.join(notes)}")
+    return used, about, tuple(notes)
 
 
 def conclude(

@@ -1,0 +1,141 @@
+"""Virtual subjects through the front door, cached: simulate -> read -> prepare -> scale -> track -> contact, and what the truth was.
+
+Used by bench_identification.py. A visit is what identification sees, in the frames of the model, with the true parameters beside it.
+"""
+
+import hashlib
+import os
+import pickle
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.identify.statistics import Fit
+from biodance.lab.session import read_session
+from biodance.motion.kinematics import poses
+from biodance.pipeline.session import examine
+from biodance.records import Array, Markers, Subject
+from biodance.virtual_lab.flesh import of_parameters, parameters, placed
+from biodance.virtual_lab.laboratory import Visit
+from biodance.virtual_lab.merge import MERGED, load_on, merged_sip
+from biodance.virtual_lab.performance import Performance, perform
+from biodance.virtual_lab.person import Person, make_person
+from biodance.virtual_lab.protocol import Protocol
+from biodance.virtual_lab.protocol_file import read_protocol
+from biodance.virtual_lab.simulate import simulate
+
+CACHE = Path(os.environ.get("BIODANCE_CACHE", Path(tempfile.gettempdir()) / "biodance_visits"))
+
+
+@dataclass(frozen=True, eq=False)
+class TrackedVisit:
+    """One session of a virtual person after tracking.
+
+    ``fits`` are the fit trials, ``validations`` the kept ones; ``true`` (120,) the matter of every segment in the model's own frames
+    (mean rigid displacement between true and tracked frame over the fit trials), ``true_own`` (120,) in the true joint frames; both
+    WITHOUT loads. ``load`` (segment, kg, place (3,) m in the model's frame) or None; ``offset`` (12, 6) mean of turn (rad) and shift (m).
+    """
+
+    body: Body
+    fits: tuple[Fit, ...]
+    validations: tuple[Fit, ...]
+    true: Array
+    true_own: Array
+    frames: Array
+    load: tuple[str, float, Array] | None
+    markers: dict[str, Markers]
+    true_poses: dict[str, tuple[Array, Array]]
+
+
+def subjects(count: int = 24) -> tuple[Subject, ...]:
+    """Return the catalogue: both sexes, 45 to 110 kg, 1.50 to 1.95 m, body mass index 18 to 34."""
+    rng = np.random.default_rng(2016)
+    out = []
+    for i in range(count):
+        sex = "FM"[i % 2]
+        stature = float(rng.uniform(1.50, 1.80) if sex == "F" else rng.uniform(1.62, 1.95))
+        mass = float(np.clip(rng.uniform(19.0, 33.0) * stature**2, 45.0, 110.0))
+        out.append(Subject(round(mass, 1), round(stature, 3), sex))
+    return tuple(out)
+
+
+def visit(subject: Subject, protocol: str, *, seed: int, session: int = 0, load: tuple[str, float] | None = None) -> TrackedVisit:
+    """Return one visit, from the cache if it was made before; ``load`` (one of the 12 segments, kg)."""
+    key = f"{subject.mass}-{subject.stature}-{subject.sex}-{protocol}-{seed}-{session}-{load}"
+    path = CACHE / f"{hashlib.sha256(key.encode()).hexdigest()[:20]}.pickle"
+    if path.is_file():
+        with open(path, "rb") as stream:
+            return pickle.load(stream)
+    made = _make(subject, protocol, seed, session, load)
+    CACHE.mkdir(parents=True, exist_ok=True)
+    with tempfile.NamedTemporaryFile(dir=CACHE, delete=False) as stream:
+        pickle.dump(made, stream)
+    os.replace(stream.name, path)
+    return made
+
+
+def _make(subject: Subject, protocol: str, seed: int, session: int, load: tuple[str, float] | None) -> TrackedVisit:
+    bare = make_person(subject, seed, session=session)
+    loads = (load_on(bare, *load),) if load else ()
+    person = make_person(subject, seed, session=session, loads=loads)
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder) / "session"
+        simulate(subject, protocol, place, seed=seed, visit=Visit(session), loads=loads)
+        result = examine(read_session(place))
+    fits: dict[str, list[Fit]] = {"fit": [], "validate": []}
+    markers, truth, moved = {}, {}, []
+    plan = read_protocol(protocol)
+    for one in result.trials:
+        role, name = one.trial.role, one.trial.name
+        if role not in fits or one.motion is None or one.comparison is None:
+            continue
+        fits[role].append(Fit(name, one.motion, one.trial.wrench, one.comparison.used))
+        assert one.trial.markers is not None
+        markers[name] = one.trial.markers
+        truth[name] = true_frames(person, _performance(person, plan, name, session), one.motion.time)
+        if role == "fit":
+            moved.append(_displacement(result.body, one.motion.q, truth[name]))
+    frames = np.mean(np.concatenate(moved), axis=0)
+    own = merged_sip(bare, bare.body).phi
+    true = np.concatenate(
+        [parameters(placed(of_parameters(phi), _orthogonal(f[:, :3]), f[:, 3])) for phi, f in zip(own.reshape(-1, 10), frames, strict=True)]
+    )
+    carried = (load[0], load[1], _load_place(person, load[0], frames)) if load else None
+    return TrackedVisit(result.body, tuple(fits["fit"]), tuple(fits["validate"]), true, own, frames, carried, markers, truth)
+
+
+def _performance(person: Person, plan: Protocol, name: str, session: int) -> Performance:
+    trial = next(t for t in plan.trials if t.name == name)
+    return perform(person, trial, session, centre=np.array([0.3, 0.2]))
+
+
+def true_frames(person: Person, performance: Performance, time: Array) -> tuple[Array, Array]:
+    """Return turn (T, 12, 3, 3) and origin (T, 12, 3) m of the 12 true joint frames at ``time``."""
+    pose = poses(person.body, performance.motion(time).q)
+    index = [person.body.joint_index(joint) if joint else -1 for joint, _ in MERGED.values()]
+    turn = np.stack([pose.root_rotation if j < 0 else pose.joint_rotation[:, j] for j in index], axis=1)
+    place = np.stack([pose.root_position if j < 0 else pose.joint_position[:, j] for j in index], axis=1)
+    return turn, place
+
+
+def _displacement(body: Body, q: Array, truth: tuple[Array, Array]) -> Array:
+    """Return [R | p] (T, 12, 3, 4) of every true frame in the tracked frame."""
+    pose = poses(body, q)
+    back = np.swapaxes(pose.rotation, -1, -2)
+    return np.concatenate([back @ truth[0], back @ (truth[1] - pose.position)[..., None]], axis=-1)
+
+
+def _orthogonal(mean: Array) -> Array:
+    U, _, Vt = np.linalg.svd(mean)
+    return U @ Vt
+
+
+def _load_place(person: Person, segment: str, frames: Array) -> Array:
+    from biodance.virtual_lab.merge import place_in_12
+
+    own = place_in_12(person, person.loads[0])[1]
+    f = frames[list(MERGED).index(segment)]
+    return _orthogonal(f[:, :3]) @ own + f[:, 3]
