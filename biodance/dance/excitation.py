@@ -1,0 +1,130 @@
+"""The paper's criterion on segments, and its slopes by the motion: first moments at rest, inertias in motion (eq. 12)."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.dance.state import State
+from biodance.identify.base_parameters import structural_base
+from biodance.motion.regressor import PHI_TENSOR
+from biodance.records import Array
+
+
+def condition(gram: Array) -> tuple[float, Array]:
+    """Return cond = sqrt(largest / smallest eigenvalue) of a Gram matrix (k, k) and its gradient (k, k)."""
+    value, vector = np.linalg.eigh(gram)
+    value = np.maximum(value, 1e-12 * max(value[-1], 1e-12))
+    cond = float(np.sqrt(value[-1] / value[0]))
+    return cond, 0.5 * cond * (np.outer(vector[:, -1], vector[:, -1]) / value[-1] - np.outer(vector[:, 0], vector[:, 0]) / value[0])
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """What counts of each segment: ``first`` (of MX, MY, MZ) and ``second`` (of the six inertias) base columns, ``weight`` (N,) kg."""
+
+    first: tuple[list[int], ...]
+    second: tuple[list[int], ...]
+    weight: Array
+
+
+def blocks(body: Body) -> Blocks:
+    """Return the base columns of every segment, weighted by its mass in the table (structural base: docs/derivations.md)."""
+    columns = structural_base(body).columns
+    first, second = (
+        tuple([c % 10 - low for c in columns if c // 10 == i and low <= c % 10 < high] for i in range(len(body.segments)))
+        for low, high in ((1, 4), (4, 10))
+    )
+    return Blocks(first, second, np.array(body.sip.mass))
+
+
+def total(weight: Array, grams: Array, pick: tuple[list[int], ...], segments: list[int]) -> tuple[float, Array]:
+    """Return sum_i M_i cond(W_bi) over ``segments`` and its gradient by the Gram matrices (N, k, k)."""
+    value, slope = 0.0, np.zeros_like(grams)
+    for i in segments:
+        if pick[i] and weight[i] > 0:
+            cond, part = condition(grams[i][np.ix_(pick[i], pick[i])])
+            value += weight[i] * cond
+            slope[i][np.ix_(pick[i], pick[i])] = weight[i] * part
+    return value, slope
+
+
+def uprights(state: State) -> Array:
+    """Return (T, N, 3) the vertical in each segment's frame."""
+    return state.rotation[:, :, 2, :]
+
+
+def static_grams(up: Array) -> Array:
+    """Return (N, 3, 3) sum over postures of 1 - u u', the Gram matrices of the first moments over g²."""
+    return len(up) * np.eye(3) - np.einsum("tni,tnj->nij", up, up) + 1e-6 * np.eye(3)
+
+
+def upright_slopes(state: State, slope: Array) -> Array:
+    """Return (T, n) derivative by x of sum <slope (T, N, 3), u>."""
+    lab = np.einsum("tnij,tnj->tni", state.rotation, slope)
+    lever = np.stack([lab[..., 1], -lab[..., 0], 0 * lab[..., 0]], axis=-1)  # lab x z
+    moved = state.chain.ancestors[list(state.chain.carriers)]
+    return np.einsum("tnc,tkc,nk->tk", lever, state.twists[:, :, 3:], moved)
+
+
+class Inertias:
+    """The moment K(w, dw) (3, 6) by the six inertias of one segment: dw-part and w-w-part as constant tensors."""
+
+    @cached_property
+    def linear(self) -> Array:
+        """(3, 3, 6): linear[c] = K of unit acceleration along c."""
+        out = np.zeros((3, 3, 6))
+        for k, (i, j) in enumerate(PHI_TENSOR):
+            out[j, i, k] = out[i, j, k] = 1.0
+        return out
+
+    @cached_property
+    def square(self) -> Array:
+        """(3, 3, 3, 6): sum_bc w_b w_c square[b, c] = w x (I w)."""
+        skew = np.zeros((3, 3, 3))
+        for b, (i, j) in enumerate(((2, 1), (0, 2), (1, 0))):
+            skew[b, i, j], skew[b, j, i] = 1.0, -1.0
+        return np.einsum("bij,cjk->bcik", skew, self.linear)
+
+
+INERTIAS = Inertias()
+
+
+def moments(w: Array, dw: Array) -> Array:
+    """Return K (..., 3, 6) of angular velocity and acceleration (..., 3) in the segment's frame."""
+    return np.einsum("...c,cik->...ik", dw, INERTIAS.linear) + np.einsum("...b,...c,bcik->...ik", w, w, INERTIAS.square)
+
+
+def turning(state: State, segments: list[int]) -> tuple[Array, Array]:
+    """Return angular velocity and acceleration (T, S, 3) of segments in their own frames."""
+    links = [state.chain.carriers[i] for i in segments]
+    turn = state.rotation[:, segments]
+    return tuple(np.einsum("tsij,tsi->tsj", turn, s[:, links, 3:]) for s in (state.velocity, state.acceleration))  # type: ignore[return-value]
+
+
+def dynamic_grams(state: State, segments: list[int]) -> Array:
+    """Return (S, 6, 6) sum over samples of K'K."""
+    K = moments(*turning(state, segments))
+    return np.einsum("tsik,tsil->skl", K, K)
+
+
+def dynamic_slopes(state: State, segments: list[int], slope: Array) -> Array:
+    """Return (3, T, n) derivative by x, v, a of sum <slope (S, 6, 6), K'K>."""
+    w, dw = turning(state, segments)
+    Y = 2 * np.einsum("tsik,skl->tsil", moments(w, dw), slope)
+    by_dw = np.einsum("tsik,cik->tsc", Y, INERTIAS.linear)
+    by_w = np.einsum("tsik,tsb,bcik->tsc", Y, w, INERTIAS.square + np.swapaxes(INERTIAS.square, 0, 1))
+    links = [state.chain.carriers[i] for i in segments]
+    turn, moved = state.rotation[:, segments], state.chain.ancestors[links]
+    by_dw, by_w = (np.einsum("tsij,tsj->tsi", turn, s) for s in (by_dw, by_w))
+    axis, V, A = state.twists[..., 3:], state.velocity[..., 3:], state.acceleration[..., 3:]
+    swept = np.cross(V, axis)
+    gap = V[:, links][:, :, None] - V[:, None]
+    back = np.cross(np.broadcast_to(swept[:, None], gap.shape), gap) - np.cross(axis, A)[:, None]
+    ahead = swept[:, None] + np.cross(np.broadcast_to(axis[:, None], gap.shape), gap)
+    # in the segment's own frame: d(R'w) = R'(-w_i x w_i-link), d(R'dw) = R'(back)
+    dx = np.einsum("tsc,tkc,sk->tk", by_w, swept, moved) + np.einsum("tsc,tskc,sk->tk", by_dw, back, moved)
+    dv = np.einsum("tsc,tkc,sk->tk", by_w, axis, moved) + np.einsum("tsc,tskc,sk->tk", by_dw, ahead, moved)
+    da = np.einsum("tsc,tkc,sk->tk", by_dw, axis, moved)
+    return np.stack([dx, dv, da])

@@ -1,0 +1,45 @@
+"""The room that segments take: limbs are the widest capsules in their boxes, trunk and pelvis the boxes themselves."""
+
+from itertools import combinations
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.records import Array
+
+BOXES = ("pelvis", "trunk_head")
+_KINDS = {
+    *(("foot", "shank"), ("foot", "thigh"), ("forearm_hand", "thigh"), ("forearm_hand", "forearm_hand")),  # the paper's
+    *(("forearm_hand", "shank"), ("forearm_hand", "upper_arm"), ("shank", "shank"), ("foot", "foot"), ("upper_arm", "thigh")),
+    *(("shank", "thigh"), ("forearm_hand", "foot")),
+}
+
+
+def capsule(body: Body, segment: int) -> tuple[Array, float]:
+    """Return the ends (2, 3) m of the axis, in the segment frame, and the radius m of a limb's capsule."""
+    low, high = body.boxes[segment]
+    half, centre = (high - low) / 2, (high + low) / 2
+    axis = int(np.argmax(half))
+    radius = float(np.sort(half)[0])
+    reach = (half[axis] - radius) * np.eye(3)[axis]
+    return np.array([centre - reach, centre + reach]), radius
+
+
+def capsule_pairs(body: Body) -> list[tuple[int, int]]:
+    """Return the pairs of limbs (segment indices) that must not touch: the paper's and others that a dance could bring together."""
+    kinds = [s.removeprefix("right_").removeprefix("left_") for s in body.segments]
+    side = [s.split("_")[0] for s in body.segments]
+    near = {("shank", "thigh"), ("foot", "shank"), ("foot", "thigh"), ("forearm_hand", "upper_arm")}  # only the opposite side
+    pairs = []
+    for i, j in combinations(range(len(kinds)), 2):
+        for pair in ((kinds[i], kinds[j]), (kinds[j], kinds[i])):
+            if pair in _KINDS and not (pair in near and side[i] == side[j]):
+                pairs.append((i, j))
+                break
+    return pairs
+
+
+def box_pairs(body: Body) -> list[tuple[int, int]]:
+    """Return the pairs (limb, trunk or pelvis) that must not touch: the forearms against both."""
+    arms = [i for i, s in enumerate(body.segments) if s.endswith("forearm_hand")]
+    return [(arm, body.segment_index(box)) for arm in arms for box in BOXES]
