@@ -14,7 +14,7 @@ from biodance.body.body import Body
 from biodance.identify.information import Information
 from biodance.identify.noise import Noise, blocks
 from biodance.identify.statistics import Fit
-from biodance.identify.twins import Twins, disturbance, draw_twins, jacobian, wrench_change
+from biodance.identify.twins import Twins, disturbance, draw_twins, jacobian, skew, wrench_change
 from biodance.motion.kinematics import poses, segment_motion
 from biodance.motion.regressor import regressor_of
 from biodance.records import Array, Motion, Sip
@@ -65,8 +65,6 @@ class Plates:
 
 def draw_plates(count: int, rng: np.random.Generator) -> Plates:
     """Draw ``count`` plates within their tolerances."""
-    from biodance.identify.twins import skew
-
     mixing = PLATE["cross-talk"] * rng.normal(size=(count, 6, 6)) * FULL_SCALE[:, None] / FULL_SCALE
     mixing[:, range(6), range(6)] = PLATE["gain"] * rng.normal(size=(count, 6))
     turn, shift = skew(PLATE["turn"] * rng.normal(size=(count, 3))), skew(PLATE["place"] * rng.normal(size=(count, 3)))
