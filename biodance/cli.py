@@ -263,6 +263,30 @@ def demo(*, out: Out = Path("demo"), force: Force = False) -> int:
 
 
 @app.command
+def criteria(*, ranges: str = "frontal", json: Json = False) -> int:
+    """Compare all excitation criteria on the planar chain: each designs a motion of 2 s, each judges all of them.
+
+    Parameters
+    ----------
+    ranges
+        Assumed joint ranges of the chain: frontal, equal or wide.
+    """
+    from biodance.body.planar import planar_chain
+    from biodance.dance.planar import compared
+
+    body = planar_chain(ranges=ranges)
+    with _progress() as tell:
+        tell("designing one motion with every criterion")
+        found = compared(body)
+    if json:
+        score = {name: dict(zip(found.names, row, strict=True)) for name, row in zip(found.names, found.score.tolist(), strict=True)}
+        _print({"criteria": list(found.names), "score": score, "sd_before": found.sd_before.tolist(), "sd_after": found.sd_after.tolist()})
+    else:
+        sys.stdout.write(f"{found.table()}\nA row is a design, a column a judge; * is the best of the column; smaller is better.\n")
+    return DONE
+
+
+@app.command
 def doctor(*, json: Json = False) -> int:
     """Say what works on this machine, and how to mend what does not."""
     from dataclasses import asdict

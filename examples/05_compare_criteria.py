@@ -10,8 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from biodance.body.planar import planar_chain
-from biodance.dance.compare import compare_criteria
-from biodance.dance.planar import MOVABLE, VIA, planar_problem
+from biodance.dance.planar import compared
 
 SHOWN = {"MX": 1, "MY": 2, "ZZ": 9}
 
@@ -19,9 +18,7 @@ SHOWN = {"MX": 1, "MY": 2, "ZZ": 9}
 def main(picture: Path) -> None:
     """Print the table of scores; draw the standard deviation that each design leaves, as a share of the table's."""
     body = planar_chain()
-    middle = (body.limits.lower + body.limits.upper) / 2
-    inner = np.random.default_rng(0).uniform(body.limits.lower, body.limits.upper, (VIA, 3))
-    found = compare_criteria(lambda name: planar_problem(body, name), (np.vstack([middle, inner, middle]),), movable=MOVABLE)
+    found = compared(body)
     print(found.table())
     columns = [10 * i + offset for i in range(3) for offset in SHOWN.values()]
     names = [f"{parameter}\n{segment.replace('_', ' ')}" for segment in body.segments for parameter in SHOWN]

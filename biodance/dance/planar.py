@@ -12,6 +12,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.planar import PLANAR_CHANNELS, PLANAR_GRAVITY
+from biodance.dance.compare import Comparison, compare_criteria
 from biodance.dance.criteria import criterion
 from biodance.dance.splines import rest_to_rest
 from biodance.dance.target import target
@@ -74,6 +75,13 @@ def seeded_series(body: Body, name: str, *, motions: int = MOTIONS, starts: int 
         return np.vstack([middle, inner, middle])
 
     return _series(body, name, [[draw() for _ in range(starts)] for _ in range(motions)])
+
+
+def compared(body: Body, *, seed: int = 0) -> Comparison:
+    """Return all criteria compared on one motion of the chain from mid-range to mid-range, from one seeded start."""
+    middle = (body.limits.lower + body.limits.upper) / 2
+    inner = np.random.default_rng(seed).uniform(body.limits.lower, body.limits.upper, (VIA, len(middle)))
+    return compare_criteria(lambda name: planar_problem(body, name), (np.vstack([middle, inner, middle]),), movable=MOVABLE)
 
 
 def _series(body: Body, name: str, starts: list[list[Array]]) -> Series:

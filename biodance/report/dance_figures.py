@@ -80,13 +80,15 @@ def postures_figure(body: Body, q: Array, titles: tuple[str, ...]) -> "Figure":
 
 def criterion_figure(values: Array, bound: float, *, what: str = "sum of M cond(W_bi), kg") -> "Figure":
     """Draw the criterion (K,) after each transition, above the smallest value that it can have."""
+    from matplotlib.ticker import MaxNLocator
+
     with look():
         drawn = figure(2.6)
         axes = drawn.subplots()
         axes.semilogy(np.arange(1, len(values) + 1), values, color=BLUE, marker="o", markersize=3, label="after the transition")
         axes.axhline(bound, color=GREEN, linestyle="--", label=f"bound {bound:.3g}")
         axes.set(xlabel="transition", ylabel=what)
-        axes.xaxis.get_major_locator().set_params(integer=True)
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.legend()
     return drawn
 
