@@ -6,8 +6,8 @@ from biodance.dance.limits import Margins
 from biodance.dance.state import State
 
 NAME, UNIT, SCALE = "foot_placement", "m", 0.03
-STRAIGHT = np.radians(2.0)
-"""Least knee flexion at which the leg still has six independent directions."""
+STRAIGHT = np.radians(9.0)
+"""Least knee flexion: the closed-form legs bend reach smoothly over the last 2 mm, and nobody is asked to lock the knees."""
 
 
 def margins(state: State) -> Margins:
