@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from types import ModuleType
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.dance.chain import ROOT, Chain
 from biodance.dance.stance import Stance
@@ -35,7 +36,7 @@ def closed(chain: Chain, stance: Stance, x: Array, v: Array, a: Array) -> State:
 
 
 def _solve(twists: Array, right: Array) -> Array:
-    return np.linalg.solve(np.swapaxes(twists, 1, 2), right[..., None])[..., 0]
+    return np.asarray(np.linalg.solve(np.swapaxes(twists, 1, 2), right[..., None])[..., 0])
 
 
 def closure_slopes(state: State) -> Array:
@@ -95,7 +96,7 @@ class Judged:
         self._found = [(limit.margins(state), limit.SCALE) for limit in programme.limits]
         self.margins = np.concatenate([np.empty(0), *((m.value / s).ravel() for m, s in self._found)]) - programme.reserve
 
-    def slopes(self, rows: Array) -> tuple[Array, Array]:
+    def slopes(self, rows: NDArray[np.intp]) -> tuple[Array, Array]:
         """Return the gradient and the chosen rows of the Jacobian."""
         closure = closure_slopes(self.state)
         frames, first, parts = len(self.state.x), 0, []
@@ -108,7 +109,7 @@ class Judged:
         gradient = self._chain(list(self._slope), np.arange(frames), closure).sum(axis=0)
         return gradient, np.concatenate([np.empty((0, gradient.size)), *parts])
 
-    def _chain(self, slopes: list[Array], time: Array, closure: Array) -> Array:
+    def _chain(self, slopes: list[Array], time: NDArray[np.intp], closure: Array) -> Array:
         free, basis = self.programme.free, self.programme.basis
         table = closure[:, :, :, free]
         by = [np.einsum("rn,rnf->rf", slopes[0], table[0, time]), None, None]

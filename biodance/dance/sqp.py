@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.records import Array
 
@@ -20,7 +21,7 @@ class Point(Protocol):
     value: float
     margins: Array
 
-    def slopes(self, rows: Array) -> tuple[Array, Array]:
+    def slopes(self, rows: NDArray[np.intp]) -> tuple[Array, Array]:
         """Return df/dy (n,) and dc/dy (len(rows), n) of the chosen margins."""
         ...
 

@@ -118,14 +118,14 @@ class State:
     @cached_property
     def wrench(self) -> Array:
         """(T, 6) N, N·m needed from the ground, about the lab origin, force first."""
-        return np.linalg.solve(self.twists[:, :ROOT], self.force[:, :ROOT, None])[..., 0]
+        return np.asarray(np.linalg.solve(self.twists[:, :ROOT], self.force[:, :ROOT, None])[..., 0])
 
     @cached_property
     def wrench_slopes(self) -> Array:
         """(3, T, 6, n) derivative of the wrench with respect to x, v, a."""
         inner = self._dynamics[1][:, :, :ROOT].copy()
         inner[0, :, :, :ROOT] -= self.moved_twists(list(range(ROOT)), self.wrench)[:, :, :ROOT]
-        return np.linalg.solve(self.twists[None, :, :ROOT], inner)
+        return np.asarray(np.linalg.solve(self.twists[None, :, :ROOT], inner))
 
     def moved_twists(self, columns: list[int], wrench: Array) -> Array:
         """Return (T, k, n) derivative of J_k' F with respect to x for the coordinates ``columns`` and a fixed wrench (T, 6)."""
