@@ -9,7 +9,9 @@ import pytest
 
 from biodance.body.human import human
 from biodance.body.joint_centres import chord, davis_hip, harrington_hip, pelvis_frame
-from biodance.body.scaling import scale_with_posture
+from biodance.body.measures import Measures
+from biodance.body.scaling import chain_angles, scale_with_posture, standing_tilt
+from biodance.body.static_frames import arm_centres, turn
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.identify.physical import smallest_eigenvalues
 from biodance.lab.prepare import prepare
@@ -43,7 +45,7 @@ def test_the_body_stands_exactly_under_its_markers() -> None:
     body, q = scale_with_posture(SUBJECT, trial)
     found = poses(body, q[None]).points(body.markers.segment, body.markers.position)[0]
     expected = np.stack([trial.markers[name][0] for name in body.markers.names])
-    np.testing.assert_allclose(found, expected, atol=1e-5)
+    np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
 def test_the_generic_person_is_found_again() -> None:
@@ -75,6 +77,62 @@ def test_unknown_labels_no_markers_and_unknown_mass_are_refused() -> None:
         scale_with_posture(SUBJECT, replace(trial, markers=None))
     with pytest.raises(SessionRefused, match="mass_kg"):
         scale_with_posture(replace(SUBJECT, mass=float("nan")), trial)
+
+
+def test_a_thigh_marker_that_was_not_placed_for_the_set_is_not_believed() -> None:
+    trial = standing_trial()
+    right, _ = scale_with_posture(SUBJECT, trial)
+    names, xyz = trial.markers.names, trial.markers.xyz.copy()
+    knee_marker, height = xyz[0, names.index("RKNE")], xyz[0, names.index("RTHI"), 2]
+    xyz[:, names.index("RTHI")] = [knee_marker[0] + 0.1, knee_marker[1] + 0.06, height]  # in front of the thigh instead of beside it
+    wrong, _ = scale_with_posture(SUBJECT, replace(trial, markers=Markers(names, trial.markers.time, xyz)))
+    assert any("right thigh marker would turn the knee's axis" in note and note.startswith("Warning") for note in wrong.notes)
+    assert not any("thigh marker would turn" in note for note in right.notes)
+    knee = right.joint_index("right_knee_flexion")
+    assert np.linalg.norm(wrong.joints[knee].translation - right.joints[knee].translation) < 0.005
+
+
+def test_wrist_markers_on_the_styloids_and_on_a_bar() -> None:
+    centre = np.array([0.0, 0.0, 0.0])
+    radial, ulnar, elbow_at = np.array([0.04, 0, 0]), np.array([-0.04, 0, 0]), np.array([0.0, 0, 0.25])
+    place = {"right_elbow_lateral": elbow_at + np.array([0.04, 0, 0]), "right_wrist_radial": radial, "right_wrist_ulnar": ulnar}
+    sizes = measures_of(wrist=0.06)
+    _, middle = arm_centres(place, sizes, np.array([0.0, 0.01, 0.55]), "right")
+    np.testing.assert_allclose(middle, centre, atol=1e-12)
+    _, palmar = arm_centres(place, measures_of(wrist=0.03), np.array([0.0, 0.01, 0.55]), "right")
+    assert np.linalg.norm(palmar - centre) == pytest.approx(0.015 + 0.007)
+
+
+def measures_of(*, wrist: float) -> Measures:
+    sides = {"right": 0.9, "left": 0.9}
+    widths = {f"{side}_{joint}": wrist if joint == "wrist" else 0.08 for side in sides for joint in ("knee", "ankle", "elbow", "wrist")}
+    return Measures(0.007, 0.25, 0.16, sides, sides, sides, widths, frozenset(widths), ())
+
+
+def test_the_angles_of_a_chain_give_its_rotation_back() -> None:
+    rng = np.random.default_rng(3)
+    for count, order in ((1, "z"), (2, "zx"), (3, "zxy")):
+        signs = rng.choice([-1.0, 1.0], count)
+        axes = np.eye(3)[["xyz".index(letter) for letter in order]] * signs[:, None]
+        angles = rng.uniform(-1.2, 1.2, count)
+        rotation = np.eye(3)
+        for letter, sign, angle in zip(order, signs, angles, strict=True):
+            rotation = rotation @ turn("xyz".index(letter), sign * angle)
+        np.testing.assert_allclose(chain_angles(rotation, axes), angles, atol=1e-12)
+
+
+def test_ranges_of_hip_and_trunk_follow_the_tilt_of_the_pelvis_markers() -> None:
+    trial = standing_trial()
+    names, xyz = trial.markers.names, trial.markers.xyz.copy()
+    for label in ("LPSI", "RPSI"):
+        xyz[:, names.index(label), 2] += 0.05
+    upright, _ = scale_with_posture(SUBJECT, trial)
+    tilted, q = scale_with_posture(SUBJECT, replace(trial, markers=Markers(names, trial.markers.time, xyz)))
+    tilt = standing_tilt(q)
+    assert np.degrees(tilt) == pytest.approx(np.degrees(np.arcsin(0.05 / np.hypot(0.05, 0.1878))), abs=0.5)
+    hip, trunk = tilted.joint_index("right_hip_flexion"), tilted.joint_index("trunk_flexion")
+    assert tilted.limits.upper[hip] - upright.limits.upper[hip] == pytest.approx(tilt, abs=1e-6)
+    assert tilted.limits.lower[trunk] - upright.limits.lower[trunk] == pytest.approx(-tilt, abs=1e-6)
 
 
 def test_a_typed_width_that_contradicts_the_markers_is_warned_about() -> None:

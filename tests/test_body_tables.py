@@ -3,9 +3,16 @@
 import numpy as np
 import pytest
 
+from biodance.body.de_leva import PARTS
 from biodance.body.human import human
+from biodance.body.inertia import TENSOR, Lump, lump_of, parameters, pseudo_inertia
+from biodance.body.limits import peak_torque
+from biodance.body.older_tables import regression
+from biodance.body.prior import parameter_jacobian
+from biodance.body.reference import COUNT, KINDS
+from biodance.body.segment_tables import reference, table_names
 from biodance.body.skeleton import SEGMENTS
-from biodance.body.tables import read_table
+from biodance.body.tables import numbers, read_table
 from biodance.errors import BiodanceError, UnknownName
 from biodance.identify.physical import smallest_eigenvalues
 from biodance.library import folder, names, read_toml
@@ -37,6 +44,72 @@ def test_a_changed_table_is_refused(tmp_path, monkeypatch: pytest.MonkeyPatch) -
     with pytest.raises(BiodanceError, match="numbers were changed"):
         tables.read_table("segments", "de_leva_1996")
     tables.read_table.cache_clear()
+
+
+@pytest.mark.parametrize("sex", ["F", "M"])
+def test_every_table_makes_a_person_who_can_exist(sex: str) -> None:
+    subject = Subject(72.0, 1.72, sex)
+    for name in table_names(sex):
+        person = reference(name, subject)
+        assert sum(COUNT[kind] * person.segments[kind].mass for kind in KINDS) == pytest.approx(1.0, abs=1e-12), name
+        for kind in KINDS:
+            assert np.linalg.eigvalsh(pseudo_inertia(parameters(person.segments[kind])))[0] > 0, (name, kind)
+            assert np.linalg.norm(person.segments[kind].com) < 1.05 * person.lengths[kind], (name, kind)
+
+
+def test_every_row_of_the_shipped_tables_can_exist() -> None:
+    for row in read_table("segments", "de_leva_1996").rows:
+        squares = np.array(numbers(row, "gyration_sagittal gyration_transverse gyration_longitudinal")) ** 2
+        assert 2 * squares.max() < squares.sum(), row["segment"]
+    for row in read_table("segments", "dumas_2018").rows:
+        xx, yy, zz, xy, xz, yz = (r * abs(r) for r in numbers(row, "r_xx r_yy r_zz r_xy r_xz r_yz"))
+        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        assert np.linalg.eigvalsh(0.5 * np.trace(tensor) * np.eye(3) - tensor)[0] > 0, row["segment"]
+
+
+def test_each_study_of_masses_adds_up() -> None:
+    rows = read_table("segments", "mass_studies").rows
+    for study, sex in {(row["study"], row["sex"]) for row in rows}:
+        mine = [row for row in rows if (row["study"], row["sex"]) == (study, sex)]
+        assert sum(int(row["count"]) * float(row["mass_fraction"]) for row in mine) == pytest.approx(1.0, abs=1e-3), study
+
+
+def test_zatsiorsky_masses_add_up_to_the_body_before_any_renormalisation() -> None:
+    for mass, stature in ((55.0, 1.65), (75.0, 1.77), (90.0, 1.85)):
+        subject = Subject(mass, stature, "M")
+        total = sum(
+            regression(part, "mass", subject)[0] * (2 if kind not in ("pelvis", "trunk_head") else 1)
+            for kind in KINDS
+            for part in PARTS[kind]
+        )
+        assert total == pytest.approx(mass, rel=0.005)
+
+
+def test_strength_of_the_table_is_anderson() -> None:
+    anderson = read_table("human", "anderson_2007")
+    for sex, mass, stature, expected in (("M", 75.0, 1.77, 209.7), ("F", 65.0, 1.75, 202.0)):
+        assert peak_torque(anderson, Subject(mass, stature, sex), "hip", "extension") == pytest.approx(expected, abs=0.5)
+
+
+def test_the_covariance_is_the_spread_of_drawn_bodies() -> None:
+    """The analytic Jacobian: parameters of bodies with drawn mass, CoM and inertia scatter as the covariance says."""
+    lump = lump_of(human(Subject(70.0, 1.72, "M")).sip.of("right_thigh"))
+    step = 1e-6
+    numeric = np.zeros((10, 10))
+    base = parameters(lump)
+    for column in range(10):
+        mass, com, unit = lump.mass, np.array(lump.com), lump.inertia / lump.mass
+        if column == 0:
+            mass += step
+        elif column < 4:
+            com[column - 1] += step
+        else:
+            i, j = TENSOR[column - 4]
+            unit = unit.copy()
+            unit[i, j] += step
+            unit[j, i] = unit[i, j]
+        numeric[:, column] = (parameters(Lump(mass, com, mass * unit)) - base) / step
+    np.testing.assert_allclose(parameter_jacobian(lump), numeric, atol=1e-4)
 
 
 @pytest.mark.parametrize("table", ["de_leva_1996", "dumas_2018"])

@@ -162,18 +162,22 @@ def chain_angles(relative: Array, axes: Array) -> Array:
         spin = np.array([relative[2, 1] - relative[1, 2], relative[0, 2] - relative[2, 0], relative[1, 0] - relative[0, 1]]) / 2
         return np.array([np.arctan2(axes[0] @ spin, (np.trace(relative) - 1) / 2)])
     if len(axes) == 2:
-        angles = [np.arctan2(relative[1, 0], relative[0, 0]), np.arctan2(-relative[1, 2], relative[2, 2])]
+        angles = [np.arctan2(relative[1, 0], relative[0, 0]), np.arctan2(relative[2, 1], relative[2, 2])]
     else:
         angles = [np.arctan2(-relative[0, 1], relative[1, 1]), np.arcsin(relative[2, 1]), np.arctan2(-relative[2, 0], relative[2, 2])]
     return axes.sum(axis=1) * np.array(angles)
 
 
 def widen(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:
-    """Return the limits widened for tracking: the static posture lies ``SPARE`` inside them, the shoulder turns as far as the hand does.
+    """Return the limits for tracking: counted from this person's upright pelvis, the static posture ``SPARE`` inside them, and the shoulder
+    turning as far as the hand does. The notes name what was changed.
 
-    The notes name every joint that the static posture needed wider.
+    Clinical ranges of hip and trunk count from upright standing, ISB angles from the plane of the pelvis markers, which stands tilted.
     """
     angle, limits = q[body.nq - len(body.joints) :], body.limits
+    tilt = standing_tilt(q)
+    shift = np.array([tilt * (joint.name.endswith("_hip_flexion") - float(joint.name == "trunk_flexion")) for joint in body.joints])
+    limits = replace(limits, lower=limits.lower + np.minimum(shift, 0.0), upper=limits.upper + np.maximum(shift, 0.0))
     turning = np.array([joint.name.endswith("_shoulder_rotation") for joint in body.joints])
     limits = replace(limits, lower=np.where(turning, -HAND_TURN, limits.lower), upper=np.where(turning, HAND_TURN, limits.upper))
     lower, upper = np.minimum(limits.lower, angle - SPARE), np.maximum(limits.upper, angle + SPARE)
@@ -183,7 +187,15 @@ def widen(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:
         for i, joint in enumerate(body.joints)
         if lower[i] < limits.lower[i] or upper[i] > limits.upper[i]
     )
-    return replace(limits, lower=lower, upper=upper), notes
+    tilted = f"Pelvis markers stand tilted {np.degrees(tilt):.0f} deg forwards: ranges of hip and trunk flexion are widened by as much."
+    return replace(limits, lower=lower, upper=upper), (tilted, *notes)
+
+
+def standing_tilt(q: Array) -> float:
+    """Return the forward tilt, rad, of the pelvis in a posture q: how far its x axis points below the horizontal."""
+    from scipy.spatial.transform import Rotation
+
+    return -float(np.arcsin(Rotation.from_quat(q[3:7]).as_matrix()[2, 0]))
 
 
 def _doubts(skeleton: Skeleton, subject: Subject, model: Reference) -> list[str]:

@@ -13,6 +13,10 @@ from biodance.records import Array
 Hip = Literal["harrington", "davis"]
 SIGN = {"right": 1.0, "left": -1.0}
 UP = np.array([0.0, 0.0, 1.0])
+WRIST_BAR = 0.03
+"""m: wrist markers this much farther apart than markers on the styloids would be sit on a bar."""
+AXIS_TOLERANCE = 30.0
+"""deg: a thigh marker that turns the knee's axis further, seen from above, is not believed."""
 Places = Mapping[str, Array]
 
 
@@ -119,14 +123,29 @@ def shoulder_centres(place: Places, sizes: Measures, mid_hip: Array) -> dict[str
 
 
 def knee_centre(place: Places, sizes: Measures, hip: Array, pelvis_right: Array, side: str) -> tuple[Array, str]:
-    """Return the knee centre, m: middle of the epicondyles, or chord with the thigh marker; and what was assumed without either."""
+    """Return the knee centre, m, and what had to be assumed: the middle of the epicondyles, or a chord with the thigh marker.
+
+    A thigh marker that would turn the knee's axis further than ``AXIS_TOLERANCE`` from square to the line of march (mean of pelvis and
+    foot) was not placed for plug-in gait: the axis is then taken square to that line.
+    """
     lateral = place[f"{side}_knee_lateral"]
     if f"{side}_knee_medial" in place:
         return (lateral + place[f"{side}_knee_medial"]) / 2, ""
-    outside, note = lateral + 0.1 * SIGN[side] * pelvis_right, f"{side} knee: no medial or thigh marker, axis taken parallel to the pelvis."
-    wand = place.get(f"{side}_thigh_wand")
     distance = sizes.widths[f"{side}_knee"] / 2 + sizes.marker_radius
-    return chord(hip, lateral, distance, outside if wand is None else wand), "" if wand is not None else note.capitalize()
+    foot_right = unit(np.cross(place[f"{side}_toe"] - place[f"{side}_heel"], UP))
+    across = unit(pelvis_right + foot_right)
+    usual = chord(hip, lateral, distance, lateral + 0.1 * SIGN[side] * across)
+    if f"{side}_thigh_wand" not in place:
+        return usual, f"{side.capitalize()} knee: no medial or thigh marker, axis taken square to the line of march."
+    centre = chord(hip, lateral, distance, place[f"{side}_thigh_wand"])
+    axis = SIGN[side] * (lateral - centre)
+    angle = float(np.degrees(np.arctan2(UP @ np.cross(across, axis), across @ axis - (across @ UP) * (axis @ UP))))
+    if abs(angle) <= AXIS_TOLERANCE:
+        return centre, ""
+    return usual, (
+        f"Warning: the {side} thigh marker would turn the knee's axis {abs(angle):.0f} deg from square to the line of march, "
+        "so the axis is taken as square. Place the marker in the frontal plane of the thigh, or add a medial knee marker."
+    )
 
 
 def ankle_centre(place: Places, sizes: Measures, knee: Array, side: str) -> Array:
@@ -139,15 +158,18 @@ def ankle_centre(place: Places, sizes: Measures, knee: Array, side: str) -> Arra
 
 
 def arm_centres(place: Places, sizes: Measures, shoulder_at: Array, side: str) -> tuple[Array, Array]:
-    """Return elbow and wrist centre, m: middles where there is a medial epicondyle marker, else the plug-in-gait construction.
+    """Return elbow and wrist centre, m: the elbow in the middle of its epicondyle markers, or by the plug-in-gait construction.
 
-    A wrist whose width was not typed is the middle of its two markers (they then sit on the styloids, not on a bar).
+    The wrist is the middle of its two markers, unless they are so much farther apart than the wrist is wide that they sit on a bar behind
+    it; then the plug-in-gait construction. (Mean plug-in-gait static of 9 adults: with a bar, the finger marker would be 5 cm behind the
+    hand; with markers on the styloids, 2 cm, as thick as a hand is.)
     """
     lateral, radial, ulnar = (place[f"{side}_{name}"] for name in ("elbow_lateral", "wrist_radial", "wrist_ulnar"))
     middle = (radial + ulnar) / 2
     if f"{side}_elbow_medial" in place:
         return (lateral + place[f"{side}_elbow_medial"]) / 2, middle
     at = elbow(shoulder_at, lateral, middle, sizes.widths[f"{side}_elbow"] / 2 + sizes.marker_radius, side=SIGN[side])
-    if f"{side}_wrist" not in sizes.typed:
+    reach = sizes.widths[f"{side}_wrist"] / 2 + sizes.marker_radius
+    if np.linalg.norm(radial - ulnar) < 2 * reach + WRIST_BAR:
         return at, middle
-    return at, wrist(at, radial, ulnar, sizes.widths[f"{side}_wrist"] / 2 + sizes.marker_radius, side=SIGN[side])
+    return at, wrist(at, radial, ulnar, reach, side=SIGN[side])
