@@ -23,6 +23,9 @@ ANKLE_HEIGHT = (0.04, 0.12)
 HAND_TURN = np.radians(120.0)
 """rad either way: the model has no pronation, so with a straight elbow a turning hand is seen as a turning shoulder; a narrower limit makes
 the arm jump to the other set of angles that reaches the same hand (seen in a real walk)."""
+LOADED_ANKLE = np.radians(40.0)
+"""rad: dorsiflexion under body weight with a bent knee, as on stairs and in squats (weight-bearing lunge, Bennell et al. 1998); the tables
+give the unloaded joint's 20 to 25 deg."""
 SPARE = np.radians(5.0)
 """rad: how far a joint range is widened beyond the angle of the static trial."""
 TILT = {"knee": 15.0, "elbow": 25.0, "ankle": 40.0}
@@ -169,8 +172,8 @@ def chain_angles(relative: Array, axes: Array) -> Array:
 
 
 def widen(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:
-    """Return the limits for tracking: counted from this person's upright pelvis, the static posture ``SPARE`` inside them, and the shoulder
-    turning as far as the hand does. The notes name what was changed.
+    """Return the limits for tracking: counted from this person's upright pelvis, the static posture ``SPARE`` inside them, the shoulder
+    turning as far as the hand does, the ankle bending as far as under load. The notes name what was changed.
 
     Clinical ranges of hip and trunk count from upright standing, ISB angles from the plane of the pelvis markers, which stands tilted.
     """
@@ -178,8 +181,11 @@ def widen(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:
     tilt = standing_tilt(q)
     shift = np.array([tilt * (joint.name.endswith("_hip_flexion") - float(joint.name == "trunk_flexion")) for joint in body.joints])
     limits = replace(limits, lower=limits.lower + np.minimum(shift, 0.0), upper=limits.upper + np.maximum(shift, 0.0))
-    turning = np.array([joint.name.endswith("_shoulder_rotation") for joint in body.joints])
-    limits = replace(limits, lower=np.where(turning, -HAND_TURN, limits.lower), upper=np.where(turning, HAND_TURN, limits.upper))
+    turning, ankle = (
+        np.array([joint.name.endswith(end) for joint in body.joints]) for end in ("_shoulder_rotation", "_ankle_dorsiflexion")
+    )
+    loaded = np.where(ankle, np.maximum(limits.upper, LOADED_ANKLE), limits.upper)
+    limits = replace(limits, lower=np.where(turning, -HAND_TURN, limits.lower), upper=np.where(turning, HAND_TURN, loaded))
     lower, upper = np.minimum(limits.lower, angle - SPARE), np.maximum(limits.upper, angle + SPARE)
     notes = tuple(
         f"Range of {joint.name} widened to {np.degrees(lower[i]):.0f} .. {np.degrees(upper[i]):.0f} deg: "
