@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from biodance.body.human import human
-from biodance.body.joint_centres import chord, davis_hip, harrington_hip, pelvis_frame
+from biodance.body.joint_centres import chord, davis_hip, elbow, harrington_hip, pelvis_frame, shoulder, unit, wrist
 from biodance.body.measures import Measures
 from biodance.body.scaling import chain_angles, scale_with_posture, standing_tilt
 from biodance.body.static_frames import arm_centres, turn
@@ -186,6 +186,34 @@ def test_davis_is_vicons_own_hip_centre(folder: str) -> None:
         local = davis_hip(width, legs, typed[f"{side}ASISTROCANTERDISTANCE"], radius) * [1, 1, sign]
         distance = np.linalg.norm(middle + rotation @ local - point(f"{side}FEP"))
         assert distance < 1e-5
+
+
+@needs_data
+@pytest.mark.parametrize("folder", sorted(STATICS))
+def test_knee_ankle_shoulder_elbow_and_wrist_are_vicons_own(folder: str) -> None:
+    """Each construction, from Vicon's own proximal centre and typed widths, gives Vicon's centre in its own static file."""
+    raw = read_raw(Path(str(DATA)) / folder / f"{STATICS[folder]}.c3d")
+    typed = {name: float(np.ravel(value)[0]) / 1e3 for name, value in raw.parameters["PROCESSING"].items() if np.size(value) == 1}
+    at = {label: raw.points[raw.points.shape[0] // 2, i] / 1e3 for i, label in enumerate(raw.labels)}
+    radius = typed.get("MARKERDIAMETER", 0.014) / 2
+    up, ahead = at["CLAV"] + at["C7"] - at["STRN"] - at["T10"], at["CLAV"] + at["STRN"] - at["C7"] - at["T10"]
+    forward = unit(np.cross(np.cross(up, ahead), up))
+    for side, sign in (("R", 1.0), ("L", -1.0)):
+
+        def reach(joint: str, side: str = side) -> float:
+            return typed[f"{side}{joint}WIDTH"] / 2 + radius
+
+        middle = (at[f"{side}WRA"] + at[f"{side}WRB"]) / 2
+        offset = typed[f"{side}SHOULDEROFFSET"] + radius
+        found = {
+            "FEO": chord(at[f"{side}FEP"], at[f"{side}KNE"], reach("KNEE"), at[f"{side}THI"]),
+            "TIO": chord(at[f"{side}FEO"], at[f"{side}ANK"], reach("ANKLE"), at[f"{side}TIB"]),
+            "CLO": shoulder(at["CLAV"] - radius * forward, forward, at[f"{side}SHO"], offset, side=sign),
+            "HUO": elbow(at[f"{side}CLO"], at[f"{side}ELB"], middle, reach("ELBOW"), side=sign),
+            "RAO": wrist(at[f"{side}HUO"], at[f"{side}WRA"], at[f"{side}WRB"], reach("WRIST"), side=sign),
+        }
+        for centre, place in found.items():
+            assert np.linalg.norm(place - at[side + centre]) < 1e-4, side + centre
 
 
 @needs_data
