@@ -62,3 +62,16 @@ def test_coefficients_above_the_last_edge_do_not_count() -> None:
 def test_edges_must_increase() -> None:
     with pytest.raises(BiodanceError, match="increase"):
         Noise(np.stack([np.eye(6)] * 2), ABOUT, edges=(0.0, 2.0, 1.0), rate=25.0)
+
+
+@pytest.mark.parametrize(("rate", "stride"), [(100.0, 4), (99.9999, 4), (120.0, 5), (50.0, 2), (24.0, 1)])
+def test_thinning_knows_the_rate_it_makes(rate: float, stride: int) -> None:
+    noise = Noise(np.eye(6)[None], ABOUT, edges=(0.0, 10.0), rate=25.0)
+    first = next(blocks(np.ones(1000, dtype=bool), rate, noise))
+    assert np.all(np.diff(first) == stride)
+    thin = noise.at(rate)
+    assert thin.rate == pytest.approx(rate / stride)
+    wave = np.cos(2 * np.pi * 4.0 * (np.arange(400) + 0.5) / thin.rate)  # 4 Hz in a band of 3.5 to 4.5 Hz
+    narrow = Noise(np.stack([np.eye(6)] * 3), ABOUT, edges=(0.0, 3.5, 4.5, 10.0), rate=25.0).at(rate)
+    power = narrow.coefficients(np.repeat(wave[:, None, None], 6, axis=1))[:, 0, 0] ** 2
+    assert power[narrow.bands_of(400) == 1].sum() > 0.95 * power.sum()

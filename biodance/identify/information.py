@@ -88,7 +88,7 @@ def whitened_rows(body: Body, motion: Motion, wrench: Wrench, noise: Noise, used
     for pick in blocks(used, motion.rate, noise):
         part = Motion(motion.time[pick], motion.q[pick], motion.v[pick], motion.a[pick])
         W = regressor_of(segment_motion(body, part))
-        yield noise.whiten(np.concatenate([W, wrench.value[pick][:, :, None]], axis=2))
+        yield noise.at(motion.rate).whiten(np.concatenate([W, wrench.value[pick][:, :, None]], axis=2))
 
 
 def merge(parts: Iterable[Information]) -> Information:

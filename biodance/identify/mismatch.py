@@ -88,10 +88,10 @@ def mismatch(body: Body, fits: tuple[Fit, ...], noise: Noise, *, seed: int = 0) 
                 continue
             motion = Motion(fit.motion.time[pick], fit.motion.q[pick], fit.motion.v[pick], fit.motion.a[pick])
             W = regressor_of(segment_motion(body, motion))
-            white = noise.whiten(W).reshape(-1, W.shape[2])
+            white = noise.at(fit.motion.rate).whiten(W).reshape(-1, W.shape[2])
             change, residual = _twin_errors(body, motion, twins)
             for index, error in enumerate((change, _plate_errors(W @ body.sip.phi, motion.rate, noise, plates))):
-                found[index] += white.T @ noise.whiten(error).reshape(-1, TWINS)
+                found[index] += white.T @ noise.at(fit.motion.rate).whiten(error).reshape(-1, TWINS)
             if fit.motion.residual.shape[1] and np.isfinite(fit.motion.residual[pick]).any():
                 predicted += residual * pick.size
                 observed += float(np.nanmean(fit.motion.residual[pick] ** 2)) * pick.size

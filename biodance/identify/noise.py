@@ -7,7 +7,7 @@ instruments. Whitening every band by its own covariance makes least squares the 
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +57,14 @@ class Noise:
         out[3:, :3] = -np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
         return out
 
+    def stride(self, rate: float) -> int:
+        """Return how many samples of a recording at ``rate`` Hz make one sample of this noise."""
+        return 1 if np.isinf(self.rate) else max(1, round(rate / self.rate))
+
+    def at(self, rate: float) -> "Noise":
+        """Return the same noise for a recording at ``rate`` Hz, at the rate that its thinned samples really have (120 Hz: 24 Hz)."""
+        return self if np.isinf(self.rate) else replace(self, rate=rate / self.stride(rate))
+
     def bands_of(self, count: int) -> NDArray[np.intp]:
         """Return the band (count,) of every coefficient of a run of ``count`` samples; -1 for those that do not count."""
         if self.is_white:
@@ -85,9 +93,8 @@ def blocks(use: NDArray[np.bool_], rate: float, noise: Noise) -> Iterator[NDArra
 
     Recordings are low-passed far below half the noise's rate, so that thinning loses nothing.
     """
-    stride = 1 if np.isinf(noise.rate) else max(1, int(rate // noise.rate))
     edge = np.flatnonzero(np.diff(np.concatenate([[False], use, [False]]).astype(int)))
     for start, stop in zip(edge[::2], edge[1::2], strict=True):
-        frames = np.arange(start, stop, stride)
+        frames = np.arange(start, stop, noise.stride(rate))
         for piece in range(0, frames.size, BLOCK):
             yield frames[piece : piece + BLOCK]

@@ -105,7 +105,7 @@ def statistics(body: Body, fit: Fit, layout: Noise) -> Statistics:
         W = regressor_of(segment_motion(body, part))
         rows = np.concatenate([W, fit.wrench.value[pick][:, :, None]], axis=2)
         X = layout.coefficients(layout.shift @ rows)
-        band = layout.bands_of(len(X))
+        band = layout.at(fit.motion.rate).bands_of(len(X))
         for b in np.unique(band[band >= 0]):
             flat = X[band == b].reshape(-1, 6 * size)
             gram[b] += (flat.T @ flat).reshape(6, size, 6, size)
