@@ -17,6 +17,7 @@ import numpy as np
 from virtual_visits import CACHE, TrackedVisit, subjects, visit
 
 import biodance.identify
+from biodance.body.inertia import smallest_eigenvalues
 from biodance.identify.added_mass import AddedMass, added_mass
 from biodance.identify.identification import Identification, conclude, identify, standing_point, usable
 from biodance.identify.knowledge import SIGMAS, segment_quantities
@@ -24,7 +25,7 @@ from biodance.identify.learning import learn
 from biodance.identify.mismatch import Mismatch, evidence_of_scale, mismatch
 from biodance.identify.noise import Noise, blocks
 from biodance.identify.paper_programme import paper_programme
-from biodance.identify.physical import physical_fit, smallest_eigenvalues
+from biodance.identify.physical import physical_fit
 from biodance.identify.posterior import posterior
 from biodance.identify.statistics import Fit, Statistics, empty, layout_for, statistics
 from biodance.lab.filters import LowPass, low_pass

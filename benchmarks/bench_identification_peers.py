@@ -21,12 +21,12 @@ from scipy.interpolate import CubicSpline
 from biodance.body.body import Body
 from biodance.body.export import write_model
 from biodance.body.human import human
+from biodance.body.inertia import smallest_eigenvalues
 from biodance.identify.identification import identify
 from biodance.identify.information import information
 from biodance.identify.knowledge import segment_quantities
 from biodance.identify.noise import Noise
 from biodance.identify.paper_programme import paper_programme
-from biodance.identify.physical import smallest_eigenvalues
 from biodance.identify.statistics import Fit
 from biodance.motion.regressor import regressor
 from biodance.records import Array, Motion, Subject, Wrench

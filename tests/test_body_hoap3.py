@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from biodance.body.hoap3 import SEGMENTS, axis_turn, hoap3
+from biodance.body.hoap3 import SEGMENTS, hoap3
+from biodance.body.inertia import smallest_eigenvalues
 from biodance.body.tables import numbers, read_table
 from biodance.identify.base_parameters import structural_base
-from biodance.identify.physical import smallest_eigenvalues
 from biodance.motion.kinematics import poses
 
 BODY = hoap3()
@@ -15,11 +15,6 @@ BODY = hoap3()
 def standing() -> np.ndarray:
     q = BODY.neutral
     return q
-
-
-def test_axis_turn_is_a_rotation() -> None:
-    np.testing.assert_allclose(axis_turn(np.array([0, 0, 1.0]), np.pi / 2) @ [1, 0, 0], [0, 1, 0], atol=1e-12)
-    np.testing.assert_allclose(axis_turn(np.array([1.0, 0, 0]), np.pi / 2) @ [0, 1, 0], [0, 0, 1], atol=1e-12)
 
 
 def test_it_weighs_what_the_paper_says_and_can_exist() -> None:

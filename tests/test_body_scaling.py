@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from biodance.body.human import human
+from biodance.body.inertia import smallest_eigenvalues
 from biodance.body.joint_centres import chord, davis_hip, elbow, harrington_hip, pelvis_frame, shoulder, unit, wrist
 from biodance.body.measures import Measures
 from biodance.body.scaling import chain_angles, scale_with_posture, standing_tilt
 from biodance.body.static_frames import arm_centres, turn
 from biodance.errors import SessionRefused, TrialRefused
-from biodance.identify.physical import smallest_eigenvalues
 from biodance.lab.prepare import prepare
 from biodance.lab.raw_c3d import read_raw
 from biodance.lab.session import read_session

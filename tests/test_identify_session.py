@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from identify_trials import noisy_fit, person, smooth_motion
 
+from biodance.body.inertia import pseudo_inertia, smallest_eigenvalues
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identify.caution import about_true_centres, widened
 from biodance.identify.identification import NOISE_ALONE, conclude, identify, standing_point
 from biodance.identify.knowledge import knowledge, segment_quantities
 from biodance.identify.learning import learn
-from biodance.identify.physical import pseudo_inertia, smallest_eigenvalues
 from biodance.identify.sessions import differences
 from biodance.identify.statistics import layout_for, statistics
 from biodance.identify.validation import gain, validate

@@ -9,6 +9,7 @@ import numpy as np
 from biodance.body.body import UPRIGHT, Body, Foot, Joint, JointLimits, SegmentMarkers
 from biodance.body.inertia import Lump, parameters
 from biodance.body.prior import parameter_jacobian
+from biodance.body.static_frames import turn
 from biodance.body.tables import Row, numbers, read_table
 from biodance.records import Array, Sip
 
@@ -28,12 +29,6 @@ ANKLE_HEIGHT, SOLE_AHEAD, SOLE_WIDE = 0.040, (-0.040, 0.068), 0.036
 """m: sole under the ankle, from heel to toe, half its width about its middle line."""
 RELATIVE_MASS_SD, COM_SD, RELATIVE_INERTIA_SD = 0.15, 0.010, 0.30
 """Prior standard deviations: covers, cables and cards come and go (judgement; the paper finds 0.4 kg of difference in all)."""
-
-
-def axis_turn(axis: Array, angle: float) -> Array:
-    """Return the rotation (3, 3) about x or z (a unit vector) by ``angle`` rad."""
-    cross = np.cross(np.eye(3), axis)
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
 def hoap3() -> Body:
@@ -62,7 +57,7 @@ def hoap3() -> Body:
 def _joints() -> tuple[Joint, ...]:
     """Return the 21 joints in the order legs, waist, arms."""
     joints: list[Joint] = []
-    x, z, reach = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]), 0.0
+    z, reach = np.array([0.0, 0.0, 1.0]), 0.0
     for row in read_table("robots", "hoap3_joints").rows:
         name = row["joint"]
         side, _, kind = name.partition("_")
@@ -70,12 +65,12 @@ def _joints() -> tuple[Joint, ...]:
             joints.append(Joint(name, -1, np.array([0.0, 1.0, 0.0]), UPRIGHT.T, np.zeros(3), SEGMENTS.index("trunk_head"), "bend forwards"))
             continue
         a, alpha, d, theta = (float(row[column]) for column in ("a_m", "alpha_deg", "d_m", "theta_deg"))
-        tilt = axis_turn(x, np.radians(alpha))
-        rotation, translation = tilt @ axis_turn(z, np.radians(theta)), np.array([a, 0.0, reach])
+        tilt = turn(0, np.radians(alpha))
+        rotation, translation = tilt @ turn(2, np.radians(theta)), np.array([a, 0.0, reach])
         parent, reach = len(joints) - 1, d  # the length d lies behind this joint's axis: its frame stays at the proximal end
         if kind in ("hip_yaw", "shoulder_pitch"):
-            parent, turn, place = _base(kind, side, joints)
-            rotation, translation = turn @ rotation, place + turn @ translation
+            parent, base, place = _base(kind, side, joints)
+            rotation, translation = base @ rotation, place + base @ translation
         carried = SEGMENTS.index(f"{side}_{CARRIES[kind]}") if kind in CARRIES else -1
         joints.append(Joint(name, parent, z, rotation, translation, carried))
     return tuple(joints)
@@ -83,10 +78,10 @@ def _joints() -> tuple[Joint, ...]:
 
 def _base(kind: str, side: str, joints: list[Joint]) -> tuple[int, Array, Array]:
     """Return the parent joint and the fixed frame (turn, place) at which a leg or an arm starts."""
-    x, z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
-    tilt = axis_turn(x, -np.pi / 2)
+    z = np.array([0.0, 0.0, 1.0])
+    tilt = turn(0, -np.pi / 2)
     if kind == "hip_yaw":
-        return -1, tilt @ axis_turn(z, np.pi / 2), LEG_BASE
+        return -1, tilt @ turn(2, np.pi / 2), LEG_BASE
     waist = next(i for i, joint in enumerate(joints) if joint.name == "waist_pitch")
     return waist, tilt, ARM_BASE + tilt @ (z * (SHOULDER if side == "left" else -SHOULDER))
 

@@ -51,16 +51,33 @@ def lump_of(phi: Array) -> Lump:
     return Lump(float(phi[0]), com, about_origin - phi[0] * _steiner(com))
 
 
+def _pseudo_inertia_map() -> Array:
+    """Return M (16, 10) with ``J = (M @ phi).reshape(4, 4)``."""
+    M = np.zeros((4, 4, 10))
+    M[3, 3, 0] = 1.0
+    for axis in range(3):
+        M[axis, 3, 1 + axis] = M[3, axis, 1 + axis] = 1.0
+    for column, (i, j) in enumerate(TENSOR, start=4):
+        if i == j:
+            for axis in range(3):
+                M[axis, axis, column] += 0.5 if axis != i else -0.5
+        else:
+            M[i, j, column] = M[j, i, column] = -1.0
+    return M.reshape(16, 10)
+
+
+PSEUDO_INERTIA = _pseudo_inertia_map()
+"""(16, 10): the pseudo-inertia is linear in the ten parameters."""
+
+
 def pseudo_inertia(phi: Array) -> Array:
-    """Return the pseudo-inertia (4, 4) of ten parameters: second moments kg·m², first moments kg·m, mass kg."""
-    inertia = np.zeros((3, 3))
-    for value, (i, j) in zip(phi[4:], TENSOR, strict=True):
-        inertia[i, j] = inertia[j, i] = value
-    out = np.zeros((4, 4))
-    out[:3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia
-    out[:3, 3] = out[3, :3] = phi[1:4]
-    out[3, 3] = phi[0]
-    return out
+    """Return the pseudo-inertia matrices (N, 4, 4) of ``phi`` (10N,): second moments kg·m², first moments kg·m, mass kg."""
+    return (phi.reshape(-1, 10) @ PSEUDO_INERTIA.T).reshape(-1, 4, 4)
+
+
+def smallest_eigenvalues(phi: Array) -> Array:
+    """Return the smallest eigenvalue (N,) of every segment's pseudo-inertia; negative means that no such body can exist."""
+    return np.asarray(np.linalg.eigvalsh(pseudo_inertia(phi))[:, 0])
 
 
 def turned(lump: Lump, rotation: Array) -> Lump:

@@ -6,9 +6,9 @@ from functools import cached_property
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.body.inertia import TENSOR
 from biodance.dance.state import State
 from biodance.identify.base_parameters import structural_base
-from biodance.motion.regressor import PHI_TENSOR
 from biodance.records import Array
 
 
@@ -75,7 +75,7 @@ class Inertias:
     def linear(self) -> Array:
         """(3, 3, 6): linear[c] = K of unit acceleration along c."""
         out = np.zeros((3, 3, 6))
-        for k, (i, j) in enumerate(PHI_TENSOR):
+        for k, (i, j) in enumerate(TENSOR):
             out[j, i, k] = out[i, j, k] = 1.0
         return out
 

@@ -6,8 +6,8 @@ a CoM that is off by d adds m d² to the inertia about the joint, which a first-
 
 import numpy as np
 
+from biodance.body.inertia import TENSOR
 from biodance.identify.twins import skew
-from biodance.motion.regressor import PHI_TENSOR
 from biodance.records import Array, Sip
 
 TURN = np.array([0.05, 0.05, 0.05])
@@ -59,7 +59,7 @@ def _shift_slope(phi: Array) -> Array:
     """Return d phi / d d (10, 3) for a shift of the matter by d (3,) m."""
     out = np.zeros((10, 3))
     out[1:4] = phi[0] * np.eye(3)
-    for row, (i, j) in enumerate(PHI_TENSOR, start=4):
+    for row, (i, j) in enumerate(TENSOR, start=4):
         out[row] = 2 * phi[1:4] * (i == j)
         out[row, i] -= phi[1 + j]
         out[row, j] -= phi[1 + i]
@@ -82,13 +82,13 @@ def _mass_spread(prior: Sip) -> Array:
 def _turn_slope(phi: Array) -> Array:
     """Return d phi / d rho (10, 3) for a turn of the matter by rho (3,) rad."""
     inertia = np.empty((3, 3))
-    for value, (i, j) in zip(phi[4:], PHI_TENSOR, strict=True):
+    for value, (i, j) in zip(phi[4:], TENSOR, strict=True):
         inertia[i, j] = inertia[j, i] = value
     out = np.zeros((10, 3))
     for axis, S in enumerate(skew(np.eye(3))):
         out[1:4, axis] = S @ phi[1:4]
         change = S @ inertia - inertia @ S
-        out[4:, axis] = [change[i, j] for i, j in PHI_TENSOR]
+        out[4:, axis] = [change[i, j] for i, j in TENSOR]
     return out
 
 
@@ -99,7 +99,7 @@ def _displacement(phi: Array, own: Array) -> Array:
     slope[:, 0], slope[:, 1:4] = -com / mass, np.eye(3) / mass
     spread = slope @ own @ slope.T
     forms = []
-    for i, j in PHI_TENSOR:
+    for i, j in TENSOR:
         form = 2 * mass * np.eye(3) * (i == j)
         form[i, j] -= mass
         form[j, i] -= mass

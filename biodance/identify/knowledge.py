@@ -9,8 +9,8 @@ from typing import Literal
 
 import numpy as np
 
+from biodance.body.inertia import TENSOR
 from biodance.identify.posterior import Posterior
-from biodance.motion.regressor import PHI_TENSOR
 from biodance.records import Array, Sip
 
 QUANTITIES = ("mass", "com x", "com y", "com z", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
@@ -55,7 +55,7 @@ def segment_quantities(phi: Array) -> tuple[Array, Array]:
     slope = np.eye(10)
     slope[1:4, 1:4] = np.eye(3) / mass
     slope[1:4, 0] = -com / mass
-    for row, (i, j) in enumerate(PHI_TENSOR, start=4):
+    for row, (i, j) in enumerate(TENSOR, start=4):
         same = float(i == j)
         value[row] = phi[row] - (same * (h @ com) - h[i] * com[j])
         slope[row, 0] = same * (com @ com) - com[i] * com[j]

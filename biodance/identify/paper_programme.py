@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from biodance.body.inertia import TENSOR
 from biodance.identify.base_parameters import BaseEstimate, estimate_base, structural_base
 from biodance.identify.information import Information
-from biodance.motion.regressor import PHI_TENSOR
 from biodance.records import Array
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def directions(count: int = DIRECTIONS) -> Array:
 
 def _tensor(phi: Array) -> Array:
     tensor = np.empty((3, 3))
-    for value, (i, j) in zip(phi[4:], PHI_TENSOR, strict=True):
+    for value, (i, j) in zip(phi[4:], TENSOR, strict=True):
         tensor[i, j] = tensor[j, i] = value
     return tensor
 
@@ -59,7 +59,7 @@ def inequalities(body: "Body") -> tuple[Array, Array]:
     rows, level = [], []
     v = directions()
     sampled = np.zeros((DIRECTIONS, 10))
-    for column, (i, j) in enumerate(PHI_TENSOR, start=4):
+    for column, (i, j) in enumerate(TENSOR, start=4):
         sampled[:, column] = v[:, i] * v[:, j] * (1 if i == j else 2)
     for s, name in enumerate(body.segments):
         block = np.zeros((7 + DIRECTIONS, 10))

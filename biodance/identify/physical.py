@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from biodance.body.inertia import PSEUDO_INERTIA, pseudo_inertia, smallest_eigenvalues
 from biodance.identify.posterior import Posterior
-from biodance.motion.regressor import PHI_TENSOR
 from biodance.records import Array, Sip
 
 if TYPE_CHECKING:
@@ -26,34 +26,6 @@ RELATIVE_FLOOR = 1e-3
 
 MARGIN, INSIDE = 1.01, 1e-7
 """How far inside the floor (factor) and the box (m, per unit of the prior's mass) the programme stays, for the solver's own tolerance."""
-
-
-def _pseudo_inertia_map() -> Array:
-    """Return M (16, 10) with ``J = (M @ phi).reshape(4, 4)``."""
-    M = np.zeros((4, 4, 10))
-    M[3, 3, 0] = 1.0
-    for axis in range(3):
-        M[axis, 3, 1 + axis] = M[3, axis, 1 + axis] = 1.0
-    for column, (i, j) in enumerate(PHI_TENSOR, start=4):
-        if i == j:
-            for axis in range(3):
-                M[axis, axis, column] += 0.5 if axis != i else -0.5
-        else:
-            M[i, j, column] = M[j, i, column] = -1.0
-    return M.reshape(16, 10)
-
-
-PSEUDO_INERTIA = _pseudo_inertia_map()
-
-
-def pseudo_inertia(phi: Array) -> Array:
-    """Return the pseudo-inertia matrices (N, 4, 4) of parameters ``phi`` (10N,)."""
-    return (phi.reshape(-1, 10) @ PSEUDO_INERTIA.T).reshape(-1, 4, 4)
-
-
-def smallest_eigenvalues(phi: Array) -> Array:
-    """Return the smallest eigenvalue (N,) of every segment's pseudo-inertia; negative means that no such body can exist."""
-    return np.asarray(np.linalg.eigvalsh(pseudo_inertia(phi))[:, 0])
 
 
 @dataclass(frozen=True, eq=False)

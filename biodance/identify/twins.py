@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.body.inertia import TENSOR
 from biodance.motion.kinematics import Poses, poses, segment_motion
-from biodance.motion.regressor import GRAVITY, PHI_TENSOR
+from biodance.motion.regressor import GRAVITY
 from biodance.records import Array, Motion
 
 SLIDE = 0.006
@@ -201,7 +202,7 @@ def _central(body: Body) -> Array:
     """Return the inertia tensors (N, 3, 3) about the centres of mass."""
     table, com = body.sip.phi.reshape(-1, 10), body.sip.com
     tensor = np.empty((len(table), 3, 3))
-    for column, (i, j) in enumerate(PHI_TENSOR, start=4):
+    for column, (i, j) in enumerate(TENSOR, start=4):
         tensor[:, i, j] = tensor[:, j, i] = table[:, column]
     square = np.sum(com**2, axis=1)[:, None, None] * np.eye(3) - com[:, :, None] * com[:, None]
     return np.asarray(tensor - table[:, 0, None, None] * square)

@@ -12,14 +12,12 @@ and the wrench about the lab origin is [f; n + p x f]. Both are linear in [m, mc
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.body.inertia import TENSOR
 from biodance.motion.kinematics import SegmentMotion, segment_motion
 from biodance.records import Array, Motion, Wrench
 
 GRAVITY = np.array([0.0, 0.0, -9.80665])
 """(3,) m/s², lab frame, z up (standard gravity, CGPM 1901)."""
-
-PHI_TENSOR = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
-"""Row and column of Ixx, Ixy, Iyy, Ixz, Iyz, Izz in Pinocchio's order of the ten parameters."""
 
 
 def _skew(vector: Array) -> Array:
@@ -34,7 +32,7 @@ def _skew(vector: Array) -> Array:
 def _inertia_columns(local: Array) -> Array:
     """Return L (..., 3, 6) with ``L @ [Ixx Ixy Iyy Ixz Iyz Izz] = I @ local`` for vectors ``local`` (..., 3)."""
     out = np.zeros((*local.shape, 6))
-    for column, (i, j) in enumerate(PHI_TENSOR):
+    for column, (i, j) in enumerate(TENSOR):
         out[..., i, column] += local[..., j]
         if i != j:
             out[..., j, column] += local[..., i]

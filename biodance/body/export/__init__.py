@@ -34,7 +34,7 @@ def refuse_impossible(body: Body) -> None:
             raise BiodanceError(f"Segment {name}: an inertial parameter is not a number, so no model can be written. Identify again.")
         if phi[0] <= 0:
             raise BiodanceError(f"Segment {name}: a mass of {phi[0]:g} kg cannot exist, so no model is written. Masses must be positive.")
-        value = np.linalg.eigvalsh(pseudo_inertia(phi))
+        value = np.linalg.eigvalsh(pseudo_inertia(phi)[0])
         if value[0] < -ROUNDING * value[-1]:
             raise BiodanceError(
                 f"Segment {name}: no body has this mass, centre and inertia (pseudo-inertia eigenvalue {value[0]:.3g}, must be >= 0), so "
