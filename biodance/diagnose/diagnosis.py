@@ -74,8 +74,8 @@ class Finding:
 
     ``effect`` and ``target`` as in the family `biodance.effects`; ``parameters`` with intervals; ``set`` all causes that the data cannot
     tell apart, the named one first; ``visible_fraction`` share of its effect that remains visible when the body's own parameters and
-    tolerances may adapt (1 = fully visible, 0 = hides in the body); ``gain`` None without a trial to judge on; ``advice`` what settles it in
-    the laboratory; ``changes`` what accepting it changes in the body, in words.
+    tolerances may adapt (1 = fully visible, 0 = hides in the body); ``gain`` None without a trial to judge on; ``advice`` what settles it
+    in the laboratory; ``changes`` what accepting it changes in the body, in words.
     """
 
     effect: str
