@@ -8,7 +8,8 @@ import sys
 import pytest
 from bad_sessions import UNREADABLE, bad_session
 
-from biodance.cli import DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED, run
+from biodance.cli import run
+from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED
 
 
 def biodance(*words):

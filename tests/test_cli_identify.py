@@ -8,7 +8,8 @@ import pytest
 from identified_sessions import body, session_result
 
 from biodance.body.export.csv import read_sip
-from biodance.cli import DONE, NEEDS_A_PERSON, NOT_DONE, run
+from biodance.cli import run
+from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE
 from biodance.lab.mot import read_mot
 from biodance.pipeline.export import legal_formats
 

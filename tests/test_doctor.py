@@ -5,7 +5,8 @@ import json
 import pytest
 
 from biodance import doctor
-from biodance.cli import DONE, NEEDS_A_PERSON, run
+from biodance.cli import run
+from biodance.cli.app import DONE, NEEDS_A_PERSON
 from biodance.doctor import Finding, Probe, run_probe
 
 MEND = "apt-get install it."

@@ -1,0 +1,42 @@
+"""The command ``biodance``: parse, call, print. Rooms are imported inside the commands, so that ``--help`` is quick.
+
+Exit codes: 0 done, 1 done but something was refused or needs a person, 2 could not be done (one sentence on stderr), 130 stopped by Ctrl-C.
+"""
+
+import os
+import sys
+from collections.abc import Sequence
+
+from cyclopts import CycloptsError
+
+from biodance.cli import dance, machine, session, virtual
+from biodance.cli.app import DONE, NOT_DONE, STOPPED, app, say
+
+__all__ = ["app", "dance", "machine", "main", "run", "session", "virtual"]
+
+
+def run(tokens: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code; every expected fault is one sentence on stderr."""
+    from biodance.errors import BiodanceError
+
+    try:
+        return app(tokens, exit_on_error=False, print_error=False, result_action="return_value") or DONE
+    except CycloptsError as error:
+        say(f"{' '.join(str(error).split())} See biodance --help.")
+    except BiodanceError as error:
+        say(str(error))
+    except OSError as error:
+        say(f"{error.filename or 'biodance'}: {error.strerror or error}.")
+    except Exception as error:
+        if "BIODANCE_TRACEBACK" in os.environ:
+            raise
+        say(f"biodance itself failed ({type(error).__name__}: {error}). Please report this; BIODANCE_TRACEBACK=1 shows where.")
+    except KeyboardInterrupt:
+        say("Stopped before the command was done; what was already written is complete.")
+        return STOPPED
+    return NOT_DONE
+
+
+def main() -> None:
+    """Run the command line and leave with its exit code."""
+    sys.exit(run())

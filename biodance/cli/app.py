@@ -1,0 +1,49 @@
+"""What all commands share: the application, its exit codes, its common options, and how it talks to the person at the terminal."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import App, Parameter
+
+from biodance import __version__
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED = 0, 1, 2, 130
+
+app = App(
+    name="biodance",
+    version=__version__,
+    help="Segment inertial parameters of a person, measured from markers and force plates. For research use, not a diagnosis.",
+    suppress_keyboard_interrupt=False,
+)
+
+Json = Annotated[bool, Parameter(name="--json", negative="", help="Print one JSON document on stdout and nothing else there.")]
+Force = Annotated[bool, Parameter(name="--force", negative="", help="Write into a folder that already holds files.")]
+Out = Annotated[Path, Parameter(name="--out", help="Folder for the results; it is made if it is missing.")]
+
+
+def say(sentence: str) -> None:
+    """Write one line to stderr."""
+    sys.stderr.write(sentence.rstrip() + "\n")
+
+
+def print_json(document: object) -> None:
+    """Write one JSON document to stdout."""
+    from biodance.report.results_json import to_text
+
+    sys.stdout.write(to_text(document))
+
+
+@contextmanager
+def progress() -> "Iterator[Callable[[str], None]]":
+    """Yield a function that shows on stderr what is being done: one changing line on a terminal, nothing elsewhere."""
+    from rich.console import Console
+    from rich.markup import escape
+
+    with Console(stderr=True).status("") as status:
+        yield lambda text: status.update(escape(text))

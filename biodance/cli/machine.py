@@ -1,0 +1,22 @@
+"""Commands about this machine: doctor."""
+
+from biodance.cli.app import DONE, NEEDS_A_PERSON, Json, app, print_json, progress
+
+
+@app.command
+def doctor(*, json: Json = False) -> int:
+    """Say what works on this machine, and how to mend what does not."""
+    from dataclasses import asdict
+
+    from rich.console import Console
+
+    from biodance.doctor import examine
+    from biodance.report.terminal import print_findings
+
+    with progress() as tell:
+        findings = examine(tell=tell)
+    if json:
+        print_json([asdict(finding) for finding in findings])
+    else:
+        print_findings(findings, Console())
+    return DONE if all(finding.works for finding in findings if finding.needed) else NEEDS_A_PERSON

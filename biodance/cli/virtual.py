@@ -1,0 +1,73 @@
+"""Commands of the virtual lab: simulate, demo."""
+
+import sys
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+from biodance.cli.app import DONE, Force, Out, app, progress
+from biodance.cli.session import reported, told
+
+
+@app.command
+def simulate(
+    *,
+    protocol: str,
+    sex: Literal["F", "M"],
+    height: Annotated[float, Parameter(help="Stature, m.")],
+    mass: Annotated[float, Parameter(help="Body mass, kg.")],
+    age: Annotated[float, Parameter(help="Age, years.")] = float("nan"),
+    seed: Annotated[int, Parameter(help="The same seed gives the same person and the same files.")],
+    effect: Annotated[tuple[str, ...], Parameter(negative=(), help="Hide a cause: plate_gain:target=Fz,gain=0.04; may be repeated.")] = (),
+    out: Out,
+    force: Force = False,
+) -> int:
+    """Write a simulated session: C3D files and session.toml as a lab would, and the truth apart in truth/truth.json.
+
+    Parameters
+    ----------
+    protocol
+        Name of a protocol: dance, short, squat, standing ...; a wrong name lists all.
+    """
+    from biodance.records import Subject
+    from biodance.virtual_lab.hide import hide, parse
+    from biodance.virtual_lab.protocol_file import read_protocol
+    from biodance.virtual_lab.simulate import simulate as write_session
+
+    if force:
+        _forget_simulated(out)
+    with progress() as tell:
+        tell(f"simulating {protocol}")
+        subject, plan = Subject(mass, height, sex, age), read_protocol(protocol)
+        visit, loads = hide(tuple(parse(text) for text in effect), subject, plan, seed=seed)
+        folder = write_session(subject, plan, out, seed=seed, loads=loads, visit=visit)
+    sys.stdout.write(f"{folder}\n")
+    return DONE
+
+
+@app.command
+def demo(*, out: Out = Path("demo"), force: Force = False) -> int:
+    """Simulate a short session of a person whose truth is known, and report it like a real one."""
+    from biodance.lab.results_folder import results_folder
+    from biodance.lab.session import read_session
+    from biodance.records import Subject
+    from biodance.virtual_lab.simulate import simulate as write_session
+
+    if force:
+        _forget_simulated(out / "simulated_session")
+    with progress() as tell:
+        tell("simulating a session")
+        session = write_session(Subject(62.0, 1.70, "F", 31.0), "short", out / "simulated_session", seed=1)
+        folder = results_folder(out / "report", session, force=force)
+        result, found = reported(read_session(session, tell=tell), folder, tell)
+    return told(result, folder, found, False)
+
+
+def _forget_simulated(folder: Path) -> None:
+    """Remove a folder that holds a simulated session and nothing else; leave every other one alone."""
+    import shutil
+
+    simulated = (folder / "truth" / "truth.json").is_file() and (folder / "session.toml").is_file()
+    if simulated and all(path.suffix == ".c3d" or path.name in ("session.toml", "truth") for path in folder.iterdir()):
+        shutil.rmtree(folder)
