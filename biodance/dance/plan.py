@@ -1,0 +1,82 @@
+"""What a dance is asked to be: how many postures on which feet, how long, for which segments. The person's limits are in the Body.
+
+A Plan comes from a protocol file (`protocol_file.read_dance`); a person's reduced range, strength or speed go into ``body.limits`` and a
+person who may not stand on one leg takes blocks out of the plan (`person.fitted`), so that whoever designs needs the two records only.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance.errors import BiodanceError, UnknownName
+from biodance.records import Array, frozen_array
+
+STANCES = ("parallel", "right_forward", "single_right", "single_left", "seated")
+"""Foot configurations: both feet side by side, right foot in front, on the right leg, on the left leg (paper Table I), on a stool."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A protocol of a dance.
+
+    ``blocks``: (stance, number of postures) in the order in which they are danced, each stance of ``STANCES`` at most once;
+    ``move``, ``hold`` s of a transition and of a posture (the paper: 2 and 5); ``forward`` m by which the right foot stands in front;
+    ``share`` of every half width of the base of support that may be used (paper 0.6); ``friction`` coefficient; ``budget`` s: from the
+    postures found, those that inform most per second are danced until the time is used up (inf: all); ``weights`` (N,) of the segments in
+    eq. 12 on top of their masses, empty = all 1; ``simplicity`` >= 0 of the performer's term beside the excitation.
+    """
+
+    name: str
+    description: str
+    blocks: tuple[tuple[str, int], ...]
+    move: float = 2.0
+    hold: float = 5.0
+    forward: float = 0.2
+    share: float = 0.6
+    friction: float = 0.5
+    budget: float = float("inf")
+    weights: Array = frozen_array(np.empty(0), (None,), "Plan.weights")
+    simplicity: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "weights", frozen_array(self.weights, (None,), "Plan.weights"))
+        names = [name for name, _ in self.blocks]
+        for name in names:
+            if name not in STANCES:
+                raise UnknownName.of("stance", name, STANCES)
+        if not names or len(set(names)) < len(names) or any(count < 1 for _, count in self.blocks):
+            raise BiodanceError(f"Plan {self.name}: blocks {self.blocks}; expected at least one, each stance once, with 1 posture or more.")
+        self._check()
+
+    def _check(self) -> None:
+        for name, low, high, unit in (
+            ("move", 0.5, 20.0, "s"),
+            ("hold", 0.0, 60.0, "s"),
+            ("forward", 0.05, 0.4, "m"),
+            ("share", 0.1, 1.0, ""),
+            ("friction", 0.05, 2.0, ""),
+            ("simplicity", 0.0, 100.0, ""),
+        ):
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise BiodanceError(f"Plan {self.name}: {name} = {value:g} {unit}; legal are {low:g} to {high:g}.")
+        if not self.budget > 0:
+            raise BiodanceError(f"Plan {self.name}: budget = {self.budget:g} s; it must be positive (inf: no limit).")
+        if self.weights.size and not (np.isfinite(self.weights).all() and (self.weights >= 0).all() and (self.weights > 0).any()):
+            raise BiodanceError(f"Plan {self.name}: weights {self.weights.tolist()}; expected numbers >= 0, at least one positive.")
+
+    @property
+    def count(self) -> int:
+        """Number of postures of all blocks."""
+        return sum(count for _, count in self.blocks)
+
+    @property
+    def seated(self) -> bool:
+        """True where the whole dance is on a stool."""
+        return all(name == "seated" for name, _ in self.blocks)
+
+    def emphasis(self, segments: int) -> Array:
+        """Return the weights (N,) of ``segments`` segments, 1 where none were given."""
+        if self.weights.size not in (0, segments):
+            raise BiodanceError(f"Plan {self.name}: {self.weights.size} weights for a body of {segments} segments.")
+        return self.weights if self.weights.size else np.ones(segments)
