@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.errors import BiodanceError, UnknownName
-from biodance.records import Array, frozen_array
+from biodance.records import Array
 
 STANCES = ("parallel", "right_forward", "single_right", "single_left", "seated")
 """Foot configurations: both feet side by side, right foot in front, on the right leg, on the left leg (paper Table I), on a stool."""
@@ -22,8 +22,9 @@ class Plan:
     ``blocks``: (stance, number of postures) in the order in which they are danced, each stance of ``STANCES`` at most once;
     ``move``, ``hold`` s of a transition and of a posture (the paper: 2 and 5); ``forward`` m by which the right foot stands in front;
     ``share`` of every half width of the base of support that may be used (paper 0.6); ``friction`` coefficient; ``budget`` s: from the
-    postures found, those that inform most per second are danced until the time is used up (inf: all); ``weights`` (N,) of the segments in
-    eq. 12 on top of their masses, empty = all 1; ``simplicity`` >= 0 of the performer's term beside the excitation.
+    postures found, those that inform most per second are danced until the time is used up (inf: all); ``weights`` (segment, factor) in
+    eq. 12 on top of the masses, ``other_weight`` the factor of all segments not named; ``simplicity`` >= 0 of the performer's term beside
+    the excitation.
     """
 
     name: str
@@ -35,11 +36,11 @@ class Plan:
     share: float = 0.6
     friction: float = 0.5
     budget: float = float("inf")
-    weights: Array = frozen_array(np.empty(0), (None,), "Plan.weights")
+    weights: tuple[tuple[str, float], ...] = ()
+    other_weight: float = 1.0
     simplicity: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "weights", frozen_array(self.weights, (None,), "Plan.weights"))
         names = [name for name, _ in self.blocks]
         for name in names:
             if name not in STANCES:
@@ -62,8 +63,9 @@ class Plan:
                 raise BiodanceError(f"Plan {self.name}: {name} = {value:g} {unit}; legal are {low:g} to {high:g}.")
         if not self.budget > 0:
             raise BiodanceError(f"Plan {self.name}: budget = {self.budget:g} s; it must be positive (inf: no limit).")
-        if self.weights.size and not (np.isfinite(self.weights).all() and (self.weights >= 0).all() and (self.weights > 0).any()):
-            raise BiodanceError(f"Plan {self.name}: weights {self.weights.tolist()}; expected numbers >= 0, at least one positive.")
+        factors = [self.other_weight, *(factor for _, factor in self.weights)]
+        if not all(np.isfinite(f) and f >= 0 for f in factors) or not any(factors):
+            raise BiodanceError(f"Plan {self.name}: weights {factors}; expected numbers >= 0, at least one of them positive.")
 
     @property
     def count(self) -> int:
@@ -75,8 +77,10 @@ class Plan:
         """True where the whole dance is on a stool."""
         return all(name == "seated" for name, _ in self.blocks)
 
-    def emphasis(self, segments: int) -> Array:
-        """Return the weights (N,) of ``segments`` segments, 1 where none were given."""
-        if self.weights.size not in (0, segments):
-            raise BiodanceError(f"Plan {self.name}: {self.weights.size} weights for a body of {segments} segments.")
-        return self.weights if self.weights.size else np.ones(segments)
+    def emphasis(self, segments: tuple[str, ...]) -> Array:
+        """Return the factor (N,) of each of the ``segments`` in eq. 12; UnknownName if a weight names none of them."""
+        named = dict(self.weights)
+        for name in named:
+            if name not in segments:
+                raise UnknownName.of(f"segment to weight in plan {self.name}", name, segments)
+        return np.array([named.get(name, self.other_weight) for name in segments])
