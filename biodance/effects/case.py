@@ -7,6 +7,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.errors import TrialRefused, UnknownName
+from biodance.motion.kinematics import Poses, poses
 from biodance.motion.regressor import regressor
 from biodance.records import Array, Motion, Plate, Trial, Wrench, frozen_array
 
@@ -47,6 +48,35 @@ class Case:
     def residual(self) -> Array:
         """(T, 6) N, N·m measured minus predicted wrench about the lab origin."""
         return self.trial.wrench.value - self.predicted
+
+    @cached_property
+    def poses(self) -> Poses:
+        """Poses of all segments in the lab frame."""
+        return poses(self.body, self.motion.q)
+
+    @cached_property
+    def marker_columns(self) -> tuple[int, ...]:
+        """(K) indices in ``body.markers`` of the markers that the trial has, in the body's order."""
+        markers = self.trial.markers
+        return () if markers is None else tuple(i for i, name in enumerate(self.body.markers.names) if name in markers)
+
+    @cached_property
+    def measured_markers(self) -> Array:
+        """(T, K, 3) m the recorded markers ``marker_columns``, NaN = not seen."""
+        markers, frames = self.trial.markers, self.motion.time.size
+        if markers is None or not self.marker_columns:
+            return np.empty((frames, 0, 3))
+        return markers.select(self.body.markers.names[i] for i in self.marker_columns).xyz
+
+    @cached_property
+    def marker_residual(self) -> Array:
+        """(K, 3) m mean over time of measured minus model marker, in the axes of the marker's segment; zero for a marker never seen."""
+        columns = list(self.marker_columns)
+        segment = [self.body.markers.segment[c] for c in columns]
+        apart = self.measured_markers - self.poses.points(segment, self.body.markers.position[columns])
+        local = np.einsum("tkij,tki->tkj", self.poses.rotation[:, segment], apart)
+        seen = np.isfinite(local)
+        return np.asarray(np.where(seen, local, 0.0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1))
 
     def plate(self, name: str) -> Plate:
         """Return a plate by name; UnknownName lists the trial's plates."""

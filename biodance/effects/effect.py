@@ -4,6 +4,9 @@ The author of an effect writes its parameters and ONE of two methods; the other 
 
 - linear in its parameters: ``columns(case)``, what one unit of each parameter adds to the MEASURED wrench; ``transform`` adds them;
 - otherwise: ``transform(case, theta)``, the case that this cause would have produced; ``columns`` is its central difference at zero.
+
+What the markers say about a cause is optional: ``marker_columns`` (a change of their mean residual) or ``shown`` (a size by themselves).
+Causes that are found by a check instead of a fit (units, labels, clipping ...) are ``DiscreteEffect`` in ``gate``.
 """
 
 from dataclasses import dataclass
@@ -33,6 +36,10 @@ class Effect:
     target: str
     name: ClassVar[str] = ""
     parameters: ClassVar[tuple[Parameter, ...]] = ()
+    separated_by: ClassVar[str] = ""
+    """The movement that tells this cause from its look-alikes, in words for the analyst."""
+    advice: ClassVar[str] = ""
+    """What to do in the laboratory to settle it, and how it is mended."""
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:
@@ -62,6 +69,26 @@ class Effect:
         if type(self).columns is Effect.columns:
             raise BiodanceError(f"Effect {self.name} defines neither columns nor transform; write one of them.")
         return case.with_added(self.plate_of(case), self.columns(case) @ np.asarray(theta, dtype=float))
+
+    def marker_columns(self, case: Case) -> Array | None:
+        """Return (K, 3, p) m per unit: what one unit adds to ``case.marker_residual``; None where the markers say nothing."""
+        return None
+
+    def shown(self, case: Case) -> Array | None:
+        """Return (p,) the size that the markers show by themselves, without any force; None where they say nothing."""
+        return None
+
+    def corrected(self, case: Case, theta: Array) -> Case:
+        """Return the case without this cause of size ``theta`` (p,): what would have been measured, or the body that moves right.
+
+        By default the plates lose what ``transform`` would have added; a cause in the body returns another body and its motion instead.
+        """
+        added = self.transform(case, np.asarray(theta, dtype=float)).residual - case.residual
+        return case.with_added(self.plate_of(case), -added)
+
+    def reported(self, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
+        """Return name, value, standard deviation and unit of what a report prints for ``theta`` (p,) with ``sd`` (p,)."""
+        return tuple((p.name, float(t), float(s), p.unit) for p, t, s in zip(self.parameters, theta, sd, strict=True))
 
     def plate_of(self, case: Case):  # type: ignore[no-untyped-def]
         """Return the plate that the target names, or the first one."""

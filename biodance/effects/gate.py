@@ -1,0 +1,58 @@
+"""Checks that run before any statistics: a cause that a look at the recording settles is named here, and never fitted.
+
+Units, signs, swapped labels, clipping, hum and clocks are wrong or right, not a little of both. The author of a discrete effect writes
+ONE method, ``look``: what it checked, whether that is well, and in one plain sentence what it saw. A check that cannot judge a recording
+(no plate, no body) returns nothing.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from biodance.effects.case import Case
+from biodance.records import Session
+
+
+@dataclass(frozen=True)
+class Gate:
+    """One check: ``check`` what was looked at, ``ok``, ``text`` one plain sentence of what was seen; where it is not well the cause:
+    ``effect`` and ``target`` as in the family, and its ``size`` (unit as in ``text``; NaN = no number).
+    """
+
+    check: str
+    ok: bool
+    text: str
+    effect: str = ""
+    target: str = ""
+    size: float = float("nan")
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """What the checks look at: the ``session`` as read, and the tracked ``cases`` (none where no body could be scaled)."""
+
+    session: Session
+    cases: tuple[Case, ...] = ()
+
+
+class DiscreteEffect:
+    """One cause that is there or not; the checks that find it are its ``look``."""
+
+    name: ClassVar[str] = ""
+    separated_by: ClassVar[str] = ""
+    """The movement or measurement that settles it, in words for the analyst."""
+    advice: ClassVar[str] = ""
+    """How it is mended."""
+
+    @classmethod
+    def look(cls, recorded: Recorded) -> tuple[Gate, ...]:
+        """Return the checks that could be made on the recording."""
+        raise NotImplementedError(f"Discrete effect {cls.name} defines no look.")
+
+
+def gates(session: Session, cases: tuple[Case, ...] = (), *, chosen: tuple[str, ...] | None = None) -> tuple[Gate, ...]:
+    """Return all checks of a session, those that are not well first; ``chosen`` limits them to some discrete effects by name."""
+    from biodance.effects import discrete_effects
+
+    recorded = Recorded(session, cases)
+    found = [gate for kind in discrete_effects(chosen).values() for gate in kind.look(recorded)]
+    return tuple(sorted(found, key=lambda gate: gate.ok))
