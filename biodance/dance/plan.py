@@ -21,7 +21,7 @@ class Plan:
 
     ``blocks``: (stance, number of postures) in the order in which they are danced, each stance of ``STANCES`` at most once;
     ``move``, ``hold`` s of a transition and of a posture (the paper: 2 and 5); ``forward`` m by which the right foot stands in front;
-    ``share`` of every half width of the base of support that may be used (paper 0.6); ``friction`` coefficient; ``budget`` s: from the
+    ``share`` of every half width of the base of support that may be used (paper 0.6); ``budget`` s: from the
     postures found, those that inform most per second are danced until the time is used up (inf: all); ``weights`` (segment, factor) in
     eq. 12 on top of the masses, ``other_weight`` the factor of all segments not named; ``simplicity`` >= 0 of the performer's term beside
     the excitation.
@@ -34,7 +34,6 @@ class Plan:
     hold: float = 5.0
     forward: float = 0.2
     share: float = 0.6
-    friction: float = 0.5
     budget: float = float("inf")
     weights: tuple[tuple[str, float], ...] = ()
     other_weight: float = 1.0
@@ -55,7 +54,6 @@ class Plan:
             ("hold", 0.0, 60.0, "s"),
             ("forward", 0.05, 0.4, "m"),
             ("share", 0.1, 1.0, ""),
-            ("friction", 0.05, 2.0, ""),
             ("simplicity", 0.0, 100.0, ""),
         ):
             value = getattr(self, name)
