@@ -28,16 +28,29 @@ def read_body(path: str | Path) -> tuple[Body, str]:
         The file cannot be read, is of another version, or is not such a file.
     """
     try:
-        found: dict[str, Any] = json.loads(Path(path).read_text(encoding="utf-8"))
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise FileRefused(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error}).") from error
+    return parse_body(text, str(path))
+
+
+def parse_body(text: str, where: str) -> tuple[Body, str]:
+    """Return the body and its source from the ``text`` of `body_text`; ``where`` it was found, for messages.
+
+    Raises
+    ------
+    FileRefused
+        The text is of another version or is not such a body.
+    """
+    try:
+        found: dict[str, Any] = json.loads(text)
         if found.get("biodance_body") != VERSION:
-            raise FileRefused(f"{path}: is no body of version {VERSION}. Run biodance identify again.")
+            raise FileRefused(f"{where}: is no body of version {VERSION}. Run biodance identify again.")
         return _body(found), str(found["source"])
-    except OSError as error:
-        raise FileRefused(f"{path}: cannot be read ({error.strerror or error}).") from error
     except FileRefused:
         raise
     except (ValueError, KeyError, TypeError, AttributeError, BiodanceError) as error:
-        raise FileRefused(f"{path}: is not a body that biodance wrote ({error}). Run biodance identify again.") from error
+        raise FileRefused(f"{where}: is not a body that biodance wrote ({error}). Run biodance identify again.") from error
 
 
 def _body(found: dict[str, Any]) -> Body:

@@ -1,6 +1,6 @@
 """Where the feet stand and which part of the ground may carry the weight."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -21,7 +21,8 @@ class Stance:
 
     ``name``; ``ankle`` (2, 3) m lab frame, right and left, where each foot stands or would stand, flat and facing lab x; ``planted`` the
     feet on the ground (0 right, 1 left); ``soles`` (2, P, 3) m their outlines; ``share`` of every half width of the support that may be
-    used (0.6 in the paper).
+    used (0.6 in the paper); ``props`` (K, 2) m corners on the ground of what else bears weight: the legs of a seat or of a frame to hold;
+    ``seated`` True where the pelvis rests and the feet bear nothing.
     """
 
     name: str
@@ -29,17 +30,21 @@ class Stance:
     planted: tuple[int, ...]
     soles: Array
     share: float = 0.6
+    props: Array = field(default_factory=lambda: np.empty((0, 2)))
+    seated: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "ankle", frozen_array(self.ankle, (2, 3), "Stance.ankle"))
         object.__setattr__(self, "soles", frozen_array(self.soles, (2, None, 3), "Stance.soles"))
+        props = self.props if np.size(self.props) else np.empty((0, 2))
+        object.__setattr__(self, "props", frozen_array(props, (None, 2), "Stance.props"))
 
     @cached_property
     def support(self) -> Array:
-        """(P, 2) m corners of the base of support (convex hull of the planted soles), counter-clockwise."""
+        """(P, 2) m corners of the base of support (convex hull of planted soles and props), counter-clockwise."""
         from scipy.spatial import ConvexHull
 
-        points = np.concatenate([self.soles[side][:, :2] for side in self.planted])
+        points = np.concatenate([*(self.soles[side][:, :2] for side in self.planted), self.props])
         return points[ConvexHull(points).vertices]
 
     @cached_property

@@ -1,0 +1,158 @@
+"""The Dance: postures held for a while, moves between them, and where the feet stand meanwhile.
+
+A dance is written in the coordinates of its `Chain`; planted legs are not written but solved in closed form, so that planted feet stay
+where they are at every instant, not only at samples.
+"""
+
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.body.body_file import body_text, parse_body
+from biodance.dance.chain import Chain
+from biodance.dance.programme import closed
+from biodance.dance.splines import basis_at
+from biodance.dance.stance import Stance
+from biodance.dance.state import State
+from biodance.errors import BiodanceError, FileRefused
+from biodance.records import Array, Motion, frozen_array
+
+VERSION = 1
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A stretch of a dance from ``start`` to ``end`` s in which the feet do not change; ``posture`` is held, or moved to."""
+
+    start: float
+    end: float
+    kind: Literal["hold", "move"]
+    stance: Stance
+    posture: int
+
+
+@dataclass(frozen=True, eq=False)
+class Dance:
+    """One continuous movement.
+
+    ``protocol`` its name; ``body`` whose it is; ``postures`` (P, n) coordinates of the chain (m, rad); ``counted`` (P,) False for the
+    postures in between that only carry the weight from one foot configuration to the next; ``stances`` (P,) the feet during each hold;
+    ``hold`` (P,) s; ``via`` (P - 1, 2, n) via points of the moves, ``move`` (P - 1,) s how long each takes, and the feet ``under`` (P - 1,) them;
+    ``seed`` of the random numbers.
+    """
+
+    protocol: str
+    body: Body
+    postures: Array
+    counted: tuple[bool, ...]
+    stances: tuple[Stance, ...]
+    hold: Array
+    via: Array
+    move: Array
+    under: tuple[Stance, ...]
+    seed: int
+
+    def __post_init__(self) -> None:
+        count, size = np.shape(self.postures)
+        shapes = {"postures": (count, size), "hold": (count,), "via": (count - 1, 2, size), "move": (count - 1,)}
+        for name, shape in shapes.items():
+            object.__setattr__(self, name, frozen_array(getattr(self, name), shape, f"Dance.{name}"))
+        if not (len(self.stances) == len(self.counted) == len(self.under) + 1 == count) or size != self.chain.size:
+            raise BiodanceError(
+                f"Dance: {count} postures of {size} coordinates, {len(self.stances)} stances and {len(self.under)} moves do not fit "
+                f"together; expected as many stances as postures, one move less, and {self.chain.size} coordinates."
+            )
+
+    @cached_property
+    def chain(self) -> Chain:
+        """The coordinates in which the dance is written."""
+        return Chain(self.body)
+
+    @property
+    def duration(self) -> float:
+        """Duration of the whole dance, s."""
+        return float(self.hold.sum() + self.move.sum())
+
+    @cached_property
+    def phases(self) -> tuple[Phase, ...]:
+        """Holds and moves in turn; holds of no duration are left out."""
+        out, now = [], 0.0
+        for p, stance in enumerate(self.stances):
+            if p:
+                out.append(Phase(now, now := now + float(self.move[p - 1]), "move", self.under[p - 1], p))
+            if self.hold[p] > 0:
+                out.append(Phase(now, now := now + float(self.hold[p]), "hold", stance, p))
+        return tuple(out)
+
+    def state(self, phase: Phase, time: Array) -> State:
+        """Return the coordinates at instants ``time`` (T,) s of the dance that lie in ``phase``."""
+        if phase.kind == "hold":
+            x = np.repeat(self.postures[None, phase.posture], len(time), axis=0)
+            return closed(self.chain, phase.stance, x, *np.zeros((2, *x.shape)))
+        move = phase.posture - 1
+        points = np.stack([self.postures[move], *self.via[move], self.postures[move + 1]])
+        basis = basis_at(np.clip(time - phase.start, 0.0, phase.end - phase.start), phase.end - phase.start)
+        return closed(self.chain, phase.stance, basis.position @ points, basis.velocity @ points, basis.acceleration @ points)
+
+    def motion(self, rate: float) -> Motion:
+        """Return the whole dance, holds included, sampled at ``rate`` Hz from 0 to its end.
+
+        Raises
+        ------
+        BiodanceError
+            The rate is not positive.
+        """
+        if not rate > 0:
+            raise BiodanceError(f"A dance cannot be sampled at {rate:g} Hz; give a positive rate, for example 100.")
+        time = np.arange(round(self.duration * rate) + 1) / rate
+        x, v, a = np.empty((3, len(time), self.chain.size))
+        starts = np.array([phase.start for phase in self.phases])
+        owner = np.clip(np.searchsorted(starts, time + 1e-9, side="right") - 1, 0, None)
+        for k, phase in enumerate(self.phases):
+            rows = owner == k
+            if rows.any():
+                state = self.state(phase, time[rows])
+                x[rows], v[rows], a[rows] = state.x, state.v, state.a
+        return self.chain.motion(time, x, v, a)
+
+    def save(self, path: str | Path) -> None:
+        """Write the dance, its body included, as an npz file."""
+        words = {"biodance_dance": VERSION, "protocol": self.protocol, "seed": self.seed, "counted": list(self.counted)}
+        words |= {"stances": [_told(s) for s in self.stances], "under": [_told(s) for s in self.under]}
+        arrays = {name: getattr(self, name) for name in ("postures", "hold", "via", "move")}
+        np.savez_compressed(path, allow_pickle=False, words=json.dumps(words), body=body_text(self.body, self.protocol), **arrays)
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Dance":
+        """Return the dance of a file that `save` made.
+
+        Raises
+        ------
+        FileRefused
+            The file cannot be read, is of another version, or is not such a file.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as found:
+                words: dict[str, Any] = json.loads(str(found["words"]))
+                if words.get("biodance_dance") != VERSION:
+                    raise FileRefused(f"{path}: is no dance of version {VERSION}. Run biodance dance again.")
+                arrays = {name: found[name] for name in ("postures", "hold", "via", "move")}
+                body, _ = parse_body(str(found["body"]), str(path))
+            feet: dict[str, Any] = {name: tuple(Stance(**s) for s in words[name]) for name in ("stances", "under")}
+            return cls(words["protocol"], body, counted=tuple(words["counted"]), seed=words["seed"], **feet, **arrays)
+        except OSError as error:
+            raise FileRefused(f"{path}: cannot be read ({error.strerror or error}).") from error
+        except FileRefused:
+            raise
+        except (ValueError, KeyError, TypeError, BiodanceError) as error:
+            raise FileRefused(f"{path}: is not a dance that biodance wrote ({error}). Run biodance dance again.") from error
+
+
+def _told(stance: Stance) -> dict[str, Any]:
+    """Return a stance in words that JSON knows."""
+    return {name: np.asarray(getattr(stance, name)).tolist() if name != "name" else stance.name for name in stance.__dataclass_fields__}
