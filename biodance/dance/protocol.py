@@ -60,7 +60,7 @@ def read_plan(name_or_path: str | Path) -> Plan:
     for key in raw:
         if key not in KEYS:
             raise UnknownName.of(f"key of {path}", key, KEYS)
-    fields = {field: number(path, key, raw[key]) for key, field in NUMBERS.items() if key in raw}
+    fields: dict[str, Any] = {field: number(path, key, raw[key]) for key, field in NUMBERS.items() if key in raw}
     counts = table(path, raw, "postures")
     for stance, count in counts.items():
         if not isinstance(count, int) or isinstance(count, bool):
