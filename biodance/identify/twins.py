@@ -180,7 +180,7 @@ def wrench_change(body: Body, motion: Motion, places: Array, turns: Array) -> Ar
     mass = body.sip.mass
     com = (move.rotation @ body.sip.com[..., None])[..., 0] + move.position
     momentum = mass[:, None] * np.gradient(com, step, axis=0)
-    inertia = move.rotation @ _central(body) @ np.swapaxes(move.rotation, -1, -2)
+    inertia = move.rotation @ central_inertia(body) @ np.swapaxes(move.rotation, -1, -2)
     spin = (inertia @ move.angular_velocity[..., None])[..., 0]
     rate = mass[:, None, None] * np.gradient(places, step, axis=0)
     angular = _summed(-skew(momentum), places) + _summed(skew(com), rate) - _summed(skew(spin), turns)
@@ -198,7 +198,7 @@ def _summed(matrix: Array, vectors: Array) -> Array:
     return np.asarray(wide @ vectors.reshape(frames, 3 * count, -1))
 
 
-def _central(body: Body) -> Array:
+def central_inertia(body: Body) -> Array:
     """Return the inertia tensors (N, 3, 3) about the centres of mass."""
     table, com = body.sip.phi.reshape(-1, 10), body.sip.com
     tensor = np.empty((len(table), 3, 3))
