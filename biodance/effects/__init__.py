@@ -16,7 +16,7 @@ from biodance.errors import UnknownName
 
 Kind = TypeVar("Kind")
 
-CONTRACT = ("case", "effect", "gate")
+CONTRACT = ("case", "effect", "gate", "oscillator")
 """Modules of this folder that are not effects."""
 
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.errors import TrialRefused, UnknownName
-from biodance.motion.kinematics import Poses, poses
-from biodance.motion.regressor import regressor
+from biodance.motion.kinematics import Poses, SegmentMotion, poses, segment_motion
+from biodance.motion.regressor import regressor_of
 from biodance.records import Array, Motion, Plate, Trial, Wrench, frozen_array
 
 
@@ -35,7 +35,12 @@ class Case:
     @cached_property
     def regressor(self) -> Array:
         """(T, 6, 10N) root regressor about the lab origin."""
-        return regressor(self.body, self.motion)
+        return regressor_of(self.segments)
+
+    @cached_property
+    def segments(self) -> SegmentMotion:
+        """Spatial motion of all segments in the lab frame."""
+        return segment_motion(self.body, self.motion)
 
     @cached_property
     def predicted(self) -> Array:

@@ -1,0 +1,47 @@
+"""Forces went through a lower low-pass than the markers: in the amplifier, in the recording software, in an export.
+
+Signature: the quick part of every channel is missing in proportion to the fourth power of its frequency; holds are untouched.
+Look-alikes: a wobbling mass, a delay (where the other filter ran one way only), the inertia of skin under the markers. Separated by faster
+movements, and by the settings of the recording software.
+"""
+
+import numpy as np
+from scipy.fft import dct, idct
+
+from biodance.effects.case import Case
+from biodance.effects.effect import Effect, Parameter
+from biodance.records import Array
+
+REFERENCE = 10.0
+"""Hz: the cut-off that a lower one is compared with."""
+STRENGTH = 4.0 / REFERENCE**5
+"""1/Hz⁵: growth of 1/cutoff⁴ per Hz by which the cut-off lies under the reference."""
+
+
+class FilterMismatch(Effect):
+    """Forces filtered ``cutoff`` Hz lower than the reference of 10 Hz (to first order): zero-phase gain 1 / (1 + (f/f_c)⁴ - (f/10)⁴), in
+    which 1/f_c⁴ grows linearly with the parameter. What a report prints is f_c itself.
+    """
+
+    name = "filter_mismatch"
+    parameters = (Parameter("cutoff", "Hz", 4.0, "6 Hz against 10 or 45 Hz are in common use (forceandmotion.org abstracts)"),)
+    separated_by = "Fast alternating movements (arms at 2-3 Hz) against slow ones."
+    advice = "Look up the filters of the amplifier and of the recording software; export forces unfiltered."
+
+    def transform(self, case: Case, theta: Array) -> Case:
+        """Return the case whose forces lack what the lower low-pass took."""
+        change = STRENGTH * float(np.ravel(theta)[0])
+        value = case.predicted
+        steep = (np.arange(len(value)) * case.motion.rate / (2 * len(value))) ** 4
+        gain = 1 / (1 + change * steep) if change >= 0 else 1 - change * steep
+        filtered = idct(gain[:, None] * dct(value, axis=0, norm="ortho"), axis=0, norm="ortho")
+        return case.with_added(case.trial.plates[0], filtered - value)
+
+    def reported(self, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
+        """Return the cut-off itself, Hz; its standard deviation to first order."""
+        inverse = 1 / REFERENCE**4 + STRENGTH * max(float(theta[0]), 0.0)
+        cutoff = inverse**-0.25
+        return (("cutoff", cutoff, 0.25 * cutoff / inverse * STRENGTH * float(sd[0]), "Hz"),)
+
+
+EFFECT = FilterMismatch
