@@ -121,7 +121,7 @@ def fitted(body: Body, plan: Plan, person: PersonLimits) -> tuple[Body, Plan, tu
         for stance, count in plan.blocks
         if not _allowed(stance, person)
     )
-    return replace(body, limits=limited(body, person)), replace(plan, blocks=kept), notes
+    return replace(body, limits=limited(body, person)), replace(plan, blocks=kept, alone=person.stand_alone_on), notes
 
 
 def limited(body: Body, person: PersonLimits) -> JointLimits:

@@ -24,7 +24,7 @@ class Plan:
     ``share`` of every half width of the base of support that may be used (paper 0.6); ``budget`` s: from the
     postures found, those that inform most per second are danced until the time is used up (inf: all); ``weights`` (segment, factor) in
     eq. 12 on top of the masses, ``other_weight`` the factor of all segments not named; ``simplicity`` >= 0 of the performer's term beside
-    the excitation.
+    the excitation; ``alone`` the legs on which the person may stand alone, be it for a step.
     """
 
     name: str
@@ -38,6 +38,7 @@ class Plan:
     weights: tuple[tuple[str, float], ...] = ()
     other_weight: float = 1.0
     simplicity: float = 0.0
+    alone: tuple[str, ...] = ("right", "left")
 
     def __post_init__(self) -> None:
         names = [name for name, _ in self.blocks]
