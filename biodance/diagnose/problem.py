@@ -1,0 +1,147 @@
+"""A session as one linear problem: rows by frequency and rows of the markers, and all columns that are no fault.
+
+    y = W (phi - phi0) + K k + noise        W regressor of the parameters' prior, K elementary kinematic errors, both unit normal once scaled
+
+Columns of faults come from `candidates`; sizes of everything from `tolerances`.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.body.body import Body
+from biodance.diagnose.kinematic_errors import Errors, kinematic_errors
+from biodance.diagnose.spectrum import Spectrum, spectrum, thinned
+from biodance.effects.case import Case
+from biodance.effects.effect import Effect
+from biodance.identify.caution import widened
+from biodance.identify.identification import usable
+from biodance.identify.posterior import prior_factor
+from biodance.identify.statistics import Fit
+from biodance.records import Array, Motion, Sip, Trial
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """One trial to look at: ``trial`` prepared, its ``motion``, ``use`` (T,) frames whose wrench may be compared, ``start`` and ``end`` of
+    it as shares of the session's time.
+    """
+
+    trial: Trial
+    motion: Motion
+    use: NDArray[np.bool_]
+    start: float
+    end: float
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """The session in rows, not yet whitened.
+
+    ``cases`` thinned trials with the parameters in use; ``spectrum`` where rows come from; ``prior`` of the parameters and ``factor`` S (p, k)
+    of its covariance; ``sip`` (r, k) columns W S; ``kinematics`` (r, K) columns of unit errors of ``groups`` (K); ``markers`` how many of
+    the r rows, at the end, are marker rows (m); ``notes`` what was left out.
+    """
+
+    cases: tuple[Case, ...]
+    spectrum: Spectrum
+    prior: Sip
+    factor: Array
+    sip: Array
+    kinematics: Array
+    groups: tuple[str, ...]
+    markers: int
+    notes: tuple[str, ...] = ()
+
+    @property
+    def wrench_rows(self) -> int:
+        """Number of rows that come from the plates: six per coefficient."""
+        return 6 * self.spectrum.band.size
+
+    def target(self, added: tuple[Array, ...] | None = None) -> Array:
+        """Return y (r,): measured minus predicted, less what named causes ``added`` (T, 6) to each trial's wrench."""
+        extra = added or tuple(np.zeros((1, 6)) for _ in self.cases)
+        wrench = self.spectrum.rows(tuple((case.residual - more)[:, :, None] for case, more in zip(self.cases, extra, strict=True)))
+        return np.concatenate([wrench.ravel(), _mean_markers(self.cases, self.spectrum).ravel()])
+
+    def columns(self, effect: Effect) -> Array:
+        """Return (r, p): what one unit of each parameter of ``effect`` adds to the rows."""
+        wrench = self.spectrum.rows(tuple(effect.columns(case) for case in self.cases))
+        return np.concatenate([wrench.reshape(self.wrench_rows, -1), self.marker_rows(effect)])
+
+    def marker_rows(self, effect: Effect) -> Array:
+        """Return (m, p): what one unit of each parameter of ``effect`` adds to the marker rows."""
+        found = [effect.marker_columns(case) for case in self.cases]
+        out = np.zeros((self.markers, len(effect.parameters)))
+        share = _shares(self.spectrum, len(self.cases))
+        for case, columns, weight in zip(self.cases, found, share, strict=True):
+            if columns is not None:
+                full = np.zeros((len(case.body.markers.names), 3, columns.shape[2]))
+                full[list(case.marker_columns)] = columns
+                out += weight * full.reshape(self.markers, -1)
+        return out
+
+    def with_parameters(self, phi: Array) -> "Problem":
+        """Return the problem whose faults are predicted with the parameters ``phi`` (10N,); what is measured against stays the prior."""
+        return replace(self, cases=tuple(replace(case, phi=phi) for case in self.cases))
+
+
+def problem(body: Body, looks: tuple[Look, ...]) -> Problem:
+    """Return the problem of ``looks`` at a session of ``body``, whose SIP are the table's.
+
+    Raises
+    ------
+    TrialRefused
+        No trial has a second of believable, fully measured frames.
+    """
+    fits = tuple(Fit(look.trial.name, look.motion, look.trial.wrench, look.use) for look in looks)
+    used, about, notes = usable(body, fits)
+    kept = {fit.name: fit.use for fit in used}
+    pairs = []
+    for look in looks:
+        if look.trial.name in kept:
+            time = np.linspace(look.start, look.end, look.motion.time.size)
+            pairs.append(thinned(Case(body, look.trial, look.motion, body.sip.phi, time), kept[look.trial.name]))
+    cases = tuple(case for case, _ in pairs)
+    where = spectrum(cases, tuple(use for _, use in pairs), about)
+    prior = widened(body.sip)
+    factor = prior_factor(prior)
+    W = where.rows(tuple(case.regressor @ factor for case in cases))
+    errors = [[kinematic_errors(body, _part(case.motion, pick)) for pick in picks] for case, picks in zip(cases, where.picks, strict=True)]
+    rows, markers = _kinematic_rows(where, errors)
+    sip = np.concatenate([W.reshape(-1, W.shape[2]), np.zeros((len(markers), W.shape[2]))])
+    groups = next(one.groups for some in errors for one in some)
+    return Problem(cases, where, prior, factor, sip, np.concatenate([rows, markers]), groups, len(markers), notes)
+
+
+def _part(motion: Motion, pick: NDArray[np.intp]) -> Motion:
+    return Motion(motion.time[pick], motion.q[pick], motion.v[pick], motion.a[pick])
+
+
+def _kinematic_rows(where: Spectrum, errors: list[list[Errors]]) -> tuple[Array, Array]:
+    """Return the rows (6 m, K) of the errors' wrenches and (3M, K) of the mean marker residuals, measured minus model."""
+    wrench, markers, frames = [], 0.0, 0
+    for index, some in enumerate(errors):
+        layout = where.layout.at(where.rates[index])
+        for pick, one in zip(where.picks[index], some, strict=True):
+            kept = layout.bands_of(pick.size) >= 0
+            wrench.append(layout.coefficients(layout.shift @ one.wrench)[kept])
+            markers = markers - pick.size * one.markers
+            frames += pick.size
+    rows = np.concatenate(wrench)
+    return rows.reshape(-1, rows.shape[2]), np.asarray(markers / frames).reshape(-1, rows.shape[2])
+
+
+def _shares(where: Spectrum, count: int) -> Array:
+    """Return the share (count,) of the used time that belongs to each trial."""
+    seconds = np.array([sum(pick.size for pick in picks) for picks in where.picks[:count]], dtype=float)
+    return np.asarray(seconds / seconds.sum())
+
+
+def _mean_markers(cases: tuple[Case, ...], where: Spectrum) -> Array:
+    """Return (M, 3) m: mean residual of every marker of the body over the session; zero for a marker that was never seen."""
+    out = np.zeros((len(cases[0].body.markers.names), 3))
+    for case, weight in zip(cases, _shares(where, len(cases)), strict=True):
+        out[list(case.marker_columns)] += weight * case.marker_residual
+    return out
