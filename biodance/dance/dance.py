@@ -5,12 +5,13 @@ where they are at every instant, not only at samples.
 """
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.body.body_file import body_text, parse_body
@@ -40,8 +41,8 @@ class Phase:
 class Dance:
     """One continuous movement.
 
-    ``protocol`` its name; ``body`` whose it is; ``postures`` (P, n) coordinates of the chain (m, rad); ``counted`` (P,) False for the
-    postures in between that only carry the weight from one foot configuration to the next; ``stances`` (P,) the feet during each hold;
+    ``protocol`` its name; ``body`` whose it is; ``postures`` (P, n) coordinates of the chain (m, rad); ``stances`` (P,) the feet during
+    each hold, with ``over`` set for postures in between that only carry the weight from one foot configuration to the next;
     ``hold`` (P,) s; ``via`` (P - 1, 2, n) via points of the moves, ``move`` (P - 1,) s how long each takes, and the feet ``under`` (P - 1,) them;
     ``seed`` of the random numbers.
     """
@@ -49,7 +50,6 @@ class Dance:
     protocol: str
     body: Body
     postures: Array
-    counted: tuple[bool, ...]
     stances: tuple[Stance, ...]
     hold: Array
     via: Array
@@ -62,7 +62,7 @@ class Dance:
         shapes = {"postures": (count, size), "hold": (count,), "via": (count - 1, 2, size), "move": (count - 1,)}
         for name, shape in shapes.items():
             object.__setattr__(self, name, frozen_array(getattr(self, name), shape, f"Dance.{name}"))
-        if not (len(self.stances) == len(self.counted) == len(self.under) + 1 == count) or size != self.chain.size:
+        if not (len(self.stances) == len(self.under) + 1 == count) or size != self.chain.size:
             raise BiodanceError(
                 f"Dance: {count} postures of {size} coordinates, {len(self.stances)} stances and {len(self.under)} moves do not fit "
                 f"together; expected as many stances as postures, one move less, and {self.chain.size} coordinates."
@@ -77,6 +77,11 @@ class Dance:
     def duration(self) -> float:
         """Duration of the whole dance, s."""
         return float(self.hold.sum() + self.move.sum())
+
+    @property
+    def counted(self) -> NDArray[np.bool_]:
+        """(P,) False for the postures in between."""
+        return np.array([stance.over is None for stance in self.stances])
 
     @cached_property
     def phases(self) -> tuple[Phase, ...]:
@@ -122,7 +127,7 @@ class Dance:
 
     def save(self, path: str | Path) -> None:
         """Write the dance, its body included, as an npz file."""
-        words = {"biodance_dance": VERSION, "protocol": self.protocol, "seed": self.seed, "counted": list(self.counted)}
+        words = {"biodance_dance": VERSION, "protocol": self.protocol, "seed": self.seed}
         words |= {"stances": [_told(s) for s in self.stances], "under": [_told(s) for s in self.under]}
         arrays = {name: getattr(self, name) for name in ("postures", "hold", "via", "move")}
         np.savez_compressed(path, allow_pickle=False, words=json.dumps(words), body=body_text(self.body, self.protocol), **arrays)
@@ -144,7 +149,7 @@ class Dance:
                 arrays = {name: found[name] for name in ("postures", "hold", "via", "move")}
                 body, _ = parse_body(str(found["body"]), str(path))
             feet: dict[str, Any] = {name: tuple(Stance(**s) for s in words[name]) for name in ("stances", "under")}
-            return cls(words["protocol"], body, counted=tuple(words["counted"]), seed=words["seed"], **feet, **arrays)
+            return cls(words["protocol"], body, seed=words["seed"], **feet, **arrays)
         except OSError as error:
             raise FileRefused(f"{path}: cannot be read ({error.strerror or error}).") from error
         except FileRefused:
@@ -155,4 +160,5 @@ class Dance:
 
 def _told(stance: Stance) -> dict[str, Any]:
     """Return a stance in words that JSON knows."""
-    return {name: np.asarray(getattr(stance, name)).tolist() if name != "name" else stance.name for name in stance.__dataclass_fields__}
+    found = {field.name: getattr(stance, field.name) for field in fields(stance)}
+    return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in found.items()}

@@ -13,6 +13,10 @@ WIDTH = 0.12
 FORWARD = 0.2
 """m: how far the right foot stands in front (paper III.D, human subject)."""
 SINGLE = {"single_right": (0,), "single_left": (1,)}
+STOOL = np.array([[-0.15, -0.2], [0.25, -0.2], [0.25, 0.2], [-0.15, 0.2]])
+"""(4, 2) m where the legs of a stool stand, from below the hips: a seat of 0.4 m by 0.4 m that bears the thighs to their middle."""
+HANGING = 0.08
+"""m between the ground and the soles of hanging legs on a stool."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,8 +25,9 @@ class Stance:
 
     ``name``; ``ankle`` (2, 3) m lab frame, right and left, where each foot stands or would stand, flat and facing lab x; ``planted`` the
     feet on the ground (0 right, 1 left); ``soles`` (2, P, 3) m their outlines; ``share`` of every half width of the support that may be
-    used (0.6 in the paper); ``props`` (K, 2) m corners on the ground of what else bears weight: the legs of a seat or of a frame to hold;
-    ``seated`` True where the pelvis rests and the feet bear nothing.
+    used (0.6 in the paper); ``props`` (K, 2) m corners on the ground of what else bears weight: the legs of a stool or of a frame to hold;
+    ``seat`` m height of the hip centres of a person on a stool, pelvis upright and still over the lab origin; 0 standing;
+    ``over`` the one of two planted feet (0, 1) over which the weight is, so that the other could be lifted; None anywhere.
     """
 
     name: str
@@ -31,7 +36,8 @@ class Stance:
     soles: Array
     share: float = 0.6
     props: Array = field(default_factory=lambda: np.empty((0, 2)))
-    seated: bool = False
+    seat: float = 0.0
+    over: int | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "ankle", frozen_array(self.ankle, (2, 3), "Stance.ankle"))
@@ -49,12 +55,20 @@ class Stance:
 
     @cached_property
     def centre(self) -> Array:
-        """(2,) m middle of the base of support: of its bounding box."""
+        """(2,) m middle of the base of support: of its bounding box; with the weight over one foot: of the edges of both."""
+        if self.over is not None:
+            return 0.4 * self.on(0, 1).centre + 0.6 * self.on(self.over).centre
         return (self.support.min(axis=0) + self.support.max(axis=0)) / 2
 
     @cached_property
     def edges(self) -> tuple[Array, Array]:
-        """Unit inward normals (P, 2) and offsets (P,) m of the reduced support: ``normals @ p + offsets`` is the distance inside."""
+        """Unit inward normals (P, 2) and offsets (P,) m of the reduced support: ``normals @ p + offsets`` is the distance inside.
+
+        With the weight over one foot: of the reduced supports of both feet and of that one.
+        """
+        if self.over is not None:
+            normals, offsets = zip(self.on(0, 1).edges, self.on(self.over).edges, strict=True)
+            return np.concatenate(normals), np.concatenate(offsets)
         corners = self.centre + self.share * (self.support - self.centre)
         along = np.roll(corners, -1, axis=0) - corners
         normals = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.linalg.norm(along, axis=1, keepdims=True)
@@ -67,7 +81,8 @@ class Stance:
 
     def on(self, *planted: int) -> "Stance":
         """Return the stance with only these feet on the ground."""
-        return replace(self, planted=planted, name=self.name if len(planted) == 2 else ("single_right", "single_left")[planted[0]])
+        apart = "parallel" if self.ankle[0, 0] == self.ankle[1, 0] else "right_forward"
+        return replace(self, planted=planted, over=None, name=apart if len(planted) == 2 else ("single_right", "single_left")[planted[0]])
 
 
 def stance(
@@ -82,6 +97,13 @@ def stance(
         for k, o in enumerate(body.feet[side].outline for side in ("right", "left"))
     ]
     return Stance(name, ankle, planted, np.array(soles), share)
+
+
+def seat(body: Body, *, share: float = 0.6) -> Stance:
+    """Return the stance of a person on a stool, hips over the lab origin, feet hanging above the ground."""
+    feet = stance(body, "seated", planted=(), share=share)
+    legs = [np.linalg.norm(body.joints[body.joint_index(f"{side}_ankle_dorsiflexion")].translation) for side in ("right", "left")]
+    return replace(feet, props=STOOL, seat=float(max(legs) + feet.ankle[:, 2].max()) + HANGING)
 
 
 def stature_of(body: Body) -> float:
