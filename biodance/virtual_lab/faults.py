@@ -10,11 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from biodance.errors import BiodanceError, UnknownName
+from biodance.errors import UnknownName
 from biodance.lab.write_c3d import PlateRecording
 from biodance.records import CHANNELS, Array, Markers
 from biodance.virtual_lab.laboratory import Fault, Recording
-from biodance.virtual_lab.protocol import Protocol
 
 PlateChange = Callable[[Array, Recording], Array]
 """Changes the wrench (S, 6) on the subject about the plate's centre, lab axes, of one recording."""
@@ -59,28 +58,34 @@ def _with_plate(recording: Recording, index: int, plate: PlateRecording) -> Reco
     return replace(recording, plates=(*recording.plates[:index], plate, *recording.plates[index + 1 :]))
 
 
-def _channel(target: str) -> int:
+def channel_index(target: str) -> int:
+    """Return the place 0..5 of the channel that a target names last; UnknownName lists the channels."""
     name = target.rpartition(":")[2]
     if name not in CHANNELS:
         raise UnknownName.of("channel of a force plate", name, CHANNELS)
     return CHANNELS.index(name)
 
 
-def _axis(target: str) -> Array:
+def axis_index(target: str) -> int:
+    """Return 0, 1, 2 for a target that ends with x, y, z; UnknownName otherwise."""
     if target[-1:] not in ("x", "y", "z"):
         raise UnknownName.of("axis", target[-1:], ("x", "y", "z"))
-    return np.eye(3)["xyz".index(target[-1])]
+    return "xyz".index(target[-1])
+
+
+def _axis(target: str) -> Array:
+    return np.eye(3)[axis_index(target)]
 
 
 def plate_offset(target: str, offset: float) -> Fault:
     """Add a constant ``offset`` (N or N·m) to a channel."""
-    step = offset * np.eye(6)[_channel(target)]
+    step = offset * np.eye(6)[channel_index(target)]
     return on_plate(target, lambda wrench, _: wrench + step)
 
 
 def plate_gain(target: str, gain: float) -> Fault:
     """Let a channel read ``gain`` (0.04 = 4 %) too much."""
-    factor = np.ones(6) + gain * np.eye(6)[_channel(target)]
+    factor = np.ones(6) + gain * np.eye(6)[channel_index(target)]
     return on_plate(target, lambda wrench, _: wrench * factor)
 
 
@@ -88,13 +93,13 @@ def plate_crosstalk(target: str, ratio: float) -> Fault:
     """Let ``ratio`` of the first channel show in the second; target ``Fz->My``."""
     first, _, second = target.rpartition(":")[2].partition("->")
     mixing = np.eye(6)
-    mixing[_channel(second), _channel(first)] += ratio
+    mixing[channel_index(second), channel_index(first)] += ratio
     return on_plate(target, lambda wrench, _: wrench @ mixing.T)
 
 
 def plate_drift(target: str, drift: float, clock: dict[str, tuple[float, float]]) -> Fault:
     """Let the zero of a channel wander by ``drift`` over the session; ``clock`` says from and to where in the session each trial lies."""
-    unit = np.eye(6)[_channel(target)]
+    unit = np.eye(6)[channel_index(target)]
 
     def change(wrench: Array, recording: Recording) -> Array:
         start, stop = clock[recording.name]
@@ -110,7 +115,7 @@ def _late(values: Array, rate: float, delay: Array) -> Array:
 
 def time_delay(target: str, delay: float) -> Fault:
     """Let all forces come ``delay`` (s) late."""
-    return lambda recording: _all_late(recording, np.asarray(delay))
+    return lambda recording: all_late(recording, np.asarray(delay))
 
 
 def clock_drift(target: str, stretch: float, clock: dict[str, tuple[float, float]]) -> Fault:
@@ -118,12 +123,13 @@ def clock_drift(target: str, stretch: float, clock: dict[str, tuple[float, float
 
     def fault(recording: Recording) -> Recording:
         share = np.linspace(*clock[recording.name], len(recording.plates[0].channels))
-        return _all_late(recording, stretch * (share - 0.5))
+        return all_late(recording, stretch * (share - 0.5))
 
     return fault
 
 
-def _all_late(recording: Recording, delay: Array) -> Recording:
+def all_late(recording: Recording, delay: Array) -> Recording:
+    """Return the recording with all forces late by ``delay`` s: one number, or one a sample."""
     plates = tuple(replace(p, channels=_late(p.channels, recording.analog_rate, delay)) for p in recording.plates)
     return replace(recording, plates=plates)
 
@@ -176,19 +182,19 @@ def unit_error(target: str, factor: float) -> Fault:
 
 def axis_error(target: str) -> Fault:
     """Turn the sign of one channel."""
-    sign = np.ones(6) - 2 * np.eye(6)[_channel(target)]
+    sign = np.ones(6) - 2 * np.eye(6)[channel_index(target)]
     return on_plate(target, lambda wrench, _: wrench * sign)
 
 
 def clipping(target: str, limit: float) -> Fault:
     """Let a channel saturate at +-``limit`` (N or N·m)."""
-    bound = np.where(np.eye(6)[_channel(target)] > 0, limit, np.inf)
+    bound = np.where(np.eye(6)[channel_index(target)] > 0, limit, np.inf)
     return on_plate(target, lambda wrench, _: np.clip(wrench, -bound, bound))
 
 
 def mains_hum(target: str, amplitude: float) -> Fault:
     """Add a 50 Hz sine of ``amplitude`` (N or N·m) to a channel."""
-    unit = amplitude * np.eye(6)[_channel(target)]
+    unit = amplitude * np.eye(6)[channel_index(target)]
 
     def change(wrench: Array, recording: Recording) -> Array:
         return wrench + np.sin(2 * np.pi * 50 * np.arange(len(wrench)) / recording.analog_rate)[:, None] * unit
@@ -210,40 +216,3 @@ def labels_swapped(target: str) -> Fault:
         return replace(recording, markers=Markers(names, markers.time, markers.xyz))
 
     return fault
-
-
-def clock_of(protocol: Protocol) -> dict[str, tuple[float, float]]:
-    """Return from and to where in the session (0 to 1) every trial lies, the trials one after another."""
-    ends = np.cumsum([trial.duration for trial in protocol.trials])
-    starts = ends - [trial.duration for trial in protocol.trials]
-    return {t.name: (float(a / ends[-1]), float(b / ends[-1])) for t, a, b in zip(protocol.trials, starts, ends, strict=True)}
-
-
-NEEDS_CLOCK = (plate_drift, clock_drift)
-FAULTS: dict[str, Callable[..., Fault]] = {
-    f.__name__: f
-    for f in (
-        plate_offset, plate_gain, plate_crosstalk, plate_drift, time_delay, clock_drift, plate_position, plate_rotation, body_mass,
-        unit_error, axis_error, clipping, mains_hum, labels_swapped,
-    )
-}  # fmt: skip
-
-
-def make_fault(name: str, target: str, values: dict[str, float], protocol: Protocol) -> Fault:
-    """Return a fault by name; ``values`` are its parameters in SI units.
-
-    Raises
-    ------
-    UnknownName
-        There is no such fault, plate, channel, axis or marker.
-    BiodanceError
-        A parameter is missing or has a wrong name.
-    """
-    if name not in FAULTS:
-        raise UnknownName.of("effect that the virtual laboratory can make", name, [*FAULTS, "added_mass"])
-    builder = FAULTS[name]
-    clock = {"clock": clock_of(protocol)} if builder in NEEDS_CLOCK else {}
-    legal = [p for p in builder.__annotations__ if p not in ("target", "clock", "return")]
-    if sorted(values) != sorted(legal):
-        raise BiodanceError(f"Effect {name} has the parameters {', '.join(legal) or 'none'}; got {', '.join(values) or 'none'}.")
-    return builder(target, **values, **clock)

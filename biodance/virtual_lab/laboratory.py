@@ -1,7 +1,7 @@
 """The laboratory of a virtual session: what stands where, what it records, and what it writes to disk."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,7 @@ from biodance.errors import BiodanceError
 from biodance.lab.write_c3d import PlateRecording, write_c3d
 from biodance.records import Array, Markers, Role, frozen_array
 from biodance.virtual_lab.cameras import film
-from biodance.virtual_lab.performance import Performance, perform
+from biodance.virtual_lab.performance import Force, Performance, perform
 from biodance.virtual_lab.person import Person
 from biodance.virtual_lab.placement import MARKER_RADIUS
 from biodance.virtual_lab.plates import HALF_SIZE, TruePlate, digitise, lay_plate, measure
@@ -64,12 +64,20 @@ class Visit:
     """The day of a session: its ``number`` (another day: markers glued, postures performed, instruments drawn anew), the ``laboratory``,
     the ``tolerances`` of everything, and ``faults`` that change each recording (markers, raw analog samples, parameters) before it is
     written.
+
+    ``tilt`` (3,) rad turns the laboratory's axes off the true vertical, beyond the tolerance; ``forces`` act on the person beside gravity
+    and ground; ``joint_shifts`` (3,) m by joint (``right_hip``) move true joint centres in the parent's frame, with all that hangs on
+    them; ``marker_shifts`` (3,) m by label move markers on their segments after the static trial.
     """
 
     number: int = 0
     laboratory: Laboratory = field(default_factory=Laboratory)
     tolerances: Tolerances = REALISTIC
     faults: tuple[Fault, ...] = ()
+    tilt: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    forces: tuple[Force, ...] = ()
+    joint_shifts: Mapping[str, Array] = field(default_factory=dict)
+    marker_shifts: Mapping[str, Array] = field(default_factory=dict)
 
 
 FIRST_VISIT = Visit()
@@ -90,7 +98,7 @@ def set_up(person: Person, visit: Visit) -> Instruments:
     """Draw the instruments of one visit."""
     laboratory, tolerances, session = visit.laboratory, visit.tolerances, visit.number
     rng = stream(person.seed, "instruments", str(session))
-    tilt = np.array([*(tolerances.lab_tilt * rng.normal(size=2)), 0.0])
+    tilt = np.array([*(tolerances.lab_tilt * rng.normal(size=2)), 0.0]) + np.array(visit.tilt)
     middle = np.array([*laboratory.centre, 0.0])
     leftward = np.array([-np.sin(laboratory.heading), np.cos(laboratory.heading), 0.0]) * HALF_SIZE[0]
     sides = [("both", 0.0)] if laboratory.plates == 1 else [("right", -1.0), ("left", 1.0)]
@@ -99,10 +107,13 @@ def set_up(person: Person, visit: Visit) -> Instruments:
 
 
 def perform_in(instruments: Instruments, person: Person, plan: TrialPlan) -> Performance:
-    """Let the person perform one trial where the laboratory's plates are."""
+    """Let the person perform one trial where the laboratory's plates are, with the forces and the moved markers of the visit."""
     visit = instruments.visit
     lab = visit.laboratory
-    return perform(person, plan, visit.number, tolerances=visit.tolerances, centre=np.array(lab.centre), heading=lab.heading)
+    if plan.role != "static":
+        person = person.with_markers_moved(visit.marker_shifts)
+    done = perform(person, plan, visit.number, tolerances=visit.tolerances, centre=np.array(lab.centre), heading=lab.heading)
+    return replace(done, forces=visit.forces)
 
 
 def record(performance: Performance, instruments: Instruments) -> Recording:

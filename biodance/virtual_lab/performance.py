@@ -3,6 +3,7 @@
 The path of the pelvis is what keeps the balance: the zero-moment point of the full body is brought to where the posture asks for it.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -35,7 +36,7 @@ class Performance:
     """One trial as it truly happened: the motion is a quintic spline through ``nodes`` (T, 46) at ``node_time`` (T,) s.
 
     ``plan`` what was asked; ``stance`` where the feet stood; ``curves`` the postures; ``balance_error`` m: the farthest that the
-    zero-moment point was from the place wanted.
+    zero-moment point was from the place wanted. ``forces`` act on the person beside gravity and the ground: a hand on a rail, a rope.
     """
 
     plan: TrialPlan
@@ -45,6 +46,7 @@ class Performance:
     node_time: Array
     nodes: Array
     balance_error: float = 0.0
+    forces: "tuple[Force, ...]" = ()
 
     @cached_property
     def _splines(self) -> tuple[Any, Any, Any]:
@@ -60,15 +62,22 @@ class Performance:
 
         time = np.arange(self.node_time[0], self.node_time[-1] + 1e-9, 0.5 / NODE_RATE)
         time = time[time <= self.node_time[-1]]
-        return make_interp_spline(time, true_wrench(self.person, self.motion(time)).value, k=5)
+        needed = true_wrench(self.person, self.motion(time)).value
+        return make_interp_spline(time, needed - sum(force(self, time) for force in self.forces), k=5)
 
     def wrench(self, time: Array) -> Wrench:
-        """Return the true ground wrench on the person about the lab origin at ``time`` (T,) s, all contacts together."""
+        """Return the true ground wrench on the person about the lab origin at ``time`` (T,) s, all feet together: what the motion needs
+        less what the ``forces`` do.
+        """
         return Wrench(time, self._wrench_spline(time))
 
     def share_right(self, time: Array) -> Array:
         """Return the share (T,) of the weight on the right foot."""
         return np.clip(np.interp(time, self.curves.time, self.curves["shift"][:, 0]), 0.0, 1.0)
+
+
+Force = Callable[[Performance, Array], Array]
+"""Wrench (T, 6) N, N·m on the person about the lab origin, true vertical, at times (T,) s, equidistant."""
 
 
 def perform(

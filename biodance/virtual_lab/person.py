@@ -1,6 +1,8 @@
 """A virtual person: the true body, its habits and the loads it carries."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -73,17 +75,40 @@ class Person:
         """True mass with loads, kg."""
         return float(self.loaded_body.sip.mass.sum())
 
+    def with_markers_moved(self, shifts: Mapping[str, Array]) -> "Person":
+        """Return the person with markers moved by ``shifts`` (3,) m in their true segments' frames; UnknownName lists the labels."""
+        markers = self.body.markers
+        position = np.array(markers.position)
+        for label, shift in shifts.items():
+            if label not in markers.names:
+                raise UnknownName.of("marker of the virtual subject", label, markers.names)
+            position[markers.names.index(label)] += shift
+        return replace(self, body=replace(self.body, markers=replace(markers, position=position)))
+
+
+NO_SHIFTS: Mapping[str, Array] = MappingProxyType({})
+BEYOND = {"hip": "thigh", "knee": "shank", "ankle": "foot", "shoulder": "upper_arm"}
+MOVABLE = (*(f"{side}_{joint}" for side in ("right", "left") for joint in BEYOND), "lumbar", "neck")
+"""Joints whose true centre can be moved."""
+
 
 def make_person(
-    subject: Subject, seed: int, *, tolerances: Tolerances = REALISTIC, loads: tuple[AddedLoad, ...] = (), session: int = 0
+    subject: Subject,
+    seed: int,
+    *,
+    tolerances: Tolerances = REALISTIC,
+    loads: tuple[AddedLoad, ...] = (),
+    session: int = 0,
+    joint_shifts: Mapping[str, Array] = NO_SHIFTS,
 ) -> Person:
     """Return the virtual person number ``seed`` of the given mass (kg), stature (m) and sex.
 
     The same ``seed`` is the same body for ever; ``session`` only moves the markers as another day does. ``loads`` come on top of the
-    subject's mass.
+    subject's mass. ``joint_shifts`` (3,) m by joint (one of ``MOVABLE``) move true joint centres in the frame of the segment before them.
     """
     t = tolerances
     size = draw_proportions(subject, seed, length_sd=t.segment_length, centre_sd=t.joint_centre, tilt_sd=t.joint_axis)
+    size = _with_joints_moved(size, joint_shifts)
     sip = draw_sip(
         size, subject.mass, subject.sex, seed, mass_sd=t.segment_mass, side_sd=t.side_mass, shape_sd=t.segment_shape, com_sd=t.com
     )
@@ -103,6 +128,16 @@ def make_person(
         {side: _sole(size, side) for side in ("right", "left")},
     )
     return Person(subject, seed, size, body, _habits(size, seed), tuple(loads))
+
+
+def _with_joints_moved(size: Proportions, shifts: Mapping[str, Array]) -> Proportions:
+    moved = np.array(size.centre_shift)
+    for joint, shift in shifts.items():
+        if joint not in MOVABLE:
+            raise UnknownName.of("joint of the virtual subject whose centre can be moved", joint, MOVABLE)
+        side, _, kind = joint.rpartition("_")
+        moved[SEGMENTS.index(f"{side}_{BEYOND[kind]}" if side else {"lumbar": "lumbar", "neck": "head"}[kind])] += shift
+    return replace(size, centre_shift=moved)
 
 
 def _box(phi: Array) -> Array:

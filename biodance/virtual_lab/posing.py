@@ -73,6 +73,7 @@ def upper_body(person: Person, curves: Curves, stance: Stance, tolerances: Toler
     angle = np.zeros((time.size, len(body.joints)))
     unasked = dict(zip(_UNASKED, smooth_noise(rng, time, columns=len(_UNASKED), cutoff=0.8).T, strict=True))
     tremor = t.tremor * smooth_noise(rng, time, columns=len(body.joints) + 3, cutoff=1.0)
+    girdle = rng.spawn(1)[0]
 
     def add(name: str, value: Array | float) -> None:
         angle[:, body.joint_index(name)] += value
@@ -93,6 +94,9 @@ def upper_body(person: Person, curves: Curves, stance: Stance, tolerances: Toler
         for name, column in zip(("shoulder_flexion", "shoulder_adduction", "shoulder_rotation", "elbow_flexion"), arm.T, strict=True):
             add(f"{side}_{name}", column)
         add(f"{side}_clavicle_elevation", t.clavicle_rhythm * np.sqrt(arm[:, 0] ** 2 + arm[:, 1] ** 2 + 0.01))
+        shrug = t.girdle_motion * smooth_noise(girdle, time, columns=2, cutoff=0.6)
+        add(f"{side}_clavicle_elevation", shrug[:, 0])
+        add(f"{side}_clavicle_protraction", shrug[:, 1])
     turn = _pelvis_turn(np.radians(curves["pelvis"]) + tremor[:, -3:], stance.heading)
     upper = ~np.isin(np.arange(angle.shape[1]), [body.joint_index(f"{side}_{name}") for side in SIDES for name in LEG])
     angle[:, upper] += tremor[:, :-3][:, upper]

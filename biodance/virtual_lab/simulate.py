@@ -46,7 +46,7 @@ def simulate(
     """
     plan = protocol if isinstance(protocol, Protocol) else read_protocol(protocol)
     _check(subject, out)
-    person = make_person(subject, seed, tolerances=visit.tolerances, loads=loads, session=visit.number)
+    person = make_person(subject, seed, tolerances=visit.tolerances, loads=loads, session=visit.number, joint_shifts=visit.joint_shifts)
     instruments = set_up(person, visit)
     out.mkdir(parents=True, exist_ok=True)
     performances = []

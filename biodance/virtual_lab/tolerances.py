@@ -25,6 +25,7 @@ class Tolerances:
     thorax_share: float = 0.06  # of the trunk's angles is bent above the lumbar joint (the subject keeps the back straight)
     wrist_motion: float = 0.052  # rad rms: 3 degrees of wrist and of forearm pronation
     clavicle_rhythm: float = 0.02  # rad of clavicle elevation per rad of arm elevation; 7 mm of shoulder lift at 130 degrees
+    girdle_motion: float = 0.0  # rad rms of each clavicle beyond that rhythm; 0.1 rad carry the shoulder by 15 mm
     performance: float = 0.05  # relative amplitude and timing of every posture: nobody repeats a dance exactly
     tremor: float = 0.004  # rad rms below 1.5 Hz on every joint: a quiet posture is not still
     sway: float = 0.004  # m rms of the centre of pressure, quiet standing of young adults

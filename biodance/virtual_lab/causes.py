@@ -1,0 +1,198 @@
+"""All causes that can be hidden in a session, by name, and where each is hidden: in the files, in the person, around the person.
+
+Names and parameters are those of the diagnosis, so that its answer can be compared with the truth; the code is another. ``UNKNOWN`` are
+the causes that no diagnosis has a description of: they must come out as "unexplained".
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from biodance.errors import BiodanceError, UnknownName
+from biodance.virtual_lab import amplifier_faults, camera_faults, faults, forces
+from biodance.virtual_lab.laboratory import Fault, Visit
+from biodance.virtual_lab.loose_masses import sloshing_load, wobbling_mass
+from biodance.virtual_lab.merge import load_on
+from biodance.virtual_lab.performance import Force
+from biodance.virtual_lab.person import AddedLoad, Person
+from biodance.virtual_lab.protocol import Protocol
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """One cause to hide: its ``name``, where (``target``) and how large (``values`` by parameter, SI units; a place has three numbers)."""
+
+    name: str
+    target: str
+    values: dict[str, tuple[float, ...]]
+
+    def numbers(self, legal: tuple[str, ...]) -> dict[str, float]:
+        """Return the values, one number each; BiodanceError unless they are exactly the ``legal`` ones."""
+        if sorted(self.values) != sorted(legal):
+            raise BiodanceError(
+                f"Effect {self.name} has the parameters {', '.join(legal) or 'none'}; got {', '.join(self.values) or 'none'}."
+            )
+        return {name: self.vector(name, 1)[0] for name in legal}
+
+    def vector(self, name: str, count: int) -> tuple[float, ...]:
+        """Return one value of ``count`` numbers; BiodanceError if it is missing or has another count."""
+        if name not in self.values or len(self.values[name]) != count:
+            raise BiodanceError(
+                f"Effect {self.name}: {name} needs {count} number{'s' * (count > 1)}, got {self.values.get(name)}. Example: 0.05;0;0"
+            )
+        return self.values[name]
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What a cause may change: the ``visit``, and the ``loads`` that the ``person`` carries through the trials of ``protocol``."""
+
+    person: Person
+    protocol: Protocol
+    visit: Visit
+    loads: tuple[AddedLoad, ...] = ()
+
+
+def clock_of(protocol: Protocol) -> dict[str, tuple[float, float]]:
+    """Return from and to where in the session (0 to 1) every trial lies, the trials one after another."""
+    ends = np.cumsum([trial.duration for trial in protocol.trials])
+    starts = ends - [trial.duration for trial in protocol.trials]
+    return {t.name: (float(a / ends[-1]), float(b / ends[-1])) for t, a, b in zip(protocol.trials, starts, ends, strict=True)}
+
+
+FAULTS: dict[str, Callable[..., Fault]] = {
+    f.__name__: f
+    for f in (
+        faults.plate_offset, faults.plate_gain, faults.plate_crosstalk, faults.plate_drift, faults.time_delay, faults.clock_drift,
+        faults.plate_position, faults.plate_rotation, faults.body_mass, faults.unit_error, faults.axis_error, faults.clipping,
+        faults.mains_hum, faults.labels_swapped, amplifier_faults.filter_mismatch, amplifier_faults.plate_hysteresis,
+        amplifier_faults.plate_creep, amplifier_faults.plate_bending, amplifier_faults.loose_connection, amplifier_faults.trigger_jitter,
+        amplifier_faults.object_on_plate, amplifier_faults.saturating, camera_faults.frame_rate, camera_faults.dropped_frames,
+        camera_faults.swaying_cameras,
+    )
+}  # fmt: skip
+FORCES: dict[str, Callable[..., Force]] = {
+    f.__name__: f
+    for f in (forces.external_contact, forces.body_weight_support, forces.slack_harness, forces.table_edge, forces.spinning_wheel)
+}
+UNKNOWN = (
+    "plate_creep", "plate_bending", "loose_connection", "trigger_jitter", "object_on_plate", "saturating", "swaying_cameras",
+    "slack_harness", "table_edge", "spinning_wheel",
+)  # fmt: skip
+
+
+def fault_of(cause: Hidden, clock: dict[str, tuple[float, float]]) -> Fault:
+    """Return the change of a recording that a cause makes; ``clock`` says from and to where in the session each trial lies.
+
+    Raises
+    ------
+    UnknownName
+        The cause is not made in the recording, or its target does not exist.
+    BiodanceError
+        A parameter is missing or has a wrong name.
+    """
+    if cause.name not in FAULTS:
+        raise UnknownName.of("effect that is made in a recording", cause.name, tuple(FAULTS))
+    builder = FAULTS[cause.name]
+    timed = {"clock": clock} if "clock" in builder.__annotations__ else {}
+    return builder(cause.target, **cause.numbers(_parameters(builder)), **timed)
+
+
+def _parameters(builder: Callable[..., object]) -> tuple[str, ...]:
+    return tuple(name for name in builder.__annotations__ if name not in ("target", "clock", "person", "return"))
+
+
+def _load(cause: Hidden, scene: Scene) -> Scene:
+    """Put ``mass`` kg on one of the 12 segments, ``place`` (3) m in its joint frame (beside the CoM if not given)."""
+    mass = cause.vector("mass", 1)[0]
+    if set(cause.values) - {"mass", "place"} or mass <= 0:
+        raise BiodanceError(f"Effect added_mass has mass (kg, > 0) and place (three numbers, m); got {cause.values}.")
+    place = np.array(cause.vector("place", 3)) if "place" in cause.values else None
+    return replace(scene, loads=(*scene.loads, load_on(scene.person, cause.target, mass, place=place)))
+
+
+def _wobble(cause: Hidden, scene: Scene) -> Scene:
+    force = wobbling_mass(scene.person, cause.target, **cause.numbers(("mass",)))
+    return replace(scene, visit=replace(scene.visit, forces=(*scene.visit.forces, force)))
+
+
+def _slosh(cause: Hidden, scene: Scene) -> Scene:
+    load, force = sloshing_load(scene.person, cause.target, **cause.numbers(("mass", "sloshing")))
+    return replace(scene, loads=(*scene.loads, load), visit=replace(scene.visit, forces=(*scene.visit.forces, force)))
+
+
+def _tilt(cause: Hidden, scene: Scene) -> Scene:
+    """Turn the laboratory's axes by ``angle`` rad about lab x or y."""
+    turn = np.array(scene.visit.tilt)
+    turn[faults.axis_index(cause.target)] += cause.numbers(("angle",))["angle"]
+    return replace(scene, visit=replace(scene.visit, tilt=tuple(turn)))
+
+
+def _shifted(field: Literal["joint_shifts", "marker_shifts"]) -> Callable[[Hidden, Scene], Scene]:
+    """Return the change that moves a joint centre or a marker by ``shift`` (3) m."""
+
+    def change(cause: Hidden, scene: Scene) -> Scene:
+        moved = {**getattr(scene.visit, field), cause.target: np.array(cause.vector("shift", 3))}
+        changes: dict[str, Any] = {field: moved}
+        return replace(scene, visit=replace(scene.visit, **changes))
+
+    return change
+
+
+def _longer(cause: Hidden, scene: Scene) -> Scene:
+    """Make a thigh or shank ``error`` m longer than its markers say: the joint at its end lies lower, with all that hangs on it."""
+    ends = {f"{side}_{upper}": f"{side}_{joint}" for side in ("right", "left") for upper, joint in (("thigh", "knee"), ("shank", "ankle"))}
+    if cause.target not in ends:
+        raise UnknownName.of("segment whose length can be wrong", cause.target, tuple(ends))
+    shift = np.array([0.0, -cause.numbers(("error",))["error"], 0.0])
+    return replace(scene, visit=replace(scene.visit, joint_shifts={**scene.visit.joint_shifts, ends[cause.target]: shift}))
+
+
+def _motion(tolerance: str) -> Callable[[Hidden, Scene], Scene]:
+    """Return the change that lets the person move a joint that the model lacks by ``angle`` rad rms per axis."""
+
+    def change(cause: Hidden, scene: Scene) -> Scene:
+        angle = cause.numbers(("angle",))["angle"]
+        return replace(scene, visit=replace(scene.visit, tolerances=replace(scene.visit.tolerances, **{tolerance: angle})))
+
+    return change
+
+
+IN_THE_PERSON: dict[str, Callable[[Hidden, Scene], Scene]] = {
+    "added_mass": _load,
+    "wobbling_mass": _wobble,
+    "sloshing_load": _slosh,
+    "lab_tilt": _tilt,
+    "joint_centre": _shifted("joint_shifts"),
+    "marker_misplaced": _shifted("marker_shifts"),
+    "segment_length": _longer,
+    "head_joint": _motion("head_motion"),
+    "trunk_joint": _motion("thorax_motion"),
+    "shoulder_girdle": _motion("girdle_motion"),
+}
+CAUSES = (*FAULTS, *FORCES, *IN_THE_PERSON)
+
+
+def conceal(cause: Hidden, scene: Scene) -> Scene:
+    """Return the scene with one more cause in it.
+
+    Raises
+    ------
+    UnknownName
+        There is no such cause, or its target does not exist.
+    BiodanceError
+        A parameter is missing, has a wrong name or an impossible value.
+    """
+    visit = scene.visit
+    if cause.name in IN_THE_PERSON:
+        return IN_THE_PERSON[cause.name](cause, scene)
+    if cause.name in FORCES:
+        builder = FORCES[cause.name]
+        force = builder(cause.target, **cause.numbers(_parameters(builder)))
+        return replace(scene, visit=replace(visit, forces=(*visit.forces, force)))
+    if cause.name not in FAULTS:
+        raise UnknownName.of("effect that the virtual laboratory can make", cause.name, CAUSES)
+    fault = fault_of(cause, clock_of(scene.protocol))
+    return replace(scene, visit=replace(visit, faults=(*visit.faults, fault)))
