@@ -1,0 +1,104 @@
+"""Selection: what it says is left unknown is what the criterion says, budgets and blocks hold, greedy beats chance."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from biodance.body.human import human
+from biodance.dance.chain import ROOT, Chain
+from biodance.dance.criteria import criterion
+from biodance.dance.plan import Plan
+from biodance.dance.selection import FORCE, MOMENT, RATE, choose, learned
+from biodance.dance.splines import rest_to_rest
+from biodance.dance.target import target
+from biodance.identify.base_parameters import structural_base
+from biodance.identify.posterior import prior_factor
+from biodance.motion.regressor import regressor
+from biodance.records import Array, Subject
+
+BODY = human(Subject(65.0, 1.75, "F", 33.0))
+CHAIN = Chain(BODY)
+STANCES = ("parallel",) * 6 + ("single_right",) * 6
+PLAN = Plan("p", "", (("parallel", 6), ("single_right", 6)), hold=1.0)
+
+
+@pytest.fixture(scope="module")
+def x() -> Array:
+    rng = np.random.default_rng(1)
+    out = np.zeros((12, CHAIN.size))
+    out[:, ROOT:] = rng.uniform(BODY.limits.lower, BODY.limits.upper, (12, 23)) * 0.8
+    out[:, 2] = 0.9
+    return out
+
+
+def information(x: Array, order: tuple[int, ...]) -> Array:
+    """Whitened rows of standing in each posture and of going there from the one before on the same feet (or from any, at first)."""
+    rows, last = [], {}
+    basis = rest_to_rest(PLAN.move, via=0, rate=RATE)
+    for p in order:
+        origin = last.get(STANCES[p], next(q for q in range(12) if STANCES[q] == STANCES[p] and q != p))
+        ends = x[[origin, p]]
+        parts = [part[1:-1] @ ends for part in (basis.position, basis.velocity, basis.acceleration)]
+        for q, v, a in (parts, (x[p][None], *np.zeros((2, 1, CHAIN.size)))):
+            rows.append(regressor(BODY, CHAIN.motion(np.arange(len(q)) / RATE, q, v, a)).reshape(-1, 120))
+        last[STANCES[p]] = p
+    rows = np.concatenate(rows)
+    return rows / np.tile(np.repeat([FORCE, MOMENT], 3), len(rows) // 6)[:, None]
+
+
+def test_what_is_left_unknown_is_what_the_criterion_says(x: Array) -> None:
+    found = choose(CHAIN, x, STANCES, PLAN)
+    assert sorted(found.picked) == list(range(12))
+    every = tuple(tuple(range(10 * i, 10 * i + 10)) for i in range(12))
+    aim = replace(target(BODY, structural_base(BODY)), blocks=every, weights=np.ones(12))
+    fixed = np.count_nonzero(np.diag(BODY.sip.covariance) > 0)
+    for count in (1, 5, 12):
+        value, _ = criterion("posterior_variance")(information(x, found.picked[:count]), aim)
+        assert found.spread[count] == pytest.approx(np.sqrt(np.exp(value) / fixed), rel=1e-6)
+
+
+def test_every_pick_is_the_best_there_was(x: Array) -> None:
+    found = choose(CHAIN, x, STANCES, PLAN)
+    S = prior_factor(BODY.sip)
+    before = np.sum(S**2, axis=1)
+
+    def left(order: tuple[int, ...]) -> float:
+        rows = information(x, order) @ S
+        after = np.sum(S * np.linalg.solve(np.eye(S.shape[1]) + rows.T @ rows, S.T).T, axis=1)
+        return float(np.sum(after[before > 0] / before[before > 0]))
+
+    first = {p: left((p,)) for p in range(12)}
+    assert min(first, key=first.__getitem__) == found.picked[0]
+    second = {p: left((found.picked[0], p)) for p in range(12) if p != found.picked[0]}
+    assert min(second, key=second.__getitem__) == found.picked[1]
+
+
+def test_blocks_stay_together_and_the_budget_is_kept(x: Array) -> None:
+    whole = choose(CHAIN, x, STANCES, PLAN)
+    assert [STANCES[p] for p in whole.order] == list(STANCES)
+    some = choose(CHAIN, x, STANCES, replace(PLAN, budget=30.0))
+    assert some.duration <= 30.0
+    assert 3 < len(some.order) < 12
+    assert some.picked == whole.picked[: len(some.picked)]
+    assert (np.diff(whole.spread) < 0).all()
+
+
+def test_emphasis_is_on_the_segment_that_counts(x: Array) -> None:
+    only = replace(PLAN, weights=(("left_shank", 1.0),), other_weight=0.0)
+    S = prior_factor(BODY.sip)
+    shank = slice(10 * BODY.segment_index("left_shank"), 10 * BODY.segment_index("left_shank") + 10)
+
+    def sd(plan: Plan) -> float:
+        rows = information(x, choose(CHAIN, x, STANCES, replace(plan, budget=24.0)).picked) @ S
+        after = np.sum(S * np.linalg.solve(np.eye(S.shape[1]) + rows.T @ rows, S.T).T, axis=1)
+        return float(np.mean((after / np.maximum(np.sum(S**2, axis=1), 1e-30))[shank]))
+
+    assert sd(only) < sd(PLAN)
+
+
+def test_learned_is_the_textbook_update() -> None:
+    rng = np.random.default_rng(0)
+    belief, rows = np.diag(rng.uniform(0.5, 1.0, 5)), rng.normal(size=(3, 5))
+    change = learned(belief, rows)
+    np.testing.assert_allclose(belief - change.T @ change, np.linalg.inv(np.linalg.inv(belief) + rows.T @ rows), atol=1e-12)
