@@ -39,5 +39,9 @@ class AddedMass(Effect):
         load = point_mass(theta[0], table[1:4] / table[0] + np.asarray(theta[1:4]))
         return case.with_added(case.trial.plates[0], case.regressor[:, :, 10 * index : 10 * index + 10] @ load)
 
+    def possible(self, theta: Array) -> bool:
+        """Return whether the size is positive: a load weighs something."""
+        return bool(theta[0] > 0)
+
 
 EFFECT = AddedMass

@@ -42,5 +42,9 @@ class BodyWeightSupport(Effect):
         spring = -away[:, 2:] * up
         return -np.stack([np.concatenate([force, np.cross(point, force)], axis=1) for force in (lift, spring)], axis=2)
 
+    def possible(self, theta: Array) -> bool:
+        """Return whether the size is positive: a rope pulls."""
+        return bool(theta[0] > 0)
+
 
 EFFECT = BodyWeightSupport

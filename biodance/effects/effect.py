@@ -86,6 +86,10 @@ class Effect:
         added = self.transform(case, np.asarray(theta, dtype=float)).residual - case.residual
         return case.with_added(self.plate_of(case), -added)
 
+    def possible(self, theta: Array) -> bool:
+        """Return whether a cause of size ``theta`` (p,) can be: by default every size, either way."""
+        return True
+
     def reported(self, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
         """Return name, value, standard deviation and unit of what a report prints for ``theta`` (p,) with ``sd`` (p,)."""
         return tuple((p.name, float(t), float(s), p.unit) for p, t, s in zip(self.parameters, theta, sd, strict=True))

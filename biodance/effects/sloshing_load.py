@@ -47,6 +47,10 @@ class SloshingLoad(Effect):
         level = np.array([1.0, 1.0, 0.0])
         return np.stack([rigid, riding_wrench(place, acceleration, (x * level, relative * level))], axis=2)
 
+    def possible(self, theta: Array) -> bool:
+        """Return whether the sizes are positive: a load weighs something, and so does what moves in it."""
+        return bool(theta[0] > 0 and theta[1] > 0)
+
 
 def carried_at(case: Case, index: int) -> Array:
     """Return where a load sits (3,) m in a segment's frame: the middle of the back of trunk and pelvis, the far end of others."""

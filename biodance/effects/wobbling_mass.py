@@ -40,5 +40,9 @@ class WobblingMass(Effect):
         moved = relative_motion(acceleration, case.motion.rate, frequency=FREQUENCY.get(self.target, LIMBS), damping=DAMPING)
         return riding_wrench(place, acceleration, moved)[:, :, None]
 
+    def possible(self, theta: Array) -> bool:
+        """Return whether the size is positive: only a mass that is there wobbles."""
+        return bool(theta[0] > 0)
+
 
 EFFECT = WobblingMass

@@ -1,0 +1,95 @@
+"""Every cause of the family at every target, as columns whose coefficients are unit normal before the data.
+
+A cause that is linear in its parameters has its own columns. One that is not (the place of a load matters only once it weighs something) is
+spanned by what it does at its typical size: the columns at zero, and the differences that the other parameters make there.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance.diagnose.problem import Problem
+from biodance.effects import effects
+from biodance.effects.effect import Effect
+from biodance.records import Array
+
+SCALE = 3.0
+"""Standard deviation of a fault before the data, in typical sizes."""
+NOTHING = 1e-7
+"""Share of the largest column below which a column is zero."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One cause: ``basis`` (r, k) rows per unit-normal coefficient; ``silent`` (p,) True for parameters whose column vanishes at zero."""
+
+    effect: Effect
+    basis: Array
+    silent: tuple[bool, ...]
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Effect and target."""
+        return self.effect.name, self.effect.target
+
+    def start(self, coefficients: Array) -> Array:
+        """Return the parameters (p,) near which to begin fitting, from the coefficients (k,) of the basis."""
+        typical, silent = self.effect.typical, np.array(self.silent)
+        theta = np.zeros(typical.size)
+        loud = np.flatnonzero(~silent)
+        theta[loud] = SCALE * typical[loud] * coefficients[: loud.size]
+        if silent.any():
+            size = theta[loud[0]] / typical[loud[0]]
+            if abs(size) > 0.05:
+                slopes = SCALE * coefficients[loud.size : loud.size + silent.sum()]
+                theta[silent] = typical[silent] * np.clip(slopes / size, -3.0, 3.0)
+        return theta
+
+
+def candidates(problem: Problem, chosen: Iterable[str] | None = None) -> tuple[Candidate, ...]:
+    """Return all causes of the family (or those ``chosen`` by name) at all their targets; those without any trace are left out."""
+    found = [candidate(problem, kind(target)) for kind in effects(chosen).values() for target in kind.targets(problem.cases[0])]
+    return tuple(one for one in found if one.basis.shape[1])
+
+
+def candidate(problem: Problem, effect: Effect) -> Candidate:
+    """Return one cause with its basis."""
+    columns = problem.columns(effect) * effect.typical
+    length = np.linalg.norm(columns, axis=0)
+    silent = length <= NOTHING * length.max(initial=1e-300)
+    parts = list(columns[:, ~silent].T)
+    if silent.any() and not silent.all():
+        parts += _differences(problem, effect, silent)
+    basis = SCALE * np.array(parts).T if parts else np.empty((len(columns), 0))
+    return Candidate(effect, basis, tuple(bool(s) for s in silent))
+
+
+def _differences(problem: Problem, effect: Effect, silent: Array) -> list[Array]:
+    """Return what the silent parameters change at the typical size of the others: first differences, then second."""
+    loud = np.where(silent, 0.0, effect.typical)
+    middle = changes(problem, effect, loud)
+    first, second = [], []
+    for k in np.flatnonzero(silent):
+        step = effect.typical * (np.arange(len(silent)) == k)
+        up, down = changes(problem, effect, loud + step), changes(problem, effect, loud - step)
+        first.append(0.5 * (up - down))
+        second.append(0.5 * (up + down) - middle)
+    return first + [bend for bend in second if np.linalg.norm(bend) > NOTHING * np.linalg.norm(middle)]
+
+
+def added(problem: Problem, effect: Effect, theta: Array) -> tuple[Array, ...]:
+    """Return per case (T, 6): what the cause of size ``theta`` (p,) adds to measured minus predicted wrench, about the lab origin."""
+    return tuple(effect.transform(case, theta).residual - case.residual for case in problem.cases)
+
+
+def changes(problem: Problem, effect: Effect, theta: Array) -> Array:
+    """Return (r,): what the cause of size ``theta`` (p,) adds to the rows."""
+    wrench = problem.spectrum.rows(tuple(part[:, :, None] for part in added(problem, effect, theta)))
+    return np.concatenate([wrench.ravel(), problem.marker_rows(effect) @ theta])
+
+
+def slopes(problem: Problem, effect: Effect, theta: Array) -> Array:
+    """Return (r, p): derivative of `changes` at ``theta`` by central differences."""
+    steps = 0.02 * np.diag(effect.typical)
+    return np.stack([(changes(problem, effect, theta + s) - changes(problem, effect, theta - s)) / (2 * s.max()) for s in steps], axis=1)

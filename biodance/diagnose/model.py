@@ -1,0 +1,77 @@
+"""The problem under its tolerances: whitened rows, columns of all that is no fault, and the causes that were named so far."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from biodance.diagnose.candidates import SCALE, Candidate, changes
+from biodance.diagnose.evidence import Belief, believe
+from biodance.diagnose.kinematic_errors import kind_of
+from biodance.diagnose.problem import Problem
+from biodance.diagnose.tolerances import Tolerances, key_of, whitened
+from biodance.effects.effect import Effect
+from biodance.records import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Named:
+    """A cause of size ``theta`` (p,) with ``covariance`` (p, p)."""
+
+    effect: Effect
+    theta: Array
+    covariance: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """``problem`` with the parameters in use, under ``tolerances``; ``belief`` about all that is no fault, the ``named`` causes taken off.
+
+    ``log_likelihood`` of the target under it, up to a constant of the session.
+    """
+
+    problem: Problem
+    tolerances: Tolerances
+    belief: Belief
+    named: tuple[Named, ...] = ()
+
+    @property
+    def log_likelihood(self) -> float:
+        """-1/2 y' C^-1 y with C the covariance of the rows under everything that is no fault."""
+        return -0.5 * float(self.belief.y @ self.belief.left)
+
+    @property
+    def phi(self) -> Array:
+        """(10N,) posterior mean of the parameters."""
+        return self.problem.prior.phi + self.problem.factor @ self.belief.mean[: self.problem.factor.shape[1]]
+
+    def white(self, rows: Array) -> Array:
+        """Return whitened ``rows`` (r, n)."""
+        return white(self.problem, self.tolerances, rows)
+
+    def less(self, named: tuple[Named, ...]) -> "Model":
+        """Return the model with the causes ``named`` taken off the target."""
+        y = self.problem.target()
+        for one in named:
+            y = y - changes(self.problem, one.effect, one.theta)
+        X, factor = self.belief.X, self.belief.factor
+        return replace(self, belief=Belief.known(X, factor, self.white(y[:, None])[:, 0]), named=named)
+
+
+def white(problem: Problem, tolerances: Tolerances, rows: Array) -> Array:
+    """Return ``rows`` (r, n) of the problem in units of their standard deviation."""
+    body = problem.cases[0].body
+    keys = tuple(f"marker {kind_of(body.segments[s])}" for s in body.markers.segment for _ in range(3))
+    return whitened(rows, problem.spectrum.band, keys, float(body.sip.mass.sum()), tolerances)
+
+
+def model(problem: Problem, causes: tuple[Candidate, ...], tolerances: Tolerances) -> Model:
+    """Return the model without any named cause; single parameters of ``causes`` with a learned size are tolerances."""
+    kinematic = problem.kinematics * np.array([tolerances.size(group) for group in problem.groups])
+    installed = [
+        one.basis[:, 0] * (tolerances.size(key_of(*one.names)) / (SCALE * one.effect.typical[0]))
+        for one in causes
+        if one.effect.typical.size == 1 and tolerances.size(key_of(*one.names)) > 0
+    ]
+    X = np.concatenate([problem.sip, kinematic, np.array(installed).reshape(-1, len(problem.sip)).T], axis=1)
+    both = white(problem, tolerances, np.concatenate([X, problem.target()[:, None]], axis=1))
+    return Model(problem, tolerances, believe(both[:, :-1], both[:, -1]))

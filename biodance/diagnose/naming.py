@@ -1,0 +1,181 @@
+"""Name the causes one after the other: screen all, refine the best, take the most probable off, rebuild what depends on it, look again."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from biodance.diagnose.candidates import SCALE, Candidate, candidates, slopes
+from biodance.diagnose.diagnosis import Alias
+from biodance.diagnose.evidence import evidence
+from biodance.diagnose.model import Model, Named, model
+from biodance.diagnose.problem import Problem
+from biodance.diagnose.tolerances import Tolerances
+from biodance.records import Array
+
+ROUNDS = 3
+"""Causes named at most."""
+REFINED = 6
+"""Causes of the screening that are fitted with all their curvature."""
+NEAR = 12.0
+"""Natural logarithm: causes this far behind the best one of the screening are refined."""
+TOGETHER = 3.0
+"""Natural logarithm: causes that are at most this much less probable than the best one are in its set."""
+STEPS = 5
+"""Gauss-Newton steps at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Suspect:
+    """One cause in one round: its ``score`` is the log Bayes factor less the logarithm of its number of targets; ``start`` (p,) parameters;
+    ``visible`` share.
+    """
+
+    cause: Candidate
+    log_bayes_factor: float
+    score: float
+    start: Array
+    visible: float
+
+    @property
+    def alias(self) -> Alias:
+        """The cause with its evidence."""
+        return Alias(*self.cause.names, self.log_bayes_factor)
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """What one round found: the ``suspects``, most probable first; those of the first cannot be told from it are its ``set``."""
+
+    suspects: tuple[Suspect, ...]
+
+    @property
+    def set(self) -> tuple[Alias, ...]:
+        """The most probable cause and those that are nearly as probable."""
+        best = self.suspects[0].score
+        return tuple(one.alias for one in self.suspects if best - one.score <= TOGETHER)
+
+
+@dataclass(frozen=True, eq=False)
+class Naming:
+    """All rounds; ``found`` the last model, with the named causes; ``first`` the model before any; ``accepted`` a round per named cause."""
+
+    first: Model
+    found: Model
+    accepted: tuple[Round, ...]
+    screening: Round
+    causes: tuple[Candidate, ...]
+
+
+def name_causes(problem: Problem, tolerances: Tolerances, chosen: Iterable[str] | None = None) -> Naming:
+    """Return the causes that the session shows, at most `ROUNDS`; ``chosen`` limits the family to some effects by name."""
+    causes = candidates(problem, chosen)
+    first = found = model(problem, causes, tolerances)
+    screening = Round(screen(found, causes))
+    accepted: list[Round] = []
+    ranking = screening
+    for _ in range(ROUNDS):
+        if not ranking.suspects or ranking.suspects[0].score < tolerances.threshold:
+            break
+        ranking, settled = refine(found, ranking)
+        if ranking.suspects[0].score < tolerances.threshold:
+            break
+        accepted.append(ranking)
+        rebuilt = settled.problem.with_parameters(settled.phi)
+        causes = candidates(rebuilt, chosen)
+        found = settle(model(rebuilt, causes, tolerances), settled.named)
+        ranking = Round(tuple(one for one in screen(found, causes) if one.cause.names not in {named_of(n) for n in found.named}))
+    return Naming(first, found, tuple(accepted), screening, causes)
+
+
+def named_of(one: Named) -> tuple[str, str]:
+    """Return effect and target of a named cause."""
+    return one.effect.name, one.effect.target
+
+
+def screen(found: Model, causes: tuple[Candidate, ...]) -> tuple[Suspect, ...]:
+    """Return all causes with their evidence, most probable first."""
+    widths = [one.basis.shape[1] for one in causes]
+    named = taken(found)
+    Z = found.white(np.concatenate([one.basis for one in causes], axis=1))
+    s, G = found.belief.score(Z)
+    if named.shape[1]:
+        G = G - _shared(found, named, Z)
+    targets = {name: sum(1 for one in causes if one.names[0] == name) for name, _ in (c.names for c in causes)}
+    suspects, start = [], 0
+    for one, width in zip(causes, widths, strict=True):
+        cut = slice(start, start + width)
+        start += width
+        here = evidence(s[cut], G[cut, cut], float(np.sum(Z[:, cut] ** 2)))
+        score = here.log_bayes_factor - float(np.log(targets[one.names[0]]))
+        suspects.append(Suspect(one, here.log_bayes_factor, score, one.start(here.mean), here.visible))
+    return tuple(sorted(suspects, key=lambda suspect: -suspect.score))
+
+
+def taken(found: Model) -> Array:
+    """Return the whitened columns (r, k) of the named causes, per standard deviation of a fault."""
+    parts = [slopes(found.problem, one.effect, one.theta) * SCALE * one.effect.typical for one in found.named]
+    return found.white(np.concatenate(parts, axis=1)) if parts else np.empty((found.belief.y.size, 0))
+
+
+def _shared(found: Model, named: Array, Z: Array) -> Array:
+    """Return (k, k): what of the information of ``Z`` (r, k) the sizes of the named causes may still absorb."""
+    both = np.concatenate([named, Z], axis=1)
+    _, G = found.belief.score(both)
+    n = named.shape[1]
+    return np.asarray(G[n:, :n] @ np.linalg.solve(np.eye(n) + G[:n, :n], G[:n, n:]))
+
+
+def refine(found: Model, ranking: Round) -> tuple[Round, Model]:
+    """Return the ranking with its first causes fitted with all their curvature, and the model with the most probable one named."""
+    best = ranking.suspects[0].score
+    near = [one for one in ranking.suspects[:REFINED] if best - one.score <= max(NEAR, 0.5 * best)]
+    refined = []
+    before = found.log_likelihood - _penalty(found)
+    for one in near:
+        start = Named(one.cause.effect, one.start, np.empty((0, 0)))
+        settled = settle(found, (*found.named, start))
+        gain = settled.log_likelihood - _penalty(settled) - before
+        bayes = gain if settled.named[-1].effect.possible(settled.named[-1].theta) else -np.inf
+        refined.append((replace(one, log_bayes_factor=bayes, score=bayes + one.score - one.log_bayes_factor), settled))
+    refined.sort(key=lambda pair: -pair[0].score)
+    rest = ranking.suspects[len(near) :]
+    return Round((*(one for one, _ in refined), *rest)), refined[0][1]
+
+
+def settle(found: Model, named: tuple[Named, ...]) -> Model:
+    """Return the model with the parameters of all ``named`` causes at their most probable values, by Gauss-Newton steps."""
+    current = found.less(named)
+    for _ in range(STEPS):
+        if not named:
+            return current
+        Z = taken(current)
+        s, G = current.belief.score(Z)
+        u = np.concatenate([one.theta / (SCALE * one.effect.typical) for one in named])
+        inner = np.linalg.inv(np.eye(len(s)) + G)
+        step = inner @ (s - u)
+        named, start = _moved(named, u + step, inner)
+        current = current.less(named)
+        if np.abs(step).max() < 1e-3:
+            break
+    return current
+
+
+def _moved(named: tuple[Named, ...], u: Array, inner: Array) -> tuple[tuple[Named, ...], int]:
+    """Return the causes with new parameters ``u`` (in standard deviations of a fault) and their covariances."""
+    out, start = [], 0
+    for one in named:
+        width = one.effect.typical.size
+        cut, scale = slice(start, start + width), SCALE * one.effect.typical
+        out.append(Named(one.effect, scale * u[cut], inner[cut, cut] * np.outer(scale, scale)))
+        start += width
+    return tuple(out), start
+
+
+def _penalty(found: Model) -> float:
+    """Return what the parameters of the named causes cost: their prior, and the volume that the data leave of it (Laplace)."""
+    if not found.named:
+        return 0.0
+    _, G = found.belief.score(taken(found))
+    u = np.concatenate([one.theta / (SCALE * one.effect.typical) for one in found.named])
+    return 0.5 * float(u @ u) + 0.5 * float(np.linalg.slogdet(np.eye(len(u)) + G)[1])
