@@ -19,6 +19,8 @@
 
     [weights]                    emphasis of segments, on top of their masses
     trunk_head = 2.0
+
+Only [postures] is needed; everything else has the value of the paper or none.
 """
 
 import math
