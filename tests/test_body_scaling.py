@@ -7,12 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from biodance.body.body import Body
 from biodance.body.human import human
 from biodance.body.inertia import smallest_eigenvalues
 from biodance.body.joint_centres import chord, davis_hip, elbow, harrington_hip, pelvis_frame, shoulder, unit, wrist
 from biodance.body.measures import Measures
-from biodance.body.scaling import chain_angles, scale_with_posture, standing_tilt
-from biodance.body.static_frames import arm_centres, turn
+from biodance.body.scaling import chain_angles, measure
+from biodance.body.static_centres import arm_centres
+from biodance.body.static_frames import turn
+from biodance.body.tracking_limits import standing_tilt
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.lab.prepare import prepare
 from biodance.lab.raw_c3d import read_raw
@@ -40,16 +43,21 @@ def standing_trial(*, drop: tuple[str, ...] = (), measurements: dict[str, float]
     return Trial("static", "static", markers, (), Source(Path("static.c3d"), "", "test", 100.0), "plug_in_gait", measurements or {})
 
 
+def scaled(subject: Subject, static: Trial) -> tuple[Body, np.ndarray]:
+    """Return the body and its standing posture."""
+    return measure(subject, static).body()
+
+
 def test_the_body_stands_exactly_under_its_markers() -> None:
     trial = standing_trial()
-    body, q = scale_with_posture(SUBJECT, trial)
+    body, q = scaled(SUBJECT, trial)
     found = poses(body, q[None]).points(body.markers.segment, body.markers.position)[0]
     expected = np.stack([trial.markers[name][0] for name in body.markers.names])
     np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
 def test_the_generic_person_is_found_again() -> None:
-    body, _ = scale_with_posture(SUBJECT, standing_trial())
+    body, _ = scaled(SUBJECT, standing_trial())
     generic = human(SUBJECT)
     for name in ("right_knee_flexion", "left_knee_flexion", "right_ankle_dorsiflexion", "right_elbow_flexion"):
         i = body.joint_index(name)
@@ -60,32 +68,32 @@ def test_the_generic_person_is_found_again() -> None:
 
 @pytest.mark.parametrize("drop", [("LUPA", "RUPA", "LFRM", "RFRM"), ("LFHD", "RFHD", "LBHD", "RBHD", "RBAK"), ("T10", "STRN")])
 def test_fewer_markers_still_make_a_body(drop: tuple[str, ...]) -> None:
-    body, _ = scale_with_posture(SUBJECT, standing_trial(drop=drop))
+    body, _ = scaled(SUBJECT, standing_trial(drop=drop))
     assert not set(drop) & set(body.markers.names)
 
 
 def test_missing_landmarks_are_named() -> None:
     with pytest.raises(TrialRefused, match=r"knee|KNE"):
-        scale_with_posture(SUBJECT, standing_trial(drop=("RKNE",)))
+        scaled(SUBJECT, standing_trial(drop=("RKNE",)))
 
 
 def test_unknown_labels_no_markers_and_unknown_mass_are_refused() -> None:
     trial = standing_trial()
     with pytest.raises(TrialRefused, match="no known marker set"):
-        scale_with_posture(SUBJECT, replace(trial, marker_set=""))
+        scaled(SUBJECT, replace(trial, marker_set=""))
     with pytest.raises(TrialRefused, match="no markers"):
-        scale_with_posture(SUBJECT, replace(trial, markers=None))
+        scaled(SUBJECT, replace(trial, markers=None))
     with pytest.raises(SessionRefused, match="mass_kg"):
-        scale_with_posture(replace(SUBJECT, mass=float("nan")), trial)
+        scaled(replace(SUBJECT, mass=float("nan")), trial)
 
 
 def test_a_thigh_marker_that_was_not_placed_for_the_set_is_not_believed() -> None:
     trial = standing_trial()
-    right, _ = scale_with_posture(SUBJECT, trial)
+    right, _ = scaled(SUBJECT, trial)
     names, xyz = trial.markers.names, trial.markers.xyz.copy()
     knee_marker, height = xyz[0, names.index("RKNE")], xyz[0, names.index("RTHI"), 2]
     xyz[:, names.index("RTHI")] = [knee_marker[0] + 0.1, knee_marker[1] + 0.06, height]  # in front of the thigh instead of beside it
-    wrong, _ = scale_with_posture(SUBJECT, replace(trial, markers=Markers(names, trial.markers.time, xyz)))
+    wrong, _ = scaled(SUBJECT, replace(trial, markers=Markers(names, trial.markers.time, xyz)))
     assert any("right thigh marker would turn the knee's axis" in note and note.startswith("Warning") for note in wrong.notes)
     assert not any("thigh marker would turn" in note for note in right.notes)
     knee = right.joint_index("right_knee_flexion")
@@ -126,8 +134,8 @@ def test_ranges_of_hip_and_trunk_follow_the_tilt_of_the_pelvis_markers() -> None
     names, xyz = trial.markers.names, trial.markers.xyz.copy()
     for label in ("LPSI", "RPSI"):
         xyz[:, names.index(label), 2] += 0.05
-    upright, _ = scale_with_posture(SUBJECT, trial)
-    tilted, q = scale_with_posture(SUBJECT, replace(trial, markers=Markers(names, trial.markers.time, xyz)))
+    upright, _ = scaled(SUBJECT, trial)
+    tilted, q = scaled(SUBJECT, replace(trial, markers=Markers(names, trial.markers.time, xyz)))
     tilt = standing_tilt(q)
     assert np.degrees(tilt) == pytest.approx(np.degrees(np.arcsin(0.05 / np.hypot(0.05, 0.1878))), abs=0.5)
     hip, trunk = tilted.joint_index("right_hip_flexion"), tilted.joint_index("trunk_flexion")
@@ -137,7 +145,7 @@ def test_ranges_of_hip_and_trunk_follow_the_tilt_of_the_pelvis_markers() -> None
 
 def test_a_typed_width_that_contradicts_the_markers_is_warned_about() -> None:
     true = 2 * 0.5 * 0.13 * 1.75
-    body, _ = scale_with_posture(SUBJECT, standing_trial(measurements={"InterAsisDistance": true - 0.08}))
+    body, _ = scaled(SUBJECT, standing_trial(measurements={"InterAsisDistance": true - 0.08}))
     assert any("InterAsisDistance" in note and note.startswith("Warning") for note in body.notes)
 
 
@@ -146,7 +154,7 @@ def test_hidden_frames_of_the_static_do_no_harm() -> None:
     xyz = trial.markers.xyz.copy()
     xyz[10:40, 3] = np.nan
     hidden = replace(trial, markers=Markers(trial.markers.names, trial.markers.time, xyz))
-    a, b = scale_with_posture(SUBJECT, trial)[0], scale_with_posture(SUBJECT, hidden)[0]
+    a, b = scaled(SUBJECT, trial)[0], scaled(SUBJECT, hidden)[0]
     np.testing.assert_allclose(a.markers.position, b.markers.position, atol=1e-9)
 
 
@@ -221,7 +229,7 @@ def test_knee_ankle_shoulder_elbow_and_wrist_are_vicons_own(folder: str) -> None
 def test_real_people_are_scaled_and_stand_under_their_markers(folder: str) -> None:
     session = read_session(Path(str(DATA)) / folder)
     (static,) = session.of_role("static")
-    body, q = scale_with_posture(session.subject, prepare(static))
+    body, q = scaled(session.subject, prepare(static))
     found = poses(body, q[None]).points(body.markers.segment, body.markers.position)[0]
     measured = np.stack([np.nanmedian(prepare(static).markers[name], axis=0) for name in body.markers.names])
     assert np.median(np.linalg.norm(found - measured, axis=1)) < 0.003

@@ -6,6 +6,8 @@ the scale (their sum is the body mass within ``scale_sd``). The covariance of ph
 that covariance times the Jacobian's transpose: positive semi-definite by construction.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from biodance.body.inertia import TENSOR, Lump, mirrored, parameters, turned
@@ -32,7 +34,8 @@ def prior(reference: Reference, skeleton: Skeleton, subject: Subject) -> Sip:
 def scaled_lumps(reference: Reference, skeleton: Skeleton, subject: Subject) -> tuple[Lump, ...]:
     """Return the 12 segments of the reference person at the subject's mass and segment lengths, each in its segment frame.
 
-    The pelvis of the table is upright; it is turned so that its long axis points from the mid hip to the trunk joint.
+    The pelvis of the table is upright; it is turned so that its long axis points from the mid hip to where the table cuts the trunk. The
+    trunk above the cut keeps its place in the person, also where the joint lies elsewhere.
     """
     lumps = []
     for segment in SEGMENTS:
@@ -41,7 +44,9 @@ def scaled_lumps(reference: Reference, skeleton: Skeleton, subject: Subject) -> 
         scale, mass = skeleton.lengths[segment] / reference.lengths[kind], unit.mass * subject.mass
         lump = Lump(mass, scale * unit.com, mass * scale**2 * unit.inertia)
         if segment == "pelvis":
-            lump = turned(lump, _upright_to(skeleton.origins["trunk"]))
+            lump = turned(lump, _upright_to(skeleton.cut.get("pelvis", skeleton.origins["trunk"])))
+        if segment == "trunk_head":
+            lump = replace(lump, com=lump.com + skeleton.cut.get("trunk_head", np.zeros(3)))
         lumps.append(lump if side_of(segment) > 0 else mirrored(lump))
     return tuple(lumps)
 

@@ -4,30 +4,24 @@ The static posture is reached exactly by the body: whatever the joints cannot do
 carrying angle) becomes a constant tilt of that joint, so that in the static trial every marker and joint centre has residual zero.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from biodance.body.body import Body, Joint, JointLimits, SegmentMarkers
+from biodance.body.body import Body, Joint, SegmentMarkers
 from biodance.body.human import DEFAULT_TABLE, assemble
 from biodance.body.measures import Measures, measures
-from biodance.body.reference import Reference, proportion
+from biodance.body.reference import proportion
 from biodance.body.segment_tables import reference
 from biodance.body.skeleton import JOINTS, SEGMENTS, SIDES, Skeleton, kind_of
 from biodance.body.standing import Standing, standing
-from biodance.body.static_frames import Frames, Hip, static_frames, turn
+from biodance.body.static_centres import Centres, Hip, static_centres
+from biodance.body.static_frames import Frames, segment_frames, turn
+from biodance.body.tracking_limits import widen
 from biodance.records import Array, Subject, Trial
 
 ANKLE_HEIGHT = (0.04, 0.12)
 """m: an ankle centre so high over z = 0 of the lab is taken to stand on that floor."""
-HAND_TURN = np.radians(120.0)
-"""rad either way: the model has no pronation, so with a straight elbow a turning hand is seen as a turning shoulder; a narrower limit makes
-the arm jump to the other set of angles that reaches the same hand (seen in a real walk)."""
-LOADED_ANKLE = np.radians(40.0)
-"""rad: dorsiflexion under body weight with a bent knee, as on stairs and in squats (weight-bearing lunge, Bennell et al. 1998); the tables
-give the unloaded joint's 20 to 25 deg."""
-SPARE = np.radians(5.0)
-"""rad: how far a joint range is widened beyond the angle of the static trial."""
 TILT = {"knee": 15.0, "elbow": 25.0, "ankle": 40.0}
 """deg: larger constant tilts of a joint point to a misplaced marker."""
 LENGTH_RATIO = {
@@ -40,8 +34,33 @@ LENGTH_RATIO = {
 """of stature: the lengths that adults and children have."""
 
 
-def scale(subject: Subject, static: Trial, *, hip: Hip = "harrington", table: str = DEFAULT_TABLE) -> Body:
-    """Return the body of a subject, scaled on the static trial, with every marker calibrated in its segment.
+@dataclass(frozen=True, eq=False)
+class Scaling:
+    """All that a scaled body is made of: the standing posture, its measures, the joint centres and the ``table`` of masses. With other
+    ``centres`` (``dataclasses.replace``) it makes the body of the same person with joints elsewhere.
+    """
+
+    subject: Subject
+    table: str
+    posture: Standing
+    sizes: Measures
+    centres: Centres
+    notes: tuple[str, ...]
+
+    def body(self) -> tuple[Body, Array]:
+        """Return the scaled body and its posture q (30,) in the static trial, at which all calibrated markers are met exactly."""
+        frames = segment_frames(self.centres)
+        skeleton = static_skeleton(frames, self.posture, self.sizes, self.subject)
+        doubts = _doubts(skeleton, self.subject)
+        markers = calibrated_markers(frames, self.posture)
+        body = assemble(self.subject, skeleton, table=self.table, markers=markers, notes=(*self.notes, *doubts))
+        q = static_posture(body, frames)
+        limits, widened = widen(body, q)
+        return replace(body, limits=limits, notes=(*body.notes, *widened)), q
+
+
+def measure(subject: Subject, static: Trial, *, hip: Hip = "harrington", table: str = DEFAULT_TABLE) -> Scaling:
+    """Return what the static trial says about the body of a subject.
 
     ``hip``: "harrington" (regressions on the pelvis markers) or "davis" (plug-in gait). ``table`` gives masses, CoM, inertias and where the
     trunk joint lies between mid hip and mid shoulder. ``notes`` of the body say what was measured, assumed, contradicted and warned about.
@@ -55,24 +74,18 @@ def scale(subject: Subject, static: Trial, *, hip: Hip = "harrington", table: st
     SessionRefused
         The mass or the stature of the subject is not known.
     """
-    return scale_with_posture(subject, static, hip=hip, table=table)[0]
-
-
-def scale_with_posture(subject: Subject, static: Trial, *, hip: Hip = "harrington", table: str = DEFAULT_TABLE) -> tuple[Body, Array]:
-    """Return the scaled body and its posture q (30,) in the static trial, at which all calibrated markers are met exactly."""
     subject.require("mass", "stature")
     posture = standing(static)
     sizes = measures(posture, static, subject)
-    model = reference(table, subject)
-    fraction = model.lengths["pelvis"] / model.lengths["trunk_head"]
-    frames = static_frames(posture.landmarks, sizes, hip=hip, trunk_fraction=fraction)
-    skeleton = static_skeleton(frames, posture, sizes, subject)
-    notes = (f"Scaled on static trial {static.name}; hip centres: {hip}.", *posture.notes, *sizes.notes, *frames.notes)
-    markers = calibrated_markers(frames, posture)
-    body = assemble(subject, skeleton, table=table, markers=markers, notes=(*notes, *_doubts(skeleton, subject, model)))
-    q = static_posture(body, frames)
-    limits, widened = widen(body, q)
-    return replace(body, limits=limits, notes=(*body.notes, *widened)), q
+    lengths = reference(table, subject).lengths
+    centres = static_centres(posture.landmarks, sizes, hip=hip, trunk_fraction=lengths["pelvis"] / lengths["trunk_head"])
+    notes = (f"Scaled on static trial {static.name}; hip centres: {hip}.", *posture.notes, *sizes.notes, *centres.notes)
+    return Scaling(subject, table, posture, sizes, centres, notes)
+
+
+def scale(subject: Subject, static: Trial, *, hip: Hip = "harrington", table: str = DEFAULT_TABLE) -> Body:
+    """Return the body of a subject, scaled on the static trial alone, with every marker calibrated in its segment; see ``measure``."""
+    return measure(subject, static, hip=hip, table=table).body()[0]
 
 
 def calibrated_markers(frames: Frames, posture: Standing) -> SegmentMarkers:
@@ -92,7 +105,8 @@ def static_skeleton(frames: Frames, posture: Standing, sizes: Measures, subject:
 
     shoulders = (frames.origin["right_upper_arm"] + frames.origin["left_upper_arm"]) / 2
     origins = {"trunk": local("pelvis", frames.origin["trunk_head"])}
-    lengths = {"pelvis": float(np.linalg.norm(origins["trunk"])), "trunk_head": float(np.linalg.norm(shoulders - frames.origin["pelvis"]))}
+    cut = {segment: local(segment, frames.cut) for segment in ("pelvis", "trunk_head")}
+    lengths = {"pelvis": float(np.linalg.norm(cut["pelvis"])), "trunk_head": float(np.linalg.norm(shoulders - frames.origin["pelvis"]))}
     turns: dict[str, Array] = {}
     height: dict[str, float] = {}
     behind: dict[str, float] = {}
@@ -107,7 +121,7 @@ def static_skeleton(frames: Frames, posture: Standing, sizes: Measures, subject:
         lengths[foot], height[side], behind[side] = _foot(frames, posture, sizes, subject, side)
         for joint, pair in (("knee", (thigh, shank)), ("ankle", (shank, foot)), ("elbow", (arm, forearm))):
             turns[f"{side}_{joint}"] = _turn(frames, *pair)
-    return Skeleton(lengths, origins, height, behind, sizes.pelvis_width, subject.stature, turns)
+    return Skeleton(lengths, origins, height, behind, sizes.pelvis_width, subject.stature, turns, cut)
 
 
 def _turn(frames: Frames, parent: str, child: str) -> Array:
@@ -171,40 +185,7 @@ def chain_angles(relative: Array, axes: Array) -> Array:
     return axes.sum(axis=1) * np.array(angles)
 
 
-def widen(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:
-    """Return the limits for tracking: counted from this person's upright pelvis, the static posture ``SPARE`` inside them, the shoulder
-    turning as far as the hand does, the ankle bending as far as under load. The notes name what was changed.
-
-    Clinical ranges of hip and trunk count from upright standing, ISB angles from the plane of the pelvis markers, which stands tilted.
-    """
-    angle, limits = q[body.nq - len(body.joints) :], body.limits
-    tilt = standing_tilt(q)
-    shift = np.array([tilt * (joint.name.endswith("_hip_flexion") - float(joint.name == "trunk_flexion")) for joint in body.joints])
-    limits = replace(limits, lower=limits.lower + np.minimum(shift, 0.0), upper=limits.upper + np.maximum(shift, 0.0))
-    turning, ankle = (
-        np.array([joint.name.endswith(end) for joint in body.joints]) for end in ("_shoulder_rotation", "_ankle_dorsiflexion")
-    )
-    loaded = np.where(ankle, np.maximum(limits.upper, LOADED_ANKLE), limits.upper)
-    limits = replace(limits, lower=np.where(turning, -HAND_TURN, limits.lower), upper=np.where(turning, HAND_TURN, loaded))
-    lower, upper = np.minimum(limits.lower, angle - SPARE), np.maximum(limits.upper, angle + SPARE)
-    notes = tuple(
-        f"Range of {joint.name} widened to {np.degrees(lower[i]):.0f} .. {np.degrees(upper[i]):.0f} deg: "
-        f"{np.degrees(angle[i]):.0f} deg when standing."
-        for i, joint in enumerate(body.joints)
-        if lower[i] < limits.lower[i] or upper[i] > limits.upper[i]
-    )
-    tilted = f"Pelvis markers stand tilted {np.degrees(tilt):.0f} deg forwards: ranges of hip and trunk flexion are widened by as much."
-    return replace(limits, lower=lower, upper=upper), (tilted, *notes)
-
-
-def standing_tilt(q: Array) -> float:
-    """Return the forward tilt, rad, of the pelvis in a posture q: how far its x axis points below the horizontal."""
-    from scipy.spatial.transform import Rotation
-
-    return -float(np.arcsin(Rotation.from_quat(q[3:7]).as_matrix()[2, 0]))
-
-
-def _doubts(skeleton: Skeleton, subject: Subject, model: Reference) -> list[str]:
+def _doubts(skeleton: Skeleton, subject: Subject) -> list[str]:
     """Return warnings about lengths, sides and tilts that no person has."""
     notes = []
     for segment in SEGMENTS:

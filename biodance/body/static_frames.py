@@ -1,68 +1,49 @@
-"""Joint centres and segment frames of a standing person from landmarks and measures."""
+"""Segment frames of a standing person from the joint centres."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
-from biodance.body.joint_centres import chord, davis_hip, elbow, harrington_hip, pelvis_frame, shoulder, unit, wrist
-from biodance.body.measures import Measures
+from biodance.body.joint_centres import unit
+from biodance.body.static_centres import SIGN, UP, Centres, Places
 from biodance.records import Array
-
-Hip = Literal["harrington", "davis"]
-SIGN = {"right": 1.0, "left": -1.0}
-UP = np.array([0.0, 0.0, 1.0])
-WRIST_BAR = 0.03
-"""m: wrist markers this much farther apart than markers on the styloids would be sit on a bar."""
-AXIS_TOLERANCE = 30.0
-"""deg: a thigh marker that turns the knee's axis further, seen from above, is not believed."""
-Places = Mapping[str, Array]
 
 
 @dataclass(frozen=True, eq=False)
 class Frames:
     """Segment frames in the lab: ``rotation`` segment -> (3, 3) lab_R_segment, ``origin`` segment -> (3,) m (the proximal joint centre);
-    ``ends`` side_wrist -> (3,) m; ``notes`` what was assumed.
+    ``ends`` side_wrist -> (3,) m; ``cut`` (3,) m where the table cuts pelvis from trunk.
     """
 
     rotation: Places
     origin: Places
     ends: Places
-    notes: tuple[str, ...]
+    cut: Array
 
 
-def static_frames(place: Places, sizes: Measures, *, hip: Hip, trunk_fraction: float) -> Frames:
+def segment_frames(centres: Centres) -> Frames:
     """Return the 12 segment frames.
 
-    Pelvis: ISB axes, origin in the middle of the hip centres. Trunk joint: on the line from mid hip to mid shoulder, at
-    ``trunk_fraction`` of it; trunk_head: y along that line. Thigh, upper arm: y to the proximal joint, z in the plane of the flexion
-    axis. Shank, forearm: y to the proximal joint, flexed about the parent's z and tilted by a constant varus. Foot: flat on the ground, x
-    from heel to toe.
+    Pelvis: ISB axes, origin in the middle of the hip centres. trunk_head: y along the line from mid hip to mid shoulder. Thigh, upper
+    arm: y to the proximal joint, z in the plane of the flexion axis. Shank, forearm: y to the proximal joint, flexed about the parent's
+    z and tilted by a constant varus. Foot: flat on the ground, x from heel to toe.
     """
-    rotation: dict[str, Array] = {}
-    origin: dict[str, Array] = {}
-    ends: dict[str, Array] = {}
-    rotation["pelvis"], hips = hip_centres(place, sizes, hip=hip)
-    origin["pelvis"] = (hips["right"] + hips["left"]) / 2
-    shoulders = shoulder_centres(place, sizes, origin["pelvis"])
-    axis = (shoulders["right"] + shoulders["left"]) / 2 - origin["pelvis"]
-    origin["trunk_head"] = origin["pelvis"] + trunk_fraction * axis
-    rotation["trunk_head"] = frame_yz(axis, shoulders["right"] - shoulders["left"])
-    notes: list[str] = []
+    at = centres.place
+    hips, shoulders = ((at[f"right_{joint}"] + at[f"left_{joint}"]) / 2 for joint in ("hip", "shoulder"))
+    axis = shoulders - hips
+    rotation = {"pelvis": centres.pelvis, "trunk_head": frame_yz(axis, at["right_shoulder"] - at["left_shoulder"])}
+    origin = {"pelvis": hips, "trunk_head": at["trunk"]}
     for side in SIGN:
-        knee, note = knee_centre(place, sizes, hips[side], rotation["pelvis"][:, 2], side)
-        notes += [note] if note else []
-        ankle = ankle_centre(place, sizes, knee, side)
-        outwards = SIGN[side] * (place[f"{side}_knee_lateral"] - knee)
-        _chain(rotation, origin, (f"{side}_thigh", f"{side}_shank"), (hips[side], knee, ankle), outwards)
-        origin[f"{side}_foot"] = ankle
-        rotation[f"{side}_foot"] = frame_yz(UP, np.cross(place[f"{side}_toe"] - place[f"{side}_heel"], UP))
-        elbow_at, wrist_at = arm_centres(place, sizes, shoulders[side], side)
-        outwards = SIGN[side] * (place[f"{side}_elbow_lateral"] - elbow_at)
-        _chain(rotation, origin, (f"{side}_upper_arm", f"{side}_forearm_hand"), (shoulders[side], elbow_at, wrist_at), outwards)
-        ends[f"{side}_wrist"] = wrist_at
-    return Frames(rotation, origin, ends, tuple(notes))
+        for names, joints in (
+            (("thigh", "shank"), ("hip", "knee", "ankle")),
+            (("upper_arm", "forearm_hand"), ("shoulder", "elbow", "wrist")),
+        ):
+            limb = (f"{side}_{names[0]}", f"{side}_{names[1]}")
+            _chain(rotation, origin, limb, tuple(at[f"{side}_{joint}"] for joint in joints), centres.right[f"{side}_{joints[1]}"])
+        origin[f"{side}_foot"] = at[f"{side}_ankle"]
+        rotation[f"{side}_foot"] = frame_yz(UP, centres.across[side])
+    ends = {f"{side}_wrist": at[f"{side}_wrist"] for side in SIGN}
+    return Frames(rotation, origin, ends, hips + centres.cut * axis)
 
 
 def frame_yz(up: Array, right: Array) -> Array:
@@ -88,88 +69,3 @@ def turn(axis: int, angle: float) -> Array:
     out[i, i] = out[j, j] = np.cos(angle)
     out[j, i], out[i, j] = np.sin(angle), -np.sin(angle)
     return out
-
-
-def hip_centres(place: Places, sizes: Measures, *, hip: Hip) -> tuple[Array, dict[str, Array]]:
-    """Return lab_R_pelvis (3, 3) and the hip centres by side, m."""
-    rotation, middle = pelvis_frame(place["right_asis"], place["left_asis"], place["mid_psis"])
-    legs = float(np.mean(list(sizes.leg_length.values())))
-    centres = {}
-    for side, sign in SIGN.items():
-        local = (
-            harrington_hip(sizes.pelvis_width, sizes.pelvis_depth)
-            if hip == "harrington"
-            else davis_hip(sizes.pelvis_width, legs, sizes.asis_to_trochanter[side], sizes.marker_radius)
-        )
-        centres[side] = middle + rotation @ (local * [1.0, 1.0, sign])
-    return rotation, centres
-
-
-def shoulder_centres(place: Places, sizes: Measures, mid_hip: Array) -> dict[str, Array]:
-    """Return the shoulder centres by side, m: chord from the jugular notch, or straight under the acromion where that has no marker."""
-    right, left = place["right_acromion"], place["left_acromion"]
-    if all(name in place for name in ("c7", "t10", "jugular_notch", "xiphoid")):
-        up = (place["c7"] + place["jugular_notch"]) - (place["t10"] + place["xiphoid"])
-        ahead = (place["jugular_notch"] + place["xiphoid"]) - (place["c7"] + place["t10"])
-        forward = unit(np.cross(np.cross(up, ahead), up))
-    else:
-        up = (right + left) / 2 - mid_hip
-        forward = unit(np.cross(up, right - left))
-    offset = {side: sizes.shoulder_offset[side] + sizes.marker_radius for side in SIGN}
-    if "jugular_notch" not in place:
-        return {side: place[f"{side}_acromion"] - offset[side] * unit(up) for side in SIGN}
-    base = place["jugular_notch"] - sizes.marker_radius * forward
-    return {side: shoulder(base, forward, place[f"{side}_acromion"], offset[side], side=SIGN[side]) for side in SIGN}
-
-
-def knee_centre(place: Places, sizes: Measures, hip: Array, pelvis_right: Array, side: str) -> tuple[Array, str]:
-    """Return the knee centre, m, and what had to be assumed: the middle of the epicondyles, or a chord with the thigh marker.
-
-    A thigh marker that would turn the knee's axis further than ``AXIS_TOLERANCE`` from square to the line of march (mean of pelvis and
-    foot) was not placed for plug-in gait: the axis is then taken square to that line.
-    """
-    lateral = place[f"{side}_knee_lateral"]
-    if f"{side}_knee_medial" in place:
-        return (lateral + place[f"{side}_knee_medial"]) / 2, ""
-    distance = sizes.widths[f"{side}_knee"] / 2 + sizes.marker_radius
-    foot_right = unit(np.cross(place[f"{side}_toe"] - place[f"{side}_heel"], UP))
-    across = unit(pelvis_right + foot_right)
-    usual = chord(hip, lateral, distance, lateral + 0.1 * SIGN[side] * across)
-    if f"{side}_thigh_wand" not in place:
-        return usual, f"{side.capitalize()} knee: no medial or thigh marker, axis taken square to the line of march."
-    centre = chord(hip, lateral, distance, place[f"{side}_thigh_wand"])
-    axis = SIGN[side] * (lateral - centre)
-    angle = float(np.degrees(np.arctan2(UP @ np.cross(across, axis), across @ axis - (across @ UP) * (axis @ UP))))
-    if abs(angle) <= AXIS_TOLERANCE:
-        return centre, ""
-    return usual, (
-        f"Warning: the {side} thigh marker would turn the knee's axis {abs(angle):.0f} deg from square to the line of march, "
-        "so the axis is taken as square. Place the marker in the frontal plane of the thigh, or add a medial knee marker."
-    )
-
-
-def ankle_centre(place: Places, sizes: Measures, knee: Array, side: str) -> Array:
-    """Return the ankle centre, m: middle of the malleoli, or chord with the shank marker, or with the knee's axis without either."""
-    lateral = place[f"{side}_ankle_lateral"]
-    if f"{side}_ankle_medial" in place:
-        return np.asarray((lateral + place[f"{side}_ankle_medial"]) / 2)
-    outside = place.get(f"{side}_shank_wand", lateral + place[f"{side}_knee_lateral"] - knee)
-    return chord(knee, lateral, sizes.widths[f"{side}_ankle"] / 2 + sizes.marker_radius, outside)
-
-
-def arm_centres(place: Places, sizes: Measures, shoulder_at: Array, side: str) -> tuple[Array, Array]:
-    """Return elbow and wrist centre, m: the elbow in the middle of its epicondyle markers, or by the plug-in-gait construction.
-
-    The wrist is the middle of its two markers, unless they are so much farther apart than the wrist is wide that they sit on a bar behind
-    it; then the plug-in-gait construction. (Mean plug-in-gait static of 9 adults: with a bar, the finger marker would be 5 cm behind the
-    hand; with markers on the styloids, 2 cm, as thick as a hand is.)
-    """
-    lateral, radial, ulnar = (place[f"{side}_{name}"] for name in ("elbow_lateral", "wrist_radial", "wrist_ulnar"))
-    middle = (radial + ulnar) / 2
-    if f"{side}_elbow_medial" in place:
-        return (lateral + place[f"{side}_elbow_medial"]) / 2, middle
-    at = elbow(shoulder_at, lateral, middle, sizes.widths[f"{side}_elbow"] / 2 + sizes.marker_radius, side=SIGN[side])
-    reach = sizes.widths[f"{side}_wrist"] / 2 + sizes.marker_radius
-    if np.linalg.norm(radial - ulnar) < 2 * reach + WRIST_BAR:
-        return at, middle
-    return at, wrist(at, radial, ulnar, reach, side=SIGN[side])

@@ -1,0 +1,160 @@
+"""Joint centres of a standing person from landmarks and measures: the answer of the static trial alone."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from biodance.body.joint_centres import chord, davis_hip, elbow, harrington_hip, pelvis_frame, shoulder, unit, wrist
+from biodance.body.measures import Measures
+from biodance.records import Array
+
+Hip = Literal["harrington", "davis"]
+SIGN = {"right": 1.0, "left": -1.0}
+UP = np.array([0.0, 0.0, 1.0])
+WRIST_BAR = 0.03
+"""m: wrist markers this much farther apart than markers on the styloids would be sit on a bar."""
+AXIS_TOLERANCE = 30.0
+"""deg: a thigh marker that turns the knee's axis further, seen from above, is not believed."""
+MEDIAL_SD = {"knee": 0.10, "elbow": 0.15}
+"""rad: how far an axis between lateral and medial marker may be turned about the bone (palpation of the epicondyles: 5 to 6 degrees at the
+femur, Della Croce 1999, DOI 10.1007/BF02513272; the humerus is shorter across)."""
+WAND_SD, MARCH_SD = 0.12, 0.25
+"""rad: the same for a knee axis from a thigh marker, and for one that was taken square to the line of march."""
+STRAIGHT_ARM_SD = 0.8
+"""rad: the same for an elbow without medial marker: its axis is square to a plane that a hanging arm hardly defines (40 to 65 degrees off
+on virtual persons)."""
+Places = Mapping[str, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Centres:
+    """Where the joints of a standing person are, lab frame.
+
+    ``place`` joint -> (3,) m: hips, knees, ankles, trunk, shoulders, elbows, and the wrists, where the forearms end. ``right`` of knees and
+    elbows -> (3,) m, along the flexion axis to the person's right; ``axis_sd`` -> rad, how far that axis may be turned about the bone;
+    ``lateral`` -> (3,) m, the lateral marker. ``pelvis`` (3, 3) lab_R_pelvis; ``across`` side -> (3,) m, horizontal, to the right of the
+    foot; ``cut``: at which fraction of the way from mid hip to mid shoulder the table cuts pelvis from trunk; ``notes`` what was assumed.
+    """
+
+    place: Places
+    right: Places
+    axis_sd: Mapping[str, float]
+    lateral: Places
+    pelvis: Array
+    across: Places
+    cut: float
+    notes: tuple[str, ...]
+
+
+def static_centres(mark: Places, sizes: Measures, *, hip: Hip, trunk_fraction: float) -> Centres:
+    """Return the joint centres from the landmarks ``mark`` name -> (3,) m.
+
+    Hip: regressions. Knee, ankle, elbow: middle of lateral and medial marker, or the constructions of plug-in gait. Trunk: on the line from
+    mid hip to mid shoulder, at ``trunk_fraction`` of it, where the table cuts the trunk.
+    """
+    pelvis, hips = hip_centres(mark, sizes, hip=hip)
+    middle = (hips["right"] + hips["left"]) / 2
+    shoulders = shoulder_centres(mark, sizes, middle)
+    place = {"trunk": middle + trunk_fraction * ((shoulders["right"] + shoulders["left"]) / 2 - middle)}
+    right, axis_sd, lateral, across = {}, {}, {}, {}
+    notes: list[str] = []
+    for side, sign in SIGN.items():
+        knee, note = knee_centre(mark, sizes, hips[side], pelvis[:, 2], side)
+        notes += [note] if note else []
+        place |= {f"{side}_hip": hips[side], f"{side}_knee": knee, f"{side}_ankle": ankle_centre(mark, sizes, knee, side)}
+        place[f"{side}_shoulder"] = shoulders[side]
+        place[f"{side}_elbow"], place[f"{side}_wrist"] = arm_centres(mark, sizes, shoulders[side], side)
+        for joint, otherwise in (("knee", MARCH_SD if note else WAND_SD), ("elbow", STRAIGHT_ARM_SD)):
+            name = f"{side}_{joint}"
+            lateral[name] = mark[f"{name}_lateral"]
+            right[name] = sign * (lateral[name] - place[name])
+            axis_sd[name] = MEDIAL_SD[joint] if f"{name}_medial" in mark else otherwise
+        across[side] = np.cross(mark[f"{side}_toe"] - mark[f"{side}_heel"], UP)
+    return Centres(place, right, axis_sd, lateral, pelvis, across, trunk_fraction, tuple(notes))
+
+
+def hip_centres(place: Places, sizes: Measures, *, hip: Hip) -> tuple[Array, dict[str, Array]]:
+    """Return lab_R_pelvis (3, 3) and the hip centres by side, m."""
+    rotation, middle = pelvis_frame(place["right_asis"], place["left_asis"], place["mid_psis"])
+    legs = float(np.mean(list(sizes.leg_length.values())))
+    centres = {}
+    for side, sign in SIGN.items():
+        local = (
+            harrington_hip(sizes.pelvis_width, sizes.pelvis_depth)
+            if hip == "harrington"
+            else davis_hip(sizes.pelvis_width, legs, sizes.asis_to_trochanter[side], sizes.marker_radius)
+        )
+        centres[side] = middle + rotation @ (local * [1.0, 1.0, sign])
+    return rotation, centres
+
+
+def shoulder_centres(place: Places, sizes: Measures, mid_hip: Array) -> dict[str, Array]:
+    """Return the shoulder centres by side, m: chord from the jugular notch, or straight under the acromion where that has no marker."""
+    right, left = place["right_acromion"], place["left_acromion"]
+    if all(name in place for name in ("c7", "t10", "jugular_notch", "xiphoid")):
+        up = (place["c7"] + place["jugular_notch"]) - (place["t10"] + place["xiphoid"])
+        ahead = (place["jugular_notch"] + place["xiphoid"]) - (place["c7"] + place["t10"])
+        forward = unit(np.cross(np.cross(up, ahead), up))
+    else:
+        up = (right + left) / 2 - mid_hip
+        forward = unit(np.cross(up, right - left))
+    offset = {side: sizes.shoulder_offset[side] + sizes.marker_radius for side in SIGN}
+    if "jugular_notch" not in place:
+        return {side: place[f"{side}_acromion"] - offset[side] * unit(up) for side in SIGN}
+    base = place["jugular_notch"] - sizes.marker_radius * forward
+    return {side: shoulder(base, forward, place[f"{side}_acromion"], offset[side], side=SIGN[side]) for side in SIGN}
+
+
+def knee_centre(place: Places, sizes: Measures, hip: Array, pelvis_right: Array, side: str) -> tuple[Array, str]:
+    """Return the knee centre, m, and what had to be assumed: the middle of the epicondyles, or a chord with the thigh marker.
+
+    A thigh marker that would turn the knee's axis further than ``AXIS_TOLERANCE`` from square to the line of march (mean of pelvis and
+    foot) was not placed for plug-in gait: the axis is then taken square to that line.
+    """
+    lateral = place[f"{side}_knee_lateral"]
+    if f"{side}_knee_medial" in place:
+        return (lateral + place[f"{side}_knee_medial"]) / 2, ""
+    distance = sizes.widths[f"{side}_knee"] / 2 + sizes.marker_radius
+    foot_right = unit(np.cross(place[f"{side}_toe"] - place[f"{side}_heel"], UP))
+    across = unit(pelvis_right + foot_right)
+    usual = chord(hip, lateral, distance, lateral + 0.1 * SIGN[side] * across)
+    if f"{side}_thigh_wand" not in place:
+        return usual, f"{side.capitalize()} knee: no medial or thigh marker, axis taken square to the line of march."
+    centre = chord(hip, lateral, distance, place[f"{side}_thigh_wand"])
+    axis = SIGN[side] * (lateral - centre)
+    angle = float(np.degrees(np.arctan2(UP @ np.cross(across, axis), across @ axis - (across @ UP) * (axis @ UP))))
+    if abs(angle) <= AXIS_TOLERANCE:
+        return centre, ""
+    return usual, (
+        f"Warning: the {side} thigh marker would turn the knee's axis {abs(angle):.0f} deg from square to the line of march, "
+        "so the axis is taken as square. Place the marker in the frontal plane of the thigh, or add a medial knee marker."
+    )
+
+
+def ankle_centre(place: Places, sizes: Measures, knee: Array, side: str) -> Array:
+    """Return the ankle centre, m: middle of the malleoli, or chord with the shank marker, or with the knee's axis without either."""
+    lateral = place[f"{side}_ankle_lateral"]
+    if f"{side}_ankle_medial" in place:
+        return np.asarray((lateral + place[f"{side}_ankle_medial"]) / 2)
+    outside = place.get(f"{side}_shank_wand", lateral + place[f"{side}_knee_lateral"] - knee)
+    return chord(knee, lateral, sizes.widths[f"{side}_ankle"] / 2 + sizes.marker_radius, outside)
+
+
+def arm_centres(place: Places, sizes: Measures, shoulder_at: Array, side: str) -> tuple[Array, Array]:
+    """Return elbow and wrist centre, m: the elbow in the middle of its epicondyle markers, or by the plug-in-gait construction.
+
+    The wrist is the middle of its two markers, unless they are so much farther apart than the wrist is wide that they sit on a bar behind
+    it; then the plug-in-gait construction. (Mean plug-in-gait static of 9 adults: with a bar, the finger marker would be 5 cm behind the
+    hand; with markers on the styloids, 2 cm, as thick as a hand is.)
+    """
+    lateral, radial, ulnar = (place[f"{side}_{name}"] for name in ("elbow_lateral", "wrist_radial", "wrist_ulnar"))
+    middle = (radial + ulnar) / 2
+    if f"{side}_elbow_medial" in place:
+        return (lateral + place[f"{side}_elbow_medial"]) / 2, middle
+    at = elbow(shoulder_at, lateral, middle, sizes.widths[f"{side}_elbow"] / 2 + sizes.marker_radius, side=SIGN[side])
+    reach = sizes.widths[f"{side}_wrist"] / 2 + sizes.marker_radius
+    if np.linalg.norm(radial - ulnar) < 2 * reach + WRIST_BAR:
+        return at, middle
+    return at, wrist(at, radial, ulnar, reach, side=SIGN[side])
