@@ -210,7 +210,7 @@ def labels_swapped(target: str) -> Fault:
         markers = recording.markers
         for name in (one, other):
             if name not in markers:
-                raise UnknownName.of("marker of the virtual subject", name, markers.names)
+                raise UnknownName.of("marker of the recording", name, markers.names)
         exchange = {one: other, other: one}
         names = tuple(exchange.get(name, name) for name in markers.names)
         return replace(recording, markers=Markers(names, markers.time, markers.xyz))
