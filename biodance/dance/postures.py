@@ -13,9 +13,11 @@ from biodance.dance.stance import Stance
 from biodance.dance.state import State
 from biodance.records import Array
 
-STATIC = ("balance", "foot_placement", "ground_clearance", "joint_range", "joint_torque", "self_collision")
+STATIC = ("balance", "foot_placement", "ground_clearance", "joint_range", "joint_torque", "seat", "self_collision")
+RESERVE = 0.06
+"""Share of every limit's scale that is kept in reserve, for the moves that begin and end here."""
 KEPT = 0.01
-"""Violation, in scales of the limits, of the reserved margins that is accepted; the reserve is 0.05, so the limits themselves hold."""
+"""Violation, in scales of the limits, of the reserved margins that is accepted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +33,7 @@ class Postures:
 
 def free_coordinates(chain: Chain, stance: Stance) -> list[int]:
     """Return the coordinates that are free when the planted legs follow the pelvis."""
-    held = {c for side in stance.planted for c in chain.leg_columns[side]}
+    held = {c for side in stance.planted for c in chain.leg_columns[side]} | set(range(ROOT if stance.seat else 0))
     return [c for c in range(chain.size) if c not in held]
 
 
@@ -40,6 +42,9 @@ def start(chain: Chain, stance: Stance, rng: np.random.Generator) -> Array:
     limits_, x = chain.body.limits, np.zeros(chain.size)
     low, high = limits_.lower, limits_.upper
     x[ROOT:] = low + (high - low) * rng.uniform(0.15, 0.85, len(low))
+    if stance.seat:
+        x[:3] = [0.0, 0.0, stance.seat]
+        return x
     reach = min(float(leg.length(np.radians(rng.uniform(15, 60)))) for leg in chain.legs)
     x[:3] = [*(stance.centre - [0.02, 0.0]), stance.ankle[0, 2] + 0.97 * reach]
     x[3:6] = rng.normal(0, 0.15, 3)
@@ -99,7 +104,7 @@ def _solve(chain: Chain, stance: Stance, begin: Array, objective: _Static, *, it
     basis = np.zeros((3, 1, 1))
     basis[0] = 1.0
     kept = tuple(limit for limit in limits() if limit.NAME in STATIC)
-    programme = Programme(chain, stance, base, basis, free, kept, objective, reserve=0.05)
+    programme = Programme(chain, stance, base, basis, free, kept, objective, np.full((1, len(kept)), RESERVE))
     found = minimise(programme.judge, begin[free], iterations=iterations)
     return programme.state(found.y), found
 

@@ -64,7 +64,7 @@ def closure_slopes(state: State) -> Array:
 @dataclass(frozen=True, eq=False)
 class Programme:
     """``base`` (3, T, n) coordinates, rates and accelerations to which the points of the ``free`` coordinates add through ``basis``
-    (3, T, K); ``limits`` to keep, each by ``reserve`` of its scale.
+    (3, T, K); ``limits`` to keep, each by its column of ``reserve`` (T, limits) in its scale.
     """
 
     chain: Chain
@@ -74,7 +74,7 @@ class Programme:
     free: list[int]
     limits: tuple[ModuleType, ...]
     objective: Objective
-    reserve: float = 0.02
+    reserve: Array
 
     def state(self, y: Array) -> State:
         """Return the motion of the points y (K * free,)."""
@@ -94,7 +94,21 @@ class Judged:
         self.programme, self.state = programme, state
         self.value, self._slope = programme.objective(state)
         self._found = [(limit.margins(state), limit.SCALE) for limit in programme.limits]
-        self.margins = np.concatenate([np.empty(0), *((m.value / s).ravel() for m, s in self._found)]) - programme.reserve
+        spare = programme.reserve.T[:, :, None]
+        self._spare = [m.value / scale - r for (m, scale), r in zip(self._found, spare, strict=True)]
+        self.margins = np.concatenate([np.empty(0), *(spare.ravel() for spare in self._spare)])
+
+    @property
+    def worst(self) -> tuple[float, str]:
+        """The largest violation in the scale of its limit (negative: room left), and the name of the limit."""
+        least = [float(spare.min(initial=np.inf)) for spare in self._spare]
+        k = int(np.argmin(least))
+        return -least[k], str(self.programme.limits[k].NAME)
+
+    @property
+    def least(self) -> Array:
+        """(T,) what is left in each sample, in the scales of the limits."""
+        return np.min([spare.min(axis=1, initial=np.inf) for spare in self._spare], axis=0)
 
     def slopes(self, rows: NDArray[np.intp]) -> tuple[Array, Array]:
         """Return the gradient and the chosen rows of the Jacobian."""

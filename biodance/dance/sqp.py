@@ -80,7 +80,9 @@ def quadratic_step(hessian: Array, gradient: Array, jacobian: Array, margins: Ar
     """Return the step d (n,) and the prices (m,) of the margins: min d'Hd/2 + g'd + t + t²/2, Jd + t/weight >= -c, |d| <= radius."""
     from scipy.optimize import nnls
 
-    n, box = gradient.size, np.eye(gradient.size)
+    n, box, price = gradient.size, np.eye(gradient.size), np.zeros(len(jacobian))
+    within = margins < radius * np.abs(jacobian).sum(axis=1) + 1 / WEIGHT  # the others cannot be reached by this step
+    jacobian, margins = jacobian[within], margins[within]
     lower = np.linalg.cholesky(hessian)
     rows = np.concatenate([jacobian, box, -box])
     needed = np.concatenate([-margins, np.full(2 * n, -radius)])
@@ -90,13 +92,13 @@ def quadratic_step(hessian: Array, gradient: Array, jacobian: Array, margins: Ar
     G = np.concatenate([np.column_stack([inner, slack]), np.eye(n + 1)[-1:]])
     h = np.concatenate([needed + inner @ shift + slack, [1.0]])
     try:
-        price, _ = nnls(np.vstack([G.T, h]), np.eye(n + 2)[-1], maxiter=20 * len(h))
+        multiplier, _ = nnls(np.vstack([G.T, h]), np.eye(n + 2)[-1], maxiter=20 * len(h))
     except RuntimeError:
-        return np.zeros(n), np.zeros(len(jacobian))
-    rest = 1.0 - h @ price
-    z = (G.T @ price)[:n] / max(rest, 1e-12)
-    step = np.linalg.solve(lower.T, z - shift)
-    return np.clip(step, -radius, radius), np.minimum(price[: len(jacobian)] / max(rest, 1e-12), WEIGHT)
+        return np.zeros(n), price
+    rest = max(1.0 - float(h @ multiplier), 1e-12)
+    step = np.linalg.solve(lower.T, (G.T @ multiplier)[:n] / rest - shift)
+    price[within] = np.minimum(multiplier[: len(jacobian)] / rest, WEIGHT)
+    return np.clip(step, -radius, radius), price
 
 
 def update(hessian: Array, step: Array, change: Array) -> Array:

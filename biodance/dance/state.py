@@ -13,12 +13,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.body.pinocchio_model import load_pinocchio
 from biodance.dance.chain import ROOT, Chain
 from biodance.dance.feet import foot_forces
 from biodance.dance.stance import Stance
 from biodance.records import Array
+
+Index = list[int] | NDArray[np.intp]
 
 
 def cross(a: Array, b: Array) -> Array:
@@ -86,15 +89,20 @@ class State:
         """(T, n, 6) A_k of every link."""
         return self.chain.ancestors @ (self.twists * self.a[:, :, None] + cross(self.velocity, self.twists) * self.v[:, :, None])
 
+    def placed(self, segment: Index, local: Array) -> Array:
+        """Return positions (T, K, 3) m of points ``local`` (K, 3) of the segments (K)."""
+        return np.asarray((self.rotation[:, segment] @ local[:, :, None])[..., 0] + self.position[:, segment])
+
+    def along(self, segment: Index, place: Array, direction: Array) -> Array:
+        """Return (T, K, n) derivative by x of the places (T, K, 3) m, fixed in the segments (K), along directions (T, K, 3)."""
+        wrench = np.concatenate([direction, cross(place, direction)], axis=2)
+        return (wrench @ np.swapaxes(self.twists, 1, 2)) * self.chain.ancestors[np.array(self.chain.carriers)[segment]]
+
     def points(self, segment: list[int], local: Array) -> tuple[Array, Array]:
         """Return positions (T, K, 3) m of points ``local`` (K, 3) of the segments, and their slopes (T, K, 3, n)."""
-        place = np.einsum("tkij,kj->tki", self.rotation[:, segment], local) + self.position[:, segment]
-        moved = self.chain.ancestors[[self.chain.carriers[s] for s in segment]]
-        linear, angular = self.twists[:, None, :, :3], self.twists[:, None, :, 3:]
-        slope = (linear + cross(np.broadcast_to(angular, (*place.shape[:2], *angular.shape[2:])), place[:, :, None])) * moved[
-            None, :, :, None
-        ]
-        return place, np.swapaxes(slope, 2, 3)
+        place = self.placed(segment, local)
+        axes = np.broadcast_to(np.eye(3)[:, None, None], (3, *place.shape))
+        return place, np.stack([self.along(segment, place, axis) for axis in axes], axis=2)
 
     @cached_property
     def _dynamics(self) -> tuple[Array, Array]:

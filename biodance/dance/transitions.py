@@ -1,50 +1,132 @@
-"""Moves between postures: first what excites, then what keeps the balance (paper eq. 18-20), rest to rest through two via points."""
+"""Moves between postures: what excites the inertias within all limits (paper eq. 18-20), rest to rest through two via points.
+
+One programme instead of the paper's two stages: all free coordinates look for excitation, the zero-moment point is a limit and, weakly, part
+of the objective. The start is the smoothest straight move, which is nearly always feasible; limits are kept on a coarse grid with a reserve
+and judged on a fine one.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from biodance.dance.chain import Chain
-from biodance.dance.excitation import Blocks, dynamic_grams, dynamic_slopes, total
+from biodance.dance.excitation import Blocks, condition, dynamic_grams, dynamic_slopes, total
 from biodance.dance.limits import limits
 from biodance.dance.postures import free_coordinates
-from biodance.dance.programme import Objective, Programme
-from biodance.dance.splines import Basis, rest_to_rest
-from biodance.dance.sqp import Solution, minimise
+from biodance.dance.programme import Judged, Programme
+from biodance.dance.splines import basis_at
+from biodance.dance.sqp import minimise
 from biodance.dance.stance import Stance
 from biodance.dance.state import State
 from biodance.records import Array
 
-RATE = 25.0
-"""Hz at which limits are kept while designing."""
-RESERVE = 0.05
-"""Share of every limit's scale that is kept in reserve for the instants in between."""
+GRID = 10.0
+"""Hz at which limits are kept while designing; instants that turn out worse in between are added."""
+CHECK = 50.0
+"""Hz at which a move is judged before it is taken."""
+RESERVE = 0.04
+"""Share of every limit's scale that is kept in reserve for the instants in between; for a foot's clearance none at the ends."""
+THIRDS = np.array([0.20987654, 0.79012346])
+"""Of the way at one and two thirds of the time, for least jerk (10 s³ - 15 s⁴ + 6 s⁵)."""
+ATTEMPTS = ((0.2, 1.0), (0.1, 1.0), (0.0, 0.0))
+"""Spread (rad) of the via points' start about the straight move, and share of excitation in the objective."""
+ROUNDS = (14, 8, 8)
+"""Iterations; after each round the worst instants are added."""
+CENTRE = 0.1
+"""Worth of 1 dm² of mean squared distance of the zero-moment point from the middle, beside log cond."""
+LITTLE = 0.01
+"""s·(rad/s²)², information on every inertia that is supposed before the first move."""
 
 
 @dataclass(frozen=True, eq=False)
-class Transition:
-    """``via`` (2, n) coordinates of the via points; ``gram`` (N, 6, 6) information on the inertias including the history;
-    ``criterion`` sum of M_i cond(W_bi^D), kg, over the excited segments; ``zmp_before``, ``zmp_after`` m, root mean square distance of the
-    zero-moment point to the middle of the support; ``violation`` of the reserved limits in their scales (feasible: at most ``RESERVE``).
+class Task:
+    """A move to find: from ``ends[0]`` to ``ends[1]`` (2, n) in ``duration`` s on the feet of ``stance``."""
+
+    chain: Chain
+    blocks: Blocks
+    stance: Stance
+    ends: Array
+    duration: float
+
+    @property
+    def excited(self) -> list[int]:
+        """Coordinates that excite: trunk and arms with both feet down, the free leg with one (paper Table I), all joints when seated."""
+        legs = [self.chain.leg_columns[side] for side in (0, 1) if side not in self.stance.planted]
+        return sorted([*([] if len(legs) == 1 else self.chain.upper), *(c for leg in legs for c in leg)])
+
+    @property
+    def segments(self) -> list[int]:
+        """The segments whose inertias the excited coordinates show."""
+        return [i for i, k in enumerate(self.chain.carriers) if k in self.excited]
+
+    def straight(self) -> Array:
+        """Return the via points (2, n) of the smoothest move."""
+        return np.asarray(self.ends[0] + THIRDS[:, None] * (self.ends[1] - self.ends[0]))
+
+    def programme(self, via: Array, free: list[int], time: Array, *, reserve: float, objective: "Objective") -> Programme:
+        """Return the programme of the via points of the ``free`` coordinates at instants ``time`` s, the others as in ``via`` (2, n)."""
+        basis, kept = basis_at(time, self.duration), limits()
+        points = np.stack([self.ends[0], *via, self.ends[1]])
+        points[1:3, free] = 0.0
+        parts = np.stack([basis.position, basis.velocity, basis.acceleration])
+        s = time / self.duration
+        way = s**3 * (10 - 15 * s + 6 * s**2)
+        lifting = np.array([limit.NAME == "ground_clearance" for limit in kept])
+        share = reserve * np.where(lifting, (4 * way * (1 - way))[:, None], 1.0)
+        return Programme(self.chain, self.stance, parts @ points, parts[:, :, 1:3], free, kept, objective, share)
+
+    def grid(self, rate: float) -> Array:
+        """Return the instants (T,) s between the ends at about ``rate`` Hz."""
+        return np.linspace(0.0, self.duration, round(self.duration * rate) + 1)[1:-1]
+
+    def state(self, via: Array) -> State:
+        """Return the move through ``via`` on the coarse grid."""
+        return self.programme(via, [], self.grid(GRID), reserve=0.0, objective=_nothing).state(np.empty(0))
+
+
+@dataclass(frozen=True, eq=False)
+class Move:
+    """``via`` (2, n) of a move of ``duration`` s; ``gram`` (N, 6, 6) its own information on the inertias, integrated over time;
+    ``zmp_before``, ``zmp_after`` m, root mean square distance of the zero-moment point to the middle of the support when only the excited
+    coordinates leave the straight move, and in the move found; ``violation`` of the limits in their scales (feasible: 0) and of which.
     """
 
     via: Array
+    duration: float
     gram: Array
-    criterion: float
     zmp_before: float
     zmp_after: float
     violation: float
+    limit: str
 
 
-def excited_coordinates(chain: Chain, stance: Stance) -> list[int]:
-    """Return trunk and arms with both feet down, the free leg with one (paper Table I)."""
-    return chain.upper if len(stance.planted) == 2 else chain.leg_columns[1 - stance.planted[0]]
+@dataclass(frozen=True, eq=False)
+class Objective:
+    """Mass-weighted mean log cond of the inertias after ``history`` (N, 6, 6), times ``share``, and the distance of the ZMP."""
+
+    task: Task
+    history: Array
+    share: float = 1.0
+
+    def __call__(self, state: State) -> tuple[float, Array]:
+        value, slope = off_centre(state)
+        value, slope = CENTRE * value, CENTRE * slope
+        weight, picks = self.task.blocks.weight, self.task.blocks.second
+        segments = [i for i in self.task.segments if picks[i] and weight[i] > 0]
+        if not self.share or not segments:
+            return value, slope
+        grams = self.history[segments] + dynamic_grams(state, segments) / GRID + LITTLE * np.eye(6)
+        part = np.zeros_like(grams)
+        for k, i in enumerate(segments):
+            pick = np.ix_(picks[i], picks[i])
+            cond, by = condition(grams[k][pick])
+            value += self.share * weight[i] / weight[segments].sum() * np.log(cond)
+            part[k][pick] = self.share * weight[i] / weight[segments].sum() / cond * by
+        return value, slope + dynamic_slopes(state, segments, part / GRID)
 
 
-def excited_segments(chain: Chain, stance: Stance) -> list[int]:
-    """Return the segments whose inertias the excited coordinates show."""
-    moved = excited_coordinates(chain, stance)
-    return [i for i, k in enumerate(chain.carriers) if k in moved]
+def _nothing(state: State) -> tuple[float, Array]:
+    return 0.0, np.zeros((3, *state.x.shape))
 
 
 def off_centre(state: State) -> tuple[float, Array]:
@@ -58,69 +140,47 @@ def off_centre(state: State) -> tuple[float, Array]:
     return 100 * float(np.mean(np.sum(gap**2, axis=1))), 200 / len(gap) * np.einsum("tc,ktcn->ktn", gap, moved)
 
 
-def find_transition(
-    chain: Chain, blocks: Blocks, stance: Stance, ends: Array, gram: Array, *, rng: np.random.Generator, duration: float = 2.0
-) -> Transition:
-    """Return the move between the postures ``ends`` (2, n) after the history ``gram`` (N, 6, 6).
-
-    Where the balance cannot be kept under the exciting motion, all coordinates together look for the nearest motion that can.
-    """
-    basis, free = rest_to_rest(duration, rate=RATE), free_coordinates(chain, stance)
-    excite, segments = excited_coordinates(chain, stance), excited_segments(chain, stance)
-
-    def information(state: State) -> tuple[float, Array]:
-        grams = gram.copy()
-        grams[segments] += dynamic_grams(state, segments)
-        grams += 1e-3 * np.eye(6)
-        value, slope = total(blocks.weight, grams, blocks.second, segments)
-        unit = float(blocks.weight[segments].sum())
-        return value / unit, dynamic_slopes(state, segments, slope[segments]) / unit
-
-    via = ends[0] + np.array([[1 / 3], [2 / 3]]) * (ends[1] - ends[0])
-    via[:, excite] += rng.normal(0, 0.15, (2, len(excite)))
-    first = ("ground_clearance", "joint_range", "joint_speed", "self_collision")
-    via, _ = _improve(chain, stance, ends, via, excite, information, basis, first)
-    before = _distance(chain, stance, ends, via, basis)
-    balance = [c for c in free if c not in excite]
-    names = tuple(limit.NAME for limit in limits())
-    via, found = _improve(chain, stance, ends, via, balance, off_centre, basis, names)
-    if found.violation > RESERVE / 2:
-        via, found = _improve(chain, stance, ends, via, free, off_centre, basis, names, iterations=40)
-    state = _programme(chain, stance, ends, via, [], off_centre, basis, ()).state(np.empty(0))
-    whole = gram + dynamic_grams(state, list(range(len(gram))))
-    value, _ = total(blocks.weight, whole, blocks.second, segments)
-    return Transition(via, whole, value, before, float(np.sqrt(off_centre(state)[0]) / 10), found.violation)
+def find_move(task: Task, history: Array, *, rng: np.random.Generator) -> Move:
+    """Return the best feasible move found after the information ``history`` (N, 6, 6); if there is none, the one that violates least."""
+    best = None
+    for spread, share in ATTEMPTS:
+        via, time, objective = task.straight(), task.grid(GRID), Objective(task, history, share)
+        via[:, task.excited] += rng.normal(0, spread, (2, len(task.excited)))
+        for iterations in ROUNDS:
+            via = _improved(task, via, time, objective, iterations)
+            found, instants = judged(task, via)
+            if best is None or found.violation < best.violation:
+                best = found
+            if best.violation == 0:
+                return best
+            time = np.union1d(time, instants)
+    assert best is not None
+    return best
 
 
-def _programme(
-    chain: Chain, stance: Stance, ends: Array, via: Array, free: list[int], objective: Objective, basis: Basis, names: tuple[str, ...]
-) -> Programme:
-    points = np.stack([ends[0], *via, ends[1]])
-    points[1:3, free] = 0.0
-    parts = np.stack([basis.position, basis.velocity, basis.acceleration])
-    kept = tuple(limit for limit in limits() if limit.NAME in names)
-    return Programme(chain, stance, parts @ points, parts[:, :, 1:3], free, kept, objective, RESERVE)
+def _improved(task: Task, via: Array, time: Array, objective: Objective, iterations: int) -> Array:
+    free = free_coordinates(task.chain, task.stance)
+    programme = task.programme(via, free, time, reserve=RESERVE, objective=objective)
+    out = via.copy()
+    out[:, free] = minimise(programme.judge, via[:, free].ravel(), iterations=iterations).y.reshape(2, -1)
+    return out
 
 
-def _improve(
-    chain: Chain,
-    stance: Stance,
-    ends: Array,
-    via: Array,
-    free: list[int],
-    objective: Objective,
-    basis: Basis,
-    names: tuple[str, ...],
-    *,
-    iterations: int = 20,
-) -> tuple[Array, Solution]:
-    programme = _programme(chain, stance, ends, via, free, objective, basis, names)
-    found = minimise(programme.judge, via[:, free].ravel(), iterations=iterations)
-    better = via.copy()
-    better[:, free] = found.y.reshape(2, -1)
-    return better, found
+def judged(task: Task, via: Array) -> tuple[Move, Array]:
+    """Return the move through ``via`` as it is, judged by all limits on the fine grid, and the worst instants s where one is broken."""
+    time = task.grid(CHECK)
+    programme = task.programme(via, [], time, reserve=0.0, objective=_nothing)
+    found = Judged(programme, programme.state(np.empty(0)))
+    worst, limit = found.worst
+    left = np.pad(found.least, 1, constant_values=np.inf)
+    dips = (left[1:-1] < 0) & (left[1:-1] <= left[:-2]) & (left[1:-1] <= left[2:])
+    plain = task.straight()
+    plain[:, task.excited] = via[:, task.excited]
+    gram = dynamic_grams(found.state, list(range(len(task.chain.body.segments)))) / CHECK
+    before, after = (float(np.sqrt(off_centre(task.state(v))[0]) / 10) for v in (plain, via))
+    return Move(via, task.duration, gram, before, after, max(0.0, worst), limit if worst > 0 else ""), time[dips]
 
 
-def _distance(chain: Chain, stance: Stance, ends: Array, via: Array, basis: Basis) -> float:
-    state = _programme(chain, stance, ends, via, [], off_centre, basis, ()).state(np.empty(0))
-    return float(np.sqrt(off_centre(state)[0]) / 10)
+def dynamic_criterion(blocks: Blocks, gram: Array, segments: list[int]) -> float:
+    """Return the sum of M_i cond(W_bi^D), kg, over ``segments`` for the information ``gram`` (N, 6, 6)."""
+    return total(blocks.weight, gram + LITTLE * np.eye(6), blocks.second, segments)[0]

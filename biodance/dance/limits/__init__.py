@@ -13,10 +13,15 @@ import numpy as np
 
 from biodance.records import Array
 
+FAR = 2.0
+
 
 @dataclass(frozen=True, eq=False)
 class Margins:
-    """``value`` (T, m) >= 0 where the limit holds; ``slopes`` (k, T, m, n) by x, v, a in this order, k = 1, 2 or 3 as far as needed."""
+    """``value`` (T, m) >= 0 where the limit holds; ``slopes`` (k, T, m, n) by x, v, a in this order, k = 1, 2 or 3 as far as needed.
+
+    Columns that are further than ``FAR`` scales from their limit in all samples may have slopes of zero.
+    """
 
     value: Array
     slopes: Array

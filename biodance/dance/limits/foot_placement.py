@@ -11,7 +11,9 @@ STRAIGHT = np.radians(9.0)
 
 
 def margins(state: State) -> Margins:
-    """Return how much longer each planted leg could be, (T, planted feet) m."""
+    """Return how much longer each planted leg could be, (T, planted feet) m; none for hanging legs."""
+    if not state.stance.planted:
+        return Margins(np.empty((len(state.x), 0)), np.empty((1, len(state.x), 0, state.chain.size)))
     hips = [state.chain.legs[side] for side in state.stance.planted]
     place, slope = state.points([0] * len(hips), np.array([leg.hip for leg in hips]))
     away = place - state.stance.ankle[list(state.stance.planted)]

@@ -6,7 +6,7 @@ finished dance is checked exactly.
 
 import numpy as np
 
-from biodance.dance.limits import Margins
+from biodance.dance.limits import FAR, Margins
 from biodance.dance.shapes import box_pairs, capsule, capsule_pairs
 from biodance.dance.state import State
 from biodance.records import Array
@@ -25,20 +25,19 @@ def margins(state: State) -> Margins:
 def _capsules(state: State) -> Margins:
     body = state.chain.body
     pairs = capsule_pairs(body)
-    limbs = sorted({i for pair in pairs for i in pair})
-    shape = [capsule(body, i) for i in limbs]
-    place, slope = state.points([i for i in limbs for _ in range(2)], np.concatenate([ends for ends, _ in shape]))
-    place, slope = (p.reshape(p.shape[0], len(limbs), 2, *p.shape[2:]) for p in (place, slope))
-    first, second = ([limbs.index(pair[k]) for pair in pairs] for k in range(2))
-    s, t = nearest(place[:, first], place[:, second])
-    weight = np.stack([1 - s, s, t - 1, -t], axis=2)
-    both = np.concatenate([place[:, first], place[:, second]], axis=2)
-    apart = np.einsum("tpk,tpkc->tpc", weight, both)
+    first, second = (np.array([pair[k] for pair in pairs]) for k in range(2))
+    shape = {i: capsule(body, i) for i in {*first, *second}}
+    a, b = (state.placed(np.repeat(side, 2), np.concatenate([shape[i][0] for i in side])) for side in (first, second))
+    a, b = (place.reshape(len(place), -1, 2, 3) for place in (a, b))
+    s, t = nearest(a, b)
+    here, there = ((1 - u)[..., None] * c[:, :, 0] + u[..., None] * c[:, :, 1] for u, c in ((s, a), (t, b)))
+    apart = here - there
     distance = np.maximum(np.linalg.norm(apart, axis=2), 1e-9)
-    toward = (apart / distance[..., None])[:, :, None, :, None] * weight[..., None, None]
-    moved = np.sum(toward[:, :, :2] * slope[:, first], axis=(2, 3)) + np.sum(toward[:, :, 2:] * slope[:, second], axis=(2, 3))
-    radii = np.array([shape[i][1] + shape[j][1] for i, j in zip(first, second, strict=True)])
-    return Margins(distance - radii, moved[None])
+    value = distance - np.array([shape[i][1] + shape[j][1] for i, j in pairs])
+    slopes, close = np.zeros((1, *value.shape, state.chain.size)), (value < FAR * SCALE).any(axis=0)
+    normal = (apart / distance[..., None])[:, close]
+    slopes[0][:, close] = state.along(first[close], here[:, close], normal) - state.along(second[close], there[:, close], normal)
+    return Margins(value, slopes)
 
 
 def nearest(a: Array, b: Array) -> tuple[Array, Array]:
@@ -53,23 +52,23 @@ def nearest(a: Array, b: Array) -> tuple[Array, Array]:
 
 
 def _boxes(state: State) -> Margins:
-    body, values, slopes = state.chain.body, [], []
-    for limb, box in box_pairs(body):
-        ends, radius = capsule(body, limb)
-        points = ends[0] + ALONG[:, None] * (ends[1] - ends[0])
-        place, slope = state.points([limb] * len(points), points)
-        low, high = body.boxes[box]
-        turn, origin = state.rotation[:, box], state.position[:, box]
-        local = np.einsum("tji,tkj->tki", turn, place - origin[:, None]) - (low + high) / 2
-        over = np.abs(local) - (high - low) / 2
-        outside = np.linalg.norm(np.maximum(over, 0.0), axis=2)
-        deepest = np.eye(3)[np.argmax(over, axis=2)]
-        away = np.where(outside[..., None] > 0, np.maximum(over, 0.0) / np.maximum(outside, 1e-12)[..., None], deepest) * np.sign(local)
-        normal = np.einsum("tij,tkj->tki", turn, away)
-        still, carried = state.points([box], np.zeros((1, 3)))
-        moved = state.chain.ancestors[state.chain.carriers[box]]
-        lever = np.cross(place - still, normal)
-        turning = np.einsum("tnc,tkc->tkn", state.twists[:, :, 3:], lever) * moved
-        values.append(np.where(outside > 0, outside, over.max(axis=2)) - radius)
-        slopes.append(np.einsum("tkc,tkcn->tkn", normal, slope - carried) - turning)
-    return Margins(np.concatenate(values, axis=1), np.concatenate(slopes, axis=1)[None])
+    body = state.chain.body
+    pairs = box_pairs(body)
+    if not pairs:
+        return Margins(np.empty((len(state.x), 0)), np.empty((1, len(state.x), 0, state.chain.size)))
+    limb, box = (np.repeat([pair[k] for pair in pairs], len(ALONG)) for k in range(2))
+    shape = {i: capsule(body, i) for i, _ in pairs}
+    points = np.concatenate([shape[i][0][0] + ALONG[:, None] * (shape[i][0][1] - shape[i][0][0]) for i, _ in pairs])
+    place = state.placed(limb, points)
+    low, high = np.swapaxes(body.boxes[box], 0, 1)
+    turn = state.rotation[:, box]
+    local = np.einsum("tkji,tkj->tki", turn, place - state.position[:, box]) - (low + high) / 2
+    over = np.abs(local) - (high - low) / 2
+    outside = np.linalg.norm(np.maximum(over, 0.0), axis=2)
+    deepest = np.eye(3)[np.argmax(over, axis=2)]
+    away = np.where(outside[..., None] > 0, np.maximum(over, 0.0) / np.maximum(outside, 1e-12)[..., None], deepest) * np.sign(local)
+    value = np.where(outside > 0, outside, over.max(axis=2)) - np.array([shape[i][1] for i in limb])
+    slopes, close = np.zeros((1, *value.shape, state.chain.size)), (value < FAR * SCALE).any(axis=0)
+    normal = np.einsum("tkij,tkj->tki", turn[:, close], away[:, close])
+    slopes[0][:, close] = state.along(limb[close], place[:, close], normal) - state.along(box[close], place[:, close], normal)
+    return Margins(value, slopes)
