@@ -1,7 +1,6 @@
 """Limbs, trunk and pelvis do not touch each other (paper eq. 14, d > 0).
 
-Capsule against capsule is the exact distance of two line segments; a capsule against a box is judged at points along its axis, and the
-finished dance is checked exactly.
+Exact distances: of two line segments for two capsules, of a line segment from a box for a capsule and a box.
 """
 
 import numpy as np
@@ -12,8 +11,10 @@ from biodance.dance.state import State
 from biodance.records import Array
 
 NAME, UNIT, SCALE = "self_collision", "m", 0.05
-ALONG = np.linspace(0.0, 1.0, 6)
-"""Places on the axis of a capsule that are held against a box."""
+SAMPLES = np.linspace(0.0, 1.0, 9)
+"""Places on the axis of a capsule that are held against a box in each round of the search."""
+ROUNDS = 11
+"""Of the search, which leaves a fourth of the line each time."""
 
 
 def margins(state: State) -> Margins:
@@ -56,19 +57,46 @@ def _boxes(state: State) -> Margins:
     pairs = box_pairs(body)
     if not pairs:
         return Margins(np.empty((len(state.x), 0)), np.empty((1, len(state.x), 0, state.chain.size)))
-    limb, box = (np.repeat([pair[k] for pair in pairs], len(ALONG)) for k in range(2))
-    shape = {i: capsule(body, i) for i, _ in pairs}
-    points = np.concatenate([shape[i][0][0] + ALONG[:, None] * (shape[i][0][1] - shape[i][0][0]) for i, _ in pairs])
-    place = state.placed(limb, points)
+    limb, box = (np.array([pair[k] for pair in pairs]) for k in range(2))
+    shape = [capsule(body, i) for i in limb]
+    ends = state.placed(np.repeat(limb, 2), np.concatenate([ends for ends, _ in shape])).reshape(len(state.x), -1, 2, 3)
     low, high = np.swapaxes(body.boxes[box], 0, 1)
     turn = state.rotation[:, box]
-    local = np.einsum("tkji,tkj->tki", turn, place - state.position[:, box]) - (low + high) / 2
-    over = np.abs(local) - (high - low) / 2
-    outside = np.linalg.norm(np.maximum(over, 0.0), axis=2)
-    deepest = np.eye(3)[np.argmax(over, axis=2)]
-    away = np.where(outside[..., None] > 0, np.maximum(over, 0.0) / np.maximum(outside, 1e-12)[..., None], deepest) * np.sign(local)
-    value = np.where(outside > 0, outside, over.max(axis=2)) - np.array([shape[i][1] for i in limb])
+    local = np.einsum("tkji,tkej->tkei", turn, ends - state.position[:, box, None]) - ((low + high) / 2)[:, None]
+    share = deepest(local, (high - low) / 2)
+    depth, away = outside(_on(local, share), (high - low) / 2)
+    value = depth - np.array([radius for _, radius in shape])
     slopes, close = np.zeros((1, *value.shape, state.chain.size)), (value < FAR * SCALE).any(axis=0)
-    normal = np.einsum("tkij,tkj->tki", turn[:, close], away[:, close])
-    slopes[0][:, close] = state.along(limb[close], place[:, close], normal) - state.along(box[close], place[:, close], normal)
+    normal, place = np.einsum("tkij,tkj->tki", turn, away)[:, close], _on(ends, share)[:, close]
+    slopes[0][:, close] = state.along(limb[close], place, normal) - state.along(box[close], place, normal)
     return Margins(value, slopes)
+
+
+def _on(ends: Array, share: Array) -> Array:
+    """Return the points (..., 3) at ``share`` (...) of the way between two ends (..., 2, 3)."""
+    return np.asarray(ends[..., 0, :] + share[..., None] * (ends[..., 1, :] - ends[..., 0, :]))
+
+
+def outside(point: Array, half: Array) -> tuple[Array, Array]:
+    """Return the signed distance (...) of points (..., 3) from a box about the origin with half sides ``half`` (..., 3), and its slope."""
+    over = np.abs(point) - half
+    beyond = np.maximum(over, 0.0)
+    distance = np.linalg.norm(beyond, axis=-1)
+    free = distance > 0
+    nearest_side = np.eye(3)[np.argmax(over, axis=-1)]
+    slope = np.where(free[..., None], beyond / np.where(free, distance, 1.0)[..., None], nearest_side) * np.sign(point)
+    return np.where(free, distance, over.max(axis=-1)), slope
+
+
+def deepest(ends: Array, half: Array) -> Array:
+    """Return where (T, K), 0..1, the lines between ``ends`` (T, K, 2, 3) come nearest to their boxes with half sides (K, 3).
+
+    The signed distance from a convex body is convex along a line, so that the smallest of nine samples encloses the minimum.
+    """
+    start, width = np.zeros(ends.shape[:2]), np.ones(ends.shape[:2])
+    for _ in range(ROUNDS):
+        share = start + width * SAMPLES[:, None, None]
+        best = np.argmin(outside(_on(ends[None], share), half)[0], axis=0)
+        start = np.clip(start + width * (best - 1) / (len(SAMPLES) - 1), 0.0, 1.0)
+        width = np.minimum(width * 2 / (len(SAMPLES) - 1), 1.0 - start)
+    return start + width / 2
