@@ -1,0 +1,43 @@
+"""Refusals: a healthy person is let through; whoever lacks one thing hears which one, and that it is enough to give it back."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from biodance.body.body import Body
+from biodance.body.human import human
+from biodance.body.limits import joint_limits
+from biodance.dance.chain import Chain
+from biodance.dance.person import PersonLimits, limited
+from biodance.dance.refusal import NoDance, check_postures, nearest
+from biodance.dance.stance import Stance, stance
+from biodance.records import Subject
+
+SUBJECT = Subject(65.0, 1.75, "F", 33.0)
+BODY = replace(human(SUBJECT), limits=joint_limits(SUBJECT, within="comfortable"))
+FEET = stance(BODY, "parallel")
+
+
+def limits_of(person: PersonLimits) -> Body:
+    return replace(BODY, limits=limited(BODY, person))
+
+
+def words(person: PersonLimits, feet: Stance) -> str:
+    return nearest(Chain(limits_of(person)), feet, rng=np.random.default_rng(1))[1]
+
+
+def test_a_healthy_person_can_stand_in_all_ways() -> None:
+    check_postures(Chain(BODY), (FEET, stance(BODY, "right_forward", right=0.2), FEET.on(0), FEET.on(1)))
+
+
+def test_weak_hips_cannot_bear_the_body_on_that_leg_alone() -> None:
+    weak = PersonLimits(strengths=(("right_hip", 0.05), ("right_knee", 0.05)))
+    assert "joint torque of right" in words(weak, FEET.on(0))
+    assert words(weak, FEET.on(1)) == ""
+
+
+def test_an_ankle_that_stays_pointed_cannot_stand() -> None:
+    stiff = PersonLimits(ranges=(("ankle_dorsiflexion", np.radians(-35.0), np.radians(-30.0)),))
+    with pytest.raises(NoDance, match=r"both feet side by side.*joint range of (left|right) ankle dorsiflexion"):
+        check_postures(Chain(limits_of(stiff)), (FEET,))
