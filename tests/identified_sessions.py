@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from biodance.body.human import human
-from biodance.identify.added_mass import point_mass
+from biodance.identify.loads import point_mass
 from biodance.motion.comparison import compare
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.identification import identify_trials

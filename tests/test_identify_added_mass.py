@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 from identify_trials import noisy_fit, person, smooth_motion
 
-from biodance.identify.added_mass import added_mass, load_moments, point_mass, surprised
-from biodance.identify.identification import Identification, identify
+from biodance.identify.added_mass import added_mass, surprised
+from biodance.identify.identification import Identification, identify, standing_point
+from biodance.identify.learning import learn
+from biodance.identify.loads import load_moments, may_carry, point_mass
+from biodance.identify.statistics import layout_for, statistics
+from biodance.records import Sip
 
 PLACE = np.array([0.15, -0.2, 0.2])
 
@@ -65,3 +69,20 @@ def test_point_mass_and_its_moments() -> None:
     U = load_moments(person(0)[0], 1)
     assert U.shape[0] == 10
     assert np.sqrt((U @ U.T)[0, 0]) == pytest.approx(2.0)
+
+
+def test_an_undeclared_load_is_not_learned_as_noise() -> None:
+    body, truth, rng = person(40)
+    total = np.tile(np.eye(10)[0], 4)
+    cov = np.array(body.sip.covariance)
+    gain = cov @ total
+    body = replace(body, sip=Sip(body.segments, body.sip.phi, cov - np.outer(gain, gain) / (total @ gain + 0.01**2)))
+    motion, slow = smooth_motion(body, rng, frames=1200), []
+    for mass in (0.0, 3.0):
+        loaded = truth.copy()
+        loaded[10:20] += mass * point_mass(PLACE)
+        fit = noisy_fit(body, motion, loaded, np.random.default_rng(1))
+        data = statistics(body, fit, layout_for(standing_point((fit,))))
+        slow.append([learn(data, prior)[0].covariance[0][2, 2] for prior in (may_carry(body, body.sip), body.sip)])
+    assert slow[1][0] < 3 * slow[0][0]
+    assert slow[1][1] > 3 * slow[1][0]

@@ -3,17 +3,45 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from identify_trials import noisy_fit, person, smooth_motion
 
+from biodance.body.body import Body
 from biodance.identify.information import Information
-from biodance.identify.mismatch import Mismatch, Sizes, draw_plates, evidence_of_scale, evident_sizes, mismatch, temper
+from biodance.identify.kinematic_scores import kinematic_scores
+from biodance.identify.mismatch import Mismatch, Sizes, evidence_of_scale, evident_sizes, mismatch, nothing, plate_sources, temper
 from biodance.identify.noise import Noise
 from biodance.identify.posterior import posterior
-from biodance.identify.twins import Twins, chains, disturbance, draw_twins, jacobian, neighbours, wrench_change
-from biodance.motion.kinematics import poses
+from biodance.identify.twins import Twins, central_inertia, chains, disturbance, draw_twins, jacobian, neighbours, skew
+from biodance.motion.kinematics import poses, segment_motion
 from biodance.motion.regressor import GRAVITY, predict_wrench
-from biodance.records import Sip
+from biodance.records import Array, Motion
+
+
+def wrench_change(body: Body, motion: Motion, places: Array, turns: Array) -> Array:
+    """Return the change (T, 6, K) of the table's wrench about the lab origin when centres of mass move by ``places`` and segments turn by
+    ``turns`` (T, N, 3, K), lab frame: the rate of change of momentum and angular momentum, less the moment of gravity.
+    """
+    move = segment_motion(body, motion)
+    step = 1.0 / motion.rate
+    mass = body.sip.mass
+    com = (move.rotation @ body.sip.com[..., None])[..., 0] + move.position
+    momentum = mass[:, None] * np.gradient(com, step, axis=0)
+    inertia = move.rotation @ central_inertia(body) @ np.swapaxes(move.rotation, -1, -2)
+    spin = (inertia @ move.angular_velocity[..., None])[..., 0]
+    rate = mass[:, None, None] * np.gradient(places, step, axis=0)
+    angular = _summed(-skew(momentum), places) + _summed(skew(com), rate) - _summed(skew(spin), turns)
+    angular += _summed(inertia, np.gradient(turns, step, axis=0))
+    force = np.gradient(rate.sum(axis=1), step, axis=0)
+    weight = mass[:, None] * GRAVITY
+    moment = np.gradient(angular, step, axis=0) + np.tensordot(places, skew(weight), axes=([1, 2], [0, 2])).swapaxes(1, 2)
+    return np.concatenate([force, moment], axis=1)
+
+
+def _summed(matrix: Array, vectors: Array) -> Array:
+    """Return sum over segments of matrix (T, N, 3, 3) times vectors (T, N, 3, K)."""
+    frames, count = matrix.shape[:2]
+    wide = np.swapaxes(matrix, 1, 2).reshape(frames, 3, 3 * count)
+    return np.asarray(wide @ vectors.reshape(frames, 3 * count, -1))
 
 
 def test_jacobian_is_the_derivative_of_the_places() -> None:
@@ -107,7 +135,7 @@ def test_tempered_data_give_the_textbook_posterior() -> None:
     found = Mismatch(rng.normal(size=(40, 60)), rng.normal(size=(40, 60)))
     body, _, _ = person(6)
     H = data.triangle.T @ data.triangle
-    C = 2.0 * H + found.kinematics @ found.kinematics.T / 60 + found.plates @ found.plates.T / 60
+    C = 2.0 * H + found.kinematics @ found.kinematics.T + found.plates @ found.plates.T
     W = H @ np.linalg.inv(C)
     precision = np.linalg.inv(body.sip.covariance) + W @ H
     mean = np.linalg.solve(precision, np.linalg.inv(body.sip.covariance) @ body.sip.phi + W @ data.triangle.T @ data.target)
@@ -145,12 +173,60 @@ def test_mismatch_is_reproducible_and_scaled_to_the_markers() -> None:
         motion = replace(fit.motion, residual=np.full((400, 3), size), marker_names=("m0", "m1", "m2"))
         return mismatch(body, (replace(fit, motion=motion),), noise).kinematics
 
-    np.testing.assert_allclose(with_residual(0.02), 2 * with_residual(0.01), rtol=1e-9)
+    rigid = 3 * 2 * len(body.joints)
+    first, second = with_residual(0.1), with_residual(0.2)
+    np.testing.assert_allclose(second[:, :-rigid], 2 * first[:, :-rigid], rtol=1e-9)
+    np.testing.assert_array_equal(second[:, -rigid:], first[:, -rigid:])
+    np.testing.assert_array_equal(with_residual(1e-6), plain.kinematics)
+
+
+def test_scores_are_what_every_source_does_to_the_equations() -> None:
+    body, _, rng = person(9)
+    motion = smooth_motion(body, rng, frames=60)
+    twins, weight = draw_twins(body, 6, rng), rng.normal(size=(60, 6, 5))
+    pose, segment, everything = poses(body, motion.q), list(body.markers.segment), list(range(4))
+    J, _ = jacobian(body, pose, segment, pose.points(segment, body.markers.position))
+    place, turn = jacobian(body, pose, everything, pose.points(everything, body.sip.com))
+    wrong = disturbance(body, motion, pose, twins)
+    weighted = np.swapaxes(np.repeat(body.markers.weight, 3)[:, None] * J, 1, 2)
+    ridge = 1e-6 * np.trace(weighted @ J, axis1=1, axis2=2)[:, None, None] / body.nv * np.eye(body.nv)
+    tangent = -np.linalg.solve(weighted @ J + ridge, weighted @ wrong.markers.reshape(60, -1, 6))
+    shape = wrong.places.shape
+    error = wrench_change(body, motion, wrong.places + (place @ tangent).reshape(shape), wrong.turns + (turn @ tangent).reshape(shape))
+    found = kinematic_scores(body, motion, weight)
+    pairs = ((found.slide, twins.slide), (found.flesh, twins.flesh), (found.centre, twins.centre), (found.tilt, twins.tilt))
+    total = sum(a.reshape(-1, 5).T @ b.reshape(-1, 6) for a, b in pairs)
+    np.testing.assert_allclose(total, np.einsum("tcp,tck->pk", weight, error), rtol=1e-9, atol=1e-9 * np.abs(total).max())
+
+
+def test_weighted_rows_are_whitened_twice() -> None:
+    rng = np.random.default_rng(4)
+    factor = rng.normal(size=(2, 6, 6)) + 4 * np.eye(6)
+    rows, other = rng.normal(size=(2, 80, 6, 3))
+    for noise in (
+        Noise(factor @ np.swapaxes(factor, 1, 2), np.array([0.2, 0.1, 0.0]), (0.0, 1.0, 8.0), 25.0),
+        Noise(factor[:1] @ np.swapaxes(factor[:1], 1, 2), np.array([0.2, 0.1, 0.0])),
+    ):
+        white = [noise.whiten(x).reshape(-1, 3) for x in (rows, other)]
+        np.testing.assert_allclose(np.einsum("tci,tcj->ij", other, noise.weighted(rows)), white[1].T @ white[0], rtol=1e-9)
+
+
+def test_no_frames_make_no_scores() -> None:
+    body, truth, rng = person(10)
+    fit = noisy_fit(body, smooth_motion(body, rng, frames=100), truth, rng)
+    some = mismatch(body, (fit,), Noise(np.tile(np.eye(6), (2, 1, 1)), np.zeros(3), (0.0, 1.0, 10.0), 25.0))
+    none = nothing(body)
+    assert none.kinematics.shape == some.kinematics.shape
+    assert none.plates.shape == some.plates.shape
+    assert np.abs(some.kinematics).max() > 0
+    short = replace(fit, use=np.arange(100) < 5)
+    assert not np.any(mismatch(body, (short,), Noise(np.tile(np.eye(6), (2, 1, 1)), np.zeros(3), (0.0, 1.0, 10.0), 25.0)).kinematics)
 
 
 def test_plates_have_the_tolerances_stated() -> None:
-    plates = draw_plates(4000, np.random.default_rng(0))
-    assert plates.mixing[:, 2, 2].std() == pytest.approx(0.004, rel=0.1)
-    assert plates.mixing[:, 3, 1].std() == pytest.approx(np.hypot(0.002, 0.001 * 0.5), rel=0.1)
-    assert plates.offset[:, 2].std() == pytest.approx(1.0, rel=0.1)
-    assert isinstance(Sip(("a",), np.zeros(10), np.zeros((10, 10))).phi, np.ndarray)
+    plates = plate_sources()
+    np.testing.assert_allclose(np.sqrt((plates.mixing**2).sum(axis=0))[2, 2], 0.004)
+    np.testing.assert_allclose(np.sqrt((plates.mixing**2).sum(axis=0))[3, 1], np.hypot(0.002, 0.001 * 0.5))
+    np.testing.assert_allclose(np.sqrt((plates.offset**2).sum(axis=0))[2], 1.0)
+    faults = (plates.mixing != 0).any(axis=(1, 2)).astype(int) + (plates.offset != 0).any(axis=1) + (plates.delay != 0)
+    np.testing.assert_array_equal(faults, 1)

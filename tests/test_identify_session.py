@@ -12,6 +12,7 @@ from biodance.identify.caution import about_true_centres, widened
 from biodance.identify.identification import NOISE_ALONE, conclude, identify, standing_point
 from biodance.identify.knowledge import knowledge, segment_quantities
 from biodance.identify.learning import learn
+from biodance.identify.loads import may_carry
 from biodance.identify.sessions import differences
 from biodance.identify.statistics import layout_for, statistics
 from biodance.identify.validation import gain, validate
@@ -155,7 +156,7 @@ def test_gain_has_the_known_ratio_in_its_interval() -> None:
 def test_learned_noise_is_used_when_given() -> None:
     body, _, fits = session(9, frames=600)
     total = statistics(body, fits[0], layout_for(standing_point(fits)))
-    noise, _ = learn(total, widened(body.sip))
+    noise, _ = learn(total, may_carry(body, widened(body.sip)))
     np.testing.assert_allclose(conclude(body, total, ("t",), noise=noise).sip.phi, conclude(body, total, ("t",)).sip.phi)
 
 

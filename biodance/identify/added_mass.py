@@ -16,17 +16,12 @@ from biodance.body.body import Body
 from biodance.identify.identification import Identification
 from biodance.identify.information import Information
 from biodance.identify.knowledge import SIGMAS
+from biodance.identify.loads import load_moments, point_mass
 from biodance.identify.posterior import prior_factor
 from biodance.records import Array, Sip
 
-SCALE = 2.0
-"""kg: typical size of a load; the answer changes little between half and twice of it."""
-RADIUS = 0.04
-"""m: radius of gyration of a compact load."""
 THRESHOLD = 0.05
 """p of "no load" below which a load is announced."""
-NEAR = 0.5
-"""A load may lie this share of the box beyond the box (straps, wrist weights)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,26 +98,6 @@ def expected(reference: Identification, session: Identification) -> Sip:
     """
     shift = session.belief.prior.phi - reference.belief.prior.phi
     return Sip(reference.sip.segments, reference.belief.mean + shift, reference.belief.covariance)
-
-
-def load_moments(body: Body, segment: int) -> Array:
-    """Return U (10, k): U U' is the second moment of the parameters of a load of typical mass in or near the segment's box."""
-    low, high = body.boxes[segment]
-    margin = NEAR * (high - low)
-    rng = np.random.default_rng(segment)
-    place = rng.uniform(low - margin, high + margin, (2000, 3))
-    loads = np.array([point_mass(p) for p in place]) * SCALE
-    moment = loads.T @ loads / len(loads)
-    value, vector = np.linalg.eigh(moment)
-    keep = value > 1e-12 * value.max()
-    return np.asarray(vector[:, keep] * np.sqrt(value[keep]))
-
-
-def point_mass(place: Array, radius: float = RADIUS) -> Array:
-    """Return the ten parameters per kg of a compact load with CoM at ``place`` (3,) m and radius of gyration ``radius`` m."""
-    x, y, z = place
-    r = radius**2
-    return np.array([1.0, x, y, z, y * y + z * z + r, -x * y, x * x + z * z + r, -x * z, -y * z, x * x + y * y + r])
 
 
 def surprised(data: Information, before: Sip) -> tuple[Array, Array]:

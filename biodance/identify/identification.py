@@ -18,6 +18,7 @@ from biodance.identify.gate import believable
 from biodance.identify.information import Information
 from biodance.identify.knowledge import Known, knowledge
 from biodance.identify.learning import learn
+from biodance.identify.loads import may_carry
 from biodance.identify.mismatch import Mismatch, Sizes, evident_sizes, mismatch, temper
 from biodance.identify.noise import Noise
 from biodance.identify.physical import PhysicalFit, physical_fit
@@ -82,7 +83,7 @@ def identify(body: Body, fits: tuple[Fit, ...], *, prior: Sip | None = None) -> 
     total: Statistics = empty(10 * len(body.segments), layout)
     for fit in used:
         total = total + statistics(body, fit, layout)
-    noise, _ = learn(total, prior or widened(body.sip))
+    noise, _ = learn(total, may_carry(body, prior or widened(body.sip)))
     found = conclude(body, total, tuple(fit.name for fit in used), noise=noise, found=mismatch(body, used, noise), prior=prior)
     return replace(found, notes=(*notes, *found.notes))
 
@@ -126,10 +127,10 @@ def conclude(
     too short, and the notes say so.
     """
     before = prior or widened(body.sip)
-    noise = noise or learn(total, before)[0]
+    noise = noise or learn(total, may_carry(body, before))[0]
     data, sizes = total.information(noise), Sizes(0.0, 1.0)
     if found is not None:
-        sizes = evident_sizes(data, found, before)
+        sizes = evident_sizes(data, found, may_carry(body, before))
         data = temper(data, found, sizes)
     belief = posterior(data, before)
     fit = physical_fit(belief, body)

@@ -1,9 +1,9 @@
-"""What disturbs a session beyond the noise: twins of the subject, plates within their tolerances, and unknown remainders; how large by
-evidence.
+"""What disturbs a session beyond the noise: kinematics that are wrong coherently, plates within their tolerances; how large by evidence.
 
-The errors of K twins and K plates are projected on the regressor as scores W' S^-1 e; their mean outer products are covariances of
-b = W' S^-1 y. The model is  b ~ N(H phi, noise H + kinematics² M_kinematics + M_plates),  and the two sizes are those under which the
-session's own b is most probable given the table (evidence). What is left for the parameters is H (...)^-1 H in place of H.
+The errors of independent sources, each of one standard deviation, enter the equations b = W' S^-1 y as scores W' S^-1 e; with the scores as
+columns of F the covariance is F F', exact over all sources (`kinematic_scores`). The model is
+b ~ N(H phi, noise H + kinematics² F_kinematics F_kinematics' + F_plates F_plates'),  and the two sizes are those under which the session's
+own b is most probable given the table (evidence), never smaller than drawn. What is left for the parameters is H (...)^-1 H in place of H.
 """
 
 from dataclasses import dataclass
@@ -12,17 +12,17 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.identify.information import Information
+from biodance.identify.kinematic_scores import KinematicScores, kinematic_scores
 from biodance.identify.noise import Noise, blocks
 from biodance.identify.statistics import Fit
-from biodance.identify.twins import Twins, disturbance, draw_twins, jacobian, skew, wrench_change
+from biodance.identify.twins import HINGE_TILT, JOINT_CENTRE, OTHER_CENTRE, OTHER_TILT, SLIDE, disturbance, draw_twins, neighbours
 from biodance.motion.kinematics import poses, segment_motion
+from biodance.motion.marker_jacobian import chains, jacobian, skew
 from biodance.motion.regressor import regressor_of
 from biodance.records import Array, Motion, Sip
 
-TWINS = 128
-"""Number of twins and of plates: a variance from so many is known within an eighth."""
-CHUNK = 32
-"""Twins carried at a time: constant memory."""
+TWINS, EVERY = 32, 8
+"""Twins and frames (one of so many) from which the size of the marker residuals is predicted."""
 SHORTEST = 8
 """Frames: shorter runs have no accelerations worth the name."""
 FULL_SCALE = np.array([1.0, 1.0, 4.0, 0.5, 0.4, 0.2])
@@ -33,12 +33,14 @@ OFFSET = np.array([0.5, 0.5, 1.0, 0.3, 0.3, 0.2])
 """N, N·m: what is left after zeroing."""
 KINEMATICS = (1.0, 1.4, 2.0, 2.8)
 NOISE = (1.0, 1.5, 2.0, 3.0, 4.5, 7.0, 10.0, 15.0, 22.0)
-"""Sizes among which the evidence chooses: of the twins' errors (never smaller than the markers say), and variance factor of the noise."""
+"""Sizes among which the evidence chooses: of the kinematic errors (never smaller than drawn), and variance factor of the noise."""
 
 
 @dataclass(frozen=True, eq=False)
 class Mismatch:
-    """``kinematics``, ``plates`` (p, K): scores W' S^-1 e of the errors e of K twins and K plates over all trials."""
+    """``kinematics`` (p, n), ``plates`` (p, m): scores W' S^-1 e over all trials of n and m independent sources of errors e, each of one
+    standard deviation.
+    """
 
     kinematics: Array
     plates: Array
@@ -46,9 +48,7 @@ class Mismatch:
 
 @dataclass(frozen=True)
 class Sizes:
-    """How large the disturbances are: ``kinematics`` (1 = as drawn, marker residuals matched), ``noise`` variance factor (1 = as
-    learned).
-    """
+    """How large the disturbances are: ``kinematics`` (1 = as drawn), ``noise`` variance factor (1 = as learned)."""
 
     kinematics: float
     noise: float
@@ -56,75 +56,98 @@ class Sizes:
 
 @dataclass(frozen=True, eq=False)
 class Plates:
-    """What K plates do to a wrench about their middle: ``mixing`` (K, 6, 6), ``offset`` (K, 6) N, N·m, ``delay`` (K,) s."""
+    """What m plates do to a wrench about their middle: ``mixing`` (m, 6, 6), ``offset`` (m, 6) N, N·m, ``delay`` (m,) s."""
 
     mixing: Array
     offset: Array
     delay: Array
 
 
-def draw_plates(count: int, rng: np.random.Generator) -> Plates:
-    """Draw ``count`` plates within their tolerances."""
-    mixing = PLATE["cross-talk"] * rng.normal(size=(count, 6, 6)) * FULL_SCALE[:, None] / FULL_SCALE
-    mixing[:, range(6), range(6)] = PLATE["gain"] * rng.normal(size=(count, 6))
-    turn, shift = skew(PLATE["turn"] * rng.normal(size=(count, 3))), skew(PLATE["place"] * rng.normal(size=(count, 3)))
-    mixing[:, :3, :3] += turn
-    mixing[:, 3:, 3:] += turn
-    mixing[:, 3:, :3] += shift
-    return Plates(mixing, OFFSET * rng.normal(size=(count, 6)), PLATE["delay"] * rng.normal(size=count))
+def plate_sources() -> Plates:
+    """Return plates with one fault of one standard deviation each: 36 gains and cross-talks, 3 turns, 3 shifts, 6 offsets, a delay."""
+    share = PLATE["cross-talk"] * FULL_SCALE[:, None] / FULL_SCALE
+    np.fill_diagonal(share, PLATE["gain"])
+    mixing, offset, delay = np.zeros((49, 6, 6)), np.zeros((49, 6)), np.zeros(49)
+    rows, columns = np.divmod(np.arange(36), 6)
+    mixing[np.arange(36), rows, columns] = share.ravel()
+    turn, shift = skew(PLATE["turn"] * np.eye(3)), skew(PLATE["place"] * np.eye(3))
+    mixing[36:39, :3, :3] = mixing[36:39, 3:, 3:] = turn
+    mixing[39:42, 3:, :3] = shift
+    offset[42:48] = np.diag(OFFSET)
+    delay[48] = PLATE["delay"]
+    return Plates(mixing, offset, delay)
 
 
-def mismatch(body: Body, fits: tuple[Fit, ...], noise: Noise, *, seed: int = 0) -> Mismatch:
-    """Return the scores of twins and plates over all trials, the twins scaled so that their marker residuals are as large as the
-    observed.
+def mismatch(body: Body, fits: tuple[Fit, ...], noise: Noise) -> Mismatch:
+    """Return the scores of kinematics and plates over all trials.
+
+    Skin and flesh slide as much as `twins` says, or more where the markers' residuals are larger than that predicts.
     """
-    rng = np.random.default_rng(seed)
-    twins, plates = draw_twins(body, TWINS, rng), draw_plates(TWINS, rng)
-    found = np.zeros((2, 10 * len(body.segments), TWINS))
+    size = 10 * len(body.segments)
+    sources, plates = plate_sources(), np.zeros((size, 49))
+    scores: KinematicScores | None = None
     predicted, observed = 0.0, 0.0
     for fit in fits:
+        white = noise.at(fit.motion.rate)
         for pick in blocks(fit.use, fit.motion.rate, noise):
             if pick.size < SHORTEST:
                 continue
             motion = Motion(fit.motion.time[pick], fit.motion.q[pick], fit.motion.v[pick], fit.motion.a[pick])
             W = regressor_of(segment_motion(body, motion))
-            white = noise.at(fit.motion.rate).whiten(W).reshape(-1, W.shape[2])
-            change, residual = _twin_errors(body, motion, twins)
-            for index, error in enumerate((change, _plate_errors(W @ body.sip.phi, motion.rate, noise, plates))):
-                found[index] += white.T @ noise.at(fit.motion.rate).whiten(error).reshape(-1, TWINS)
+            weight = white.weighted(W)
+            found = kinematic_scores(body, motion, weight)
+            scores = found if scores is None else scores + found
+            wrong = _plate_errors(W @ body.sip.phi, motion.rate, noise, sources)
+            plates += np.tensordot(weight, wrong, axes=((0, 1), (0, 1)))
             if fit.motion.residual.shape[1] and np.isfinite(fit.motion.residual[pick]).any():
-                predicted += residual * pick.size
+                predicted += _marker_squares(body, motion) * pick.size
                 observed += float(np.nanmean(fit.motion.residual[pick] ** 2)) * pick.size
-    scale = np.sqrt(observed / predicted) if predicted > 0 and observed > 0 else 1.0
-    return Mismatch(scale * found[0], found[1])
+    if scores is None:
+        return nothing(body)
+    return Mismatch(_of_one_sd(body, scores, np.sqrt(max(1.0, observed / predicted)) if predicted > 0 else 1.0), plates)
 
 
-def _twin_errors(body: Body, motion: Motion, twins: Twins) -> tuple[Array, float]:
-    """Return the wrench errors (T, 6, K) about the lab origin, and the mean square distance of the markers that is left, m²."""
-    pose = poses(body, motion.q)
-    everything, segment = list(range(len(body.segments))), list(body.markers.segment)
+def nothing(body: Body) -> Mismatch:
+    """Return the scores of no frames."""
+    size, joints = 10 * len(body.segments), len(body.joints)
+    sources = 3 * joints * (len(body.markers.names) + len(body.segments) + 2)
+    return Mismatch(np.zeros((size, sources)), np.zeros((size, 49)))
+
+
+def _of_one_sd(body: Body, scores: KinematicScores, slack: float) -> Array:
+    """Return the scores (p, n) of every source times its standard deviation; ``slack`` multiplies those of skin and flesh."""
+    beside = neighbours(body)
+    centre, tilt = np.zeros(len(body.joints)), np.zeros((len(body.joints), 3, 3))
+    for chain in chains(body):
+        joint = body.joints[chain[0]]
+        kind = joint.name.rsplit("_", 1)[0].removeprefix("right_").removeprefix("left_")
+        centre[chain[0]] = JOINT_CENTRE.get(kind, OTHER_CENTRE)
+        if len(chain) == 1:
+            tilt[chain[0]] = HINGE_TILT.get(kind, OTHER_TILT) * (np.eye(3) - np.outer(joint.axis, joint.axis))
+    parts = [
+        slack * SLIDE * beside[:, list(body.markers.segment), None, None] * scores.slide,
+        slack * SLIDE * beside[:, :, None, None] * scores.flesh,
+        centre[:, None, None] * scores.centre,
+        tilt @ scores.tilt,
+    ]
+    return np.concatenate([part.reshape(-1, part.shape[-1]) for part in parts]).T
+
+
+def _marker_squares(body: Body, motion: Motion) -> float:
+    """Return the mean square distance (m²) that twins leave between markers and model."""
+    few = Motion(motion.time[::EVERY], motion.q[::EVERY], motion.v[::EVERY], motion.a[::EVERY])
+    pose, segment = poses(body, few.q), list(body.markers.segment)
     J, _ = jacobian(body, pose, segment, pose.points(segment, body.markers.position))
-    place, turn = jacobian(body, pose, everything, pose.points(everything, body.sip.com))
+    wrong = disturbance(body, few, pose, draw_twins(body, TWINS, np.random.default_rng(0)))
+    moved = wrong.markers.reshape(few.time.size, 3 * len(segment), -1)
     weighted = np.swapaxes(np.repeat(body.markers.weight, 3)[:, None] * J, 1, 2)
     normal = weighted @ J
     ridge = 1e-6 * np.trace(normal, axis1=1, axis2=2)[:, None, None] / body.nv * np.eye(body.nv)
-    gain = -np.linalg.solve(normal + ridge, weighted)
-    errors, left = [], 0.0
-    for start in range(0, TWINS, CHUNK):
-        few = Twins(*(x[..., start : start + CHUNK] for x in (twins.slide, twins.flesh, twins.centre, twins.tilt)))
-        wrong = disturbance(body, motion, pose, few)
-        moved = wrong.markers.reshape(motion.time.size, 3 * len(segment), -1)
-        tangent = gain @ moved
-        left += 3 * float(np.mean((moved + J @ tangent) ** 2)) * CHUNK / TWINS
-        shape = wrong.places.shape
-        errors.append(
-            wrench_change(body, motion, wrong.places + (place @ tangent).reshape(shape), wrong.turns + (turn @ tangent).reshape(shape))
-        )
-    return np.concatenate(errors, axis=2), left
+    return 3 * float(np.mean((moved - J @ np.linalg.solve(normal + ridge, weighted @ moved)) ** 2))
 
 
 def _plate_errors(wrench: Array, rate: float, noise: Noise, plates: Plates) -> Array:
-    """Return the errors (T, 6, K) about the lab origin of plates that measure ``wrench`` (T, 6)."""
+    """Return the errors (T, 6, m) about the lab origin of plates that measure ``wrench`` (T, 6)."""
     near = wrench @ noise.shift.T
     late = np.gradient(near, 1.0 / rate, axis=0)[..., None] * plates.delay
     return np.asarray(np.linalg.inv(noise.shift) @ (np.tensordot(near, plates.mixing, axes=(1, 2)).swapaxes(1, 2) + plates.offset.T - late))
@@ -132,7 +155,7 @@ def _plate_errors(wrench: Array, rate: float, noise: Noise, plates: Plates) -> A
 
 def covariance(H: Array, found: Mismatch, sizes: Sizes) -> Array:
     """Return the covariance (p, p) of b = W' S^-1 y at given parameters."""
-    M, P = (x @ x.T / x.shape[1] for x in (found.kinematics, found.plates))
+    M, P = (x @ x.T for x in (found.kinematics, found.plates))
     return np.asarray(sizes.noise * H + sizes.kinematics**2 * M + P)
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import dct
+from scipy.fft import dct, idct
 
 from biodance.errors import BiodanceError
 from biodance.records import Array, frozen_array
@@ -82,6 +82,17 @@ class Noise:
         keep = band >= 0
         inverse = np.linalg.inv(np.linalg.cholesky(self.covariance))
         return inverse[band[keep]] @ self.coefficients(shifted)[keep]
+
+    def weighted(self, rows: Array) -> Array:
+        """Return S^-1 rows (T, 6, n) for consecutive samples ``rows`` (T, 6, n) about the lab origin: ``whiten`` and its transpose."""
+        white = self.whiten(rows)
+        if self.is_white:
+            return np.asarray(self.shift.T @ np.linalg.solve(np.linalg.cholesky(self.covariance[0]).T, white))
+        band = self.bands_of(len(rows))
+        keep = band >= 0
+        spectrum = np.zeros_like(rows)
+        spectrum[keep] = np.swapaxes(np.linalg.inv(np.linalg.cholesky(self.covariance)), 1, 2)[band[keep]] @ white
+        return np.asarray(self.shift.T @ idct(spectrum, type=2, norm="ortho", axis=0))
 
     def coefficients(self, shifted: Array) -> Array:
         """Return the cosine transform (T, 6, n) along time of samples about ``about``; the samples themselves for white noise."""

@@ -16,7 +16,8 @@ from biodance.identify.caution import widened
 from biodance.identify.identification import Identification, conclude
 from biodance.identify.knowledge import Known
 from biodance.identify.learning import learn
-from biodance.identify.mismatch import SHORTEST, TWINS, Mismatch, mismatch
+from biodance.identify.loads import may_carry
+from biodance.identify.mismatch import SHORTEST, Mismatch, mismatch, nothing
 from biodance.identify.noise import BLOCK, blocks
 from biodance.identify.statistics import Fit, Statistics, empty, layout_for, statistics
 from biodance.records import Array, Motion, Wrench
@@ -104,7 +105,7 @@ class Stream:
         intervals count the noise alone, and the notes say so.
         """
         found = self.statistics
-        noise, _ = learn(found, widened(self.body.sip))
+        noise, _ = learn(found, may_carry(self.body, widened(self.body.sip)))
         disturbed = mismatch(self.body, fits, noise) if fits else None
         return conclude(self.body, found, tuple(fit.name for fit in fits) or ("stream",), noise=noise, found=disturbed)
 
@@ -134,8 +135,7 @@ def begin(body: Body, *, rate: float) -> Stream:
     if not (np.isfinite(rate) and rate > 0):
         raise BiodanceError(f"A stream needs a frame rate over 0 Hz, got {rate}.")
     total = empty(10 * len(body.segments), layout_for(np.zeros(3)))
-    nothing = np.zeros((10 * len(body.segments), TWINS))
-    return Stream(body, rate, total, Mismatch(nothing, nothing), np.empty((0, 8 + body.nq + 2 * body.nv)), np.zeros(4))
+    return Stream(body, rate, total, nothing(body), np.empty((0, 8 + body.nq + 2 * body.nv)), np.zeros(4))
 
 
 def about(found: Statistics, point: Array) -> Statistics:
@@ -201,7 +201,7 @@ def _settle(stream: Stream) -> Stream:
     closed = _close(stream)
     if len(stream.pending) < SHORTEST:
         return closed
-    noise, _ = learn(closed.statistics, widened(stream.body.sip))
+    noise, _ = learn(closed.statistics, may_carry(stream.body, widened(stream.body.sip)))
     more = mismatch(stream.body, (_pending_fit(stream),), noise)
     old = stream.disturbed
     return replace(closed, disturbed=Mismatch(old.kinematics + more.kinematics, old.plates + more.plates))

@@ -12,12 +12,11 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.inertia import TENSOR
-from biodance.motion.kinematics import Poses, poses, segment_motion
+from biodance.motion.kinematics import Poses, poses
 from biodance.motion.marker_jacobian import below as below
 from biodance.motion.marker_jacobian import chains as chains
 from biodance.motion.marker_jacobian import jacobian as jacobian
 from biodance.motion.marker_jacobian import skew as skew
-from biodance.motion.regressor import GRAVITY
 from biodance.records import Array, Motion
 
 SLIDE = 0.006
@@ -120,33 +119,6 @@ def _drift(body: Body, pose: Poses, twins: Twins, hangs: Array) -> Array:
 
 def _parent_turn(pose: Poses, parent: int) -> Array:
     return pose.root_rotation if parent < 0 else pose.joint_rotation[:, parent]
-
-
-def wrench_change(body: Body, motion: Motion, places: Array, turns: Array) -> Array:
-    """Return the change (T, 6, K) of the table's wrench about the lab origin when centres of mass move by ``places`` and segments turn by
-    ``turns`` (T, N, 3, K), lab frame: the rate of change of momentum and angular momentum, less the moment of gravity.
-    """
-    move = segment_motion(body, motion)
-    step = 1.0 / motion.rate
-    mass = body.sip.mass
-    com = (move.rotation @ body.sip.com[..., None])[..., 0] + move.position
-    momentum = mass[:, None] * np.gradient(com, step, axis=0)
-    inertia = move.rotation @ central_inertia(body) @ np.swapaxes(move.rotation, -1, -2)
-    spin = (inertia @ move.angular_velocity[..., None])[..., 0]
-    rate = mass[:, None, None] * np.gradient(places, step, axis=0)
-    angular = _summed(-skew(momentum), places) + _summed(skew(com), rate) - _summed(skew(spin), turns)
-    angular += _summed(inertia, np.gradient(turns, step, axis=0))
-    force = np.gradient(rate.sum(axis=1), step, axis=0)
-    weight = mass[:, None] * GRAVITY
-    moment = np.gradient(angular, step, axis=0) + np.tensordot(places, skew(weight), axes=([1, 2], [0, 2])).swapaxes(1, 2)
-    return np.concatenate([force, moment], axis=1)
-
-
-def _summed(matrix: Array, vectors: Array) -> Array:
-    """Return sum over segments of matrix (T, N, 3, 3) times vectors (T, N, 3, K)."""
-    frames, count = matrix.shape[:2]
-    wide = np.swapaxes(matrix, 1, 2).reshape(frames, 3, 3 * count)
-    return np.asarray(wide @ vectors.reshape(frames, 3 * count, -1))
 
 
 def central_inertia(body: Body) -> Array:
