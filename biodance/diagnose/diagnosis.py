@@ -107,12 +107,17 @@ class Adequacy:
 
 @dataclass(frozen=True)
 class Unobservable:
-    """The smallest size ``limit`` (``unit``) of a cause that this session would name; infinite: it leaves no trace here."""
+    """The smallest size ``limit`` (``unit``) of a cause that this session would see; infinite: it leaves no trace here.
+
+    ``told_from`` the size from which it is also told from every other cause, infinite if one looks the same; ``typical`` size.
+    """
 
     effect: str
     target: str
     limit: float
     unit: str
+    told_from: float = float("nan")
+    typical: float = float("nan")
 
 
 @dataclass(frozen=True, eq=False)

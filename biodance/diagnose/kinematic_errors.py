@@ -24,9 +24,9 @@ REACH = 0.1
 class Errors:
     """What K elementary errors do in one trial.
 
-    ``groups`` (K) names such as ``slide thigh`` (m/rad), ``flesh thigh`` (m/rad), ``centre hip`` (m), ``tilt knee`` (rad); ``wrench``
-    (T, 6, K) added to the wrench that the motion needs beyond the predicted one, about the lab origin; ``markers`` (M, 3, K) m, mean residual
-    of every marker, model less measured, segment axes.
+    ``groups`` (K) names such as ``slide thigh`` (m/rad), ``sag thigh`` (s²), ``flesh thigh`` (m/rad), ``centre hip`` (m), ``tilt knee``
+    (rad); ``wrench`` (T, 6, K) added to the wrench that the motion needs beyond the predicted one, about the lab origin; ``markers``
+    (M, 3, K) m, mean residual of every marker, model less measured, segment axes.
     """
 
     groups: tuple[str, ...]
@@ -39,7 +39,12 @@ def kinematic_errors(body: Body, motion: Motion) -> Errors:
     pose = poses(body, motion.q)
     angles = motion.q[:, body.nq - len(body.joints) :]
     response = _Response.of(body, motion, pose)
-    parts = [_slides(body, pose, angles, response), _flesh(body, pose, angles, response), _joints(body, motion, pose, response)]
+    parts = [
+        _slides(body, pose, angles, response),
+        _sags(body, motion, pose, response),
+        _flesh(body, pose, angles, response),
+        _joints(body, motion, pose, response),
+    ]
     wrench = differentiated(np.concatenate([part[1] for part in parts], axis=3), motion.rate)
     return Errors(tuple(n for part in parts for n in part[0]), wrench, np.concatenate([part[2] for part in parts], axis=2))
 
@@ -50,8 +55,8 @@ Part = tuple[list[str], Array, Array]
 
 @dataclass(frozen=True, eq=False)
 class _Response:
-    """How a trial answers: ``place``, ``turn`` (T, N, 3, 6, 3) functionals of a segment's CoM moved and turned; ``tangent`` (T, 3, 6, nv) of
-    the coordinates; ``gain`` (T, nv, 3M) coordinates per marker displacement; ``J`` (T, 3M, nv) markers per coordinate.
+    """How a trial answers: ``place``, ``turn`` (T, N, 3, 6, 3) functionals of a segment's CoM moved and turned; ``tangent``
+    (T, 3, 6, nv) of the coordinates; ``gain`` (T, nv, 3M) coordinates per marker displacement; ``J`` (T, 3M, nv) markers per coordinate.
     """
 
     place: Array
@@ -130,6 +135,29 @@ def _slides(body: Body, pose: Poses, angles: Array, response: _Response) -> Part
     return names, np.concatenate(values, axis=3), np.concatenate(left, axis=2)
 
 
+def _sags(body: Body, motion: Motion, pose: Poses, response: _Response) -> Part:
+    """Return the errors of markers on flesh that yields to its own weight and acceleration, segment by segment (s²: m per m/s²)."""
+    segment, move, frames = np.array(body.markers.segment), segment_motion(body, motion), motion.time.size
+    names: list[str] = []
+    values, left = [], []
+    for s, name in enumerate(body.segments):
+        on = np.flatnonzero(segment == s)
+        if not on.size:
+            continue
+        arm = move.rotation[:, s] @ body.markers.position[on].mean(axis=0)
+        w = move.angular_velocity[:, s]
+        acceleration = move.acceleration[:, s] + np.cross(move.angular_acceleration[:, s], arm) + np.cross(w, np.cross(w, arm))
+        moved = np.tile(acceleration - GRAVITY, (1, on.size))[:, :, None]
+        rows = (3 * on[:, None] + np.arange(3)).ravel()
+        tangent = response.gain[:, :, rows] @ moved
+        values.append((response.tangent.reshape(frames, 18, -1) @ tangent).reshape(frames, 3, 6, 1))
+        residual = response.J @ tangent
+        residual[:, rows] += moved
+        left.append(_mean_local(body, pose, residual, np.ones((frames, 1))))
+        names.append(f"sag {kind_of(name)}")
+    return names, np.concatenate(values, axis=3), np.concatenate(left, axis=2)
+
+
 def _mean_local(body: Body, pose: Poses, residual: Array, weight: Array) -> Array:
     """Return (M, 3, P * n): mean over time of residuals (T, 3M, P) in segment axes, times ``weight`` (T, n)."""
     frames, segment = len(residual), list(body.markers.segment)
@@ -156,7 +184,8 @@ def _joints(body: Body, motion: Motion, pose: Poses, response: _Response) -> Par
     firsts = chains(body)
     centres = [(chain[0], axis) for chain in firsts for axis in np.eye(3)]
     tilts = [(chain[0], axis) for chain in firsts if len(chain) == 1 for axis in _across(body.joints[chain[0]].axis)]
-    names = [f"centre {joint_kind(body.joints[j].name)}" for j, _ in centres] + [f"tilt {joint_kind(body.joints[j].name)}" for j, _ in tilts]
+    names = [f"centre {joint_kind(body.joints[j].name)}" for j, _ in centres]
+    names += [f"tilt {joint_kind(body.joints[j].name)}" for j, _ in tilts]
     count, markers = len(names), len(body.markers.names)
     still = np.zeros((n, markers, 3, count)), np.zeros((n, segments, 3, count))
     centre, tilt = np.zeros((2, n, 3, count))
@@ -167,7 +196,8 @@ def _joints(body: Body, motion: Motion, pose: Poses, response: _Response) -> Par
     tangent = response.gain @ moved
     value = response.tangent.reshape(frames, 18, -1) @ tangent
     for s in range(segments):
-        value += response.place[:, s].reshape(frames, 18, 3) @ wrong.places[:, s] + response.turn[:, s].reshape(frames, 18, 3) @ wrong.turns[:, s]
+        value += response.place[:, s].reshape(frames, 18, 3) @ wrong.places[:, s]
+        value += response.turn[:, s].reshape(frames, 18, 3) @ wrong.turns[:, s]
     left = _mean_local(body, pose, moved + response.J @ tangent, np.ones((frames, 1)))
     return names, value.reshape(frames, 3, 6, count), left
 

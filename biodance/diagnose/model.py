@@ -50,7 +50,7 @@ class Model:
 
     def less(self, named: tuple[Named, ...]) -> "Model":
         """Return the model with the causes ``named`` taken off the target."""
-        y = self.problem.target()
+        y = self.problem.target
         for one in named:
             y = y - changes(self.problem, one.effect, one.theta)
         X, factor = self.belief.X, self.belief.factor
@@ -73,5 +73,5 @@ def model(problem: Problem, causes: tuple[Candidate, ...], tolerances: Tolerance
         if one.effect.typical.size == 1 and tolerances.size(key_of(*one.names)) > 0
     ]
     X = np.concatenate([problem.sip, kinematic, np.array(installed).reshape(-1, len(problem.sip)).T], axis=1)
-    both = white(problem, tolerances, np.concatenate([X, problem.target()[:, None]], axis=1))
+    both = white(problem, tolerances, np.concatenate([X, problem.target[:, None]], axis=1))
     return Model(problem, tolerances, believe(both[:, :-1], both[:, -1]))

@@ -58,18 +58,20 @@ class Round:
 
 @dataclass(frozen=True, eq=False)
 class Naming:
-    """All rounds; ``found`` the last model, with the named causes; ``first`` the model before any; ``accepted`` a round per named cause."""
+    """All rounds: ``first`` the model before any was named, with the ``screening`` of ``first_causes``; ``found`` the last model, with the
+    named causes; ``accepted`` a round per named cause, in their order.
+    """
 
     first: Model
     found: Model
     accepted: tuple[Round, ...]
     screening: Round
-    causes: tuple[Candidate, ...]
+    first_causes: tuple[Candidate, ...]
 
 
 def name_causes(problem: Problem, tolerances: Tolerances, chosen: Iterable[str] | None = None) -> Naming:
     """Return the causes that the session shows, at most `ROUNDS`; ``chosen`` limits the family to some effects by name."""
-    causes = candidates(problem, chosen)
+    first_causes = causes = candidates(problem, chosen)
     first = found = model(problem, causes, tolerances)
     screening = Round(screen(found, causes))
     accepted: list[Round] = []
@@ -85,7 +87,7 @@ def name_causes(problem: Problem, tolerances: Tolerances, chosen: Iterable[str] 
         causes = candidates(rebuilt, chosen)
         found = settle(model(rebuilt, causes, tolerances), settled.named)
         ranking = Round(tuple(one for one in screen(found, causes) if one.cause.names not in {named_of(n) for n in found.named}))
-    return Naming(first, found, tuple(accepted), screening, causes)
+    return Naming(first, found, tuple(accepted), screening, first_causes)
 
 
 def named_of(one: Named) -> tuple[str, str]:
@@ -154,14 +156,14 @@ def settle(found: Model, named: tuple[Named, ...]) -> Model:
         u = np.concatenate([one.theta / (SCALE * one.effect.typical) for one in named])
         inner = np.linalg.inv(np.eye(len(s)) + G)
         step = inner @ (s - u)
-        named, start = _moved(named, u + step, inner)
+        named = _moved(named, u + step, inner)
         current = current.less(named)
         if np.abs(step).max() < 1e-3:
             break
     return current
 
 
-def _moved(named: tuple[Named, ...], u: Array, inner: Array) -> tuple[tuple[Named, ...], int]:
+def _moved(named: tuple[Named, ...], u: Array, inner: Array) -> tuple[Named, ...]:
     """Return the causes with new parameters ``u`` (in standard deviations of a fault) and their covariances."""
     out, start = [], 0
     for one in named:
@@ -169,7 +171,7 @@ def _moved(named: tuple[Named, ...], u: Array, inner: Array) -> tuple[tuple[Name
         cut, scale = slice(start, start + width), SCALE * one.effect.typical
         out.append(Named(one.effect, scale * u[cut], inner[cut, cut] * np.outer(scale, scale)))
         start += width
-    return tuple(out), start
+    return tuple(out)
 
 
 def _penalty(found: Model) -> float:

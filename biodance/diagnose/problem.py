@@ -1,6 +1,6 @@
 """A session as one linear problem: rows by frequency and rows of the markers, and all columns that are no fault.
 
-    y = W (phi - phi0) + K k + noise        W regressor of the parameters' prior, K elementary kinematic errors, both unit normal once scaled
+    y = W (phi - phi0) + K k + noise        W regressor, K elementary kinematic errors, both unit normal once scaled
 
 Columns of faults come from `candidates`; sizes of everything from `tolerances`.
 """
@@ -39,13 +39,14 @@ class Look:
 class Problem:
     """The session in rows, not yet whitened.
 
-    ``cases`` thinned trials with the parameters in use; ``spectrum`` where rows come from; ``prior`` of the parameters and ``factor`` S (p, k)
-    of its covariance; ``sip`` (r, k) columns W S; ``kinematics`` (r, K) columns of unit errors of ``groups`` (K); ``markers`` how many of
-    the r rows, at the end, are marker rows (m); ``notes`` what was left out.
+    ``cases`` thinned trials with the parameters in use; ``spectrum`` where rows come from; ``target`` (r,) measured minus what the prior's mean predicts; ``prior`` of the parameters and ``factor`` S
+    (p, k) of its covariance; ``sip`` (r, k) columns W S; ``kinematics`` (r, K) columns of unit errors of ``groups`` (K); ``markers`` how many
+    of the r rows, at the end, are marker rows (m); ``notes`` what was left out.
     """
 
     cases: tuple[Case, ...]
     spectrum: Spectrum
+    target: Array
     prior: Sip
     factor: Array
     sip: Array
@@ -58,12 +59,6 @@ class Problem:
     def wrench_rows(self) -> int:
         """Number of rows that come from the plates: six per coefficient."""
         return 6 * self.spectrum.band.size
-
-    def target(self, added: tuple[Array, ...] | None = None) -> Array:
-        """Return y (r,): measured minus predicted, less what named causes ``added`` (T, 6) to each trial's wrench."""
-        extra = added or tuple(np.zeros((1, 6)) for _ in self.cases)
-        wrench = self.spectrum.rows(tuple((case.residual - more)[:, :, None] for case, more in zip(self.cases, extra, strict=True)))
-        return np.concatenate([wrench.ravel(), _mean_markers(self.cases, self.spectrum).ravel()])
 
     def columns(self, effect: Effect) -> Array:
         """Return (r, p): what one unit of each parameter of ``effect`` adds to the rows."""
@@ -87,14 +82,15 @@ class Problem:
         return replace(self, cases=tuple(replace(case, phi=phi) for case in self.cases))
 
 
-def problem(body: Body, looks: tuple[Look, ...]) -> Problem:
-    """Return the problem of ``looks`` at a session of ``body``, whose SIP are the table's.
+def problem(body: Body, looks: tuple[Look, ...], *, prior: Sip | None = None) -> Problem:
+    """Return the problem of ``looks`` at a session of ``body``; ``prior`` of its parameters, by default the table's with widened sd.
 
     Raises
     ------
     TrialRefused
         No trial has a second of believable, fully measured frames.
     """
+    before = prior or widened(body.sip)
     fits = tuple(Fit(look.trial.name, look.motion, look.trial.wrench, look.use) for look in looks)
     used, about, notes = usable(body, fits)
     kept = {fit.name: fit.use for fit in used}
@@ -102,17 +98,18 @@ def problem(body: Body, looks: tuple[Look, ...]) -> Problem:
     for look in looks:
         if look.trial.name in kept:
             time = np.linspace(look.start, look.end, look.motion.time.size)
-            pairs.append(thinned(Case(body, look.trial, look.motion, body.sip.phi, time), kept[look.trial.name]))
+            pairs.append(thinned(Case(body, look.trial, look.motion, before.phi, time), kept[look.trial.name]))
     cases = tuple(case for case, _ in pairs)
     where = spectrum(cases, tuple(use for _, use in pairs), about)
-    prior = widened(body.sip)
-    factor = prior_factor(prior)
+    factor = prior_factor(before)
     W = where.rows(tuple(case.regressor @ factor for case in cases))
     errors = [[kinematic_errors(body, _part(case.motion, pick)) for pick in picks] for case, picks in zip(cases, where.picks, strict=True)]
     rows, markers = _kinematic_rows(where, errors)
     sip = np.concatenate([W.reshape(-1, W.shape[2]), np.zeros((len(markers), W.shape[2]))])
     groups = next(one.groups for some in errors for one in some)
-    return Problem(cases, where, prior, factor, sip, np.concatenate([rows, markers]), groups, len(markers), notes)
+    measured = where.rows(tuple(case.residual[:, :, None] for case in cases))
+    target = np.concatenate([measured.ravel(), _mean_markers(cases, where).ravel()])
+    return Problem(cases, where, target, before, factor, sip, np.concatenate([rows, markers]), groups, len(markers), notes)
 
 
 def _part(motion: Motion, pick: NDArray[np.intp]) -> Motion:

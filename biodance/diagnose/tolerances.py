@@ -1,4 +1,4 @@
-"""How large everything is that is no fault: soft tissue, joint centres, installed plates, and what is left; learned from sessions without fault.
+"""How large everything is that is no fault: soft tissue, joint centres, installed plates, and what is left; learned from null sessions.
 
 Errors of a person repeat with the movement, so that counting residuals as independent noise would name a cause in every session. The sizes
 of all nuisances and the covariance of the rest per band are learned together by expectation maximisation on null sessions: virtual
@@ -28,8 +28,8 @@ MARKER_FLOOR = 0.0003
 
 @dataclass(frozen=True, eq=False)
 class Tolerances:
-    """``sizes`` standard deviation by key: an effect and its target (``plate_gain Fz``), a group of elementary errors (``slide thigh``) or a
-    marker's segment (``marker thigh``), in the unit of its column; ``noise`` (B, 6, 6) covariance of one coefficient at `REFERENCE`;
+    """``sizes`` standard deviation by key: an effect and its target (``plate_gain Fz``), a group of elementary errors (``slide thigh``) or
+    a marker's segment (``marker thigh``), in the unit of its column; ``noise`` (B, 6, 6) covariance of one coefficient at `REFERENCE`;
     ``energy``, ``energy_sd`` (B, 6) mean square of the whitened residual in null sessions and its standard deviation; ``threshold`` of
     the evidence (natural logarithm) that no more than a few null sessions reach; ``origin`` in words.
     """
@@ -60,10 +60,28 @@ class Tolerances:
 @cache
 def shipped() -> Tolerances:
     """Return the tolerances that come with biodance, learned from virtual subjects (`tolerances.toml` says which)."""
-    raw = tomllib.loads((files("biodance.diagnose") / "tolerances.toml").read_text(encoding="utf-8"))
+    return read_tolerances((files("biodance.diagnose") / "tolerances.toml").read_text(encoding="utf-8"))
+
+
+def read_tolerances(text: str) -> Tolerances:
+    """Return the tolerances from the text of a TOML file."""
+    raw = tomllib.loads(text)
     return Tolerances(
         raw["sizes"], np.array(raw["noise"]), np.array(raw["energy"]), np.array(raw["energy_sd"]), raw["threshold"], raw["origin"]
     )
+
+
+def to_toml(found: Tolerances) -> str:
+    """Return the tolerances as the text of a TOML file that `read_tolerances` reads."""
+    lines = [f'origin = "{found.origin}"', f"threshold = {found.threshold:.4g}"]
+    for name in ("energy", "energy_sd"):
+        rows = ", ".join("[" + ", ".join(f"{x:.4g}" for x in row) + "]" for row in getattr(found, name))
+        lines.append(f"{name} = [{rows}]")
+    lines.append("noise = [")
+    lines += ["  [" + ", ".join("[" + ", ".join(f"{x:.5g}" for x in row) + "]" for row in band) + "]," for band in found.noise]
+    lines += ["]", "", "[sizes]"]
+    lines += [f'"{key}" = {value:.4g}' for key, value in sorted(found.sizes.items())]
+    return "\n".join(lines) + "\n"
 
 
 def key_of(name: str, target: str) -> str:

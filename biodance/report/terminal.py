@@ -78,6 +78,32 @@ def print_identification(found: dict[str, Any], console: Console) -> None:
         console.print(f"note: {escape(note)}", soft_wrap=True)
 
 
+def print_diagnosis(found: dict[str, Any], console: Console) -> None:
+    """Print the verdict, what was named with size and interval, and what could not be seen, of `biodance diagnose`."""
+    console.print(f"verdict: [bold]{found['verdict']}[/]")
+    for finding in found["findings"]:
+        sizes = ", ".join(
+            f"{name} {p['value']:.4g} {p['unit']}" + (f" ± {p['sd']:.2g}" if p["sd"] is not None else "")
+            for name, p in finding["parameters"].items()
+        )
+        others = ", ".join(f"{a['effect']} {a['target']}".strip() for a in finding["set"][1:])
+        told = f"; it could also be: {others}" if others else ""
+        console.print(f"found: [bold]{escape(finding['effect'])} {escape(finding['target'])}[/]: {escape(sizes + told)}", soft_wrap=True)
+        if finding["gain"]:
+            low, high = (100 * x for x in finding["gain"]["ci95"])
+            console.print(
+                f"  on trials that were not used, accepting it removes {low:.0f} to {high:.0f} % of the difference", soft_wrap=True
+            )
+        console.print(f"  {escape(finding['advice'])}", soft_wrap=True)
+    if found["verdict"] in ("unexplained", "named, incomplete") and found["adequacy"]:
+        worst = found["adequacy"][0]
+        low, high = worst["band_hz"]
+        where = f"{worst['channel']}, {low:g} to {high:g} Hz, trial {worst['trial']}"
+        console.print(f"left unexplained: {escape(where)} ({worst['z']:.0f} times what sessions without fault vary)")
+    for note in found["notes"]:
+        console.print(f"note: {escape(note)}", soft_wrap=True)
+
+
 def print_findings(findings: Sequence[Finding], console: Console) -> None:
     """Print one line a finding of the doctor."""
     table = Table(box=None, pad_edge=False, show_header=False)

@@ -4,10 +4,13 @@ from pathlib import Path
 from typing import Any
 
 from biodance.body.body_file import body_text
+from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.export import BODY, body_of_result
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.provenance import Provenance, now, provenance
 from biodance.pipeline.results import SessionResult
+from biodance.report.diagnosis_json import diagnosis_document
+from biodance.report.diagnosis_page import diagnosis_page
 from biodance.report.identification_json import identification_document
 from biodance.report.page import page
 from biodance.report.results_json import document, plain, to_text
@@ -30,6 +33,21 @@ def write_identification(result: SessionResult, found: SessionIdentification, fo
     numbers = {"session": result.session.folder.name, **identification_document(found), "provenance": made.as_dict()}
     body, source = body_of_result(result)
     _write(folder, {NUMBERS: to_text(numbers), PAGE: _page(result, made), BODY: body_text(body, source)})
+    return dict(plain(numbers))
+
+
+def write_diagnosis(result: SessionResult, found: SessionDiagnosis, folder: Path, *, accepted: bool) -> dict[str, Any]:
+    """Write ``report.html`` and ``results.json`` of a diagnosis; with ``accepted`` also ``body.json``, identified with the findings accepted.
+
+    Return the numbers.
+    """
+    made = provenance(result, created=now())
+    numbers = {"session": result.session.folder.name, **diagnosis_document(found), "provenance": made.as_dict()}
+    files = {NUMBERS: to_text(numbers), PAGE: diagnosis_page(result, found, made)}
+    if accepted and found.accepted is not None:
+        named = ", ".join(f"{one.effect} {one.target}".strip() for one in found.diagnosis.findings)
+        files[BODY] = body_text(found.accepted.identified, f"Session {result.session.folder.name}: identified with {named} accepted.")
+    _write(folder, files)
     return dict(plain(numbers))
 
 

@@ -1,0 +1,58 @@
+"""The command diagnose: what the simulation of a session gets wrong, and what naming it gains."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from biodance.cli.app import DONE, NEEDS_A_PERSON, Force, Json, Out, app, print_json, progress
+
+
+@app.command
+def diagnose(
+    session: Path,
+    *,
+    out: Out,
+    reference: Path | None = None,
+    accept: Annotated[
+        bool, Parameter(name="--accept", negative="", help="Also write the body identified with the findings accepted.")
+    ] = False,
+    subject: str | None = None,
+    json: Json = False,
+    force: Force = False,
+) -> int:
+    """Say what the simulation of a session gets wrong: the cause, its size, how sure, what else it could be, and what naming it gains.
+
+    Parameters
+    ----------
+    session
+        Folder with the static trial and the other trials.
+    reference
+        An earlier session of the same person without load: the body is then known ten times better than from the table.
+    subject
+        The person to diagnose where C3D files hold several.
+    """
+    from rich.console import Console
+
+    from biodance.lab.results_folder import results_folder
+    from biodance.lab.session import read_session
+    from biodance.pipeline.diagnosis import diagnose_session
+    from biodance.pipeline.session import examine, identified
+    from biodance.report.terminal import print_diagnosis
+    from biodance.report.write import write_diagnosis
+
+    with progress() as tell:
+        before = identified(examine(read_session(reference, subject_name=subject, tell=tell), tell=tell)) if reference else None
+        recording = read_session(session, subject_name=subject, tell=tell)
+        folder = results_folder(out, session, force=force)
+        result = examine(recording, reference=before, tell=tell)
+        found = diagnose_session(result, reference=before, tell=tell)
+        tell("writing the page")
+        document = write_diagnosis(result, found, folder, accepted=accept)
+    if json:
+        print_json(document)
+    else:
+        print_diagnosis(document, Console())
+        sys.stdout.write(f"{folder / 'report.html'}\n")
+    return DONE if document["verdict"] == "nothing wrong" else NEEDS_A_PERSON

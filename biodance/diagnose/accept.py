@@ -1,0 +1,113 @@
+"""Accept named causes: the trials as they would have been recorded, or the body that moves right, and what that gains elsewhere."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.body.body import Body
+from biodance.diagnose.diagnosis import Gain
+from biodance.diagnose.model import Named
+from biodance.effects.case import Case
+from biodance.errors import BiodanceError
+from biodance.identify.noise import BANDS, blocks
+from biodance.identify.statistics import Fit, layout_for
+from biodance.identify.validation import BLOCK_SECONDS, moved
+from biodance.motion.regressor import predict_wrench
+from biodance.records import Array
+
+DRAWS = 1000
+"""Bootstrap samples of the interval."""
+
+
+def accept(case: Case, named: tuple[Named, ...]) -> Case:
+    """Return ``case`` without the ``named`` causes: its trial corrected, or its body and motion."""
+    for one in reversed(named):
+        case = one.effect.corrected(case, one.theta)
+    return case
+
+
+def fit_of(case: Case, use: NDArray[np.bool_]) -> Fit:
+    """Return a case as a trial to identify from."""
+    return Fit(case.trial.name, case.motion, case.trial.wrench, use)
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """What a body leaves of trials: per trial ``left`` (T, 6) N, N·m about the standing point, frames ``use`` (T,), ``rate`` Hz."""
+
+    names: tuple[str, ...]
+    left: tuple[Array, ...]
+    use: tuple[NDArray[np.bool_], ...]
+    rate: tuple[float, ...]
+
+
+def judged(body: Body, fits: tuple[Fit, ...], about: Array) -> Judged:
+    """Return measured minus predicted wrench of ``body`` in every trial, about ``about`` (3,) m."""
+    left = tuple(moved(fit.wrench, about).value - moved(predict_wrench(body, fit.motion), about).value for fit in fits)
+    return Judged(tuple(f.name for f in fits), left, tuple(f.use for f in fits), tuple(f.motion.rate for f in fits))
+
+
+def gain(before: Judged, after: Judged, *, fitted: tuple[Judged, Judged], seed: int = 0) -> Gain:
+    """Return what naming the causes gains on trials that were not used: ``before`` and ``after`` hold the same trials.
+
+    ``fitted`` the same two bodies on the trials that were used: their residual covariances per band are the two predictive densities.
+
+    Raises
+    ------
+    BiodanceError
+        There are fewer than three blocks of one second: no interval can be given.
+    """
+    scale = np.sqrt(np.mean(np.concatenate([left[use] for left, use in zip(before.left, before.use, strict=True)]) ** 2, axis=0))
+    pairs = [(_blocks(left / scale, use, rate), _blocks(right / scale, use, rate)) for left, right, use, rate in _aligned(before, after)]
+    a, b = (np.concatenate([pair[i] for pair in pairs]) for i in (0, 1))
+    if len(a) < 3:
+        raise BiodanceError(f"The kept trials hold {len(a)} blocks of {BLOCK_SECONDS:g} s; an interval of the gain needs 3.")
+    drawn = np.random.default_rng(seed).integers(0, len(a), (DRAWS, len(a)))
+    share = 1 - np.sqrt(b[drawn].sum(axis=1) / a[drawn].sum(axis=1))
+    low, high = np.percentile(share, [2.5, 97.5])
+    change = _log_density(after, fitted[1]) - _log_density(before, fitted[0])
+    seconds = sum(float(use.sum()) / rate for use, rate in zip(before.use, before.rate, strict=True))
+    score, error = float(change.sum() / seconds), float(np.sqrt(change.size) * change.std() / seconds)
+    return Gain(_rms(before), _rms(after), (float(low), float(high)), before.names, score, error)
+
+
+def _aligned(before: Judged, after: Judged) -> list[tuple[Array, Array, NDArray[np.bool_], float]]:
+    return list(zip(before.left, after.left, before.use, before.rate, strict=True))
+
+
+def _rms(found: Judged) -> Array:
+    """Return (6,) root mean square over the used frames of all trials."""
+    return np.sqrt(np.mean(np.concatenate([left[use] for left, use in zip(found.left, found.use, strict=True)]) ** 2, axis=0))
+
+
+def _blocks(left: Array, use: NDArray[np.bool_], rate: float) -> Array:
+    """Return the summed squares (n,) of blocks of one second."""
+    frames = np.flatnonzero(use)
+    pieces = np.array_split(frames, max(1, frames.size // max(1, round(BLOCK_SECONDS * rate))))
+    return np.array([float(np.sum(left[piece] ** 2)) for piece in pieces if piece.size])
+
+
+def _coefficients(found: Judged) -> tuple[Array, NDArray[np.intp]]:
+    """Return the cosine coefficients (n, 6) of all residuals and their bands (n,)."""
+    layout = layout_for(np.zeros(3), edges=BANDS)
+    values, bands = [], []
+    for left, use, rate in zip(found.left, found.use, found.rate, strict=True):
+        there = layout.at(rate)
+        for pick in blocks(use, rate, layout):
+            band = there.bands_of(pick.size)
+            values.append(there.coefficients(left[pick])[band >= 0])
+            bands.append(band[band >= 0])
+    return np.concatenate(values), np.concatenate(bands)
+
+
+def _log_density(found: Judged, fitted: Judged) -> Array:
+    """Return the log predictive density (n,) of every coefficient, under the residual covariance per band of the trials used."""
+    values, bands = _coefficients(found)
+    known, known_bands = _coefficients(fitted)
+    out = np.zeros(len(values))
+    for b in np.unique(bands):
+        here, there = values[bands == b], known[known_bands == b]
+        spread = (there.T @ there + np.diag([1.0] * 3 + [0.25] * 3)) / (len(there) + 1)
+        out[bands == b] = -0.5 * np.sum(here * np.linalg.solve(spread, here.T).T, axis=1) - 0.5 * np.linalg.slogdet(spread)[1]
+    return out

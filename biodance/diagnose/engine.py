@@ -1,0 +1,86 @@
+"""A session's diagnosis: name causes, ask whether what is left is like a session without fault, and say what could not be seen."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.diagnose.adequacy import adequacy, verdict
+from biodance.diagnose.diagnosis import Diagnosis, Estimate, Finding, Unobservable
+from biodance.diagnose.model import Named
+from biodance.diagnose.naming import Naming, Round, name_causes
+from biodance.diagnose.observability import hidden, limits, visibility
+from biodance.diagnose.problem import Look, problem
+from biodance.diagnose.tolerances import Tolerances, shipped
+from biodance.effects.gate import Gate
+from biodance.records import Sip
+
+
+@dataclass(frozen=True, eq=False)
+class Examined:
+    """A diagnosis with what it was made from: ``naming`` all rounds, with the problem and the named causes."""
+
+    diagnosis: Diagnosis
+    naming: Naming
+
+    @property
+    def named(self) -> tuple[Named, ...]:
+        """The named causes with their sizes."""
+        return self.naming.found.named
+
+
+def diagnose(
+    body: Body,
+    looks: tuple[Look, ...],
+    *,
+    gates: tuple[Gate, ...] = (),
+    tolerances: Tolerances | None = None,
+    prior: Sip | None = None,
+    chosen: Iterable[str] | None = None,
+) -> Examined:
+    """Return what the simulation of ``body`` (with the SIP known before, by default the table's) gets wrong in the trials ``looks``.
+
+    ``gates`` the checks made before; ``tolerances`` of everything that is no fault (those of virtual subjects by default);
+    ``prior`` of the parameters (an earlier session's; by default the table's); ``chosen`` limits the causes to some effects by name.
+
+    Raises
+    ------
+    TrialRefused
+        No trial has a second of believable, fully measured frames.
+    """
+    known = tolerances or shipped()
+    asked = None if chosen is None else tuple(chosen)
+    put = problem(body, looks, prior=prior)
+    naming = name_causes(put, known, asked)
+    rows = limits(visibility(naming.first, naming.first_causes), known.threshold)
+    left = adequacy(naming.found)
+    findings = tuple(_finding(one, r) for one, r in zip(naming.found.named, naming.accepted, strict=True))
+    found = Diagnosis(
+        verdict=verdict(len(findings), left[0].z, gates),
+        findings=findings,
+        gates=gates,
+        adequacy=left,
+        unobservable=hidden(rows),
+        limits=tuple(sorted(rows, key=_relative)),
+        notes=put.notes,
+        candidates=tuple(one.alias for one in naming.screening.suspects),
+    )
+    return Examined(found, naming)
+
+
+def with_gains(examined: Examined, findings: tuple[Finding, ...]) -> Examined:
+    """Return the diagnosis with ``findings`` in place of its own, after their gains were measured."""
+    return replace(examined, diagnosis=replace(examined.diagnosis, findings=findings))
+
+
+def _relative(row: Unobservable) -> float:
+    return row.limit / row.typical
+
+
+def _finding(one: Named, found: Round) -> Finding:
+    """Return a named cause as a finding."""
+    sd = np.sqrt(np.diag(one.covariance))
+    parameters = tuple(Estimate(*row) for row in one.effect.reported(one.theta, sd))
+    advice = " ".join(text for text in (one.effect.advice, one.effect.separated_by if len(found.set) > 1 else "") if text)
+    return Finding(one.effect.name, one.effect.target, parameters, found.set, found.suspects[0].visible, advice=advice)

@@ -1,0 +1,94 @@
+"""What a session can see and what it cannot: from the movement alone, before any force is looked at.
+
+With a cause of size a, the score is expected to be G a; all expected log Bayes factors are quadratic in a. So the size from which a cause
+is seen, the size from which it is told from every other cause, and the pairs that no size separates follow from G.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from biodance.diagnose.candidates import SCALE, Candidate
+from biodance.diagnose.diagnosis import Unobservable
+from biodance.diagnose.evidence import smallest
+from biodance.diagnose.model import Model
+from biodance.diagnose.naming import TOGETHER
+from biodance.records import Array
+
+LARGE = 4.0
+"""A cause that is not seen at this many typical sizes is listed as one that this session cannot see."""
+
+
+@dataclass(frozen=True, eq=False)
+class Visibility:
+    """``causes`` (C); ``G`` (k, k) information of all bases together, ``cuts`` where each cause's basis lies in it."""
+
+    causes: tuple[Candidate, ...]
+    G: Array
+    cuts: tuple[slice, ...]
+
+    def seen(self, index: int, threshold: float) -> float:
+        """Return the size, in units of the first parameter, from which cause ``index`` is expected to pass ``threshold``; each of several
+        forces or masses at once in the same size: the worst of them.
+        """
+        one, cut = self.causes[index], self.cuts[index]
+        return max(smallest(self.G[cut, cut], way, threshold) for way in unit_directions(one))
+
+    def separation(self, index: int) -> tuple[Array, Array]:
+        """Return ``fixed``, ``growth`` (C,): log Bayes factor of cause ``index`` less that of every other one at size a (first parameter,
+        its own unit) is expected to be fixed + growth a².
+        """
+        way, cut = unit_directions(self.causes[index])[0], self.cuts[index]
+        pull = self.G[:, cut] @ way
+        fixed, growth = np.empty((2, len(self.causes)))
+        for i, other in enumerate(self.cuts):
+            block = self.G[other, other]
+            inner = np.linalg.inv(np.eye(len(block)) + block)
+            fixed[i] = -0.5 * np.linalg.slogdet(np.eye(len(block)) + block)[1] + 0.5 * np.trace(inner @ block)
+            growth[i] = 0.5 * pull[other] @ inner @ pull[other]
+        return fixed[index] - fixed, growth[index] - growth
+
+    def told(self, index: int) -> float:
+        """Return the size from which cause ``index`` is told from every other cause; infinite if one of them looks the same."""
+        fixed, growth = self.separation(index)
+        others = np.arange(len(self.causes)) != index
+        need = TOGETHER - fixed[others]
+        if np.any((growth[others] <= 1e-9) & (need > 0)):
+            return float("inf")
+        size = np.sqrt(np.maximum(need, 0.0) / np.maximum(growth[others], 1e-9))
+        return float(size.max(initial=0.0))
+
+
+def unit_directions(one: Candidate) -> list[Array]:
+    """Return the coefficients (k,) of one unit of each parameter that is not silent."""
+    loud = np.flatnonzero(~np.array(one.silent))
+    same = [k for k in loud if one.effect.parameters[k].unit == one.effect.parameters[loud[0]].unit]
+    width = one.basis.shape[1]
+    return [np.eye(width)[i] / (SCALE * one.effect.typical[k]) for i, k in enumerate(loud) if k in same]
+
+
+def visibility(found: Model, causes: tuple[Candidate, ...]) -> Visibility:
+    """Return what ``found``, a model without named causes, lets every cause show."""
+    widths = np.cumsum([0, *(one.basis.shape[1] for one in causes)])
+    Z = found.white(np.concatenate([one.basis for one in causes], axis=1))
+    _, G = found.belief.score(Z)
+    return Visibility(causes, G, tuple(slice(a, b) for a, b in pairwise(widths.tolist())))
+
+
+def limits(seen: Visibility, threshold: float) -> tuple[Unobservable, ...]:
+    """Return from which size on every cause is seen and told from the others."""
+    targets: dict[str, int] = {}
+    for one in seen.causes:
+        targets[one.names[0]] = targets.get(one.names[0], 0) + 1
+    rows = []
+    for i, one in enumerate(seen.causes):
+        limit = seen.seen(i, threshold + float(np.log(targets[one.names[0]])))
+        first = one.effect.parameters[one.silent.index(False)]
+        rows.append(Unobservable(*one.names, limit, first.unit, max(limit, seen.told(i)), first.typical))
+    return tuple(rows)
+
+
+def hidden(rows: tuple[Unobservable, ...]) -> tuple[Unobservable, ...]:
+    """Return the causes that stay unseen at `LARGE` times their typical size."""
+    return tuple(row for row in rows if row.limit > LARGE * row.typical)

@@ -1,0 +1,193 @@
+"""What the simulation of a session gets wrong: checks first, then causes; what accepting them changes in the body and gains elsewhere."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.diagnose.accept import accept, fit_of, gain, judged
+from biodance.diagnose.diagnosis import Alias, Diagnosis, Estimate, Finding
+from biodance.diagnose.engine import Examined, diagnose
+from biodance.diagnose.problem import Look
+from biodance.diagnose.tolerances import Tolerances
+from biodance.effects.case import Case
+from biodance.effects.gate import Gate, gates
+from biodance.errors import BiodanceError, SessionRefused, TrialRefused
+from biodance.identify.added_mass import expected
+from biodance.identify.identification import Identification, identify, standing_point
+from biodance.pipeline.identification import FITTED, KEPT, SessionIdentification
+from biodance.pipeline.results import SessionResult, TrialResult
+from biodance.records import Role, Sip
+
+
+@dataclass(frozen=True, eq=False)
+class SessionDiagnosis:
+    """``diagnosis``; ``accepted`` what is identified once the findings are accepted (None without findings), ``before`` without them;
+    ``examined`` what the engine looked at (None where a check stopped it).
+    """
+
+    diagnosis: Diagnosis
+    examined: Examined | None = None
+    before: Identification | None = None
+    accepted: Identification | None = None
+
+
+def looks(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[Look, ...]:
+    """Return the trials of the given roles that have motion and measured contact, each at its place in the session's time."""
+    moving = [one for one in results if one.motion is not None and one.trial.role != "static"]
+    ends = np.cumsum([float(one.motion.time[-1] - one.motion.time[0]) for one in moving if one.motion is not None])
+    found = []
+    for one, end in zip(moving, ends, strict=True):
+        if one.comparison is None or one.motion is None or one.trial.role not in roles or not one.comparison.used.any():
+            continue
+        start = end - float(one.motion.time[-1] - one.motion.time[0])
+        found.append(Look(one.trial, one.motion, one.comparison.used, start / ends[-1], end / ends[-1]))
+    return tuple(found)
+
+
+def diagnose_session(
+    result: SessionResult,
+    *,
+    reference: SessionIdentification | None = None,
+    tolerances: Tolerances | None = None,
+    chosen: Iterable[str] | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+) -> SessionDiagnosis:
+    """Return the diagnosis of an examined session, with the gain of every finding on the trials that were kept.
+
+    ``reference`` an earlier session of the same person without fault or load: its posterior is then what is known of the body;
+    ``tolerances`` as learned by the laboratory; ``chosen`` limits the causes to some effects by name.
+
+    Raises
+    ------
+    SessionRefused
+        No body, or no trial to look at, and no check found a cause either.
+    """
+    fitted = looks(result.trials, FITTED) or looks(result.trials, KEPT)
+    tell("checking units, signs, labels and clocks")
+    names = None if chosen is None else tuple(chosen)
+    checks = gates(result.session, _cases(result.body, (*fitted, *looks(result.trials, KEPT))), chosen=_discrete(names))
+    failed = tuple(gate for gate in checks if not gate.ok)
+    if result.body is None or not fitted:
+        if failed:
+            return SessionDiagnosis(_by_checks(checks))
+        raise SessionRefused(f"{result.session.folder}: there is nothing to diagnose. {result.body_source} {_reasons(result)}".strip())
+    tell("looking for causes")
+    try:
+        examined = diagnose(
+            result.body, fitted, gates=checks, tolerances=tolerances, prior=_prior(reference, result), chosen=_continuous(names)
+        )
+    except TrialRefused:
+        if failed:
+            return SessionDiagnosis(_by_checks(checks))
+        raise
+    if failed:
+        return SessionDiagnosis(_by_checks(checks, examined.diagnosis), examined)
+    before = result.identification.identification if result.identification else None
+    if not examined.named or before is None:
+        return SessionDiagnosis(examined.diagnosis, examined, before)
+    tell("measuring what the findings change")
+    return _accepted(result, examined, before)
+
+
+def _discrete(names: tuple[str, ...] | None) -> tuple[str, ...] | None:
+    from biodance.effects import discrete_effects
+
+    return None if names is None else tuple(name for name in names if name in discrete_effects())
+
+
+def _continuous(names: tuple[str, ...] | None) -> tuple[str, ...] | None:
+    from biodance.effects import effects
+
+    return None if names is None else tuple(name for name in names if name in effects())
+
+
+def _prior(reference: SessionIdentification | None, result: SessionResult) -> Sip | None:
+    """Return what an earlier session lets expect of the body; None without one."""
+    if reference is None or result.identification is None:
+        return None
+    return expected(reference.identification, result.identification.identification)
+
+
+def _cases(body: Body | None, found: tuple[Look, ...]) -> tuple[Case, ...]:
+    """Return the trials as effects see them, at the rate of the markers, with the table's parameters."""
+    if body is None:
+        return ()
+    return tuple(
+        Case(body, look.trial, look.motion, body.sip.phi, np.linspace(look.start, look.end, look.motion.time.size)) for look in found
+    )
+
+
+def _by_checks(checks: tuple[Gate, ...], left: Diagnosis | None = None) -> Diagnosis:
+    """Return the diagnosis of a session in which a check failed: what it found, and nothing built on unmended recordings."""
+    findings = tuple(_finding(gate) for gate in checks if not gate.ok)
+    note = "A check named its cause before any statistics. Mend it and diagnose again: nothing is fitted to recordings that are wrong."
+    clean = left is not None and left.verdict == "named, complete" and not left.findings
+    return Diagnosis(
+        verdict="named, complete" if clean else "named, incomplete",
+        findings=findings,
+        gates=checks,
+        adequacy=left.adequacy if left else (),
+        unobservable=left.unobservable if left else (),
+        limits=left.limits if left else (),
+        notes=(note, *(left.notes if left else ())),
+    )
+
+
+def _finding(gate: Gate) -> Finding:
+    """Return a failed check as a finding."""
+    from biodance.effects import discrete_effects
+
+    kind = discrete_effects().get(gate.effect)
+    size = () if np.isnan(gate.size) else (Estimate("size", gate.size, float("nan"), ""),)
+    cause = Alias(gate.effect, gate.target, float("inf"))
+    return Finding(gate.effect, gate.target, size, (cause,), 1.0, advice=f"{gate.text} {kind.advice if kind else ''}".strip())
+
+
+def _reasons(result: SessionResult) -> str:
+    return " ".join(dict.fromkeys(reason for trial in result.trials if trial.trial.role in FITTED for reason in trial.reasons))
+
+
+def _accepted(result: SessionResult, examined: Examined, before: Identification) -> SessionDiagnosis:
+    """Return the diagnosis with gains: identified again from the corrected trials, judged on the kept ones."""
+    assert result.body is not None
+    named, phi = examined.named, examined.naming.found.phi
+    fitted, kept = ([(c, look.use) for c, look in _pairs(result, phi, roles)] for roles in (FITTED, KEPT))
+    mended = [(accept(case, named), use) for case, use in fitted]
+    after = identify(mended[0][0].body, tuple(fit_of(*pair) for pair in mended))
+    findings = examined.diagnosis.findings
+    changes = _changes(before, after)
+    if kept:
+        as_is, better = (tuple(fit_of(*pair) for pair in some) for some in (kept, [(accept(case, named), use) for case, use in kept]))
+        used = tuple(fit_of(*pair) for pair in fitted), tuple(fit_of(*pair) for pair in mended)
+        about = standing_point(as_is)
+        try:
+            measured = gain(
+                judged(before.identified, as_is, about),
+                judged(after.identified, better, about),
+                fitted=(judged(before.identified, used[0], about), judged(after.identified, used[1], about)),
+            )
+        except BiodanceError:
+            measured = None
+        findings = tuple(replace(one, gain=measured) for one in findings)
+    findings = tuple(replace(one, changes=changes) for one in findings)
+    return SessionDiagnosis(replace(examined.diagnosis, findings=findings), examined, before, after)
+
+
+def _pairs(result: SessionResult, phi: np.ndarray, roles: tuple[Role, ...]) -> list[tuple[Case, Look]]:
+    """Return the cases with the parameters found, and where they came from."""
+    assert result.body is not None
+    found = looks(result.trials, roles)
+    return list(zip((replace(case, phi=phi) for case in _cases(result.body, found)), found, strict=True))
+
+
+def _changes(before: Identification, after: Identification) -> tuple[str, ...]:
+    """Say which segment masses change most when the findings are accepted."""
+    change = after.sip.mass - before.sip.mass
+    order = np.argsort(-np.abs(change))[:3]
+    return tuple(
+        f"{before.sip.segments[i].replace('_', ' ')}: {before.sip.mass[i]:.2f} kg becomes {after.sip.mass[i]:.2f} kg"
+        for i in order
+        if abs(change[i]) >= 0.01
+    )
