@@ -59,7 +59,7 @@ def simulate(
         declared = float(recording.parameters["PROCESSING"]["Bodymass"])  # type: ignore[arg-type]
         write(recording, out)
         performances.append(performance)
-    (out / "session.toml").write_text(_session_toml(person, plan, declared))
+    (out / "session.toml").write_text(session_toml(person, plan, declared))
     (out / TRUTH).mkdir()
     document = truth(person, plan.name, instruments, performances)
     (out / TRUTH / "truth.json").write_text(json.dumps(document, indent=1) + "\n")
@@ -77,7 +77,7 @@ def _check(subject: Subject, out: Path) -> None:
         raise BiodanceError(f"{out}: exists and is not an empty folder; nothing was written. Choose another --out.")
 
 
-def _session_toml(person: Person, protocol: Protocol, mass: float) -> str:
+def session_toml(person: Person, protocol: Protocol, mass: float) -> str:
     """Return what an analyst would have written down about the session."""
     lines = ["[subject]", f"mass_kg = {float(mass)}", f"height_m = {float(person.subject.stature)}", f'sex = "{person.subject.sex}"']
     if np.isfinite(person.subject.age):

@@ -1,0 +1,145 @@
+"""A virtual person copies a planned dance from a screen: late, slower, degrees off in every joint, but on both feet.
+
+The plan is a motion of the 12-segment model with its feet and its zero-moment point. The person's own bones, habits and soft parts differ,
+so the copy is made joint by joint; the path of the pelvis then keeps the zero-moment point where the plan has it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from biodance.body.body import UPRIGHT, Body
+from biodance.errors import BiodanceError
+from biodance.motion.kinematics import axis_rotation, poses, quaternion_matrix
+from biodance.motion.legs import Leg
+from biodance.records import Array, Motion, frozen_array
+from biodance.virtual_lab.choreography import COLUMNS, RAISED, SHIFT, SIDES, WIDTH, Curves
+from biodance.virtual_lab.performance import MARGIN, NODE_RATE, Performance, keep_balance
+from biodance.virtual_lab.person import Person
+from biodance.virtual_lab.posing import STRAIGHT, Stance, Z, upper_body
+from biodance.virtual_lab.protocol import TrialPlan
+from biodance.virtual_lab.randomness import smooth_noise, stream
+from biodance.virtual_lab.tolerances import REALISTIC, Tolerances
+
+ARM = ("shoulder_flexion", "shoulder_adduction", "shoulder_rotation", "elbow_flexion")
+FREE_LEG = ("hip_flexion", "hip_adduction", "hip_rotation", "knee_flexion", "ankle_dorsiflexion")
+JOINTS = {
+    "trunk": ("trunk_flexion", "trunk_bending", "trunk_rotation"),
+    **{f"{side}_arm": tuple(f"{side}_{joint}" for joint in ARM) for side in SIDES},
+    **{f"{side}_leg": tuple(f"{side}_{joint}" for joint in FREE_LEG) for side in SIDES},
+}
+"""Joints of the model behind every field of a posture."""
+WANDER = 0.25
+"""Hz: how fast the error of a person who follows a screen changes."""
+PELVIS = 0.4
+"""Share of the tracking error that the pelvis has: whoever stands on planted feet is held by them."""
+
+
+@dataclass(frozen=True)
+class Performer:
+    """How well somebody copies: ``tracking`` rad, root mean square error of every joint; ``pace`` how many times the planned duration."""
+
+    tracking: float = float(np.radians(7.0))
+    pace: float = 1.2
+
+    def __post_init__(self) -> None:
+        if not (0 <= self.tracking < 0.6 and 0.5 <= self.pace <= 5):
+            raise BiodanceError(
+                f"Performer: tracking {self.tracking:g} rad, pace {self.pace:g}; legal are 0 to 0.6 rad and 0.5 to 5 times the duration."
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """One stretch of a dance as it is shown, both feet staying where they are.
+
+    ``motion`` of ``body``, resting at both ends; ``ankle`` (2, 3) m right and left; ``raised`` (T, 2) 0 = planted .. 1 = free, right and
+    left; ``pressure`` (T, 2) m zero-moment point.
+    """
+
+    name: str
+    body: Body
+    motion: Motion
+    ankle: Array
+    raised: Array
+    pressure: Array
+
+    def __post_init__(self) -> None:
+        frames = self.motion.time.size
+        for name, shape in (("ankle", (2, 3)), ("raised", (frames, 2)), ("pressure", (frames, 2))):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), shape, f"Shown.{name}"))
+
+
+def copy_dance(
+    person: Person,
+    shown: Shown,
+    session: int,
+    *,
+    centre: Array,
+    heading: float = 0.0,
+    performer: Performer = Performer(),
+    tolerances: Tolerances = REALISTIC,
+) -> Performance:
+    """Let ``person`` copy one stretch around ``centre`` (2,) m, facing ``heading`` rad; the same arguments give the same motion."""
+    rng = stream(person.seed, "copy", str(session), shown.name)
+    duration = round((shown.motion.time[-1] - shown.motion.time[0]) * performer.pace, 1)
+    time = -MARGIN + np.arange(round((duration + 2 * MARGIN) * NODE_RATE) + 1) / NODE_RATE
+    when = np.clip(time / performer.pace + shown.motion.time[0], shown.motion.time[0], shown.motion.time[-1])
+    values, pressure = (make_interp_spline(shown.motion.time, what, k=5)(when) for what in (_fields(shown), shown.pressure))
+    values[:, RAISED:] = np.clip(values[:, RAISED:], 0.0, 1.0)
+    error = np.degrees(performer.tracking) * smooth_noise(rng, time, columns=WIDTH, cutoff=WANDER)
+    for field in JOINTS:
+        values[:, COLUMNS[field]] += error[:, COLUMNS[field]]
+    values[:, COLUMNS["pelvis"]] += PELVIS * error[:, COLUMNS["pelvis"]]
+    stance, middle, turn = _stand(person, shown, centre, heading, rng)
+    target = centre + (pressure - middle) @ turn[:2, :2].T + tolerances.sway * smooth_noise(rng, time, columns=2, cutoff=0.5)
+    apart = shown.ankle[1, 1] - shown.ankle[0, 1]
+    values[:, SHIFT] = np.clip((shown.ankle[1, 1] - pressure[:, 1]) / apart, 0.0, 1.0)
+    curves = Curves(time, values)
+    pose = upper_body(person, curves, stance, tolerances, rng)
+    nodes, missed = keep_balance(person, pose, curves, stance, target)
+    return Performance(TrialPlan(shown.name, "fit", "parallel", (), duration / 2), person, stance, curves, time, nodes, missed)
+
+
+def _fields(shown: Shown) -> Array:
+    """Return the plan in the fields of a posture (T, WIDTH), without lean and shift."""
+    body, q = shown.body, shown.motion.q
+    angle, out = np.degrees(q[:, body.nq - len(body.joints) :]), np.zeros((len(q), WIDTH))
+    for field, names in JOINTS.items():
+        out[:, COLUMNS[field]] = angle[:, [body.joint_index(name) for name in names]]
+    out[:, COLUMNS["pelvis"]] = pelvis_angles(quaternion_matrix(q[:, 3:7]))
+    out[:, COLUMNS["depth"]] = _depth(shown)[:, None]
+    out[:, RAISED:] = shown.raised
+    return out
+
+
+def pelvis_angles(turn: Array) -> Array:
+    """Return forward tilt, right drop and left turn (T, 3) degrees of lab_R_pelvis (T, 3, 3), facing lab x."""
+    from scipy.spatial.transform import Rotation
+
+    left, drop, back = Rotation.from_matrix(UPRIGHT.T @ turn).as_euler("YXZ").T
+    return np.degrees(np.stack([-back, drop, left], axis=1))
+
+
+def _depth(shown: Shown) -> Array:
+    """Return (T,) how much shorter than straight the straightest planted leg is, as a share of the straight leg."""
+    pose, rooms = poses(shown.body, shown.motion.q), []
+    for k, side in enumerate(SIDES):
+        leg = Leg.of(shown.body, side)
+        hip = pose.position[:, 0] + pose.rotation[:, 0] @ leg.hip
+        room = 1.0 - np.linalg.norm(hip - shown.ankle[k], axis=1) / float(leg.length(STRAIGHT))
+        rooms.append(room + 10.0 * (shown.raised[:, k] > 0.5))
+    return np.clip(np.min(rooms, axis=0), 0.0, 0.6)
+
+
+def _stand(person: Person, shown: Shown, centre: Array, heading: float, rng: np.random.Generator) -> tuple[Stance, Array, Array]:
+    """Return where the person's feet are, the plan's middle (2,) m and the turn (3, 3) from the plan to the lab."""
+    turn = axis_rotation(Z, np.array([heading]))[0]
+    middle = shown.ankle[:, :2].mean(axis=0) + np.array([0.04, 0.0])
+    ankle, foot = {}, {}
+    for k, side in enumerate(SIDES):
+        xy = centre + turn[:2, :2] @ (shown.ankle[k, :2] - middle) + 0.005 * rng.normal(size=2)
+        ankle[side] = np.array([*xy, person.size["ankle_height"]])
+        foot[side] = axis_rotation(Z, np.array([heading + 0.02 * rng.normal()]))[0] @ UPRIGHT
+    return Stance(heading, ankle, foot, {side: ankle[side][:2] for side in SIDES}), middle, turn
