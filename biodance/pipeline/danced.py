@@ -11,7 +11,7 @@ from biodance.errors import BiodanceError
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion, Subject
 from biodance.virtual_lab.choreography import septic
-from biodance.virtual_lab.dancing import Performer, Shown, copy_dance
+from biodance.virtual_lab.dancing import USUAL, Performer, Shown, copy_dance
 from biodance.virtual_lab.laboratory import FIRST_VISIT, Visit, declared_mass, perform_in, record, set_up, write
 from biodance.virtual_lab.performance import Performance
 from biodance.virtual_lab.person import make_person
@@ -75,7 +75,7 @@ def simulate_dance(
     out: Path,
     *,
     seed: int,
-    performer: Performer = Performer(),
+    performer: Performer = USUAL,
     visit: Visit = FIRST_VISIT,
 ) -> Path:
     """Write the session of a virtual person who dances ``dance``: static, the dance in stretches, two trials of squats for validation.
