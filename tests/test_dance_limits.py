@@ -5,7 +5,7 @@ from biodance.body.human import human
 from biodance.dance import limits as family
 from biodance.dance.chain import Chain
 from biodance.dance.excitation import blocks, dynamic_grams, dynamic_slopes, static_grams
-from biodance.dance.postures import _Static, free_coordinates, start
+from biodance.dance.postures import Exciting, free_coordinates, start
 from biodance.dance.programme import Programme
 from biodance.dance.stance import seat, stance
 from biodance.motion.regressor import predict_wrench
@@ -77,7 +77,7 @@ def test_slopes_of_the_dynamic_criterion(planted):
 def test_slopes_of_the_static_criterion():
     up = np.random.default_rng(1).normal(size=(9, 12, 3))
     others = static_grams(up / np.linalg.norm(up, axis=2, keepdims=True))
-    built, y, _ = programme((0, 1), (), _Static(BLOCKS, others, 1.0), frames=1, still=True)
+    built, y, _ = programme((0, 1), (), Exciting(BLOCKS, others, 1.0, 8), frames=1, still=True)
     expected = differences(built.judge, y, lambda p: p.value)
     got, _ = built.judge(y).slopes(np.arange(0))
     np.testing.assert_allclose(got, expected, atol=1e-5 * np.abs(expected).max())

@@ -53,7 +53,7 @@ def account(dance: Dance, plan: Plan) -> Account:
     holds = [phase for phase in dance.phases if phase.kind == "hold" and phase.stance.over is None]
     ups = np.concatenate([uprights(dance.state(phase, np.array([phase.start]))) for phase in holds])
     every = list(range(len(dance.body.segments)))
-    static, _ = total(weight, static_grams(ups), parts.first, every)
+    static, _ = total(weight, static_grams(ups), parts.first)
     gram = np.tile(LITTLE * np.eye(6), (len(every), 1, 1))
     straight = replace(dance, via=dance.postures[:-1, None] + THIRDS * np.diff(dance.postures, axis=0)[:, None])
     dynamic, paths = [], []
@@ -61,7 +61,7 @@ def account(dance: Dance, plan: Plan) -> Account:
         time = np.linspace(phase.start, phase.end, round((phase.end - phase.start) * RATE) + 1)
         state = dance.state(phase, time)
         gram = gram + dynamic_grams(state, every) / RATE
-        dynamic.append(total(weight, gram, parts.second, every)[0])
+        dynamic.append(total(weight, gram, parts.second)[0])
         paths.append(ZmpPath(phase.posture - 1, phase.stance, zmp(straight.state(phase, time).wrench), zmp(state.wrench)))
     bounds = [float(sum(w for w, pick in zip(weight, picks, strict=True) if pick)) for picks in (parts.first, parts.second)]
     return Account(static, bounds[0], np.array(dynamic), bounds[1], tuple(paths))

@@ -1,5 +1,6 @@
 """The paper's criterion on segments, and its slopes by the motion: first moments at rest, inertias in motion (eq. 12)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -18,6 +19,19 @@ def condition(gram: Array) -> tuple[float, Array]:
     value = np.maximum(value, 1e-12 * max(value[-1], 1e-12))
     cond = float(np.sqrt(value[-1] / value[0]))
     return cond, 0.5 * cond * (np.outer(vector[:, -1], vector[:, -1]) / value[-1] - np.outer(vector[:, 0], vector[:, 0]) / value[0])
+
+
+def smooth_condition(gram: Array, *, sharpness: int) -> tuple[float, Array]:
+    """Return a condition number without kinks and its gradient: power means of the eigenvalues instead of largest and smallest.
+
+    sqrt(mean(value^p)^(1/p) * mean(value^-p)^(1/p)), p = ``sharpness``: at most cond, 1 exactly where cond is, cond for p -> infinity.
+    """
+    value, vector = np.linalg.eigh(gram)
+    value = np.maximum(value, 1e-12 * max(value[-1], 1e-12))
+    high, low = (value / value[-1]) ** sharpness, (value[0] / value) ** sharpness
+    cond = float(np.sqrt(value[-1] / value[0] * (high.mean() * low.mean()) ** (1 / sharpness)))
+    by = 0.5 * cond * (high / high.sum() - low / low.sum()) / value
+    return cond, (vector * by) @ vector.T
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,14 +53,18 @@ def blocks(body: Body) -> Blocks:
     return Blocks(first, second, np.array(body.sip.mass))
 
 
-def total(weight: Array, grams: Array, pick: tuple[list[int], ...], segments: list[int]) -> tuple[float, Array]:
-    """Return sum_i M_i cond(W_bi) over ``segments`` and its gradient by the Gram matrices (N, k, k)."""
+Measure = Callable[[Array], tuple[float, Array]]
+"""Says of a Gram matrix (k, k) how badly conditioned it is, and the gradient (k, k)."""
+
+
+def total(weight: Array, grams: Array, pick: tuple[list[int], ...], *, measure: Measure = condition) -> tuple[float, Array]:
+    """Return sum_i M_i cond(W_bi) and its gradient by the Gram matrices (N, k, k); segments without weight or columns do not count."""
     value, slope = 0.0, np.zeros_like(grams)
-    for i in segments:
-        if pick[i] and weight[i] > 0:
-            cond, part = condition(grams[i][np.ix_(pick[i], pick[i])])
+    for i, columns in enumerate(pick):
+        if columns and weight[i] > 0:
+            cond, part = measure(grams[i][np.ix_(columns, columns)])
             value += weight[i] * cond
-            slope[i][np.ix_(pick[i], pick[i])] = weight[i] * part
+            slope[i][np.ix_(columns, columns)] = weight[i] * part
     return value, slope
 
 

@@ -1,16 +1,24 @@
-"""Sixty static postures that turn gravity through every segment (paper eq. 14-17), one small problem each, swept in turn."""
+"""Static postures that turn gravity through every segment (paper eq. 14-17): small problems in turn, then the best of all that were found.
 
+cond has a kink where a segment is isotropic, at which one posture after the other stands still; sweeps therefore use a smooth condition
+number of growing sharpness, and after two independent runs postures are exchanged for better ones among all that came by.
+"""
+
+from collections.abc import Iterator
+from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from biodance.dance.chain import ROOT, Chain
-from biodance.dance.excitation import Blocks, static_grams, total, upright_slopes, uprights
+from biodance.dance.excitation import Blocks, smooth_condition, static_grams, total, upright_slopes, uprights
 from biodance.dance.limits import limits
-from biodance.dance.programme import Programme, closed
-from biodance.dance.sqp import Solution, minimise
+from biodance.dance.programme import Judged, Objective, Programme, closed
+from biodance.dance.sqp import minimise
 from biodance.dance.stance import Stance
 from biodance.dance.state import State
+from biodance.errors import BiodanceError
 from biodance.records import Array
 
 STATIC = ("balance", "foot_placement", "ground_clearance", "joint_range", "joint_torque", "seat", "self_collision")
@@ -18,96 +26,212 @@ RESERVE = 0.06
 """Share of every limit's scale that is kept in reserve, for the moves that begin and end here."""
 KEPT = 0.01
 """Violation, in scales of the limits, of the reserved margins that is accepted."""
+RUNS = 2
+"""Independent searches whose postures are put together."""
+SWEEPS = ((4, 20), (4, 10))
+"""Sharpness of the smooth condition number and iterations for every posture, of the sweeps of a run."""
+FRESH, POLISH = ((8, 20),), ((8, 10), (8, 10), (16, 10), (16, 10))
+"""The same for the sweeps after the exchange, first from fresh starts, then from where the postures are."""
+ATTEMPTS = 8
+"""Starts of a posture that is not feasible."""
+EASE = 2e-3
+"""Worth of a joint at its stop against the criterion: postures near mid range are easier to take."""
 
 
 @dataclass(frozen=True, eq=False)
 class Postures:
-    """``x`` (P, n) coordinates, ``stances`` (P), ``criterion`` sum of M_i cond(W_bi^S), kg, and its ``bound``; ``violation`` (P,)."""
+    """``x`` (P, n) coordinates, ``stances`` (P), ``criterion`` sum of M_i cond(W_bi^S), kg, and its ``bound``."""
 
     x: Array
     stances: tuple[Stance, ...]
     criterion: float
     bound: float
-    violation: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Posture:
+    """``x`` (n,) coordinates, ``up`` (N, 3) the vertical in the segments, ``violation`` of the reserved limits in their scales, ``limit`` the
+    worst.
+    """
+
+    x: Array
+    up: Array
+    violation: float = np.inf
+    limit: str = ""
 
 
 def free_coordinates(chain: Chain, stance: Stance) -> list[int]:
-    """Return the coordinates that are free when the planted legs follow the pelvis."""
+    """Return the coordinates that are free when the planted legs follow the pelvis, and a seated pelvis rests."""
     held = {c for side in stance.planted for c in chain.leg_columns[side]} | set(range(ROOT if stance.seat else 0))
     return [c for c in range(chain.size) if c not in held]
 
 
 def start(chain: Chain, stance: Stance, rng: np.random.Generator) -> Array:
-    """Return the coordinates (n,) of a shallow squat over the support, arms and trunk anywhere."""
+    """Return the coordinates (n,) of a squat of any depth over the support, arms and trunk anywhere; seated: all joints anywhere."""
     limits_, x = chain.body.limits, np.zeros(chain.size)
     low, high = limits_.lower, limits_.upper
     x[ROOT:] = low + (high - low) * rng.uniform(0.15, 0.85, len(low))
     if stance.seat:
-        x[:3] = [0.0, 0.0, stance.seat]
+        x[2] = stance.seat
         return x
-    reach = min(float(leg.length(np.radians(rng.uniform(15, 60)))) for leg in chain.legs)
+    reach = min(float(leg.length(np.radians(rng.uniform(15, 110)))) for leg in chain.legs)
     x[:3] = [*(stance.centre - [0.02, 0.0]), stance.ankle[0, 2] + 0.97 * reach]
-    x[3:6] = rng.normal(0, 0.15, 3)
+    x[3:6] = rng.normal([0.0, 0.0, -0.2], [0.25, 0.25, 0.4])
     return x
 
 
 @dataclass(frozen=True, eq=False)
-class _Static:
-    """Objective of one posture when the Gram matrices of the ``others`` (N, 3, 3) are given; ease pulls towards mid range."""
+class Exciting:
+    """Objective of one posture beside the Gram matrices of the ``others`` (N, 3, 3), per ``unit`` kg."""
 
     blocks: Blocks
     others: Array
     unit: float
-    ease: float = 2e-3
+    sharpness: int
 
     def __call__(self, state: State) -> tuple[float, Array]:
+        """Return the criterion and its slopes by x."""
         up = uprights(state)
-        grams = self.others + static_grams(up)
-        value, slope = total(self.blocks.weight, grams, self.blocks.first, list(range(len(grams))))
-        by_up = -2 * np.einsum("nij,tnj->tni", slope, up)
+        measure = partial(smooth_condition, sharpness=self.sharpness)
+        value, slope = total(self.blocks.weight, self.others + static_grams(up), self.blocks.first, measure=measure)
         by = np.zeros((3, *state.x.shape))
-        by[0] = upright_slopes(state, by_up) / self.unit
+        by[0] = upright_slopes(state, -2 * np.einsum("nij,tnj->tni", slope, up)) / self.unit
         ends = state.chain.body.limits
-        middle, half = (ends.upper + ends.lower) / 2, np.maximum((ends.upper - ends.lower) / 2, 1e-3)
-        off = (state.x[:, ROOT:] - middle) / half
-        by[0][:, ROOT:] += 2 * self.ease * off / half
-        return value / self.unit + self.ease * float(np.sum(off**2)), by
+        half = np.maximum((ends.upper - ends.lower) / 2, 1e-3)
+        off = (state.x[:, ROOT:] - (ends.upper + ends.lower) / 2) / half
+        by[0][:, ROOT:] += 2 * EASE * off / half
+        return value / self.unit + EASE * float(np.sum(off**2)), by
 
 
-def find_postures(chain: Chain, blocks: Blocks, stances: tuple[Stance, ...], *, rng: np.random.Generator, sweeps: int = 2) -> Postures:
+def find_postures(chain: Chain, blocks: Blocks, stances: tuple[Stance, ...], *, seed: int, workers: Executor) -> Postures:
     """Return one posture per entry of ``stances``, together the most exciting for all first moments.
 
-    Every posture is solved while the others are held; a posture that is not feasible after its turn gets other starts.
+    Raises
+    ------
+    BiodanceError
+        On some feet there is no posture within the limits; the message names the limit.
     """
-    x = np.array([closed(chain, s, start(chain, s, rng)[None], *np.zeros((2, 1, chain.size))).x[0] for s in stances])
-    ups = np.array([_upright(chain, s, row) for s, row in zip(stances, x, strict=True)])
-    violation = np.full(len(x), np.inf)
-    for sweep in range(sweeps):
-        for p, stance in enumerate(stances):
-            others = static_grams(np.delete(ups, p, axis=0))
-            unit = 0.1 * float(blocks.weight.sum()) / len(x)
-            for attempt in range(6):
-                begin = x[p] if attempt == 0 else start(chain, stance, rng)
-                state, found = _solve(chain, stance, begin, _Static(blocks, others, unit), iterations=20 if sweep == 0 else 10)
-                if found.violation <= KEPT or attempt == 5:
+    tasks = [workers.submit(_Search(chain, blocks, stances, seed).run, run) for run in range(RUNS)]
+    pool = [[p for search in searches for p in search] for searches in zip(*(task.result() for task in tasks), strict=True)]
+    kept = [[p for p in found if p.violation <= KEPT] or _refuse(s, found) for s, found in zip(stances, pool, strict=True)]
+    chosen, search = exchange(blocks, stances, kept), _Search(chain, blocks, stances, seed)
+    for sharpness, iterations in (*FRESH, *POLISH):
+        fresh = (sharpness, iterations) in FRESH
+        begin = [search.anywhere(k, 2) for k in range(len(stances))] if fresh else [p.x for p in chosen]
+        halves = [list(range(k, len(stances), 2)) for k in range(2)]
+        parts = [workers.submit(search.sweep, chosen, begin, half, sharpness, iterations) for half in halves]
+        better = [part.result() for part in parts]
+        found = [better[k % 2][k // 2] for k in range(len(stances))]
+        chosen = exchange(blocks, stances, [[q for q in (new, old) if q.violation <= KEPT] for old, new in zip(chosen, found, strict=True)])
+    value, _ = total(blocks.weight, static_grams(np.array([p.up for p in chosen])), blocks.first)
+    return Postures(np.array([p.x for p in chosen]), stances, value, float(blocks.weight.sum()))
+
+
+def _refuse(stance: Stance, found: list[Posture]) -> list[Posture]:
+    best = min(found, key=lambda p: p.violation)
+    raise BiodanceError(
+        f"On the feet {stance.name!r} no posture keeps all limits: {best.limit.replace('_', ' ')} is exceeded by {best.violation:.2f} of "
+        "its scale in the best of all tried. Leave this stance out of the protocol, or widen that limit."
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """What all searches share; random numbers depend on ``seed`` and the place of a posture only."""
+
+    chain: Chain
+    blocks: Blocks
+    stances: tuple[Stance, ...]
+    seed: int
+
+    def anywhere(self, place: int, run: int) -> Array:
+        """Return the start (n,) of one posture in one run."""
+        return start(self.chain, self.stances[place], np.random.default_rng([self.seed, run, place]))
+
+    def run(self, run: int) -> list[list[Posture]]:
+        """Return for every place the postures of one run, one per sweep."""
+        now = [at(self.chain, s, self.anywhere(k, run)) for k, s in enumerate(self.stances)]
+        order = list(np.random.default_rng([self.seed, run]).permutation(len(now)))
+        out: list[list[Posture]] = [[] for _ in now]
+        for sharpness, iterations in SWEEPS:
+            now = self.sweep(now, [p.x for p in now], order, sharpness, iterations)
+            for search, posture in zip(out, now, strict=True):
+                search.append(posture)
+        return out
+
+    def sweep(self, now: list[Posture], begin: list[Array], order: list[int], sharpness: int, iterations: int) -> list[Posture]:
+        """Return the postures of the places ``order``, found one after the other from ``begin`` while all others are held, by place."""
+        now, unit = list(now), 0.1 * float(self.blocks.weight.sum()) / len(now)
+        for p in order:
+            others = np.array([one.up for k, one in enumerate(now) if k != p]).reshape(-1, *now[p].up.shape)
+            objective = Exciting(self.blocks, static_grams(others), unit, sharpness)
+            x, steps = begin[p], iterations
+            for attempt in range(ATTEMPTS):
+                now[p] = solve(self.chain, self.stances[p], x, objective, iterations=steps)
+                if now[p].violation <= KEPT:
                     break
-            x[p], ups[p], violation[p] = state.x[0], uprights(state)[0], found.violation
-    value, _ = total(blocks.weight, static_grams(ups), blocks.first, list(range(len(ups[0]))))
-    return Postures(x, stances, value, float(blocks.weight.sum()), violation)
+                x, steps = self.anywhere(p, 3 + attempt), max(iterations, 20)
+        return [now[p] for p in sorted(order)]
 
 
-def _solve(chain: Chain, stance: Stance, begin: Array, objective: _Static, *, iterations: int) -> tuple[State, Solution]:
+def exchange(blocks: Blocks, stances: tuple[Stance, ...], pool: list[list[Posture]]) -> list[Posture]:
+    """Return one posture for each place: those that come first, exchanged for better ones of the same stance as long as any helps."""
+    kinds = [stance.name for stance in stances]
+    every = {kind: [p for k, found in zip(kinds, pool, strict=True) if k == kind for p in found] for kind in dict.fromkeys(kinds)}
+    grams = {kind: np.eye(3) - np.einsum("pni,pnj->pnij", *[np.array([p.up for p in found])] * 2) for kind, found in every.items()}
+    taken = {
+        kind: [next(i for i, p in enumerate(found) if p is pool[k][0]) for k in range(len(kinds)) if kinds[k] == kind]
+        for kind, found in every.items()
+    }
+    whole = sum(grams[kind][picks].sum(axis=0) for kind, picks in taken.items())
+    value = _values(blocks, whole[None])[0]
+    for kind, place in _places(taken):
+        spare = [i for i in range(len(every[kind])) if i not in taken[kind]]
+        if spare:
+            trial = whole - grams[kind][taken[kind][place]] + grams[kind][spare]
+            values = _values(blocks, trial)
+            if values.min() < value - 1e-6:
+                value, best = values.min(), int(values.argmin())
+                whole, taken[kind][place] = trial[best], spare[best]
+    picks = {kind: iter(chosen) for kind, chosen in taken.items()}
+    return [every[kind][next(picks[kind])] for kind in kinds]
+
+
+def _places(taken: dict[str, list[int]]) -> Iterator[tuple[str, int]]:
+    """Yield all places in turn, again and again, until a round has changed nothing."""
+    before: dict[str, list[int]] = {}
+    while before != taken:
+        before = {kind: list(picks) for kind, picks in taken.items()}
+        for kind, picks in taken.items():
+            for place in range(len(picks)):
+                yield kind, place
+
+
+def _values(blocks: Blocks, grams: Array) -> Array:
+    """Return the criterion (K,) kg of K sets of Gram matrices (K, N, 3, 3)."""
+    out = np.zeros(len(grams))
+    for i, pick in enumerate(blocks.first):
+        if pick and blocks.weight[i] > 0:
+            value = np.linalg.eigvalsh(grams[:, i][np.ix_(range(len(grams)), pick, pick)])
+            out += blocks.weight[i] * np.sqrt(value[:, -1] / np.maximum(value[:, 0], 1e-12))
+    return out
+
+
+def solve(chain: Chain, stance: Stance, begin: Array, objective: Objective, *, iterations: int) -> Posture:
+    """Return the posture on the feet ``stance`` that is best for ``objective`` near ``begin`` (n,)."""
     free = free_coordinates(chain, stance)
-    base = np.zeros((3, 1, chain.size))
+    base, basis = np.zeros((3, 1, chain.size)), np.zeros((3, 1, 1))
     base[0, 0] = begin
     base[0, 0, free] = 0.0
-    basis = np.zeros((3, 1, 1))
     basis[0] = 1.0
     kept = tuple(limit for limit in limits() if limit.NAME in STATIC)
     programme = Programme(chain, stance, base, basis, free, kept, objective, np.full((1, len(kept)), RESERVE))
     found = minimise(programme.judge, begin[free], iterations=iterations)
-    return programme.state(found.y), found
+    state = programme.state(found.y)
+    return Posture(state.x[0], uprights(state)[0], *Judged(programme, state).worst)
 
 
-def _upright(chain: Chain, stance: Stance, row: Array) -> Array:
-    return uprights(State(chain, stance, row[None], *np.zeros((2, 1, chain.size))))[0]
+def at(chain: Chain, stance: Stance, x: Array) -> Posture:
+    """Return the posture with the coordinates x (n,), its planted feet in place, not judged."""
+    state = closed(chain, stance, x[None], *np.zeros((2, 1, chain.size)))
+    return Posture(state.x[0], uprights(state)[0])

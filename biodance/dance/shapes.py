@@ -1,8 +1,10 @@
 """The room that segments take: limbs are the widest capsules in their boxes, trunk and pelvis the boxes themselves."""
 
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.records import Array
@@ -43,3 +45,25 @@ def box_pairs(body: Body) -> list[tuple[int, int]]:
     """Return the pairs (limb, trunk or pelvis) that must not touch: the forearms against both."""
     arms = [i for i, s in enumerate(body.segments) if s.endswith("forearm_hand")]
     return [(arm, body.segment_index(box)) for arm in arms for box in BOXES]
+
+
+@dataclass(frozen=True, eq=False)
+class Solids:
+    """What must not touch: capsules ``first`` and ``second`` (C,) of segments, limbs ``limb`` (B,) and boxes ``box`` (B,) of segments;
+    ``axis`` (N, 2, 3) m and ``radius`` (N,) m of the capsule in every segment's box.
+    """
+
+    first: NDArray[np.intp]
+    second: NDArray[np.intp]
+    limb: NDArray[np.intp]
+    box: NDArray[np.intp]
+    axis: Array
+    radius: Array
+
+    @classmethod
+    def of(cls, body: Body) -> "Solids":
+        """Return the pairs of a body."""
+        capsules, boxes = (np.array(pairs, dtype=np.intp).reshape(-1, 2) for pairs in (capsule_pairs(body), box_pairs(body)))
+        shape = [capsule(body, i) for i in range(len(body.segments))]
+        axis, radius = np.array([ends for ends, _ in shape]), np.array([radius for _, radius in shape])
+        return cls(capsules[:, 0], capsules[:, 1], boxes[:, 0], boxes[:, 1], axis, radius)

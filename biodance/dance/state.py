@@ -27,16 +27,13 @@ Index = list[int] | NDArray[np.intp]
 def cross(a: Array, b: Array) -> Array:
     """Return the spatial (6) or ordinary (3) cross product along the last axis."""
     if a.shape[-1] == 3:
-        return np.stack(
-            [
-                a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1],
-                a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2],
-                a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0],
-            ],
-            axis=-1,
-        )
-    v1, w1, v2, w2 = a[..., :3], a[..., 3:], b[..., :3], b[..., 3:]
-    return np.concatenate([cross(w1, v2) + cross(v1, w2), cross(w1, w2)], axis=-1)
+        return np.asarray(a[..., _NEXT] * b[..., _LAST] - a[..., _LAST] * b[..., _NEXT])
+    w1, w2 = a[..., 3:], b[..., 3:]
+    linear = cross(w1, b[..., :3]) + cross(a[..., :3], w2)
+    return np.concatenate([linear, cross(w1, w2)], axis=-1)
+
+
+_NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
 
 
 @dataclass(frozen=True, eq=False)

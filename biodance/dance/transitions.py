@@ -1,7 +1,7 @@
 """Moves between postures: what excites the inertias within all limits (paper eq. 18-20), rest to rest through two via points.
 
-One programme instead of the paper's two stages: all free coordinates look for excitation, the zero-moment point is a limit and, weakly, part
-of the objective. The start is the smoothest straight move, which is nearly always feasible; limits are kept on a coarse grid with a reserve
+One programme instead of the paper's two stages: all free coordinates look for excitation, the zero-moment point is a limit and, weakly,
+part of the objective. The start is the smoothest straight move, which is nearly always feasible; limits are kept on a coarse grid with a reserve
 and judged on a fine one.
 """
 
@@ -14,6 +14,7 @@ from biodance.dance.excitation import Blocks, condition, dynamic_grams, dynamic_
 from biodance.dance.limits import limits
 from biodance.dance.postures import free_coordinates
 from biodance.dance.programme import Judged, Programme
+from biodance.dance.programme import Objective as Judge
 from biodance.dance.splines import basis_at
 from biodance.dance.sqp import minimise
 from biodance.dance.stance import Stance
@@ -63,7 +64,7 @@ class Task:
         """Return the via points (2, n) of the smoothest move."""
         return np.asarray(self.ends[0] + THIRDS[:, None] * (self.ends[1] - self.ends[0]))
 
-    def programme(self, via: Array, free: list[int], time: Array, *, reserve: float, objective: "Objective") -> Programme:
+    def programme(self, via: Array, free: list[int], time: Array, *, reserve: float, objective: Judge) -> Programme:
         """Return the programme of the via points of the ``free`` coordinates at instants ``time`` s, the others as in ``via`` (2, n)."""
         basis, kept = basis_at(time, self.duration), limits()
         points = np.stack([self.ends[0], *via, self.ends[1]])
@@ -109,20 +110,23 @@ class Objective:
     share: float = 1.0
 
     def __call__(self, state: State) -> tuple[float, Array]:
+        """Return the objective and its slopes by x, v, a."""
         value, slope = off_centre(state)
         value, slope = CENTRE * value, CENTRE * slope
         weight, picks = self.task.blocks.weight, self.task.blocks.second
         segments = [i for i in self.task.segments if picks[i] and weight[i] > 0]
         if not self.share or not segments:
             return value, slope
-        grams = self.history[segments] + dynamic_grams(state, segments) / GRID + LITTLE * np.eye(6)
-        part = np.zeros_like(grams)
-        for k, i in enumerate(segments):
-            pick = np.ix_(picks[i], picks[i])
-            cond, by = condition(grams[k][pick])
-            value += self.share * weight[i] / weight[segments].sum() * np.log(cond)
-            part[k][pick] = self.share * weight[i] / weight[segments].sum() / cond * by
-        return value, slope + dynamic_slopes(state, segments, part / GRID)
+        grams = self.history + dynamic_grams(state, list(range(len(weight)))) / GRID + LITTLE * np.eye(6)
+        chosen = np.zeros(len(weight))
+        chosen[segments] = self.share * weight[segments] / weight[segments].sum()
+        found, by = total(chosen, grams, picks, measure=_logarithm)
+        return value + found, slope + dynamic_slopes(state, segments, by[segments] / GRID)
+
+
+def _logarithm(gram: Array) -> tuple[float, Array]:
+    value, slope = condition(gram)
+    return float(np.log(value)), slope / value
 
 
 def _nothing(state: State) -> tuple[float, Array]:
@@ -181,6 +185,6 @@ def judged(task: Task, via: Array) -> tuple[Move, Array]:
     return Move(via, task.duration, gram, before, after, max(0.0, worst), limit if worst > 0 else ""), time[dips]
 
 
-def dynamic_criterion(blocks: Blocks, gram: Array, segments: list[int]) -> float:
-    """Return the sum of M_i cond(W_bi^D), kg, over ``segments`` for the information ``gram`` (N, 6, 6)."""
-    return total(blocks.weight, gram + LITTLE * np.eye(6), blocks.second, segments)[0]
+def dynamic_criterion(blocks: Blocks, gram: Array) -> float:
+    """Return the sum of M_i cond(W_bi^D), kg, for the information ``gram`` (N, 6, 6)."""
+    return total(blocks.weight, gram + LITTLE * np.eye(6), blocks.second)[0]

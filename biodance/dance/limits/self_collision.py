@@ -6,7 +6,6 @@ Exact distances: of two line segments for two capsules, of a line segment from a
 import numpy as np
 
 from biodance.dance.limits import FAR, Margins
-from biodance.dance.shapes import box_pairs, capsule, capsule_pairs
 from biodance.dance.state import State
 from biodance.records import Array
 
@@ -24,17 +23,15 @@ def margins(state: State) -> Margins:
 
 
 def _capsules(state: State) -> Margins:
-    body = state.chain.body
-    pairs = capsule_pairs(body)
-    first, second = (np.array([pair[k] for pair in pairs]) for k in range(2))
-    shape = {i: capsule(body, i) for i in {*first, *second}}
-    a, b = (state.placed(np.repeat(side, 2), np.concatenate([shape[i][0] for i in side])) for side in (first, second))
+    solids = state.chain.solids
+    first, second = solids.first, solids.second
+    a, b = (state.placed(np.repeat(side, 2), solids.axis[side].reshape(-1, 3)) for side in (first, second))
     a, b = (place.reshape(len(place), -1, 2, 3) for place in (a, b))
     s, t = nearest(a, b)
-    here, there = ((1 - u)[..., None] * c[:, :, 0] + u[..., None] * c[:, :, 1] for u, c in ((s, a), (t, b)))
+    here, there = _on(a, s), _on(b, t)
     apart = here - there
     distance = np.maximum(np.linalg.norm(apart, axis=2), 1e-9)
-    value = distance - np.array([shape[i][1] + shape[j][1] for i, j in pairs])
+    value = distance - solids.radius[first] - solids.radius[second]
     slopes, close = np.zeros((1, *value.shape, state.chain.size)), (value < FAR * SCALE).any(axis=0)
     normal = (apart / distance[..., None])[:, close]
     slopes[0][:, close] = state.along(first[close], here[:, close], normal) - state.along(second[close], there[:, close], normal)
@@ -53,19 +50,15 @@ def nearest(a: Array, b: Array) -> tuple[Array, Array]:
 
 
 def _boxes(state: State) -> Margins:
-    body = state.chain.body
-    pairs = box_pairs(body)
-    if not pairs:
-        return Margins(np.empty((len(state.x), 0)), np.empty((1, len(state.x), 0, state.chain.size)))
-    limb, box = (np.array([pair[k] for pair in pairs]) for k in range(2))
-    shape = [capsule(body, i) for i in limb]
-    ends = state.placed(np.repeat(limb, 2), np.concatenate([ends for ends, _ in shape])).reshape(len(state.x), -1, 2, 3)
-    low, high = np.swapaxes(body.boxes[box], 0, 1)
-    turn = state.rotation[:, box]
-    local = np.einsum("tkji,tkej->tkei", turn, ends - state.position[:, box, None]) - ((low + high) / 2)[:, None]
-    share = deepest(local, (high - low) / 2)
-    depth, away = outside(_on(local, share), (high - low) / 2)
-    value = depth - np.array([radius for _, radius in shape])
+    solids = state.chain.solids
+    limb, box = solids.limb, solids.box
+    ends = state.placed(np.repeat(limb, 2), solids.axis[limb].reshape(-1, 3)).reshape(len(state.x), -1, 2, 3)
+    low, high = np.swapaxes(state.chain.body.boxes[box], 0, 1)
+    turn, half = state.rotation[:, box], (high - low) / 2
+    local = (ends - state.position[:, box, None]) @ turn - (low + half)[:, None]
+    share = deepest(local, half)
+    depth, away = outside(_on(local, share), half)
+    value = depth - solids.radius[limb]
     slopes, close = np.zeros((1, *value.shape, state.chain.size)), (value < FAR * SCALE).any(axis=0)
     normal, place = np.einsum("tkij,tkj->tki", turn, away)[:, close], _on(ends, share)[:, close]
     slopes[0][:, close] = state.along(limb[close], place, normal) - state.along(box[close], place, normal)
