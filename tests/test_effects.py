@@ -4,6 +4,7 @@ import importlib
 
 import numpy as np
 import pytest
+from human_cases import human_case
 from random_bodies import random_body
 from scipy.interpolate import CubicSpline
 
@@ -36,12 +37,12 @@ def example(plates: int = 1) -> Case:
     return Case(body, trial, motion, body.sip.phi, time / time[-1])
 
 
-CASES = {1: example(1), 2: example(2)}
+CASES = {1: example(1), 2: example(2), "human": human_case(120)}
 ALL = [(name, plates) for name in sorted(effects()) for plates in CASES]
 
 
 @pytest.mark.parametrize(("name", "plates"), ALL)
-def test_zero_changes_nothing(name: str, plates: int) -> None:
+def test_zero_changes_nothing(name: str, plates: int | str) -> None:
     case = CASES[plates]
     for target in effect(name).targets(case):
         found = effect(name).at(target, case)
@@ -50,12 +51,14 @@ def test_zero_changes_nothing(name: str, plates: int) -> None:
 
 
 @pytest.mark.parametrize(("name", "plates"), ALL)
-def test_columns_are_the_differences_of_transform(name: str, plates: int) -> None:
+def test_columns_are_the_differences_of_transform(name: str, plates: int | str) -> None:
     case = CASES[plates]
     for target in effect(name).targets(case)[:12]:
         found = effect(name).at(target, case)
         columns = found.columns(case)
         assert columns.shape == (120, 6, len(found.parameters))
+        rows = found.marker_columns(case)
+        assert rows is None or rows.shape == (len(case.marker_columns), 3, len(found.parameters))
         for k, size in enumerate(found.typical):
             step = 1e-3 * size * np.eye(len(found.parameters))[k]
             slope = (found.transform(case, step).residual - found.transform(case, -step).residual) / (2e-3 * size)
@@ -80,7 +83,7 @@ def test_every_effect_says_what_it_is(name: str) -> None:
 
 @pytest.mark.parametrize("name", sorted(effects()))
 def test_typical_size_is_seen_in_the_residual(name: str) -> None:
-    case = CASES[1]
+    case = CASES[1] if effect(name).targets(CASES[1]) else CASES["human"]
     found = effect(name).at(effect(name).targets(case)[-1], case)
     change = found.transform(case, found.typical).residual - case.residual
     assert np.abs(change).max() > 1e-3

@@ -16,7 +16,7 @@ from biodance.errors import UnknownName
 
 Kind = TypeVar("Kind")
 
-CONTRACT = ("case", "effect", "gate", "oscillator")
+CONTRACT = ("case", "effect", "gate", "geometry", "moved_matter", "oscillator", "posture_answer")
 """Modules of this folder that are not effects."""
 
 

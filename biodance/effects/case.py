@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from biodance.errors import TrialRefused, UnknownName
 from biodance.motion.kinematics import Poses, SegmentMotion, poses, segment_motion
 from biodance.motion.regressor import regressor_of
 from biodance.records import Array, Motion, Plate, Trial, Wrench, frozen_array
+
+if TYPE_CHECKING:
+    from biodance.effects.geometry import Geometry
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +86,13 @@ class Case:
         local = np.einsum("tkij,tki->tkj", self.poses.rotation[:, segment], apart)
         seen = np.isfinite(local)
         return np.asarray(np.where(seen, local, 0.0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1))
+
+    @cached_property
+    def geometry(self) -> "Geometry":
+        """How posture, wrench and markers answer to changes of the body's geometry."""
+        from biodance.effects.geometry import geometry
+
+        return geometry(self)
 
     def plate(self, name: str) -> Plate:
         """Return a plate by name; UnknownName lists the trial's plates."""

@@ -1,0 +1,54 @@
+"""A joint turns about another point than the model's: regressions, functional trials and palpation miss joint centres by centimetres.
+
+Signature: what hangs on the joint lies elsewhere in proportion to how far the joint is bent, so the moment follows the joint's angle; the
+markers beyond the joint leave the model in the same measure. In the posture of the static trial nothing shows.
+Look-alikes: a misplaced marker of the same segment, another length of the bone, a centre of mass that is off in the segments that meet
+there. Separated by turning this joint through its whole range about all its axes (hip: star-arc) while the rest stands still.
+"""
+
+from dataclasses import replace
+
+from biodance.body.moved import recentre_joint
+from biodance.effects.case import Case
+from biodance.effects.effect import Effect, Parameter
+from biodance.effects.geometry import joint_chains
+from biodance.motion.track import track
+from biodance.records import Array
+
+
+class JointCentre(Effect):
+    """A ``shift`` (x, y, z: m, axes of the segment nearer to the root) from the model's centre of joint ``target`` to the true one."""
+
+    name = "joint_centre"
+    parameters = tuple(
+        Parameter(f"shift_{axis}", "m", 0.015, "hip: 12.3 mm (Harrington) to 25 mm (Davis) of error (Mantovani 2016)") for axis in "xyz"
+    )
+    separated_by = "The joint alone through its whole range, about all its axes, the rest standing still."
+    advice = "Record a functional calibration of this joint (for the hip a star and an arc), or palpate and re-place its markers."
+
+    @classmethod
+    def targets(cls, case: Case) -> tuple[str, ...]:
+        """Return every anatomical joint; none without markers."""
+        return tuple(joint_chains(case.body)) if case.marker_columns else ()
+
+    def columns(self, case: Case) -> Array:
+        """Return the change of the wrench with the posture that the markers give the true body, per metre."""
+        return case.geometry.joint_changes.wrench[..., self._own(case)]
+
+    def marker_columns(self, case: Case) -> Array:
+        """Return what the model with the wrong centre leaves of the markers, per metre."""
+        return -case.geometry.joint_changes.residual[..., self._own(case)]
+
+    def corrected(self, case: Case, theta: Array) -> Case:
+        """Return the trial tracked again with the body whose centre is moved by ``theta`` (3,) m."""
+        body = recentre_joint(case.body, joint_chains(case.body)[self.target][0], theta)
+        shift = body.sip.phi - case.body.sip.phi
+        return replace(case, body=body, motion=track(body, case.trial), phi=case.phi + shift)
+
+    def _own(self, case: Case) -> slice:
+        """Return the columns of this joint's centre in ``Geometry.joint_changes``."""
+        first = 4 * list(joint_chains(case.body)).index(self.target)
+        return slice(first, first + 3)
+
+
+EFFECT = JointCentre

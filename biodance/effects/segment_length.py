@@ -1,0 +1,63 @@
+"""A segment is longer than the model's: typed measures, a body scaled on another day, shoes that came or went since the static trial.
+
+Signature: everything beyond the segment's far joint lies farther out; the markers on both sides of the bone contradict each other by the
+same distance in every posture, and the moment follows the segment's direction.
+Look-alikes: a joint centre shifted along the bone, markers misplaced along it. Separated by deep squats (legs) and elbow flexion (arms),
+and by measuring the bone.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from biodance.body.moved import move_joint
+from biodance.effects.case import Case
+from biodance.effects.effect import Effect, Parameter
+from biodance.effects.geometry import joint_chains
+from biodance.motion.track import track
+from biodance.records import Array
+
+
+class SegmentLength(Effect):
+    """An ``error`` (m): segment ``target`` is this much longer, from its near to its far joint, than in the model."""
+
+    name = "segment_length"
+    parameters = (Parameter("error", "m", 0.010, "3-20 mm between typed measures and markers (public recordings: 16 mm at the hip)"),)
+    separated_by = "Deep squats for the legs, full flexion of the elbow for the arms."
+    advice = "Measure the bone with a calliper between its landmarks; record a new static trial in the shoes of the session."
+
+    @classmethod
+    def targets(cls, case: Case) -> tuple[str, ...]:
+        """Return the segments between two joints; none without markers."""
+        inner = {case.body.joints[chain[0]].parent for chain in joint_chains(case.body).values()} - {-1}
+        carried = [case.body.joints[j].segment for j in sorted(inner)]
+        return tuple(case.body.segments[s] for s in carried) if case.marker_columns else ()
+
+    def columns(self, case: Case) -> Array:
+        """Return the change of the wrench with the posture that the markers give the true body, per metre."""
+        return case.geometry.joint_changes.wrench[..., self._own(case)].sum(axis=2, keepdims=True)
+
+    def marker_columns(self, case: Case) -> Array:
+        """Return what the model with the wrong length leaves of the markers, per metre."""
+        return -case.geometry.joint_changes.residual[..., self._own(case)].sum(axis=2, keepdims=True)
+
+    def corrected(self, case: Case, theta: Array) -> Case:
+        """Return the trial tracked again with the longer body."""
+        body = case.body
+        for chain in self._far(case):
+            out = body.joints[chain[0]].translation
+            body = move_joint(body, chain[0], float(theta[0]) * out / np.linalg.norm(out))
+        return replace(case, body=body, motion=track(body, case.trial))
+
+    def _far(self, case: Case) -> list[tuple[int, ...]]:
+        """Return the joints at the far end."""
+        own = case.body.segment_joint[case.body.segment_index(self.target)]
+        return [chain for chain in joint_chains(case.body).values() if case.body.joints[chain[0]].parent == own]
+
+    def _own(self, case: Case) -> list[int]:
+        """Return the columns of the far joints in ``Geometry.joint_changes``."""
+        far = self._far(case)
+        return [4 * i + 3 for i, chain in enumerate(joint_chains(case.body).values()) if chain in far]
+
+
+EFFECT = SegmentLength
