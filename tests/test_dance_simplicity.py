@@ -1,0 +1,55 @@
+"""Simplicity: nothing to do is simplest, exact slopes, symmetric is simpler than not, one joint simpler than two."""
+
+import numpy as np
+
+from biodance.body.human import human
+from biodance.dance.chain import ROOT, Chain
+from biodance.dance.simplicity import hardness
+from biodance.dance.stance import stance
+from biodance.dance.state import State
+from biodance.records import Array, Subject
+
+BODY = human(Subject(65.0, 1.75, "F"))
+CHAIN = Chain(BODY)
+FEET = stance(BODY, "parallel")
+
+
+def hard(x: Array, feet=FEET) -> float:
+    return hardness(State(CHAIN, feet, x, *np.zeros((2, *x.shape))))[0]
+
+
+def posed(**angles: float) -> Array:
+    x = np.zeros((1, CHAIN.size))
+    for name, angle in angles.items():
+        x[0, ROOT + BODY.joint_index(name)] = angle
+    return x
+
+
+def test_slopes_are_exact() -> None:
+    rng = np.random.default_rng(2)
+    x = np.zeros((3, CHAIN.size))
+    x[:, ROOT:] = rng.uniform(BODY.limits.lower, BODY.limits.upper, (3, 23))
+    for feet in (FEET, FEET.on(0)):
+        _, slopes = hardness(State(CHAIN, feet, x, *np.zeros((2, *x.shape))))
+        turn = rng.normal(size=x.shape)
+        step = 1e-6
+        difference = (hard(x + step * turn, feet) - hard(x - step * turn, feet)) / (2 * step)
+        np.testing.assert_allclose(np.sum(slopes[0] * turn), difference, rtol=1e-7)
+        assert not slopes[1:].any()
+
+
+def test_what_a_person_would_call_simpler_is_simpler() -> None:
+    standing = hard(posed())
+    one = hard(posed(right_shoulder_flexion=1.0))
+    two = hard(posed(right_shoulder_flexion=1.0, trunk_flexion=0.5))
+    both = hard(posed(right_shoulder_flexion=1.0, left_shoulder_flexion=1.0))
+    mixed = hard(posed(right_shoulder_flexion=1.0, left_shoulder_flexion=-0.5))
+    assert standing < one < two
+    assert both < mixed
+    assert hard(posed(right_elbow_flexion=2.45)) > 1.3 * hard(posed(right_elbow_flexion=2.0))
+
+
+def test_planted_legs_are_not_counted_and_the_free_one_is() -> None:
+    bent = posed(right_knee_flexion=1.0)
+    assert hard(bent) == hard(posed())
+    assert hard(bent, FEET.on(1)) > hard(posed(), FEET.on(1))
