@@ -50,8 +50,8 @@ class Postures:
 
 @dataclass(frozen=True, eq=False)
 class Posture:
-    """``x`` (n,) coordinates, ``up`` (N, 3) the vertical in the segments, ``violation`` of the reserved limits in their scales, ``limit`` the
-    worst.
+    """``x`` (n,) coordinates, ``up`` (N, 3) the vertical in the segments; ``violation`` of the reserved limits in their scales and the worst
+    ``limit``.
     """
 
     x: Array
@@ -113,7 +113,7 @@ def find_postures(chain: Chain, blocks: Blocks, stances: tuple[Stance, ...], *, 
     """
     tasks = [workers.submit(_Search(chain, blocks, stances, seed).run, run) for run in range(RUNS)]
     pool = [[p for search in searches for p in search] for searches in zip(*(task.result() for task in tasks), strict=True)]
-    kept = [[p for p in found if p.violation <= KEPT] or _refuse(s, found) for s, found in zip(stances, pool, strict=True)]
+    kept = [[p for p in found if p.violation <= KEPT] or refuse(s, found) for s, found in zip(stances, pool, strict=True)]
     chosen, search = exchange(blocks, stances, kept), _Search(chain, blocks, stances, seed)
     for sharpness, iterations in (*FRESH, *POLISH):
         fresh = (sharpness, iterations) in FRESH
@@ -121,13 +121,16 @@ def find_postures(chain: Chain, blocks: Blocks, stances: tuple[Stance, ...], *, 
         halves = [list(range(k, len(stances), 2)) for k in range(2)]
         parts = [workers.submit(search.sweep, chosen, begin, half, sharpness, iterations) for half in halves]
         better = [part.result() for part in parts]
-        found = [better[k % 2][k // 2] for k in range(len(stances))]
-        chosen = exchange(blocks, stances, [[q for q in (new, old) if q.violation <= KEPT] for old, new in zip(chosen, found, strict=True)])
+        for k, (posture, found) in enumerate(zip(chosen, kept, strict=True)):
+            new = better[k % 2][k // 2]
+            kept[k] = [*([new] if new.violation <= KEPT else []), posture, *(p for p in found if p is not posture)]
+        chosen = exchange(blocks, stances, kept)
     value, _ = total(blocks.weight, static_grams(np.array([p.up for p in chosen])), blocks.first)
     return Postures(np.array([p.x for p in chosen]), stances, value, float(blocks.weight.sum()))
 
 
-def _refuse(stance: Stance, found: list[Posture]) -> list[Posture]:
+def refuse(stance: Stance, found: list[Posture]) -> list[Posture]:
+    """Raise the BiodanceError that says which limit forbids the postures ``found`` on these feet."""
     best = min(found, key=lambda p: p.violation)
     raise BiodanceError(
         f"On the feet {stance.name!r} no posture keeps all limits: {best.limit.replace('_', ' ')} is exceeded by {best.violation:.2f} of "

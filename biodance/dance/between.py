@@ -1,0 +1,47 @@
+"""Postures in between, which carry the weight from one foot configuration to the next: simple, near their neighbours."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance.dance.chain import Chain
+from biodance.dance.postures import ATTEMPTS, KEPT, Posture, refuse, solve, start
+from biodance.dance.stance import Stance
+from biodance.dance.state import State
+from biodance.records import Array
+
+ITERATIONS = 30
+MILD = 0.3
+"""Share of the neighbours' joint angles that a posture in between keeps: it is a rest."""
+
+
+@dataclass(frozen=True, eq=False)
+class Near:
+    """Objective: mean squared distance (rad, m) of the coordinates from ``target`` (n,)."""
+
+    target: Array
+
+    def __call__(self, state: State) -> tuple[float, Array]:
+        """Return the objective and its slopes by x."""
+        gap, by = state.x - self.target, np.zeros((3, *state.x.shape))
+        by[0] = 2 * gap / len(self.target)
+        return float(np.mean(gap**2)), by
+
+
+def middle_posture(chain: Chain, stance: Stance, neighbours: Array, *, seed: list[int]) -> Posture:
+    """Return a posture on the feet ``stance`` between ``neighbours`` (K, n) coordinates.
+
+    Raises
+    ------
+    BiodanceError
+        There is none within the limits; the message names the limit.
+    """
+    rng, found = np.random.default_rng(seed), []
+    begin = start(chain, stance, rng)
+    begin[3:] = MILD * neighbours[:, 3:].mean(axis=0)
+    for _ in range(ATTEMPTS):
+        found.append(solve(chain, stance, begin, Near(begin), iterations=ITERATIONS))
+        if found[-1].violation <= KEPT:
+            return found[-1]
+        begin = start(chain, stance, rng)
+    return refuse(stance, found)[0]
