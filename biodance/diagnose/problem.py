@@ -79,7 +79,7 @@ class Problem:
 
     def with_parameters(self, phi: Array) -> "Problem":
         """Return the problem whose faults are predicted with the parameters ``phi`` (10N,); what is measured against stays the prior."""
-        return replace(self, cases=tuple(replace(case, phi=phi) for case in self.cases))
+        return replace(self, cases=tuple(case.with_parameters(phi) for case in self.cases))
 
 
 def problem(body: Body, looks: tuple[Look, ...], *, prior: Sip | None = None) -> Problem:

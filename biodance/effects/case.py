@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from biodance.effects.geometry import Geometry
 
 
+OF_MOTION = ("regressor", "segments", "poses", "marker_columns", "measured_markers", "marker_residual", "geometry")
+"""What a case computes once from body, motion and markers, whatever the forces and the parameters."""
+
+
 @dataclass(frozen=True, eq=False)
 class Case:
     """A prepared ``trial`` (plates at marker times) with the ``motion`` of ``body`` in it and the parameters ``phi`` (10N,) in use.
@@ -113,7 +117,17 @@ class Case:
         """Return the case with ``change`` (T, 6) about the lab origin added to what ``plate`` measured."""
         changed = replace(plate, wrench=Wrench(plate.wrench.time, plate.wrench.value + change))
         plates = tuple(changed if p.name == plate.name else p for p in self.trial.plates)
-        return replace(self, trial=replace(self.trial, plates=plates))
+        changed_trial = replace(self.trial, plates=plates)
+        return self._known(replace(self, trial=changed_trial), *OF_MOTION, "predicted")
+
+    def with_parameters(self, phi: Array) -> "Case":
+        """Return the case with the parameters ``phi`` (10N,) in use."""
+        return self._known(replace(self, phi=phi), *OF_MOTION)
+
+    def _known(self, other: "Case", *names: str) -> "Case":
+        """Return ``other``, a case of the same motion, with what was computed here already."""
+        other.__dict__.update({name: self.__dict__[name] for name in names if name in self.__dict__})
+        return other
 
 
 def at_point(wrench: Array, point: Array) -> Array:
