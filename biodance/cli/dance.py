@@ -1,8 +1,74 @@
-"""Commands of the dance: criteria."""
+"""Commands of the dance: dance, criteria."""
 
+import shutil
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Literal
 
-from biodance.cli.app import DONE, Json, app, print_json, progress
+from cyclopts import Parameter
+
+from biodance.cli.app import DONE, NEEDS_A_PERSON, Force, Json, Out, app, print_json, progress, say
+
+
+@app.command
+def dance(
+    *,
+    sex: Literal["F", "M"],
+    height: Annotated[float, Parameter(help="Stature, m.")],
+    mass: Annotated[float, Parameter(help="Body mass, kg.")],
+    age: Annotated[float, Parameter(help="Age, years; strength falls with it.")] = float("nan"),
+    protocol: Annotated[str, Parameter(help="full, short, chair, one_segment, or a TOML file.")] = "full",
+    limits: Annotated[Path | None, Parameter(help="TOML file with what this person can and may do.")] = None,
+    seed: Annotated[int, Parameter(help="The same seed gives the same dance.")] = 0,
+    out: Out,
+    json: Json = False,
+    force: Force = False,
+) -> int:
+    """Design a dance for one person: safe, balanced, and telling much about every segment.
+
+    Writes dance.npz, dance.c3d (virtual markers), cues.md, margins.md, figures and results.json. Ctrl-C keeps what is finished, and the
+    same command goes on from there. A dance that cannot exist is refused with the constraint that forbids it (exit code 1).
+    """
+    from biodance.dance.person import HEALTHY, read_person
+    from biodance.dance.protocol import read_plan
+    from biodance.pipeline.dance import UNFINISHED, dance_folder, dancer, make_dance
+    from biodance.records import Subject
+    from biodance.report.dance_write import print_dance, write_dance
+
+    plan, person = read_plan(protocol), read_person(limits) if limits else HEALTHY
+    body = dancer(Subject(mass, height, sex, age))
+    folder = dance_folder(out, force=force)
+    with counted_progress() as tell:
+        try:
+            result = make_dance(body, plan, person, seed=seed, tell=tell, resume=folder / UNFINISHED)
+        except KeyboardInterrupt:
+            say(f"Stopped; {folder} keeps what is finished. The same command goes on from there.")
+            raise
+        tell("writing", 0, 0)
+        found = write_dance(result, folder)
+    shutil.rmtree(folder / UNFINISHED, ignore_errors=True)
+    if json:
+        print_json(found)
+    else:
+        print_dance(found)
+        sys.stdout.write(f"{folder}\n")
+    if not result.feasible:
+        say(f"There is no such dance. {result.reason}")
+    return DONE if result.feasible and not result.notes else NEEDS_A_PERSON
+
+
+@contextmanager
+def counted_progress() -> Iterator[Callable[[str, int, int], None]]:
+    """Yield a function that shows on stderr what is being done, how much of it is finished, and of how much (0: not counted)."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
+        task = bars.add_task("", total=None)
+        yield lambda what, done, of: bars.update(task, description=what, completed=done, total=of or None)
 
 
 @app.command

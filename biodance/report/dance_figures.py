@@ -1,4 +1,4 @@
-"""Figures of a dance: the postures as stick figures (paper Fig. 3), the criterion over the transitions (Fig. 5), the ZMP (Fig. 6)."""
+"""Figures of a dance: postures as stick figures (paper Fig. 3), criterion by transition (Fig. 5), ZMP (Fig. 6), expected accuracy."""
 
 from typing import TYPE_CHECKING
 
@@ -7,11 +7,16 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.motion.kinematics import poses
 from biodance.records import Array
-from biodance.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, SIDES, WIDTH, figure, look
+from biodance.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PINK, RED, SIDES, SKY, WIDTH, figure, look
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from biodance.dance.account import ZmpPath
+    from biodance.dance.expectation import Expectation
 
 COLUMNS = 10
 VIEW = np.array([[0.80, -0.60, 0.0], [0.18, 0.24, 0.95]])
@@ -93,18 +98,50 @@ def criterion_figure(values: Array, bound: float, *, what: str = "sum of M cond(
     return drawn
 
 
-def zmp_figure(before: Array, after: Array, support: Array, usable: Array) -> "Figure":
-    """Draw the zero-moment point before (T, 2) and after (S, 2) balancing, m, in the base of ``support`` (P, 2) and its ``usable`` part."""
+def zmp_figure(paths: "Sequence[ZmpPath]") -> "Figure":
+    """Draw the zero-moment point of every move, below on the straight way between the postures, above in the dance; a column a stance."""
+    names = list(dict.fromkeys(path.stance.name for path in paths))
     with look():
-        drawn = figure(3.2)
+        drawn = figure(4.0)
+        panels = drawn.subplots(2, len(names), sharex=True, sharey=True, squeeze=False)
+        for column, name in enumerate(names):
+            mine = [path for path in paths if path.stance.name == name]
+            feet = mine[0].stance
+            usable = feet.centre + feet.share * (feet.support - feet.centre)
+            for axes, colour, what in zip(panels[:, column], (BLUE, ORANGE), ("designed", "straight"), strict=True):
+                _outline(axes, feet.support, BLACK, "-", "base of support")
+                _outline(axes, usable, GREY, "--", "part that may be used")
+                for k, path in enumerate(mine):
+                    label = f"zero-moment point, {what} way" if k == 0 else None
+                    axes.plot(*getattr(path, what).T, color=colour, linewidth=0.7, label=label)
+                axes.set_aspect("equal")
+            panels[0, column].set_title(name.replace("_", " "))
+            panels[1, column].set_xlabel("lab x, m")
+        low, high = (edge(np.concatenate([path.stance.support for path in paths]), axis=0) for edge in (np.min, np.max))
+        panels[0, 0].set(xlim=(low[0] - 0.1, high[0] + 0.1), ylim=(low[1] - 0.1, high[1] + 0.1))
+        for axes in panels[:, 0]:
+            axes.set_ylabel("lab y, m")
+        handles = {label: handle for axes in panels[:, 0] for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+        drawn.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=2)
+    return drawn
+
+
+def expectation_figure(expectation: "Expectation") -> "Figure":
+    """Draw the standard deviations of mass and centre of mass that are expected after each duration, as shares of the table's."""
+    kinds = [name.removeprefix("right_") for name in expectation.segments if not name.startswith("left_")]
+    colours = (BLACK, ORANGE, SKY, GREEN, BLUE, RED, PINK, GREY)
+    with look():
+        drawn = figure(2.9)
         left, right = drawn.subplots(1, 2, sharex=True, sharey=True)
-        for axes, path, colour, title in ((left, before, ORANGE, "before balancing"), (right, after, BLUE, "after balancing")):
-            _outline(axes, support, BLACK, "-", "base of support")
-            _outline(axes, usable, GREY, "--", "part that may be used")
-            axes.plot(*path.T, color=colour, label="zero-moment point")
-            axes.set(title=title, xlabel="lab x, m", aspect="equal")
-        left.set_ylabel("lab y, m")
-        drawn.legend(*right.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+        for axes, values, title in ((left, expectation.mass, "mass"), (right, expectation.com, "centre of mass")):
+            for number, kind in enumerate(kinds):
+                mine = [i for i, name in enumerate(expectation.segments) if name.removeprefix("right_").removeprefix("left_") == kind]
+                share = 100 * (values[:, mine] / values[0, mine]).mean(axis=1)
+                style = ("-", "--", ":")[number // len(colours)]
+                axes.plot(expectation.duration, share, style, color=colours[number % len(colours)], label=kind.replace("_", " "))
+            axes.set(title=title, xlabel="duration of the dance, s", ylim=(0, 105))
+        left.set_ylabel("expected sd, % of the table's")
+        drawn.legend(*right.get_legend_handles_labels(), loc="outside lower center", ncols=min(len(kinds), 4))
     return drawn
 
 

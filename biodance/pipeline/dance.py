@@ -1,0 +1,122 @@
+"""A dance for one person, from what is known of the person to the numbers of the finished dance, all steps in order."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from biodance.body.body import Body
+from biodance.body.human import human
+from biodance.body.limits import joint_limits
+from biodance.dance.account import Account, account
+from biodance.dance.chain import Chain
+from biodance.dance.dance import Dance
+from biodance.dance.design import design
+from biodance.dance.expectation import Expectation, expect
+from biodance.dance.person import PersonLimits, fitted
+from biodance.dance.plan import Plan
+from biodance.dance.refusal import check_postures
+from biodance.dance.sequence import sequence
+from biodance.dance.verify import Margin, broken, verify
+from biodance.errors import BiodanceError
+from biodance.records import Subject
+
+Tell = Callable[[str, int, int], None]
+"""Told what is being done, how many parts are finished and of how many (0: not counted)."""
+UNFINISHED = "unfinished"
+"""Folder with what is finished of a dance whose design was stopped."""
+OURS = (
+    *("results.json", "dance.npz", "dance.c3d", "cues.md", "margins.md"),
+    *("postures.png", "criterion.png", "zmp.png", "expectation.png"),
+)
+"""Files that a dance consists of."""
+
+
+@dataclass(frozen=True, eq=False)
+class DanceResult:
+    """What came of designing a dance.
+
+    ``plan`` and ``body`` as fitted to the person; ``dance`` with its ``margins`` (worst of every limit, checked by other code than the
+    optimiser's), ``account`` and ``expectation``; where there is none that keeps all limits, ``reason`` says which constraint forbids it
+    and ``dance`` is None. ``notes`` what was left out for the person; ``seconds`` of computing.
+    """
+
+    body: Body
+    plan: Plan
+    dance: Dance | None
+    margins: tuple[Margin, ...]
+    account: Account | None
+    expectation: Expectation | None
+    reason: str
+    notes: tuple[str, ...]
+    seconds: float
+
+    @property
+    def feasible(self) -> bool:
+        """True where there is a dance and every margin of it is kept."""
+        return self.dance is not None
+
+
+def dancer(subject: Subject) -> Body:
+    """Return the body of a person for whom a dance is designed: a generic one, joints within what is reached without effort."""
+    return replace(human(subject), limits=joint_limits(subject, within="comfortable"))
+
+
+def make_dance(
+    body: Body, plan: Plan, person: PersonLimits, *, seed: int = 0, tell: Tell = lambda *_: None, resume: Path | None = None
+) -> DanceResult:
+    """Design, check and count a dance of ``plan`` for ``body`` with the limits of ``person``; ``resume`` keeps what is finished meanwhile.
+
+    Raises
+    ------
+    BiodanceError
+        The protocol and the person contradict each other (`person.fitted`).
+    """
+    started = time.perf_counter()
+    own, plan, notes = fitted(body, plan, person)
+    reason, margins, dance = "", tuple[Margin, ...](), None
+    tell("looking for a posture on all feet", 0, 0)
+    try:
+        check_postures(Chain(own), tuple({(s.name, s.planted): s for s in sequence(own, plan) if s.over is None}.values()), seed=seed)
+        dance = design(own, plan, seed=seed, tell=tell, resume=resume)
+    except BiodanceError as error:
+        reason = str(error)
+    if dance is not None:
+        tell("checking every limit", 0, 0)
+        margins = verify(own, dance, plan)
+        reason = " ".join(_told(margin) for margin in broken(margins))
+    kept = dance if not reason else None
+    counted = expected = None
+    if kept is not None:
+        tell("counting what the dance tells", 0, 0)
+        counted, expected = account(kept, plan), expect(kept)
+    return DanceResult(own, plan, kept, margins, counted, expected, reason, notes, time.perf_counter() - started)
+
+
+def _told(m: Margin) -> str:
+    what = f"{m.limit} {m.what}".replace("_", " ").strip()
+    return f"The limit on {what} is broken by {-m.worst:.3g} {m.unit} at {m.where_s:.2f} s."
+
+
+def dance_folder(out: Path, *, force: bool = False) -> Path:
+    """Return the folder for a dance, made if missing; with ``force`` the files of an earlier dance in it are removed.
+
+    A folder that holds nothing but a stopped design is gone on with.
+
+    Raises
+    ------
+    BiodanceError
+        It is a file, holds files already and ``force`` was not given, or holds files that are not of a dance.
+    """
+    if out.exists() and not out.is_dir():
+        raise BiodanceError(f"{out}: is a file; a dance needs a folder. Choose another --out.")
+    out.mkdir(parents=True, exist_ok=True)
+    found = sorted(path.name for path in out.iterdir() if path.name != UNFINISHED)
+    foreign = [name for name in found if name not in OURS]
+    if foreign:
+        raise BiodanceError(f"{out}: holds files that are not of a dance ({foreign[0]}). Choose another --out.")
+    if found and not force:
+        raise BiodanceError(f"{out}: holds a dance already and nothing is overwritten. Choose another --out, or --force.")
+    for name in found:
+        (out / name).unlink()
+    return out

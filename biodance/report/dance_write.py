@@ -1,0 +1,164 @@
+"""Write a designed dance into a folder: for programs, for the motion-capture screen, for the person who calls it, for the analyst."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from biodance.dance.cues import cue_sheet
+from biodance.dance.dance import Dance
+from biodance.dance.refusal import told
+from biodance.dance.stance import Stance
+from biodance.dance.verify import Margin
+from biodance.lab.write_c3d import write_c3d
+from biodance.motion.kinematics import poses
+from biodance.pipeline.dance import DanceResult
+from biodance.records import Markers
+from biodance.report.dance_figures import criterion_figure, expectation_figure, postures_figure, zmp_figure
+from biodance.report.results_json import plain, to_text
+
+RATE = 100.0
+"""Hz of the preview's markers."""
+SIDES = ("right", "left")
+DOTS = 160
+"""Dots per inch of the figures."""
+
+
+def write_dance(result: DanceResult, folder: Path) -> dict[str, Any]:
+    """Write all files of a dance into ``folder`` (which exists) and return the content of ``results.json``.
+
+    A dance that does not keep every limit is not written: then ``results.json`` alone says why.
+    """
+    found: dict[str, Any] = plain(dance_document(result))
+    if result.dance is not None and result.account is not None and result.expectation is not None:
+        dance = result.dance
+        dance.save(folder / "dance.npz")
+        write_preview(dance, folder / "dance.c3d")
+        (folder / "cues.md").write_text(cues(dance), encoding="utf-8", newline="\n")
+        (folder / "margins.md").write_text(margin_table(result.margins), encoding="utf-8", newline="\n")
+        counted = np.flatnonzero(dance.counted).tolist()
+        titles = tuple(f"{k} {_short(dance.stances[p])}" for k, p in enumerate(counted, start=1))
+        still = dance.chain.motion(np.arange(len(counted), dtype=float), *(_held(dance, counted)))
+        drawn = {
+            "postures": postures_figure(dance.body, still.q, titles),
+            "criterion": criterion_figure(result.account.dynamic, result.account.dynamic_bound),
+            "zmp": zmp_figure(result.account.paths),
+            "expectation": expectation_figure(result.expectation),
+        }
+        for name, figure in drawn.items():
+            figure.savefig(folder / f"{name}.png", dpi=DOTS, metadata={"Software": None})
+    (folder / "results.json").write_text(to_text(found), encoding="utf-8", newline="\n")
+    return found
+
+
+def dance_document(result: DanceResult) -> dict[str, Any]:
+    """Return what `biodance dance` promises as results.json (see docs/dance.md); SI units by suffix."""
+    dance, account, expectation = result.dance, result.account, result.expectation
+    limits = [{"limit": m.limit, "worst": m.worst, "where_s": m.where_s, "unit": m.unit, "what": m.what} for m in result.margins]
+    criterion = None
+    if account is not None:
+        criterion = {
+            "static": account.static,
+            "static_bound": account.static_bound,
+            "dynamic": account.dynamic,
+            "dynamic_bound": account.dynamic_bound,
+        }
+    rows = []
+    if expectation is not None:
+        for i, name in enumerate(expectation.segments):
+            ends = {"mass_kg": expectation.mass, "com_m": expectation.com, "inertia_kgm2": expectation.inertia}
+            now = {key: values[-1, i] for key, values in ends.items()}
+            before = {key.replace("_", "_table_", 1): values[0, i] for key, values in ends.items()}
+            rows.append({"segment": name, **now, **before, "information": expectation.share[-1, i]})
+    return {
+        "protocol": result.plan.name,
+        "postures": int(dance.counted.sum()) if dance else 0,
+        "transitions": len(dance.move) if dance else 0,
+        "duration_s": dance.duration if dance else 0.0,
+        "criterion": criterion,
+        "margins": limits,
+        "feasible": result.feasible,
+        "reason": result.reason,
+        "expected_sd": rows,
+        "expected_curve": _curve(result),
+        "notes": result.notes,
+        "seed": dance.seed if dance else None,
+        "compute_s": result.seconds,
+    }
+
+
+def _curve(result: DanceResult) -> dict[str, Any] | None:
+    if result.expectation is None:
+        return None
+    e = result.expectation
+    return {"segments": e.segments, "duration_s": e.duration, "mass_kg": e.mass, "com_m": e.com, "inertia_kgm2": e.inertia}
+
+
+def _held(dance: Dance, chosen: Sequence[int]) -> tuple[Any, Any, Any]:
+    """Return coordinates, rates and accelerations (K, n) of the chosen postures."""
+    x = np.array([dance.chain.plant(dance.postures[p][None], dance.stances[p].planted, dance.stances[p].ankle)[0] for p in chosen])
+    return x, np.zeros_like(x), np.zeros_like(x)
+
+
+def _short(stance: Stance) -> str:
+    return {"parallel": "feet parallel", "right_forward": "right forward", "seated": "seated"}.get(
+        stance.name, f"on the {stance.name.removeprefix('single_')}"
+    )
+
+
+def cues(dance: Dance) -> str:
+    """Return the cue sheet of all postures, those in between included."""
+    words = tuple(told(s) if s.over is None else f"{told(s.on(0, 1))}, the weight on the {SIDES[s.over]} one" for s in dance.stances)
+    angles = _held(dance, range(len(dance.stances)))[0][:, 6:]
+    planted = tuple(tuple(SIDES[side] for side in s.planted) for s in dance.stances)
+    return cue_sheet(dance.body, angles, words, planted, move=float(np.median(dance.move)), hold=float(np.max(dance.hold)))
+
+
+def write_preview(dance: Dance, path: Path) -> None:
+    """Write the dance as virtual markers at 100 Hz: what the cameras will see of a person who dances it exactly."""
+    motion, markers = dance.motion(RATE), dance.body.markers
+    xyz = poses(dance.body, motion.q).points(list(markers.segment), markers.position)
+    weight = float(dance.body.sip.mass.sum())
+    path.unlink(missing_ok=True)
+    write_c3d(
+        path,
+        markers=Markers(markers.names, motion.time, xyz),
+        parameters={"PROCESSING": {"Bodymass": weight}, "SUBJECTS": {"NAMES": ["designed dance"]}},
+    )
+
+
+def margin_table(margins: Sequence[Margin]) -> str:
+    """Return the margins as a Markdown table: what is left of every limit where it is tightest."""
+    lines = ["# What is left of every limit", "", "Checked on the finished dance, every 0.01 s, by other code than its design.", ""]
+    lines += ["| limit | least margin | unit | at, s | of |", "|---|---|---|---|---|"]
+    lines += [f"| {_plain(m.limit)} | {m.worst:.4g} | {m.unit} | {m.where_s:.2f} | {_plain(m.what)} |" for m in margins]
+    return "\n".join(lines) + "\n"
+
+
+def _plain(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def print_dance(found: dict[str, Any]) -> None:
+    """Print what was designed on the terminal: its size, its criteria, the margins and what will be known."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console()
+    if found["feasible"]:
+        criterion = found["criterion"]
+        console.print(f"{found['postures']} postures, {found['transitions']} moves, {found['duration_s']:.0f} s ({found['protocol']})")
+        console.print(f"static criterion {criterion['static']:.1f} kg, {criterion['static'] / criterion['static_bound']:.2f} of its bound")
+        for rows, keys, title in (
+            (found["margins"], ("limit", "worst", "unit", "where_s", "what"), "least margins"),
+            (found["expected_sd"], ("segment", "mass_kg", "mass_table_kg", "com_m", "com_table_m"), "expected standard deviations"),
+        ):
+            table = Table(box=None, pad_edge=False, title=title, title_justify="left")
+            for key in keys:
+                table.add_column(key)
+            for row in rows:
+                table.add_row(*(f"{row[key]:.3g}" if isinstance(row[key], float) else str(row[key]) for key in keys))
+            console.print(table)
+    for note in found["notes"]:
+        console.print(f"look: {note}", markup=False)
