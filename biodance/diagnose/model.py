@@ -65,13 +65,9 @@ def white(problem: Problem, tolerances: Tolerances, rows: Array) -> Array:
 
 
 def model(problem: Problem, causes: tuple[Candidate, ...], tolerances: Tolerances) -> Model:
-    """Return the model without any named cause; single parameters of ``causes`` with a learned size are tolerances."""
+    """Return the model without any named cause; those of ``causes`` with a learned size are tolerances as well."""
     kinematic = problem.kinematics * np.array([tolerances.size(group) for group in problem.groups])
-    installed = [
-        one.basis[:, 0] * (tolerances.size(key_of(*one.names)) / (SCALE * one.effect.typical[0]))
-        for one in causes
-        if one.effect.typical.size == 1 and tolerances.size(key_of(*one.names)) > 0
-    ]
-    X = np.concatenate([problem.sip, kinematic, np.array(installed).reshape(-1, len(problem.sip)).T], axis=1)
+    shares = [(one, tolerances.size(key_of(*one.names)) / (SCALE * one.effect.typical[0])) for one in causes]
+    X = np.concatenate([problem.sip, kinematic, *(one.basis * share for one, share in shares if share > 0)], axis=1)
     both = white(problem, tolerances, np.concatenate([X, problem.target[:, None]], axis=1))
     return Model(problem, tolerances, believe(both[:, :-1], both[:, -1]))

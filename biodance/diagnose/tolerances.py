@@ -5,6 +5,7 @@ of all nuisances and the covariance of the rest per band are learned together by
 subjects whose file is in `tolerances.toml`, or a laboratory's own sessions (`learn`).
 """
 
+import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -85,9 +86,10 @@ def to_toml(found: Tolerances) -> str:
 
 
 def key_of(name: str, target: str) -> str:
-    """Return the key of an effect at a target; plates share their tolerances."""
+    """Return the key of an effect at a target: plates share their tolerances, and so do the sides of the body."""
     plate, colon, rest = target.partition(":")
-    return f"{name} {rest if colon and plate.startswith('plate') else target}".strip()
+    kind = rest if colon and plate.startswith("plate") else re.sub(r"^(right_|left_|[LR](?=[A-Z]{3}))", "", target)
+    return f"{name} {kind}".strip()
 
 
 @dataclass(frozen=True, eq=False)

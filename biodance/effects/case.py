@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from biodance.effects.geometry import Geometry
 
 
-OF_MOTION = ("regressor", "segments", "poses", "marker_columns", "measured_markers", "marker_residual", "geometry")
+OF_MOTION = ("regressor", "segments", "poses", "marker_columns", "measured_markers", "marker_residual")
 """What a case computes once from body, motion and markers, whatever the forces and the parameters."""
 
 
@@ -118,7 +118,7 @@ class Case:
         changed = replace(plate, wrench=Wrench(plate.wrench.time, plate.wrench.value + change))
         plates = tuple(changed if p.name == plate.name else p for p in self.trial.plates)
         changed_trial = replace(self.trial, plates=plates)
-        return self._known(replace(self, trial=changed_trial), *OF_MOTION, "predicted")
+        return self._known(replace(self, trial=changed_trial), *OF_MOTION, "predicted", "geometry")
 
     def with_parameters(self, phi: Array) -> "Case":
         """Return the case with the parameters ``phi`` (10N,) in use."""
