@@ -1,10 +1,14 @@
-"""Who moves in this session: the body scaled on a static trial, else from stature alone; how it came about is said."""
+"""Who moves in this session: the body scaled on a static trial, its joints placed by the movement, else from stature alone; how it came
+about is said.
+"""
 
 from functools import partial
 
 from biodance.body.body import Body
 from biodance.body.human import DEFAULT_TABLE, human
-from biodance.body.scaling import scale
+from biodance.body.scaling import Scaling, measure
+from biodance.errors import TrialRefused
+from biodance.motion.functional_joints import functional_joints
 from biodance.pipeline.results import Step
 from biodance.pipeline.steps import attempt
 from biodance.pipeline.trial import Prepared
@@ -21,9 +25,13 @@ def body_of(subject: Subject, read: tuple[Prepared, ...], steps: list[Step]) -> 
         return None, "No body: the subject's mass or stature is not known."
     statics = [one.trial for one in read if one.trial.role == "static" and one.usable]
     for static in statics:
-        body = attempt(steps, "scale", partial(scale, subject, static))
-        if body is not None:
-            return body, f"Scaled on the static trial {static.name}; masses and inertias from the table {DEFAULT_TABLE}."
+        scaling = attempt(steps, "scale", partial(measure, subject, static))
+        if scaling is not None:
+            placed = attempt(steps, "joints", partial(placed_by_movement, scaling, read))
+            how = "joints placed by movement" if placed else "joints where it shows them"
+            return (placed or scaling).body()[0], (
+                f"Scaled on the static trial {static.name}, {how}; masses and inertias from the table {DEFAULT_TABLE}."
+            )
     if not statics:
         steps.append(Step("scale", "refused", "No static trial can be used, so the body comes from stature alone. Record a static trial."))
     sets = [one.trial.marker_set for one in read if one.trial.marker_set]
@@ -31,3 +39,19 @@ def body_of(subject: Subject, read: tuple[Prepared, ...], steps: list[Step]) -> 
         return None, "No body: no trial has markers of a known set."
     body = attempt(steps, "body from stature", lambda: human(subject, markers=sets[0]))
     return body, f"From stature alone, with the usual places of the markers; masses and inertias from the table {DEFAULT_TABLE}."
+
+
+def placed_by_movement(scaling: Scaling, read: tuple[Prepared, ...]) -> Scaling:
+    """Return the scaling with the joints that the trials with role fit show at the places where these show them.
+
+    Raises
+    ------
+    TrialRefused
+        No trial with role fit has markers of the same set.
+    """
+    wanted = scaling.posture.marker_set.name
+    fits = [one.trial for one in read if one.usable and one.trial.role == "fit" and one.trial.marker_set == wanted]
+    same = [trial.markers for trial in fits if trial.markers is not None]
+    if not same:
+        raise TrialRefused("No trial with role fit has markers of the static trial's set, so the joints stay where that trial shows them.")
+    return functional_joints(scaling, same).scaling

@@ -1,0 +1,123 @@
+"""Joint centres and axes from movement: found where the movement shows them, left alone where it does not, derivatives exact."""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from biodance.body.human import human
+from biodance.body.limits import joint_limits
+from biodance.body.scaling import Scaling, measure
+from biodance.body.skeleton import JOINTS
+from biodance.errors import TrialRefused
+from biodance.motion.functional_joints import evaluate, functional_joints, spread_postures
+from biodance.motion.joint_unknowns import HINGES, SIZE, JointUnknowns, own_centre, own_turn
+from biodance.motion.kinematics import poses
+from biodance.records import Array, Markers, Source, Subject, Trial
+
+SUBJECT = Subject(65.0, 1.75, "F", 33.0)
+ARMS = {"shoulder_adduction": -25, "elbow_flexion": 25, "knee_flexion": 5}
+
+
+@cache
+def scaling() -> Scaling:
+    """Return the scaling on a static trial of the generic person with slightly bent arms."""
+    body = human(SUBJECT)
+    q = body.neutral
+    q[2] = 0.95
+    for side in ("right", "left"):
+        for joint, degrees in ARMS.items():
+            q[7 + body.joint_index(f"{side}_{joint}")] = np.radians(degrees)
+    xyz = poses(body, np.tile(q, (60, 1))).points(body.markers.segment, body.markers.position)
+    markers = Markers(body.markers.names, np.arange(60) / 100, xyz)
+    return measure(SUBJECT, Trial("static", "static", markers, (), Source(Path("static.c3d"), "", "test", 100.0), "plug_in_gait"))
+
+
+def displaced(theta: Array) -> Scaling:
+    """Return the same person with joints elsewhere; the static trial looks exactly the same."""
+    return replace(scaling(), centres=JointUnknowns(scaling().centres).moved(theta))
+
+
+def moving(true: Scaling, *, share: float = 0.8, seconds: float = 120.0, seed: int = 3) -> Markers:
+    """Return what a person does who goes ``share`` of the way to a random posture every 0.4 s, with 1 mm of noise."""
+    rng = np.random.default_rng(seed)
+    body, stand = true.body()
+    time = np.arange(0, seconds, 0.4)
+    limits = joint_limits(SUBJECT)
+    q = np.tile(stand, (time.size, 1))
+    q[:, 7:] += share * (rng.uniform(limits.lower, limits.upper, size=(time.size, len(body.joints))) - stand[7:])
+    xyz = poses(body, q).points(body.markers.segment, body.markers.position)
+    return Markers(body.markers.names, time, xyz + 0.001 * rng.normal(size=xyz.shape))
+
+
+def hidden() -> Array:
+    """Return joints that a static trial does not show: elbows turned by 40 degrees, the trunk's joint 6 cm lower, a hip 15 mm off."""
+    theta = np.zeros(SIZE)
+    unknowns = JointUnknowns(scaling().centres)
+    for elbow, angle in (("right_elbow", 0.7), ("left_elbow", -0.6)):
+        theta[own_turn(elbow)] = angle
+        residual, _ = unknowns.prior(theta)
+        theta[own_centre(elbow)] = -0.008 * residual[own_centre(elbow)]
+    theta[own_centre("trunk")] = [-0.01, 0.005, -0.06]
+    theta[own_centre("right_hip")] = [0.01, -0.008, 0.009]
+    return theta
+
+
+def test_every_choice_of_the_joints_stands_exactly_under_the_static_markers() -> None:
+    body, q = displaced(hidden()).body()
+    found = poses(body, q[None]).points(body.markers.segment, body.markers.position)[0]
+    expected = np.stack([scaling().posture.points[name] for name in body.markers.names])
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def test_hidden_joints_are_found_from_movement() -> None:
+    theta = hidden()
+    found = functional_joints(scaling(), [moving(displaced(theta))])
+    true = displaced(theta).centres
+    for joint in ("right_elbow", "left_elbow", "trunk", "right_hip", "right_knee", "left_shoulder"):
+        error = np.linalg.norm(found.scaling.centres.place[joint] - true.place[joint])
+        assert error < 0.006, (joint, error)
+    for elbow, angle in (("right_elbow", 0.7), ("left_elbow", -0.6)):
+        assert found.turned[elbow] == pytest.approx(angle, abs=np.radians(4)), elbow
+    assert found.rms[1] < 0.25 * found.rms[0]
+    assert any(note.startswith("Joints placed by movement") for note in found.scaling.notes)
+
+
+def test_the_mass_above_the_cut_stays_where_it_is_when_the_trunk_joint_moves() -> None:
+    before, q = scaling().body()
+    after, moved_q = displaced(hidden()).body()
+    places = []
+    for body, posture in ((before, q), (after, moved_q)):
+        pose, trunk = poses(body, posture[None]), body.segment_index("trunk_head")
+        places.append(pose.position[0, trunk] + pose.rotation[0, trunk] @ body.sip.com[trunk])
+    assert before.sip.mass == pytest.approx(after.sip.mass, abs=1e-12)
+    assert np.linalg.norm(places[0] - places[1]) < 0.006  # the hip that moved turns the line on which the cut lies
+
+
+@pytest.mark.parametrize(("share", "seconds"), [(0.0, 120.0), (0.1, 2.0)], ids=["quiet standing", "two seconds"])
+def test_what_the_movement_does_not_show_stays(share: float, seconds: float) -> None:
+    found = functional_joints(scaling(), [moving(displaced(hidden()), share=share, seconds=seconds)])
+    assert set(found.kept) >= {"trunk", "right_hip", "right_shoulder", "right_elbow"}
+    for joint in found.kept:
+        np.testing.assert_array_equal(found.scaling.centres.place[joint], scaling().centres.place[joint])
+    assert any("kept where the static trial puts them" in note for note in found.notes)
+
+
+def test_the_gradient_is_that_of_the_cost() -> None:
+    rng = np.random.default_rng(1)
+    theta = np.concatenate([0.005 * rng.normal(size=SIZE - len(HINGES)), 0.1 * rng.normal(size=len(HINGES))])
+    postures = spread_postures([moving(displaced(hidden()), share=0.3, seconds=12.0)], scaling().body()[0].markers.names)
+    at = evaluate(scaling(), postures, theta, None, noise=0.008)
+    left_out = [i for joint in JOINTS if joint.endswith(("knee", "ankle")) for i in range(SIZE)[own_centre(joint)]]
+    for k in rng.choice(np.setdiff1d(np.arange(SIZE), left_out), 8, replace=False):
+        step = 1e-5 * np.eye(SIZE)[k]
+        up, down = (evaluate(scaling(), postures, theta + sign * step, at.q, noise=0.008).cost for sign in (1, -1))
+        assert (up - down) / 2e-5 == pytest.approx(at.gradient[k], rel=1e-3, abs=0.05), k
+
+
+def test_trials_without_the_body_s_markers_are_refused() -> None:
+    other = Markers(("HEAD",), np.arange(10) / 100, np.zeros((10, 1, 3)))
+    with pytest.raises(TrialRefused, match="stay where the static trial puts them"):
+        functional_joints(scaling(), [other])
