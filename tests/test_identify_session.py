@@ -12,7 +12,7 @@ from biodance.identify.caution import about_true_centres, widened
 from biodance.identify.identification import NOISE_ALONE, conclude, identify, standing_point
 from biodance.identify.knowledge import knowledge, segment_quantities
 from biodance.identify.learning import learn
-from biodance.identify.loads import may_carry
+from biodance.identify.loads import may_carry, point_mass
 from biodance.identify.sessions import differences
 from biodance.identify.statistics import layout_for, statistics
 from biodance.identify.validation import gain, validate
@@ -122,6 +122,7 @@ def test_a_turned_frame_and_a_shifted_centre_to_first_order() -> None:
 
 def test_equal_sessions_do_not_differ() -> None:
     body, truth, rng = person(7)
+    body = replace(body, boxes=np.tile([[-0.3] * 3, [0.3] * 3], (4, 1, 1)))
     first, second = (identify(body, (noisy_fit(body, smooth_motion(body, rng, frames=1000), truth, rng),)) for _ in range(2))
     rows = differences(first, second)
     assert len(rows) == 40
@@ -129,11 +130,14 @@ def test_equal_sessions_do_not_differ() -> None:
     assert np.mean(np.abs(z) < 1.96) > 0.9
     assert all(row.value == 0 and row.p == 1 for row in differences(first, first))
     changed = truth.copy()
-    changed[10:20] *= 1.5
+    changed[20:30] += 2.0 * point_mass(np.array([0.15, -0.2, 0.2]))
     third = identify(body, (noisy_fit(body, smooth_motion(body, rng, frames=1000), changed, rng),))
-    clear = min(differences(first, third), key=lambda row: row.p)
-    assert clear.segment == "s1"
-    assert clear.p < 1e-4
+    for pair, sign in (((first, third), 1), ((third, first), -1)):
+        masses = {row.segment: row for row in differences(*pair) if row.quantity == "mass"}
+        assert min(masses.values(), key=lambda row: row.p).segment == "s2"
+        assert abs(masses["s2"].value - 2.0 * sign) < 1.96 * masses["s2"].sd
+        assert abs(masses["s2"].value - 2.0 * sign) < 0.3
+        assert all(abs(row.value) < 0.3 for name, row in masses.items() if name != "s2")
 
 
 def test_gain_has_the_known_ratio_in_its_interval() -> None:

@@ -37,13 +37,15 @@ def load_moments(body: Body, segment: int) -> Array:
     return np.asarray(vector[:, keep] * np.sqrt(value[keep]))
 
 
-def may_carry(body: Body, prior: Sip) -> Sip:
+def may_carry(body: Body, prior: Sip, *, share: Array | None = None) -> Sip:
     """Return ``prior`` with a covariance that leaves room for an undeclared load on every segment.
 
-    Noise is learned under it: with the total mass pinned to the declared one, a load would pass for slow noise.
+    ``share`` (N,) of a load's second moment for every segment, by default `UNDECLARED`. Noise is learned under it: with the total mass
+    pinned to the declared one, a load would pass for slow noise.
     """
+    room = np.full(len(prior.segments), UNDECLARED) if share is None else share
     covariance = np.array(prior.covariance)
     for i in range(len(prior.segments)):
         U = load_moments(body, i)
-        covariance[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] += UNDECLARED * U @ U.T
+        covariance[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] += room[i] * U @ U.T
     return Sip(prior.segments, prior.phi, covariance)

@@ -6,8 +6,12 @@ import numpy as np
 from scipy.stats import norm
 
 from biodance.errors import BiodanceError
+from biodance.identify.added_mass import added_mass
 from biodance.identify.identification import Identification
 from biodance.identify.knowledge import QUANTITIES, SIGMAS, UNITS, segment_quantities
+from biodance.identify.loads import may_carry
+from biodance.identify.physical import physical_fit
+from biodance.identify.posterior import Posterior, posterior
 
 
 @dataclass(frozen=True)
@@ -31,10 +35,12 @@ class Difference:
 
 
 def differences(earlier: Identification, later: Identification) -> tuple[Difference, ...]:
-    """Return all differences, later minus earlier.
+    """Return all differences, later minus earlier, each session with room for what it carries beyond the other.
 
-    The two posteriors share the table: what both still owe to it is common and cancels, so the variance of the difference is that of the
-    data parts; with gain K = 1 - C P^-1 of each session, Var = C1 + C2 - A1 P A2' - A2 P A1' with A = C P^-1.
+    The declared masses pin both totals, so a load that was not declared would be spread over the body. Every segment therefore gets room
+    D for a load, in proportion to the probability that one sits there (`added_mass`, in both directions: a load, a loss); values may
+    differ from those of the two tables of results. The two posteriors share the table P: what both still owe to it is common and
+    cancels. With the covariances C under the prior P + D and A = C (P + D)^-1, Var = C1 + C2 - A1 P A2' - A2 P A1'.
 
     Raises
     ------
@@ -43,14 +49,15 @@ def differences(earlier: Identification, later: Identification) -> tuple[Differe
     """
     if earlier.sip.segments != later.sip.segments:
         raise BiodanceError("The two sessions have different segments and cannot be compared. Use the same kind of body in both.")
-    first, second = earlier.belief, later.belief
-    keep1, keep2 = (belief.covariance @ np.linalg.pinv(belief.prior.covariance, rcond=1e-12, hermitian=True) for belief in (first, second))
-    mutual = keep1 @ first.prior.covariance @ keep2.T
+    first, second = _with_room(earlier, later), _with_room(later, earlier)
+    keep1, keep2 = (one.covariance @ np.linalg.pinv(one.prior.covariance, rcond=1e-12, hermitian=True) for one in (first, second))
+    mutual = keep1 @ earlier.belief.prior.covariance @ keep2.T
     spread = first.covariance + second.covariance - mutual - mutual.T
+    values = [physical_fit(belief, one.body).sip.phi for belief, one in ((first, earlier), (second, later))]
     rows = []
     for i, segment in enumerate(earlier.sip.segments):
         cut = slice(10 * i, 10 * i + 10)
-        before, after = (segment_quantities(one.sip.phi[cut]) for one in (earlier, later))
+        before, after = (segment_quantities(phi[cut]) for phi in values)
         slope = 0.5 * (before[1] + after[1])
         sd = np.sqrt(np.maximum(np.diag(slope @ spread[cut, cut] @ slope.T), 0.0))
         for k, (quantity, unit) in enumerate(zip(QUANTITIES, UNITS, strict=True)):
@@ -59,3 +66,9 @@ def differences(earlier: Identification, later: Identification) -> tuple[Differe
             informed = any(one.known[10 * i + k].verdict != "cannot be known" for one in (earlier, later))
             rows.append(Difference(segment, quantity, unit, value, float(sd[k]), p, informed))
     return tuple(rows)
+
+
+def _with_room(one: Identification, other: Identification) -> Posterior:
+    """Return the belief of session ``one`` with room for the loads that it carries beyond ``other``."""
+    chance = {suspect.segment: suspect.probability for suspect in added_mass(one, reference=other).suspects}
+    return posterior(one.data, may_carry(one.body, one.belief.prior, share=np.array([chance[s] for s in one.body.segments])))
