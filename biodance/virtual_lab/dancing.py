@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
+from scipy.ndimage import gaussian_filter1d
+from scipy.special import logsumexp
 
 from biodance.body.body import UPRIGHT, Body
 from biodance.errors import BiodanceError
@@ -17,7 +19,7 @@ from biodance.records import Array, Motion, frozen_array
 from biodance.virtual_lab.choreography import COLUMNS, RAISED, SHIFT, SIDES, WIDTH, Curves
 from biodance.virtual_lab.performance import MARGIN, NODE_RATE, Performance, keep_balance
 from biodance.virtual_lab.person import Person
-from biodance.virtual_lab.posing import STRAIGHT, Stance, Z, upper_body
+from biodance.virtual_lab.posing import STRAIGHT, Pose, Stance, Z, upper_body
 from biodance.virtual_lab.protocol import TrialPlan
 from biodance.virtual_lab.randomness import smooth_noise, stream
 from biodance.virtual_lab.tolerances import REALISTIC, Tolerances
@@ -34,6 +36,10 @@ WANDER = 0.25
 """Hz: how fast the error of a person who follows a screen changes."""
 PELVIS = 0.4
 """Share of the tracking error that the pelvis has: whoever stands on planted feet is held by them."""
+SMOOTH = 0.12
+"""s: the plan's zero-moment point has corners where holds begin and end; nobody's has."""
+AWAY, SOFTNESS = 0.6, 80.0
+"""m by which a foot that is up no longer holds the pelvis down; 1/m of the soft minimum over the legs."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +96,8 @@ def copy_dance(
     duration = round((shown.motion.time[-1] - shown.motion.time[0]) * performer.pace, 1)
     time = -MARGIN + np.arange(round((duration + 2 * MARGIN) * NODE_RATE) + 1) / NODE_RATE
     when = np.clip(time / performer.pace + shown.motion.time[0], shown.motion.time[0], shown.motion.time[-1])
-    values, pressure = (make_interp_spline(shown.motion.time, what, k=5)(when) for what in (_fields(shown), shown.pressure))
+    smoothed = gaussian_filter1d(shown.pressure, SMOOTH / np.diff(shown.motion.time).mean(), axis=0, mode="nearest")
+    values, pressure = (make_interp_spline(shown.motion.time, what, k=5)(when) for what in (_fields(shown), smoothed))
     values[:, RAISED:] = np.clip(values[:, RAISED:], 0.0, 1.0)
     error = np.degrees(performer.tracking) * smooth_noise(rng, time, columns=WIDTH, cutoff=WANDER)
     for field in JOINTS:
@@ -102,7 +109,7 @@ def copy_dance(
     values[:, SHIFT] = np.clip((shown.ankle[1, 1] - pressure[:, 1]) / apart, 0.0, 1.0)
     curves = Curves(time, values)
     pose = upper_body(person, curves, stance, tolerances, rng)
-    nodes, missed = keep_balance(person, pose, curves, stance, target)
+    nodes, missed = keep_balance(person, pose, curves, stance, target, height=_height)
     return Performance(TrialPlan(shown.name, "fit", "parallel", (), duration / 2), person, stance, curves, time, nodes, missed)
 
 
@@ -127,14 +134,32 @@ def pelvis_angles(turn: Array) -> Array:
 
 
 def _depth(shown: Shown) -> Array:
-    """Return (T,) how much shorter than straight the straightest planted leg is, as a share of the straight leg."""
-    pose, rooms = poses(shown.body, shown.motion.q), []
+    """Return how far (T,) the pelvis is below the highest place that the feet allow, per leg length."""
+    pose = poses(shown.body, shown.motion.q)
+    highest, length = _reach(shown.body, pose.rotation[:, 0], pose.position[:, 0, :2], shown.ankle, shown.raised)
+    return np.asarray((highest - pose.position[:, 0, 2]) / length)
+
+
+def _height(person: Person, pose: Pose, curves: Curves, stance: Stance, xy: Array) -> Array:
+    """Return the height (T,) m of the pelvis of the person who copies."""
+    raised, ankle = np.stack([curves.raised(side) for side in SIDES], axis=1), np.array([stance.ankle[side] for side in SIDES])
+    highest, length = _reach(person.body, pose.pelvis_turn, xy, ankle, raised)
+    return highest - curves["depth"][:, 0] * length
+
+
+def _reach(body: Body, turn: Array, xy: Array, ankle: Array, raised: Array) -> tuple[Array, float]:
+    """Return the highest place (T,) m of a pelvis at ``turn`` (T, 3, 3) over ``xy`` (T, 2) m, and the mean length m of the legs.
+
+    A foot that is lifted gives way as it rises (`posing.pelvis_height` lets go at once, which would throw up a leaning body).
+    """
+    tops, lengths = [], []
     for k, side in enumerate(SIDES):
-        leg = Leg.of(shown.body, side)
-        hip = pose.position[:, 0] + pose.rotation[:, 0] @ leg.hip
-        room = 1.0 - np.linalg.norm(hip - shown.ankle[k], axis=1) / float(leg.length(STRAIGHT))
-        rooms.append(room + 10.0 * (shown.raised[:, k] > 0.5))
-    return np.clip(np.min(rooms, axis=0), 0.0, 0.6)
+        leg = Leg.of(body, side)
+        hip, reach = turn @ leg.hip, float(leg.length(STRAIGHT))
+        across = np.sum((xy + hip[:, :2] - ankle[k, :2]) ** 2, axis=1)
+        tops.append(ankle[k, 2] + np.sqrt(np.maximum(reach**2 - across, (0.5 * reach) ** 2)) - hip[:, 2] + AWAY * raised[:, k])
+        lengths.append(reach)
+    return -logsumexp(-SOFTNESS * np.array(tops), axis=0) / SOFTNESS, float(np.mean(lengths))
 
 
 def _stand(person: Person, shown: Shown, centre: Array, heading: float, rng: np.random.Generator) -> tuple[Stance, Array, Array]:

@@ -16,7 +16,7 @@ from biodance.motion.regressor import GRAVITY
 from biodance.records import Array, Motion, Wrench
 from biodance.virtual_lab.choreography import Curves, choreograph
 from biodance.virtual_lab.person import Person
-from biodance.virtual_lab.posing import Pose, Stance, stand_on_feet, take_stance, upper_body
+from biodance.virtual_lab.posing import Height, Pose, Stance, pelvis_height, stand_on_feet, take_stance, upper_body
 from biodance.virtual_lab.protocol import TrialPlan
 from biodance.virtual_lab.randomness import smooth_noise, stream
 from biodance.virtual_lab.tolerances import REALISTIC, Tolerances
@@ -108,7 +108,9 @@ def wanted_pressure(curves: Curves, stance: Stance) -> Array:
     return middle + forward * ahead + sideways * rightwards
 
 
-def keep_balance(person: Person, pose: Pose, curves: Curves, stance: Stance, target: Array) -> tuple[Array, float]:
+def keep_balance(
+    person: Person, pose: Pose, curves: Curves, stance: Stance, target: Array, *, height: Height = pelvis_height
+) -> tuple[Array, float]:
     """Return the configurations (T, 46) whose zero-moment point follows ``target`` (T, 2) m, and the largest distance left, m.
 
     Each round moves the pelvis by the bounded solution of  d - h d'' = -(error), the linear pendulum with h = height of the centre of mass
@@ -116,7 +118,7 @@ def keep_balance(person: Person, pose: Pose, curves: Curves, stance: Stance, tar
     """
     time = curves.time
     xy = target.copy()
-    q = stand_on_feet(person, pose, curves, stance, xy)
+    q = stand_on_feet(person, pose, curves, stance, xy, height=height)
     for _ in range(ROUNDS):
         motion = _motion(_splines(time, q), time)
         value = true_wrench(person, motion).value
@@ -126,7 +128,7 @@ def keep_balance(person: Person, pose: Pose, curves: Curves, stance: Stance, tar
             break
         pendulum = person.mass * 0.56 * person.subject.stature / vertical
         xy = xy - 0.95 * _pendulum(error, pendulum, 1.0 / NODE_RATE)
-        q = stand_on_feet(person, pose, curves, stance, xy)
+        q = stand_on_feet(person, pose, curves, stance, xy, height=height)
     return q, float(np.abs(error).max())
 
 

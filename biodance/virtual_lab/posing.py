@@ -1,5 +1,6 @@
 """From curves to the true configuration: posture in, 46 coordinates out, feet exactly where they stand."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -146,10 +147,14 @@ def pelvis_height(person: Person, pose: Pose, curves: Curves, stance: Stance, xy
     return height - curves["depth"][:, 0] * np.mean(lengths)
 
 
-def stand_on_feet(person: Person, pose: Pose, curves: Curves, stance: Stance, xy: Array) -> Array:
+Height = Callable[[Person, Pose, Curves, Stance, Array], Array]
+"""Says how high (T,) m the pelvis is over ``xy`` (T, 2) m, as `pelvis_height` does."""
+
+
+def stand_on_feet(person: Person, pose: Pose, curves: Curves, stance: Stance, xy: Array, *, height: Height = pelvis_height) -> Array:
     """Return q (T, 46) with the pelvis over ``xy`` (T, 2) m and the legs that hold the planted feet exactly still."""
     q = pose.q.copy()
-    q[:, :2], q[:, 2] = xy, pelvis_height(person, pose, curves, stance, xy)
+    q[:, :2], q[:, 2] = xy, height(person, pose, curves, stance, xy)
     frames = q.shape[0]
     for side in SIDES:
         leg, raised = Leg.of(person.body, side), curves.raised(side)[:, None]
