@@ -1,0 +1,79 @@
+"""An amplifier or converter is at its end: the channel stays flat where the load goes on.
+
+Signature: the highest (or lowest) value of a channel comes many times in a row, exactly.
+Look-alikes: an unloaded plate whose noise was set to zero (flat at zero, not at the top). Separated by the histogram of the raw samples.
+"""
+
+import numpy as np
+
+from biodance.effects.case import at_point
+from biodance.effects.gate import DiscreteEffect, Gate, Recorded
+from biodance.records import CHANNELS, Array, Trial
+
+LONGEST = 0.015
+"""s that a channel may stay at its extreme value."""
+CLEARLY = 3.0
+"""How many times longer than anywhere else the flat top must be: coarse converters repeat values everywhere."""
+SAME = 2e-5
+"""Share of the channel's range within which two samples are the same number."""
+AT_ZERO = 0.05
+"""Share of the largest value under which a flat part is an unloaded plate."""
+
+
+class Clipping(DiscreteEffect):
+    """A channel of a plate that is flat at its top or bottom."""
+
+    name = "clipping"
+    separated_by = "The histogram of the raw samples."
+    advice = "Choose a larger range of the amplifier for this channel and repeat the movement; what was cut off is lost."
+
+    @classmethod
+    def look(cls, recorded: Recorded) -> tuple[Gate, ...]:
+        """Return one check per channel that clips, or one that says none does."""
+        found: dict[str, tuple[float, str]] = {}
+        trials = [trial for trial in recorded.session.trials if trial.plates]
+        for trial in trials:
+            for target, limit in clipped(trial):
+                found.setdefault(target, (limit, trial.name))
+        if found:
+            said = "{} is flat at {:.4g} (first in {}): the amplifier or converter is at its end."
+            return tuple(
+                Gate("range of the channels", False, said.format(target, limit, trial), cls.name, target, abs(limit))
+                for target, (limit, trial) in found.items()
+            )
+        return (Gate("range of the channels", True, "No channel of the plates is flat at its extremes."),) if trials else ()
+
+
+def clipped(trial: Trial) -> list[tuple[str, float]]:
+    """Return target and level of every channel that clips, about the plate's centre in lab axes and with its zero still in it."""
+    found = []
+    for plate in trial.plates:
+        channels = at_point(plate.wrench.value, plate.centre)
+        for k, name in enumerate(CHANNELS):
+            level = flat_level(channels[:, k], plate.wrench.rate)
+            if level is not None:
+                target = name if len(trial.plates) == 1 else f"{plate.name}:{name}"
+                found.append((target, level + (plate.zero[k] if k < 3 else 0.0)))
+    return found
+
+
+def flat_level(values: Array, rate: float) -> float | None:
+    """Return the level (unit of ``values`` (S,)) at which a channel is flat; None where it is not."""
+    values = values[np.isfinite(values)]
+    span = float(np.ptp(values)) if values.size > 2 else 0.0
+    if not span > 0:
+        return None
+    same = np.abs(np.diff(values)) <= SAME * span
+    starts = np.flatnonzero(same & ~np.append(False, same[:-1]))
+    stops = np.flatnonzero(same & ~np.append(same[1:], False)) + 1
+    lengths, levels = stops - starts, values[starts]
+    for extreme in (values.max(), values.min()):
+        at = np.abs(levels - extreme) <= 2 * SAME * span
+        elsewhere = lengths[~at].max(initial=1)
+        long = lengths[at].max(initial=0)
+        if long > LONGEST * rate and long > CLEARLY * elsewhere and abs(extreme) > AT_ZERO * np.abs(values).max():
+            return float(extreme)
+    return None
+
+
+EFFECT = Clipping

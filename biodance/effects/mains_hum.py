@@ -1,0 +1,74 @@
+"""The mains hum in a channel: 50 or 60 Hz from a missing earth, a broken screen, a lamp.
+
+Signature: a narrow line at 50 or 60 Hz that is there when nobody moves.
+Look-alikes: vibration of a treadmill motor or a building, at other frequencies. Separated by a recording of the empty plate. After the
+low-pass nothing is left of it, unless it was sampled so slowly that it was folded into the movement.
+"""
+
+import numpy as np
+
+from biodance.effects.case import at_point
+from biodance.effects.gate import DiscreteEffect, Gate, Recorded
+from biodance.records import CHANNELS, Array, Trial
+
+MAINS = (50.0, 60.0)
+LEAST = np.array([2.0, 2.0, 2.0, 0.6, 0.6, 0.6])
+"""N, N·m: a smaller amplitude harms nothing."""
+CLEARLY = 10.0
+"""How far the line must stand over its neighbours."""
+SECONDS = 2.0
+
+
+class MainsHum(DiscreteEffect):
+    """A line of the mains in a channel of a plate."""
+
+    name = "mains_hum"
+    separated_by = "A recording of the empty plate."
+    advice = "Check earth and screens of the cables; keep them away from mains cables and lamps. Forces below 10 Hz are not touched."
+
+    @classmethod
+    def look(cls, recorded: Recorded) -> tuple[Gate, ...]:
+        """Return one check per channel that hums, or one that says none does."""
+        found: dict[str, tuple[float, float]] = {}
+        judged = [trial for trial in recorded.session.trials if any(_fast_enough(p.wrench.rate, p.wrench.time.size) for p in trial.plates)]
+        for trial in judged:
+            for target, amplitude, frequency in humming(trial):
+                found[target] = max(found.get(target, (0.0, 0.0)), (amplitude, frequency))
+        said = "{} hums at {:g} Hz with an amplitude of {:.2g}."
+        if found:
+            return tuple(
+                Gate("mains hum", False, said.format(target, frequency, size), cls.name, target, size)
+                for target, (size, frequency) in found.items()
+            )
+        return (Gate("mains hum", True, "No channel of the plates hums at 50 or 60 Hz."),) if judged else ()
+
+
+def humming(trial: Trial) -> list[tuple[str, float, float]]:
+    """Return target, amplitude (N, N·m) and frequency (Hz) of every channel that hums."""
+    found = []
+    for plate in trial.plates:
+        if not _fast_enough(plate.wrench.rate, plate.wrench.time.size):
+            continue
+        channels = at_point(plate.wrench.value, plate.centre)
+        for frequency in MAINS:
+            amplitude, around = line(channels, plate.wrench.rate, frequency)
+            for k in np.flatnonzero((amplitude > LEAST) & (amplitude > CLEARLY * around)):
+                name = CHANNELS[k] if len(trial.plates) == 1 else f"{plate.name}:{CHANNELS[k]}"
+                found.append((name, float(amplitude[k]), frequency))
+    return found
+
+
+def line(values: Array, rate: float, frequency: float) -> tuple[Array, Array]:
+    """Return the amplitude (n,) of the line within 0.7 Hz of ``frequency``, and the median of the spectrum 2 to 8 Hz beside it."""
+    window = np.hanning(len(values))
+    spectrum = 2 * np.abs(np.fft.rfft(np.nan_to_num(values - np.nanmean(values, axis=0)) * window[:, None], axis=0)) / window.sum()
+    away = np.abs(np.fft.rfftfreq(len(values), 1 / rate) - frequency)
+    return spectrum[away < 0.7].max(axis=0), np.median(spectrum[(away > 2) & (away < 8)], axis=0)
+
+
+def _fast_enough(rate: float, samples: int) -> bool:
+    """Return whether a recording can show 60 Hz and its neighbours."""
+    return rate > 2 * (max(MAINS) + 10) and samples > SECONDS * rate
+
+
+EFFECT = MainsHum
