@@ -36,12 +36,14 @@ def middle_posture(chain: Chain, stance: Stance, neighbours: Array, *, seed: lis
     BiodanceError
         There is none within the limits; the message names the limit.
     """
-    rng, found = np.random.default_rng(seed), []
+    rng, tried = np.random.default_rng(seed), list[Array]()
     begin = start(chain, stance, rng)
     begin[3:] = MILD * neighbours[:, 3:].mean(axis=0)
     for _ in range(ATTEMPTS):
-        found.append(solve(chain, stance, begin, Near(begin), iterations=ITERATIONS))
-        if found[-1].violation <= KEPT:
-            return found[-1]
+        found = solve(chain, stance, begin, Near(begin), iterations=ITERATIONS)
+        if found.violation <= KEPT:
+            return found
+        tried.append(begin)
         begin = start(chain, stance, rng)
-    return refuse(stance, found)[0]
+    refuse(chain, stance, tried)
+    return found

@@ -43,8 +43,8 @@ class Dance:
 
     ``protocol`` its name; ``body`` whose it is; ``postures`` (P, n) coordinates of the chain (m, rad); ``stances`` (P,) the feet during
     each hold, with ``over`` set for postures in between that only carry the weight from one foot configuration to the next;
-    ``hold`` (P,) s; ``via`` (P - 1, 2, n) via points of the moves, ``move`` (P - 1,) s how long each takes, and the feet ``under`` (P - 1,) them;
-    ``seed`` of the random numbers.
+    ``hold`` (P,) s; ``via`` (P - 1, 2, n) via points of the moves, ``move`` (P - 1,) s how long each takes, ``under`` (P - 1,) the feet
+    meanwhile; ``seed`` of the random numbers.
     """
 
     protocol: str

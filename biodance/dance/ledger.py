@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from biodance import __version__
 from biodance.body.body import Body
 from biodance.body.body_file import body_text
 from biodance.dance.plan import Plan
@@ -15,7 +16,7 @@ class Ledger:
     """Named sets of arrays in a folder that belongs to one body, plan and seed; without a folder nothing is kept."""
 
     def __init__(self, folder: Path | None, body: Body, plan: Plan, seed: int) -> None:
-        key = hashlib.sha256(f"{body_text(body, '')}{plan!r}{seed}".encode()).hexdigest()[:16]
+        key = hashlib.sha256(f"{__version__}{body_text(body, '')}{plan!r}{seed}".encode()).hexdigest()[:16]
         self.folder = folder / f"dance_{key}" if folder else None
         if self.folder:
             self.folder.mkdir(parents=True, exist_ok=True)

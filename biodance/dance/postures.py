@@ -24,6 +24,8 @@ from biodance.records import Array
 STATIC = ("balance", "foot_placement", "ground_clearance", "joint_range", "joint_torque", "seat", "self_collision")
 RESERVE = 0.06
 """Share of every limit's scale that is kept in reserve, for the moves that begin and end here."""
+EDGE = 0.2
+"""The same for balance: whoever leaves the edge of the support first pushes the zero-moment point towards it."""
 KEPT = 0.01
 """Violation, in scales of the limits, of the reserved margins that is accepted."""
 RUNS = 2
@@ -111,10 +113,13 @@ def find_postures(chain: Chain, blocks: Blocks, stances: tuple[Stance, ...], *, 
     BiodanceError
         On some feet there is no posture within the limits; the message names the limit.
     """
-    tasks = [workers.submit(_Search(chain, blocks, stances, seed).run, run) for run in range(RUNS)]
-    pool = [[p for search in searches for p in search] for searches in zip(*(task.result() for task in tasks), strict=True)]
-    kept = [[p for p in found if p.violation <= KEPT] or refuse(s, found) for s, found in zip(stances, pool, strict=True)]
-    chosen, search = exchange(blocks, stances, kept), _Search(chain, blocks, stances, seed)
+    search, named = _Search(chain, blocks, stances, seed), {stance.name: k for k, stance in enumerate(stances)}
+    for checked in [workers.submit(search.possible, k) for k in named.values()]:
+        checked.result()
+    tasks = [workers.submit(search.run, run) for run in range(RUNS)]
+    pool = [[p for part in parts for p in part] for parts in zip(*(task.result() for task in tasks), strict=True)]
+    kept = [[p for p in found if p.violation <= KEPT] or found[:1] for found in pool]
+    chosen = exchange(blocks, stances, kept)
     for sharpness, iterations in (*FRESH, *POLISH):
         fresh = (sharpness, iterations) in FRESH
         begin = [search.anywhere(k, 2) for k in range(len(stances))] if fresh else [p.x for p in chosen]
@@ -129,12 +134,22 @@ def find_postures(chain: Chain, blocks: Blocks, stances: tuple[Stance, ...], *, 
     return Postures(np.array([p.x for p in chosen]), stances, value, float(blocks.weight.sum()))
 
 
-def refuse(stance: Stance, found: list[Posture]) -> list[Posture]:
-    """Raise the BiodanceError that says which limit forbids the postures ``found`` on these feet."""
-    best = min(found, key=lambda p: p.violation)
+def anyhow(state: State) -> tuple[float, Array]:
+    """Objective of a posture that need only keep its limits."""
+    return 0.0, np.zeros((3, *state.x.shape))
+
+
+def refuse(chain: Chain, stance: Stance, begin: list[Array]) -> None:
+    """Raise the BiodanceError that says which limit forbids every posture on these feet: without which there would be one."""
+    without = []
+    for name in STATIC:
+        names = tuple(other for other in STATIC if other != name)
+        tried = (solve(chain, stance, x, anyhow, iterations=30, names=names) for x in begin)
+        if any(posture.violation <= KEPT for posture in tried):
+            without.append(name.replace("_", " "))
+    forbids = f"{' or '.join(without)} forbids it" if without else "several limits together forbid it"
     raise BiodanceError(
-        f"On the feet {stance.name!r} no posture keeps all limits: {best.limit.replace('_', ' ')} is exceeded by {best.violation:.2f} of "
-        "its scale in the best of all tried. Leave this stance out of the protocol, or widen that limit."
+        f"On the feet {stance.name!r} no posture keeps all limits: {forbids}. Leave this stance out of the protocol, or widen that limit."
     )
 
 
@@ -150,6 +165,13 @@ class _Search:
     def anywhere(self, place: int, run: int) -> Array:
         """Return the start (n,) of one posture in one run."""
         return start(self.chain, self.stances[place], np.random.default_rng([self.seed, run, place]))
+
+    def possible(self, place: int) -> None:
+        """Raise the BiodanceError that names the limit if there is no posture at this place."""
+        begin = [self.anywhere(place, run) for run in range(ATTEMPTS)]
+        stance = self.stances[place]
+        if not any(solve(self.chain, stance, x, anyhow, iterations=30).violation <= KEPT for x in begin):
+            refuse(self.chain, stance, begin)
 
     def run(self, run: int) -> list[list[Posture]]:
         """Return for every place the postures of one run, one per sweep."""
@@ -220,15 +242,19 @@ def _values(blocks: Blocks, grams: Array) -> Array:
     return out
 
 
-def solve(chain: Chain, stance: Stance, begin: Array, objective: Objective, *, iterations: int) -> Posture:
-    """Return the posture on the feet ``stance`` that is best for ``objective`` near ``begin`` (n,)."""
+def solve(
+    chain: Chain, stance: Stance, begin: Array, objective: Objective, *, iterations: int, names: tuple[str, ...] = STATIC
+) -> Posture:
+    """Return the posture on the feet ``stance`` that is best for ``objective`` near ``begin`` (n,) and keeps the limits ``names``."""
     free = free_coordinates(chain, stance)
     base, basis = np.zeros((3, 1, chain.size)), np.zeros((3, 1, 1))
     base[0, 0] = begin
     base[0, 0, free] = 0.0
     basis[0] = 1.0
-    kept = tuple(limit for limit in limits() if limit.NAME in STATIC)
-    programme = Programme(chain, stance, base, basis, free, kept, objective, np.full((1, len(kept)), RESERVE))
+    kept = tuple(limit for limit in limits() if limit.NAME in names)
+    wide = stance.over is None
+    reserve = np.array([[EDGE if limit.NAME == "balance" and wide else RESERVE for limit in kept]])
+    programme = Programme(chain, stance, base, basis, free, kept, objective, reserve)
     found = minimise(programme.judge, begin[free], iterations=iterations)
     state = programme.state(found.y)
     return Posture(state.x[0], uprights(state)[0], *Judged(programme, state).worst)

@@ -55,9 +55,13 @@ class Stance:
 
     @cached_property
     def centre(self) -> Array:
-        """(2,) m middle of the base of support: of its bounding box; with the weight over one foot: of the edges of both."""
+        """(2,) m middle of the base of support: of its bounding box; with the weight over one foot: deepest inside both bases."""
         if self.over is not None:
-            return 0.4 * self.on(0, 1).centre + 0.6 * self.on(self.over).centre
+            from scipy.optimize import linprog
+
+            normals, offsets = self.edges
+            rows = np.column_stack([-normals, np.ones(len(normals))])
+            return np.asarray(linprog([0.0, 0.0, -1.0], rows, offsets, bounds=(None, None)).x[:2])
         return (self.support.min(axis=0) + self.support.max(axis=0)) / 2
 
     @cached_property

@@ -1,8 +1,8 @@
 """Moves between postures: what excites the inertias within all limits (paper eq. 18-20), rest to rest through two via points.
 
 One programme instead of the paper's two stages: all free coordinates look for excitation, the zero-moment point is a limit and, weakly,
-part of the objective. The start is the smoothest straight move, which is nearly always feasible; limits are kept on a coarse grid with a reserve
-and judged on a fine one.
+part of the objective. The start is the smoothest straight move, which is nearly feasible; limits are kept on a coarse grid with a
+reserve and judged on a fine one.
 """
 
 from dataclasses import dataclass
@@ -31,8 +31,8 @@ THIRDS = np.array([0.20987654, 0.79012346])
 """Of the way at one and two thirds of the time, for least jerk (10 s³ - 15 s⁴ + 6 s⁵)."""
 ATTEMPTS = ((0.2, 1.0), (0.1, 1.0), (0.0, 0.0))
 """Spread (rad) of the via points' start about the straight move, and share of excitation in the objective."""
-ROUNDS = (14, 8, 8)
-"""Iterations; after each round the worst instants are added."""
+ROUNDS = (14, 8, 8, 8)
+"""Iterations; after each round the worst instants are added and the reserve grows."""
 CENTRE = 0.1
 """Worth of 1 dm² of mean squared distance of the zero-moment point from the middle, beside log cond."""
 LITTLE = 0.01
@@ -150,8 +150,8 @@ def find_move(task: Task, history: Array, *, rng: np.random.Generator) -> Move:
     for spread, share in ATTEMPTS:
         via, time, objective = task.straight(), task.grid(GRID), Objective(task, history, share)
         via[:, task.excited] += rng.normal(0, spread, (2, len(task.excited)))
-        for iterations in ROUNDS:
-            via = _improved(task, via, time, objective, iterations)
+        for k, iterations in enumerate(ROUNDS):
+            via = _improved(task, via, time, objective, iterations, RESERVE * (1 + k / 2))
             found, instants = judged(task, via)
             if best is None or found.violation < best.violation:
                 best = found
@@ -162,9 +162,9 @@ def find_move(task: Task, history: Array, *, rng: np.random.Generator) -> Move:
     return best
 
 
-def _improved(task: Task, via: Array, time: Array, objective: Objective, iterations: int) -> Array:
+def _improved(task: Task, via: Array, time: Array, objective: Objective, iterations: int, reserve: float) -> Array:
     free = free_coordinates(task.chain, task.stance)
-    programme = task.programme(via, free, time, reserve=RESERVE, objective=objective)
+    programme = task.programme(via, free, time, reserve=reserve, objective=objective)
     out = via.copy()
     out[:, free] = minimise(programme.judge, via[:, free].ravel(), iterations=iterations).y.reshape(2, -1)
     return out
