@@ -1,80 +1,94 @@
-import coal
+"""Static postures: exchanged among all found, more exciting than any one search, the same for the same seed, refused by name."""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from biodance.body.body import UPRIGHT
 from biodance.body.human import human
+from biodance.dance import postures
 from biodance.dance.chain import Chain
-from biodance.dance.excitation import blocks
-from biodance.dance.postures import find_postures
-from biodance.dance.shapes import box_pairs, capsule, capsule_pairs
-from biodance.dance.stance import stance
-from biodance.motion.dynamics import distribute, joint_torques, zmp
-from biodance.motion.kinematics import poses
-from biodance.motion.regressor import predict_wrench
+from biodance.dance.excitation import blocks, condition, smooth_condition
+from biodance.dance.postures import KEPT, Posture, anyhow, at, exchange, solve, start
+from biodance.dance.stance import seat, stance
+from biodance.errors import BiodanceError
 from biodance.records import Subject
 
 BODY = human(Subject(65.0, 1.75, "F", 33.0))
 CHAIN = Chain(BODY)
+BLOCKS = blocks(BODY)
+FEET = stance(BODY, "parallel")
 
 
-@pytest.fixture(scope="module")
-def found():
-    feet = stance(BODY, "parallel")
-    stances = (feet, feet, stance(BODY, "right_forward", right=0.2), feet.on(0), feet.on(1))
-    return find_postures(CHAIN, blocks(BODY), stances, rng=np.random.default_rng(3), sweeps=1)
+@pytest.mark.parametrize("sharpness", [2, 8, 64])
+def test_the_smooth_condition_number_and_its_slope(sharpness):
+    rng = np.random.default_rng(sharpness)
+    root, towards = rng.normal(size=(6, 3)), rng.normal(size=(3, 3))
+    gram, towards = root.T @ root, towards + towards.T
+    value, slope = smooth_condition(gram, sharpness=sharpness)
+    up, down = (smooth_condition(gram + sign * 1e-6 * towards, sharpness=sharpness)[0] for sign in (1, -1))
+    assert np.sum(slope * towards) == pytest.approx((up - down) / 2e-6, rel=1e-5)
+    assert 1 < value <= condition(gram)[0]
+    assert smooth_condition(np.eye(3), sharpness=sharpness)[0] == pytest.approx(1.0)
+    assert smooth_condition(gram, sharpness=4096)[0] == pytest.approx(condition(gram)[0], rel=2e-3)
 
 
-def still(x):
-    return CHAIN.motion(np.zeros(1), x[None], *np.zeros((2, 1, CHAIN.size)))
+def test_postures_are_exchanged_until_none_of_all_found_helps():
+    rng = np.random.default_rng(0)
+    up = rng.normal(size=(40, 12, 3))
+    found = [Posture(np.full(1, k), u / np.linalg.norm(u, axis=1, keepdims=True)) for k, u in enumerate(up)]
+    pool = [found[k::4] for k in range(4)]
+    chosen = exchange(BLOCKS, (FEET,) * 4, pool)
+    best = criterion(chosen)
+    assert best < criterion([search[0] for search in pool])
+    for k in range(4):
+        for other in found:
+            if other not in chosen:
+                assert criterion([*chosen[:k], other, *chosen[k + 1 :]]) >= best - 1e-9
 
 
-def test_every_posture_holds_its_limits_judged_by_other_code(found):
-    for x, where in zip(found.x, found.stances, strict=True):
-        motion = still(x)
-        pose, wrench = poses(BODY, motion.q), predict_wrench(BODY, motion)
-        for side, name in enumerate(("right_foot", "left_foot")):
-            foot = BODY.segment_index(name)
-            if side in where.planted:
-                np.testing.assert_allclose(pose.position[0, foot], where.ankle[side], atol=1e-9)
-                np.testing.assert_allclose(pose.rotation[0, foot], UPRIGHT, atol=1e-9)
-        normals, offsets = where.edges
-        assert (normals @ zmp(wrench)[0, :2] + offsets).min() >= 0
-        touching = np.array([[0 in where.planted, 1 in where.planted]])
-        right, left = distribute(wrench, where.sole_centres[:1], where.sole_centres[1:], touching)
-        torque = joint_torques(BODY, motion, {"right_foot": right, "left_foot": left}).torque[0]
-        assert (torque - BODY.limits.torque_lower).min() >= 0
-        assert (BODY.limits.torque_upper - torque).min() >= 0
-        assert (motion.q[0, 7:] - BODY.limits.lower).min() >= 0
-        assert (BODY.limits.upper - motion.q[0, 7:]).min() >= 0
-        assert gaps(pose).min() > 0
+def test_feet_keep_their_own_postures_when_exchanged():
+    rng = np.random.default_rng(1)
+    here, there = FEET.on(0), FEET.on(1)
+    up = rng.normal(size=(4, 5, 12, 3))
+    up /= np.linalg.norm(up, axis=3, keepdims=True)
+    pool = [[Posture(np.full(1, side), one) for one in up[k]] for k, side in enumerate((0, 1, 0, 1))]
+    chosen = exchange(BLOCKS, (here, there, here, there), pool)
+    assert [p.x[0] for p in chosen] == [0, 1, 0, 1]
 
 
-def gaps(pose):
-    def solid(segment, box):
-        turn, origin = pose.rotation[0, segment], pose.position[0, segment]
-        if box:
-            low, high = BODY.boxes[segment]
-            return coal.Box(*(high - low)), coal.Transform3s(turn, origin + turn @ (low + high) / 2)
-        ends, radius = capsule(BODY, segment)
-        along = ends[1] - ends[0]
-        axis = along / np.linalg.norm(along)
-        side = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-        side /= np.linalg.norm(side)
-        place = turn @ np.stack([side, np.cross(axis, side), axis], axis=1)
-        return coal.Capsule(radius, np.linalg.norm(along)), coal.Transform3s(place, origin + turn @ ends.mean(axis=0))
-
-    out = []
-    for pairs, boxed in ((capsule_pairs(BODY), False), (box_pairs(BODY), True)):
-        for i, j in pairs:
-            a, b = solid(i, False), solid(j, boxed)
-            out.append(coal.distance(*a, *b, coal.DistanceRequest(), coal.DistanceResult()))
-    return np.array(out)
+def criterion(postures):
+    up = np.array([p.up for p in postures])
+    gram = len(up) * np.eye(3) - np.einsum("pni,pnj->nij", up, up)
+    pairs = zip(BLOCKS.weight, BLOCKS.first, gram, strict=True)
+    return sum(w * np.linalg.cond(g[np.ix_(pick, pick)]) ** 0.5 for w, pick, g in pairs)
 
 
-def test_the_criterion_is_over_its_bound_and_the_same_seed_gives_the_same_postures(found):
+def test_a_search_lowers_the_criterion_and_the_same_seed_gives_the_same_postures(monkeypatch):
+    for name, sweeps in (("SWEEPS", ((4, 8),)), ("FRESH", ((8, 8),)), ("POLISH", ((8, 4),))):
+        monkeypatch.setattr(postures, name, sweeps)
+    stances = (FEET, FEET.on(0), FEET.on(1))
+    with ThreadPoolExecutor(1) as workers:
+        found = postures.find_postures(CHAIN, BLOCKS, stances, seed=3, workers=workers)
+        twice = postures.find_postures(CHAIN, BLOCKS, stances, seed=3, workers=workers)
+    np.testing.assert_array_equal(found.x, twice.x)
+    rng = np.random.default_rng(0)
+    anywhere = [at(CHAIN, s, start(CHAIN, s, rng)) for s in stances]
     assert found.bound == pytest.approx(65.0, abs=1e-6)
-    assert found.criterion > found.bound
-    again = find_postures(CHAIN, blocks(BODY), found.stances[:1], rng=np.random.default_rng(5), sweeps=1)
-    twice = find_postures(CHAIN, blocks(BODY), found.stances[:1], rng=np.random.default_rng(5), sweeps=1)
-    np.testing.assert_array_equal(again.x, twice.x)
+    assert found.bound < found.criterion < 0.7 * criterion(anywhere)
+    assert found.criterion == pytest.approx(criterion([at(CHAIN, s, x) for s, x in zip(stances, found.x, strict=True)]), rel=1e-3)
+
+
+def test_a_seated_person_keeps_the_pelvis_still_and_the_knees_up():
+    stool = seat(BODY)
+    found = solve(CHAIN, stool, start(CHAIN, stool, np.random.default_rng(0)), anyhow, iterations=30)
+    assert found.violation <= KEPT
+    np.testing.assert_allclose(found.x[:6], [0, 0, stool.seat, 0, 0, 0], atol=1e-12)
+
+
+def test_a_person_too_weak_to_stand_is_refused_by_the_name_of_the_limit():
+    limits = BODY.limits
+    weak = replace(BODY, limits=replace(limits, torque_lower=0.02 * limits.torque_lower, torque_upper=0.02 * limits.torque_upper))
+    with ThreadPoolExecutor(1) as workers, pytest.raises(BiodanceError, match="joint torque"):
+        postures.find_postures(Chain(weak), BLOCKS, (FEET,), seed=0, workers=workers)
