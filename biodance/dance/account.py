@@ -7,11 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from biodance.body.body import Body
 from biodance.dance.dance import Dance
-from biodance.dance.excitation import blocks, dynamic_grams, static_grams, total, uprights
+from biodance.dance.excitation import blocks, dynamic_grams, moments, static_grams, total, uprights
 from biodance.dance.plan import Plan
 from biodance.dance.stance import Stance
-from biodance.records import Array
+from biodance.motion.kinematics import segment_motion
+from biodance.records import Array, Motion
 
 RATE = 50.0
 """Hz, of the paper's transitions."""
@@ -70,3 +72,15 @@ def account(dance: Dance, plan: Plan) -> Account:
 def zmp(wrench: Array) -> Array:
     """Return the zero-moment point (T, 2) m on the ground of wrenches (T, 6) about the lab origin."""
     return np.stack([-wrench[:, 4], wrench[:, 3]], axis=1) / wrench[:, 2:3]
+
+
+def criterion_of(body: Body, motion: Motion) -> tuple[float, float]:
+    """Return the paper's criterion (eq. 12), static and dynamic, kg, of any motion: of the directions of gravity in the segments at every
+    instant, and of their angular velocities and accelerations. The bound of both is the mass of the segments that have such parameters.
+    """
+    parts, segments = blocks(body), segment_motion(body, motion)
+    turned = np.swapaxes(segments.rotation, -1, -2)
+    w, dw = (np.einsum("tnij,tnj->tni", turned, value) for value in (segments.angular_velocity, segments.angular_acceleration))
+    K = moments(w, dw)
+    gram = np.einsum("tnik,tnil->nkl", K, K) / motion.rate + LITTLE * np.eye(6)
+    return total(parts.weight, static_grams(turned[..., 2]), parts.first)[0], total(parts.weight, gram, parts.second)[0]
