@@ -15,9 +15,7 @@ def diagnose(
     *,
     out: Out,
     reference: Path | None = None,
-    accept: Annotated[
-        bool, Parameter(name="--accept", negative="", help="Also write the body identified with the findings accepted.")
-    ] = False,
+    accept: Annotated[bool, Parameter(name="--accept", negative="", help="Also write the body with the findings accepted.")] = False,
     subject: str | None = None,
     json: Json = False,
     force: Force = False,

@@ -58,7 +58,7 @@ def believe(X: Array, y: Array) -> Belief:
 @dataclass(frozen=True, eq=False)
 class Evidence:
     """One cause under the score test: ``log_bayes_factor`` against nothing wrong; posterior ``mean`` (k,) and ``covariance`` (k, k) of its
-    coefficients; ``visible`` share of its squared length that is left when all that is no fault may adapt.
+    coefficients; ``visible`` share of its size that is left when all that is no fault may adapt.
     """
 
     log_bayes_factor: float
@@ -72,7 +72,7 @@ def evidence(s: Array, G: Array, length: float) -> Evidence:
     inner = np.linalg.inv(np.eye(len(s)) + G)
     mean = inner @ s
     value = -0.5 * float(np.linalg.slogdet(np.eye(len(s)) + G)[1]) + 0.5 * float(s @ mean)
-    return Evidence(value, mean, inner, float(np.clip(np.trace(G) / length, 0.0, 1.0)) if length > 0 else 0.0)
+    return Evidence(value, mean, inner, float(np.sqrt(np.clip(np.trace(G) / length, 0.0, 1.0))) if length > 0 else 0.0)
 
 
 def smallest(G: Array, direction: Array, threshold: float) -> float:

@@ -5,6 +5,7 @@ is seen, the size from which it is told from every other cause, and the pairs th
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -41,13 +42,21 @@ class Visibility:
         """
         way, cut = unit_directions(self.causes[index])[0], self.cuts[index]
         pull = self.G[:, cut] @ way
-        fixed, growth = np.empty((2, len(self.causes)))
-        for i, other in enumerate(self.cuts):
-            block = self.G[other, other]
-            inner = np.linalg.inv(np.eye(len(block)) + block)
-            fixed[i] = -0.5 * np.linalg.slogdet(np.eye(len(block)) + block)[1] + 0.5 * np.trace(inner @ block)
-            growth[i] = 0.5 * pull[other] @ inner @ pull[other]
-        return fixed[index] - fixed, growth[index] - growth
+        growth = np.array([0.5 * pull[c] @ inner @ pull[c] for c, inner in zip(self.cuts, self._inner, strict=True)])
+        return self._fixed[index] - self._fixed, growth[index] - growth
+
+    @cached_property
+    def _inner(self) -> tuple[Array, ...]:
+        """Posterior covariance of every cause's coefficients."""
+        return tuple(np.linalg.inv(np.eye(c.stop - c.start) + self.G[c, c]) for c in self.cuts)
+
+    @cached_property
+    def _fixed(self) -> Array:
+        """(C,) expected log Bayes factor of every cause at size zero."""
+        blocks = [self.G[c, c] for c in self.cuts]
+        return np.array(
+            [-0.5 * np.linalg.slogdet(np.eye(len(b)) + b)[1] + 0.5 * np.trace(i @ b) for b, i in zip(blocks, self._inner, strict=True)]
+        )
 
     def told(self, index: int) -> float:
         """Return the size from which cause ``index`` is told from every other cause; infinite if one of them looks the same."""

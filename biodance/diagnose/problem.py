@@ -39,9 +39,10 @@ class Look:
 class Problem:
     """The session in rows, not yet whitened.
 
-    ``cases`` thinned trials with the parameters in use; ``spectrum`` where rows come from; ``target`` (r,) measured minus what the prior's mean predicts; ``prior`` of the parameters and ``factor`` S
-    (p, k) of its covariance; ``sip`` (r, k) columns W S; ``kinematics`` (r, K) columns of unit errors of ``groups`` (K); ``markers`` how many
-    of the r rows, at the end, are marker rows (m); ``notes`` what was left out.
+    ``cases`` thinned trials with the parameters in use; ``spectrum`` where rows come from; ``target`` (r,) measured minus what the prior's
+    mean predicts; ``prior`` of the parameters and ``factor`` S (p, k) of its covariance; ``sip`` (r, k) columns W S; ``kinematics``
+    (r, K) columns of unit errors of ``groups`` (K); ``markers`` how many of the r rows, at the end, are
+    marker rows (m); ``notes`` what was left out.
     """
 
     cases: tuple[Case, ...]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.diagnose.accept import accept, fit_of, gain, judged
+from biodance.diagnose.accept import Judged, accept, fit_of, gain, judged
 from biodance.diagnose.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnose.engine import Examined, diagnose
 from biodance.diagnose.problem import Look
@@ -24,13 +24,15 @@ from biodance.records import Role, Sip
 @dataclass(frozen=True, eq=False)
 class SessionDiagnosis:
     """``diagnosis``; ``accepted`` what is identified once the findings are accepted (None without findings), ``before`` without them;
-    ``examined`` what the engine looked at (None where a check stopped it).
+    ``examined`` what the engine looked at (None where a check stopped it); ``left`` what the body in use leaves of the kept trials,
+    and what is left once the findings are accepted.
     """
 
     diagnosis: Diagnosis
     examined: Examined | None = None
     before: Identification | None = None
     accepted: Identification | None = None
+    left: tuple[Judged, Judged] | None = None
 
 
 def looks(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[Look, ...]:
@@ -156,23 +158,22 @@ def _accepted(result: SessionResult, examined: Examined, before: Identification)
     fitted, kept = ([(c, look.use) for c, look in _pairs(result, phi, roles)] for roles in (FITTED, KEPT))
     mended = [(accept(case, named), use) for case, use in fitted]
     after = identify(mended[0][0].body, tuple(fit_of(*pair) for pair in mended))
-    findings = examined.diagnosis.findings
-    changes = _changes(before, after)
-    if kept:
-        as_is, better = (tuple(fit_of(*pair) for pair in some) for some in (kept, [(accept(case, named), use) for case, use in kept]))
-        used = tuple(fit_of(*pair) for pair in fitted), tuple(fit_of(*pair) for pair in mended)
-        about = standing_point(as_is)
-        try:
-            measured = gain(
-                judged(before.identified, as_is, about),
-                judged(after.identified, better, about),
-                fitted=(judged(before.identified, used[0], about), judged(after.identified, used[1], about)),
-            )
-        except BiodanceError:
-            measured = None
-        findings = tuple(replace(one, gain=measured) for one in findings)
-    findings = tuple(replace(one, changes=changes) for one in findings)
-    return SessionDiagnosis(replace(examined.diagnosis, findings=findings), examined, before, after)
+    findings = tuple(replace(one, changes=_changes(before, after)) for one in examined.diagnosis.findings)
+    if not kept:
+        return SessionDiagnosis(replace(examined.diagnosis, findings=findings), examined, before, after)
+    as_is, better = (tuple(fit_of(*pair) for pair in some) for some in (kept, [(accept(case, named), use) for case, use in kept]))
+    about = standing_point(as_is)
+    left = judged(before.identified, as_is, about), judged(after.identified, better, about)
+    used = (
+        judged(before.identified, tuple(fit_of(*pair) for pair in fitted), about),
+        judged(after.identified, tuple(fit_of(*pair) for pair in mended), about),
+    )
+    try:
+        measured = gain(*left, fitted=used)
+    except BiodanceError:
+        measured = None
+    findings = tuple(replace(one, gain=measured) for one in findings)
+    return SessionDiagnosis(replace(examined.diagnosis, findings=findings), examined, before, after, left)
 
 
 def _pairs(result: SessionResult, phi: np.ndarray, roles: tuple[Role, ...]) -> list[tuple[Case, Look]]:

@@ -1,12 +1,43 @@
-"""The page of a diagnosis for the analyst: what is wrong, how we know, how big, how sure, what else, what to do, what changes, what stays unseen."""
+"""The page of a diagnosis for the analyst: what is wrong, how we know, how big, how sure, what else it could be, what to do, what changes."""
 
 from importlib.resources import files
 
+from biodance.diagnose.diagnosis import Diagnosis
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.provenance import Provenance
 from biodance.pipeline.results import SessionResult
 from biodance.records import CHANNELS
-from biodance.report.wording import millimetres, number
+from biodance.report.diagnosis_figures import adequacy_figure, left_figure, limits_figure
+from biodance.report.effect_words import estimated, named, sized, words_of
+from biodance.report.style import svg_address
+from biodance.report.wording import number
+
+CERTAIN = 14.0
+"""Natural logarithm of a million: above it odds are no longer printed."""
+
+
+def answer(one: Diagnosis) -> str:
+    """Return the verdict as one or two plain sentences."""
+    what = " and ".join(named(finding.effect, finding.target) for finding in one.findings)
+    worst = one.adequacy[0] if one.adequacy else None
+    where = f"{worst.channel}, movement of {worst.band_hz[0]:g} to {worst.band_hz[1]:g} Hz, most in trial {worst.trial}" if worst else ""
+    return {
+        "nothing wrong": "Nothing wrong was found: what the simulation misses is what it misses in any session without a fault. "
+        "Faults below the sizes at the end of this page would not have been seen.",
+        "named, complete": f"Found: {what}. With it accepted, what is left is no more than in any session without a fault.",
+        "named, incomplete": f"Found: {what}. Something more is wrong that no known cause explains" + (f" ({where})." if where else "."),
+        "unexplained": f"Something is wrong that no known cause explains. It shows most in {where}."
+        + (f" Part of it looks like {what}, which is not enough." if what else ""),
+    }[one.verdict]
+
+
+def odds(log_bayes_factor: float) -> str:
+    """Return evidence against "nothing wrong" as odds in words."""
+    if log_bayes_factor != log_bayes_factor or log_bayes_factor == float("inf"):
+        return "a check of the recording shows it"
+    if log_bayes_factor > CERTAIN:
+        return "more than a million times as probable as nothing wrong"
+    return f"{number(2.718281828**log_bayes_factor, 0)} times as probable as nothing wrong"
 
 
 def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: Provenance) -> str:
@@ -14,14 +45,25 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
+    one = found.diagnosis
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters.update(number=number, mm=millimetres)
+    environment.filters.update(number=number, sized=sized, estimated=estimated, odds=odds)
+    environment.globals.update(named=named, words_of=words_of)
     folder = files("biodance.report") / "templates"
+    masses = []
+    if found.before and found.accepted:
+        rows = zip(found.before.sip.segments, found.before.sip.mass, found.accepted.sip.mass, strict=True)
+        masses = [(name.replace("_", " "), float(a), float(b)) for name, a, b in rows]
     return environment.from_string((folder / "diagnosis.html.j2").read_text(encoding="utf-8")).render(
         style=Markup((folder / "page.css").read_text(encoding="utf-8")),
         result=result,
-        found=found,
-        one=found.diagnosis,
+        one=one,
+        answer=answer(one),
         provenance=provenance,
         channels=list(zip(CHANNELS, ("N",) * 3 + ("N·m",) * 3, strict=True)),
+        masses=masses,
+        left=svg_address(left_figure(found.left)) if found.left else "",
+        adequacy=svg_address(adequacy_figure(one.adequacy)) if one.adequacy else "",
+        limits=svg_address(limits_figure(one.limits)) if one.limits else "",
+        gain=one.findings[0].gain if one.findings else None,
     )

@@ -9,6 +9,7 @@ from biodance.identify.added_mass import AddedMass
 from biodance.identify.identification import Identification
 from biodance.identify.knowledge import Known
 from biodance.identify.sessions import Difference
+from biodance.identify.torques import TorqueBands
 from biodance.identify.validation import Gain, TrialValidation
 from biodance.motion.comparison import Agreement
 from biodance.pipeline.identification import SessionIdentification
@@ -116,12 +117,35 @@ def _difference(row: Difference) -> dict[str, Any]:
     }
 
 
+def torques_document(bands: TorqueBands | None) -> dict[str, Any] | None:
+    """Return every joint's largest torque with its interval, over the fully measured frames; None where the feet's wrenches are unknown."""
+    if bands is None:
+        return None
+    rows = []
+    for j, name in enumerate(bands.joints):
+        torque, half, table = (column[bands.use, j] for column in (bands.torque, bands.half_width, bands.table))
+        peak = int(np.argmax(np.abs(torque)))
+        rows.append(
+            {
+                "joint": name,
+                "peak_time_s": bands.time[bands.use][peak],
+                "peak_Nm": torque[peak],
+                "peak_ci95_Nm": (torque[peak] - half[peak], torque[peak] + half[peak]),
+                "peak_table_Nm": table[peak],
+                "sd_rms_Nm": np.sqrt(np.mean(bands.sd[bands.use, j] ** 2)),
+                "change_rms_Nm": np.sqrt(np.mean((torque - table) ** 2)),
+            }
+        )
+    return {"trial": bands.trial, "joints": rows}
+
+
 def identification_document(found: SessionIdentification) -> dict[str, Any]:
     """Return all that identification found.
 
     CoM in the segment's axes from its proximal joint centre; inertia about the CoM, order xx xy yy xz yz zz; validation moments about
     ``about_m``, the mean centre of pressure. ``added_mass`` null: no load is announced; ``added_mass_search`` says what was looked for;
-    ``differences`` to the reference session, empty without one.
+    ``joint_torques`` of one trial with what the
+    parameters leave uncertain (not this trial's own skin and plates); ``differences`` to the reference session, empty without one.
     """
     one = found.identification
     return {
@@ -138,6 +162,7 @@ def identification_document(found: SessionIdentification) -> dict[str, Any]:
         "gain": _gain(found.gain),
         "added_mass": added_mass_document(found.search),
         "added_mass_search": _search(found.search),
+        "joint_torques": torques_document(found.torques),
         "differences": [_difference(row) for row in found.changes],
         "notes": found.notes,
     }

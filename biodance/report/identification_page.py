@@ -6,8 +6,9 @@ from biodance.identify.knowledge import QUANTITIES
 from biodance.pipeline.identification import SessionIdentification
 from biodance.records import CHANNELS
 from biodance.report.forest_figure import forest_figure
-from biodance.report.identification_json import information, segment_rows
+from biodance.report.identification_json import information, segment_rows, torques_document
 from biodance.report.style import svg_address
+from biodance.report.torque_figure import drawn_joints, torque_figure
 from biodance.report.validation_figure import validation_figure
 from biodance.report.wording import millimetres, number
 
@@ -48,6 +49,9 @@ def identification_section(found: SessionIdentification) -> str:
         trials=[(trial, "kept") for trial in found.validations] + [(trial, "fitted") for trial in found.fitted],
         channels=list(zip(CHANNELS, UNITS, strict=True)),
         figures=[(trial, svg_address(validation_figure(trial))) for trial in shown],
+        torques=found.torques,
+        torque_rows=(torques_document(found.torques) or {}).get("joints", []),
+        torque_image=svg_address(torque_figure(found.torques)) if found.torques and drawn_joints(found.torques) else "",
         search=found.search,
         changes=[row for row in found.changes if row.quantity == "mass"],
     )

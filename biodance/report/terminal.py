@@ -91,9 +91,7 @@ def print_diagnosis(found: dict[str, Any], console: Console) -> None:
         console.print(f"found: [bold]{escape(finding['effect'])} {escape(finding['target'])}[/]: {escape(sizes + told)}", soft_wrap=True)
         if finding["gain"]:
             low, high = (100 * x for x in finding["gain"]["ci95"])
-            console.print(
-                f"  on trials that were not used, accepting it removes {low:.0f} to {high:.0f} % of the difference", soft_wrap=True
-            )
+            console.print(f"  accepting it removes {low:.0f} to {high:.0f} % of the difference on trials not used", soft_wrap=True)
         console.print(f"  {escape(finding['advice'])}", soft_wrap=True)
     if found["verdict"] in ("unexplained", "named, incomplete") and found["adequacy"]:
         worst = found["adequacy"][0]

@@ -37,7 +37,7 @@ def write_identification(result: SessionResult, found: SessionIdentification, fo
 
 
 def write_diagnosis(result: SessionResult, found: SessionDiagnosis, folder: Path, *, accepted: bool) -> dict[str, Any]:
-    """Write ``report.html`` and ``results.json`` of a diagnosis; with ``accepted`` also ``body.json``, identified with the findings accepted.
+    """Write ``report.html`` and ``results.json`` of a diagnosis; with ``accepted`` also ``body.json``.
 
     Return the numbers.
     """
