@@ -51,15 +51,8 @@ def adequacy_figure(rows: tuple[Adequacy, ...]) -> "Figure":
         axes.imshow(np.clip(table, 0, 2 * LIMIT), cmap="Greys", vmin=0, vmax=2 * LIMIT, aspect="auto")
         for (i, j), value in np.ndenumerate(table):
             outside = value > LIMIT
-            axes.text(
-                j,
-                i,
-                f"{value:.0f}",
-                ha="center",
-                va="center",
-                color="white" if value > LIMIT else BLACK,
-                weight="bold" if outside else "normal",
-            )
+            color, weight = ("white", "bold") if outside else (BLACK, "normal")
+            axes.text(j, i, f"{value:.0f}", ha="center", va="center", color=color, weight=weight)
         axes.set_yticks(range(6), CHANNELS)
         axes.set_xticks(range(len(bands)), ["rest" if low == 0 else f"{low:g}-{high:g} Hz" for low, high in bands])
         axes.grid(visible=False)

@@ -1,4 +1,4 @@
-"""The page of a diagnosis for the analyst: what is wrong, how we know, how big, how sure, what else it could be, what to do, what changes."""
+"""The page of a diagnosis for the analyst: what is wrong, how we know, how big, how sure, what else, what to do, what changes."""
 
 from importlib.resources import files
 
