@@ -57,8 +57,21 @@ class DanceResult:
         return self.dance is not None
 
 
+LEGAL = {"mass": (30.0, 200.0, "kg"), "stature": (1.2, 2.2, "m")}
+
+
 def dancer(subject: Subject) -> Body:
-    """Return the body of a person for whom a dance is designed: a generic one, joints within what is reached without effort."""
+    """Return the body of a person for whom a dance is designed: a generic one, joints within what is reached without effort.
+
+    Raises
+    ------
+    BiodanceError
+        Mass or stature are outside the range of the tables.
+    """
+    for name, (low, high, unit) in LEGAL.items():
+        value = getattr(subject, name)
+        if not low <= value <= high:
+            raise BiodanceError(f"The {name} is {value:g} {unit}; a dance is designed for {low:g} to {high:g} {unit}. Correct it.")
     return replace(human(subject), limits=joint_limits(subject, within="comfortable"))
 
 
