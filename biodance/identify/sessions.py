@@ -70,5 +70,5 @@ def differences(earlier: Identification, later: Identification) -> tuple[Differe
 
 def _with_room(one: Identification, other: Identification) -> Posterior:
     """Return the belief of session ``one`` with room for the loads that it carries beyond ``other``."""
-    chance = {suspect.segment: suspect.probability for suspect in added_mass(one, reference=other).suspects}
+    chance = {found.segment: found.probability * (found.mass > 0) for found in added_mass(one, reference=other).suspects}
     return posterior(one.data, may_carry(one.body, one.belief.prior, share=np.array([chance[s] for s in one.body.segments])))

@@ -11,9 +11,12 @@ from biodance.identify.added_mass import AddedMass, added_mass
 from biodance.identify.identification import Identification, identify, standing_point
 from biodance.identify.sessions import Difference, differences
 from biodance.identify.statistics import Fit
+from biodance.identify.torques import TorqueBands, torque_bands
 from biodance.identify.validation import Gain, TrialValidation, gain, validate
 from biodance.motion.comparison import Agreement, compare
+from biodance.motion.contact import foot_wrenches, ground_contact
 from biodance.motion.regressor import GRAVITY, predict_wrench
+from biodance.motion.soles import SIDES, soles_from_body
 from biodance.pipeline.results import TrialResult
 from biodance.records import ROLES, Role, Wrench
 
@@ -30,7 +33,8 @@ class SessionIdentification:
     ``fitted`` and ``validations`` compare the trials used and the trials kept, about the mean centre of pressure; ``agreements`` the
     identified body on every compared trial by name, about the lab origin; ``gain`` table / identified over the validations (None without
     an interval); ``search`` the loads looked for, against ``search.reference``; ``changes`` since the reference session, empty without one;
-    ``name`` of the session; ``notes`` what a person should know.
+    ``torques`` of the joints in the first trial kept (else fitted), None where the feet's wrenches are not known; ``name`` of the session;
+    ``notes`` what a person should know.
     """
 
     name: str
@@ -42,6 +46,7 @@ class SessionIdentification:
     gain: Gain | None
     search: AddedMass
     changes: tuple[Difference, ...] = ()
+    torques: TorqueBands | None = None
     notes: tuple[str, ...] = ()
 
 
@@ -94,8 +99,22 @@ def identify_trials(
         gain=_gain(kept, notes),
         search=replace(search, reference=f"session {reference.name}") if reference else search,
         changes=differences(reference.identification, found) if reference else (),
+        torques=_torques(found, results),
         notes=tuple(notes),
     )
+
+
+def _torques(found: Identification, results: tuple[TrialResult, ...]) -> TorqueBands | None:
+    """Return the joint torques of the first trial kept, else of the first fitted, whose plates tell what each foot carries."""
+    for role in (*KEPT, *FITTED):
+        for one in results:
+            if one.trial.role != role or one.motion is None or one.comparison is None or not one.trial.plates:
+                continue
+            soles = soles_from_body(found.body, one.motion)
+            feet = foot_wrenches(one.trial, ground_contact(one.trial, soles, mass=found.sip.mass.sum()), soles)
+            ground = {f"{side}_foot": wrench for side, wrench in zip(SIDES, feet, strict=True)}
+            return torque_bands(found, one.motion, ground, trial=one.trial.name, use=one.comparison.used)
+    return None
 
 
 def _weight(fitted: tuple[TrialValidation, ...]) -> list[str]:

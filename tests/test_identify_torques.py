@@ -1,0 +1,56 @@
+"""Joint torques and their bands: against pinocchio, and by Monte Carlo against known truth."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from identify_trials import noisy_fit, person, smooth_motion
+
+from biodance.errors import UnknownName
+from biodance.identify.identification import identify
+from biodance.identify.torques import ground_torques, torque_bands, torque_regressor
+from biodance.motion.dynamics import joint_torques
+from biodance.records import Sip, Wrench
+
+
+def test_torques_are_pinocchios() -> None:
+    for seed in range(4):
+        body, truth, rng = person(seed, segments=5)
+        motion = smooth_motion(body, rng, frames=40)
+        ground = {name: Wrench(motion.time, rng.normal(0, 50, (40, 6))) for name in ("s2", "s4")}
+        true_body = replace(body, sip=Sip(body.segments, truth, body.sip.covariance))
+        expected = joint_torques(true_body, motion, ground).torque
+        got = torque_regressor(body, motion) @ truth - ground_torques(body, motion, ground)
+        np.testing.assert_allclose(got, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+
+
+def test_a_wrench_on_a_foreign_segment_is_refused() -> None:
+    body, _, rng = person(0)
+    motion = smooth_motion(body, rng, frames=5)
+    with pytest.raises(UnknownName):
+        ground_torques(body, motion, {"tail": Wrench(motion.time, np.zeros((5, 6)))})
+
+
+def test_bands_hold_the_true_torques() -> None:
+    inside, ratio = [], []
+    for seed in range(12):
+        body, truth, rng = person(50 + seed)
+        found = identify(body, (noisy_fit(body, smooth_motion(body, rng, frames=900), truth, rng),))
+        motion = smooth_motion(body, rng, frames=60)
+        bands = torque_bands(found, motion, {}, trial="t", use=np.ones(60, dtype=bool))
+        true = torque_regressor(body, motion) @ truth
+        inside.append(np.abs(true - bands.torque) <= bands.half_width)
+        ratio.append(np.abs(bands.torque - true).mean() / np.abs(bands.table - true).mean())
+        assert bands.joints == tuple(joint.name for joint in body.joints)
+    assert 0.9 < np.mean(np.concatenate([x.ravel() for x in inside])) <= 1.0
+    assert np.mean(ratio) < 0.8
+
+
+def test_the_band_is_the_spread_of_the_belief() -> None:
+    body, truth, rng = person(70)
+    found = identify(body, (noisy_fit(body, smooth_motion(body, rng, frames=600), truth, rng),))
+    motion = smooth_motion(body, rng, frames=20)
+    bands = torque_bands(found, motion, {}, trial="t", use=np.ones(20, dtype=bool))
+    drawn = found.belief.factor @ rng.normal(size=(found.belief.factor.shape[1], 4000))
+    spread = (torque_regressor(body, motion) @ drawn).std(axis=2)
+    np.testing.assert_allclose(bands.sd, spread, rtol=0.1)
