@@ -1,15 +1,18 @@
 """Identification in the pipeline, its numbers for programs and its pages, on a session whose truth is known."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from identified_sessions import body, session_result, truth
 
 from biodance.errors import SessionRefused, TrialRefused
+from biodance.motion.dynamics import joint_torques
 from biodance.pipeline.identification import can_identify, identify_trials
 from biodance.pipeline.provenance import provenance
 from biodance.pipeline.session import identified
+from biodance.records import Plate, Wrench
 from biodance.report.identification_json import identification_document
 from biodance.report.identification_page import identification_section
 from biodance.report.page import page
@@ -123,3 +126,23 @@ def test_a_load_on_the_page_has_segment_size_and_interval(monkeypatch):
     text = identification_section(session_result(load=2.4, seed=5).identification)
     assert "carries <strong>" in text
     assert "kg on the left forearm hand</strong>" in text
+
+
+def test_joint_torques_of_the_kept_trial_are_told_with_their_band(monkeypatch):
+    monkeypatch.setattr("biodance.report.identification_page.svg_address", lambda _: "data:,")
+    fitted, kept = session_result().trials
+    corners = np.array([[0.5, 0.5, 0], [-0.5, 0.5, 0], [-0.5, -0.5, 0], [0.5, -0.5, 0]])
+    plate = Plate("plate1", 2, corners, Wrench(kept.comparison.time, kept.comparison.measured))
+    one = identify_trials(body(), (fitted, replace(kept, trial=replace(kept.trial, plates=(plate,)))), name="S03")
+    bands, elbow = one.torques, body().joint_index("left_elbow_flexion")
+    assert bands.trial == kept.trial.name
+    expected = joint_torques(one.identification.identified, kept.motion, {}).torque[:, elbow]
+    np.testing.assert_allclose(bands.torque[:, elbow], expected, atol=1e-9)
+    assert np.all(bands.sd > 0)
+    rows = {row["joint"]: row for row in identification_document(one)["joint_torques"]["joints"]}
+    assert rows["left_elbow_flexion"]["peak_Nm"] == pytest.approx(max(bands.torque[bands.use, elbow], key=abs))
+    low, high = rows["left_elbow_flexion"]["peak_ci95_Nm"]
+    assert low < rows["left_elbow_flexion"]["peak_Nm"] < high
+    assert "Joint torques" in identification_section(one)
+    assert session_result().identification.torques is None
+    assert identification_document(session_result().identification)["joint_torques"] is None
