@@ -15,6 +15,7 @@ from biodance.dance.chain import ROOT, Chain
 from biodance.dance.excitation import Blocks, smooth_condition, static_grams, total, upright_slopes, uprights
 from biodance.dance.limits import limits
 from biodance.dance.programme import Judged, Objective, Programme, closed
+from biodance.dance.refusal import PERSONAL, Excess, describe, told
 from biodance.dance.sqp import minimise
 from biodance.dance.stance import Stance
 from biodance.dance.state import State
@@ -52,8 +53,8 @@ class Postures:
 
 @dataclass(frozen=True, eq=False)
 class Posture:
-    """``x`` (n,) coordinates, ``up`` (N, 3) the vertical in the segments; ``violation`` of the reserved limits in their scales and the worst
-    ``limit``.
+    """``x`` (n,) coordinates, ``up`` (N, 3) the vertical in the segments; ``violation`` of the reserved limits in their scales and the
+    worst ``limit``.
     """
 
     x: Array
@@ -140,16 +141,19 @@ def anyhow(state: State) -> tuple[float, Array]:
 
 
 def refuse(chain: Chain, stance: Stance, begin: list[Array]) -> None:
-    """Raise the BiodanceError that says which limit forbids every posture on these feet: without which there would be one."""
-    without = []
-    for name in STATIC:
+    """Raise the BiodanceError that says which limit forbids every posture on these feet: the first without which there would be one."""
+    for name in PERSONAL:
         names = tuple(other for other in STATIC if other != name)
-        tried = (solve(chain, stance, x, anyhow, iterations=30, names=names) for x in begin)
-        if any(posture.violation <= KEPT for posture in tried):
-            without.append(name.replace("_", " "))
-    forbids = f"{' or '.join(without)} forbids it" if without else "several limits together forbid it"
+        for x in begin:
+            posture = solve(chain, stance, x, Excess(name), iterations=60, names=names)
+            if posture.violation <= KEPT:
+                what = describe(State(chain, stance, posture.x[None], *np.zeros((2, 1, chain.size))), name)
+                raise BiodanceError(
+                    f"No posture {told(stance)} keeps all limits; there would be one without the limit on {what}. "
+                    "Widen that limit, or leave this stance out of the protocol."
+                )
     raise BiodanceError(
-        f"On the feet {stance.name!r} no posture keeps all limits: {forbids}. Leave this stance out of the protocol, or widen that limit."
+        f"No posture {told(stance)} keeps all limits, whichever of them is left out. Leave this stance out of the protocol."
     )
 
 
@@ -242,9 +246,7 @@ def _values(blocks: Blocks, grams: Array) -> Array:
     return out
 
 
-def solve(
-    chain: Chain, stance: Stance, begin: Array, objective: Objective, *, iterations: int, names: tuple[str, ...] = STATIC
-) -> Posture:
+def solve(chain: Chain, stance: Stance, begin: Array, objective: Objective, *, iterations: int, names: tuple[str, ...] = STATIC) -> Posture:
     """Return the posture on the feet ``stance`` that is best for ``objective`` near ``begin`` (n,) and keeps the limits ``names``."""
     free = free_coordinates(chain, stance)
     base, basis = np.zeros((3, 1, chain.size)), np.zeros((3, 1, 1))

@@ -9,14 +9,11 @@ from biodance.body.body import Body
 from biodance.body.human import human
 from biodance.body.limits import joint_limits
 from biodance.dance.account import Account, account
-from biodance.dance.chain import Chain
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.expectation import Expectation, expect
 from biodance.dance.person import PersonLimits, fitted
 from biodance.dance.plan import Plan
-from biodance.dance.refusal import check_postures
-from biodance.dance.sequence import sequence
 from biodance.dance.verify import Margin, broken, verify
 from biodance.errors import BiodanceError
 from biodance.records import Subject
@@ -88,9 +85,7 @@ def make_dance(
     started = time.perf_counter()
     own, plan, notes = fitted(body, plan, person)
     reason, margins, dance = "", tuple[Margin, ...](), None
-    tell("looking for a posture on all feet", 0, 0)
     try:
-        check_postures(Chain(own), tuple({(s.name, s.planted): s for s in sequence(own, plan) if s.over is None}.values()), seed=seed)
         dance = design(own, plan, seed=seed, tell=tell, resume=resume)
     except BiodanceError as error:
         reason = str(error)
