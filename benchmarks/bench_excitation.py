@@ -139,7 +139,7 @@ def examined(number: int, subject: Subject, rival: str, write: Callable[[Path], 
     pose = poses(body, static.motion.q[frame : frame + 1])
     true = sip_in_frames(document, pose.rotation[0], pose.position[0])
     criteria = criterion_of(body, joined([t.motion for t in fits]))
-    rms = np.array([[v.table.rms, v.identified.rms] for v in found.validations]).mean(axis=0)
+    rms = np.array([[v.table_agreement.rms, v.identified_agreement.rms] for v in found.validations]).mean(axis=0)
     squat = np.array([[np.linalg.norm(row[:3]), np.linalg.norm(row[3:])] for row in rms])
     own, table = errors(found.identification.sip.phi, true.phi), errors(body.sip.phi, true.phi)
     seconds = float(sum(t.motion.time[-1] - t.motion.time[0] for t in fits))
