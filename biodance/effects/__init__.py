@@ -16,7 +16,7 @@ from biodance.errors import UnknownName
 
 Kind = TypeVar("Kind")
 
-CONTRACT = ("case", "effect", "gate", "geometry", "moved_matter", "oscillator", "posture_answer", "reader_words")
+CONTRACT = ("case", "effect", "gate", "geometry", "missing_joint", "moved_matter", "oscillator", "posture_answer", "reader_words")
 """Modules of this folder that are not effects."""
 
 

@@ -92,6 +92,11 @@ class Case:
         return np.asarray(np.where(seen, local, 0.0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1))
 
     @cached_property
+    def memory(self) -> dict[str, object]:
+        """What was computed for this case and serves again, by name."""
+        return {}
+
+    @cached_property
     def geometry(self) -> "Geometry":
         """How posture, wrench and markers answer to changes of the body's geometry."""
         from biodance.effects.geometry import geometry

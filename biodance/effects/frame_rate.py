@@ -9,6 +9,7 @@ against height, and by a clock in the picture.
 import numpy as np
 
 from biodance.effects.case import Case
+from biodance.effects.clipping import clipped
 from biodance.effects.gate import DiscreteEffect, Gate, Recorded
 from biodance.lab.filters import LowPass, low_pass
 from biodance.motion.regressor import predict_wrench
@@ -38,7 +39,9 @@ class FrameRate(DiscreteEffect):
     @classmethod
     def look(cls, recorded: Recorded) -> tuple[Gate, ...]:
         """Return whether accelerations have the size that forces need, and whether the delay is the same from start to end."""
-        parts = [part for case in recorded.cases if (part := moving_parts(case)) is not None]
+        cut = {trial.name for trial in recorded.session.trials if clipped(trial)}
+        whole = [case for case in recorded.cases if case.trial.name not in cut]
+        parts = [part for case in whole if (part := moving_parts(case)) is not None]
         return (*cls._rate(parts), *cls._lost(parts))
 
     @classmethod

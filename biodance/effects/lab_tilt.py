@@ -9,7 +9,7 @@ import numpy as np
 
 from biodance.effects.case import Case
 from biodance.effects.effect import Effect, Parameter, axis_vector
-from biodance.motion.regressor import GRAVITY, regressor
+from biodance.motion.regressor import GRAVITY
 from biodance.records import Array
 
 
@@ -25,10 +25,13 @@ class LabTilt(Effect):
         return ("x", "y")
 
     def columns(self, case: Case) -> Array:
-        """Return the change of the predicted wrench per radian: gravity enters linearly, and turns by axis x gravity."""
+        """Return the change of the predicted wrench per radian: the weight turns by axis x gravity, and its moment with it."""
         turned = np.cross(axis_vector(self.target), GRAVITY)
-        still = regressor(case.body, case.motion, gravity=GRAVITY)
-        return ((regressor(case.body, case.motion, gravity=GRAVITY + turned) - still) @ case.phi)[:, :, None]
+        table = case.phi.reshape(-1, 10)
+        move = case.segments
+        first = np.einsum("tnij,nj->ti", move.rotation, table[:, 1:4]) + np.einsum("tni,n->ti", move.position, table[:, 0])
+        force = np.tile(-table[:, 0].sum() * turned, (len(first), 1))
+        return np.concatenate([force, np.cross(first, -turned)], axis=1)[:, :, None]
 
 
 EFFECT = LabTilt

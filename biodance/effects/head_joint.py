@@ -1,0 +1,68 @@
+"""The head moves on the trunk; the model has trunk and head in one piece.
+
+Signature: five kilograms that follow the head markers instead of the trunk: mostly Mx and My, and Mz when the head turns; the head markers
+leave the model together.
+Look-alikes: skin that slides under C7, a centre of mass of the trunk that is too high or low. Separated by nodding and turning the head
+alone, and by asking the person to look at one point.
+"""
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.body.branch import Cut, branch_off
+from biodance.effects.case import Case
+from biodance.effects.effect import Effect, Parameter
+from biodance.effects.missing_joint import extended, loosened, share_of_body, shoulders
+from biodance.records import Array
+
+CERVICALE = 0.29
+"""Height of the neck's base between shoulders and vertex (de Leva 1996: 0.27 men, 0.32 women)."""
+AXES = {"neck_flexion": -np.eye(3)[2], "neck_bending": np.eye(3)[0], "neck_rotation": np.eye(3)[1]}
+MARKERS = 3
+
+
+class HeadJoint(Effect):
+    """The head turns by ``angle`` (rad rms per axis) on the trunk, in the course of time that its markers show."""
+
+    name = "head_joint"
+    parameters = (Parameter("angle", "rad", 0.10, "5-15 deg rms of head movement in whole-body tasks (laboratory experience)"),)
+    separated_by = "Nodding and turning the head alone, standing still."
+    advice = "Accept a body with a neck, or ask the person to look at one point straight ahead."
+
+    @classmethod
+    def targets(cls, case: Case) -> tuple[str, ...]:
+        """Return one target where the head has three markers."""
+        return ("",) if with_neck(case) is not None else ()
+
+    def columns(self, case: Case) -> Array:
+        """Return the wrench that the head's motion adds, per radian."""
+        return self._loosened(case).wrench[:, :, None] / max(self._loosened(case).angle, 1e-6)
+
+    def shown(self, case: Case) -> Array:
+        """Return the angle that the head markers show."""
+        return np.array([self._loosened(case).angle])
+
+    def corrected(self, case: Case, theta: Array) -> Case:
+        """Return the trial tracked with a body that has a neck."""
+        body = with_neck(case)
+        return extended(case, body) if body is not None else case
+
+    def _loosened(self, case: Case):  # type: ignore[no-untyped-def]
+        body = with_neck(case)
+        assert body is not None
+        return loosened(case, body)
+
+
+def with_neck(case: Case) -> Body | None:
+    """Return the body with three joints at the base of the neck; None where the markers do not show the head."""
+    body, middle = case.body, shoulders(case.body)
+    seen = tuple(body.markers.names[c] for c in case.marker_columns if body.markers.names[c].endswith("HD"))
+    if middle is None or len(seen) < MARKERS:
+        return None
+    vertex = np.array([middle[0], body.boxes[body.segment_index("trunk_head"), 1, 1], 0.0])
+    neck = middle + CERVICALE * (vertex - middle)
+    head = share_of_body(body, "head_2", top=vertex, bottom=neck)
+    return branch_off(body, Cut("trunk_head", "head", AXES, neck, head, seen))
+
+
+EFFECT = HeadJoint

@@ -1,0 +1,71 @@
+"""The shoulders move on the trunk: shrugging, reaching; the model has them fixed.
+
+Signature: the arm's weight moves by centimetres against the model, mostly in Mx and My; the shoulder markers leave the trunk's.
+Look-alikes: a misplaced shoulder marker (which does not come back), a centre of mass that is off in the upper arm. Separated by shrugging
+alone, with hanging arms.
+"""
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.body.branch import Cut, branch_off
+from biodance.effects.case import Case
+from biodance.effects.effect import Effect, Parameter
+from biodance.effects.missing_joint import extended, loosened, shoulders
+from biodance.records import Array
+
+STERNOCLAVICULAR = np.array([0.2, 0.0, 0.12])
+"""Forwards, upwards and sideways from the middle of the shoulders, in half shoulder widths."""
+
+
+class ShoulderGirdle(Effect):
+    """Both shoulders turn by ``angle`` (rad rms per axis) about the inner end of the collar bone, as their markers show; 0.1 rad carry the
+    shoulder by 15 mm.
+    """
+
+    name = "shoulder_girdle"
+    parameters = (Parameter("angle", "rad", 0.10, "2-5 cm of the shoulder joint on the thorax (laboratory experience)"),)
+    separated_by = "Shrugging alone, with hanging arms."
+    advice = "Accept a body with collar bones; keep the shoulder markers on the acromion, not on the deltoid."
+
+    @classmethod
+    def targets(cls, case: Case) -> tuple[str, ...]:
+        """Return one target where both shoulders have a marker."""
+        return ("",) if with_clavicles(case) is not None else ()
+
+    def columns(self, case: Case) -> Array:
+        """Return the wrench that the shoulders' motion adds, per radian."""
+        return self._loosened(case).wrench[:, :, None] / max(self._loosened(case).angle, 1e-6)
+
+    def shown(self, case: Case) -> Array:
+        """Return the angle that the shoulder markers show."""
+        return np.array([self._loosened(case).angle])
+
+    def corrected(self, case: Case, theta: Array) -> Case:
+        """Return the trial tracked with a body that has collar bones."""
+        body = with_clavicles(case)
+        return extended(case, body) if body is not None else case
+
+    def _loosened(self, case: Case):  # type: ignore[no-untyped-def]
+        body = with_clavicles(case)
+        assert body is not None
+        return loosened(case, body)
+
+
+def with_clavicles(case: Case) -> Body | None:
+    """Return the body with two joints at the inner end of each collar bone; None where the markers do not show both shoulders."""
+    body, middle = case.body, shoulders(case.body)
+    seen = {body.markers.names[c] for c in case.marker_columns}
+    if middle is None or not seen.issuperset({"RSHO", "LSHO"}):
+        return None
+    for side, sign in (("right", 1.0), ("left", -1.0)):
+        shoulder = body.joint_index(f"{side}_shoulder_flexion")
+        width = abs(float(body.joints[shoulder].translation[2]))
+        place = middle + width * STERNOCLAVICULAR * [1.0, 1.0, sign]
+        axes = {f"{side}_clavicle_elevation": -sign * np.eye(3)[0], f"{side}_clavicle_protraction": sign * np.eye(3)[1]}
+        markers = (f"{side[0].upper()}SHO",)
+        body = branch_off(body, Cut("trunk_head", f"{side}_clavicle", axes, place, np.zeros(10), markers, (shoulder,)))
+    return body
+
+
+EFFECT = ShoulderGirdle

@@ -1,0 +1,74 @@
+"""The trunk bends in two places; the model bends it in one.
+
+Signature: the thorax leans and bends on the loins: half the body's mass moves by centimetres against the model, in Mx and My; the trunk
+markers stand away from where the pelvis would have them.
+Look-alikes: skin that slides over the spine, a trunk joint in the wrong place (which follows the trunk's angle only). Separated by
+rounding and arching the back alone, and by markers on the loins.
+"""
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.body.branch import Cut, branch_off
+from biodance.effects.case import Case
+from biodance.effects.effect import Effect, Parameter
+from biodance.effects.missing_joint import extended, loosened, share_of_body, shoulders
+from biodance.records import Array
+
+XIPHION = 0.61
+"""Height of the joint between the trunk's joint and the shoulders (de Leva 1996, omphalion to xiphion: 0.58 men, 0.65 women)."""
+AXES = {"thorax_flexion": -np.eye(3)[2], "thorax_bending": np.eye(3)[0]}
+MARKERS = 4
+
+
+class TrunkJoint(Effect):
+    """The thorax bends by ``angle`` (rad rms per axis) on the loins, in the course of time that the trunk markers show; turning about the
+    long axis cannot be told from the model's own joint.
+    """
+
+    name = "trunk_joint"
+    parameters = (Parameter("angle", "rad", 0.06, "5-10 deg rms between lumbar and thoracic spine (laboratory experience)"),)
+    separated_by = "Rounding and arching the back alone, standing still."
+    advice = "Accept a body with a thorax, and put two more markers on the loins (L1, L3)."
+
+    @classmethod
+    def targets(cls, case: Case) -> tuple[str, ...]:
+        """Return one target where the trunk has four markers."""
+        return ("",) if with_thorax(case) is not None else ()
+
+    def columns(self, case: Case) -> Array:
+        """Return the wrench that the thorax's motion adds, per radian."""
+        return self._loosened(case).wrench[:, :, None] / max(self._loosened(case).angle, 1e-6)
+
+    def shown(self, case: Case) -> Array:
+        """Return the angle that the trunk markers show."""
+        return np.array([self._loosened(case).angle])
+
+    def corrected(self, case: Case, theta: Array) -> Case:
+        """Return the trial tracked with a body that has a thorax."""
+        body = with_thorax(case)
+        return extended(case, body) if body is not None else case
+
+    def _loosened(self, case: Case):  # type: ignore[no-untyped-def]
+        body = with_thorax(case)
+        assert body is not None
+        return loosened(case, body)
+
+
+def with_thorax(case: Case) -> Body | None:
+    """Return the body with two joints at the xiphion; None where the markers do not show the thorax."""
+    body, middle = case.body, shoulders(case.body)
+    if middle is None:
+        return None
+    index = body.segment_index("trunk_head")
+    on = tuple(name for name, s in zip(body.markers.names, body.markers.segment, strict=True) if s == index)
+    if sum(body.markers.segment[c] == index for c in case.marker_columns) < MARKERS:
+        return None
+    place = XIPHION * middle
+    loins = share_of_body(body, "middle_trunk", top=place, bottom=np.zeros(3))
+    thorax = body.sip.phi[10 * index : 10 * index + 10] - loins
+    arms = tuple(i for i, joint in enumerate(body.joints) if joint.parent == body.segment_joint[index])
+    return branch_off(body, Cut("trunk_head", "thorax", AXES, place, thorax, on, arms))
+
+
+EFFECT = TrunkJoint
