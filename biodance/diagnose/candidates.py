@@ -49,13 +49,16 @@ class Candidate:
 
 def candidates(problem: Problem, chosen: Iterable[str] | None = None) -> tuple[Candidate, ...]:
     """Return all causes of the family (or those ``chosen`` by name) at all their targets; those without any trace are left out."""
-    found = [candidate(problem, kind(target)) for kind in effects(chosen).values() for target in kind.targets(problem.cases[0])]
+    every = [kind(target) for kind in effects(chosen).values() for target in kind.targets(problem.cases[0])]
+    if not every:
+        return ()
+    found = [candidate(problem, effect, columns) for effect, columns in zip(every, problem.columns(every), strict=True)]
     return tuple(one for one in found if one.basis.shape[1])
 
 
-def candidate(problem: Problem, effect: Effect) -> Candidate:
-    """Return one cause with its basis."""
-    columns = problem.columns(effect) * effect.typical
+def candidate(problem: Problem, effect: Effect, unit: Array) -> Candidate:
+    """Return one cause with its basis, from its columns (r, p) per ``unit`` of each parameter."""
+    columns = unit * effect.typical
     length = np.linalg.norm(columns, axis=0)
     silent = length <= NOTHING * length.max(initial=1e-300)
     parts = list(columns[:, ~silent].T)

@@ -5,6 +5,7 @@
 Columns of faults come from `candidates`; sizes of everything from `tolerances`.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -61,10 +62,12 @@ class Problem:
         """Number of rows that come from the plates: six per coefficient."""
         return 6 * self.spectrum.band.size
 
-    def columns(self, effect: Effect) -> Array:
-        """Return (r, p): what one unit of each parameter of ``effect`` adds to the rows."""
-        wrench = self.spectrum.rows(tuple(effect.columns(case) for case in self.cases))
-        return np.concatenate([wrench.reshape(self.wrench_rows, -1), self.marker_rows(effect)])
+    def columns(self, some: Sequence[Effect]) -> list[Array]:
+        """Return (r, p) for each of ``some`` effects: what one unit of each parameter adds to the rows."""
+        wrench = self.spectrum.rows(tuple(np.concatenate([one.columns(case) for one in some], axis=2) for case in self.cases))
+        ends = np.cumsum([len(one.parameters) for one in some])
+        parts = np.split(wrench.reshape(self.wrench_rows, -1), ends[:-1], axis=1)
+        return [np.concatenate([part, self.marker_rows(one)]) for part, one in zip(parts, some, strict=True)]
 
     def marker_rows(self, effect: Effect) -> Array:
         """Return (m, p): what one unit of each parameter of ``effect`` adds to the marker rows."""

@@ -18,6 +18,8 @@ class LabTilt(Effect):
 
     name = "lab_tilt"
     parameters = (Parameter("angle", "rad", 0.005, "0.1-1 deg after an L-frame calibration on an uneven floor"),)
+    separated_by = "Squats: the centre of mass changes its height, an offset does not."
+    advice = "Hang a plumb line with two markers; set the cameras' vertical by it."
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:
