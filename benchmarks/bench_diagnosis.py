@@ -1,0 +1,53 @@
+"""Hide everything, diagnose, judge: writes docs/diagnosis.md.
+
+    python benchmarks/bench_diagnosis.py [--run NAME] [--minutes 30] [--out docs/diagnosis.md] [--prepare]
+
+Sessions are simulated and tracked once and kept on disk (`hidden_sessions.CACHE`); scores are kept per ``--run``, so that a run that was
+stopped goes on. ``--minutes`` ends the run early: the sessions come in an order in which every beginning is a sample of the whole, and the
+page says how many there were. ``--prepare`` only simulates and tracks.
+"""
+
+import argparse
+import time
+from pathlib import Path
+
+from diagnosis_page import draw, page
+from diagnosis_scores import Score, judged, stored
+from hidden_causes import everything
+from hidden_sessions import Scenario, examined
+
+
+def without_culprit(scenarios: list[Scenario]) -> list[Scenario]:
+    """Return the sessions that are diagnosed again with the hidden cause taken out of the family: large ones of the first person."""
+    return [one for one in scenarios if one.group == "issue"]
+
+
+def main() -> None:
+    """Run what time allows and write the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--run", default="now")
+    parser.add_argument("--minutes", type=float, default=1e9)
+    parser.add_argument("--out", type=Path, default=Path("docs/diagnosis.md"))
+    parser.add_argument("--prepare", action="store_true")
+    chosen = parser.parse_args()
+    start, scenarios = time.monotonic(), everything()
+    jobs = [(one, absent) for one in scenarios for absent in ((False, True) if one in without_culprit(scenarios) else (False,))]
+    scores: list[Score] = []
+    for scenario, absent in jobs:
+        found = stored(scenario, chosen.run, absent=absent)
+        if found is None and time.monotonic() - start < 60 * chosen.minutes:
+            if chosen.prepare:
+                examined(scenario)
+                continue
+            found = judged(scenario, chosen.run, absent=absent)
+            print(f"{time.monotonic() - start:6.0f} s  {found.key} {found.hidden}: {found.verdict} {found.names} {found.note}", flush=True)
+        scores += [found] if found else []
+    if not chosen.prepare and scores:
+        figure = chosen.out.parent / "figures" / "diagnosis_confusion.png"
+        draw(scores, figure)
+        chosen.out.write_text("\n".join(page(scores, run=chosen.run, figure="figures/diagnosis_confusion.png")) + "\n")
+        print(f"wrote {chosen.out}")
+
+
+if __name__ == "__main__":
+    main()

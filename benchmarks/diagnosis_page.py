@@ -1,0 +1,219 @@
+"""The page docs/diagnosis.md and its figure from the scores of a run: every number with how many sessions it rests on."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import numpy as np
+from diagnosis_scores import Score
+from hidden_causes import Cause
+
+TWICE = 2.0
+
+
+def share(hits: Iterable[bool]) -> str:
+    """Return "k of n (p %)" of true values."""
+    found = list(hits)
+    return f"{sum(found)} of {len(found)} ({100 * sum(found) / len(found):.0f} %)" if found else "none measured"
+
+
+def page(scores: list[Score], *, run: str, figure: str) -> list[str]:
+    """Return the page as lines; ``run`` names the version that was measured."""
+    groups: dict[str, list[Score]] = {}
+    for one in scores:
+        groups.setdefault(one.group, []).append(one)
+    singles = [*groups.get("single", []), *groups.get("issue", [])]
+    sections: dict[str, list[str]] = {
+        "What was asked, what was measured": demands(groups, singles),
+        "Causes one by one": cause_lines(singles),
+        "Confusion": [f"![Which cause was named for which hidden one]({figure})", "", *confusion_lines(singles)],
+        "Effects that no file describes": unknown_lines(groups.get("unknown", [])),
+        "The culprit taken out of the family": absent_lines(groups.get("absent", [])),
+        "Two causes at once": pair_lines(groups.get("pair", [])),
+        "Checks before any statistics": check_lines(groups.get("discrete", [])),
+        "What accepting the cause gains": gain_lines(groups.get("issue", [])),
+        "Sessions without fault": null_lines(groups.get("null", [])),
+    }
+    seconds = [one.seconds for one in scores if one.verdict != "error"]
+    head = [
+        "# Diagnosis of hidden effects",
+        "",
+        f"Protocol diagnosis (eight trials of ten seconds), {len(scores)} sessions of virtual subjects, each written as C3D files, read, prepared, "
+        f"scaled, tracked and diagnosed through the public pipeline. Version {run}. Made by `benchmarks/bench_diagnosis.py`.",
+        f"Time of the diagnosis alone: median {np.median(seconds):.1f} s, largest {np.max(seconds):.1f} s of one processor (on a busy machine).",
+        "What is hidden is made by `biodance/virtual_lab`, which cannot import the effects: raw samples, corners and labels for instruments, a "
+        "richer body (16 segments, soft tissue) for the person. The limit of a cause is what the diagnosis computes for that very session.",
+    ]
+    return [*head, *(line for title, lines in sections.items() if lines for line in ("", f"## {title}", *lines))]
+
+
+def above(singles: list[Score]) -> list[Score]:
+    """Return the sessions whose cause is at least twice its limit."""
+    return [one for one in singles if one.ratio >= TWICE]
+
+
+def below(singles: list[Score]) -> list[Score]:
+    """Return the sessions whose cause is smaller than its limit."""
+    return [one for one in singles if one.ratio < 1]
+
+
+def demands(groups: dict[str, list[Score]], singles: list[Score]) -> list[str]:
+    """Return the table of demands."""
+    high, low, nulls, unknown, pairs = above(singles), below(singles), *(groups.get(g, []) for g in ("null", "unknown", "pair"))
+    told = [one for one in high if one.told >= TWICE]
+    sizes = [one.size_error for one in high if np.isfinite(one.size_error)]
+    covered = [one.covered for one in high if one.covered is not None]
+    rows = [
+        ("false name or alarm in sessions without fault", "<= 5 %", share(not one.silent for one in nulls)),
+        ("twice the limit or more: detected", ">= 98 %", share(not one.silent for one in high)),
+        ("... exact name", ">= 90 %", share(one.exact[0] for one in high)),
+        ("... exact name, where also twice the size from which it is told from all others", "", share(one.exact[0] for one in told)),
+        ("... truth in the named set", ">= 95 %", share(one.within[0] for one in high)),
+        ("... error of the size, median", "<= 10 %", f"{100 * np.median(sizes):.0f} % of {len(sizes)}" if sizes else "none measured"),
+        ("... 95 % interval covers", ">= 90 %", share(covered)),
+        ("below the limit: wrong name", "<= 5 %", share(one.wrong for one in low)),
+        ("no describing file: unexplained", ">= 90 %", share(one.verdict == "unexplained" for one in unknown)),
+        ("no describing file: named, complete", "never", share(one.verdict == "named, complete" for one in unknown)),
+        ("two causes: both named", ">= 85 %", share(all(one.exact) for one in pairs)),
+        ("two causes: both in the sets", "", share(all(one.within) for one in pairs)),
+    ]
+    return ["| demand | bar | measured |", "|---|---|---|", *(f"| {a} | {b} | {c} |" for a, b, c in rows)]
+
+
+def cause_lines(singles: list[Score]) -> list[str]:
+    """Return one line per cause: what was said below, about and above the limit."""
+    out = [
+        "| hidden | size / limit: named exactly (in the set) of sessions, per range |  |  |",
+        "|---|---|---|---|",
+        "| | < 1 | 1 to 2 | >= 2 |",
+    ]
+    for name in dict.fromkeys(Cause(one.hidden[0], 0.0).name for one in singles):
+        own = [one for one in singles if Cause(one.hidden[0], 0.0).name == name]
+        cells = []
+        for low, high in ((0.0, 1.0), (1.0, TWICE), (TWICE, np.inf)):
+            some = [one for one in own if low <= one.ratio < high]
+            cells.append(f"{sum(o.exact[0] for o in some)} ({sum(o.within[0] for o in some)}) of {len(some)}" if some else "-")
+        rest = [one for one in own if not np.isfinite(one.ratio)]
+        if rest:
+            cells[2] += f"; without a limit {sum(o.exact[0] for o in rest)} ({sum(o.within[0] for o in rest)}) of {len(rest)}"
+        out.append(f"| {' '.join(name).strip()} | {' | '.join(cells)} |")
+    return out
+
+
+def confusion_lines(singles: list[Score]) -> list[str]:
+    """Return what was named instead, above twice the limit."""
+    missed = [one for one in above(singles) if not one.exact[0]]
+    if not missed:
+        return ["Above twice the limit nothing was confused."]
+    out = ["Not named exactly at twice the limit or more:", ""]
+    for one in missed:
+        said = ", ".join(" ".join(name).strip() for name in one.names) or "nothing"
+        where = " (truth in the set)" if one.within[0] else ""
+        out.append(f"- {one.hidden[0]}, {one.ratio:.1f} x limit: {one.verdict}, {said}{where}")
+    return out
+
+
+def unknown_lines(unknown: list[Score]) -> list[str]:
+    """Return the verdicts per unknown effect and size."""
+    if not unknown:
+        return []
+    out = ["| effect | small | large |", "|---|---|---|"]
+    for name in dict.fromkeys(one.hidden[0].partition(":")[0] for one in unknown):
+        cells = []
+        for level in ("small", "large"):
+            some = [one for one in unknown if one.hidden[0].startswith(name) and one.level == level]
+            cells.append("; ".join(f"{count} {verdict}" for verdict, count in Counter(map(_said, some)).items()) or "-")
+        out.append(f"| {name} | {' | '.join(cells)} |")
+    return out
+
+
+def _said(one: Score) -> str:
+    names = ", ".join(" ".join(name).strip() for name in one.names)
+    return f"{one.verdict}" + (f" [{names}]" if names and one.verdict != "unexplained" else "")
+
+
+def absent_lines(absent: list[Score]) -> list[str]:
+    """Return the verdicts where the effect's file was taken out."""
+    if not absent:
+        return []
+    said = Counter(one.verdict for one in absent)
+    out = [f"{len(absent)} sessions: {', '.join(f'{count} {verdict}' for verdict, count in said.items())}.", ""]
+    return [*out, *(f"- {one.hidden[0]}: {_said(one)}" for one in absent if one.verdict == "named, complete")]
+
+
+def pair_lines(pairs: list[Score]) -> list[str]:
+    """Return what was named for pairs."""
+    return [
+        f"- {' with '.join(one.hidden)}: {_said(one) if one.verdict != 'unexplained' else 'unexplained'}, {sum(one.exact)} of 2"
+        for one in pairs
+    ]
+
+
+def check_lines(discrete: list[Score]) -> list[str]:
+    """Return what the checks named."""
+    return [f"- {one.hidden[0]}: {_said(one)}" + ("" if any(one.exact) or any(one.within) else " (not found)") for one in discrete]
+
+
+def gain_lines(issue: list[Score]) -> list[str]:
+    """Return the gains on squats that were not fitted, where trials were kept."""
+    judged = [one for one in issue if "before" in one.gain]
+    if not judged:
+        return []
+    out = ["| hidden | verdict | squats, N: before -> after | N·m | interval of the share removed |", "|---|---|---|---|---|"]
+    for one in judged:
+        before, after = (np.array(one.gain[key]) for key in ("before", "after"))
+        force, moment = (f"{_mean(before[part]):.2f} -> {_mean(after[part]):.2f}" for part in (slice(0, 3), slice(3, 6)))
+        low, high = one.gain["ci95"]
+        out.append(f"| {one.hidden[0]} | {one.verdict} | {force} | {moment} | {100 * low:.0f} to {100 * high:.0f} % |")
+    return out
+
+
+def _mean(rms: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(rms**2)))
+
+
+def null_lines(nulls: list[Score]) -> list[str]:
+    """Return the false alarms."""
+    if not nulls:
+        return []
+    people = len({one.subject for one in nulls})
+    alarms = [f"- {one.key}: {_said(one)}, worst {one.worst[0]} z = {one.worst[1]:.1f}" for one in nulls if not one.silent]
+    worst = [one.worst[1] for one in nulls]
+    return [
+        f"{len(nulls)} sessions of {people} persons; largest z of what is left: median {np.median(worst):.1f}, largest {np.max(worst):.1f}.",
+        "",
+        *alarms,
+    ]
+
+
+def draw(scores: list[Score], path: Path) -> None:
+    """Draw which effect was named (columns) for which hidden one (rows), sessions at twice the limit or more."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    some = above([one for one in scores if one.group in ("single", "issue")])
+    if not some:
+        return
+    hidden: Callable[[Score], str] = lambda one: one.hidden[0].partition(":")[0]  # noqa: E731
+    named: Callable[[Score], str] = lambda one: one.names[0][0] if one.names else one.verdict  # noqa: E731
+    rows = sorted({hidden(one) for one in some})
+    columns = [*rows, *sorted({named(one) for one in some} - set(rows))]
+    table = np.zeros((len(rows), len(columns)))
+    for one in some:
+        table[rows.index(hidden(one)), columns.index(named(one))] += 1
+    share_of = table / table.sum(axis=1, keepdims=True)
+    figure, axes = plt.subplots(figsize=(0.42 * len(columns) + 2.6, 0.36 * len(rows) + 2.2), layout="constrained")
+    axes.imshow(share_of, cmap="Blues", vmin=0, vmax=1, aspect="auto")
+    for (row, column), count in np.ndenumerate(table):
+        if count:
+            axes.text(
+                column, row, f"{count:.0f}", ha="center", va="center", color="white" if share_of[row, column] > 0.6 else "black", size=8
+            )
+    axes.set_xticks(range(len(columns)), [c.replace("_", " ") for c in columns], rotation=60, ha="right", size=8)
+    axes.set_yticks(range(len(rows)), [r.replace("_", " ") for r in rows], size=8)
+    axes.set(xlabel="named first", ylabel="hidden", title=f"{len(some)} sessions, cause at twice its limit or more")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=150)
+    plt.close(figure)

@@ -1,0 +1,187 @@
+"""What a diagnosis is worth, given what was hidden: one `Score` a session, stored as JSON so that a run that was stopped goes on."""
+
+import json
+import time
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from hidden_causes import Name, truth
+from hidden_sessions import CACHE, Scenario, examined
+
+from biodance.diagnose.diagnosis import Diagnosis, Finding
+from biodance.effects import discrete_effects, effects
+from biodance.pipeline.diagnosis import diagnose_session
+from biodance.virtual_lab.hide import parse
+
+SIGMAS = 1.959964
+
+
+@dataclass(frozen=True)
+class Score:
+    """One session judged.
+
+    ``names`` what was named, in order, ``sets`` the sets; ``exact``, ``within`` per hidden cause: named as such, in a set; ``ratio`` size
+    over the limit that this session computed for it, ``told`` over the size from which it is told from the others (NaN = not computed);
+    ``size_error`` relative, ``covered`` by the 95 % interval (NaN, None = no size to compare); ``gain`` as in the JSON; ``seconds`` of the
+    processor.
+    """
+
+    key: str
+    group: str
+    level: str
+    subject: int
+    hidden: tuple[str, ...]
+    verdict: str
+    names: tuple[Name, ...]
+    sets: tuple[tuple[Name, ...], ...]
+    exact: tuple[bool, ...]
+    within: tuple[bool, ...]
+    ratio: float
+    told: float
+    size_error: float
+    covered: bool | None
+    worst: tuple[str, float]
+    seconds: float
+    gain: dict[str, Any] = field(default_factory=dict)
+    note: str = ""
+
+    @property
+    def silent(self) -> bool:
+        """Whether nothing was said."""
+        return self.verdict == "nothing wrong"
+
+    @property
+    def wrong(self) -> bool:
+        """Whether a name was given whose set does not hold the truth."""
+        return bool(self.names) and not all(self.within)
+
+
+def judge(scenario: Scenario, *, absent: bool = False) -> Score:
+    """Diagnose a session and judge the answer; ``absent`` takes the hidden causes out of the family of effects first."""
+    result = examined(scenario)
+    chosen: Iterable[str] | None = None
+    if absent:
+        gone = {name for names in truth(scenario) for name, _ in names}
+        chosen = tuple(name for name in (*effects(), *discrete_effects()) if name not in gone)
+    start = time.process_time()
+    found = diagnose_session(result, chosen=chosen)
+    seconds = time.process_time() - start
+    masses = _masses(found) if scenario.judged else {}
+    return score(scenario, found.diagnosis, seconds, group="absent" if absent else scenario.group, masses=masses)
+
+
+def score(scenario: Scenario, found: Diagnosis, seconds: float, *, group: str, masses: dict[str, Any]) -> Score:
+    """Judge one diagnosis."""
+    wanted = truth(scenario)
+    names = tuple((finding.effect, finding.target) for finding in found.findings)
+    sets = tuple(tuple((alias.effect, alias.target) for alias in finding.set) for finding in found.findings)
+    exact = tuple(any(name in same for name in names) for same in wanted)
+    within = tuple(any(same & set(some) for some in sets) for same in wanted)
+    ratio, told = _ratio(scenario, found)
+    error, covered = _size(scenario, found.findings, wanted[0]) if len(wanted) == 1 else (float("nan"), None)
+    worst = found.adequacy[0] if found.adequacy else None
+    return Score(
+        scenario.key, group, scenario.level, scenario.subject, scenario.hidden, found.verdict, names, sets, exact, within, ratio, told,
+        error, covered, (f"{worst.channel} {worst.band_hz[0]:g}-{worst.band_hz[1]:g} Hz", worst.z) if worst else ("", 0.0), seconds,
+        gain=masses | _gain(found.findings),
+    )  # fmt: skip
+
+
+def _ratio(scenario: Scenario, found: Diagnosis) -> tuple[float, float]:
+    """Return the size of the only hidden cause over its limits in this session."""
+    if len(scenario.hidden) != 1:
+        return float("nan"), float("nan")
+    same, size = truth(scenario)[0], _hidden_size(scenario.hidden[0])
+    rows = [row for row in found.limits if _is_among((row.effect, row.target), same)]
+    if not rows or size is None:
+        return float("nan"), float("nan")
+    return size[1] / min(row.limit for row in rows), size[1] / min(row.told_from for row in rows)
+
+
+def _is_among(name: Name, same: set[Name]) -> bool:
+    return name in same or (name[0], "") in same
+
+
+def _hidden_size(text: str) -> tuple[str, float] | None:
+    """Return name and size of the first parameter; a filter's is how far its cut-off lies under 10 Hz."""
+    cause = parse(text)
+    if not cause.values:
+        return None
+    name, numbers = next(iter(cause.values.items()))
+    return name, 10.0 - numbers[0] if cause.name == "filter_mismatch" else float(np.linalg.norm(numbers))
+
+
+def _size(scenario: Scenario, findings: tuple[Finding, ...], same: set[Name]) -> tuple[float, bool | None]:
+    """Return relative error of the size and whether the interval covers it, where the cause was named and has that parameter."""
+    size = _hidden_size(scenario.hidden[0])
+    for finding in findings:
+        if size is None or (finding.effect, finding.target) not in same or scenario.group == "discrete":
+            continue
+        name, true = size
+        if finding.effect == "filter_mismatch":
+            true = 10.0 - true
+        parts = [p for p in finding.parameters if p.name == name or p.name.startswith(f"{name}_")]
+        if parts:
+            value = float(np.linalg.norm([p.value for p in parts]))
+            sd = float(np.sqrt(sum((p.value * p.sd) ** 2 for p in parts)) / max(value, 1e-12))
+            value = parts[0].value if len(parts) == 1 else value
+            return abs(value - true) / true, bool(abs(value - true) <= SIGMAS * sd)
+    return float("nan"), None
+
+
+def _gain(findings: tuple[Finding, ...]) -> dict[str, Any]:
+    if not findings or findings[0].gain is None:
+        return {}
+    one = findings[0].gain
+    return {"before": list(map(float, one.rms_before)), "after": list(map(float, one.rms_after)), "ci95": list(map(float, one.ci95))}
+
+
+def _masses(found: Any) -> dict[str, Any]:
+    """Return the segment masses kg: identified without the finding, and with it accepted."""
+    out = {}
+    for name, one in (("masses_before", found.before), ("masses_after", found.accepted)):
+        if one is not None:
+            out[name] = list(map(float, one.sip.mass))
+    return out
+
+
+def stored(scenario: Scenario, run: str, *, absent: bool = False) -> Score | None:
+    """Return the score of an earlier run, or None."""
+    path = _path(scenario, run, absent)
+    if not path.is_file():
+        return None
+    raw = json.loads(path.read_text())
+    for key in ("names", "sets", "hidden", "exact", "within", "worst"):
+        raw[key] = _tuples(raw[key])
+    return Score(**raw)
+
+
+def judged(scenario: Scenario, run: str, *, absent: bool = False) -> Score:
+    """Return the score of a session in this ``run``, made now if it is not there; an error of the diagnosis is a score that says so."""
+    found = stored(scenario, run, absent=absent)
+    if found is None:
+        try:
+            found = judge(scenario, absent=absent)
+        except Exception as error:  # a benchmark goes on and tells
+            none = tuple(False for _ in scenario.hidden)
+            group = "absent" if absent else scenario.group
+            nan = float("nan")
+            found = Score(
+                scenario.key, group, scenario.level, scenario.subject, scenario.hidden, "error", (), (), none, none, nan, nan, nan, None,
+                ("", 0.0), 0.0, note=f"{type(error).__name__}: {error}"[:300],
+            )  # fmt: skip
+        path = _path(scenario, run, absent)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(asdict(found)))
+    return found
+
+
+def _path(scenario: Scenario, run: str, absent: bool) -> Path:
+    return CACHE / f"scores-{run}" / f"{scenario.key}{'-absent' if absent else ''}.json"
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value
