@@ -1,0 +1,111 @@
+"""A virtual person copies a dance: exactly when told to, degrees off and slower when not, always on feet that stay where they are."""
+
+import json
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from biodance.body.human import human
+from biodance.body.limits import joint_limits
+from biodance.dance.between import Near
+from biodance.dance.chain import Chain
+from biodance.dance.dance import Dance
+from biodance.dance.plan import Plan
+from biodance.dance.postures import KEPT, solve, start
+from biodance.dance.sequence import sequence, under
+from biodance.dance.stance import seat
+from biodance.errors import BiodanceError
+from biodance.lab.session import read_session
+from biodance.motion.kinematics import poses
+from biodance.pipeline.danced import simulate_dance, stretches
+from biodance.records import Subject
+from biodance.virtual_lab.dancing import JOINTS, Performer, copy_dance
+from biodance.virtual_lab.performance import true_wrench
+from biodance.virtual_lab.person import make_person
+from biodance.virtual_lab.tolerances import PERFECT
+
+SUBJECT = Subject(65.0, 1.75, "F", 33.0)
+BODY = replace(human(SUBJECT), limits=joint_limits(SUBJECT, within="comfortable"))
+EXACT = Performer(tracking=0.0, pace=1.0)
+
+
+@pytest.fixture(scope="module")
+def dance() -> Dance:
+    """Return two postures on both feet, one on the right leg, those in between included, straight ways between them."""
+    chain, rng = Chain(BODY), np.random.default_rng(2)
+    stances = sequence(BODY, Plan("test", "", (("parallel", 2), ("single_right", 1)), hold=1.0))
+    rows = []
+    for stance in stances:
+        for _ in range(40):
+            begin = start(chain, stance, rng)
+            begin[3:] *= 0.3
+            found = solve(chain, stance, begin, Near(begin), iterations=40)
+            if found.violation <= KEPT:
+                break
+        rows.append(found.x)
+    x, feet = np.array(rows), tuple(under(a, b) for a, b in pairwise(stances))
+    via = x[:-1, None] + np.array([[0.21], [0.79]]) * np.diff(x, axis=0)[:, None]
+    return Dance("test", BODY, x, stances, np.full(len(x), 1.0), via, np.full(len(x) - 1, 2.0), feet, 0)
+
+
+def copied(dance: Dance, performer: Performer = EXACT):
+    person = make_person(SUBJECT, 3, tolerances=PERFECT)
+    (shown,) = stretches(dance)
+    return person, shown, copy_dance(person, shown, 0, centre=np.zeros(2), performer=performer, tolerances=PERFECT)
+
+
+def test_an_exact_copy_has_the_angles_of_the_plan_and_keeps_its_balance(dance: Dance) -> None:
+    person, shown, done = copied(dance)
+    motion = done.motion(shown.motion.time)
+    for name in (*JOINTS["right_arm"], *JOINTS["left_arm"]):
+        planned = shown.motion.q[:, 7 + shown.body.joint_index(name)]
+        np.testing.assert_allclose(motion.q[:, 7 + person.body.joint_index(name)], planned, atol=0.03)
+    assert done.balance_error < 0.005
+    force = true_wrench(person, motion).force[:, 2]
+    assert (force / (9.80665 * person.mass)).min() > 0.5
+    assert (force / (9.80665 * person.mass)).max() < 1.5
+
+
+def test_planted_feet_stay_and_a_free_foot_does_not(dance: Dance) -> None:
+    person, _, done = copied(dance, Performer())
+    time = np.arange(0.0, done.plan.duration, 0.02)
+    pose = poses(person.body, done.motion(time).q)
+    right, left = (pose.position[:, person.body.segment_index(f"{side}_foot")] for side in ("right", "left"))
+    assert np.ptp(right, axis=0).max() < 2e-3
+    up = done.curves.raised("left")[np.searchsorted(done.curves.time, time)]
+    assert np.ptp(left[up == 0], axis=0).max() < 2e-3
+    assert np.linalg.norm(np.ptp(left[up > 0.5], axis=0)) > 0.05
+
+
+def test_the_usual_performer_is_five_to_ten_degrees_off_and_slower(dance: Dance) -> None:
+    person, shown, done = copied(dance, Performer())
+    assert done.plan.duration == pytest.approx(1.2 * (shown.motion.time[-1] - shown.motion.time[0]), abs=0.06)
+    motion = done.motion(1.2 * shown.motion.time)
+    arms = [name for field in ("right_arm", "left_arm") for name in JOINTS[field]]
+    planned = shown.motion.q[:, [7 + shown.body.joint_index(name) for name in arms]]
+    off = motion.q[:, [7 + person.body.joint_index(name) for name in arms]] - planned
+    assert 4.0 < np.degrees(np.sqrt(np.mean(np.square(off)))) < 10.0
+
+
+def test_a_danced_session_is_read_like_any_other(dance: Dance, tmp_path: Path) -> None:
+    folder = simulate_dance(SUBJECT, dance, tmp_path / "session", seed=3)
+    session = read_session(folder)
+    assert sorted(trial.name for trial in session.trials) == ["dance_1", "squat_1", "squat_2", "static"]
+    assert len(session.of_role("fit")) == 1
+    truth = json.loads((folder / "truth" / "truth.json").read_text())
+    assert truth["protocol"] == "test"
+    assert max(trial["balance_error_m"] for trial in truth["trials"]) < 0.01
+    with pytest.raises(BiodanceError, match="not an empty folder"):
+        simulate_dance(SUBJECT, dance, folder, seed=3)
+
+
+def test_what_cannot_be_copied_is_refused(dance: Dance) -> None:
+    with pytest.raises(BiodanceError, match=r"0 to 0\.6 rad"):
+        Performer(tracking=1.0)
+    stool = seat(BODY)
+    seated = replace(dance, stances=(stool,) * len(dance.stances), under=(stool,) * len(dance.under))
+    with pytest.raises(BiodanceError, match="virtual persons stand"):
+        stretches(seated)
