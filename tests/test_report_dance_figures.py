@@ -3,9 +3,12 @@
 import numpy as np
 
 from biodance.body.human import human
+from biodance.dance.account import ZmpPath
+from biodance.dance.expectation import Expectation
+from biodance.dance.stance import stance
 from biodance.motion.kinematics import poses
 from biodance.records import Subject
-from biodance.report.dance_figures import bones, criterion_figure, postures_figure, zmp_figure
+from biodance.report.dance_figures import bones, criterion_figure, expectation_figure, postures_figure, zmp_figure
 
 BODY = human(Subject(65.0, 1.75, "F"))
 
@@ -38,10 +41,24 @@ def test_criterion_stays_over_its_bound_line() -> None:
     assert [float(line.get_ydata()[0]) for line in drawn.axes[0].lines] == [90.0, 34.8]
 
 
-def test_zmp_outlines_are_closed_in_both_panels() -> None:
-    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-    drawn = zmp_figure(0.5 + np.zeros((5, 2)), 0.4 + np.zeros((6, 2)), square, 0.2 + 0.6 * square)
-    for axes in drawn.axes:
+def test_zmp_has_a_column_for_every_stance_with_closed_outlines_and_every_move_in_both_rows() -> None:
+    feet = stance(BODY, "parallel")
+    path = 0.05 * np.random.default_rng(0).normal(size=(9, 2))
+    drawn = zmp_figure([ZmpPath(k, where, path, 0.5 * path) for k, where in enumerate((feet, feet, feet.on(0)))])
+    titles = [axes.get_title() for axes in drawn.axes]
+    assert titles == ["parallel", "single right", "", ""]
+    for axes, moves in zip(drawn.axes, (2, 1, 2, 1), strict=True):
+        assert len(axes.lines) == 2 + moves
         outline = axes.lines[0].get_xydata()
         np.testing.assert_array_equal(outline[0], outline[-1])
-        assert len(outline) == 5
+    np.testing.assert_array_equal(drawn.axes[1].lines[-1].get_xydata(), 0.5 * path)
+    np.testing.assert_array_equal(drawn.axes[3].lines[-1].get_xydata(), path)
+
+
+def test_expected_accuracy_starts_at_the_table_and_pairs_share_a_line() -> None:
+    duration = np.array([0.0, 60.0])
+    values = np.tile([[1.0], [0.5]], (1, 12))
+    drawn = expectation_figure(Expectation(BODY.segments, duration, values, values, values, 1 - values))
+    for axes in drawn.axes:
+        assert len(axes.lines) == 7
+        assert all(line.get_ydata()[0] == 100.0 and line.get_ydata()[-1] == 50.0 for line in axes.lines)
