@@ -38,11 +38,12 @@ def page(scores: list[Score], *, run: str, figure: str) -> list[str]:
     head = [
         "# Diagnosis of hidden effects",
         "",
-        f"Protocol diagnosis (eight trials of ten seconds), {len(scores)} sessions of virtual subjects, each written as C3D files, read, prepared, "
-        f"scaled, tracked and diagnosed through the public pipeline. Version {run}. Made by `benchmarks/bench_diagnosis.py`.",
-        f"Time of the diagnosis alone: median {np.median(seconds):.1f} s, largest {np.max(seconds):.1f} s of one processor (on a busy machine).",
-        "What is hidden is made by `biodance/virtual_lab`, which cannot import the effects: raw samples, corners and labels for instruments, a "
-        "richer body (16 segments, soft tissue) for the person. The limit of a cause is what the diagnosis computes for that very session.",
+        f"Protocol diagnosis (eight trials of ten seconds), {len(scores)} sessions of virtual subjects, each written as C3D files, read, "
+        f"prepared, scaled, tracked and diagnosed through the public pipeline. Version {run}. Made by `benchmarks/bench_diagnosis.py`.",
+        f"Diagnosis alone: median {np.median(seconds):.1f} s, largest {np.max(seconds):.1f} s of one processor (on a busy machine).",
+        "What is hidden is made by `biodance/virtual_lab`, which cannot import the effects: raw samples, corners and labels for "
+        "instruments, a richer body (16 segments, soft tissue) for the person. The limit of a cause is what the diagnosis computes for "
+        "that very session.",
     ]
     return [*head, *(line for title, lines in sections.items() if lines for line in ("", f"## {title}", *lines))]
 
@@ -82,11 +83,8 @@ def demands(groups: dict[str, list[Score]], singles: list[Score]) -> list[str]:
 
 def cause_lines(singles: list[Score]) -> list[str]:
     """Return one line per cause: what was said below, about and above the limit."""
-    out = [
-        "| hidden | size / limit: named exactly (in the set) of sessions, per range |  |  |",
-        "|---|---|---|---|",
-        "| | < 1 | 1 to 2 | >= 2 |",
-    ]
+    out = ["Named exactly (truth in the set) of so many sessions, by size over limit:", ""]
+    out += ["| hidden | < 1 | 1 to 2 | >= 2 |", "|---|---|---|---|"]
     for name in dict.fromkeys(Cause(one.hidden[0], 0.0).name for one in singles):
         own = [one for one in singles if Cause(one.hidden[0], 0.0).name == name]
         cells = []
@@ -143,10 +141,7 @@ def absent_lines(absent: list[Score]) -> list[str]:
 
 def pair_lines(pairs: list[Score]) -> list[str]:
     """Return what was named for pairs."""
-    return [
-        f"- {' with '.join(one.hidden)}: {_said(one) if one.verdict != 'unexplained' else 'unexplained'}, {sum(one.exact)} of 2"
-        for one in pairs
-    ]
+    return [f"- {' with '.join(one.hidden)}: {_said(one)}, {sum(one.exact)} of 2" for one in pairs]
 
 
 def check_lines(discrete: list[Score]) -> list[str]:
@@ -178,12 +173,11 @@ def null_lines(nulls: list[Score]) -> list[str]:
         return []
     people = len({one.subject for one in nulls})
     alarms = [f"- {one.key}: {_said(one)}, worst {one.worst[0]} z = {one.worst[1]:.1f}" for one in nulls if not one.silent]
-    worst = [one.worst[1] for one in nulls]
-    return [
-        f"{len(nulls)} sessions of {people} persons; largest z of what is left: median {np.median(worst):.1f}, largest {np.max(worst):.1f}.",
-        "",
-        *alarms,
-    ]
+    worst = np.array([one.worst[1] for one in nulls])
+    what = (
+        f"{len(nulls)} sessions of {people} persons; z of what is left: median {np.median(worst):.1f}, largest {worst.max():.1f}."
+    )
+    return [what, "", *alarms]
 
 
 def draw(scores: list[Score], path: Path) -> None:
