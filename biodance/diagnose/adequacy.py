@@ -1,8 +1,11 @@
 """Is what is left like what sessions without fault leave? The test that may say "unexplained", apart from the search for names."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.fft import idct
+from scipy.ndimage import uniform_filter1d
 
 from biodance.diagnose.diagnosis import Adequacy, Verdict
 from biodance.diagnose.model import Model
@@ -36,7 +39,27 @@ def adequacy(found: Model) -> tuple[Adequacy, ...]:
         total = np.array([[square[here & (spectrum.trial == t), c].sum() for c in range(6)] for t in range(len(names))])
         for c in range(6):
             rows.append(Adequacy(CHANNELS[c], (EDGES[b], EDGES[b + 1]), float(z[b, c]), names[int(np.argmax(total[:, c]))]))
-    return tuple(sorted(rows, key=lambda row: -row.z))
+    worst, *others = sorted(rows, key=lambda row: -row.z)
+    return (replace(worst, second=_when(found, worst)), *others)
+
+
+def _when(found: Model, row: Adequacy) -> float:
+    """Return the second of the trial's recording around which what is left in ``row`` is largest."""
+    spectrum = found.problem.spectrum
+    index = [case.trial.name for case in found.problem.cases].index(row.trial)
+    left = found.belief.left[: 6 * spectrum.band.size].reshape(-1, 6)[spectrum.trial == index, CHANNELS.index(row.channel)]
+    layout, time = spectrum.layout.at(spectrum.rates[index]), found.problem.cases[index].motion.time
+    best, second, start = -1.0, float("nan"), 0
+    for pick in spectrum.picks[index]:
+        band = layout.bands_of(pick.size)
+        full = np.zeros(pick.size)
+        full[band >= 0] = left[start : start + int(np.sum(band >= 0))]
+        start += int(np.sum(band >= 0))
+        full[band != EDGES.index(row.band_hz[0])] = 0.0
+        power = uniform_filter1d(idct(full, norm="ortho") ** 2, max(1, round(layout.rate)))
+        if power.max() > best:
+            best, second = float(power.max()), float(time[pick[int(np.argmax(power))]])
+    return second
 
 
 def verdict(named: int, worst: float, gates: "tuple[Gate, ...]") -> Verdict:

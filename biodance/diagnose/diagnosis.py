@@ -96,13 +96,14 @@ class Finding:
 @dataclass(frozen=True)
 class Adequacy:
     """How far the residual that is left in one ``channel`` and band (Hz) is from what sessions without fault show, in their standard
-    deviations; ``trial`` where it is largest.
+    deviations; ``trial`` where it is largest, and the ``second`` s of its recording around which (NaN: not looked for).
     """
 
     channel: str
     band_hz: tuple[float, float]
     z: float
     trial: str = ""
+    second: float = float("nan")
 
 
 @dataclass(frozen=True)

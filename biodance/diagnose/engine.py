@@ -82,5 +82,4 @@ def _finding(one: Named, found: Round) -> Finding:
     """Return a named cause as a finding."""
     sd = np.sqrt(np.diag(one.covariance))
     parameters = tuple(Estimate(*row) for row in one.effect.reported(one.theta, sd))
-    advice = " ".join(text for text in (one.effect.advice, one.effect.separated_by if len(found.set) > 1 else "") if text)
-    return Finding(one.effect.name, one.effect.target, parameters, found.set, found.suspects[0].visible, advice=advice)
+    return Finding(one.effect.name, one.effect.target, parameters, found.set, found.suspects[0].visible, advice=one.effect.advice)

@@ -69,7 +69,7 @@ class Evidence:
 
 def evidence(s: Array, G: Array, length: float) -> Evidence:
     """Return the evidence from the score ``s`` (k,), its information ``G`` (k, k) and the squared length of the whitened columns."""
-    inner = np.linalg.inv(np.eye(len(s)) + G)
+    inner: Array = np.asarray(np.linalg.inv(np.eye(len(s)) + G), dtype=float)
     mean = inner @ s
     value = -0.5 * float(np.linalg.slogdet(np.eye(len(s)) + G)[1]) + 0.5 * float(s @ mean)
     return Evidence(value, mean, inner, float(np.sqrt(np.clip(np.trace(G) / length, 0.0, 1.0))) if length > 0 else 0.0)

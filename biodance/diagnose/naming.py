@@ -154,7 +154,7 @@ def settle(found: Model, named: tuple[Named, ...]) -> Model:
         Z = taken(current)
         s, G = current.belief.score(Z)
         u = np.concatenate([one.theta / (SCALE * one.effect.typical) for one in named])
-        inner = np.linalg.inv(np.eye(len(s)) + G)
+        inner: Array = np.asarray(np.linalg.inv(np.eye(len(s)) + G), dtype=float)
         step = inner @ (s - u)
         named = _moved(named, u + step, inner)
         current = current.less(named)

@@ -48,7 +48,7 @@ class Visibility:
     @cached_property
     def _inner(self) -> tuple[Array, ...]:
         """Posterior covariance of every cause's coefficients."""
-        return tuple(np.linalg.inv(np.eye(c.stop - c.start) + self.G[c, c]) for c in self.cuts)
+        return tuple(np.asarray(np.linalg.inv(np.eye(c.stop - c.start) + self.G[c, c]), dtype=float) for c in self.cuts)
 
     @cached_property
     def _fixed(self) -> Array:

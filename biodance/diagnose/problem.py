@@ -122,16 +122,17 @@ def _part(motion: Motion, pick: NDArray[np.intp]) -> Motion:
 
 def _kinematic_rows(where: Spectrum, errors: list[list[Errors]]) -> tuple[Array, Array]:
     """Return the rows (6 m, K) of the errors' wrenches and (3M, K) of the mean marker residuals, measured minus model."""
-    wrench, markers, frames = [], 0.0, 0
+    wrench, frames = [], 0
+    markers = np.zeros_like(next(one for some in errors for one in some).markers)
     for index, some in enumerate(errors):
         layout = where.layout.at(where.rates[index])
         for pick, one in zip(where.picks[index], some, strict=True):
             kept = layout.bands_of(pick.size) >= 0
             wrench.append(layout.coefficients(layout.shift @ one.wrench)[kept])
-            markers = markers - pick.size * one.markers
+            markers -= pick.size * one.markers
             frames += pick.size
     rows = np.concatenate(wrench)
-    return rows.reshape(-1, rows.shape[2]), np.asarray(markers / frames).reshape(-1, rows.shape[2])
+    return rows.reshape(-1, rows.shape[2]), (markers / frames).reshape(-1, rows.shape[2])
 
 
 def _shares(where: Spectrum, count: int) -> Array:

@@ -71,7 +71,7 @@ def diagnosis_document(found: SessionDiagnosis) -> dict[str, Any]:
         "gates": [
             {"check": g.check, "ok": g.ok, "text": g.text, "effect": g.effect, "target": g.target, "size": g.size} for g in one.gates
         ],
-        "adequacy": [{"channel": a.channel, "band_hz": a.band_hz, "z": a.z, "trial": a.trial} for a in one.adequacy],
+        "adequacy": [{"channel": a.channel, "band_hz": a.band_hz, "z": a.z, "trial": a.trial, "around_s": a.second} for a in one.adequacy],
         "unobservable": [_limit(row) for row in one.unobservable],
         "limits": [_limit(row) for row in one.limits],
         "candidates": [_alias(a) for a in one.candidates],

@@ -8,7 +8,7 @@ from biodance.pipeline.provenance import Provenance
 from biodance.pipeline.results import SessionResult
 from biodance.records import CHANNELS
 from biodance.report.diagnosis_figures import adequacy_figure, left_figure, limits_figure
-from biodance.report.effect_words import estimated, named, sized, words_of
+from biodance.report.effect_words import estimated, first_upper, named, sized, words_of
 from biodance.report.style import svg_address
 from biodance.report.wording import number
 
@@ -20,7 +20,11 @@ def answer(one: Diagnosis) -> str:
     """Return the verdict as one or two plain sentences."""
     what = " and ".join(named(finding.effect, finding.target) for finding in one.findings)
     worst = one.adequacy[0] if one.adequacy else None
-    where = f"{worst.channel}, movement of {worst.band_hz[0]:g} to {worst.band_hz[1]:g} Hz, most in trial {worst.trial}" if worst else ""
+    where = (
+        f"{worst.channel}, movement of {worst.band_hz[0]:g} to {worst.band_hz[1]:g} Hz, most in trial {worst.trial} around {worst.second:.1f} s"
+        if worst
+        else ""
+    )
     return {
         "nothing wrong": "Nothing wrong was found: what the simulation misses is what it misses in any session without a fault. "
         "Faults below the sizes at the end of this page would not have been seen.",
@@ -47,7 +51,7 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
 
     one = found.diagnosis
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters.update(number=number, sized=sized, estimated=estimated, odds=odds)
+    environment.filters.update(number=number, sized=sized, estimated=estimated, odds=odds, first_upper=first_upper)
     environment.globals.update(named=named, words_of=words_of)
     folder = files("biodance.report") / "templates"
     masses = []

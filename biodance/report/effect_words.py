@@ -13,11 +13,12 @@ SHOWN = {"m": (1000.0, "mm", 0), "rad": (57.29578, "°", 1), "s": (1000.0, "ms",
 
 @dataclass(frozen=True)
 class Words:
-    """What a cause is, its signature and its look-alikes, each a few sentences."""
+    """What a cause is, its signature, its look-alikes and what separates them, each a few sentences."""
 
     what: str
     signature: str
     alike: str
+    separated: str
 
 
 def words_of(effect: str) -> Words:
@@ -26,8 +27,13 @@ def words_of(effect: str) -> Words:
     text = " ".join(((sys.modules[kind.__module__].__doc__ if kind else "") or "").split())
     what, _, rest = text.partition("Signature:")
     signature, _, rest = rest.partition("Look-alikes:")
-    alike, _, _ = rest.partition("Separated by")
-    return Words(what.strip(), signature.strip(), alike.strip())
+    alike, _, separated = rest.partition("Separated by")
+    return Words(what.strip(), first_upper(signature.strip()), first_upper(alike.strip()), first_upper(separated.strip()))
+
+
+def first_upper(text: str) -> str:
+    """Return ``text`` with a capital first letter and nothing else changed."""
+    return text[:1].upper() + text[1:]
 
 
 def named(effect: str, target: str) -> str:
