@@ -87,7 +87,8 @@ def test_a_seated_person_keeps_the_pelvis_still_and_the_knees_up():
     np.testing.assert_allclose(found.x[:6], [0, 0, stool.seat, 0, 0, 0], atol=1e-12)
 
 
-def test_a_person_too_weak_to_stand_is_refused_by_the_name_of_the_limit():
+def test_a_person_too_weak_to_stand_is_refused_by_the_name_of_the_limit(monkeypatch):
+    monkeypatch.setattr(postures, "ATTEMPTS", 2)
     limits = BODY.limits
     weak = replace(BODY, limits=replace(limits, torque_lower=0.02 * limits.torque_lower, torque_upper=0.02 * limits.torque_upper))
     with ThreadPoolExecutor(1) as workers, pytest.raises(BiodanceError, match="joint torque"):

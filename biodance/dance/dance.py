@@ -80,8 +80,8 @@ class Dance:
 
     @property
     def counted(self) -> NDArray[np.bool_]:
-        """(P,) False for the postures in between."""
-        return np.array([stance.over is None for stance in self.stances])
+        """(P,) False for the postures in between: where the weight is over one foot of two, and stops that are not held as long."""
+        return np.array([stance.over is None for stance in self.stances]) & (self.hold == self.hold.max())
 
     @cached_property
     def phases(self) -> tuple[Phase, ...]:

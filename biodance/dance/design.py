@@ -7,7 +7,6 @@ all others do not wait for them. The result depends on body, plan and seed only,
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -24,14 +23,13 @@ from biodance.dance.postures import find_postures
 from biodance.dance.selection import choose
 from biodance.dance.sequence import sequence, under
 from biodance.dance.stance import Stance
-from biodance.dance.transitions import Move, Task, find_move
+from biodance.dance.transitions import Task
 from biodance.dance.verify import broken, verify
+from biodance.dance.ways import Way, find_way
 from biodance.errors import BiodanceError
 from biodance.records import Array
 
 WORKERS = 2
-SLOWER = (1.0, 1.25, 1.5, 2.0, 3.0)
-"""Factors on the duration of a move that is not feasible, one after the other."""
 SHORT = 1.0
 """s that postures in between are held."""
 Tell = Callable[[str, int, int], None]
@@ -71,11 +69,7 @@ def design(
     parts = replace(parts, weight=parts.weight * plan.emphasis(body.segments))
     work = _Work(chain, parts, plan, seed, Ledger(resume, body, plan, seed), workers, tell or (lambda what, done, of: None))
     x, stances = _postures(work)
-    moves = _moves(work, x, stances)
-    hold = np.array([plan.hold if stance.over is None else min(SHORT, plan.hold) for stance in stances])
-    via, duration = np.array([move.via for move in moves]).reshape(-1, 2, chain.size), np.array([move.duration for move in moves])
-    feet = tuple(under(a, b) for a, b in pairwise(stances))
-    dance = Dance(plan.name, body, x, tuple(stances), hold, via, duration, feet, seed)
+    dance = _joined(work, x, stances, _ways(work, x, stances))
     wrong = broken(verify(body, dance, plan))
     if wrong:
         told = "; ".join(f"{m.limit.replace('_', ' ')} by {-m.worst:.3g} {m.unit} at {m.where_s:.2f} s {m.what}" for m in wrong)
@@ -112,60 +106,64 @@ def _postures(work: _Work) -> tuple[Array, list[Stance]]:
     return rows, stances
 
 
-def _moves(work: _Work, x: Array, stances: list[Stance]) -> list[Move]:
-    """Return the moves between all postures, found in chains of those that excite the same segments."""
+def _ways(work: _Work, x: Array, stances: list[Stance]) -> list[Way]:
+    """Return the ways between all postures, found in chains of those that excite the same segments."""
     chain, count = work.chain, len(x) - 1
     tasks = [Task(chain, work.blocks, under(stances[k], stances[k + 1]), x[k : k + 2], work.plan.move) for k in range(count)]
-    chains: dict[tuple[int, ...], list[int]] = {}
+    queue: dict[tuple[int, ...], list[int]] = {}
     for k, task in enumerate(tasks):
-        chains.setdefault(task.stance.planted, []).append(k)
-    found: dict[int, Move] = {}
-    history = {key: np.zeros((len(chain.body.segments), 6, 6)) for key in chains}
-    running: dict[Future[Move], tuple[tuple[int, ...], int]] = {}
-    queue = {key: list(members) for key, members in chains.items()}
+        queue.setdefault(task.stance.planted, []).append(k)
+    history = {feet: np.zeros((len(chain.body.segments), 6, 6)) for feet in queue}
+    found: dict[int, Way] = {}
+    running: dict[Future[Way], int] = {}
 
-    def advance(key: tuple[int, ...]) -> None:
-        while queue[key]:
-            k = queue[key].pop(0)
+    def advance(feet: tuple[int, ...]) -> None:
+        """Take up what is kept of this chain, then submit the next of its moves."""
+        while queue[feet]:
+            k = queue[feet][0]
             kept = work.ledger.get(f"move_{k:03d}")
             if kept is None:
-                running[work.workers.submit(feasible_move, tasks[k], history[key], [work.seed, 3, k])] = (key, k)
+                running[work.workers.submit(find_way, tasks[k], history[feet], [work.seed, 3, k])] = k
                 return
-            before, after = map(float, kept["zmp"])
-            accept(key, k, Move(kept["via"], float(kept["duration"]), kept["gram"], before, after, 0.0, ""))
+            accept(k, Way(kept["via"], kept["duration"], kept["stops"], kept["gram"]))
 
-    def accept(key: tuple[int, ...], k: int, move: Move) -> None:
-        found[k] = move
-        history[key] = history[key] + move.gram
+    def accept(k: int, way: Way) -> None:
+        feet = tasks[k].stance.planted
+        queue[feet].remove(k)
+        found[k], history[feet] = way, history[feet] + way.gram
         work.tell("moves", len(found), count)
 
-    for key in chains:
-        advance(key)
+    for feet in queue:
+        advance(feet)
     while running:
         for future in wait(running, return_when=FIRST_COMPLETED).done:
-            key, k = running.pop(future)
-            move = future.result()
-            if move.violation > 0:
-                raise BiodanceError(_impossible(stances, k, move))
-            zmp = np.array([move.zmp_before, move.zmp_after])
-            work.ledger.put(f"move_{k:03d}", via=move.via, duration=move.duration, gram=move.gram, zmp=zmp)
-            accept(key, k, move)
-            advance(key)
+            k = running.pop(future)
+            way = future.result()
+            if way.limit:
+                raise BiodanceError(_impossible(stances, k, way))
+            work.ledger.put(f"move_{k:03d}", via=way.via, duration=way.duration, stops=way.stops, gram=way.gram)
+            accept(k, way)
+            advance(tasks[k].stance.planted)
     return [found[k] for k in range(count)]
 
 
-def _impossible(stances: list[Stance], k: int, move: Move) -> str:
+def _joined(work: _Work, x: Array, stances: list[Stance], ways: list[Way]) -> Dance:
+    """Return the dance of postures x (P, n) and the ways between them, stops on the way included, which are not held."""
+    plan = work.plan
+    rows, feet, hold, under_ = [x[0]], [stances[0]], [plan.hold], list[Stance]()
+    for k, way in enumerate(ways):
+        ground = under(stances[k], stances[k + 1])
+        under_ += [ground] * len(way.via)
+        rows += [*way.stops, x[k + 1]]
+        feet += [*[ground] * len(way.stops), stances[k + 1]]
+        hold += [*[0.0] * len(way.stops), plan.hold if stances[k + 1].over is None else min(SHORT, plan.hold)]
+    via, duration = (np.concatenate([getattr(way, name) for way in ways]) for name in ("via", "duration"))
+    return Dance(plan.name, work.chain.body, np.array(rows), tuple(feet), np.array(hold), via, duration, tuple(under_), work.seed)
+
+
+def _impossible(stances: list[Stance], k: int, way: Way) -> str:
     return (
         f"The move from posture {k + 1} to {k + 2} of {len(stances)} ({stances[k].name} to {stances[k + 1].name}) cannot be made: "
-        f"{move.limit.replace('_', ' ')} is exceeded by {move.violation:.2f} of its scale even in {move.duration:.1f} s. "
+        f"{way.limit.replace('_', ' ')} is exceeded even slowly and by way of a posture in between. "
         "Try another seed, fewer postures on these feet, or a wider limit."
     )
-
-
-def feasible_move(task: Task, history: Array, seed: list[int]) -> Move:
-    """Return a move that keeps all limits, slower where it must be; if there is none, the last that was tried."""
-    for factor in SLOWER:
-        move = find_move(replace(task, duration=task.duration * factor), history, rng=np.random.default_rng(seed))
-        if move.violation == 0:
-            break
-    return move

@@ -25,8 +25,8 @@ from biodance.records import Array
 STATIC = ("balance", "foot_placement", "ground_clearance", "joint_range", "joint_torque", "seat", "self_collision")
 RESERVE = 0.06
 """Share of every limit's scale that is kept in reserve, for the moves that begin and end here."""
-EDGE = 0.2
-"""The same for balance: whoever leaves the edge of the support first pushes the zero-moment point towards it."""
+WIDER = {"balance": 0.2, "foot_placement": 0.4}
+"""Larger reserves: whoever leaves the edge of the support first pushes the zero-moment point towards it; nearly straight legs are singular."""
 KEPT = 0.01
 """Violation, in scales of the limits, of the reserved margins that is accepted."""
 RUNS = 2
@@ -254,8 +254,8 @@ def solve(chain: Chain, stance: Stance, begin: Array, objective: Objective, *, i
     base[0, 0, free] = 0.0
     basis[0] = 1.0
     kept = tuple(limit for limit in limits() if limit.NAME in names)
-    wide = stance.over is None
-    reserve = np.array([[EDGE if limit.NAME == "balance" and wide else RESERVE for limit in kept]])
+    wider = WIDER if stance.over is None else {**WIDER, "balance": RESERVE}  # with the weight over one foot there is no more room
+    reserve = np.array([[wider.get(limit.NAME, RESERVE) for limit in kept]])
     programme = Programme(chain, stance, base, basis, free, kept, objective, reserve)
     found = minimise(programme.judge, begin[free], iterations=iterations)
     state = programme.state(found.y)

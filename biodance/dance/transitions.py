@@ -27,6 +27,10 @@ CHECK = 50.0
 """Hz at which a move is judged before it is taken."""
 RESERVE = 0.04
 """Share of every limit's scale that is kept in reserve for the instants in between; for a foot's clearance none at the ends."""
+LEGS = 0.3
+"""The same for the reach of planted legs, which are singular when straight, if it is more."""
+BETWEEN = 0.004
+"""The same where a move is judged, for what is between those instants."""
 THIRDS = np.array([0.20987654, 0.79012346])
 """Of the way at one and two thirds of the time, for least jerk (10 s³ - 15 s⁴ + 6 s⁵)."""
 ATTEMPTS = ((0.2, 1.0), (0.1, 1.0), (0.0, 0.0))
@@ -72,8 +76,10 @@ class Task:
         parts = np.stack([basis.position, basis.velocity, basis.acceleration])
         s = time / self.duration
         way = s**3 * (10 - 15 * s + 6 * s**2)
-        lifting = np.array([limit.NAME == "ground_clearance" for limit in kept])
-        share = reserve * np.where(lifting, (4 * way * (1 - way))[:, None], 1.0)
+        lifting, legs = (np.array([limit.NAME == name for limit in kept]) for name in ("ground_clearance", "foot_placement"))
+        share = np.where(
+            lifting, reserve * (4 * way * (1 - way))[:, None], np.where(legs & (reserve > BETWEEN), max(LEGS, reserve), reserve)
+        )
         return Programme(self.chain, self.stance, parts @ points, parts[:, :, 1:3], free, kept, objective, share)
 
     def grid(self, rate: float) -> Array:
@@ -173,7 +179,7 @@ def _improved(task: Task, via: Array, time: Array, objective: Objective, iterati
 def judged(task: Task, via: Array) -> tuple[Move, Array]:
     """Return the move through ``via`` as it is, judged by all limits on the fine grid, and the worst instants s where one is broken."""
     time = task.grid(CHECK)
-    programme = task.programme(via, [], time, reserve=0.0, objective=_nothing)
+    programme = task.programme(via, [], time, reserve=BETWEEN, objective=_nothing)
     found = Judged(programme, programme.state(np.empty(0)))
     worst, limit = found.worst
     left = np.pad(found.least, 1, constant_values=np.inf)

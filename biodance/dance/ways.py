@@ -1,0 +1,66 @@
+"""From one posture to the next, by all means: at once, slower, or by way of a comfortable posture in between."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from biodance.dance.between import middle_posture
+from biodance.dance.transitions import Move, Task, find_move
+from biodance.errors import BiodanceError
+from biodance.records import Array
+
+SLOWER = (1.0, 1.25, 1.5)
+"""Factors on the duration of a move, one after the other."""
+DETOURS = 4
+"""Postures in between that are tried."""
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """One or two moves: ``via`` (M, 2, n) points, ``duration`` (M,) s, ``stops`` (M - 1, n) the posture in between;
+    ``gram`` (N, 6, 6) information on the inertias; ``limit`` that is broken all the same, "" if none.
+    """
+
+    via: Array
+    duration: Array
+    stops: Array
+    gram: Array
+    limit: str = ""
+
+
+def find_way(task: Task, history: Array, seed: list[int]) -> Way:
+    """Return a way that keeps all limits; if there is none, the direct one that was tried last, with the limit it breaks."""
+    for factor in SLOWER:
+        move = find_move(replace(task, duration=task.duration * factor), history, rng=np.random.default_rng(seed))
+        if move.violation == 0:
+            return _way([move], task.ends[:0])
+    for attempt in range(DETOURS):
+        try:
+            stop = middle_posture(task.chain, task.stance, task.ends, seed=[*seed, attempt]).x
+        except BiodanceError:
+            continue
+        parts = _through(task, history, stop, [*seed, attempt])
+        if parts:
+            return _way(parts, stop[None])
+    return replace(_way([move], task.ends[:0]), limit=move.limit)
+
+
+def _through(task: Task, history: Array, stop: Array, seed: list[int]) -> list[Move]:
+    """Return the two moves by way of ``stop`` (n,), none if one of them is not possible."""
+    parts: list[Move] = []
+    for ends in ((task.ends[0], stop), (stop, task.ends[1])):
+        tried = (
+            find_move(replace(task, ends=np.array(ends), duration=task.duration * factor), history, rng=np.random.default_rng(seed))
+            for factor in SLOWER
+        )
+        move = next((move for move in tried if move.violation == 0), None)
+        if move is None:
+            return []
+        parts.append(move)
+        history = history + move.gram
+    return parts
+
+
+def _way(moves: list[Move], stops: Array) -> Way:
+    gram = np.sum([move.gram for move in moves], axis=0)
+    return Way(np.array([move.via for move in moves]), np.array([move.duration for move in moves]), stops, gram)
