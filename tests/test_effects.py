@@ -72,6 +72,9 @@ def test_every_effect_says_what_it_is(name: str) -> None:
     assert kind.name == name
     assert issubclass(kind, Effect)
     assert kind.parameters
+    for words in (kind.separated_by, kind.advice):
+        assert words.endswith(".")
+        assert len(words) > 20
     for parameter in kind.parameters:
         assert parameter.unit
         assert parameter.typical > 0

@@ -26,6 +26,8 @@ class AddedMass(Effect):
         Parameter("mass", "kg", 1.0, "0.5-8 kg loads; 2.4 kg on the arm in Bonnet 2016"),
         *(Parameter(f"place_{axis}", "m", 0.05, "half the width of a limb (segment boxes)") for axis in "xyz"),
     )
+    separated_by = "Move the loaded segment alone, the rest standing still; repeat the session without the load."
+    advice = "Weigh the load; or record a reference session without it and compare."
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:

@@ -15,6 +15,8 @@ class BodyMass(Effect):
 
     name = "body_mass"
     parameters = (Parameter("error", "kg", 1.5, "1-4 % of body mass for clothes and shoes"),)
+    separated_by = "Weigh the person on the plate and on a scale, as dressed for the recording."
+    advice = "Enter the mass of the day, with clothes and shoes."
 
     def columns(self, case: Case) -> Array:
         """Return the predicted wrench per kilogram of body mass."""

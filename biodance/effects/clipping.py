@@ -16,6 +16,8 @@ CLEARLY = 3.0
 """How many times longer than anywhere else the flat top must be: coarse converters repeat values everywhere."""
 SAME = 2e-5
 """Share of the channel's range within which two samples are the same number."""
+LEVELS = 64
+"""Different values that a channel must have taken: a movement of a few steps of the converter has flat tops anyway."""
 AT_ZERO = 0.05
 """Share of the largest value under which a flat part is an unloaded plate."""
 
@@ -61,15 +63,17 @@ def flat_level(values: Array, rate: float) -> float | None:
     """Return the level (unit of ``values`` (S,)) at which a channel is flat; None where it is not."""
     values = values[np.isfinite(values)]
     span = float(np.ptp(values)) if values.size > 2 else 0.0
-    if not span > 0:
+    if not span > 0 or np.unique(np.round(values / (SAME * span))).size < LEVELS:
         return None
     same = np.abs(np.diff(values)) <= SAME * span
     starts = np.flatnonzero(same & ~np.append(False, same[:-1]))
     stops = np.flatnonzero(same & ~np.append(same[1:], False)) + 1
     lengths, levels = stops - starts, values[starts]
-    for extreme in (values.max(), values.min()):
+    highest, lowest = values.max(), values.min()
+    between = (levels < highest - 2 * SAME * span) & (levels > lowest + 2 * SAME * span)
+    elsewhere = lengths[between].max(initial=1)
+    for extreme in (highest, lowest):
         at = np.abs(levels - extreme) <= 2 * SAME * span
-        elsewhere = lengths[~at].max(initial=1)
         long = lengths[at].max(initial=0)
         if long > LONGEST * rate and long > CLEARLY * elsewhere and abs(extreme) > AT_ZERO * np.abs(values).max():
             return float(extreme)

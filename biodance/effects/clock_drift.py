@@ -17,6 +17,8 @@ class ClockDrift(Effect):
 
     name = "clock_drift"
     parameters = (Parameter("stretch", "s", 0.01, "1-2.5 % rate errors of older video systems (ISBS 1723); a few ms in synchronised labs"),)
+    separated_by = "The first trial repeated at the end of a long session."
+    advice = "Run cameras and forces from one clock; drop a marker on the plate before and after."
 
     def transform(self, case: Case, theta: Array) -> Case:
         """Return the case whose forces are late by stretch times (session time - 1/2)."""

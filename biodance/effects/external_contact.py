@@ -17,6 +17,8 @@ class ExternalContact(Effect):
 
     name = "external_contact"
     parameters = tuple(Parameter(f"force_{axis}", "N", 10.0, "light touch of 1 N to tens of newtons (IJmker 2015)") for axis in "xyz")
+    separated_by = "The video: what is touched, and when."
+    advice = "Repeat the trial without touching anything; or measure the rail with a plate of its own."
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:

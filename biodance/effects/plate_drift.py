@@ -19,6 +19,8 @@ class PlateDrift(Effect):
     parameters = (
         Parameter("drift", "N or N·m", 3.0, "a few newtons per session (laboratory experience; acceptance limit 1 N of one lab)"),
     )
+    separated_by = "The first trial repeated at the end, and the empty plate before and after."
+    advice = "Let the plate warm up, zero it before each trial."
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:

@@ -17,6 +17,8 @@ class PlateGain(Effect):
 
     name = "plate_gain"
     parameters = (Parameter("gain", "1", 0.02, "3-5 N under dead loads of some hundred newtons (Cappello 2011, PMID 21392999)"),)
+    separated_by = "Squats against standing: the channel's own size must change."
+    advice = "Check the channel with dead weights; correct sensitivity or calibration matrix."
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:

@@ -17,6 +17,8 @@ class PlateOffset(Effect):
 
     name = "plate_offset"
     parameters = (Parameter("offset", "N or N·m", 5.0, "re-zeroing rule of +-5 N in laboratory guides (Codamotion)"),)
+    separated_by = "Postures of different weight on the plate: squats, one leg, sitting down beside it."
+    advice = "Record the empty plate before and after, and re-zero it."
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:

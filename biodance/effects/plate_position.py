@@ -17,6 +17,8 @@ class PlatePosition(Effect):
 
     name = "plate_position"
     parameters = (Parameter("shift", "m", 0.010, "centre-of-pressure errors up to 30 mm (PMID 11091955); 1-2 mm wand errors"),)
+    separated_by = "Standing at several places, squats and a pole pressed onto marked points."
+    advice = "Measure the plate's corners with markers and enter them again (FORCE_PLATFORM:CORNERS)."
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:

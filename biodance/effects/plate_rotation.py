@@ -20,6 +20,8 @@ class PlateRotation(Effect):
 
     name = "plate_rotation"
     parameters = (Parameter("angle", "rad", 0.02, "about 0.2 deg in a CalTester example report; 1 deg and more when corners are typed"),)
+    separated_by = "Lunges and arm swings in two directions; a pole pressed at a slant."
+    advice = "Measure the plate's corners with markers and enter them again."
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:

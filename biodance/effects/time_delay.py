@@ -23,6 +23,8 @@ class TimeDelay(Effect):
 
     name = "time_delay"
     parameters = (Parameter("delay", "s", 0.005, "2.1 to 10 ms measured between systems (van den Bogert 2000; Lemaire & Kuo 2024)"),)
+    separated_by = "Fast alternating movements (arms at 2-3 Hz) in every direction."
+    advice = "Drop a marker on the plate: its stop and the force must come in one frame; correct the trigger."
 
     def transform(self, case: Case, theta: Array) -> Case:
         """Return the case whose forces come ``theta[0]`` seconds late."""

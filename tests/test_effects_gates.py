@@ -1,0 +1,188 @@
+"""Gates: what is wrong or right, found on recordings whose fault is known, and nothing found on those without."""
+
+import importlib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from human_cases import CORNERS, human_case
+
+from biodance.effects import discrete_effects, effect, effects
+from biodance.effects.case import Case, at_origin, at_point
+from biodance.effects.gate import DiscreteEffect, Gate, Recorded, gates
+from biodance.effects.unit_error import FACTORS
+from biodance.errors import UnknownName
+from biodance.motion.track import track
+from biodance.records import Array, Markers, Motion, Plate, Session, Source, Subject, Trial, Wrench
+
+MASS = 70.0
+SECTIONS = ("Signature:", "Look-alikes:", "Separated by")
+
+
+def standing(rng: np.random.Generator, *, seconds: float = 10.0, rate: float = 1000.0) -> Array:
+    """Return a wrench (S, 6) about the lab origin of somebody who sways on the plate, with the noise of an amplifier."""
+    time = np.arange(int(seconds * rate)) / rate
+    sway = 0.02 * np.stack([np.sin(2 * np.pi * 0.3 * time), np.cos(2 * np.pi * 0.4 * time)], axis=1)
+    force = np.stack([5 * np.sin(2 * time), 4 * np.cos(3 * time), MASS * 9.80665 + 40 * np.sin(2 * np.pi * 0.6 * time)], axis=1)
+    point = np.hstack([CORNERS.mean(axis=0)[:2] + sway, np.zeros((time.size, 1))])
+    return np.hstack([force, np.cross(point, force)]) + rng.normal(0, 0.3, (time.size, 6))
+
+
+def recorded(value: Array, *, rate: float = 1000.0, decisions: tuple[str, ...] = (), warnings: tuple[str, ...] = ()) -> Recorded:
+    """Return a session of one trial on one plate."""
+    time = np.arange(len(value)) / rate
+    plate = Plate("plate1", 2, CORNERS, Wrench(time, value), decisions)
+    trial = Trial("stand", "fit", None, (plate,), Source(Path("stand.c3d"), "", "C3D"), warnings=warnings)
+    return Recorded(Session(Subject(MASS, 1.75, "M"), (trial,), Path()))
+
+
+def failed(found: tuple[Gate, ...]) -> list[tuple[str, str]]:
+    return [(gate.effect, gate.target) for gate in found if not gate.ok]
+
+
+def on_plate(case: Case, change: Array) -> Case:
+    """Return the case whose plate's wrench about its centre is multiplied by ``change`` (6,)."""
+    plate = case.trial.plates[0]
+    value = at_origin(at_point(plate.wrench.value, plate.centre) * change, plate.centre)
+    return replace(case, trial=replace(case.trial, plates=(replace(plate, wrench=Wrench(plate.wrench.time, value)),)))
+
+
+def session_of(*cases: Case) -> Recorded:
+    trials = tuple(case.trial for case in cases)
+    return Recorded(Session(Subject(MASS, 1.75, "M"), trials, Path()), cases)
+
+
+@pytest.mark.parametrize("name", sorted(discrete_effects()))
+def test_every_discrete_effect_says_what_it_is(name: str) -> None:
+    kind = discrete_effects()[name]
+    assert kind.name == name
+    assert issubclass(kind, DiscreteEffect)
+    assert kind.separated_by.endswith(".")
+    assert len(kind.advice) > 20
+    text = " ".join((importlib.import_module(f"biodance.effects.{name}").__doc__ or "").split())
+    for section in SECTIONS:
+        assert section in text, f"{name} lacks {section}"
+
+
+def test_nothing_is_found_where_nothing_is_wrong() -> None:
+    value = standing(np.random.default_rng(0))
+    found = gates(recorded(value).session)
+    assert failed(found) == []
+    assert {gate.check for gate in found} == {"range of the channels", "mains hum", "weight on the plates"}
+    moving = human_case(600)
+    found = gates(session_of(moving).session, (moving, moving))
+    assert failed(found) == []
+    assert {gate.check for gate in found} >= {"signs of the channels", "rate of the cameras", "lost frames", "labels of the markers"}
+
+
+@pytest.mark.parametrize("factor", FACTORS)
+def test_a_known_factor_is_named(factor: float) -> None:
+    found = discrete_effects()["unit_error"].look(recorded(factor * standing(np.random.default_rng(1))))
+    assert failed(found) == [("unit_error", "")]
+    assert found[0].size == pytest.approx(factor)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.7, 1.04, 1.2])
+def test_a_foot_beside_the_plate_is_no_unit(share: float) -> None:
+    assert failed(discrete_effects()["unit_error"].look(recorded(share * standing(np.random.default_rng(2))))) == []
+
+
+def test_what_the_reader_overruled_is_told() -> None:
+    said = (
+        "The moments put the load on the plate only when taken 1000 times as large as the file's units say; that was done.",
+        "The load lies 0.31 m from the feet that the markers show, and under them when the corners are counted from another one: "
+        "the plate axes were turned by 90 degrees.",
+    )
+    unit = "POINT:UNITS is 'furlong'; a cloud of markers of 1723 can only be in mm, so lengths are in mm."
+    found = gates(recorded(standing(np.random.default_rng(3)), decisions=said, warnings=(unit,)).session)
+    assert failed(found) == [("axis_error", "plate1:axes"), ("unit_error", "markers"), ("unit_error", "plate1:moments")]
+    assert sorted(gate.size for gate in found if gate.size > 0) == [90, 1000]
+
+
+@pytest.mark.parametrize(("channel", "target"), [(1, "Fy"), (3, "Mx"), (5, "Mz")])
+def test_a_mirrored_channel_is_named(channel: int, target: str) -> None:
+    sign = np.ones(6) - 2 * np.eye(6)[channel]
+    found = discrete_effects()["axis_error"].look(session_of(on_plate(human_case(), sign)))
+    assert failed(found) == [("axis_error", target)]
+
+
+@pytest.mark.parametrize(("channel", "target", "limit"), [(2, "Fz", 710.0), (3, "Mx", 9.0)])
+def test_a_flat_top_is_named_with_its_level(channel: int, target: str, limit: float) -> None:
+    local = at_point(standing(np.random.default_rng(4)), CORNERS.mean(axis=0))
+    local[:, channel] = np.clip(local[:, channel], -limit, limit)
+    found = discrete_effects()["clipping"].look(recorded(at_origin(local, CORNERS.mean(axis=0))))
+    assert failed(found) == [("clipping", target)]
+    assert found[0].size == pytest.approx(limit, rel=1e-3)
+
+
+def test_coarse_converters_and_empty_plates_do_not_clip() -> None:
+    value = standing(np.random.default_rng(5))
+    coarse = np.round(value / 4) * 4
+    stepped_off = np.where((np.arange(len(value)) > 6000)[:, None], 0.0, value)
+    for fine in (coarse, stepped_off):
+        assert failed(discrete_effects()["clipping"].look(recorded(fine))) == []
+
+
+@pytest.mark.parametrize("frequency", [50.0, 60.0])
+def test_hum_is_named_with_its_amplitude(frequency: float) -> None:
+    local = at_point(standing(np.random.default_rng(6)), CORNERS.mean(axis=0))
+    local[:, 0] += 5 * np.sin(2 * np.pi * frequency * np.arange(len(local)) / 1000)
+    value = at_origin(local, CORNERS.mean(axis=0))
+    found = discrete_effects()["mains_hum"].look(recorded(value))
+    assert failed(found) == [("mains_hum", "Fx")]
+    assert found[0].size == pytest.approx(5, rel=0.05)
+    slow = discrete_effects()["mains_hum"].look(recorded(value[::10], rate=100.0))
+    assert slow == (), "100 Hz cannot show it"
+
+
+@pytest.mark.parametrize("ratio", [0.8, 1.2, 2.0])
+def test_a_wrong_rate_is_named(ratio: float) -> None:
+    """Forces of the true motion, read with a motion whose time runs too fast or slowly."""
+    case = human_case(600)
+    motion = Motion(case.motion.time / ratio, case.motion.q, ratio * case.motion.v, ratio**2 * case.motion.a)
+    plate = case.trial.plates[0]
+    plate = replace(plate, wrench=Wrench(motion.time, plate.wrench.value))
+    wrong = replace(case, motion=motion, trial=replace(case.trial, plates=(plate,)))
+    found = discrete_effects()["frame_rate"].look(session_of(wrong, wrong))
+    assert ("frame_rate", "") in failed(found)
+    assert found[0].size == pytest.approx(ratio, rel=0.05)
+
+
+def test_lost_frames_are_named() -> None:
+    case = human_case(600)
+    plate, lost = case.trial.plates[0], 6
+    value = np.array(plate.wrench.value)
+    value[300:] = value[300 - lost : -lost]
+    late = replace(case, trial=replace(case.trial, plates=(replace(plate, wrench=Wrench(plate.wrench.time, value)),)))
+    found = discrete_effects()["frame_rate"].look(session_of(late, late))
+    assert failed(found) == [("frame_rate", "")]
+    assert found[-1].size == pytest.approx(0.01 * lost, rel=0.3)
+
+
+@pytest.mark.parametrize("pair", [("LKNE", "RKNE"), ("LELB", "RELB")])
+def test_swapped_labels_are_named(pair: tuple[str, str]) -> None:
+    case = human_case(120)
+    markers = case.trial.markers
+    assert markers is not None
+    other = {pair[0]: pair[1], pair[1]: pair[0]}
+    swapped = Markers(tuple(other.get(name, name) for name in markers.names), markers.time, markers.xyz)
+    static = replace(case.trial, name="static", role="static", markers=swapped)
+    found = discrete_effects()["labels_swapped"].look(Recorded(Session(Subject(MASS, 1.75, "M"), (static,), Path())))
+    assert failed(found) == [("labels_swapped", "/".join(pair))]
+    trial = replace(case.trial, markers=swapped)
+    wrong = replace(case, trial=trial, motion=track(case.body, trial))
+    found = discrete_effects()["labels_swapped"].look(session_of(wrong))
+    assert failed(found) == [("labels_swapped", "/".join(pair))]
+
+
+def test_the_library_can_lack_an_effect() -> None:
+    names = [name for name in effects() if name != "plate_gain"]
+    assert "plate_gain" not in effects(names)
+    assert list(effects(names)) == names
+    assert list(discrete_effects(("clipping",))) == ["clipping"]
+    assert {gate.effect for gate in gates(recorded(standing(np.random.default_rng(7))).session, chosen=("mains_hum",))} <= {"", "mains_hum"}
+    with pytest.raises(UnknownName, match="plate_gain"):
+        effects(("plate_gian",))
+    with pytest.raises(UnknownName):
+        effect("clipping")

@@ -1,0 +1,98 @@
+"""Joints that the model lacks: a person who has them, read by a model without."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from human_cases import CORNERS, human_case, moving
+
+from biodance.body.body import Body
+from biodance.body.human import human
+from biodance.body.inertia import smallest_eigenvalues
+from biodance.effects import effect
+from biodance.effects.case import Case
+from biodance.effects.head_joint import with_neck
+from biodance.effects.shoulder_girdle import with_clavicles
+from biodance.effects.trunk_joint import with_thorax
+from biodance.motion.kinematics import poses
+from biodance.motion.regressor import predict_wrench
+from biodance.motion.smoothing import smooth
+from biodance.motion.track import track
+from biodance.records import Array, Markers, Plate, Source, Subject, Trial
+
+KINDS = {"head_joint": with_neck, "trunk_joint": with_thorax, "shoulder_girdle": with_clavicles}
+INSIDE = slice(60, -60)
+
+
+def longer(body: Body, extended: Body, q: Array) -> Array:
+    """Return the postures ``q`` of a body as those of the extended one, new joints at zero."""
+    old = [joint.name for joint in body.joints]
+    out = np.zeros((len(q), extended.nq))
+    out[:, :7] = q[:, :7]
+    for i, joint in enumerate(extended.joints):
+        if joint.name in old:
+            out[:, 7 + i] = q[:, 7 + old.index(joint.name)]
+    return out
+
+
+def person(name: str, size: float) -> tuple[Case, Array]:
+    """Return a trial of a person who moves the joint by ``size`` rad rms, tracked without it, and the wrench (T, 6) of that motion."""
+    rng = np.random.default_rng(4)
+    body = human(Subject(70, 1.75, "M", 30))
+    extended = KINDS[name](human_case(120))
+    assert extended is not None
+    time = np.arange(400) / 100
+    q = longer(body, extended, moving(body, 400, rng))
+    new = [i for i, joint in enumerate(extended.joints) if joint.name not in [j.name for j in body.joints]]
+    for k, i in enumerate(new):
+        q[:, 7 + i] = size * np.sqrt(2) * np.sin(2 * np.pi * (0.5 + 0.2 * k) * time + k)
+    markers = Markers(body.markers.names, time, poses(extended, q).points(extended.markers.segment, extended.markers.position))
+    true = predict_wrench(extended, smooth(extended, time, q))
+    trial = Trial("t", "fit", markers, (Plate("plate1", 2, CORNERS, true),), Source(Path(__file__), "", "test"))
+    case = Case(body, trial, track(body, trial), body.sip.phi, np.linspace(0, 1, 400))
+    return case, case.residual
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_body_with_the_joint_is_the_same_body_at_zero(name: str) -> None:
+    case = human_case(120)
+    extended = KINDS[name](case)
+    assert extended is not None
+    motion = smooth(extended, case.motion.time, longer(case.body, extended, case.motion.q))
+    plain = smooth(case.body, case.motion.time, case.motion.q)
+    np.testing.assert_allclose(predict_wrench(extended, motion).value, predict_wrench(case.body, plain).value, atol=1e-8)
+    assert extended.sip.mass.sum() == pytest.approx(case.body.sip.mass.sum())
+    heavy = extended.sip.phi.reshape(-1, 10)[extended.sip.mass > 0]
+    assert (smallest_eigenvalues(heavy.ravel()) > 0).all()
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_markers_show_the_joint_and_the_wrench_follows(name: str) -> None:
+    case, residual = person(name, 0.12)
+    found = effect(name).at("", case)
+    shown = found.shown(case)
+    assert shown is not None
+    assert shown[0] == pytest.approx(0.12, rel=0.1)
+    explained = (found.columns(case) @ shown)[INSIDE]
+    before = np.linalg.norm(residual[INSIDE])
+    assert np.linalg.norm(residual[INSIDE] - explained) < 0.2 * before
+    right = found.corrected(case, shown)
+    assert np.linalg.norm(right.residual[INSIDE]) < 0.1 * before
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_without_its_markers_there_is_no_target(name: str) -> None:
+    case = human_case(120)
+    assert case.trial.markers is not None
+    few = case.trial.markers.select(n for n in case.trial.markers.names if not n.endswith(("HD", "SHO")) and n not in ("C7", "CLAV"))
+    blind = replace(case, trial=replace(case.trial, markers=few))
+    assert effect(name).targets(blind) == ()
+
+
+def test_still_joint_adds_nothing() -> None:
+    case, _ = person("head_joint", 0.0)
+    found = effect("head_joint").at("", case)
+    shown = found.shown(case)
+    assert shown is not None
+    assert shown[0] < 1e-3
