@@ -20,11 +20,10 @@ def answer(one: Diagnosis) -> str:
     """Return the verdict as one or two plain sentences."""
     what = " and ".join(named(finding.effect, finding.target) for finding in one.findings)
     worst = one.adequacy[0] if one.adequacy else None
-    where = (
-        f"{worst.channel}, movement of {worst.band_hz[0]:g} to {worst.band_hz[1]:g} Hz, most in trial {worst.trial} around {worst.second:.1f} s"
-        if worst
-        else ""
-    )
+    where = ""
+    if worst:
+        low, high = worst.band_hz
+        where = f"{worst.channel}, movement of {low:g} to {high:g} Hz, most in trial {worst.trial} around {worst.second:.1f} s"
     return {
         "nothing wrong": "Nothing wrong was found: what the simulation misses is what it misses in any session without a fault. "
         "Faults below the sizes at the end of this page would not have been seen.",
