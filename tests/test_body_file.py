@@ -1,8 +1,11 @@
 """A body survives its file without loss; what is no such file is refused in a sentence."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from biodance.body.body import JointError
 from biodance.body.body_file import body_text, read_body
 from biodance.body.human import human
 from biodance.errors import FileRefused
@@ -13,8 +16,10 @@ WOMAN = human(Subject(58.3, 1.64, "F", 31.0))
 
 def test_a_body_reads_back_exactly(tmp_path) -> None:
     path = tmp_path / "body.json"
-    path.write_text(body_text(WOMAN, "identified from dance"), encoding="utf-8")
+    woman = replace(WOMAN, joint_errors=(JointError("right_elbow", 0.008, 0.12),))
+    path.write_text(body_text(woman, "identified from dance"), encoding="utf-8")
     back, source = read_body(path)
+    assert back.joint_errors == woman.joint_errors
     assert source == "identified from dance"
     assert (back.segments, back.notes, back.root) == (WOMAN.segments, WOMAN.notes, WOMAN.root)
     assert np.array_equal(back.sip.phi, WOMAN.sip.phi)

@@ -81,6 +81,10 @@ def test_hidden_joints_are_found_from_movement() -> None:
         assert error < 0.006, (joint, error)
     for elbow, angle in (("right_elbow", 0.7), ("left_elbow", -0.6)):
         assert found.turned[elbow] == pytest.approx(angle, abs=np.radians(4)), elbow
+    errors = {error.joint: error for error in found.scaling.body()[0].joint_errors}
+    assert set(errors) == set(JOINTS) - set(found.kept)
+    assert errors["right_elbow"].axis == pytest.approx(0.1, abs=0.08)
+    assert errors["right_hip"].axis == 0.0
     assert found.rms[1] < 0.25 * found.rms[0]
     assert any(note.startswith("Joints placed by movement") for note in found.scaling.notes)
 

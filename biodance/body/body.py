@@ -7,7 +7,7 @@ A joint with several degrees of freedom is a chain of one-dof joints whose inter
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -64,6 +64,16 @@ class SegmentMarkers:
             raise BiodanceError(f"SegmentMarkers: {count} names but {len(self.segment)} segment indices.")
 
 
+class JointError(NamedTuple):
+    """How far the anatomical ``joint`` of a body may be from the person's, standard deviations: ``centre`` m per axis, ``axis`` rad of a
+    hinge's flexion axis (0 for other joints).
+    """
+
+    joint: str
+    centre: float
+    axis: float
+
+
 @dataclass(frozen=True, eq=False)
 class JointLimits:
     """Per joint (n,), along its positive sense: ``lower``, ``upper`` rad; ``velocity`` rad/s > 0;
@@ -102,7 +112,8 @@ class Body:
     ``segments`` (N) names, the first is the root's; ``joints`` (n) in topological order = Pinocchio's order; ``sip`` prior with covariance;
     ``limits`` per joint; ``markers`` on segments; ``boxes`` (N, 2, 3) m, lower and upper corner of the shape box in the segment frame;
     ``com_boxes`` (N, 2, 3) m, where the CoM may be; ``feet`` soles by side ("left", "right"); ``root`` "free_flyer" (nq = 7 + n, nv =
-    6 + n) or "fixed" (nq = nv = n; the root joint carries no segment then); ``notes`` how the body was made: table, scaling, warnings.
+    6 + n) or "fixed" (nq = nv = n; the root joint carries no segment then); ``notes`` how the body was made: table, scaling, warnings;
+    ``joint_errors`` of the joints that a movement placed, none of those that only landmarks did.
     """
 
     name: str
@@ -116,6 +127,7 @@ class Body:
     feet: dict[str, Foot] = field(default_factory=dict)
     root: Literal["free_flyer", "fixed"] = "free_flyer"
     notes: tuple[str, ...] = ()
+    joint_errors: tuple[JointError, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(self.segments)

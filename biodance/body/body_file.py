@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from biodance.body.body import Body, Foot, Joint, JointLimits, SegmentMarkers
+from biodance.body.body import Body, Foot, Joint, JointError, JointLimits, SegmentMarkers
 from biodance.errors import BiodanceError, FileRefused
 from biodance.records import Sip
 
@@ -68,4 +68,5 @@ def _body(found: dict[str, Any]) -> Body:
         feet={side: Foot(**foot) for side, foot in found["feet"].items()},
         root=found["root"],
         notes=tuple(found["notes"]),
+        joint_errors=tuple(JointError(*error) for error in found["joint_errors"]),
     )

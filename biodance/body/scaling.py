@@ -56,7 +56,7 @@ class Scaling:
         body = assemble(self.subject, skeleton, table=self.table, markers=markers, notes=(*self.notes, *doubts))
         q = static_posture(body, frames)
         limits, widened = widen(body, q)
-        return replace(body, limits=limits, notes=(*body.notes, *widened)), q
+        return replace(body, limits=limits, notes=(*body.notes, *widened), joint_errors=self.centres.errors), q
 
 
 def measure(subject: Subject, static: Trial, *, hip: Hip = "harrington", table: str = DEFAULT_TABLE) -> Scaling:

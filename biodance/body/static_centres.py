@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from biodance.body.body import JointError
 from biodance.body.joint_centres import chord, davis_hip, elbow, harrington_hip, pelvis_frame, shoulder, unit, wrist
 from biodance.body.measures import Measures
 from biodance.records import Array
@@ -35,7 +36,8 @@ class Centres:
     ``place`` joint -> (3,) m: hips, knees, ankles, trunk, shoulders, elbows, and the wrists, where the forearms end. ``right`` of knees and
     elbows -> (3,) m, along the flexion axis to the person's right; ``axis_sd`` -> rad, how far that axis may be turned about the bone;
     ``lateral`` -> (3,) m, the lateral marker. ``pelvis`` (3, 3) lab_R_pelvis; ``across`` side -> (3,) m, horizontal, to the right of the
-    foot; ``cut``: at which fraction of the way from mid hip to mid shoulder the table cuts pelvis from trunk; ``notes`` what was assumed.
+    foot; ``cut``: at which fraction of the way from mid hip to mid shoulder the table cuts pelvis from trunk; ``notes`` what was assumed;
+    ``errors`` of the joints that a movement placed.
     """
 
     place: Places
@@ -46,6 +48,7 @@ class Centres:
     across: Places
     cut: float
     notes: tuple[str, ...]
+    errors: tuple[JointError, ...] = ()
 
 
 def static_centres(mark: Places, sizes: Measures, *, hip: Hip, trunk_fraction: float) -> Centres:

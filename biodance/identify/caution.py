@@ -6,6 +6,7 @@ a CoM that is off by d adds m d² to the inertia about the joint, which a first-
 
 import numpy as np
 
+from biodance.body.body import JointError
 from biodance.body.inertia import TENSOR
 from biodance.identify.twins import skew
 from biodance.records import Array, Sip
@@ -23,6 +24,8 @@ SIDES, SCALE_SD = 0.8, 0.2
 """Correlation of the right and the left side; kg, how well the scale pins the total mass."""
 CENTRE = {"thigh": 0.012, "shank": 0.008, "foot": 0.008, "trunk_head": 0.030, "upper_arm": 0.012, "forearm_hand": 0.020}
 """m per axis: how far the origin of a segment's frame may be from its true joint centre (see `twins.JOINT_CENTRE`)."""
+JOINT = {"thigh": "hip", "shank": "knee", "foot": "ankle", "trunk_head": "trunk", "upper_arm": "shoulder", "forearm_hand": "elbow"}
+"""The joint at the origin of each segment's frame."""
 ROOT_CENTRE = 0.008
 """m per axis: the same for the pelvis, and for segments of other bodies."""
 
@@ -41,18 +44,25 @@ def widened(prior: Sip) -> Sip:
     return Sip(prior.segments, prior.phi, covariance)
 
 
-def about_true_centres(sip: Sip) -> Sip:
+def about_true_centres(sip: Sip, placed: tuple[JointError, ...] = ()) -> Sip:
     """Return ``sip`` with a covariance that also holds about the true joint centres, which no wrench can find.
 
     The data tell where matter is relative to the model's frames; where the person's own joint centre is stays as uncertain as the formula
-    that predicted it.
+    that predicted it, or as the movement that ``placed`` it left it.
     """
     covariance = np.array(sip.covariance)
+    known = {error.joint: error.centre for error in placed}
     for i, segment in enumerate(sip.segments):
-        sd = next((value for kind, value in CENTRE.items() if segment.endswith(kind)), ROOT_CENTRE)
+        by_formula = next((value for kind, value in CENTRE.items() if segment.endswith(kind)), ROOT_CENTRE)
+        sd = known.get(_joint_of(segment), by_formula)
         slope = sd * _shift_slope(sip.phi[10 * i : 10 * i + 10])
         covariance[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] += slope @ slope.T
     return Sip(sip.segments, sip.phi, covariance)
+
+
+def _joint_of(segment: str) -> str:
+    """Return the anatomical joint at the origin of a segment of the human, "" for other segments."""
+    return next((segment.removesuffix(kind) + joint for kind, joint in JOINT.items() if segment.endswith(kind)), "")
 
 
 def _shift_slope(phi: Array) -> Array:

@@ -135,8 +135,8 @@ def conclude(
     belief = posterior(data, before)
     fit = physical_fit(belief, body)
     base = estimate_base(data, structural_base(body))
-    sip = about_true_centres(fit.sip)
-    known = knowledge(sip, about_true_centres(before), belief)
+    sip = about_true_centres(fit.sip, body.joint_errors)
+    known = knowledge(sip, about_true_centres(before, body.joint_errors), belief)
     words = (*(() if found else (NOISE_ALONE,)), *_notes(known, fit))
     return Identification(body, sip, belief, data, base, noise, sizes, fit, trials, data.frames, known, fit.status, fit.cause, words)
 

@@ -15,7 +15,7 @@ from biodance.identify.information import Information
 from biodance.identify.kinematic_scores import KinematicScores, kinematic_scores
 from biodance.identify.noise import Noise, blocks
 from biodance.identify.statistics import Fit
-from biodance.identify.twins import HINGE_TILT, JOINT_CENTRE, OTHER_CENTRE, OTHER_TILT, SLIDE, disturbance, draw_twins, neighbours
+from biodance.identify.twins import SLIDE, disturbance, draw_twins, joint_error, neighbours
 from biodance.motion.kinematics import poses, segment_motion
 from biodance.motion.marker_jacobian import chains, jacobian, skew
 from biodance.motion.regressor import regressor_of
@@ -120,10 +120,10 @@ def _of_one_sd(body: Body, scores: KinematicScores, slack: float) -> Array:
     centre, tilt = np.zeros(len(body.joints)), np.zeros((len(body.joints), 3, 3))
     for chain in chains(body):
         joint = body.joints[chain[0]]
-        kind = joint.name.rsplit("_", 1)[0].removeprefix("right_").removeprefix("left_")
-        centre[chain[0]] = JOINT_CENTRE.get(kind, OTHER_CENTRE)
+        error = joint_error(body, chain)
+        centre[chain[0]] = error.centre
         if len(chain) == 1:
-            tilt[chain[0]] = HINGE_TILT.get(kind, OTHER_TILT) * (np.eye(3) - np.outer(joint.axis, joint.axis))
+            tilt[chain[0]] = error.axis * (np.eye(3) - np.outer(joint.axis, joint.axis))
     parts = [
         slack * SLIDE * beside[:, list(body.markers.segment), None, None] * scores.slide,
         slack * SLIDE * beside[:, :, None, None] * scores.flesh,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.body.body import Body
+from biodance.body.body import Body, JointError
 from biodance.body.inertia import TENSOR
 from biodance.motion.kinematics import Poses, poses
 from biodance.motion.marker_jacobian import below as below
@@ -51,18 +51,26 @@ def neighbours(body: Body) -> Array:
     return table
 
 
+def joint_error(body: Body, chain: tuple[int, ...]) -> JointError:
+    """Return how far the anatomical joint of a chain of axes may be from the person's: as the movement tells, else as landmarks do."""
+    name = body.joints[chain[0]].name.rsplit("_", 1)[0]
+    kind = name.removeprefix("right_").removeprefix("left_")
+    by_landmarks = JointError(name, JOINT_CENTRE.get(kind, OTHER_CENTRE), HINGE_TILT.get(kind, OTHER_TILT))
+    return next((error for error in body.joint_errors if error.joint == name), by_landmarks)
+
+
 def draw_twins(body: Body, count: int, rng: np.random.Generator) -> Twins:
     """Draw the errors of ``count`` twins of ``body``."""
     beside, segment = neighbours(body), list(body.markers.segment)
     n = len(body.joints)
     centre, tilt = np.zeros((n, 3, count)), np.zeros((n, 3, count))
     for chain in chains(body):
-        kind = body.joints[chain[0]].name.rsplit("_", 1)[0].removeprefix("right_").removeprefix("left_")
-        centre[chain[0]] = JOINT_CENTRE.get(kind, OTHER_CENTRE) * rng.normal(size=(3, count))
+        error = joint_error(body, chain)
+        centre[chain[0]] = error.centre * rng.normal(size=(3, count))
         if len(chain) == 1:
             axis = body.joints[chain[0]].axis
             across = np.eye(3) - np.outer(axis, axis)
-            tilt[chain[0]] = HINGE_TILT.get(kind, OTHER_TILT) * across @ rng.normal(size=(3, count))
+            tilt[chain[0]] = error.axis * across @ rng.normal(size=(3, count))
     slide = SLIDE * beside[:, segment, None, None] * rng.normal(size=(n, len(segment), 3, count))
     flesh = SLIDE * beside[:, :, None, None] * rng.normal(size=(n, len(body.segments), 3, count))
     return Twins(slide, flesh, centre, tilt)

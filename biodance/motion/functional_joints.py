@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.body.body import Body
+from biodance.body.body import Body, JointError
 from biodance.body.scaling import Scaling
 from biodance.body.skeleton import JOINTS
 from biodance.errors import TrialRefused
@@ -32,21 +32,24 @@ SOFT_TISSUE = 0.008
 EXCITED = 0.3
 """Share of a joint's prior standard deviation that the movement must remove; below it the static trial's answer is kept, because what
 little the markers say of such a joint is soft tissue."""
+FIXED_POINT = {"shoulder": 0.008, "trunk": 0.008}
+"""m per axis: what no fixed point of the trunk can give; the shoulder rides on its blade, the trunk bends along its length. Added to the
+standard deviations, which are then those of 12 virtual dances."""
 STEPS, SMALLEST = 8, 5e-4
 """Most Gauss-Newton steps; m or rad below which a step ends the search."""
 
 
 @dataclass(frozen=True, eq=False)
 class FunctionalJoints:
-    """``scaling`` with the joints where the movement puts them; joint -> ``moved`` m, ``sd`` m (root mean square per axis); hinge ->
-    ``turned`` rad; ``kept`` the joints that the movement does not show; ``rms`` m, weighted marker distance before and after; ``notes``
-    say all this in plain sentences.
+    """``scaling`` with the joints where the movement puts them; joint -> ``moved`` m; hinge -> ``turned`` rad; ``errors`` of the joints
+    that moved; ``kept`` the joints that the movement does not show; ``rms`` m, weighted marker distance before and after; ``notes`` say
+    all this in plain sentences.
     """
 
     scaling: Scaling
     moved: Mapping[str, float]
-    sd: Mapping[str, float]
     turned: Mapping[str, float]
+    errors: tuple[JointError, ...]
     kept: tuple[str, ...]
     rms: tuple[float, float]
     notes: tuple[str, ...]
@@ -180,7 +183,8 @@ def _told(scaling: Scaling, start: State, found: State, shown: NDArray[np.bool_]
     deviation = np.sqrt(np.diag(np.linalg.inv(found.information)))
     kept = tuple(joint for joint in JOINTS if not shown[own_centre(joint)].any())
     moved = {joint: float(np.linalg.norm(found.theta[own_centre(joint)])) for joint in JOINTS if joint not in kept}
-    sd = {joint: float(np.sqrt(np.mean(deviation[own_centre(joint)] ** 2))) for joint in moved}
+    axis = {hinge: float(deviation[own_turn(hinge)]) for hinge in HINGES}
+    errors = tuple(JointError(joint, _centre_sd(joint, deviation), axis.get(joint, 0.0)) for joint in moved)
     turned = {hinge: float(found.theta[own_turn(hinge)]) for hinge in HINGES if hinge not in kept}
     notes = []
     if moved:
@@ -191,6 +195,11 @@ def _told(scaling: Scaling, start: State, found: State, shown: NDArray[np.bool_]
     if kept:
         names = ", ".join(joint.replace("_", " ") for joint in kept)
         notes.append(f"Joints that the movement does not show, kept where the static trial puts them: {names}.")
-    centres = JointUnknowns(scaling.centres).moved(found.theta)
+    centres = replace(JointUnknowns(scaling.centres).moved(found.theta), errors=errors)
     placed = replace(scaling, centres=centres, notes=(*scaling.notes, *notes))
-    return FunctionalJoints(placed, moved, sd, turned, kept, (start.rms, found.rms), tuple(notes))
+    return FunctionalJoints(placed, moved, turned, errors, kept, (start.rms, found.rms), tuple(notes))
+
+
+def _centre_sd(joint: str, deviation: Array) -> float:
+    """Return the standard deviation of a centre per axis, m (root mean square), from those of the unknowns (37,)."""
+    return float(np.hypot(np.sqrt(np.mean(deviation[own_centre(joint)] ** 2)), FIXED_POINT.get(joint.split("_")[-1], 0.0)))
