@@ -19,6 +19,8 @@ SUSPECTS = 4
 FRAMES = 8
 CASES = 2
 """At most so many suspects of so many trials are exchanged, in so many frames: a body that does not fit is slow to track."""
+ROUGH = 1e-3
+"""m, tolerance of the trial trackings."""
 BETTER = 0.3
 """Share of the squared distances that the exchange must leave at most."""
 LEAST = 0.03
@@ -97,18 +99,19 @@ def exchanged(case: Case) -> tuple[tuple[str, str], ...]:
         return ()
     frames = np.unique(np.linspace(0, case.motion.time.size - 1, FRAMES).astype(int))
     names = [case.motion.marker_names[k] for k in order]
-    pairs = [(a, b) for i, a in enumerate(names) for b in names[i + 1 :]]
+    pairs = sorted(((a, b) for i, a in enumerate(names) for b in names[i + 1 :]), key=lambda pair: partner(pair[0]) != pair[1])
     before = _misfit(case.body, case.trial.markers, frames)
-    after = {pair: _misfit(case.body, _renamed(case.trial.markers, pair), frames) for pair in pairs}
-    best = min(after, key=lambda pair: after[pair])
-    return (tuple(sorted(best)),) if after[best] < BETTER * before else ()  # type: ignore[return-value]
+    for pair in pairs:
+        if _misfit(case.body, _renamed(case.trial.markers, pair), frames) < BETTER * before:
+            return ((min(pair), max(pair)),)
+    return ()
 
 
 def _misfit(body: Body, markers: Markers, frames: Array) -> float:
     """Return the mean square distance (m²) of some frames' markers to the body; infinite where they do not determine it."""
     some = Markers(markers.names, markers.time[frames], markers.xyz[frames])
     try:
-        return float(np.nanmean(solve_ik(body, some).residual ** 2))
+        return float(np.nanmean(solve_ik(body, some, tolerance=ROUGH).residual ** 2))
     except BiodanceError:
         return float("inf")
 
