@@ -16,8 +16,10 @@ from biodance.body.body import Body
 from biodance.identify.statistics import Fit
 from biodance.lab.session import read_session
 from biodance.motion.kinematics import poses
-from biodance.pipeline.session import examine
-from biodance.records import Array, Markers, Subject
+from biodance.pipeline.body import body_of
+from biodance.pipeline.results import TrialResult
+from biodance.pipeline.trial import examine_trial, prepared
+from biodance.records import Array, Session, Subject
 from biodance.virtual_lab.flesh import of_parameters, parameters, placed
 from biodance.virtual_lab.laboratory import Visit
 from biodance.virtual_lab.merge import MERGED, load_on, merged_sip
@@ -46,13 +48,16 @@ class TrackedVisit:
     true_own: Array
     frames: Array
     load: tuple[str, float, Array] | None
-    markers: dict[str, Markers]
     true_poses: dict[str, tuple[Array, Array]]
 
 
-def subjects(count: int = 24) -> tuple[Subject, ...]:
-    """Return the catalogue: both sexes, 45 to 110 kg, 1.50 to 1.95 m, body mass index 18 to 34."""
-    rng = np.random.default_rng(2016)
+TUNED, FRESH = (2016, 100), (2026, 700)
+"""Catalogues: the subjects on which identification was tuned, and those on which it is published; (seed of subjects, first of sessions)."""
+
+
+def subjects(count: int = 20, catalogue: tuple[int, int] = FRESH) -> tuple[Subject, ...]:
+    """Return the subjects of a catalogue: both sexes, 45 to 110 kg, 1.50 to 1.95 m, body mass index 18 to 34."""
+    rng = np.random.default_rng(catalogue[0])
     out = []
     for i in range(count):
         sex = "FM"[i % 2]
@@ -84,27 +89,33 @@ def _make(subject: Subject, protocol: str, seed: int, session: int, load: tuple[
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder) / "session"
         simulate(subject, protocol, place, seed=seed, visit=Visit(session), loads=loads)
-        result = examine(read_session(place))
+        body, results = _tracked(read_session(place))
     fits: dict[str, list[Fit]] = {"fit": [], "validate": []}
-    markers, truth, moved = {}, {}, []
+    truth, moved = {}, []
     plan = read_protocol(protocol)
-    for one in result.trials:
+    for one in results:
         role, name = one.trial.role, one.trial.name
         if role not in fits or one.motion is None or one.comparison is None:
             continue
         fits[role].append(Fit(name, one.motion, one.trial.wrench, one.comparison.used))
-        assert one.trial.markers is not None
-        markers[name] = one.trial.markers
         truth[name] = true_frames(person, _performance(person, plan, name, session), one.motion.time)
         if role == "fit":
-            moved.append(_displacement(result.body, one.motion.q, truth[name]))
+            moved.append(_displacement(body, one.motion.q, truth[name]))
     frames = np.mean(np.concatenate(moved), axis=0)
     own = merged_sip(bare, bare.body).phi
     true = np.concatenate(
         [parameters(placed(of_parameters(phi), _orthogonal(f[:, :3]), f[:, 3])) for phi, f in zip(own.reshape(-1, 10), frames, strict=True)]
     )
     carried = (load[0], load[1], _load_place(person, load[0], frames)) if load else None
-    return TrackedVisit(result.body, tuple(fits["fit"]), tuple(fits["validate"]), true, own, frames, carried, markers, truth)
+    return TrackedVisit(body, tuple(fits["fit"]), tuple(fits["validate"]), true, own, frames, carried, truth)
+
+
+def _tracked(session: Session) -> tuple[Body, list[TrialResult]]:
+    """Return the body of a session and its trials after all steps before identification."""
+    read = tuple(prepared(trial) for trial in session.trials)
+    body, _ = body_of(session.subject, read, [])
+    assert body is not None
+    return body, [examine_trial(one, body, mass=session.subject.mass) for one in read]
 
 
 def _performance(person: Person, plan: Protocol, name: str, session: int) -> Performance:
