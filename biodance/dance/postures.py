@@ -26,7 +26,7 @@ STATIC = ("balance", "foot_placement", "ground_clearance", "joint_range", "joint
 RESERVE = 0.06
 """Share of every limit's scale that is kept in reserve, for the moves that begin and end here."""
 WIDER = {"balance": 0.2, "foot_placement": 0.4}
-"""Larger reserves: whoever leaves the edge of the support first pushes the zero-moment point towards it; nearly straight legs are singular."""
+"""Larger ones: whoever leaves the edge of the support first pushes the zero-moment point towards it; straight legs are singular."""
 KEPT = 0.01
 """Violation, in scales of the limits, of the reserved margins that is accepted."""
 RUNS = 2

@@ -138,6 +138,15 @@ class State:
         pairs = cross(self.twists[:, None], self.twists[:, columns, None])
         return np.einsum("tkic,tc->tki", pairs, wrench) * swept
 
+    @property
+    def alone(self) -> "State":
+        """The same motion with everything on the foot over which the weight is."""
+        assert self.stance.over is not None
+        other = State(self.chain, self.stance.on(self.stance.over), self.x, self.v, self.a)
+        shared = ("_frames", "velocity", "acceleration", "_dynamics", "force", "wrench", "wrench_slopes")
+        other.__dict__.update({name: self.__dict__[name] for name in shared if name in self.__dict__})
+        return other
+
     @cached_property
     def feet(self) -> tuple[Array, Array]:
         """Wrenches (T, 2, 6) of the ground on each foot about the lab origin, and their derivative (T, 2, 6, 6) by the total."""

@@ -76,7 +76,7 @@ class Task:
         parts = np.stack([basis.position, basis.velocity, basis.acceleration])
         s = time / self.duration
         way = s**3 * (10 - 15 * s + 6 * s**2)
-        lifting, legs = (np.array([limit.NAME == name for limit in kept]) for name in ("ground_clearance", "foot_placement"))
+        lifting, legs = (np.array([name == limit.NAME for limit in kept]) for name in ("ground_clearance", "foot_placement"))
         share = np.where(
             lifting, reserve * (4 * way * (1 - way))[:, None], np.where(legs & (reserve > BETWEEN), max(LEGS, reserve), reserve)
         )

@@ -106,8 +106,10 @@ def _judge(stretch: _Stretch) -> Iterator[Judged]:
     angle = motion.q[:, -n:]
     yield "joint_range", "rad", np.minimum(angle - limits.lower, limits.upper - angle), joints
     yield "joint_speed", "rad/s", limits.velocity - np.abs(motion.v[:, -n:]), joints
-    torque = _torques(stretch)
-    yield "joint_torque", "N m", np.minimum(torque - limits.torque_lower, limits.torque_upper - torque), joints
+    over = stretch.dance.phases[stretch.phase].stance.over
+    for bearing in {stretch.planted, stretch.planted if over is None else (over,)}:
+        torque = _torques(stretch, bearing)
+        yield "joint_torque", "N m", np.minimum(torque - limits.torque_lower, limits.torque_upper - torque), joints
     force = stretch.wrench.force
     yield "friction", "N", FRICTION * force[:, 2:] - np.abs(force[:, :2]), ["forward", "sideways"]
     yield "balance", "m", _balance(stretch)[:, None], [stretch.dance.phases[stretch.phase].stance.name]
@@ -121,10 +123,10 @@ def _judge(stretch: _Stretch) -> Iterator[Judged]:
     yield "self_collision", "m", apart, pairs
 
 
-def _torques(stretch: _Stretch) -> Array:
-    touching = np.tile([side in stretch.planted for side in (0, 1)], (stretch.motion.time.size, 1))
+def _torques(stretch: _Stretch, bearing: tuple[int, ...]) -> Array:
+    touching = np.tile([side in bearing for side in (0, 1)], (stretch.motion.time.size, 1))
     loads = {}
-    if stretch.planted:
+    if bearing:
         centres = [sole.mean(axis=1) for sole in stretch.soles()]
         parts = distribute(stretch.wrench, *centres, touching)
         names = [stretch.body.segments[stretch.body.feet[side].segment] for side in ("right", "left")]
