@@ -43,7 +43,7 @@ from biodance.virtual_lab.truth import sip_in_frames
 
 CACHE = Path(os.environ.get("BIODANCE_CACHE", Path(tempfile.gettempdir()) / "biodance_excitation"))
 THIRDS = np.array([[0.20987654], [0.79012346]])
-RIVALS = ("full", "short", "random as long as full", "random as long as short", "squats as long as full", "squats as long as short")
+ORDER = ("short", "squats as long as short", "random as long as short", "full", "squats as long as full", "random as long as full")
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,8 @@ def designed(subject: Subject, protocol: str) -> Dance:
         return dance, time.perf_counter() - began
 
     dance, seconds = cached(f"dance {subject} {protocol}", make)
-    print(f"  {protocol}: {dance.counted.sum()} postures, {dance.duration:.0f} s, designed in {seconds:.0f} s", flush=True)
+    told = f"{dance.counted.sum()} postures, {dance.duration:.0f} s, designed in {seconds:.0f} s"
+    print(f"  {subject.sex} {subject.stature:.2f} m, {protocol}: {told}", flush=True)
     return dance
 
 
@@ -160,31 +161,23 @@ def errors(phi: Array, true: Array) -> tuple[Array, Array, Array]:
     return a[:, 0] - b[:, 0], com, np.linalg.norm(a[:, 4:] - b[:, 4:], axis=1) / np.linalg.norm(b[:, 4:], axis=1)
 
 
-def visits(number: int, subject: Subject) -> list[Row]:
-    """Return the rows of one subject."""
-    seed, plans = 500 + number, {name: read_plan(name) for name in ("full", "short")}
-    rows = []
-    for name in ("short", "full"):
-        dance = designed(subject, name)
+def visit(number: int, subject: Subject, rival: str) -> Row:
+    """Return the row of one subject and one rival."""
+    seed, name = 500 + number, rival.split()[-1]
+    dance, began = designed(subject, name), time.perf_counter()
 
-        def dances(place: Path, dance: Dance = dance) -> object:
-            return simulate_dance(subject, dance, place, seed=seed)
-
-        def randomly(place: Path, dance: Dance = dance, name: str = name) -> object:
-            return simulate_dance(subject, random_dance(subject, dance, plans[name]), place, seed=seed)
-
-        def squatting(place: Path, dance: Dance = dance) -> object:
+    def write(place: Path) -> object:
+        if rival.startswith("squats"):
             return simulate(subject, squats(1.2 * dance.duration), place, seed=seed)
+        shown = random_dance(subject, dance, read_plan(name)) if rival.startswith("random") else dance
+        return simulate_dance(subject, shown, place, seed=seed)
 
-        for rival, write in ((name, dances), (f"random as long as {name}", randomly), (f"squats as long as {name}", squatting)):
-            began = time.perf_counter()
-            row = cached(f"row {subject} {rival} {seed}", lambda rival=rival, write=write: examined(number, subject, rival, write))
-            mass, before = (np.sqrt(np.mean(e**2)) for e in (row.mass, row.table_mass))
-            com = 1000 * np.sqrt(np.mean(row.com**2))
-            print(f"  {rival}: {row.duration:.0f} s, mass {mass:.3f} kg (table {before:.3f}), CoM {com:.1f} mm", end=" ")
-            print(f"({time.perf_counter() - began:.0f} s)", flush=True)
-            rows.append(row)
-    return rows
+    row = cached(f"row {subject} {rival} {seed}", lambda: examined(number, subject, rival, write))
+    mass, before = (np.sqrt(np.mean(e**2)) for e in (row.mass, row.table_mass))
+    com = 1000 * np.sqrt(np.mean(row.com**2))
+    print(f"{number} {rival}: {row.duration:.0f} s, mass {mass:.3f} kg (table {before:.3f}), CoM {com:.1f} mm", end=" ")
+    print(f"({time.perf_counter() - began:.0f} s)", flush=True)
+    return row
 
 
 def table(rows: list[Row]) -> str:
@@ -197,13 +190,13 @@ def table(rows: list[Row]) -> str:
         "| motion | s | static, kg | dynamic, kg | mass RMS, kg | CoM RMS, mm | inertia, % (median) | squats, N | squats, N·m |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
-    some = [row for row in rows if row.rival == "full"]
+    some = [row for row in rows if row.rival == "short"]
     force, moment = np.mean([row.squats[0] for row in some], axis=0)
     lines.append(
         f"| table, nothing danced | 0 | | | {rms([r.table_mass for r in some]):.3f} | {1000 * rms([r.table_com for r in some]):.1f} "
         f"| {100 * np.median([r.table_inertia for r in some]):.0f} | {force:.1f} | {moment:.1f} |"
     )
-    for rival in RIVALS:
+    for rival in ORDER:
         mine = [row for row in rows if row.rival == rival]
         if mine:
             force, moment = np.mean([row.squats[1] for row in mine], axis=0)
@@ -215,12 +208,11 @@ def table(rows: list[Row]) -> str:
 
 
 def main() -> None:
-    """Run the subjects and print the table."""
+    """Run the subjects, the short motions first, and print the table after each rival."""
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 3
     rows: list[Row] = []
-    for number, subject in enumerate(subjects(count)):
-        print(f"subject {number}: {subject.sex} {subject.stature:.2f} m, {subject.mass:.0f} kg", flush=True)
-        rows += visits(number, subject)
+    for rival in ORDER:
+        rows += [visit(number, subject, rival) for number, subject in enumerate(subjects(count))]
         print(table(rows), flush=True)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
-from biodance.dance.excitation import blocks, dynamic_grams, moments, static_grams, total, uprights
+from biodance.dance.excitation import blocks, condition, dynamic_grams, moments, static_grams, total, uprights
 from biodance.dance.plan import Plan
 from biodance.dance.stance import Stance
 from biodance.motion.kinematics import segment_motion
@@ -19,6 +19,8 @@ RATE = 50.0
 """Hz, of the paper's transitions."""
 LITTLE = 0.01
 """rad²/s³: information on every inertia that is supposed before the first move, so that no condition number is infinite."""
+POOR = 30.0
+"""Condition number above which a segment was hardly tilted, so that gravity does not tell where along it the mass is."""
 THIRDS = np.array([[0.20987654], [0.79012346]])
 """Share of the way at one and two thirds of the time for least jerk: 10 s³ - 15 s⁴ + 6 s⁵."""
 
@@ -38,13 +40,15 @@ class ZmpPath:
 @dataclass(frozen=True, eq=False)
 class Account:
     """``static`` sum of w_i M_i cond(W_bi^S) of the postures that count, kg, ``dynamic`` (K,) sum of w_i M_i cond(W_bi^D) after each move,
-    kg; ``static_bound``, ``dynamic_bound`` kg: what they would be if every condition number were 1; ``paths`` (K) of the zero-moment point.
+    kg; ``static_bound``, ``dynamic_bound`` kg: what they would be if every condition number were 1; ``hardly`` the segments whose static
+    condition number is above ``POOR``; ``paths`` (K) of the zero-moment point.
     """
 
     static: float
     static_bound: float
     dynamic: Array
     dynamic_bound: float
+    hardly: tuple[str, ...]
     paths: tuple[ZmpPath, ...]
 
 
@@ -55,7 +59,9 @@ def account(dance: Dance, plan: Plan) -> Account:
     holds = [phase for phase in dance.phases if phase.kind == "hold" and phase.stance.over is None]
     ups = np.concatenate([uprights(dance.state(phase, np.array([phase.start]))) for phase in holds])
     every = list(range(len(dance.body.segments)))
-    static, _ = total(weight, static_grams(ups), parts.first)
+    grams = static_grams(ups)
+    static, _ = total(weight, grams, parts.first)
+    poor = [i for i in every if parts.first[i] and weight[i] > 0 and condition(grams[i][np.ix_(parts.first[i], parts.first[i])])[0] > POOR]
     gram = np.tile(LITTLE * np.eye(6), (len(every), 1, 1))
     straight = replace(dance, via=dance.postures[:-1, None] + THIRDS * np.diff(dance.postures, axis=0)[:, None])
     dynamic, paths = [], []
@@ -66,7 +72,7 @@ def account(dance: Dance, plan: Plan) -> Account:
         dynamic.append(total(weight, gram, parts.second)[0])
         paths.append(ZmpPath(phase.posture - 1, phase.stance, zmp(straight.state(phase, time).wrench), zmp(state.wrench)))
     bounds = [float(sum(w for w, pick in zip(weight, picks, strict=True) if pick)) for picks in (parts.first, parts.second)]
-    return Account(static, bounds[0], np.array(dynamic), bounds[1], tuple(paths))
+    return Account(static, bounds[0], np.array(dynamic), bounds[1], tuple(dance.body.segments[i] for i in poor), tuple(paths))
 
 
 def zmp(wrench: Array) -> Array:

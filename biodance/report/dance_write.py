@@ -63,6 +63,7 @@ def dance_document(result: DanceResult) -> dict[str, Any]:
             "static_bound": account.static_bound,
             "dynamic": account.dynamic,
             "dynamic_bound": account.dynamic_bound,
+            "hardly_excited": account.hardly,
         }
     rows = []
     if expectation is not None:
@@ -160,5 +161,7 @@ def print_dance(found: dict[str, Any]) -> None:
             for row in rows:
                 table.add_row(*(f"{row[key]:.3g}" if isinstance(row[key], float) else str(row[key]) for key in keys))
             console.print(table)
+        if criterion["hardly_excited"]:
+            console.print(f"hardly tilted: {', '.join(criterion['hardly_excited'])}", markup=False)
     for note in found["notes"]:
         console.print(f"look: {note}", markup=False)
