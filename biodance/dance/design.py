@@ -66,7 +66,7 @@ def design(
         with ProcessPoolExecutor(WORKERS) as pool:
             return design(body, plan, seed=seed, tell=tell, resume=resume, workers=pool)
     chain, parts = Chain(body), blocks(body)
-    parts = replace(parts, weight=parts.weight * plan.emphasis(body.segments))
+    parts = replace(parts, weight=parts.weight * plan.emphasis(body.segments), simplicity=plan.simplicity)
     work = _Work(chain, parts, plan, seed, Ledger(resume, body, plan, seed), workers, tell or (lambda what, done, of: None))
     x, stances = _postures(work)
     dance = _joined(work, x, stances, _ways(work, x, stances))

@@ -36,11 +36,14 @@ def smooth_condition(gram: Array, *, sharpness: int) -> tuple[float, Array]:
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """What counts of each segment: ``first`` (of MX, MY, MZ) and ``second`` (of the six inertias) base columns, ``weight`` (N,) kg."""
+    """What counts of each segment: ``first`` (of MX, MY, MZ) and ``second`` (of the six inertias) base columns, ``weight`` (N,) kg; and of
+    the performer: ``simplicity``, what a hardness of 1 (`simplicity.hardness`) is worth in mean condition numbers.
+    """
 
     first: tuple[list[int], ...]
     second: tuple[list[int], ...]
     weight: Array
+    simplicity: float = 0.0
 
 
 def blocks(body: Body) -> Blocks:

@@ -16,6 +16,7 @@ from biodance.dance.excitation import Blocks, smooth_condition, static_grams, to
 from biodance.dance.limits import limits
 from biodance.dance.programme import Judged, Objective, Programme, closed
 from biodance.dance.refusal import PERSONAL, Excess, describe, told
+from biodance.dance.simplicity import hardness
 from biodance.dance.sqp import minimise
 from biodance.dance.stance import Stance
 from biodance.dance.state import State
@@ -54,13 +55,14 @@ class Postures:
 @dataclass(frozen=True, eq=False)
 class Posture:
     """``x`` (n,) coordinates, ``up`` (N, 3) the vertical in the segments; ``violation`` of the reserved limits in their scales and the
-    worst ``limit``.
+    worst ``limit``; ``hard`` how hard it is to take.
     """
 
     x: Array
     up: Array
     violation: float = np.inf
     limit: str = ""
+    hard: float = 0.0
 
 
 def free_coordinates(chain: Chain, stance: Stance) -> list[int]:
@@ -103,7 +105,11 @@ class Exciting:
         half = np.maximum((ends.upper - ends.lower) / 2, 1e-3)
         off = (state.x[:, ROOT:] - (ends.upper + ends.lower) / 2) / half
         by[0][:, ROOT:] += 2 * EASE * off / half
-        return value / self.unit + EASE * float(np.sum(off**2)), by
+        value = value / self.unit + EASE * float(np.sum(off**2))
+        if not self.blocks.simplicity:
+            return value, by
+        hard, slopes = hardness(state)
+        return value + 10 * self.blocks.simplicity * hard, by + 10 * self.blocks.simplicity * slopes
 
 
 def find_postures(chain: Chain, blocks: Blocks, stances: tuple[Stance, ...], *, seed: int, workers: Executor) -> Postures:
@@ -212,16 +218,20 @@ def exchange(blocks: Blocks, stances: tuple[Stance, ...], pool: list[list[Postur
         kind: [next(i for i, p in enumerate(found) if p is pool[k][0]) for k in range(len(kinds)) if kinds[k] == kind]
         for kind, found in every.items()
     }
+    worth = blocks.simplicity * float(blocks.weight.sum()) / len(stances)
+    hard = {kind: worth * np.array([p.hard for p in found]) for kind, found in every.items()}
     whole = sum(grams[kind][picks].sum(axis=0) for kind, picks in taken.items())
-    value = _values(blocks, whole[None])[0]
+    effort = sum(hard[kind][picks].sum() for kind, picks in taken.items())
+    value = _values(blocks, whole[None])[0] + effort
     for kind, place in _places(taken):
         spare = [i for i in range(len(every[kind])) if i not in taken[kind]]
         if spare:
-            trial = whole - grams[kind][taken[kind][place]] + grams[kind][spare]
-            values = _values(blocks, trial)
+            now = taken[kind][place]
+            trial, efforts = whole - grams[kind][now] + grams[kind][spare], effort - hard[kind][now] + hard[kind][spare]
+            values = _values(blocks, trial) + efforts
             if values.min() < value - 1e-6:
                 value, best = values.min(), int(values.argmin())
-                whole, taken[kind][place] = trial[best], spare[best]
+                whole, effort, taken[kind][place] = trial[best], efforts[best], spare[best]
     picks = {kind: iter(chosen) for kind, chosen in taken.items()}
     return [every[kind][next(picks[kind])] for kind in kinds]
 
@@ -259,7 +269,7 @@ def solve(chain: Chain, stance: Stance, begin: Array, objective: Objective, *, i
     programme = Programme(chain, stance, base, basis, free, kept, objective, reserve)
     found = minimise(programme.judge, begin[free], iterations=iterations)
     state = programme.state(found.y)
-    return Posture(state.x[0], uprights(state)[0], *Judged(programme, state).worst)
+    return Posture(state.x[0], uprights(state)[0], *Judged(programme, state).worst, hard=hardness(state)[0])
 
 
 def at(chain: Chain, stance: Stance, x: Array) -> Posture:

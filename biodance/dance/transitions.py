@@ -15,6 +15,7 @@ from biodance.dance.limits import limits
 from biodance.dance.postures import free_coordinates
 from biodance.dance.programme import Judged, Programme
 from biodance.dance.programme import Objective as Judge
+from biodance.dance.simplicity import hardness
 from biodance.dance.splines import basis_at
 from biodance.dance.sqp import minimise
 from biodance.dance.stance import Stance
@@ -119,6 +120,9 @@ class Objective:
         """Return the objective and its slopes by x, v, a."""
         value, slope = off_centre(state)
         value, slope = CENTRE * value, CENTRE * slope
+        if self.task.blocks.simplicity:
+            hard, by = hardness(state)
+            value, slope = value + self.task.blocks.simplicity * hard, slope + self.task.blocks.simplicity * by
         weight, picks = self.task.blocks.weight, self.task.blocks.second
         segments = [i for i in self.task.segments if picks[i] and weight[i] > 0]
         if not self.share or not segments:
