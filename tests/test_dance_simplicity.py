@@ -1,9 +1,13 @@
 """Simplicity: nothing to do is simplest, exact slopes, symmetric is simpler than not, one joint simpler than two."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from biodance.body.human import human
 from biodance.dance.chain import ROOT, Chain
+from biodance.dance.excitation import blocks, static_grams
+from biodance.dance.postures import KEPT, Exciting, Posture, at, exchange, solve, start
 from biodance.dance.simplicity import hardness
 from biodance.dance.stance import stance
 from biodance.dance.state import State
@@ -53,3 +57,28 @@ def test_planted_legs_are_not_counted_and_the_free_one_is() -> None:
     bent = posed(right_knee_flexion=1.0)
     assert hard(bent) == hard(posed())
     assert hard(bent, FEET.on(1)) > hard(posed(), FEET.on(1))
+
+
+def test_who_asks_for_simple_postures_gets_simpler_ones() -> None:
+    plain = blocks(BODY)
+    others = static_grams(np.array([at(CHAIN, FEET, begun(seed)).up for seed in range(3)]))
+    found = {}
+    for simplicity in (0.0, 2.0):
+        objective = Exciting(replace(plain, simplicity=simplicity), others, 0.1 * 65.0 / 4, 8)
+        found[simplicity] = [solve(CHAIN, FEET, begun(seed), objective, iterations=30) for seed in (4, 5)]
+    for usual, simple in zip(found[0.0], found[2.0], strict=True):
+        assert usual.violation <= KEPT
+        assert simple.violation <= KEPT
+        assert simple.hard < 0.8 * usual.hard
+
+
+def test_of_two_postures_that_tell_the_same_the_simpler_is_taken() -> None:
+    up = np.tile([0.0, 1.0, 0.0], (12, 1))
+    hard, easy = (Posture(np.full(1, k), up, hard=k) for k in (0.9, 0.1))
+    for simplicity, kept in ((0.0, 0.9), (1.0, 0.1)):
+        chosen = exchange(replace(blocks(BODY), simplicity=simplicity), (FEET,), [[hard, easy]])
+        assert chosen[0].hard == kept
+
+
+def begun(seed: int) -> Array:
+    return start(CHAIN, FEET, np.random.default_rng(seed))
