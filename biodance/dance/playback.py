@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.body.export import mjcf
@@ -85,11 +86,14 @@ def floor_model(body: Body, *, friction: float = 0.5) -> Any:
     return spec.compile()
 
 
-def planned_torques(body: Body, motion: Motion, wrench: Wrench) -> Array:
-    """Return the joint torques (T, n) N·m of the plan, the ground wrench shared by the feet that are down."""
+def planned_torques(body: Body, motion: Motion, wrench: Wrench, down: NDArray[np.bool_] | None = None) -> Array:
+    """Return the joint torques (T, n) N·m of the plan, the ground wrench shared by the feet (right, left) that are ``down`` (T, 2);
+    without it, those whose soles are near the floor.
+    """
     pose = poses(body, motion.q)
     soles = [pose.rotation[:, f.segment] @ f.outline.mean(axis=0) + pose.position[:, f.segment] for f in _both(body)]
-    down = np.stack([sole[:, 2] < TOUCHING for sole in soles], axis=1)
+    if down is None:
+        down = np.stack([sole[:, 2] < TOUCHING for sole in soles], axis=1)
     parts = distribute(wrench, soles[0], soles[1], down)
     names = [body.segments[f.segment] for f in _both(body)]
     return joint_torques(body, motion, dict(zip(names, parts, strict=True))).torque
@@ -101,8 +105,10 @@ def _both(body: Body) -> tuple[Any, Any]:
     return body.feet["right"], body.feet["left"]
 
 
-def play(body: Body, motion: Motion, *, friction: float = 0.5) -> Playback:
+def play(body: Body, motion: Motion, *, friction: float = 0.5, down: NDArray[np.bool_] | None = None) -> Playback:
     """Return what becomes of ``motion`` of ``body`` (from rest, feet on the plane z = 0) when only its joints are driven.
+
+    ``down`` (T, 2) True where the right, the left foot is planned to bear; without it, where its sole is near the floor.
 
     Raises
     ------
@@ -113,7 +119,7 @@ def play(body: Body, motion: Motion, *, friction: float = 0.5) -> Playback:
     """
     mujoco = _mujoco()
     wrench = predict_wrench(body, motion)
-    torque = planned_torques(body, motion, wrench)
+    torque = planned_torques(body, motion, wrench, down)
     model = floor_model(body, friction=friction)
     data = mujoco.MjData(model)
     driver = _Driver(body, model)
