@@ -1,5 +1,7 @@
 """Joint centres and axes from movement: found where the movement shows them, left alone where it does not, derivatives exact."""
 
+import json
+import os
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -12,12 +14,16 @@ from biodance.body.limits import joint_limits
 from biodance.body.scaling import Scaling, measure
 from biodance.body.skeleton import JOINTS
 from biodance.errors import TrialRefused
+from biodance.lab.prepare import prepare
+from biodance.lab.session import read_session
 from biodance.motion.functional_joints import evaluate, functional_joints, spread_postures
 from biodance.motion.joint_unknowns import HINGES, SIZE, JointUnknowns, own_centre, own_turn
 from biodance.motion.kinematics import poses
 from biodance.records import Array, Markers, Source, Subject, Trial
+from biodance.virtual_lab.simulate import simulate
 
 SUBJECT = Subject(65.0, 1.75, "F", 33.0)
+DATA = os.environ.get("BIODANCE_DATA")
 ARMS = {"shoulder_adduction": -25, "elbow_flexion": 25, "knee_flexion": 5}
 
 
@@ -125,3 +131,26 @@ def test_trials_without_the_body_s_markers_are_refused() -> None:
     other = Markers(("HEAD",), np.arange(10) / 100, np.zeros((10, 1, 3)))
     with pytest.raises(TrialRefused, match="stay where the static trial puts them"):
         functional_joints(scaling(), [other])
+
+
+def test_a_virtual_person_s_trunk_and_left_elbow_come_nearer_to_the_truth(tmp_path: Path) -> None:
+    session = read_session(simulate(Subject(71.6, 1.704, "M"), "short", tmp_path / "short", seed=101))
+    truth = json.loads((tmp_path / "short" / "truth" / "truth.json").read_text())
+    true = {one["name"]: np.array(one["position_m"]) for one in truth["static_pose"]["segments_12"]}
+    (static,), fits = session.of_role("static"), session.of_role("fit")
+    before = measure(session.subject, prepare(static))
+    after = functional_joints(before, [prepare(fit).markers for fit in fits]).scaling
+    for joint, segment, share in (("trunk", "trunk_head", 0.7), ("left_elbow", "left_forearm_hand", 0.7)):
+        old, new = (np.linalg.norm(one.centres.place[joint] - true[segment]) for one in (before, after))
+        assert new < share * old, (joint, old, new)
+
+
+@pytest.mark.skipif(not DATA, reason="BIODANCE_DATA is not set: the folder of real recordings")
+@pytest.mark.parametrize("folder", ["adl_gait", "biomechzoo/HC032A"])
+def test_a_real_walk_of_two_seconds_leaves_the_joints_alone(folder: str) -> None:
+    session = read_session(Path(str(DATA)) / folder)
+    (static,), (walk,) = session.of_role("static"), session.of_role("fit")
+    before = measure(session.subject, prepare(static))
+    found = functional_joints(before, [prepare(walk).markers])
+    assert {"trunk", "right_hip", "left_hip", "right_elbow", "left_elbow"} <= set(found.kept)
+    assert max(found.moved.values(), default=0.0) < 0.005
