@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from virtual_visits import subjects
+from virtual_visits import TUNED, subjects
 
 from biodance.body.scaling import Scaling, measure
 from biodance.lab.prepare import prepare
@@ -22,7 +22,7 @@ from biodance.motion.joint_unknowns import HINGES
 from biodance.motion.kinematics import poses
 from biodance.virtual_lab.simulate import simulate
 
-SEED = 100
+
 JOINTS = {"thigh": "hip", "shank": "knee", "foot": "ankle", "trunk_head": "trunk", "upper_arm": "shoulder", "forearm_hand": "elbow"}
 
 
@@ -50,9 +50,9 @@ def main() -> None:
     parser.add_argument("--protocol", default="dance")
     chosen = parser.parse_args()
     before, after, seconds = [], [], []
-    for i, subject in enumerate(subjects(chosen.subjects)):
+    for i, subject in enumerate(subjects(chosen.subjects, TUNED)):
         with tempfile.TemporaryDirectory() as folder:
-            place = simulate(subject, chosen.protocol, Path(folder) / "session", seed=SEED + i)
+            place = simulate(subject, chosen.protocol, Path(folder) / "session", seed=TUNED[1] + i)
             session, truth = read_session(place), json.loads((place / "truth" / "truth.json").read_text())
         (static,) = session.of_role("static")
         scaling = measure(session.subject, prepare(static))
