@@ -86,7 +86,8 @@ def _postures(work: _Work) -> tuple[Array, list[Stance]]:
     kept = work.ledger.get("postures")
     if kept is None:
         work.tell("postures", 0, len(counted))
-        kept = {"x": find_postures(chain, work.blocks, tuple(counted), seed=work.seed, workers=work.workers).x}
+        found = find_postures(chain, work.blocks, tuple(counted), seed=work.seed, workers=work.workers, simplicity=plan.simplicity)
+        kept = {"x": found.x}
         work.ledger.put("postures", **kept)
     work.tell("postures", len(counted), len(counted))
     x, names = kept["x"], [s.name for s in counted]

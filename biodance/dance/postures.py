@@ -23,7 +23,7 @@ from biodance.dance.state import State
 from biodance.errors import BiodanceError
 from biodance.records import Array
 
-STATIC = ("balance", "foot_placement", "ground_clearance", "joint_range", "joint_torque", "seat", "self_collision")
+STATIC = ("balance", "foot_placement", "grip", "ground_clearance", "joint_range", "joint_torque", "seat", "self_collision")
 RESERVE = 0.06
 """Share of every limit's scale that is kept in reserve, for the moves that begin and end here."""
 WIDER = {"balance": 0.2, "foot_placement": 0.4}
@@ -87,12 +87,13 @@ def start(chain: Chain, stance: Stance, rng: np.random.Generator) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Exciting:
-    """Objective of one posture beside the Gram matrices of the ``others`` (N, 3, 3), per ``unit`` kg."""
+    """Objective of one posture beside the Gram matrices of the ``others`` (N, 3, 3), per ``unit`` kg, and ``simplicity`` for the performer."""
 
     blocks: Blocks
     others: Array
     unit: float
     sharpness: int
+    simplicity: float = 0.0
 
     def __call__(self, state: State) -> tuple[float, Array]:
         """Return the criterion and its slopes by x."""
@@ -112,15 +113,19 @@ class Exciting:
         return value + 10 * self.blocks.simplicity * hard, by + 10 * self.blocks.simplicity * slopes
 
 
-def find_postures(chain: Chain, blocks: Blocks, stances: tuple[Stance, ...], *, seed: int, workers: Executor) -> Postures:
+def find_postures(
+    chain: Chain, blocks: Blocks, stances: tuple[Stance, ...], *, seed: int, workers: Executor, simplicity: float = 0.0
+) -> Postures:
     """Return one posture per entry of ``stances``, together the most exciting for all first moments.
+
+    ``simplicity`` is the worth of `simplicity.hardness` beside the excitation.
 
     Raises
     ------
     BiodanceError
         On some feet there is no posture within the limits; the message names the limit.
     """
-    search, named = _Search(chain, blocks, stances, seed), {stance.name: k for k, stance in enumerate(stances)}
+    search, named = _Search(chain, blocks, stances, seed, simplicity), {stance.name: k for k, stance in enumerate(stances)}
     for checked in [workers.submit(search.possible, k) for k in named.values()]:
         checked.result()
     tasks = [workers.submit(search.run, run) for run in range(RUNS)]
@@ -171,6 +176,7 @@ class _Search:
     blocks: Blocks
     stances: tuple[Stance, ...]
     seed: int
+    simplicity: float
 
     def anywhere(self, place: int, run: int) -> Array:
         """Return the start (n,) of one posture in one run."""
@@ -199,7 +205,7 @@ class _Search:
         now, unit = list(now), 0.1 * float(self.blocks.weight.sum()) / len(now)
         for p in order:
             others = np.array([one.up for k, one in enumerate(now) if k != p]).reshape(-1, *now[p].up.shape)
-            objective = Exciting(self.blocks, static_grams(others), unit, sharpness)
+            objective = Exciting(self.blocks, static_grams(others), unit, sharpness, self.simplicity)
             x, steps = begin[p], iterations
             for attempt in range(ATTEMPTS):
                 now[p] = solve(self.chain, self.stances[p], x, objective, iterations=steps)
