@@ -22,7 +22,6 @@ from biodance.motion.joint_unknowns import HINGES
 from biodance.motion.kinematics import poses
 from biodance.virtual_lab.simulate import simulate
 
-
 JOINTS = {"thigh": "hip", "shank": "knee", "foot": "ankle", "trunk_head": "trunk", "upper_arm": "shoulder", "forearm_hand": "elbow"}
 
 
