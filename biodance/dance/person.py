@@ -4,6 +4,7 @@
     max_speed_deg_s = 120                      no joint turns faster
     stand_alone_on = ["right"]                 legs on which the person may stand alone; [] = never; without it: both
     seated = false                             true: only protocols on a stool
+    hold_frame = ["right"]                     hands that stay on the grips of a walking frame on the plate; without it: none
 
     [range_deg]                                what a joint reaches, degrees
     left_shoulder_flexion = [0, 70]
@@ -30,7 +31,7 @@ from biodance.dance.protocol import number, table
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import read_toml
 
-KEYS = ("reason", "max_speed_deg_s", "stand_alone_on", "seated", "range_deg", "range_share", "strength")
+KEYS = ("reason", "max_speed_deg_s", "stand_alone_on", "seated", "hold_frame", "range_deg", "range_share", "strength")
 SIDES = ("right", "left")
 Shares = tuple[tuple[str, float], ...]
 
@@ -40,7 +41,8 @@ class PersonLimits:
     """Limits of one person beyond those of sex, age, mass and stature.
 
     ``ranges`` (key, lower, upper) rad; ``range_shares``, ``strengths`` (key, share 0..1); ``max_speed`` rad/s; ``stand_alone_on`` the legs
-    on which the person may stand alone; ``seated`` True where standing is not possible; ``reason`` in words. Keys: see the module.
+    on which the person may stand alone; ``seated`` True where standing is not possible; ``holds`` the hands that stay on a frame;
+    ``reason`` in words. Keys: see the module.
     """
 
     ranges: tuple[tuple[str, float, float], ...] = ()
@@ -50,6 +52,7 @@ class PersonLimits:
     stand_alone_on: tuple[str, ...] = SIDES
     seated: bool = False
     reason: str = ""
+    holds: tuple[str, ...] = ()
 
 
 HEALTHY = PersonLimits()
@@ -83,11 +86,14 @@ def read_person(path: str | Path) -> PersonLimits:
     for leg in legs:
         if leg not in SIDES:
             raise UnknownName.of(f"leg in stand_alone_on of {path}", str(leg), SIDES)
+    hands = raw.get("hold_frame", [])
+    if not isinstance(hands, list) or any(hand not in SIDES for hand in hands):
+        raise BiodanceError(f'{path}: hold_frame = {hands!r}; expected a list of hands, "right" and "left".')
     speed = math.radians(number(path, "max_speed_deg_s", raw["max_speed_deg_s"])) if "max_speed_deg_s" in raw else math.inf
     if not speed > 0:
         raise BiodanceError(f"{path}: max_speed_deg_s = {raw['max_speed_deg_s']!r}; it must be positive.")
     shares, strengths = (_shares(path, table(path, raw, name), name) for name in ("range_share", "strength"))
-    return PersonLimits(tuple(ranges), shares, strengths, speed, tuple(legs), seated, str(raw.get("reason", "")))
+    return PersonLimits(tuple(ranges), shares, strengths, speed, tuple(legs), seated, str(raw.get("reason", "")), tuple(hands))
 
 
 def _shares(path: Path, raw: dict[str, object], name: str) -> Shares:
@@ -121,7 +127,7 @@ def fitted(body: Body, plan: Plan, person: PersonLimits) -> tuple[Body, Plan, tu
         for stance, count in plan.blocks
         if not _allowed(stance, person)
     )
-    return replace(body, limits=limited(body, person)), replace(plan, blocks=kept, alone=person.stand_alone_on), notes
+    return replace(body, limits=limited(body, person)), replace(plan, blocks=kept, alone=person.stand_alone_on, holds=person.holds), notes
 
 
 def limited(body: Body, person: PersonLimits) -> JointLimits:

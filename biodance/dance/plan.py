@@ -24,7 +24,8 @@ class Plan:
     ``share`` of every half width of the base of support that may be used (paper 0.6); ``budget`` s: from the
     postures found, those that inform most per second are danced until the time is used up (inf: all); ``weights`` (segment, factor) in
     eq. 12 on top of the masses, ``other_weight`` the factor of all segments not named; ``simplicity`` >= 0 of the performer's term beside
-    the excitation; ``alone`` the legs on which the person may stand alone, be it for a step.
+    the excitation; ``alone`` the legs on which the person may stand alone, be it for a step;
+    ``holds`` the hands that stay on the grips of a frame.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Plan:
     other_weight: float = 1.0
     simplicity: float = 0.0
     alone: tuple[str, ...] = ("right", "left")
+    holds: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         names = [name for name, _ in self.blocks]

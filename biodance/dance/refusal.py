@@ -10,7 +10,7 @@ from biodance.dance.stance import Stance
 from biodance.dance.state import State
 from biodance.records import Array
 
-PERSONAL = ("joint_torque", "joint_range", "balance", "self_collision", "seat", "ground_clearance", "foot_placement")
+PERSONAL = ("joint_torque", "joint_range", "balance", "grip", "self_collision", "seat", "ground_clearance", "foot_placement")
 """The limits of a posture in the order in which they are suspected: first those in which persons differ."""
 FEET = {
     "parallel": "with both feet side by side",

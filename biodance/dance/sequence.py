@@ -10,7 +10,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.dance.plan import Plan
-from biodance.dance.stance import SINGLE, Stance, seat, stance
+from biodance.dance.stance import SINGLE, Stance, holding, seat, stance
 from biodance.errors import BiodanceError
 
 RIGHT, LEFT = 0, 1
@@ -45,7 +45,8 @@ def sequence(body: Body, plan: Plan) -> tuple[Stance, ...]:
 
 
 def _double(body: Body, plan: Plan, name: str) -> Stance:
-    return stance(body, name, right=plan.forward if name == "right_forward" else 0.0, share=plan.share)
+    feet = stance(body, name, right=plan.forward if name == "right_forward" else 0.0, share=plan.share)
+    return holding(feet, body, plan.holds)
 
 
 def _over(feet: Stance, side: int) -> Stance:

@@ -67,3 +67,10 @@ class Solids:
         shape = [capsule(body, i) for i in range(len(body.segments))]
         axis, radius = np.array([ends for ends, _ in shape]), np.array([radius for _, radius in shape])
         return cls(capsules[:, 0], capsules[:, 1], boxes[:, 0], boxes[:, 1], axis, radius)
+
+
+def palm(body: Body, side: str) -> tuple[int, Array]:
+    """Return the segment of a hand and the middle of its palm (3,) m in that segment: 0.85 of the way to the fingertips."""
+    segment = body.segment_index(f"{side}_forearm_hand")
+    low, high = body.boxes[segment]
+    return segment, np.array([(low[0] + high[0]) / 2, 0.85 * low[1], (low[2] + high[2]) / 2])

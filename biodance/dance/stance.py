@@ -18,6 +18,9 @@ STOOL = np.array([[-0.15, -0.2], [0.25, -0.2], [0.25, 0.2], [-0.15, 0.2]])
 HANGING = 0.08
 """m between the ground and the soles of hanging legs on a stool."""
 
+GRIP = (0.18, 0.28, 0.50)
+"""Grips of a walking frame: m ahead of the heels' line, m to the side, and height over stature (crease of the wrist, as they are set)."""
+
 
 @dataclass(frozen=True, eq=False)
 class Stance:
@@ -25,7 +28,8 @@ class Stance:
 
     ``name``; ``ankle`` (2, 3) m lab frame, right and left, where each foot stands or would stand, flat and facing lab x; ``planted`` the
     feet on the ground (0 right, 1 left); ``soles`` (2, P, 3) m their outlines; ``share`` of every half width of the support that may be
-    used (0.6 in the paper); ``props`` (K, 2) m corners on the ground of what else bears weight: the legs of a stool or of a frame to hold;
+    used (0.6 in the paper); ``props`` (K, 2) m corners on the ground of what else bears weight: the legs of a stool;
+    ``hands`` (2, 3) m grips that the right and the left hand hold, NaN = free;
     ``seat`` m height of the hip centres of a person on a stool, pelvis upright and still over the lab origin; 0 standing;
     ``over`` the one of two planted feet (0, 1) over which the weight is, so that the other could be lifted; None anywhere.
     """
@@ -38,10 +42,12 @@ class Stance:
     props: Array = field(default_factory=lambda: np.empty((0, 2)))
     seat: float = 0.0
     over: int | None = None
+    hands: Array = field(default_factory=lambda: np.full((2, 3), np.nan))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "ankle", frozen_array(self.ankle, (2, 3), "Stance.ankle"))
         object.__setattr__(self, "soles", frozen_array(self.soles, (2, None, 3), "Stance.soles"))
+        object.__setattr__(self, "hands", frozen_array(self.hands, (2, 3), "Stance.hands"))
         props = self.props if np.size(self.props) else np.empty((0, 2))
         object.__setattr__(self, "props", frozen_array(props, (None, 2), "Stance.props"))
 
@@ -101,6 +107,15 @@ def stance(
         for k, o in enumerate(body.feet[side].outline for side in ("right", "left"))
     ]
     return Stance(name, ankle, planted, np.array(soles), share)
+
+
+def holding(feet: Stance, body: Body, hands: tuple[str, ...]) -> Stance:
+    """Return the stance in which the named ``hands`` ("right", "left") hold the grips of a frame around the person."""
+    grips, stature = np.full((2, 3), np.nan), stature_of(body)
+    for side, name in enumerate(("right", "left")):
+        if name in hands:
+            grips[side] = [GRIP[0], (-GRIP[1], GRIP[1])[side], GRIP[2] * stature]
+    return replace(feet, hands=grips)
 
 
 def seat(body: Body, *, share: float = 0.6) -> Stance:

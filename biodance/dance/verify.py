@@ -13,6 +13,7 @@ import numpy as np
 from biodance.body.body import UPRIGHT, Body
 from biodance.dance.dance import Dance
 from biodance.dance.plan import Plan
+from biodance.dance.shapes import palm
 from biodance.dance.solid_distance import distances
 from biodance.motion.dynamics import distribute, joint_torques, zmp
 from biodance.motion.kinematics import Poses, poses
@@ -26,6 +27,8 @@ TOUCH = 1e-9
 """m by which a sole that has just left the ground may be below it: rounding."""
 STOOL = 0.03
 """m by which the knees of a seated person may hang below the hips."""
+GRIP = 0.04
+"""m by which the palm of a hand that holds a frame may move about the grip."""
 JUMP = 1e-6
 """rad, rad/s, rad/s²: jumps of coordinates between phases: rounding."""
 
@@ -119,6 +122,11 @@ def _judge(stretch: _Stretch) -> Iterator[Judged]:
         shanks = [body.segment_index(f"{side}_shank") for side in ("right", "left")]
         hips = stretch.dance.phases[stretch.phase].stance.seat
         yield "seat", "m", stretch.pose.position[:, shanks, 2] - hips + STOOL, ["right_knee", "left_knee"]
+    held = stretch.dance.phases[stretch.phase].stance.hands
+    for side in np.flatnonzero(np.isfinite(held[:, 0])):
+        segment, local = palm(body, ("right", "left")[side])
+        hand = stretch.pose.points([segment], local[None])[:, 0]
+        yield "grip", "m", GRIP - np.linalg.norm(hand - held[side], axis=1)[:, None], [("right_hand", "left_hand")[side]]
     apart, pairs = distances(body, stretch.pose)
     yield "self_collision", "m", apart, pairs
 
