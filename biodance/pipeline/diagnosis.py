@@ -185,10 +185,9 @@ def _pairs(result: SessionResult, phi: np.ndarray, roles: tuple[Role, ...]) -> l
 
 def _changes(before: Identification, after: Identification) -> tuple[str, ...]:
     """Say which segment masses change most when the findings are accepted."""
-    change = after.sip.mass - before.sip.mass
-    order = np.argsort(-np.abs(change))[:3]
+    then, now = (dict(zip(one.sip.segments, one.sip.mass.tolist(), strict=True)) for one in (before, after))
+    change = {name: now.get(name, 0.0) - mass for name, mass in then.items()}
+    most = sorted(change, key=lambda name: -abs(change[name]))[:3]
     return tuple(
-        f"{before.sip.segments[i].replace('_', ' ')}: {before.sip.mass[i]:.2f} kg becomes {after.sip.mass[i]:.2f} kg"
-        for i in order
-        if abs(change[i]) >= 0.01
+        f"{name.replace('_', ' ')}: {then[name]:.2f} kg becomes {now.get(name, 0.0):.2f} kg" for name in most if abs(change[name]) >= 0.01
     )

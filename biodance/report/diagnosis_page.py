@@ -55,8 +55,8 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
     folder = files("biodance.report") / "templates"
     masses = []
     if found.before and found.accepted:
-        rows = zip(found.before.sip.segments, found.before.sip.mass, found.accepted.sip.mass, strict=True)
-        masses = [(name.replace("_", " "), float(a), float(b)) for name, a, b in rows]
+        then, now = (dict(zip(one.sip.segments, one.sip.mass.tolist(), strict=True)) for one in (found.before, found.accepted))
+        masses = [(name.replace("_", " "), then.get(name, float("nan")), mass) for name, mass in now.items()]
     return environment.from_string((folder / "diagnosis.html.j2").read_text(encoding="utf-8")).render(
         style=Markup((folder / "page.css").read_text(encoding="utf-8")),
         result=result,

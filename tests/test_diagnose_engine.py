@@ -1,0 +1,147 @@
+"""The engine on sessions whose only fault is known: it names it, sizes it, stays silent without one, and says unexplained when it must."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosed_sessions import about_plate, body, known, looks
+from scipy.interpolate import make_interp_spline
+
+from biodance.diagnose.accept import accept, fit_of, gain, judged
+from biodance.diagnose.engine import diagnose
+from biodance.effects.case import Case
+from biodance.errors import BiodanceError, TrialRefused, UnknownName
+from biodance.identify.identification import standing_point
+
+FAST = ("plate_gain", "plate_offset", "plate_position", "plate_rotation", "time_delay", "body_mass", "added_mass", "plate_drift")
+
+
+def found(hidden, *, seed: int = 1, chosen=FAST):
+    return diagnose(body(), looks(seed, hidden=hidden), tolerances=known(), chosen=chosen)
+
+
+def gained(local, session):
+    local[:, 2] *= 1.05
+    return local
+
+
+def offset(local, session):
+    local[:, 0] += 12.0
+    return local
+
+
+def late(wrench, session, moving):
+    return make_interp_spline(moving.time, wrench, k=5)(np.clip(moving.time - 0.02, 0, None))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_without_fault_nothing_is_named(seed: int) -> None:
+    diagnosis = found(lambda wrench, session, moving: wrench, seed=seed).diagnosis
+    assert diagnosis.verdict == "nothing wrong"
+    assert not diagnosis.findings
+    assert diagnosis.worst < 4.5
+
+
+@pytest.mark.parametrize(
+    ("hidden", "effect", "target", "parameter", "size"),
+    [
+        (about_plate(gained), "plate_gain", "Fz", "gain", 0.05),
+        (about_plate(offset), "plate_offset", "Fx", "offset", 12.0),
+        (late, "time_delay", "", "delay", 0.02),
+    ],
+)
+def test_a_hidden_fault_is_named_and_sized(hidden, effect, target, parameter, size) -> None:
+    diagnosis = found(hidden).diagnosis
+    assert diagnosis.verdict == "named, complete"
+    (finding,) = diagnosis.findings
+    assert (finding.effect, finding.target) == (effect, target)
+    (estimate,) = finding.parameters
+    assert estimate.name == parameter
+    assert estimate.value == pytest.approx(size, rel=0.1)
+    assert estimate.interval[0] < size * 1.02
+    assert estimate.interval[1] > size * 0.98
+    assert finding.log_bayes_factor > 10
+    assert 0 < finding.visible_fraction <= 1
+
+
+def test_two_faults_are_both_named() -> None:
+    both = lambda wrench, session, moving: late(about_plate(offset)(wrench, session, moving), session, moving)  # noqa: E731
+    diagnosis = found(both).diagnosis
+    assert {f.effect for f in diagnosis.findings} == {"plate_offset", "time_delay"}
+
+
+def test_what_no_cause_describes_is_unexplained_and_located() -> None:
+    def knocked(wrench, session, moving):
+        knock = 40.0 * np.sin(2 * np.pi * 4.0 * moving.time) * (np.abs(moving.time - 6.0) < 1.0)
+        return wrench + knock[:, None] * (np.arange(6) == 1) * (session[0] == 0.5)
+
+    diagnosis = found(knocked).diagnosis
+    assert diagnosis.verdict == "unexplained"
+    worst = diagnosis.adequacy[0]
+    assert (worst.channel, worst.band_hz, worst.trial) == ("Fy", (2.5, 6.0), "t2")
+    assert worst.second == pytest.approx(6.0, abs=1.0)
+
+
+def test_an_absent_culprit_is_never_complete() -> None:
+    diagnosis = found(late, chosen=tuple(name for name in FAST if name != "time_delay")).diagnosis
+    assert diagnosis.verdict in ("unexplained", "named, incomplete")
+
+
+def test_a_load_is_named_with_mass_and_place() -> None:
+    from biodance.identify.added_mass import point_mass
+    from biodance.motion.regressor import predict_wrench
+
+    index = body().segment_index("left_forearm_hand")
+    place = body().sip.com[index] + [0.0, -0.05, 0.03]
+    load = np.zeros(120)
+    load[10 * index : 10 * index + 10] = 2.4 * point_mass(place)
+    diagnosis = found(lambda wrench, session, moving: wrench + predict_wrench(body(), moving, load).value).diagnosis
+    finding = diagnosis.findings[0]
+    assert (finding.effect, finding.target) == ("added_mass", "left_forearm_hand")
+    assert finding.parameters[0].value == pytest.approx(2.4, abs=0.35)
+
+
+def test_accepting_a_fault_gains_on_trials_that_were_not_used() -> None:
+    examined = found(about_plate(gained))
+    kept = looks(7, trials=2, hidden=about_plate(gained))
+    cases = [
+        Case(body(), look.trial, look.motion, body().sip.phi, np.linspace(look.start, look.end, look.motion.time.size)) for look in kept
+    ]
+    as_is = tuple(fit_of(case, look.use) for case, look in zip(cases, kept, strict=True))
+    mended = tuple(fit_of(accept(case, examined.named), look.use) for case, look in zip(cases, kept, strict=True))
+    about = standing_point(as_is)
+    before, after = judged(body(), as_is, about), judged(body(), mended, about)
+    measured = gain(before, after, fitted=(before, after))
+    assert measured.proven
+    assert measured.rms_after[2] < 0.6 * measured.rms_before[2]
+    assert measured.score > 2 * measured.score_se > 0
+
+
+def test_a_gain_needs_three_blocks() -> None:
+    look = looks(1, trials=1)[0]
+    use = look.use & (look.motion.time < 1.5)
+    fit = fit_of(Case(body(), look.trial, look.motion, body().sip.phi, np.linspace(0, 1, look.motion.time.size)), use)
+    one = judged(body(), (fit,), np.zeros(3))
+    with pytest.raises(BiodanceError, match="needs 3"):
+        gain(one, one, fitted=(one, one))
+
+
+def test_too_short_trials_are_refused() -> None:
+    (look,) = looks(1, trials=1)
+    short = replace(look, use=look.motion.time < 0.5)
+    with pytest.raises(TrialRefused, match="1 s of fully measured"):
+        diagnose(body(), (short,), tolerances=known())
+
+
+def test_a_cause_that_is_not_in_the_family_is_refused() -> None:
+    with pytest.raises(UnknownName, match="plate_gain"):
+        diagnose(body(), looks(1, trials=1), tolerances=known(), chosen=("plate_gian",))
+
+
+def test_limits_come_without_the_forces() -> None:
+    clean, wrong = found(lambda wrench, session, moving: wrench), found(about_plate(offset))
+    first, second = ({(r.effect, r.target): r.limit for r in one.diagnosis.limits} for one in (clean, wrong))
+    assert first.keys() == second.keys()
+    for key, limit in first.items():
+        assert limit == pytest.approx(second[key], rel=0.1), key
+    assert first["plate_gain", "Fz"] < 0.05
