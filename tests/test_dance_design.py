@@ -12,6 +12,7 @@ from biodance.dance import postures
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.plan import Plan
+from biodance.dance.rehearsal import bearing, rehearse
 from biodance.dance.verify import broken, verify
 from biodance.errors import BiodanceError, FileRefused
 from biodance.motion.kinematics import poses, quaternion_matrix
@@ -129,3 +130,20 @@ def test_a_dance_that_fails_the_check_is_not_returned(dance, folder, monkeypatch
     monkeypatch.setattr(design_module, "_joined", lambda *parts: wrong)
     with ThreadPoolExecutor(1) as workers, pytest.raises(BiodanceError, match=r"balance by .* m at "):
         design(BODY, PLAN, seed=1, resume=folder, workers=workers)
+
+
+def test_played_on_its_own_feet_it_stays_up_near_the_plan(dance):
+    pytest.importorskip("mujoco", reason="MuJoCo is not installed (extra peers)")
+    found = rehearse(dance, hold=0.2)
+    assert found.playback.stays_up
+    assert found.playback.time[-1] == pytest.approx(found.dance.duration, abs=0.01)
+    assert np.degrees(np.abs(found.playback.angle_error).max()) < 5.0
+    assert np.nanquantile(found.inside, 0.01) > 0
+    assert "stays up" in found.table()
+
+
+def test_feet_are_planned_down_where_the_phases_say_so(dance):
+    down = bearing(dance, dance.motion(20).time)
+    assert down[:, 1].all()
+    assert not down[:, 0].all()
+    assert down[-1].all()

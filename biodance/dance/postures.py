@@ -87,7 +87,7 @@ def start(chain: Chain, stance: Stance, rng: np.random.Generator) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Exciting:
-    """Objective of one posture beside the Gram matrices of the ``others`` (N, 3, 3), per ``unit`` kg, and ``simplicity`` for the performer."""
+    """Objective of one posture beside the Gram matrices of the ``others`` (N, 3, 3), per ``unit`` kg, and its simplicity."""
 
     blocks: Blocks
     others: Array
