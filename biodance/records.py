@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from biodance.errors import BiodanceError, SessionRefused, TrialRefused, UnknownName
 
 Array = NDArray[np.float64]
+Index = NDArray[np.intp]
 Role = Literal["static", "fit", "validate", "check", "skip"]
 ROLES: tuple[Role, ...] = ("static", "fit", "validate", "check", "skip")
 CHANNELS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")

@@ -16,8 +16,7 @@ from biodance.effects.posture_answer import PostureAnswer
 from biodance.identify.twins import skew
 from biodance.motion.kinematics import Poses, SegmentMotion
 from biodance.motion.marker_jacobian import below, chains, jacobian
-from biodance.motion.tree import Index
-from biodance.records import Array
+from biodance.records import Array, Index
 
 if TYPE_CHECKING:
     from biodance.effects.case import Case

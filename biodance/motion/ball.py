@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import NO_SEGMENT, Body
-from biodance.motion.quaternion import exponential, product
 from biodance.records import Array
 
 
@@ -79,42 +78,3 @@ def angles_of(quaternion: Array, sign: Array, near: Array, lower: Array, upper: 
 def _turned_near(angles: Array, middle: Array) -> Array:
     """Return ``angles`` plus full turns, within half a turn of ``middle``."""
     return middle + (angles - middle + np.pi) % (2 * np.pi) - np.pi
-
-
-def turned(angles: Array, step: Array, joints: Balls, lower: Array, upper: Array) -> Array:
-    """Return the angles (3, G, B) after a turn by the rotation vector ``step`` (3, G, B) rad, and brought into the limits (3, G, 1).
-
-    The vector is written along a1, a2, a3 of the frame of the first joint (after its angle).
-    """
-    sign = joints.sign
-    sine, cosine = np.sin(sign * angles[0]), np.cos(sign * angles[0])
-    still = sign * np.stack([step[0], cosine * step[1] - sine * step[2], sine * step[1] + cosine * step[2]])
-    rotation = product(exponential(still), quaternion_of(angles, sign))
-    new = angles_of(rotation, sign, angles, lower, upper)
-    outside = np.maximum(lower - new, new - upper)
-    ball, frame = np.nonzero(outside.max(axis=0) > 0)
-    if ball.size:
-        worst = outside[:, ball, frame].argmax(axis=0)
-        new[:, ball, frame] = _held(
-            rotation[:, ball, frame], sign[ball, 0], worst, new[:, ball, frame], lower[:, ball, 0], upper[:, ball, 0]
-        )
-    return new
-
-
-def _held(rotation: Array, sign: Array, which: Array, angles: Array, lower: Array, upper: Array) -> Array:
-    """Return the angles (3, M) inside the limits that come nearest to ``rotation`` (4, M) with angle ``which`` (M,) held at its limit.
-
-    The overlap of two unit quaternions is bilinear in the half angles' (cos, sin) of the two angles that remain, so their best values are
-    the leading singular vectors of a 2 x 2 matrix.
-    """
-    out = np.clip(angles, lower, upper)
-    for k in np.unique(which):
-        one, two = (i for i in range(3) if i != k)
-        chosen = np.flatnonzero(which == k)
-        corners = np.zeros((3, 4, len(chosen)))
-        corners[k], corners[one, 2:], corners[two, 1::2] = out[k, chosen], np.pi, np.pi
-        overlap = np.einsum("icm,im->mc", quaternion_of(corners, sign[chosen]), rotation[:, chosen]).reshape(-1, 2, 2)
-        left, _, right = np.linalg.svd(overlap)
-        for angle, (cosine, sine) in ((one, left[:, :, 0].T), (two, right[:, 0].T)):
-            out[angle, chosen] = _turned_near(2 * np.arctan2(sine, cosine), 0.5 * (lower + upper)[angle, chosen])
-    return np.clip(out, lower, upper)

@@ -11,8 +11,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.motion.ball import Balls, angles_of, balls, quaternion_of
 from biodance.motion.quaternion import continuous, normalised
-from biodance.motion.tree import Index
-from biodance.records import Array
+from biodance.records import Array, Index
 
 
 @dataclass(frozen=True, eq=False)

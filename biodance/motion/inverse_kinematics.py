@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.motion.determination import determination
-from biodance.motion.marker_problem import MarkerProblem, descend, distances, marker_problem, points
-from biodance.motion.newton import Minimum
+from biodance.motion.kinematics import poses
+from biodance.motion.marker_problem import MarkerProblem, Minimum, descend, distances, marker_problem
 from biodance.motion.search import between, from_guess, search
-from biodance.motion.tree import Index
-from biodance.records import Array, Markers
+from biodance.records import Array, Index, Markers
 
 LEAN = 1e-3
 """Weight, per unit marker weight, of the interpolated posture in a frame whose own markers do not determine it."""
@@ -67,26 +66,25 @@ def solve_ik(body: Body, markers: Markers, *, guess: Array | None = None, tolera
         raise TrialRefused(_too_few(body, chosen, verdict.open_coordinates))
     problem = marker_problem(body, columns, chosen.xyz, tolerance=tolerance)
     own, open_frames = np.flatnonzero(verdict.determined), np.flatnonzero(~verdict.determined)
-    found = search(problem, own) if guess is None else from_guess(problem, own, _checked(guess, body, chosen).T[:, own])
+    found = search(problem, own) if guess is None else from_guess(problem, own, _checked(guess, body, chosen)[own])
     leaning = _lean(problem, own, found, open_frames)
     order = np.argsort(np.concatenate([own, open_frames]), kind="stable")
     q, slope, steps = (
-        np.concatenate([a, b], axis=-1)[..., order]
-        for a, b in ((found.q, leaning.q), (found.slope, leaning.slope), (found.steps, leaning.steps))
+        np.concatenate([a, b])[order] for a, b in ((found.q, leaning.q), (found.slope, leaning.slope), (found.steps, leaning.steps))
     )
     status = np.where(verdict.determined, FrameStatus.SOLVED, FrameStatus.LEANING).astype(np.int8)
     status[slope > tolerance] = FrameStatus.STOPPED
     residual = np.where(chosen.seen, distances(problem, q), np.nan)
-    return InverseKinematics(np.ascontiguousarray(q.T), residual, status, slope, steps, names)
+    return InverseKinematics(q, residual, status, slope, steps, names)
 
 
 def _lean(problem: MarkerProblem, own: Index, found: Minimum, frames: Index) -> Minimum:
     """Solve ``frames`` with their markers and, at the weight ``LEAN``, all markers of the posture interpolated from the ``own`` frames."""
-    start = between(problem.chart, own, found.q, frames)
+    start = between(problem, own, found.q, frames)
     if not frames.size:
         return Minimum(start, np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.intp))
     hidden = problem.weight[frames] == 0
-    stand_in = points(problem, start).transpose(2, 0, 1)
+    stand_in = poses(problem.body, start).points(problem.segment, problem.chain.local)
     xyz, weight = problem.xyz.copy(), problem.weight.copy()
     xyz[frames] = np.where(hidden[:, :, None], stand_in, xyz[frames])
     weight[frames] = np.where(hidden, LEAN, weight[frames])

@@ -7,16 +7,12 @@ neighbours is tried again from theirs and from its own markers.
 from functools import reduce
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import median_filter
 
-from biodance.motion.chart import Chart
-from biodance.motion.marker_moments import fit
-from biodance.motion.marker_problem import MarkerProblem, better, descend
-from biodance.motion.newton import Minimum
+from biodance.motion.compiled.interpolation import interpolate
+from biodance.motion.marker_problem import MarkerProblem, Minimum, better, descend
 from biodance.motion.starts import placed, start
-from biodance.motion.tree import Index
-from biodance.records import Array
+from biodance.records import Array, Index
 
 STRIDES = (64, 16, 4, 1)
 """Every 64th frame is solved from its own markers; then every 16th, 4th and each frame from those around it."""
@@ -40,44 +36,33 @@ DOUBT = (1.5, 0.001)
 def search(problem: MarkerProblem, frames: Index) -> Minimum:
     """Return the minima (F frames) of ``frames`` (F,), increasing, without any guess."""
     count = len(frames)
-    out = Minimum(np.zeros((problem.chart.nq, count)), np.zeros(count), np.full(count, np.inf), np.zeros(count, dtype=np.intp))
+    out = Minimum(np.zeros((count, problem.chart.nq)), np.zeros(count), np.full(count, np.inf), np.zeros(count, dtype=np.intp))
     known = np.zeros(0, dtype=np.intp)
     for stride in STRIDES:
-        level = np.setdiff1d(np.append(np.arange(0, count, stride), count - 1), known)
+        level = np.setdiff1d(np.append(np.arange(0, count, stride), count - 1), known, assume_unique=True)
         if not known.size:
             found = from_markers(problem, frames[level], SHARES if count > SHORT else (*SHARES, *MORE_SHARES))
         elif level.size:
-            found = descend(problem, frames[level], between(problem.chart, frames[known], out.q[:, known], frames[level]))
+            found = descend(problem, frames[level], between(problem, frames[known], out.q[known], frames[level]))
         else:
             continue
-        _store(out, level, found)
+        out.put(level, found)
         known = np.union1d(known, level)
         if stride in (STRIDES[0], STRIDES[-1]):
-            _store(out, known, retry(problem, frames[known], _part(out, known)))
+            out.put(known, retry(problem, frames[known], out.part(known)))
     return out
 
 
 def from_markers(problem: MarkerProblem, frames: Index, shares: tuple[float | None, ...]) -> Minimum:
     """Return the best of the minima reached from the first guesses at the given ``shares`` of the joint ranges."""
-    measured, origin = problem.measured(frames)
-    found = []
-    for share in shares:
-        q = start(problem.tree, measured, share=share)
-        q[: min(problem.tree.n_root, 3)] += origin[: min(problem.tree.n_root, 3)]
-        found.append(descend(problem, frames, q))
-    return reduce(better, found)
+    return reduce(better, [descend(problem, frames, start(problem, frames, share=share)) for share in shares])
 
 
 def from_guess(problem: MarkerProblem, frames: Index, guess: Array) -> Minimum:
-    """Return the minima reached from the postures ``guess`` (nq, F), each root first put where the markers say if that is nearer."""
-    measured, origin = problem.measured(frames)
-    r, angles = min(problem.tree.n_root, 3), guess[len(guess) - problem.tree.joints :]
-    own, moved = guess.copy(), placed(problem.tree, measured, angles)
-    own[:r] -= origin[:r]
-    nearer = fit(problem.tree, measured, moved).cost < fit(problem.tree, measured, own).cost
-    start = np.where(nearer, moved, own)
-    start[:r] += origin[:r]
-    return retry(problem, frames, descend(problem, frames, start))
+    """Return the minima reached from the postures ``guess`` (F, nq), each root first put where the markers say if that is nearer."""
+    moved = placed(problem, frames, guess[:, guess.shape[1] - len(problem.chain.lower) :])
+    own, other = (descend(problem, frames, q, steps=0) for q in (guess, moved))
+    return retry(problem, frames, descend(problem, frames, better(own, other).q))
 
 
 def retry(problem: MarkerProblem, frames: Index, found: Minimum) -> Minimum:
@@ -87,33 +72,22 @@ def retry(problem: MarkerProblem, frames: Index, found: Minimum) -> Minimum:
     sound, bad = np.flatnonzero(~doubtful), np.flatnonzero(doubtful)
     if not (bad.size and sound.size):
         return found
-    best = better(_part(found, bad), from_markers(problem, frames[bad], (*SHARES, *MORE_SHARES)))
+    best = better(found.part(bad), from_markers(problem, frames[bad], (*SHARES, *MORE_SHARES)))
     after = np.searchsorted(sound, bad)
     for neighbour in (sound[np.maximum(after - 1, 0)], sound[np.minimum(after, len(sound) - 1)]):
-        best = better(best, descend(problem, frames[bad], found.q[:, neighbour]))
-    out = _part(found, np.arange(len(frames)))
-    _store(out, bad, best)
+        best = better(best, descend(problem, frames[bad], found.q[neighbour]))
+    out = found.part(np.arange(len(frames)))
+    out.put(bad, best)
     return out
 
 
-def between(chart: Chart, known: Index, q: Array, wanted: Index) -> Array:
-    """Return postures (nq, F) at the frames ``wanted`` (F,) between the postures ``q`` (nq, M) at the frames ``known`` (M,), increasing.
+def between(problem: MarkerProblem, known: Index, q: Array, wanted: Index) -> Array:
+    """Return postures (F, nq) at the frames ``wanted`` (F,) between the postures ``q`` (M, nq) at the frames ``known`` (M,), increasing.
 
     Monotone cubics in smooth coordinates; the first and the last posture are kept outside.
     """
-    values = chart.smooth(q).stacked()
-    if known.size > 1:
-        values = PchipInterpolator(known, values, axis=1)(np.clip(wanted, known[0], known[-1]))
-    else:
-        values = np.repeat(values, len(wanted), axis=1)
-    nearest = np.clip(np.searchsorted(known, wanted), 0, known.size - 1)
-    return chart.posture(chart.split(values), q[len(q) - chart.joint_count :, nearest])
-
-
-def _part(whole: Minimum, frames: Index) -> Minimum:
-    return Minimum(whole.q[:, frames], whole.cost[frames], whole.slope[frames], whole.steps[frames])
-
-
-def _store(whole: Minimum, frames: Index, part: Minimum) -> None:
-    whole.q[:, frames], whole.cost[frames], whole.slope[frames] = part.q, part.cost, part.slope
-    whole.steps[frames] = part.steps
+    out = np.empty((len(wanted), q.shape[1]))
+    if wanted.size:
+        smooth = np.ascontiguousarray(problem.chart.smooth(q.T).stacked().T)
+        interpolate(problem.chain, known, smooth, q, problem.chart.single, wanted, out)
+    return out
