@@ -83,7 +83,8 @@ def designed(subject: Subject, protocol: str) -> Dance:
 
     def make() -> tuple[Dance, float]:
         began = time.perf_counter()
-        dance = design(dancer(subject), read_plan(protocol), resume=CACHE / "unfinished")
+        plan = read_plan(protocol)
+        dance = design(dancer(subject, plan), plan, resume=CACHE / "unfinished")
         return dance, time.perf_counter() - began
 
     dance, seconds = cached(f"dance {subject} {protocol}", make)
@@ -94,7 +95,7 @@ def designed(subject: Subject, protocol: str) -> Dance:
 
 def random_dance(subject: Subject, like: Dance, plan: Plan) -> Dance:
     """Return a dance through as many random feasible postures on the same feet, straight ways between them."""
-    body = dancer(subject)
+    body = dancer(subject, plan)
     chain, rng = Chain(body), np.random.default_rng(7)
     count = {name: sum(s.over is None and s.name == name for s in like.stances) for name, _ in plan.blocks}
     stances = sequence(body, replace(plan, budget=float("inf"), blocks=tuple((name, n) for name, n in count.items() if n)))

@@ -53,7 +53,7 @@ def test_results_json_keeps_its_promise(made: tuple[Path, Path, int]) -> None:
 def test_the_dance_on_disk_keeps_every_limit(made: tuple[Path, Path, int]) -> None:
     folder, protocol, _ = made
     dance = Dance.load(folder / "dance.npz")
-    assert not broken(verify(dancer(Subject(65.0, 1.75, "F")), dance, read_plan(protocol)))
+    assert not broken(verify(dancer(Subject(65.0, 1.75, "F"), read_plan(protocol)), dance, read_plan(protocol)))
 
 
 def test_virtual_markers_are_what_cameras_would_see(made: tuple[Path, Path, int]) -> None:

@@ -59,6 +59,7 @@ def test_one_segment_counts_alone() -> None:
         ("budget_s = -3\n[postures]\nparallel = 3", "budget = -3"),
         ("other_weight = 0\n[postures]\nparallel = 3", "at least one of them positive"),
         ("postures = 3", "must be a table"),
+        ("ranges = 'all'\n[postures]\nparallel = 3", "Legal: anatomical, comfortable"),
     ],
 )
 def test_a_wrong_protocol_is_refused(tmp_path: Path, text: str, said: str) -> None:

@@ -38,7 +38,7 @@ def dance(
     from biodance.report.dance_write import print_dance, write_dance
 
     plan, person = read_plan(protocol), read_person(limits) if limits else HEALTHY
-    body = dancer(Subject(mass, height, sex, age))
+    body = dancer(Subject(mass, height, sex, age), plan)
     folder = dance_folder(out, force=force)
     with counted_progress() as tell:
         try:

@@ -5,9 +5,11 @@ person who may not stand on one leg takes blocks out of the plan (`person.fitted
 """
 
 from dataclasses import dataclass
+from typing import get_args
 
 import numpy as np
 
+from biodance.body.limits import Range
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import Array
 
@@ -25,7 +27,8 @@ class Plan:
     postures found, those that inform most per second are danced until the time is used up (inf: all); ``weights`` (segment, factor) in
     eq. 12 on top of the masses, ``other_weight`` the factor of all segments not named; ``simplicity`` >= 0 of the performer's term beside
     the excitation; ``alone`` the legs on which the person may stand alone, be it for a step;
-    ``holds`` the hands that stay on the grips of a frame.
+    ``holds`` the hands that stay on the grips of a frame; ``ranges`` what joints may use: what is reached without effort, or all that a
+    healthy joint allows (the paper).
     """
 
     name: str
@@ -41,6 +44,7 @@ class Plan:
     simplicity: float = 0.0
     alone: tuple[str, ...] = ("right", "left")
     holds: tuple[str, ...] = ()
+    ranges: Range = "comfortable"
 
     def __post_init__(self) -> None:
         names = [name for name, _ in self.blocks]
@@ -49,6 +53,8 @@ class Plan:
                 raise UnknownName.of("stance", name, STANCES)
         if not names or len(set(names)) < len(names) or any(count < 1 for _, count in self.blocks):
             raise BiodanceError(f"Plan {self.name}: blocks {self.blocks}; expected at least one, each stance once, with 1 posture or more.")
+        if self.ranges not in get_args(Range):
+            raise UnknownName.of(f"range of joints in plan {self.name}", self.ranges, get_args(Range))
         self._check()
 
     def _check(self) -> None:

@@ -9,6 +9,7 @@
     budget_s = 115               the postures that inform most per second are danced until the time is used up; without it: all
     simplicity = 0.0             the performer's term: 0 = excitation only; 1 = a simple dance is worth as much as an exciting one
     other_weight = 1.0           emphasis of the segments that [weights] does not name
+    ranges = "comfortable"       what joints may use: what is reached without effort, or "anatomical": all that a healthy joint allows
 
     [postures]                   how many postures on which feet, in the order of the dance
     parallel = 15                both feet side by side
@@ -42,7 +43,7 @@ NUMBERS = {
     "other_weight": "other_weight",
 }
 """Key of the file: field of the Plan."""
-KEYS = ("name", "description", "postures", "weights", *NUMBERS)
+KEYS = ("name", "description", "postures", "weights", "ranges", *NUMBERS)
 
 
 def read_plan(name_or_path: str | Path) -> Plan:
@@ -62,7 +63,8 @@ def read_plan(name_or_path: str | Path) -> Plan:
     for key in raw:
         if key not in KEYS:
             raise UnknownName.of(f"key of {path}", key, KEYS)
-    fields: dict[str, Any] = {field: number(path, key, raw[key]) for key, field in NUMBERS.items() if key in raw}
+    words = {"ranges": str(raw["ranges"])} if "ranges" in raw else {}
+    fields: dict[str, Any] = words | {field: number(path, key, raw[key]) for key, field in NUMBERS.items() if key in raw}
     counts = table(path, raw, "postures")
     for stance, count in counts.items():
         if not isinstance(count, int) or isinstance(count, bool):

@@ -57,8 +57,8 @@ class DanceResult:
 LEGAL = {"mass": (30.0, 200.0, "kg"), "stature": (1.2, 2.2, "m")}
 
 
-def dancer(subject: Subject) -> Body:
-    """Return the body of a person for whom a dance is designed: a generic one, joints within what is reached without effort.
+def dancer(subject: Subject, plan: Plan) -> Body:
+    """Return the body of a person for whom a dance is designed: a generic one, joints within the ranges that the plan names.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def dancer(subject: Subject) -> Body:
         value = getattr(subject, name)
         if not low <= value <= high:
             raise BiodanceError(f"The {name} is {value:g} {unit}; a dance is designed for {low:g} to {high:g} {unit}. Correct it.")
-    return replace(human(subject), limits=joint_limits(subject, within="comfortable"))
+    return replace(human(subject), limits=joint_limits(subject, within=plan.ranges))
 
 
 def make_dance(
