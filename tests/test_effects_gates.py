@@ -13,6 +13,7 @@ from biodance.effects.case import Case, at_origin, at_point
 from biodance.effects.gate import DiscreteEffect, Gate, Recorded, gates
 from biodance.effects.unit_error import FACTORS
 from biodance.errors import UnknownName
+from biodance.motion.kinematics import poses
 from biodance.motion.track import track
 from biodance.records import Array, Markers, Motion, Plate, Session, Source, Subject, Trial, Wrench
 
@@ -132,6 +133,10 @@ def test_hum_is_named_with_its_amplitude(frequency: float) -> None:
     found = discrete_effects()["mains_hum"].look(recorded(value))
     assert failed(found) == [("mains_hum", "Fx")]
     assert found[0].size == pytest.approx(5, rel=0.05)
+    once = recorded(value)
+    quiet = replace(once.session.trials[0], plates=recorded(standing(np.random.default_rng(8))).session.trials[0].plates)
+    single = Recorded(replace(once.session, trials=(once.session.trials[0], quiet, quiet)))
+    assert failed(discrete_effects()["mains_hum"].look(single)) == [], "a glitch in one trial is no hum"
     slow = discrete_effects()["mains_hum"].look(recorded(value[::10], rate=100.0))
     assert slow == (), "100 Hz cannot show it"
 
@@ -174,6 +179,20 @@ def test_swapped_labels_are_named(pair: tuple[str, str]) -> None:
     wrong = replace(case, trial=trial, motion=track(case.body, trial))
     found = discrete_effects()["labels_swapped"].look(session_of(wrong))
     assert failed(found) == [("labels_swapped", "/".join(pair))]
+
+
+@pytest.mark.parametrize("side", ["L", "R"])
+def test_a_turned_wrist_is_named_in_the_static_trial(side: str) -> None:
+    body = human_case(120).body
+    q = np.tile(body.neutral, (20, 1))
+    xyz = poses(body, q).points(body.markers.segment, body.markers.position)
+    other = {f"{side}WRA": f"{side}WRB", f"{side}WRB": f"{side}WRA"}
+    names = body.markers.names
+    for labels, expected in ((names, []), (tuple(other.get(n, n) for n in names), [("labels_swapped", f"{side}WRA/{side}WRB")])):
+        markers = Markers(labels, np.arange(20) / 100, xyz)
+        static = Trial("static", "static", markers, (), Source(Path("static.c3d"), "", "C3D"))
+        found = discrete_effects()["labels_swapped"].look(Recorded(Session(Subject(MASS, 1.75, "M"), (static,), Path())))
+        assert failed(found) == expected
 
 
 def test_the_library_can_lack_an_effect() -> None:

@@ -23,6 +23,8 @@ ROUGH = 1e-3
 """m, tolerance of the trial trackings."""
 BETTER = 0.3
 """Share of the squared distances that the exchange must leave at most."""
+OPPOSITE = 0.4
+"""Cosine: how opposite one wrist must be to the mirrored other one."""
 LEAST = 0.03
 """m by which a left marker must lie to the right of its right partner in the static trial."""
 
@@ -40,7 +42,7 @@ class LabelsSwapped(DiscreteEffect):
         found: dict[tuple[str, str], list[str]] = {}
         statics = [trial for trial in recorded.session.trials if trial.role == "static" and trial.markers is not None]
         for trial in statics:
-            for pair in crossed(trial):
+            for pair in (*crossed(trial), *turned_wrists(trial)):
                 found.setdefault(pair, []).append(trial.name)
         for case in () if found else _worst(recorded.cases):
             for pair in exchanged(case):
@@ -77,6 +79,32 @@ def crossed(trial: Trial) -> tuple[tuple[str, str], ...]:
     along = apart @ strongest
     leftwards = along * np.sign(np.nansum(np.sign(along)))
     return tuple(pair for pair, side in zip(pairs, leftwards, strict=True) if side < -LEAST)
+
+
+def turned_wrists(trial: Trial) -> tuple[tuple[str, str], ...]:
+    """Return the wrists whose thumb-side marker (WRA) lies behind and inside of the other one (WRB) while the person stands, against the
+    mirrored other wrist.
+    """
+    markers = trial.markers
+    assert markers is not None
+    needed = [f"{side}{name}" for side in "LR" for name in ("WRA", "WRB", "TOE", "HEE")]
+    if any(name not in markers for name in needed):
+        return ()
+    middle = {name: _median(markers[name]) for name in needed}
+    forward = sum((middle[f"{side}TOE"] - middle[f"{side}HEE"] for side in "LR"), np.zeros(3)) * [1, 1, 0]
+    across = (middle["RHEE"] - middle["LHEE"]) * [1, 1, 0]
+    if not (np.isfinite(forward).all() and np.linalg.norm(forward) > 0.1 and np.linalg.norm(across) > LEAST):
+        return ()
+    forward /= np.linalg.norm(forward)
+    right = np.array([forward[1], -forward[0], 0.0])
+    out = {}
+    for side, sign in (("L", -1.0), ("R", 1.0)):
+        bar = middle[f"{side}WRA"] - middle[f"{side}WRB"]
+        out[side] = np.array([bar @ forward, sign * (bar @ right)]) / max(float(np.linalg.norm(bar)), 1e-9)
+    if out["L"] @ out["R"] > -OPPOSITE:
+        return ()
+    wrong = min(out, key=lambda side: float(out[side].sum()))
+    return ((f"{wrong}WRA", f"{wrong}WRB"),)
 
 
 def _median(values: Array) -> Array:

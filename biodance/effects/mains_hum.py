@@ -28,33 +28,36 @@ class MainsHum(DiscreteEffect):
 
     @classmethod
     def look(cls, recorded: Recorded) -> tuple[Gate, ...]:
-        """Return one check per channel that hums, or one that says none does."""
-        found: dict[str, tuple[float, float]] = {}
-        judged = [trial for trial in recorded.session.trials if any(_fast_enough(p.wrench.rate, p.wrench.time.size) for p in trial.plates)]
-        for trial in judged:
-            for target, amplitude, frequency in humming(trial):
-                found[target] = max(found.get(target, (0.0, 0.0)), (amplitude, frequency))
-        said = "{} hums at {:g} Hz with an amplitude of {:.2g}."
-        if found:
-            return tuple(
-                Gate("mains hum", False, said.format(target, frequency, size), cls.name, target, size)
-                for target, (size, frequency) in found.items()
-            )
-        return (Gate("mains hum", True, "No channel of the plates hums at 50 or 60 Hz."),) if judged else ()
+        """Return one check per channel that hums in most trials, or one that says none does."""
+        seen: dict[tuple[str, float], list[float]] = {}
+        trials = 0
+        for trial in recorded.session.trials:
+            amplitudes = lines(trial)
+            trials += bool(amplitudes)
+            for key, amplitude in amplitudes.items():
+                seen.setdefault(key, []).append(amplitude)
+        gates = []
+        for (target, frequency), amplitudes_seen in seen.items():
+            middle = float(np.median(amplitudes_seen))
+            if middle > LEAST[CHANNELS.index(target.rpartition(":")[2])]:
+                said = f"{target} hums at {frequency:g} Hz with an amplitude of {middle:.2g}."
+                gates.append(Gate("mains hum", False, said, cls.name, target, middle))
+        none = (Gate("mains hum", True, "No channel of the plates hums at 50 or 60 Hz."),) if trials else ()
+        return tuple(gates) or none
 
 
-def humming(trial: Trial) -> list[tuple[str, float, float]]:
-    """Return target, amplitude (N, N·m) and frequency (Hz) of every channel that hums."""
-    found = []
+def lines(trial: Trial) -> dict[tuple[str, float], float]:
+    """Return the amplitude (N, N·m) by channel and frequency (Hz) of the mains; 0 where no line stands over its neighbours."""
+    found = {}
     for plate in trial.plates:
         if not _fast_enough(plate.wrench.rate, plate.wrench.time.size):
             continue
         channels = at_point(plate.wrench.value, plate.centre)
         for frequency in MAINS:
             amplitude, around = line(channels, plate.wrench.rate, frequency)
-            for k in np.flatnonzero((amplitude > LEAST) & (amplitude > CLEARLY * around)):
-                name = CHANNELS[k] if len(trial.plates) == 1 else f"{plate.name}:{CHANNELS[k]}"
-                found.append((name, float(amplitude[k]), frequency))
+            for k, name in enumerate(CHANNELS):
+                target = name if len(trial.plates) == 1 else f"{plate.name}:{name}"
+                found[target, frequency] = float(amplitude[k]) if amplitude[k] > CLEARLY * around[k] else 0.0
     return found
 
 
