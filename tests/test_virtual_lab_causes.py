@@ -16,6 +16,7 @@ from biodance.virtual_lab.causes import CAUSES, UNKNOWN
 from biodance.virtual_lab.hide import hide, parse
 from biodance.virtual_lab.laboratory import FIRST_VISIT, Visit
 from biodance.virtual_lab.loose_masses import Spring, swing
+from biodance.virtual_lab.performance import perform
 from biodance.virtual_lab.person import make_person
 from biodance.virtual_lab.protocol import Protocol
 from biodance.virtual_lab.protocol_file import read_protocol
@@ -195,3 +196,14 @@ def test_a_wrong_rate_is_declared_for_both_clocks(squats: Protocol, clean: Trial
 def test_wrong_words_are_refused(text: str, match: str, squats: Protocol, tmp_path: Path) -> None:
     with pytest.raises((BiodanceError, UnknownName), match=match):
         made(tmp_path / "s", squats, text, visit=FIRST_VISIT)
+
+
+def test_without_a_fault_nothing_hums() -> None:
+    """Balance is found in rounds; what alternates between its nodes, 50 Hz, once grew into 1.3 N·m of hum for this person."""
+    subject = Subject(80.4, 1.742, "M")
+    plan = next(trial for trial in read_protocol("diagnosis").trials if trial.name == "move_4")
+    done = perform(make_person(subject, 909), plan, 0, centre=np.array([0.3, 0.2]))
+    wrench = done.wrench(np.arange(0.0, plan.duration, 0.002)).value
+    spectrum = np.abs(np.fft.rfft((wrench - wrench.mean(axis=0)) * np.hanning(len(wrench))[:, None], axis=0)) * 4 / len(wrench)
+    frequency = np.fft.rfftfreq(len(wrench), 0.002)
+    assert spectrum[np.abs(frequency - 50) < 1].max() < 0.05
