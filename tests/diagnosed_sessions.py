@@ -11,6 +11,7 @@ from biodance.body.human import human
 from biodance.diagnose.problem import Look
 from biodance.diagnose.spectrum import EDGES
 from biodance.diagnose.tolerances import Tolerances
+from biodance.effects.case import at_origin
 from biodance.motion.regressor import predict_wrench
 from biodance.records import CHANNELS, Motion, Plate, Source, Subject, Trial, Wrench
 
@@ -74,7 +75,10 @@ def looks(seed: int, *, trials: int = 4, hidden=lambda wrench, time, motion: wre
         moving = motion(10 * seed + k)
         share = (k / trials, (k + 1) / trials)
         session = np.linspace(*share, moving.time.size)
-        value = hidden(predict_wrench(body(), moving, phi).value, session, moving) + noise(rng, moving.time.size)
+        value = hidden(predict_wrench(body(), moving, phi).value, session, moving)
+        value = value + at_origin(noise(rng, moving.time.size), CORNERS.mean(axis=0))
+            noise(rng, moving.time.size), CORNERS.mean(axis=0)
+        )
         plate = Plate("plate1", 2, CORNERS, Wrench(moving.time, value))
         trial = Trial(f"t{k}", "fit", None, (plate,), Source(Path(f"t{k}.c3d"), "", "test"))
         found.append(Look(trial, moving, np.ones(moving.time.size, dtype=bool), *share))

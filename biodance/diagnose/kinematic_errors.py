@@ -11,8 +11,9 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from biodance.body.body import Body
-from biodance.identify.twins import Twins, central_inertia, chains, disturbance, jacobian, neighbours, skew
+from biodance.identify.twins import Twins, central_inertia, disturbance, neighbours
 from biodance.motion.kinematics import Poses, poses, segment_motion
+from biodance.motion.marker_jacobian import chains, jacobian, skew
 from biodance.motion.regressor import GRAVITY
 from biodance.records import Array, Motion
 

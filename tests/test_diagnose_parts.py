@@ -1,0 +1,178 @@
+"""The parts of the diagnosis against brute force: evidence, limits, kinematic errors, rows, tolerances."""
+
+import numpy as np
+import pytest
+from diagnosed_sessions import body, known, looks, motion
+from scipy.stats import multivariate_normal
+
+from biodance.diagnose.candidates import added, candidates, changes, slopes
+from biodance.diagnose.evidence import believe, evidence, smallest
+from biodance.diagnose.kinematic_errors import kinematic_errors
+from biodance.diagnose.model import model
+from biodance.diagnose.naming import screen
+from biodance.diagnose.observability import limits, visibility
+from biodance.diagnose.problem import problem
+from biodance.diagnose.tolerances import Null, Tolerances, key_of, learn, read_tolerances, shipped, to_toml
+from biodance.effects import effect
+from biodance.identify.twins import Twins, central_inertia, disturbance
+from biodance.motion.kinematics import poses, segment_motion
+from biodance.motion.marker_jacobian import jacobian, skew
+from biodance.motion.regressor import GRAVITY
+
+
+def test_evidence_is_the_ratio_of_two_gaussian_densities() -> None:
+    rng = np.random.default_rng(0)
+    X, Z, y = rng.normal(size=(30, 5)), rng.normal(size=(30, 2)), rng.normal(size=30) * 2
+    belief = believe(X, y)
+    s, G = belief.score(Z)
+    found = evidence(s, G, float(np.sum(Z**2)))
+    plain = np.eye(30) + X @ X.T
+    ratio = multivariate_normal(np.zeros(30), plain + Z @ Z.T).logpdf(y) - multivariate_normal(np.zeros(30), plain).logpdf(y)
+    assert found.log_bayes_factor == pytest.approx(ratio)
+    both = np.concatenate([X, Z], axis=1)
+    mean = np.linalg.solve(both.T @ both + np.eye(7), both.T @ y)
+    np.testing.assert_allclose(found.mean, mean[5:])
+    assert 0 < found.visible < 1
+
+
+def test_the_smallest_size_meets_the_threshold_in_the_mean() -> None:
+    rng = np.random.default_rng(1)
+    X, Z = rng.normal(size=(200, 8)), 0.3 * rng.normal(size=(200, 1))
+    _, G = believe(X, np.zeros(200)).score(Z)
+    size = smallest(G, np.ones(1), 10.0)
+    drawn = []
+    for _ in range(400):
+        y = X @ rng.normal(size=8) + rng.normal(size=200) + size * Z[:, 0]
+        s, _ = believe(X, y).score(Z)
+        drawn.append(evidence(s, G, 1.0).log_bayes_factor)
+    assert np.mean(drawn) == pytest.approx(10.0, abs=4 * np.std(drawn) / 20)
+    assert smallest(np.zeros((1, 1)), np.ones(1), 10.0) == float("inf")
+
+
+@pytest.mark.parametrize("kind", ["slide", "centre", "tilt", "flesh"])
+def test_elementary_errors_agree_with_the_twins(kind: str) -> None:
+    one, moving = body(), motion(3)
+    found = kinematic_errors(one, moving)
+    index = {"slide": "slide thigh", "centre": "centre shoulder", "tilt": "tilt knee", "flesh": "flesh shank"}[kind]
+    k = found.groups.index(index)
+    n, markers, segments = len(one.joints), len(one.markers.names), len(one.segments)
+    parts = {"slide": (n, markers, 3, 1), "flesh": (n, segments, 3, 1), "centre": (n, 3, 1), "tilt": (n, 3, 1)}
+    twin = {name: np.zeros(shape) for name, shape in parts.items()}
+    joint = one.joint_index({"slide": "right_hip_flexion", "centre": "right_shoulder_flexion"}.get(kind, "right_knee_flexion"))
+    if kind == "slide":
+        on = [i for i, s in enumerate(one.markers.segment) if one.segments[s] == "right_thigh"]
+        twin["slide"][joint, on, 0, 0] = 1.0
+    elif kind == "flesh":
+        twin["flesh"][joint, one.segment_index("right_shank"), 0, 0] = 1.0
+    elif kind == "centre":
+        twin["centre"][joint, 0, 0] = 1.0
+    else:
+        axis = one.joints[joint].axis
+        across = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+        twin["tilt"][joint, :, 0] = across / np.linalg.norm(across)
+    expected = _through_tracking(one, moving, Twins(**twin))
+    inside = slice(10, -10)
+    scale = np.abs(expected).max(axis=0)
+    np.testing.assert_allclose(found.wrench[inside, :, k] / scale, expected[inside] / scale, atol=0.25)
+    assert np.corrcoef(found.wrench[inside, :, k].ravel(), expected[inside].ravel())[0, 1] > 0.995
+
+
+def _through_tracking(one, moving, twin):
+    pose, segment, every = poses(one, moving.q), list(one.markers.segment), list(range(len(one.segments)))
+    J, _ = jacobian(one, pose, segment, pose.points(segment, one.markers.position))
+    place, turn = jacobian(one, pose, every, pose.points(every, one.sip.com))
+    weighted = np.swapaxes(np.repeat(one.markers.weight, 3)[:, None] * J, 1, 2)
+    normal = weighted @ J
+    ridge = 1e-6 * np.trace(normal, axis1=1, axis2=2)[:, None, None] / one.nv * np.eye(one.nv)
+    wrong = disturbance(one, moving, pose, twin)
+    tangent = -np.linalg.solve(normal + ridge, weighted) @ wrong.markers.reshape(len(J), -1, 1)
+    shape = wrong.places.shape
+    places, turns = (wrong.places + (place @ tangent).reshape(shape))[..., 0], (wrong.turns + (turn @ tangent).reshape(shape))[..., 0]
+    return (_needed(one, moving, places, turns, 1e-3) - _needed(one, moving, places, turns, -1e-3)) / 2e-3
+
+
+def _needed(one, moving, places, turns, size):
+    """Return the wrench from the rates of momentum and angular momentum, CoMs moved and segments turned by ``size`` times the errors."""
+    move, step = segment_motion(one, moving), 1.0 / moving.rate
+    mass, spin = one.sip.mass, move.angular_velocity
+    com = (move.rotation @ one.sip.com[..., None])[..., 0] + move.position + size * places
+    velocity = np.gradient(com, step, axis=0)
+    omega = spin + size * (np.gradient(turns, step, axis=0) + np.cross(turns, spin))
+    turn = np.eye(3) + size * skew(turns)
+    inertia = turn @ move.rotation @ central_inertia(one) @ np.swapaxes(turn @ move.rotation, -1, -2)
+    angular = np.sum(np.cross(com, mass[:, None] * velocity) + (inertia @ omega[..., None])[..., 0], axis=1)
+    force = np.gradient(np.sum(mass[:, None] * velocity, axis=1), step, axis=0)
+    return np.concatenate([force, np.gradient(angular, step, axis=0) - np.sum(np.cross(com, mass[:, None] * GRAVITY), axis=1)], axis=1)
+
+
+@pytest.fixture(scope="module")
+def put():
+    return problem(body(), looks(3, trials=2))
+
+
+def test_rows_are_white_under_the_noise_they_were_made_with(put) -> None:
+    causes = candidates(put, ("plate_offset",))
+    left = model(put, causes, known()).belief.left[: put.wrench_rows]
+    assert np.mean(left**2) == pytest.approx(0.9, abs=0.15)
+
+
+def test_differences_of_a_cause_agree_with_its_columns(put) -> None:
+    late = effect("time_delay")("")
+    columns = put.columns([late])[0]
+    np.testing.assert_allclose(slopes(put, late, np.zeros(1)), columns, atol=0.02 * np.abs(columns).max())
+    np.testing.assert_allclose(changes(put, late, np.zeros(1)), 0.0, atol=1e-9)
+    assert len(added(put, late, np.array([0.01]))) == 2
+
+
+def test_a_load_is_spanned_by_mass_and_place(put) -> None:
+    (one,) = [c for c in candidates(put, ("added_mass",)) if c.effect.target == "left_forearm_hand"]
+    assert one.silent == (False, True, True, True)
+    load = changes(put, one.effect, np.array([1.5, 0.03, -0.04, 0.02]))
+    left = load - one.basis @ np.linalg.lstsq(one.basis, load, rcond=None)[0]
+    assert np.linalg.norm(left) < 0.03 * np.linalg.norm(load)
+
+
+def test_screening_ranks_every_cause_and_limits_them_all(put) -> None:
+    causes = candidates(put, ("plate_offset", "plate_gain"))
+    found = model(put, causes, known())
+    suspects = screen(found, causes)
+    assert len(suspects) == 12
+    rows = limits(visibility(found, causes), 10.0)
+    assert {(row.effect, row.target) for row in rows} == {one.cause.names for one in suspects}
+    assert all(row.told_from >= row.limit > 0 for row in rows)
+
+
+def test_learning_finds_the_sizes_that_made_the_nulls() -> None:
+    rng = np.random.default_rng(5)
+    bands = len(shipped().noise)
+    band = np.repeat(np.arange(bands), 12)
+    truth = {"slide a": 0.5, "gain b": 2.0}
+    nulls = []
+    for _ in range(40):
+        columns = rng.normal(size=(6 * band.size, 8))
+        keys = ("slide a",) * 5 + ("gain b",) * 3
+        theta = np.array([truth[key] for key in keys]) * rng.normal(size=8)
+        nulls.append(Null(columns @ theta + 1.5 * rng.normal(size=len(columns)), columns, keys, band, (), 70.0))
+    start = Tolerances({"slide a": 1.0, "gain b": 1.0}, np.tile(np.eye(6), (bands, 1, 1)), np.ones((bands, 6)), np.ones((bands, 6)), 10.0)
+    found = learn(nulls, start, rounds=8)
+    assert found.size("slide a") == pytest.approx(0.5, rel=0.15)
+    assert found.size("gain b") == pytest.approx(2.0, rel=0.15)
+    np.testing.assert_allclose(np.sqrt(np.trace(found.noise, axis1=1, axis2=2) / 6), 1.5, rtol=0.1)
+
+
+def test_tolerances_survive_their_file() -> None:
+    first = shipped()
+    again = read_tolerances(to_toml(first))
+    assert again.sizes == pytest.approx(dict(first.sizes))
+    np.testing.assert_allclose(again.noise, first.noise, rtol=1e-3)
+    assert again.threshold == first.threshold
+    for matrix, covariance in zip(first.whiteners(70.0), first.noise, strict=True):
+        np.testing.assert_allclose(matrix @ covariance @ matrix.T, np.eye(6), atol=1e-6)
+
+
+def test_plates_and_sides_share_their_tolerances() -> None:
+    assert key_of("plate_gain", "plate2:Fz") == key_of("plate_gain", "Fz") == "plate_gain Fz"
+    assert key_of("joint_centre", "left_hip") == key_of("joint_centre", "right_hip") == "joint_centre hip"
+    assert key_of("marker_misplaced", "LASI") == "marker_misplaced ASI"
+    assert key_of("marker_misplaced", "C7") == "marker_misplaced C7"
+    assert key_of("time_delay", "") == "time_delay"
