@@ -1,6 +1,7 @@
 """Holding a frame: exact slopes, postures that reach the grip, and other code that sees when a hand lets go."""
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -27,8 +28,9 @@ CHAIN = Chain(BODY)
 FRAME = holding(stance(BODY, "parallel"), BODY, ("right",))
 
 
-def held(seed: int = 0) -> Array:
-    rng = np.random.default_rng(seed)
+@cache
+def held() -> Array:
+    rng = np.random.default_rng(0)
     for _ in range(4 * ATTEMPTS):
         found = solve(CHAIN, FRAME, start(CHAIN, FRAME, rng), anyhow, iterations=60)
         if found.violation <= KEPT:
