@@ -77,8 +77,6 @@ def looks(seed: int, *, trials: int = 4, hidden=lambda wrench, time, motion: wre
         session = np.linspace(*share, moving.time.size)
         value = hidden(predict_wrench(body(), moving, phi).value, session, moving)
         value = value + at_origin(noise(rng, moving.time.size), CORNERS.mean(axis=0))
-            noise(rng, moving.time.size), CORNERS.mean(axis=0)
-        )
         plate = Plate("plate1", 2, CORNERS, Wrench(moving.time, value))
         trial = Trial(f"t{k}", "fit", None, (plate,), Source(Path(f"t{k}.c3d"), "", "test"))
         found.append(Look(trial, moving, np.ones(moving.time.size, dtype=bool), *share))
