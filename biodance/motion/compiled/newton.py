@@ -185,11 +185,10 @@ def distances(chain, xyz, q, out):
     at = sums_of(chain)
     for f in range(q.shape[0]):
         place(chain, q[f], at)
+        x, y, z = (q[f, 0], q[f, 1], q[f, 2]) if chain.roots else (0.0, 0.0, 0.0)
         for k in range(xyz.shape[1]):
-            s, square = chain.slot[k], 0.0
-            for c in range(3):
-                r = at.origin[s, c] - xyz[f, k, c] + (q[f, c] if chain.roots else 0.0)
-                for d in range(3):
-                    r += at.rotation[s, c, d] * chain.local[k, d]
-                square += r * r
-            out[f, k] = np.sqrt(square)
+            o, R, a, m = at.origin[chain.slot[k]], at.rotation[chain.slot[k]], chain.local[k], xyz[f, k]
+            rx = o[0] + x - m[0] + R[0, 0] * a[0] + R[0, 1] * a[1] + R[0, 2] * a[2]
+            ry = o[1] + y - m[1] + R[1, 0] * a[0] + R[1, 1] * a[1] + R[1, 2] * a[2]
+            rz = o[2] + z - m[2] + R[2, 0] * a[0] + R[2, 1] * a[1] + R[2, 2] * a[2]
+            out[f, k] = np.sqrt(rx * rx + ry * ry + rz * rz)
