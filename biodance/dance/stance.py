@@ -45,6 +45,7 @@ class Stance:
     hands: Array = field(default_factory=lambda: np.full((2, 3), np.nan))
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "planted", tuple(self.planted))
         object.__setattr__(self, "ankle", frozen_array(self.ankle, (2, 3), "Stance.ankle"))
         object.__setattr__(self, "soles", frozen_array(self.soles, (2, None, 3), "Stance.soles"))
         object.__setattr__(self, "hands", frozen_array(self.hands, (2, 3), "Stance.hands"))
