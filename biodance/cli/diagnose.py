@@ -10,6 +10,31 @@ from biodance.cli.app import DONE, NEEDS_A_PERSON, Force, Json, Out, app, print_
 
 
 @app.command
+def foresee(dance: Path, *, json: Json = False) -> int:
+    """Say before a recording what a designed dance will be able to see, from which size on, and which causes it will confuse.
+
+    Parameters
+    ----------
+    dance
+        The file dance.npz that `biodance dance` wrote.
+    """
+    from rich.console import Console
+
+    from biodance.pipeline.diagnosis import foresee_dance
+    from biodance.report.diagnosis_json import foresight_document
+    from biodance.report.terminal import print_foresight
+
+    with progress() as tell:
+        tell("foreseeing what the dance will see")
+        document = foresight_document(foresee_dance(dance))
+    if json:
+        print_json(document)
+    else:
+        print_foresight(document, Console())
+    return DONE
+
+
+@app.command
 def diagnose(
     session: Path,
     *,

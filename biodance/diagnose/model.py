@@ -61,6 +61,7 @@ def white(problem: Problem, tolerances: Tolerances, rows: Array) -> Array:
     """Return ``rows`` (r, n) of the problem in units of their standard deviation."""
     body = problem.cases[0].body
     keys = tuple(f"marker {kind_of(body.segments[s])}" for s in body.markers.segment for _ in range(3))
+    keys += tuple(f"shown {name}" for name, _ in problem.shown)
     return whitened(rows, problem.spectrum.band, keys, float(body.sip.mass.sum()), tolerances)
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.diagnose.kinematic_errors import Errors, kinematic_errors
 from biodance.diagnose.spectrum import Spectrum, spectrum, thinned
+from biodance.effects import effects
 from biodance.effects.case import Case
 from biodance.effects.effect import Effect
 from biodance.identify.caution import widened
@@ -43,7 +44,7 @@ class Problem:
     ``cases`` thinned trials with the parameters in use; ``spectrum`` where rows come from; ``target`` (r,) measured minus what the prior's
     mean predicts; ``prior`` of the parameters and ``factor`` S (p, k) of its covariance; ``sip`` (r, k) columns W S; ``kinematics``
     (r, K) columns of unit errors of ``groups`` (K); ``markers`` how many of the r rows, at the end, are
-    marker rows (m); ``notes`` what was left out.
+    marker rows (m), before the last s that are the sizes ``shown`` (effect, target) by the markers alone; ``notes`` what was left out.
     """
 
     cases: tuple[Case, ...]
@@ -56,6 +57,7 @@ class Problem:
     groups: tuple[str, ...]
     markers: int
     notes: tuple[str, ...] = ()
+    shown: tuple[tuple[str, str], ...] = ()
 
     @property
     def wrench_rows(self) -> int:
@@ -70,7 +72,7 @@ class Problem:
         return [np.concatenate([part, self.marker_rows(one)]) for part, one in zip(parts, some, strict=True)]
 
     def marker_rows(self, effect: Effect) -> Array:
-        """Return (m, p): what one unit of each parameter of ``effect`` adds to the marker rows."""
+        """Return (m + s, p): what one unit of each parameter of ``effect`` adds to the marker rows and to the sizes shown."""
         found = [effect.marker_columns(case) for case in self.cases]
         out = np.zeros((self.markers, len(effect.parameters)))
         share = _shares(self.spectrum, len(self.cases))
@@ -79,7 +81,9 @@ class Problem:
                 full = np.zeros((len(case.body.markers.names), 3, columns.shape[2]))
                 full[list(case.marker_columns)] = columns
                 out += weight * full.reshape(self.markers, -1)
-        return out
+        sizes = np.zeros((len(self.shown), out.shape[1]))
+        sizes[[one == (effect.name, effect.target) for one in self.shown]] = 1.0
+        return np.concatenate([out, sizes])
 
     def with_parameters(self, phi: Array) -> "Problem":
         """Return the problem whose faults are predicted with the parameters ``phi`` (10N,); what is measured against stays the prior."""
@@ -109,11 +113,24 @@ def problem(body: Body, looks: tuple[Look, ...], *, prior: Sip | None = None) ->
     W = where.rows(tuple(case.regressor @ factor for case in cases))
     errors = [[kinematic_errors(body, _part(case.motion, pick)) for pick in picks] for case, picks in zip(cases, where.picks, strict=True)]
     rows, markers = _kinematic_rows(where, errors)
-    sip = np.concatenate([W.reshape(-1, W.shape[2]), np.zeros((len(markers), W.shape[2]))])
+    shown = sizes_shown(cases, where)
+    sip = np.concatenate([W.reshape(-1, W.shape[2]), np.zeros((len(markers) + len(shown), W.shape[2]))])
     groups = next(one.groups for some in errors for one in some)
     measured = where.rows(tuple(case.residual[:, :, None] for case in cases))
-    target = np.concatenate([measured.ravel(), _mean_markers(cases, where).ravel()])
-    return Problem(cases, where, target, before, factor, sip, np.concatenate([rows, markers]), groups, len(markers), notes)
+    target = np.concatenate([measured.ravel(), _mean_markers(cases, where).ravel(), list(shown.values())])
+    rows = np.concatenate([rows, markers, np.zeros((len(shown), rows.shape[1]))])
+    return Problem(cases, where, target, before, factor, sip, rows, groups, len(markers), notes, tuple(shown))
+
+
+def sizes_shown(cases: tuple[Case, ...], where: Spectrum) -> dict[tuple[str, str], float]:
+    """Return by effect and target the size that the markers show by themselves: root mean square over the session."""
+    found = {}
+    for name, kind in effects().items():
+        for target in kind.targets(cases[0]) if kind.shown is not Effect.shown and len(kind.parameters) == 1 else ():
+            sizes = [kind(target).shown(case) for case in cases]
+            squares = np.array([0.0 if size is None else size[0] ** 2 for size in sizes])
+            found[name, target] = float(np.sqrt(squares @ _shares(where, len(cases))))
+    return found
 
 
 def _part(motion: Motion, pick: NDArray[np.intp]) -> Motion:

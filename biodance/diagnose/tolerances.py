@@ -114,7 +114,8 @@ def whitened(rows: Array, band: NDArray[np.intp], marker_keys: tuple[str, ...], 
     for b, matrix in enumerate(tolerances.whiteners(mass).astype(rows.dtype)):
         chosen = band == b
         white[chosen] = matrix @ wrench[chosen]
-    sd = np.array([max(tolerances.size(key), MARKER_FLOOR) for key in marker_keys], dtype=rows.dtype)
+    known = [tolerances.size(key) for key in marker_keys]
+    sd = np.array([max(size, MARKER_FLOOR) if size > 0 else np.inf for size in known], dtype=rows.dtype)
     return np.concatenate([white.reshape(count, -1), rows[count:] / sd[:, None]])
 
 

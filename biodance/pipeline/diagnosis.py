@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from biodance.body.body import Body
 from biodance.diagnose.accept import Judged, accept, fit_of, gain, judged
 from biodance.diagnose.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnose.engine import Examined, diagnose
+from biodance.diagnose.foresight import Foresight, foresee, session_of
 from biodance.diagnose.problem import Look
 from biodance.diagnose.tolerances import Tolerances
 from biodance.effects.case import Case
@@ -19,6 +21,9 @@ from biodance.identify.identification import Identification, identify, standing_
 from biodance.pipeline.identification import FITTED, KEPT, SessionIdentification
 from biodance.pipeline.results import SessionResult, TrialResult
 from biodance.records import Role, Sip
+
+TRIAL_SECONDS = 20.0
+"""s: a designed dance is looked at as trials of about this length."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +96,20 @@ def diagnose_session(
         return SessionDiagnosis(examined.diagnosis, examined, before)
     tell("measuring what the findings change")
     return _accepted(result, examined, before)
+
+
+def foresee_dance(path: Path) -> Foresight:
+    """Return what the dance in a file of `biodance dance` will be able to see, as trials of about `TRIAL_SECONDS`.
+
+    Raises
+    ------
+    FileRefused
+        The file is no dance.
+    """
+    from biodance.dance.dance import Dance
+
+    dance = Dance.load(path)
+    return foresee(dance.body, session_of(dance.motion(50.0), TRIAL_SECONDS))
 
 
 def _discrete(names: tuple[str, ...] | None) -> tuple[str, ...] | None:

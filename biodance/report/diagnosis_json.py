@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from biodance.diagnose.diagnosis import Alias, Finding, Gain, Unobservable
+from biodance.diagnose.foresight import Foresight
 from biodance.effects.gate import Gate
 from biodance.identify.identification import Identification
 from biodance.pipeline.diagnosis import SessionDiagnosis
@@ -52,6 +53,19 @@ def _limit(row: Unobservable) -> dict[str, Any]:
         "unit": row.unit,
         "told_from": row.told_from,
         "typical": row.typical,
+    }
+
+
+def foresight_document(found: Foresight) -> dict[str, Any]:
+    """Return what a movement will be able to see; ``separation`` the smallest expected log Bayes factor between two causes it sees."""
+    pairs = [
+        {"cause": " ".join(p.cause).strip(), "other": " ".join(p.other).strip(), "log_bayes_factor": p.difference} for p in found.confusions
+    ]
+    return {
+        "limits": [_limit(row) for row in found.limits],
+        "unobservable": [_limit(row) for row in found.hidden],
+        "confusions": pairs,
+        "separation": found.separation,
     }
 
 

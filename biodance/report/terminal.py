@@ -78,6 +78,22 @@ def print_identification(found: dict[str, Any], console: Console) -> None:
         console.print(f"note: {escape(note)}", soft_wrap=True)
 
 
+def print_foresight(found: dict[str, Any], console: Console) -> None:
+    """Print what a movement will see, what it will confuse, and what it cannot see, of `biodance foresee`."""
+    table = Table(box=None, pad_edge=False)
+    for heading in ("cause", "will be seen from", "and told from the others from", "typical"):
+        table.add_column(heading)
+    for row in found["limits"]:
+        cells = (f"{row[key]:.3g} {row['unit']}" if row[key] is not None else "never" for key in ("limit", "told_from", "typical"))
+        table.add_row(escape(f"{row['effect']} {row['target']}".strip()), *cells)
+    console.print(table)
+    for pair in found["confusions"]:
+        if pair["log_bayes_factor"] is None or pair["log_bayes_factor"] < 3:
+            console.print(f"will confuse: {escape(pair['cause'])} with {escape(pair['other'])}")
+    hidden = ", ".join(f"{row['effect']} {row['target']}".strip() for row in found["unobservable"])
+    console.print(f"cannot see: {escape(hidden or 'nothing of what it looks for')}", soft_wrap=True)
+
+
 def print_diagnosis(found: dict[str, Any], console: Console) -> None:
     """Print the verdict, what was named with size and interval, and what could not be seen, of `biodance diagnose`."""
     console.print(f"verdict: [bold]{found['verdict']}[/]")

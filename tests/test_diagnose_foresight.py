@@ -1,0 +1,62 @@
+"""What a movement will be able to see, before any force is measured."""
+
+import numpy as np
+import pytest
+from diagnosed_sessions import body, known, motion
+from random_bodies import random_body, random_motion
+
+from biodance.dance.target import target
+from biodance.diagnose.foresight import foresee, planned, session_of
+from biodance.diagnose.separation import evaluate
+from biodance.identify.base_parameters import structural_base
+from biodance.identify.information import fold
+from biodance.motion.regressor import regressor
+
+CHOSEN = ("plate_gain", "plate_offset", "body_mass", "time_delay", "added_mass")
+
+
+def test_a_planned_movement_says_what_it_will_see() -> None:
+    moves = tuple(motion(s) for s in (1, 2, 3))
+    found = foresee(body(), moves, tolerances=known(), chosen=CHOSEN)
+    limit = {(row.effect, row.target): row.limit for row in found.limits}
+    assert 0 < limit["plate_gain", "Fz"] < 0.05
+    assert limit["added_mass", "left_forearm_hand"] < limit["added_mass", "pelvis"]
+    assert found.confusions[0].difference == found.separation
+    assert {"body_mass", "added_mass"} >= {found.confusions[0].cause[0]} | {found.confusions[0].other[0]}
+    more = foresee(body(), (*moves, *(motion(s) for s in (4, 5, 6))), tolerances=known(), chosen=CHOSEN)
+    later = {(row.effect, row.target): row.limit for row in more.limits}
+    assert later["plate_gain", "Fz"] < limit["plate_gain", "Fz"]
+
+
+def test_standing_still_sees_no_delay() -> None:
+    still = motion(1)
+    frozen = type(still)(still.time, np.tile(still.q[0], (still.time.size, 1)), 0 * still.v, 0 * still.a)
+    found = foresee(body(), (frozen,), tolerances=known(), chosen=("plate_gain", "plate_offset"))
+    assert {row.effect for row in found.hidden} >= {"plate_gain"}
+
+
+def test_a_planned_trial_has_the_tables_wrench_and_markers_without_residual() -> None:
+    trial = planned(body(), motion(1), "p")
+    assert trial.markers is not None
+    assert np.abs(trial.plates[0].centre[:2] - np.nanmean(trial.wrench.cop()[:, :2], axis=0)).max() < 1e-9
+
+
+def test_a_long_movement_is_cut_into_trials() -> None:
+    pieces = session_of(motion(1), 4.0)
+    assert len(pieces) == 3
+    assert sum(one.time.size for one in pieces) == motion(1).time.size
+
+
+def test_the_gradient_of_the_separation_agrees_with_differences() -> None:
+    one = random_body(np.random.default_rng(0), n_segments=3)
+    aim = target(one, structural_base(one))
+    R = fold(regressor(one, random_motion(one, np.random.default_rng(1), frames=40)).reshape(-1, 30))
+    value, gradient = evaluate(R, aim)
+    rng = np.random.default_rng(2)
+    for _ in range(4):
+        step = rng.normal(size=R.shape)
+        h = 1e-6 * np.linalg.norm(R) / np.linalg.norm(step)
+        slope = (evaluate(R + h * step, aim)[0] - evaluate(R - h * step, aim)[0]) / (2 * h)
+        assert 2 * np.sum((R @ gradient) * step) == pytest.approx(slope, rel=2e-3)
+    twice = evaluate(np.concatenate([R, R]), aim)[0]
+    assert twice < value
