@@ -42,6 +42,8 @@ CENTRE = 0.1
 """Worth of 1 dm² of mean squared distance of the zero-moment point from the middle, beside log cond."""
 LITTLE = 0.01
 """s·(rad/s²)², information on every inertia that is supposed before the first move."""
+HOPELESS = 0.5
+"""Violation after a round, in scales, with which a start is given up."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,6 +169,8 @@ def find_move(task: Task, history: Array, *, rng: np.random.Generator) -> Move:
                 best = found
             if best.violation == 0:
                 return best
+            if found.violation > HOPELESS:
+                break
             time = np.union1d(time, instants)
     assert best is not None
     return best

@@ -9,7 +9,7 @@ from biodance.dance.transitions import Move, Task, find_move
 from biodance.errors import BiodanceError
 from biodance.records import Array
 
-SLOWER = (1.0, 1.25, 1.5)
+SLOWER = (1.0, 1.4)
 """Factors on the duration of a move, one after the other."""
 DETOURS = 4
 """Postures in between that are tried."""
