@@ -6,7 +6,7 @@ acceleration of link k, x the spatial cross product. For link n and a coordinate
     dV_n/dx_i = J_i x (V_n - V_i)                       dA_n/dx_i  = J_i x (A_n - A_i) + (V_i x J_i) x (V_n - V_i)
     dV_n/dv_i = J_i                                     dA_n/dv_i  = V_i x J_i + J_i x (V_n - V_i)
 
-(derivation: docs/derivations.md section 8). Forces come from pinocchio's RNEA derivatives.
+(derivation: docs/derivations.md section 12). Forces come from pinocchio's RNEA derivatives.
 """
 
 from dataclasses import dataclass
