@@ -13,25 +13,31 @@ from biodance.identify.base_parameters import structural_base
 from biodance.records import Array
 
 
-def condition(gram: Array) -> tuple[float, Array]:
-    """Return cond = sqrt(largest / smallest eigenvalue) of a Gram matrix (k, k) and its gradient (k, k)."""
-    value, vector = np.linalg.eigh(gram)
-    value = np.maximum(value, 1e-12 * max(value[-1], 1e-12))
-    cond = float(np.sqrt(value[-1] / value[0]))
-    return cond, 0.5 * cond * (np.outer(vector[:, -1], vector[:, -1]) / value[-1] - np.outer(vector[:, 0], vector[:, 0]) / value[0])
+def condition(gram: Array) -> tuple[Array, Array]:
+    """Return cond = sqrt(largest / smallest eigenvalue) of Gram matrices (..., k, k), (...), and its gradient (..., k, k)."""
+    value, vector = _spectrum(gram)
+    cond = np.sqrt(value[..., -1] / value[..., 0])
+    by = np.zeros_like(value)
+    by[..., -1] += 1 / value[..., -1]
+    by[..., 0] -= 1 / value[..., 0]
+    return cond, (vector * (0.5 * cond[..., None] * by)[..., None, :]) @ np.swapaxes(vector, -1, -2)
 
 
-def smooth_condition(gram: Array, *, sharpness: int) -> tuple[float, Array]:
+def smooth_condition(gram: Array, *, sharpness: int) -> tuple[Array, Array]:
     """Return a condition number without kinks and its gradient: power means of the eigenvalues instead of largest and smallest.
 
     sqrt(mean(value^p)^(1/p) * mean(value^-p)^(1/p)), p = ``sharpness``: at most cond, 1 exactly where cond is, cond for p -> infinity.
     """
+    value, vector = _spectrum(gram)
+    high, low = (value / value[..., -1:]) ** sharpness, (value[..., :1] / value) ** sharpness
+    cond = np.sqrt(value[..., -1] / value[..., 0] * (high.mean(axis=-1) * low.mean(axis=-1)) ** (1 / sharpness))
+    by = 0.5 * cond[..., None] * (high / high.sum(axis=-1, keepdims=True) - low / low.sum(axis=-1, keepdims=True)) / value
+    return cond, (vector * by[..., None, :]) @ np.swapaxes(vector, -1, -2)
+
+
+def _spectrum(gram: Array) -> tuple[Array, Array]:
     value, vector = np.linalg.eigh(gram)
-    value = np.maximum(value, 1e-12 * max(value[-1], 1e-12))
-    high, low = (value / value[-1]) ** sharpness, (value[0] / value) ** sharpness
-    cond = float(np.sqrt(value[-1] / value[0] * (high.mean() * low.mean()) ** (1 / sharpness)))
-    by = 0.5 * cond * (high / high.sum() - low / low.sum()) / value
-    return cond, (vector * by) @ vector.T
+    return np.maximum(value, 1e-12 * np.maximum(value[..., -1:], 1e-12)), vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,18 +62,22 @@ def blocks(body: Body) -> Blocks:
     return Blocks(first, second, np.array(body.sip.mass))
 
 
-Measure = Callable[[Array], tuple[float, Array]]
-"""Says of a Gram matrix (k, k) how badly conditioned it is, and the gradient (k, k)."""
+Measure = Callable[[Array], tuple[Array, Array]]
+"""Says of Gram matrices (..., k, k) how badly conditioned they are (...), and the gradient (..., k, k)."""
 
 
 def total(weight: Array, grams: Array, pick: tuple[list[int], ...], *, measure: Measure = condition) -> tuple[float, Array]:
     """Return sum_i M_i cond(W_bi) and its gradient by the Gram matrices (N, k, k); segments without weight or columns do not count."""
     value, slope = 0.0, np.zeros_like(grams)
+    alike: dict[tuple[int, ...], list[int]] = {}
     for i, columns in enumerate(pick):
         if columns and weight[i] > 0:
-            cond, part = measure(grams[i][np.ix_(columns, columns)])
-            value += weight[i] * cond
-            slope[i][np.ix_(columns, columns)] = weight[i] * part
+            alike.setdefault(tuple(columns), []).append(i)
+    for picked, segments in alike.items():
+        block = np.ix_(segments, picked, picked)
+        cond, part = measure(grams[block])
+        value += float(weight[segments] @ cond)
+        slope[block] = weight[segments][:, None, None] * part
     return value, slope
 
 

@@ -136,9 +136,9 @@ class Objective:
         return value + found, slope + dynamic_slopes(state, segments, by[segments] / GRID)
 
 
-def _logarithm(gram: Array) -> tuple[float, Array]:
+def _logarithm(gram: Array) -> tuple[Array, Array]:
     value, slope = condition(gram)
-    return float(np.log(value)), slope / value
+    return np.log(value), slope / value[..., None, None]
 
 
 def _nothing(state: State) -> tuple[float, Array]:

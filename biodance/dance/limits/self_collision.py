@@ -10,10 +10,10 @@ from biodance.dance.state import State
 from biodance.records import Array
 
 NAME, UNIT, SCALE = "self_collision", "m", 0.05
-SAMPLES = np.linspace(0.0, 1.0, 9)
+SAMPLES = np.linspace(0.0, 1.0, 33)
 """Places on the axis of a capsule that are held against a box in each round of the search."""
-ROUNDS = 11
-"""Of the search, which leaves a fourth of the line each time."""
+ROUNDS = 6
+"""Of the search, which leaves a sixteenth of the line each time."""
 
 
 def margins(state: State) -> Margins:
@@ -84,7 +84,7 @@ def outside(point: Array, half: Array) -> tuple[Array, Array]:
 def deepest(ends: Array, half: Array) -> Array:
     """Return where (T, K), 0..1, the lines between ``ends`` (T, K, 2, 3) come nearest to their boxes with half sides (K, 3).
 
-    The signed distance from a convex body is convex along a line, so that the smallest of nine samples encloses the minimum.
+    The signed distance from a convex body is convex along a line, so that the smallest sample and its neighbours enclose the minimum.
     """
     start, width = np.zeros(ends.shape[:2]), np.ones(ends.shape[:2])
     for _ in range(ROUNDS):
