@@ -17,12 +17,14 @@ if TYPE_CHECKING:
 
 def reported(recording: "Session", folder: Path, tell: "Callable[[str], None]") -> "tuple[SessionResult, dict[str, Any]]":
     """Examine a session and report it into ``folder``; return the result and the content of results.json."""
+    from biodance.pipeline.diagnosis import diagnosed
     from biodance.pipeline.session import examine
     from biodance.report.write import write_report
 
     result = examine(recording, tell=tell)
+    found = diagnosed(result, tell=tell) if not result.stopped else None
     tell("writing the page")
-    return result, write_report(result, folder)
+    return result, write_report(result, folder, diagnosis=found)
 
 
 def told(result: "SessionResult", folder: Path, found: "dict[str, Any]", json: bool) -> int:

@@ -98,6 +98,14 @@ def diagnose_session(
     return _accepted(result, examined, before)
 
 
+def diagnosed(result: SessionResult, *, tell: Callable[[str], None] = lambda _: None) -> SessionDiagnosis | None:
+    """Return the diagnosis of a session; None where the recordings cannot carry one."""
+    try:
+        return diagnose_session(result, tell=tell)
+    except BiodanceError:
+        return None
+
+
 def foresee_dance(path: Path) -> Foresight:
     """Return what the dance in a file of `biodance dance` will be able to see, as trials of about `TRIAL_SECONDS`.
 

@@ -43,6 +43,23 @@ def odds(log_bayes_factor: float) -> str:
     return f"{number(2.718281828**log_bayes_factor, 0)} times as probable as nothing wrong"
 
 
+def diagnosis_section(one: Diagnosis) -> str:
+    """Return the section of the session's report on what the simulation gets wrong, as HTML text."""
+    from markupsafe import Markup
+
+    rows = Markup("").join(
+        Markup("<tr><th scope='row'>{}</th><td>{}</td><td>{}</td></tr>").format(
+            named(f.effect, f.target), "; ".join(f"{p.name.replace('_', ' ')} {estimated(p)}" for p in f.parameters), f.advice
+        )
+        for f in one.findings
+    )
+    table = Markup("<table><tbody>{}</tbody></table>").format(rows) if one.findings else Markup("")
+    return Markup(
+        "<section><h2>What the simulation gets wrong</h2><p class='look'><strong>{}</strong></p>{}"
+        "<p class='small'>biodance diagnose says how we know, what else it could be and what accepting it changes.</p></section>"
+    ).format(answer(one), table)
+
+
 def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: Provenance) -> str:
     """Return the page as HTML text; the same arguments give the same characters."""
     from jinja2 import Environment, StrictUndefined

@@ -68,8 +68,9 @@ def _trial_part(result: TrialResult) -> TrialPart:
     )
 
 
-def page(result: SessionResult, provenance: Provenance, *, still: str = "") -> str:
-    """Return the page of ``result`` as HTML text; ``still`` is the address of its 3-D image, "" for none.
+def page(result: SessionResult, provenance: Provenance, *, still: str = "", diagnosis: str = "") -> str:
+    """Return the page of ``result`` as HTML text; ``still`` is the address of its 3-D image, ``diagnosis`` the section on what
+    the simulation gets wrong, "" for none.
 
     The same arguments give the same characters.
     """
@@ -88,6 +89,7 @@ def page(result: SessionResult, provenance: Provenance, *, still: str = "") -> s
         parts=[_trial_part(trial) for trial in result.trials],
         standing=svg_address(standing_figure(result.standing)) if result.standing else "",
         still=still,
+        diagnosis=Markup(diagnosis),
         identification=Markup(identification_section(result.identification)) if result.identification else "",
         words=STATUS_WORDS,
     )

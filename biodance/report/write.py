@@ -10,7 +10,7 @@ from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.provenance import Provenance, now, provenance
 from biodance.pipeline.results import SessionResult
 from biodance.report.diagnosis_json import diagnosis_document
-from biodance.report.diagnosis_page import diagnosis_page
+from biodance.report.diagnosis_page import diagnosis_page, diagnosis_section
 from biodance.report.identification_json import identification_document
 from biodance.report.page import page
 from biodance.report.results_json import document, plain, to_text
@@ -19,11 +19,11 @@ from biodance.report.solid import still_address
 PAGE, NUMBERS = "report.html", "results.json"
 
 
-def write_report(result: SessionResult, folder: Path) -> dict[str, Any]:
+def write_report(result: SessionResult, folder: Path, *, diagnosis: SessionDiagnosis | None = None) -> dict[str, Any]:
     """Write ``report.html`` and ``results.json`` into ``folder`` (which exists) and return the content of the latter."""
     made = provenance(result, created=now())
-    found = document(result, made)
-    _write(folder, {NUMBERS: to_text(found), PAGE: _page(result, made)})
+    found = document(result, made) | {"diagnosis": diagnosis_document(diagnosis) if diagnosis else None}
+    _write(folder, {NUMBERS: to_text(found), PAGE: _page(result, made, diagnosis)})
     return dict(plain(found))
 
 
@@ -51,8 +51,9 @@ def write_diagnosis(result: SessionResult, found: SessionDiagnosis, folder: Path
     return dict(plain(numbers))
 
 
-def _page(result: SessionResult, made: Provenance) -> str:
-    return page(result, made, still=still_address(result.still) if result.still else "")
+def _page(result: SessionResult, made: Provenance, diagnosis: SessionDiagnosis | None = None) -> str:
+    told = diagnosis_section(diagnosis.diagnosis) if diagnosis else ""
+    return page(result, made, still=still_address(result.still) if result.still else "", diagnosis=told)
 
 
 def _write(folder: Path, files: dict[str, str]) -> None:
