@@ -23,7 +23,7 @@ from biodance.records import Array, Motion, Wrench
 FRICTION = 0.5
 STILL = 1e-6
 """m, rad: how far a planted foot may be from where it stands: rounding."""
-TOUCH = 1e-9
+TOUCH = 1e-7
 """m by which a sole that has just left the ground may be below it: rounding."""
 STOOL = 0.03
 """m by which the knees of a seated person may hang below the hips."""
