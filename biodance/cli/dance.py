@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, Force, Json, Out, app, print_json, progress, say
+from biodance.cli.app import DONE, NEEDS_A_PERSON, STOPPED, Force, Json, Out, app, print_json, progress, say
 
 
 @app.command
@@ -45,7 +45,7 @@ def dance(
             result = make_dance(body, plan, person, seed=seed, tell=tell, resume=folder / UNFINISHED)
         except KeyboardInterrupt:
             say(f"Stopped; {folder} keeps what is finished. The same command goes on from there.")
-            raise
+            return STOPPED
         tell("writing", 0, 0)
         found = write_dance(result, folder)
     shutil.rmtree(folder / UNFINISHED, ignore_errors=True)
