@@ -10,6 +10,7 @@ import json
 import resource
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -75,6 +76,7 @@ def told(name: str, folder: Path) -> str:
     except BiodanceError as error:
         return f"{who} | refused: {error} |"
     margins, numbers = verify(body, dance, plan), account(dance, plan)
+    numbers = account(dance, replace(plan, weights=tuple((name, 0.0) for name in numbers.hardly)))  # feet that never leave the ground
     worst = min(margins, key=lambda m: m.worst if m.limit not in ("continuity", "foot_placement") else np.inf)
     slow, stops = int(np.sum(dance.move > plan.move + 1e-9)), int(np.sum(dance.hold == 0))
     holds = sum(m.worst >= 0 for m in margins)

@@ -46,4 +46,3 @@ def middle_posture(chain: Chain, stance: Stance, neighbours: Array, *, seed: lis
         tried.append(begin)
         begin = start(chain, stance, rng)
     refuse(chain, stance, tried)
-    return found

@@ -6,8 +6,9 @@ number of growing sharpness, and after two independent runs postures are exchang
 
 from collections.abc import Iterator
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from typing import NoReturn
 
 import numpy as np
 
@@ -34,7 +35,7 @@ RUNS = 2
 """Independent searches whose postures are put together."""
 SWEEPS = ((4, 20), (4, 10))
 """Sharpness of the smooth condition number and iterations for every posture, of the sweeps of a run."""
-FRESH, POLISH = ((8, 20),), ((8, 10), (8, 10), (16, 10), (16, 10), (32, 8))
+FRESH, POLISH = ((4, 20), (8, 20)), ((8, 10), (8, 10), (16, 10), (16, 10), (32, 8))
 """The same for the sweeps after the exchange, first from fresh starts, then from where the postures are."""
 ATTEMPTS = 8
 """Starts of a posture that is not feasible."""
@@ -87,13 +88,12 @@ def start(chain: Chain, stance: Stance, rng: np.random.Generator) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Exciting:
-    """Objective of one posture beside the Gram matrices of the ``others`` (N, 3, 3), per ``unit`` kg, and its simplicity."""
+    """Objective of one posture beside the Gram matrices of the ``others`` (N, 3, 3), per ``unit`` kg, and the performer's ease."""
 
     blocks: Blocks
     others: Array
     unit: float
     sharpness: int
-    simplicity: float = 0.0
 
     def __call__(self, state: State) -> tuple[float, Array]:
         """Return the criterion and its slopes by x."""
@@ -113,37 +113,42 @@ class Exciting:
         return value + 10 * self.blocks.simplicity * hard, by + 10 * self.blocks.simplicity * slopes
 
 
-def find_postures(
-    chain: Chain, blocks: Blocks, stances: tuple[Stance, ...], *, seed: int, workers: Executor, simplicity: float = 0.0
-) -> Postures:
+def find_postures(chain: Chain, blocks: Blocks, stances: tuple[Stance, ...], *, seed: int, workers: Executor) -> Postures:
     """Return one posture per entry of ``stances``, together the most exciting for all first moments.
 
-    ``simplicity`` is the worth of `simplicity.hardness` beside the excitation.
 
     Raises
     ------
     BiodanceError
         On some feet there is no posture within the limits; the message names the limit.
     """
-    search, named = _Search(chain, blocks, stances, seed, simplicity), {stance.name: k for k, stance in enumerate(stances)}
-    for checked in [workers.submit(search.possible, k) for k in named.values()]:
-        checked.result()
+    search, named = _Search(chain, blocks, stances, seed), {stance.name: k for k, stance in enumerate(stances)}
+    checked = {name: workers.submit(search.possible, k) for name, k in named.items()}
+    possible = {name: task.result() for name, task in checked.items()}
     tasks = [workers.submit(search.run, run) for run in range(RUNS)]
     pool = [[p for part in parts for p in part] for parts in zip(*(task.result() for task in tasks), strict=True)]
-    kept = [[p for p in found if p.violation <= KEPT] or found[:1] for found in pool]
+    kept = [[p for p in found if p.violation <= KEPT] or [replace(possible[s.name])] for s, found in zip(stances, pool, strict=True)]
     chosen = exchange(blocks, stances, kept)
-    for sharpness, iterations in (*FRESH, *POLISH):
-        fresh = (sharpness, iterations) in FRESH
-        begin = [search.anywhere(k, 2) for k in range(len(stances))] if fresh else [p.x for p in chosen]
+    for n, (sharpness, iterations) in enumerate((*FRESH, *POLISH)):
+        begin = [search.anywhere(k, 100 + n) for k in range(len(stances))] if n < len(FRESH) else [p.x for p in chosen]
         halves = [list(range(k, len(stances), 2)) for k in range(2)]
         parts = [workers.submit(search.sweep, chosen, begin, half, sharpness, iterations) for half in halves]
         better = [part.result() for part in parts]
-        for k, (posture, found) in enumerate(zip(chosen, kept, strict=True)):
-            new = better[k % 2][k // 2]
-            kept[k] = [*([new] if new.violation <= KEPT else []), posture, *(p for p in found if p is not posture)]
-        chosen = exchange(blocks, stances, kept)
-    value, _ = total(blocks.weight, static_grams(np.array([p.up for p in chosen])), blocks.first)
-    return Postures(np.array([p.x for p in chosen]), stances, value, float(blocks.weight.sum()))
+        found = [better[k % 2][k // 2] for k in range(len(stances))]
+        kept = [[new, *rest] if new.violation <= KEPT else rest for new, rest in zip(found, kept, strict=True)]
+        before = [[old, *(p for p in rest if p is not old)] for old, rest in zip(chosen, kept, strict=True)]
+        chosen = min((exchange(blocks, stances, pool) for pool in (kept, before)), key=lambda some: _price(blocks, some))
+    return Postures(np.array([p.x for p in chosen]), stances, criterion(blocks, chosen), float(blocks.weight.sum()))
+
+
+def criterion(blocks: Blocks, chosen: list[Posture]) -> float:
+    """Return the sum of M_i cond(W_bi^S), kg, of postures."""
+    return total(blocks.weight, static_grams(np.array([p.up for p in chosen])), blocks.first)[0]
+
+
+def _price(blocks: Blocks, chosen: list[Posture]) -> float:
+    """Return the criterion and, where simplicity counts, how hard the postures are to take, kg."""
+    return criterion(blocks, chosen) + blocks.simplicity * float(blocks.weight.sum() * np.mean([p.hard for p in chosen]))
 
 
 def anyhow(state: State) -> tuple[float, Array]:
@@ -151,7 +156,7 @@ def anyhow(state: State) -> tuple[float, Array]:
     return 0.0, np.zeros((3, *state.x.shape))
 
 
-def refuse(chain: Chain, stance: Stance, begin: list[Array]) -> None:
+def refuse(chain: Chain, stance: Stance, begin: list[Array]) -> NoReturn:
     """Raise the BiodanceError that says which limit forbids every posture on these feet: the first without which there would be one."""
     for name in PERSONAL:
         names = tuple(other for other in STATIC if other != name)
@@ -176,18 +181,17 @@ class _Search:
     blocks: Blocks
     stances: tuple[Stance, ...]
     seed: int
-    simplicity: float
 
     def anywhere(self, place: int, run: int) -> Array:
         """Return the start (n,) of one posture in one run."""
         return start(self.chain, self.stances[place], np.random.default_rng([self.seed, run, place]))
 
-    def possible(self, place: int) -> None:
-        """Raise the BiodanceError that names the limit if there is no posture at this place."""
-        begin = [self.anywhere(place, run) for run in range(ATTEMPTS)]
-        stance = self.stances[place]
-        if not any(solve(self.chain, stance, x, anyhow, iterations=30).violation <= KEPT for x in begin):
-            refuse(self.chain, stance, begin)
+    def possible(self, place: int) -> Posture:
+        """Return a posture that keeps all limits at this place, or raise the BiodanceError that names the limit that forbids it."""
+        begin, stance = [self.anywhere(place, run) for run in range(ATTEMPTS)], self.stances[place]
+        found = (solve(self.chain, stance, x, anyhow, iterations=30) for x in begin)
+        posture = next((p for p in found if p.violation <= KEPT), None)
+        return posture or refuse(self.chain, stance, begin)
 
     def run(self, run: int) -> list[list[Posture]]:
         """Return for every place the postures of one run, one per sweep."""
@@ -205,7 +209,7 @@ class _Search:
         now, unit = list(now), 0.1 * float(self.blocks.weight.sum()) / len(now)
         for p in order:
             others = np.array([one.up for k, one in enumerate(now) if k != p]).reshape(-1, *now[p].up.shape)
-            objective = Exciting(self.blocks, static_grams(others), unit, sharpness, self.simplicity)
+            objective = Exciting(self.blocks, static_grams(others), unit, sharpness)
             x, steps = begin[p], iterations
             for attempt in range(ATTEMPTS):
                 now[p] = solve(self.chain, self.stances[p], x, objective, iterations=steps)
@@ -218,12 +222,13 @@ class _Search:
 def exchange(blocks: Blocks, stances: tuple[Stance, ...], pool: list[list[Posture]]) -> list[Posture]:
     """Return one posture for each place: those that come first, exchanged for better ones of the same stance as long as any helps."""
     kinds = [stance.name for stance in stances]
-    every = {kind: [p for k, found in zip(kinds, pool, strict=True) if k == kind for p in found] for kind in dict.fromkeys(kinds)}
+    every: dict[str, list[Posture]] = {kind: [] for kind in kinds}
+    for kind, found in zip(kinds, pool, strict=True):
+        every[kind] += [posture for posture in found if posture not in every[kind]]
     grams = {kind: np.eye(3) - np.einsum("pni,pnj->pnij", *[np.array([p.up for p in found])] * 2) for kind, found in every.items()}
-    taken = {
-        kind: [next(i for i, p in enumerate(found) if p is pool[k][0]) for k in range(len(kinds)) if kinds[k] == kind]
-        for kind, found in every.items()
-    }
+    taken: dict[str, list[int]] = {kind: [] for kind in every}
+    for kind, found in zip(kinds, pool, strict=True):
+        taken[kind].append(every[kind].index(found[0]))
     worth = blocks.simplicity * float(blocks.weight.sum()) / len(stances)
     hard = {kind: worth * np.array([p.hard for p in found]) for kind, found in every.items()}
     whole = sum(grams[kind][picks].sum(axis=0) for kind, picks in taken.items())
