@@ -86,7 +86,7 @@ def _postures(work: _Work) -> tuple[Array, list[Stance]]:
     kept = work.ledger.get("postures")
     if kept is None:
         work.tell("postures", 0, len(counted))
-        found = find_postures(chain, work.blocks, tuple(counted), seed=work.seed, workers=work.workers, simplicity=plan.simplicity)
+        found = find_postures(chain, work.blocks, tuple(counted), seed=work.seed, workers=work.workers)
         kept = {"x": found.x}
         work.ledger.put("postures", **kept)
     work.tell("postures", len(counted), len(counted))
