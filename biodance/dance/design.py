@@ -124,7 +124,7 @@ def _ways(work: _Work, x: Array, stances: list[Stance]) -> list[Way]:
             k = queue[feet][0]
             kept = work.ledger.get(f"move_{k:03d}")
             if kept is None:
-                running[work.workers.submit(find_way, tasks[k], history[feet], [work.seed, 3, k])] = k
+                running[work.workers.submit(find_way, tasks[k], work.plan, history[feet], [work.seed, 3, k])] = k
                 return
             accept(k, Way(kept["via"], kept["duration"], kept["stops"], kept["gram"]))
 

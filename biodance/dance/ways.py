@@ -5,7 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.dance.between import middle_posture
+from biodance.dance.dance import Dance
+from biodance.dance.plan import Plan
 from biodance.dance.transitions import Move, Task, find_move
+from biodance.dance.verify import broken, verify
 from biodance.errors import BiodanceError
 from biodance.records import Array
 
@@ -28,21 +31,33 @@ class Way:
     limit: str = ""
 
 
-def find_way(task: Task, history: Array, seed: list[int]) -> Way:
-    """Return a way that keeps all limits; if there is none, the direct one that was tried last, with the limit it breaks."""
+def find_way(task: Task, plan: Plan, history: Array, seed: list[int]) -> Way:
+    """Return a way that keeps all limits, by the design's own judgement and by `verify`; if there is none, the direct one that was tried
+    last, with the limit it breaks.
+    """
     for factor in SLOWER:
         move = find_move(replace(task, duration=task.duration * factor), history, rng=np.random.default_rng(seed))
-        if move.violation == 0:
-            return _way([move], task.ends[:0])
+        way = _way([move], task.ends[:0])
+        wrong = move.limit or _doubted(task, plan, way)
+        if not wrong:
+            return way
     for attempt in range(DETOURS):
         try:
             stop = middle_posture(task.chain, task.stance, task.ends, seed=[*seed, attempt]).x
         except BiodanceError:
             continue
         parts = _through(task, history, stop, [*seed, attempt])
-        if parts:
-            return _way(parts, stop[None])
-    return replace(_way([move], task.ends[:0]), limit=move.limit)
+        if parts and not _doubted(task, plan, detour := _way(parts, stop[None])):
+            return detour
+    return replace(way, limit=wrong)
+
+
+def _doubted(task: Task, plan: Plan, way: Way) -> str:
+    """Return the limit that the way breaks by the independent check, "" if it breaks none."""
+    rows = np.array([task.ends[0], *way.stops, task.ends[1]])
+    feet, body = (task.stance,) * len(rows), task.chain.body
+    wrong = broken(verify(body, Dance("way", body, rows, feet, np.zeros(len(rows)), way.via, way.duration, feet[1:], 0), plan))
+    return wrong[0].limit if wrong else ""
 
 
 def _through(task: Task, history: Array, stop: Array, seed: list[int]) -> list[Move]:
