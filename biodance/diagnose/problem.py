@@ -43,8 +43,8 @@ class Problem:
 
     ``cases`` thinned trials with the parameters in use; ``spectrum`` where rows come from; ``target`` (r,) measured minus what the prior's
     mean predicts; ``prior`` of the parameters and ``factor`` S (p, k) of its covariance; ``sip`` (r, k) columns W S; ``kinematics``
-    (r, K) columns of unit errors of ``groups`` (K); ``markers`` how many of the r rows, at the end, are
-    marker rows (m), before the last s that are the sizes ``shown`` (effect, target) by the markers alone; ``notes`` what was left out.
+    (r, K) columns of unit errors of ``groups`` (K); ``markers`` number m of marker rows, near the end; the last s rows: sizes that the
+    markers alone show of the causes ``shown`` (s; effect, target); ``notes`` what was left out.
     """
 
     cases: tuple[Case, ...]
@@ -82,7 +82,7 @@ class Problem:
                 full[list(case.marker_columns)] = columns
                 out += weight * full.reshape(self.markers, -1)
         sizes = np.zeros((len(self.shown), out.shape[1]))
-        sizes[[one == (effect.name, effect.target) for one in self.shown]] = 1.0
+        sizes[[one == (effect.name, effect.target) for one in self.shown], 0] = 1.0
         return np.concatenate([out, sizes])
 
     def with_parameters(self, phi: Array) -> "Problem":
@@ -123,10 +123,10 @@ def problem(body: Body, looks: tuple[Look, ...], *, prior: Sip | None = None) ->
 
 
 def sizes_shown(cases: tuple[Case, ...], where: Spectrum) -> dict[tuple[str, str], float]:
-    """Return by effect and target the size that the markers show by themselves: root mean square over the session."""
+    """Return by effect and target the size of the first parameter that the markers show by themselves: RMS over the session."""
     found = {}
     for name, kind in effects().items():
-        for target in kind.targets(cases[0]) if kind.shown is not Effect.shown and len(kind.parameters) == 1 else ():
+        for target in kind.targets(cases[0]) if kind.shown is not Effect.shown else ():
             sizes = [kind(target).shown(case) for case in cases]
             squares = np.array([0.0 if size is None else size[0] ** 2 for size in sizes])
             found[name, target] = float(np.sqrt(squares @ _shares(where, len(cases))))

@@ -75,7 +75,9 @@ class Effect:
         return None
 
     def shown(self, case: Case) -> Array | None:
-        """Return (p,) the size that the markers show by themselves, without any force; None where they say nothing."""
+        """Return (p,) the size that the markers show by themselves, without any force, NaN for a parameter that they do not show; None
+        where they say nothing.
+        """
         return None
 
     def corrected(self, case: Case, theta: Array) -> Case:

@@ -12,6 +12,7 @@ from biodance.effects.case import Case
 from biodance.errors import TrialRefused
 from biodance.lab.filters import LowPass, low_pass
 from biodance.motion.inverse_kinematics import solve_ik
+from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
 from biodance.motion.smoothing import smooth
 from biodance.motion.track import track
@@ -23,10 +24,29 @@ RATE = 25.0
 
 @dataclass(frozen=True, eq=False)
 class Loosened:
-    """``wrench`` (T, 6) about the lab origin that the joint's motion adds to the predicted one; ``angle`` rad rms of its axes."""
+    """``wrench`` (T, 6) about the lab origin that the joint's motion adds to the predicted one; ``markers`` (K, 3) m by which the model's
+    markers come nearer on average, in segment axes; ``angle`` rad rms of the joint's axes.
+    """
 
     wrench: Array
+    markers: Array
     angle: float
+
+    @property
+    def columns(self) -> Array:
+        """(T, 6, 2) the wrench per radian: of the angle that the markers show, and of more than they show."""
+        return np.repeat(self.wrench[:, :, None] / max(self.angle, 1e-6), 2, axis=2)
+
+    @property
+    def marker_columns(self) -> Array:
+        """(K, 3, 2) m per radian: the mean residual that the angle shown explains."""
+        return np.stack([self.markers / max(self.angle, 1e-6), np.zeros_like(self.markers)], axis=2)
+
+    def beyond(self, natural: float) -> Array:
+        """Return (2,) rad: the angle that is left when the ``natural`` one is taken off (squares of independent movements add up), and
+        NaN for what only the wrench can show.
+        """
+        return np.array([np.sqrt(max(self.angle**2 - natural**2, 0.0)), np.nan])
 
 
 def loosened(case: Case, body: Body) -> Loosened:
@@ -36,7 +56,7 @@ def loosened(case: Case, body: Body) -> Loosened:
         try:
             case.memory[key] = _tracked(case, body)
         except TrialRefused:
-            case.memory[key] = Loosened(np.zeros((case.motion.time.size, 6)), 0.0)
+            case.memory[key] = Loosened(np.zeros((case.motion.time.size, 6)), np.zeros_like(case.marker_residual), 0.0)
     found = case.memory[key]
     assert isinstance(found, Loosened)
     return found
@@ -57,7 +77,18 @@ def _tracked(case: Case, body: Body) -> Loosened:
     stiff = smooth(case.body, time, tracked, settings=gentle)
     change = predict_wrench(body, loose, _parameters(case, body)).value - predict_wrench(case.body, stiff, case.phi).value
     angle = float(np.sqrt(loose.q[:, new].var(axis=0).mean()))
-    return Loosened(make_interp_spline(time, change, k=5)(case.motion.time), angle)
+    nearer = _markers(case, body, loose.q, stiff.q)
+    return Loosened(make_interp_spline(time, change, k=5)(case.motion.time), nearer, angle)
+
+
+def _markers(case: Case, body: Body, loose: Array, stiff: Array) -> Array:
+    """Return (K, 3) m: the mean step of the model's markers from the postures without to those with the joint, in segment axes."""
+    columns = list(case.marker_columns)
+    places, markers = case.body.markers, body.markers
+    before, after = poses(case.body, stiff), poses(body, loose)
+    segment = [places.segment[c] for c in columns]
+    step = after.points([markers.segment[c] for c in columns], markers.position[columns]) - before.points(segment, places.position[columns])
+    return np.asarray(np.einsum("tkij,tki->kj", before.rotation[:, segment], step) / len(step))
 
 
 def _parameters(case: Case, body: Body) -> Array:
