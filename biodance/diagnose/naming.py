@@ -76,18 +76,34 @@ def name_causes(problem: Problem, tolerances: Tolerances, chosen: Iterable[str] 
     screening = Round(screen(found, causes))
     accepted: list[Round] = []
     ranking = screening
+    if suspicious(screening, tolerances):
+        found, causes = rebuilt(found, tolerances, chosen)
+        ranking = Round(screen(found, causes))
     for _ in range(ROUNDS):
-        if not ranking.suspects or ranking.suspects[0].score < tolerances.threshold:
+        if not suspicious(ranking, tolerances):
             break
         ranking, settled = refine(found, ranking)
-        if ranking.suspects[0].score < tolerances.threshold:
+        if not suspicious(ranking, tolerances):
             break
         accepted.append(ranking)
-        rebuilt = settled.problem.with_parameters(settled.phi)
-        causes = candidates(rebuilt, chosen)
-        found = settle(model(rebuilt, causes, tolerances), settled.named)
+        found, causes = rebuilt(settled, tolerances, chosen)
         ranking = Round(tuple(one for one in screen(found, causes) if one.cause.names not in {named_of(n) for n in found.named}))
     return Naming(first, found, tuple(accepted), screening, first_causes)
+
+
+def suspicious(ranking: Round, tolerances: Tolerances) -> bool:
+    """Return whether the most probable cause passes the threshold."""
+    return bool(ranking.suspects) and ranking.suspects[0].score >= tolerances.threshold
+
+
+def rebuilt(found: Model, tolerances: Tolerances, chosen: Iterable[str] | None) -> tuple[Model, tuple[Candidate, ...]]:
+    """Return the model and all causes with columns predicted by the parameters that ``found`` believes in, its named causes settled again.
+
+    A load and a delay together show in the delay's columns only once the load is predicted, if only by a segment that is too heavy.
+    """
+    put = found.problem.with_parameters(found.phi)
+    causes = candidates(put, chosen)
+    return settle(model(put, causes, tolerances), found.named), causes
 
 
 def named_of(one: Named) -> tuple[str, str]:
