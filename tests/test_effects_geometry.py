@@ -45,7 +45,9 @@ def test_columns_are_those_of_tracking_again(name: str, target: str, component: 
     error = found.columns(CASE)[INSIDE, :, component] - wrench[INSIDE]
     for part in (slice(0, 3), slice(3, 6)):
         assert np.linalg.norm(error[:, part]) < 0.05 * np.linalg.norm(wrench[INSIDE])
-    np.testing.assert_allclose(found.marker_columns(CASE)[:, :, component], rows, atol=0.015)
+    predicted = found.marker_columns(CASE)
+    assert predicted is not None
+    np.testing.assert_allclose(predicted[:, :, component], rows, atol=0.015)
 
 
 def test_true_marker_place_leaves_no_mean_residual() -> None:
@@ -57,9 +59,23 @@ def test_true_marker_place_leaves_no_mean_residual() -> None:
     np.testing.assert_allclose(right.marker_residual, CASE.marker_residual, atol=1e-6)
     change = wrong.marker_residual - right.marker_residual
     row = CASE.marker_columns.index(CASE.body.markers.names.index("RTIB"))
-    predicted = found.marker_columns(CASE) @ shift
+    rows = found.marker_columns(CASE)
+    assert rows is not None
+    predicted = rows @ shift
     assert np.linalg.norm(change[row]) > 0.01
     np.testing.assert_allclose(change, predicted, atol=0.0015)
+
+
+def test_trial_without_the_marker_says_nothing_about_it() -> None:
+    assert CASE.trial.markers is not None
+    fewer = CASE.trial.markers.select(name for name in CASE.trial.markers.names if name != "LTIB")
+    blind = replace(CASE, trial=replace(CASE.trial, markers=fewer))
+    found = effect("marker_misplaced")("LTIB")
+    assert not found.columns(blind).any()
+    rows = found.marker_columns(blind)
+    assert rows is not None
+    assert rows.shape == (len(blind.marker_columns), 3, 3)
+    assert not rows.any()
 
 
 def test_recentred_joint_keeps_the_neutral_body() -> None:

@@ -88,6 +88,7 @@ def test_without_its_markers_there_is_no_target(name: str) -> None:
     few = case.trial.markers.select(n for n in case.trial.markers.names if not n.endswith(("HD", "SHO")) and n not in ("C7", "CLAV"))
     blind = replace(case, trial=replace(case.trial, markers=few))
     assert effect(name).targets(blind) == ()
+    assert not effect(name)("").columns(blind).any(), "a trial of a session in which others have the markers"
 
 
 def test_still_joint_adds_nothing() -> None:

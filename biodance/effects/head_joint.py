@@ -59,9 +59,7 @@ class HeadJoint(Effect):
         return extended(case, body) if body is not None else case
 
     def _loosened(self, case: Case) -> Loosened:
-        body = with_neck(case)
-        assert body is not None
-        return loosened(case, body)
+        return loosened(case, with_neck(case))
 
 
 def with_neck(case: Case) -> Body | None:

@@ -8,6 +8,8 @@ second static trial at the end. A marker that was wrong in the static trial, too
 
 from dataclasses import replace
 
+import numpy as np
+
 from biodance.body.moved import move_marker
 from biodance.effects.case import Case
 from biodance.effects.effect import Effect, Parameter
@@ -32,21 +34,26 @@ class MarkerMisplaced(Effect):
         return tuple(markers.names[c] for c in case.marker_columns if markers.weight[c] > 0)
 
     def columns(self, case: Case) -> Array:
-        """Return the change of the wrench with the posture that the marker at its true place gives, per metre."""
-        return case.geometry.marker_changes.wrench[..., self._own(case)]
+        """Return the change of the wrench with the posture that the marker at its true place gives, per metre; zero without the marker."""
+        own = self._own(case)
+        return np.zeros((case.motion.time.size, 6, 3)) if own is None else case.geometry.marker_changes.wrench[..., own]
 
     def marker_columns(self, case: Case) -> Array:
-        """Return what the model with the wrong place leaves of the markers, per metre."""
-        return -case.geometry.marker_changes.residual[..., self._own(case)]
+        """Return what the model with the wrong place leaves of the markers, per metre; zero without the marker."""
+        own = self._own(case)
+        return np.zeros((len(case.marker_columns), 3, 3)) if own is None else -case.geometry.marker_changes.residual[..., own]
 
     def corrected(self, case: Case, theta: Array) -> Case:
         """Return the trial tracked again with the marker at its true place."""
         body = move_marker(case.body, self.target, theta)
         return replace(case, body=body, motion=track(body, case.trial))
 
-    def _own(self, case: Case) -> slice:
-        """Return the columns of this marker in ``Geometry.marker_changes``."""
-        first = 3 * case.marker_columns.index(case.body.markers.names.index(self.target))
+    def _own(self, case: Case) -> slice | None:
+        """Return the columns of this marker in ``Geometry.marker_changes``; None where the trial does not have it."""
+        index = case.body.markers.names.index(self.target)
+        if index not in case.marker_columns:
+            return None
+        first = 3 * case.marker_columns.index(index)
         return slice(first, first + 3)
 
 

@@ -49,14 +49,19 @@ class Loosened:
         return np.array([np.sqrt(max(self.angle**2 - natural**2, 0.0)), np.nan])
 
 
-def loosened(case: Case, body: Body) -> Loosened:
-    """Return what the markers show with the joints that ``body`` has beyond ``case.body``; nothing where they do not determine them."""
+def loosened(case: Case, body: Body | None) -> Loosened:
+    """Return what the markers show with the joints that ``body`` has beyond ``case.body``; nothing where they do not determine them (None:
+    the markers for it are not there).
+    """
+    nothing = Loosened(np.zeros((case.motion.time.size, 6)), np.zeros_like(case.marker_residual), 0.0)
+    if body is None:
+        return nothing
     key = ", ".join(joint.name for joint in body.joints)
     if key not in case.memory:
         try:
             case.memory[key] = _tracked(case, body)
         except TrialRefused:
-            case.memory[key] = Loosened(np.zeros((case.motion.time.size, 6)), np.zeros_like(case.marker_residual), 0.0)
+            case.memory[key] = nothing
     found = case.memory[key]
     assert isinstance(found, Loosened)
     return found

@@ -57,9 +57,7 @@ class ShoulderGirdle(Effect):
         return extended(case, body) if body is not None else case
 
     def _loosened(self, case: Case) -> Loosened:
-        body = with_clavicles(case)
-        assert body is not None
-        return loosened(case, body)
+        return loosened(case, with_clavicles(case))
 
 
 def with_clavicles(case: Case) -> Body | None:

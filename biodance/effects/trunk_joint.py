@@ -60,9 +60,7 @@ class TrunkJoint(Effect):
         return extended(case, body) if body is not None else case
 
     def _loosened(self, case: Case) -> Loosened:
-        body = with_thorax(case)
-        assert body is not None
-        return loosened(case, body)
+        return loosened(case, with_thorax(case))
 
 
 def with_thorax(case: Case) -> Body | None:
