@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -32,7 +33,7 @@ def moving(body: Body, frames: int, rng: np.random.Generator) -> Array:
 def case_of(body: Body, markers: Markers, rng: np.random.Generator) -> Case:
     """Return the case of some markers on one plate that measures what the tracked motion needs, and 1 N of noise."""
     nothing = Wrench(markers.time, np.zeros((markers.time.size, 6)))
-    trial = Trial("t", "fit", markers, (Plate("plate1", 2, CORNERS, nothing),), Source(__file__, "", "test"))
+    trial = Trial("t", "fit", markers, (Plate("plate1", 2, CORNERS, nothing),), Source(Path(__file__), "", "test"))
     motion = track(body, trial)
     value = predict_wrench(body, motion).value + rng.normal(0, 1.0, (markers.time.size, 6))
     plate = replace(trial.plates[0], wrench=Wrench(markers.time, value))
