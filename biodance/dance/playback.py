@@ -25,6 +25,8 @@ STIFFNESS = {"hip": 4000.0, "knee": 4000.0, "ankle": 4000.0, "trunk": 3000.0, "s
 """N·m/rad of the joint springs: legs and trunk several times the m g h (about 600 N·m/rad) that would topple a standing person."""
 DAMPING = 0.05
 """s: damper over spring."""
+ROTOR = 0.005
+"""kg·m² added to every joint in the simulation: where two axes of a shoulder are nearly in line, nothing else resists them."""
 SETTLE = 0.5
 """s in which the first posture is held before the motion begins, so that the floor bears the body."""
 FALLEN = 0.6
@@ -165,6 +167,7 @@ class _Driver:
         kinds = [next((kind for kind in STIFFNESS if kind in joint.name), "trunk") for joint in body.joints]
         self.stiffness = np.array([STIFFNESS[kind] for kind in kinds])
         model.dof_damping[self.v_place] = DAMPING * self.stiffness
+        model.dof_armature[self.v_place] = ROTOR
 
     def place(self, data: Any, q: Array, v: Array) -> None:
         """Put the body into a configuration of Pinocchio's order (quaternion x y z w, root velocity in the root's frame)."""
