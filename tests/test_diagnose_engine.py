@@ -12,6 +12,7 @@ from biodance.diagnose.engine import diagnose
 from biodance.effects.case import Case
 from biodance.errors import BiodanceError, TrialRefused, UnknownName
 from biodance.identify.identification import standing_point
+from biodance.motion.kinematics import poses
 
 FAST = ("plate_gain", "plate_offset", "plate_position", "plate_rotation", "time_delay", "body_mass", "added_mass", "plate_drift")
 
@@ -99,6 +100,29 @@ def test_a_load_is_named_with_mass_and_place() -> None:
     finding = diagnosis.findings[0]
     assert (finding.effect, finding.target) == ("added_mass", "left_forearm_hand")
     assert finding.parameters[0].value == pytest.approx(2.4, abs=0.35)
+
+
+def test_a_hand_that_comes_and_goes_is_named_with_its_force() -> None:
+    one = body()
+    index = one.segment_index("left_forearm_hand")
+    low, high = one.boxes[index]
+    tip = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
+
+    def touched(wrench, session, moving):
+        point = poses(one, moving.q).points([index], tip[None])[:, 0]
+        strength = 15.0 * (np.clip(1 - np.abs(moving.time - 5.0), 0, 1) + np.clip(1 - np.abs(moving.time - 9.0), 0, 1))
+        force = strength[:, None] * np.array([0.0, 0.3, 1.0])
+        return wrench - np.concatenate([force, np.cross(point, force)], axis=1)
+
+    examined = found(touched, chosen=(*FAST, "external_contact"))
+    assert [(f.effect, f.target) for f in examined.diagnosis.findings] == [("external_contact", "left_forearm_hand")]
+    assert examined.diagnosis.verdict in ("named, complete", "named, incomplete")
+    size = [p.value for p in examined.diagnosis.findings[0].parameters]
+    np.testing.assert_allclose(size, [0.0, 4.5, 15.0], atol=2.0)
+    look = looks(1, hidden=touched)[0]
+    case = Case(one, look.trial, look.motion, one.sip.phi, np.linspace(0, 0.25, look.motion.time.size))
+    added = accept(case, examined.named).trial.wrench.value - look.trial.wrench.value
+    assert added[look.motion.time == 5.0, 2] == pytest.approx(15.0, abs=3.0)
 
 
 def test_accepting_a_fault_gains_on_trials_that_were_not_used() -> None:

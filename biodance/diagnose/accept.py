@@ -23,8 +23,17 @@ DRAWS = 1000
 def accept(case: Case, named: tuple[Named, ...]) -> Case:
     """Return ``case`` without the ``named`` causes: its trial corrected, or its body and motion."""
     for one in reversed(named):
-        case = one.effect.corrected(case, one.theta)
+        case = _without_course(case, one) if one.course else one.effect.corrected(case, one.theta)
     return case
+
+
+def _without_course(case: Case, one: Named) -> Case:
+    """Return ``case`` without a cause that came and went; as it is where nobody knows its course in this trial."""
+    columns, course = one.effect.local(case), one.course.get(case.trial.name)
+    if columns is None or course is None:
+        return case
+    count = min(columns.shape[2], course.size)
+    return case.with_added(case.trial.plates[0], -columns[:, :, :count] @ course[:count])
 
 
 def fit_of(case: Case, use: NDArray[np.bool_]) -> Fit:

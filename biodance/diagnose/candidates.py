@@ -81,6 +81,24 @@ def _differences(problem: Problem, effect: Effect, silent: Array) -> list[Array]
     return first + [bend for bend in second if np.linalg.norm(bend) > NOTHING * np.linalg.norm(middle)]
 
 
+def local_basis(problem: Problem, effect: Effect) -> Array | None:
+    """Return (r, k): the columns of a cause that comes and goes, each trial its own; None where the cause has none."""
+    blocks = []
+    for index, case in enumerate(problem.cases):
+        samples = effect.local(case)
+        if samples is None:
+            return None
+        blocks.append(problem.spectrum.of_trial(index, samples))
+    width = np.cumsum([0, *(block.shape[2] for block in blocks)])
+    out = np.zeros((len(problem.target), int(width[-1])))
+    row = 0
+    for block, start in zip(blocks, width, strict=False):
+        rows = 6 * len(block)
+        out[row : row + rows, start : start + block.shape[2]] = block.reshape(rows, -1)
+        row += rows
+    return out
+
+
 def added(problem: Problem, effect: Effect, theta: Array) -> tuple[Array, ...]:
     """Return per case (T, 6): what the cause of size ``theta`` (p,) adds to measured minus predicted wrench, about the lab origin."""
     return tuple(effect.transform(case, theta).residual - case.residual for case in problem.cases)

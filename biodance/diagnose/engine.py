@@ -11,6 +11,7 @@ from biodance.diagnose.diagnosis import Diagnosis, Estimate, Finding, Unobservab
 from biodance.diagnose.model import Named
 from biodance.diagnose.naming import Naming, Round, name_causes
 from biodance.diagnose.observability import hidden, limits, visibility
+from biodance.diagnose.passing import with_passing
 from biodance.diagnose.problem import Look, problem
 from biodance.diagnose.tolerances import Tolerances, shipped
 from biodance.effects.gate import Gate
@@ -52,7 +53,7 @@ def diagnose(
     known = tolerances or shipped()
     asked = None if chosen is None else tuple(chosen)
     put = problem(body, looks, prior=prior)
-    naming = name_causes(put, known, asked)
+    naming = with_passing(name_causes(put, known, asked), asked)
     rows = limits(visibility(naming.first, naming.first_causes), known.threshold)
     left = adequacy(naming.found)
     findings = tuple(_finding(one, r) for one, r in zip(naming.found.named, naming.accepted, strict=True))

@@ -1,6 +1,7 @@
 """The problem under its tolerances: whitened rows, columns of all that is no fault, and the causes that were named so far."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,11 +16,14 @@ from biodance.records import Array
 
 @dataclass(frozen=True, eq=False)
 class Named:
-    """A cause of size ``theta`` (p,) with ``covariance`` (p, p)."""
+    """A cause of size ``theta`` (p,) with ``covariance`` (p, p); for a cause that comes and goes the largest force, and per trial the
+    ``course`` of its parameters, as in `Effect.local`.
+    """
 
     effect: Effect
     theta: Array
     covariance: Array
+    course: Mapping[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

@@ -59,7 +59,7 @@ class Round:
 @dataclass(frozen=True, eq=False)
 class Naming:
     """All rounds: ``first`` the model before any was named, with the ``screening`` of ``first_causes``; ``found`` the last model, with the
-    named causes; ``accepted`` a round per named cause, in their order.
+    named causes; ``bare`` the same parameters without them; ``accepted`` a round per named cause, in their order.
     """
 
     first: Model
@@ -67,6 +67,7 @@ class Naming:
     accepted: tuple[Round, ...]
     screening: Round
     first_causes: tuple[Candidate, ...]
+    bare: Model
 
 
 def name_causes(problem: Problem, tolerances: Tolerances, chosen: Iterable[str] | None = None) -> Naming:
@@ -79,6 +80,7 @@ def name_causes(problem: Problem, tolerances: Tolerances, chosen: Iterable[str] 
     if suspicious(screening, tolerances):
         found, causes = rebuilt(found, tolerances, chosen)
         ranking = Round(screen(found, causes))
+    bare = found
     for _ in range(ROUNDS):
         if not suspicious(ranking, tolerances):
             break
@@ -88,7 +90,7 @@ def name_causes(problem: Problem, tolerances: Tolerances, chosen: Iterable[str] 
         accepted.append(ranking)
         found, causes = rebuilt(settled, tolerances, chosen)
         ranking = Round(tuple(one for one in screen(found, causes) if one.cause.names not in {named_of(n) for n in found.named}))
-    return Naming(first, found, tuple(accepted), screening, first_causes)
+    return Naming(first, found, tuple(accepted), screening, first_causes, bare)
 
 
 def suspicious(ranking: Round, tolerances: Tolerances) -> bool:

@@ -70,6 +70,12 @@ class Effect:
             raise BiodanceError(f"Effect {self.name} defines neither columns nor transform; write one of them.")
         return case.with_added(self.plate_of(case), self.columns(case) @ np.asarray(theta, dtype=float))
 
+    def local(self, case: Case) -> Array | None:
+        """Return (T, 6, k): what one unit of each of k parameters of this trial alone adds, for a cause that comes and goes; None for the
+        others. The k parameters follow one another in time, as many for each of `parameters`.
+        """
+        return None
+
     def marker_columns(self, case: Case) -> Array | None:
         """Return (K, 3, p) m per unit: what one unit adds to ``case.marker_residual``; None where the markers say nothing."""
         return None

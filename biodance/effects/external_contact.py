@@ -11,6 +11,9 @@ from biodance.effects.effect import Effect, Parameter
 from biodance.motion.kinematics import poses
 from biodance.records import Array
 
+STEP = 0.4
+"""s: a hand comes and goes within about a second."""
+
 
 class ExternalContact(Effect):
     """A steady ``force`` (x, y, z: N, lab axes) ON the person at the far end of segment ``target``, which the plates lack."""
@@ -37,6 +40,17 @@ class ExternalContact(Effect):
         moment = np.stack([np.cross(point, axis) for axis in np.eye(3)], axis=2)
         force = np.broadcast_to(np.eye(3), moment.shape)
         return -np.concatenate([force, moment], axis=1)
+
+    def local(self, case: Case) -> Array | None:
+        """Return the contact as a force that comes and goes: hats of `STEP` s to both sides; None for the root, which hands and feet are
+        not: its forces would explain anything that hangs on the middle of the body.
+        """
+        if case.body.segment_index(self.target) == 0:
+            return None
+        time = case.motion.time
+        knots = time[0] + STEP * np.arange(int((time[-1] - time[0]) / STEP) + 2)
+        hats = np.maximum(0.0, 1.0 - np.abs(time[:, None] - knots) / STEP)
+        return (self.columns(case)[:, :, None, :] * hats[:, None, :, None]).reshape(time.size, 6, -1)
 
 
 def _parent_segment(case: Case, joint: int) -> int:

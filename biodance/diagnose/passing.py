@@ -1,0 +1,107 @@
+"""Causes that come and go: a touch of the rail, a helper's hand. Looked for only where nothing steady explains the session.
+
+Each trial has its own course of the force in time, so there are hundreds of columns; three of the six channels stay free, which is why such
+a force does not explain just anything.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from biodance.diagnose.adequacy import LIMIT, adequacy
+from biodance.diagnose.candidates import Candidate, local_basis
+from biodance.diagnose.evidence import Evidence, believe, evidence
+from biodance.diagnose.model import Model, Named
+from biodance.diagnose.naming import Naming, Round, Suspect
+from biodance.effects import effects
+from biodance.effects.effect import Effect
+from biodance.records import Array
+
+SIZES = (2.0, 8.0, 30.0)
+"""Standard deviations of the course before the data (units of the parameter): the most probable one is taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Passing:
+    """One cause that comes and goes: whitened unit columns ``white`` (r, k), the best ``size`` and its evidence."""
+
+    effect: Effect
+    white: Array
+    size: float
+    found: Evidence
+
+
+def with_passing(naming: Naming, chosen: Iterable[str] | None = None) -> Naming:
+    """Return the naming with a cause that comes and goes, if steady causes leave too much and it leaves less; else as it is.
+
+    It is tried instead of what was named, and beside it; what leaves less is kept.
+    """
+    if adequacy(naming.found)[0].z <= LIMIT:
+        return naming
+    best = naming
+    for base, accepted in ((naming.bare, ()), (naming.found, naming.accepted)):
+        tried = _with(naming, base, accepted, chosen)
+        if tried is not None and adequacy(tried.found)[0].z < adequacy(best.found)[0].z:
+            best = tried
+        if not naming.found.named:
+            break
+    return best
+
+
+def _with(naming: Naming, base: Model, accepted: tuple[Round, ...], chosen: Iterable[str] | None) -> Naming | None:
+    """Return the naming of ``base`` with the most probable cause that comes and goes; None without one above the threshold."""
+    kinds = [kind(target) for kind in effects(chosen).values() for target in kind.targets(base.problem.cases[0])]
+    found = [one for one in (_passing(base, effect) for effect in kinds) if one is not None]
+    if not found:
+        return None
+    order = sorted(found, key=lambda one: -one.found.log_bayes_factor)
+    score = float(np.log(len(found)))
+    if order[0].found.log_bayes_factor - score < base.tolerances.threshold:
+        return None
+    suspects = tuple(_suspect(one, score) for one in order)
+    best = _loose(base, order[0])
+    belief = believe(np.concatenate([base.belief.X, best.size * best.white], axis=1), base.belief.y)
+    named = (*base.named, _named(base, best, belief.mean[-best.white.shape[1] :]))
+    model = Model(base.problem, base.tolerances, belief, named)
+    return Naming(naming.first, model, (*accepted, Round(suspects)), naming.screening, naming.first_causes, naming.bare)
+
+
+def _suspect(one: _Passing, penalty: float) -> Suspect:
+    value = one.found.log_bayes_factor
+    return Suspect(Candidate(one.effect, one.white[:, :0], ()), value, value - penalty, np.zeros(0), one.found.visible)
+
+
+def _passing(base: Model, effect: Effect) -> _Passing | None:
+    columns = local_basis(base.problem, effect)
+    if columns is None:
+        return None
+    white = base.white(columns)
+    s, G = base.belief.score(white)
+    tried = [(size, evidence(size * s, size**2 * G, size**2 * float(np.sum(white**2)))) for size in SIZES]
+    size, best = max(tried, key=lambda pair: pair[1].log_bayes_factor)
+    return _Passing(effect, white, size, best)
+
+
+def _loose(base: Model, one: _Passing) -> _Passing:
+    """Return the cause with the widest prior: the most probable one would shrink short peaks."""
+    s, G = base.belief.score(one.white)
+    size = SIZES[-1]
+    return replace(one, size=size, found=evidence(size * s, size**2 * G, size**2 * float(np.sum(one.white**2))))
+
+
+def _named(base: Model, one: _Passing, coefficients: Array) -> Named:
+    """Return the cause with its course per trial and, as its size, the force at the moment when it is largest."""
+    count = len(one.effect.parameters)
+    values, spread = one.size * coefficients, one.size**2 * np.diag(one.found.covariance)
+    course, start, peak, sd = {}, 0, np.zeros(count), np.zeros(count)
+    for case in base.problem.cases:
+        columns = one.effect.local(case)
+        width = 0 if columns is None else columns.shape[2]
+        course[case.trial.name] = values[start : start + width]
+        steps = course[case.trial.name].reshape(-1, count)
+        k = int(np.argmax(np.linalg.norm(steps, axis=1)))
+        if np.linalg.norm(steps[k]) > np.linalg.norm(peak):
+            peak, sd = steps[k], np.sqrt(spread[start + count * k : start + count * (k + 1)])
+        start += width
+    return Named(one.effect, peak, np.diag(sd**2), course)
