@@ -46,6 +46,8 @@ BODIES: dict[str, tuple[Subject, PersonLimits]] = {
     "stiff_left": (Subject(68.0, 1.72, "M", 55.0), STIFF),
     "careful": (Subject(62.0, 1.60, "F", 65.0), CAREFUL),
 }
+ROUNDING = ("continuity", "foot_placement", "ground_clearance")
+"""Limits that planted and lifting feet keep exactly: what is left of them is rounding."""
 PLAYED = ("reference",)
 """Bodies whose dance is played in MuJoCo, which takes half as long as the dance."""
 
@@ -77,7 +79,7 @@ def told(name: str, folder: Path) -> str:
         return f"{who} | refused: {error} |"
     margins, numbers = verify(body, dance, plan), account(dance, plan)
     numbers = account(dance, replace(plan, weights=tuple((name, 0.0) for name in numbers.hardly)))  # feet that never leave the ground
-    worst = min(margins, key=lambda m: m.worst if m.limit not in ("continuity", "foot_placement") else np.inf)
+    worst = min((m for m in margins if m.limit not in ROUNDING), key=lambda m: m.worst)
     slow, stops = int(np.sum(dance.move > plan.move + 1e-9)), int(np.sum(dance.hold == 0))
     holds = sum(m.worst >= 0 for m in margins)
     (folder / f"{name}.margins.txt").write_text("\n".join(map(str, margins)) + "\n", encoding="utf-8")
