@@ -141,12 +141,21 @@ def others(subjects: tuple[int, ...]) -> list[Scenario]:
     return out
 
 
+def mixed(*parts: list[Scenario]) -> list[Scenario]:
+    """Return all scenarios of the parts, dealt out evenly."""
+    placed = [((k + 0.5) / len(part), n, one) for n, part in enumerate(parts) for k, one in enumerate(part)]
+    return [one for _, _, one in sorted(placed, key=lambda place: place[:2])]
+
+
 def everything() -> list[Scenario]:
-    """Return the full set, what matters most first, so that a run that was stopped has seen of everything."""
-    waves = [nulls(visits=range(1)), singles("above", (0,)), others((0,)), nulls(visits=range(1, 2)), singles("above", (1,))]
-    waves += [singles("below", (0,)), others((1,)), nulls(visits=range(2, 3)), singles("above", (2,)), singles("below", (1,))]
-    waves += [nulls(visits=range(3, 5)), singles("at", (0, 1)), others((2,)), singles("below", (2,)), singles("above", (3,)), others((3,))]
-    waves += [singles("at", (2, 3)), singles("below", (3,)), nulls(visits=range(5, 6))]
+    """Return the full set in waves, each a sample of the whole, so that a run that was stopped has seen of everything."""
+    waves = [
+        mixed(nulls(visits=range(1)), singles("above", (0,)), others((0,))),
+        mixed(nulls(visits=range(1, 3)), singles("above", (1,)), singles("below", (0,)), others((1,))),
+        mixed(nulls(visits=range(3, 5)), singles("above", (2,)), singles("below", (1,)), singles("at", (0,)), others((2,))),
+        mixed(nulls(visits=range(5, 6)), singles("above", (3,)), singles("below", (2,)), singles("at", (1,)), others((3,))),
+        mixed(singles("at", (2, 3)), singles("below", (3,))),
+    ]
     return [scenario for wave in waves for scenario in wave]
 
 

@@ -1,0 +1,116 @@
+"""Hide an effect in a session, write it as C3D files, and require that the public way finds it; full set: benchmarks/bench_diagnosis.py.
+
+The hiding side (`biodance.virtual_lab`) knows nothing of the effects; the finding side sees files only.
+"""
+
+import json
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from biodance.cli import run
+from biodance.diagnose.diagnosis import Diagnosis
+from biodance.effects import discrete_effects, effects
+from biodance.lab.session import read_session
+from biodance.pipeline.diagnosis import diagnose_session
+from biodance.pipeline.results import SessionResult
+from biodance.pipeline.session import examine
+from biodance.records import Subject
+from biodance.virtual_lab.causes import fault_of
+from biodance.virtual_lab.hide import hide, parse
+from biodance.virtual_lab.inject import inject
+from biodance.virtual_lab.protocol_file import read_protocol
+from biodance.virtual_lab.simulate import simulate
+
+SUBJECT = Subject(64.0, 1.72, "F", 30.0)
+TRIALS = ("static", "move_1", "move_3", "move_5")
+
+
+def hidden(folder: Path, *texts: str, seed: int = 41) -> Path:
+    """Write a session of three moving trials with something hidden in it."""
+    plan = read_protocol("diagnosis")
+    plan = replace(plan, trials=tuple(trial for trial in plan.trials if trial.name in TRIALS))
+    visit, loads = hide(tuple(parse(text) for text in texts), SUBJECT, plan, seed=seed)
+    return simulate(SUBJECT, plan, folder, seed=seed, visit=visit, loads=loads)
+
+
+def examined(folder: Path, monkeypatch: pytest.MonkeyPatch) -> SessionResult:
+    """Read and track a session; what it says about the body is not needed here."""
+    monkeypatch.setattr("biodance.pipeline.session.can_identify", lambda _: False)
+    return examine(read_session(folder))
+
+
+def found(folder: Path, monkeypatch: pytest.MonkeyPatch, *, without: tuple[str, ...] = ()) -> Diagnosis:
+    chosen = tuple(name for name in (*effects(), *discrete_effects()) if name not in without) if without else None
+    return diagnose_session(examined(folder, monkeypatch), chosen=chosen).diagnosis
+
+
+def test_a_session_without_fault_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    diagnosis = found(hidden(tmp_path / "s"), monkeypatch)
+    assert diagnosis.verdict == "nothing wrong"
+    assert not diagnosis.findings
+    assert all(gate.ok for gate in diagnosis.gates)
+
+
+def test_late_forces_are_named_by_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = hidden(tmp_path / "s", "time_delay:delay=0.025")
+    assert run(["diagnose", str(folder), "--out", str(tmp_path / "out"), "--json"]) == 1
+    document = json.loads(capsys.readouterr().out)
+    assert document["verdict"].startswith("named")
+    first = document["findings"][0]
+    assert (first["effect"], first["target"]) == ("time_delay", "")
+    assert first["parameters"]["delay"]["value"] == pytest.approx(0.025, rel=0.25)
+
+
+@pytest.mark.parametrize(
+    ("text", "effect", "target"),
+    [
+        ("plate_position:target=plate1:x,shift=0.05", "plate_position", "plate1:x"),
+        ("added_mass:target=left_forearm_hand,mass=2.4", "added_mass", "left_forearm_hand"),
+    ],
+)
+def test_a_hidden_cause_is_in_the_named_set(text: str, effect: str, target: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    diagnosis = found(hidden(tmp_path / "s", text), monkeypatch)
+    assert diagnosis.verdict.startswith("named")
+    assert (effect, target) in {(alias.effect, alias.target) for alias in diagnosis.findings[0].set}
+
+
+def test_what_no_file_describes_is_unexplained(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    diagnosis = found(hidden(tmp_path / "s", "object_on_plate:weight=60"), monkeypatch)
+    assert diagnosis.verdict == "unexplained"
+    assert diagnosis.adequacy[0].z > 4.5
+
+
+def test_without_the_culprit_nobody_else_is_called_the_whole_truth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = hidden(tmp_path / "s", "plate_drift:target=Mx,drift=15")
+    assert found(folder, monkeypatch, without=("plate_drift",)).verdict in ("unexplained", "named, incomplete")
+
+
+def test_a_clipped_channel_is_named_before_any_statistics(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = hidden(tmp_path / "s", "clipping:target=Fz,limit=640")
+    result = examined(folder, monkeypatch)
+    diagnosis = diagnose_session(result, chosen=("clipping", "plate_offset")).diagnosis
+    assert diagnosis.findings[0].effect == "clipping"
+    assert [gate.effect for gate in diagnosis.gates if not gate.ok] == ["clipping"]
+
+
+@pytest.fixture
+def data() -> Path:
+    folder = os.environ.get("BIODANCE_DATA")
+    if not folder:
+        pytest.skip("BIODANCE_DATA does not name the folder with real recordings")
+    return Path(folder)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_real_walk_is_not_accused_of_a_plate_fault_and_shows_a_plate_that_was_moved(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clean = found(data / "biomechzoo" / "HC032A", monkeypatch)
+    assert not any(finding.effect.startswith("plate_") for finding in clean.findings)
+    for path in (data / "biomechzoo" / "HC032A").glob("*.c3d"):
+        inject(path, tmp_path / path.name, fault_of(parse("plate_position:target=plate1:x,shift=0.06"), {path.stem: (0.0, 1.0)}))
+    moved = found(tmp_path, monkeypatch)
+    assert any(finding.effect == "plate_position" for finding in moved.findings)
