@@ -94,7 +94,7 @@ def local_basis(problem: Problem, effect: Effect) -> Array | None:
     row = 0
     for block, start in zip(blocks, width, strict=False):
         rows = 6 * len(block)
-        out[row : row + rows, start : start + block.shape[2]] = block.reshape(rows, -1)
+        out[row : row + rows, start : start + block.shape[2]] = block.reshape(rows, block.shape[2])
         row += rows
     return out
 
