@@ -5,6 +5,7 @@ The hiding side (`biodance.virtual_lab`) knows nothing of the effects; the findi
 
 import json
 import os
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -104,13 +105,25 @@ def data() -> Path:
     return Path(folder)
 
 
+def standing(data: Path, folder: Path, text: str = "") -> Path:
+    """Write a session of a real person who stands on a plate, with a fault in the file if there is a ``text``."""
+    source = data / "biomechzoo" / "HC032A" / "HC032A01.c3d"
+    folder.mkdir()
+    shutil.copy(source, folder / "static.c3d")
+    inject(source, folder / "stand.c3d", fault_of(parse(text), {source.stem: (0.0, 1.0)}) if text else lambda recording: recording)
+    (folder / "session.toml").write_text('[trials.static]\nrole = "static"\n\n[trials.stand]\nrole = "fit"\n')
+    return folder
+
+
 @pytest.mark.filterwarnings("ignore")
-def test_a_real_walk_is_not_accused_of_a_plate_fault_and_shows_a_plate_that_was_moved(
+def test_real_standing_is_not_accused_of_a_plate_fault_unless_the_file_has_one(
     data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    clean = found(data / "biomechzoo" / "HC032A", monkeypatch)
+    """Standing shows nothing but weights: what is asked is the set, not the name."""
+    clean = found(standing(data, tmp_path / "clean"), monkeypatch)
     assert not any(finding.effect.startswith("plate_") for finding in clean.findings)
-    for path in (data / "biomechzoo" / "HC032A").glob("*.c3d"):
-        inject(path, tmp_path / path.name, fault_of(parse("plate_position:target=plate1:x,shift=0.06"), {path.stem: (0.0, 1.0)}))
-    moved = found(tmp_path, monkeypatch)
-    assert any(finding.effect == "plate_position" for finding in moved.findings)
+    for number, (text, effect) in enumerate(
+        [("plate_gain:target=plate1:Fz,gain=0.08", "plate_gain"), ("plate_offset:target=plate1:Fz,offset=30", "plate_offset")]
+    ):
+        diagnosis = found(standing(data, tmp_path / str(number), text), monkeypatch)
+        assert (effect, "plate1:Fz") in {(alias.effect, alias.target) for finding in diagnosis.findings for alias in finding.set}
