@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.diagnose.candidates import candidates
 from biodance.diagnose.diagnosis import Unobservable
-from biodance.diagnose.model import model
+from biodance.diagnose.naming import built
 from biodance.diagnose.observability import Visibility, hidden, limits, visibility
 from biodance.diagnose.problem import Look, problem
 from biodance.diagnose.tolerances import Tolerances, shipped
@@ -71,8 +70,8 @@ def foresee(
         for i, (one, a, b) in enumerate(zip(motions, starts, ends, strict=True))
     )
     put = problem(body, looks)
-    causes = candidates(put, chosen)
-    seen = visibility(model(put, causes, known), causes)
+    found, causes = built(put, known, chosen)
+    seen = visibility(found, causes)
     rows = tuple(sorted(limits(seen, known.threshold), key=lambda row: row.limit / row.typical))
     return Foresight(rows, hidden(rows), _confusions(seen, rows))
 

@@ -11,6 +11,7 @@ from biodance.diagnose.evidence import evidence
 from biodance.diagnose.model import Model, Named, model
 from biodance.diagnose.problem import Problem
 from biodance.diagnose.tolerances import Tolerances
+from biodance.effects import effects
 from biodance.records import Array
 
 ROUNDS = 3
@@ -72,8 +73,8 @@ class Naming:
 
 def name_causes(problem: Problem, tolerances: Tolerances, chosen: Iterable[str] | None = None) -> Naming:
     """Return the causes that the session shows, at most `ROUNDS`; ``chosen`` limits the family to some effects by name."""
-    first_causes = causes = candidates(problem, chosen)
-    first = found = model(problem, causes, tolerances)
+    first, first_causes = built(problem, tolerances, chosen)
+    found, causes = first, first_causes
     screening = Round(screen(found, causes))
     accepted: list[Round] = []
     ranking = screening
@@ -103,9 +104,15 @@ def rebuilt(found: Model, tolerances: Tolerances, chosen: Iterable[str] | None) 
 
     A load and a delay together show in the delay's columns only once the load is predicted, if only by a segment that is too heavy.
     """
-    put = found.problem.with_parameters(found.phi)
-    causes = candidates(put, chosen)
-    return settle(model(put, causes, tolerances), found.named), causes
+    fresh, causes = built(found.problem.with_parameters(found.phi), tolerances, chosen)
+    return settle(fresh, found.named), causes
+
+
+def built(problem: Problem, tolerances: Tolerances, chosen: Iterable[str] | None) -> tuple[Model, tuple[Candidate, ...]]:
+    """Return the model without any name and the causes to look for; what is not looked for keeps its tolerance."""
+    family = effects(chosen)
+    every = candidates(problem, {*family, *(name for name in effects() if tolerances.knows(name))})
+    return model(problem, every, tolerances), tuple(one for one in every if one.names[0] in family)
 
 
 def named_of(one: Named) -> tuple[str, str]:

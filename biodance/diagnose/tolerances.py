@@ -53,6 +53,10 @@ class Tolerances:
         """Return the standard deviation of ``key``; 0 for one that was never learned: it is then no nuisance."""
         return self.sizes.get(key, 0.0)
 
+    def knows(self, effect: str) -> bool:
+        """Return whether any size of ``effect`` was learned."""
+        return any(key.split()[0] == effect for key in self.sizes)
+
     def whiteners(self, mass: float) -> Array:
         """Return (B, 6, 6) matrices that whiten a coefficient of a person of ``mass`` kg."""
         return np.linalg.inv(np.linalg.cholesky(self.noise)) * (REFERENCE / mass)
