@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 from diagnosis_scores import Score
-from hidden_causes import Cause
+from hidden_causes import Cause, truth
+from hidden_sessions import Scenario
 
 TWICE = 2.0
 
@@ -58,6 +59,12 @@ def below(singles: list[Score]) -> list[Score]:
     return [one for one in singles if one.ratio < 1]
 
 
+def alone(one: Score) -> bool:
+    """Return whether every set that was given holds a hidden cause."""
+    hidden = {name for same in truth(Scenario("", 0, 0, hidden=one.hidden)) for name in same}
+    return all(hidden & set(some) for some in one.sets)
+
+
 def demands(groups: dict[str, list[Score]], singles: list[Score]) -> list[str]:
     """Return the table of demands."""
     high, low, nulls, unknown, pairs = above(singles), below(singles), *(groups.get(g, []) for g in ("null", "unknown", "pair"))
@@ -70,6 +77,7 @@ def demands(groups: dict[str, list[Score]], singles: list[Score]) -> list[str]:
         ("... exact name", ">= 90 %", share(one.exact[0] for one in high)),
         ("... exact name, where also twice the size from which it is told from all others", "", share(one.exact[0] for one in told)),
         ("... truth in the named set", ">= 95 %", share(one.within[0] for one in high)),
+        ("... and nothing else named beside it", "", share(alone(one) for one in high)),
         ("... error of the size, median", "<= 10 %", f"{100 * np.median(sizes):.0f} % of {len(sizes)}" if sizes else "none measured"),
         ("... 95 % interval covers", ">= 90 %", share(covered)),
         ("below the limit: wrong name", "<= 5 %", share(one.wrong for one in low)),
@@ -77,6 +85,7 @@ def demands(groups: dict[str, list[Score]], singles: list[Score]) -> list[str]:
         ("no describing file: named, complete", "never", share(one.verdict == "named, complete" for one in unknown)),
         ("two causes: both named", ">= 85 %", share(all(one.exact) for one in pairs)),
         ("two causes: both in the sets", "", share(all(one.within) for one in pairs)),
+        ("two causes: both named and nothing else", "", share(all(one.exact) and alone(one) for one in pairs)),
     ]
     return ["| demand | bar | measured |", "|---|---|---|", *(f"| {a} | {b} | {c} |" for a, b, c in rows)]
 
@@ -135,8 +144,9 @@ def absent_lines(absent: list[Score]) -> list[str]:
     if not absent:
         return []
     said = Counter(one.verdict for one in absent)
-    out = [f"{len(absent)} sessions: {', '.join(f'{count} {verdict}' for verdict, count in said.items())}.", ""]
-    return [*out, *(f"- {one.hidden[0]}: {_said(one)}" for one in absent if one.verdict == "named, complete")]
+    out = [f"{len(absent)} sessions: {'; '.join(f'{count} {verdict}' for verdict, count in said.items())}."]
+    blamed = [f"- {one.hidden[0]}: {_said(one)}" for one in absent if one.verdict.startswith("named")]
+    return [*out, "", *blamed] if blamed else out
 
 
 def pair_lines(pairs: list[Score]) -> list[str]:
@@ -174,10 +184,8 @@ def null_lines(nulls: list[Score]) -> list[str]:
     people = len({one.subject for one in nulls})
     alarms = [f"- {one.key}: {_said(one)}, worst {one.worst[0]} z = {one.worst[1]:.1f}" for one in nulls if not one.silent]
     worst = np.array([one.worst[1] for one in nulls])
-    what = (
-        f"{len(nulls)} sessions of {people} persons; z of what is left: median {np.median(worst):.1f}, largest {worst.max():.1f}."
-    )
-    return [what, "", *alarms]
+    what = f"{len(nulls)} sessions of {people} persons; z of what is left: median {np.median(worst):.1f}, largest {worst.max():.1f}."
+    return [what, "", *alarms] if alarms else [what]
 
 
 def draw(scores: list[Score], path: Path) -> None:
@@ -207,7 +215,8 @@ def draw(scores: list[Score], path: Path) -> None:
             )
     axes.set_xticks(range(len(columns)), [c.replace("_", " ") for c in columns], rotation=60, ha="right", size=8)
     axes.set_yticks(range(len(rows)), [r.replace("_", " ") for r in rows], size=8)
-    axes.set(xlabel="named first", ylabel="hidden", title=f"{len(some)} sessions, cause at twice its limit or more")
+    axes.set(xlabel="named first", ylabel="hidden", title=f"{len(some)} sessions, twice the limit or more")
+    axes.title.set_size(9)
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=150)
     plt.close(figure)
