@@ -22,6 +22,8 @@ NEAR = 12.0
 """Natural logarithm: causes this far behind the best one of the screening are refined."""
 TOGETHER = 3.0
 """Natural logarithm: causes that are at most this much less probable than the best one are in its set."""
+HEAVIER = 0.3
+"""Share of a segment's mass by which it must look heavier before its kinematic errors are computed again."""
 STEPS = 5
 """Gauss-Newton steps at most."""
 
@@ -79,6 +81,8 @@ def name_causes(problem: Problem, tolerances: Tolerances, chosen: Iterable[str] 
     accepted: list[Round] = []
     ranking = screening
     if suspicious(screening, tolerances):
+        if heavier(found):
+            found = replace(found, problem=found.problem.with_matter(found.phi))
         found, causes = rebuilt(found, tolerances, chosen)
         ranking = Round(screen(found, causes))
     bare = found
@@ -97,6 +101,12 @@ def name_causes(problem: Problem, tolerances: Tolerances, chosen: Iterable[str] 
 def suspicious(ranking: Round, tolerances: Tolerances) -> bool:
     """Return whether the most probable cause passes the threshold."""
     return bool(ranking.suspects) and ranking.suspects[0].score >= tolerances.threshold
+
+
+def heavier(found: Model) -> bool:
+    """Return whether the data make any segment so much heavier that its kinematic errors grow with it."""
+    before = found.problem.prior.mass
+    return bool(np.any(found.phi[::10] - before > HEAVIER * before))
 
 
 def rebuilt(found: Model, tolerances: Tolerances, chosen: Iterable[str] | None) -> tuple[Model, tuple[Candidate, ...]]:

@@ -23,6 +23,9 @@ from biodance.identify.posterior import prior_factor
 from biodance.identify.statistics import Fit
 from biodance.records import Array, Motion, Sip, Trial
 
+LIGHTEST = 0.2
+"""Share of the table's mass below which an identified segment is not believed."""
+
 
 @dataclass(frozen=True, eq=False)
 class Look:
@@ -89,6 +92,16 @@ class Problem:
         """Return the problem whose faults are predicted with the parameters ``phi`` (10N,); what is measured against stays the prior."""
         return replace(self, cases=tuple(case.with_parameters(phi) for case in self.cases))
 
+    def with_matter(self, phi: Array) -> "Problem":
+        """Return the problem whose kinematic errors move the matter of ``phi`` (10N,): what is heavier than the table errs more."""
+        body = self.cases[0].body
+        table, own = phi.reshape(-1, 10).copy(), body.sip.phi.reshape(-1, 10)
+        absurd = table[:, 0] < LIGHTEST * own[:, 0]
+        table[absurd] = own[absurd]
+        heavier = replace(body, sip=Sip(body.sip.segments, table.ravel(), body.sip.covariance))
+        rows, markers = _kinematic_rows(self.spectrum, _errors(heavier, self.cases, self.spectrum))
+        return replace(self, kinematics=np.concatenate([rows, markers, np.zeros((len(self.shown), rows.shape[1]))]))
+
 
 def problem(body: Body, looks: tuple[Look, ...], *, prior: Sip | None = None) -> Problem:
     """Return the problem of ``looks`` at a session of ``body``; ``prior`` of its parameters, by default the table's with widened sd.
@@ -111,7 +124,7 @@ def problem(body: Body, looks: tuple[Look, ...], *, prior: Sip | None = None) ->
     where = spectrum(cases, tuple(use for _, use in pairs), about)
     factor = prior_factor(before)
     W = where.rows(tuple(case.regressor @ factor for case in cases))
-    errors = [[kinematic_errors(body, _part(case.motion, pick)) for pick in picks] for case, picks in zip(cases, where.picks, strict=True)]
+    errors = _errors(body, cases, where)
     rows, markers = _kinematic_rows(where, errors)
     shown = sizes_shown(cases, where)
     sip = np.concatenate([W.reshape(-1, W.shape[2]), np.zeros((len(markers) + len(shown), W.shape[2]))])
@@ -131,6 +144,11 @@ def sizes_shown(cases: tuple[Case, ...], where: Spectrum) -> dict[tuple[str, str
             squares = np.array([0.0 if size is None else size[0] ** 2 for size in sizes])
             found[name, target] = float(np.sqrt(squares @ _shares(where, len(cases))))
     return found
+
+
+def _errors(body: Body, cases: tuple[Case, ...], where: Spectrum) -> list[list[Errors]]:
+    """Return the elementary errors of every run of every trial."""
+    return [[kinematic_errors(body, _part(case.motion, pick)) for pick in picks] for case, picks in zip(cases, where.picks, strict=True)]
 
 
 def _part(motion: Motion, pick: NDArray[np.intp]) -> Motion:
