@@ -115,6 +115,7 @@ def test_a_flat_top_is_named_with_its_level(channel: int, target: str, limit: fl
     found = discrete_effects()["clipping"].look(recorded(at_origin(local, CORNERS.mean(axis=0))))
     assert failed(found) == [("clipping", target)]
     assert found[0].size == pytest.approx(limit, rel=1e-3)
+    assert (found[0].quantity, found[0].unit) == ("limit", "N" if channel < 3 else "N·m")
 
 
 def test_coarse_converters_and_empty_plates_do_not_clip() -> None:

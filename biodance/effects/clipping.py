@@ -7,7 +7,7 @@ Look-alikes: an unloaded plate whose noise was set to zero (flat at zero, not at
 import numpy as np
 
 from biodance.effects.case import at_point
-from biodance.effects.gate import DiscreteEffect, Gate, Recorded
+from biodance.effects.gate import DiscreteEffect, Gate, Recorded, unit_of
 from biodance.records import CHANNELS, Array, Trial
 
 LONGEST = 0.015
@@ -40,7 +40,16 @@ class Clipping(DiscreteEffect):
         if found:
             said = "{} is flat at {:.4g} (first in {}): the amplifier or converter is at its end."
             return tuple(
-                Gate("range of the channels", False, said.format(target, limit, trial), cls.name, target, abs(limit))
+                Gate(
+                    "range of the channels",
+                    False,
+                    said.format(target, limit, trial),
+                    cls.name,
+                    target,
+                    abs(limit),
+                    "limit",
+                    unit_of(target),
+                )
                 for target, (limit, trial) in found.items()
             )
         return (Gate("range of the channels", True, "No channel of the plates is flat at its extremes."),) if trials else ()

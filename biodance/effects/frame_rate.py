@@ -52,7 +52,7 @@ class FrameRate(DiscreteEffect):
         ratio = float(np.median(found))
         if abs(ratio - 1) > RATIO:
             said = f"Forces need {1 / ratio**2:.2f} times the motion's accelerations: the declared rate is {ratio:.3g} times the true one."
-            return (Gate("rate of the cameras", False, said, cls.name, "", ratio),)
+            return (Gate("rate of the cameras", False, said, cls.name, "", ratio, "ratio", "1"),)
         return (Gate("rate of the cameras", True, f"Accelerations fit the forces: declared over true rate {ratio:.3f}."),)
 
     @classmethod
@@ -63,7 +63,7 @@ class FrameRate(DiscreteEffect):
         step = float(np.median(steps))
         if abs(step) > STEP:
             said = f"From the middle of the trials on, forces are {1000 * step:.0f} ms later than at their start: frames were lost."
-            return (Gate("lost frames", False, said, cls.name, "", step),)
+            return (Gate("lost frames", False, said, cls.name, "", step, "lost", "s"),)
         return (
             Gate("lost frames", True, f"The delay is the same at the start and at the end of the trials (within {1000 * STEP:.0f} ms)."),
         )

@@ -15,7 +15,7 @@ from biodance.records import Session
 @dataclass(frozen=True)
 class Gate:
     """One check: ``check`` what was looked at, ``ok``, ``text`` one plain sentence of what was seen; where it is not well the cause:
-    ``effect`` and ``target`` as in the family, and its ``size`` (unit as in ``text``; NaN = no number).
+    ``effect`` and ``target`` as in the family, and the ``size`` of its ``quantity`` in ``unit`` (NaN = no number).
     """
 
     check: str
@@ -24,6 +24,8 @@ class Gate:
     effect: str = ""
     target: str = ""
     size: float = float("nan")
+    quantity: str = "size"
+    unit: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +49,11 @@ class DiscreteEffect:
     def look(cls, recorded: Recorded) -> tuple[Gate, ...]:
         """Return the checks that could be made on the recording."""
         raise NotImplementedError(f"Discrete effect {cls.name} defines no look.")
+
+
+def unit_of(target: str) -> str:
+    """Return the unit of the channel that a target names last: N or N·m."""
+    return "N·m" if target.rpartition(":")[2].startswith("M") else "N"
 
 
 def gates(session: Session, cases: tuple[Case, ...] = (), *, chosen: tuple[str, ...] | None = None) -> tuple[Gate, ...]:

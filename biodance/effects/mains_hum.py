@@ -8,7 +8,7 @@ low-pass nothing is left of it, unless it was sampled so slowly that it was fold
 import numpy as np
 
 from biodance.effects.case import at_point
-from biodance.effects.gate import DiscreteEffect, Gate, Recorded
+from biodance.effects.gate import DiscreteEffect, Gate, Recorded, unit_of
 from biodance.records import CHANNELS, Array, Trial
 
 MAINS = (50.0, 60.0)
@@ -41,7 +41,7 @@ class MainsHum(DiscreteEffect):
             middle = float(np.median(amplitudes_seen))
             if middle > LEAST[CHANNELS.index(target.rpartition(":")[2])]:
                 said = f"{target} hums at {frequency:g} Hz with an amplitude of {middle:.2g}."
-                gates.append(Gate("mains hum", False, said, cls.name, target, middle))
+                gates.append(Gate("mains hum", False, said, cls.name, target, middle, "amplitude", unit_of(target)))
         none = (Gate("mains hum", True, "No channel of the plates hums at 50 or 60 Hz."),) if trials else ()
         return tuple(gates) or none
 

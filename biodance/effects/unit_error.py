@@ -62,7 +62,7 @@ class UnitError(DiscreteEffect):
         for factor, meaning in FACTORS.items():
             if abs(middle / factor - 1) < NEAR:
                 said = f"The plates carry {middle:.4g} times the declared weight: {meaning}."
-                return (Gate("weight on the plates", False, said, cls.name, "", factor),)
+                return (Gate("weight on the plates", False, said, cls.name, "", factor, "factor", "1"),)
         return (Gate("weight on the plates", True, f"The plates carry {middle:.3g} times the declared weight."),)
 
 

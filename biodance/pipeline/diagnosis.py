@@ -169,7 +169,7 @@ def _finding(gate: Gate) -> Finding:
     from biodance.effects import discrete_effects
 
     kind = discrete_effects().get(gate.effect)
-    size = () if np.isnan(gate.size) else (Estimate("size", gate.size, float("nan"), ""),)
+    size = () if np.isnan(gate.size) else (Estimate(gate.quantity, gate.size, float("nan"), gate.unit),)
     cause = Alias(gate.effect, gate.target, float("inf"))
     return Finding(gate.effect, gate.target, size, (cause,), 1.0, advice=f"{gate.text} {kind.advice if kind else ''}".strip())
 
