@@ -18,9 +18,11 @@ def walk(x: Array, groups: list[list[int]]) -> list[int]:
     apart = np.linalg.norm(scaled[:, None] - scaled[None], axis=2)
     out: list[int] = []
     for group in groups:
-        starts = [None] if out else group
-        paths = [_shortened(_greedy(apart, group, first, out[-1] if out else None), apart, out[-1] if out else None) for first in starts]
-        out += min(paths, key=lambda path: _length(path, apart))
+        starts: list[int | None] = [None] if out else [*group]
+        before = out[-1] if out else None
+        paths = [_shortened(_greedy(apart, group, first, before), apart, before) for first in starts]
+        lengths = [_length(path, apart) for path in paths]
+        out += paths[int(np.argmin(lengths))]
     return out
 
 

@@ -135,8 +135,8 @@ def _torques(stretch: _Stretch, bearing: tuple[int, ...]) -> Array:
     touching = np.tile([side in bearing for side in (0, 1)], (stretch.motion.time.size, 1))
     loads = {}
     if bearing:
-        centres = [sole.mean(axis=1) for sole in stretch.soles()]
-        parts = distribute(stretch.wrench, *centres, touching)
+        right, left = (sole.mean(axis=1) for sole in stretch.soles())
+        parts = distribute(stretch.wrench, right, left, touching)
         names = [stretch.body.segments[stretch.body.feet[side].segment] for side in ("right", "left")]
         loads = dict(zip(names, parts, strict=True))
     return joint_torques(stretch.body, stretch.motion, loads).torque
