@@ -50,13 +50,13 @@ class Minimum:
 def marker_problem(body: Body, columns: list[int], xyz: Array, *, tolerance: float) -> MarkerProblem:
     """Return the problem of the body's markers ``columns`` (K) against ``xyz`` (T, K, 3) m, NaN = hidden."""
     segment = [body.markers.segment[c] for c in columns]
-    seen = np.logical_not(np.isnan(xyz).any(axis=2))
+    seen = np.isfinite(xyz.sum(axis=2))
     return MarkerProblem(
         body=body,
         chain=chain_of(body, segment, body.markers.position[columns]),
         chart=chart_of(body),
         segment=segment,
-        xyz=np.where(seen[:, :, None], xyz, 0.0),
+        xyz=np.ascontiguousarray(xyz) if seen.all() else np.where(seen[:, :, None], xyz, 0.0),
         weight=seen * body.markers.weight[columns],
         tolerance=tolerance,
     )
