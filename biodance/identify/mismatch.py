@@ -32,9 +32,9 @@ PLATE = {"gain": 0.004, "cross-talk": 0.001, "turn": 0.004, "place": 0.002, "del
 OFFSET = np.array([0.5, 0.5, 1.0, 0.3, 0.3, 0.2])
 """N, N·m: what is left after zeroing."""
 KINEMATICS = (1.0, 1.4, 2.0, 2.8)
-NOISE = (2.0, 3.0, 4.5, 7.0, 10.0, 15.0, 22.0)
+NOISE = (1.7, 2.2, 3.0, 4.5, 7.0, 10.0, 15.0, 22.0)
 """Sizes among which the evidence chooses: of the kinematic errors (never smaller than drawn), and variance factor of the noise (never below
-2: the parameters absorb part of what is noise; with 2 the intervals of 20 virtual subjects cover 95 %)."""
+1.7: the parameters absorb part of what is noise)."""
 
 
 @dataclass(frozen=True, eq=False)
