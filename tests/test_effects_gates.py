@@ -1,6 +1,7 @@
 """Gates: what is wrong or right, found on recordings whose fault is known, and nothing found on those without."""
 
 import importlib
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,11 +9,12 @@ import numpy as np
 import pytest
 from human_cases import CORNERS, human_case
 
+import biodance.effects as family
 from biodance.effects import discrete_effects, effect, effects
 from biodance.effects.case import Case, at_origin, at_point
 from biodance.effects.gate import DiscreteEffect, Gate, Recorded, gates
 from biodance.effects.unit_error import FACTORS
-from biodance.errors import UnknownName
+from biodance.errors import BiodanceError, UnknownName
 from biodance.motion.kinematics import poses
 from biodance.motion.track import track
 from biodance.records import Array, Markers, Motion, Plate, Session, Source, Subject, Trial, Wrench
@@ -194,6 +196,16 @@ def test_a_turned_wrist_is_named_in_the_static_trial(side: str) -> None:
         static = Trial("static", "static", markers, (), Source(Path("static.c3d"), "", "C3D"))
         found = discrete_effects()["labels_swapped"].look(Recorded(Session(Subject(MASS, 1.75, "M"), (static,), Path())))
         assert failed(found) == expected
+
+
+def test_a_check_that_does_not_look_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = "from biodance.effects.gate import DiscreteEffect\n\n\nclass Blind(DiscreteEffect):\n    pass\n\n\nEFFECT = Blind\n"
+    (tmp_path / "blind_check.py").write_text(text, encoding="utf-8")
+    monkeypatch.setattr(family, "__path__", [*family.__path__, str(tmp_path)])
+    importlib.invalidate_caches()
+    with pytest.raises(BiodanceError, match=r"blind_check\.py: Blind lacks look"):
+        discrete_effects()
+    sys.modules.pop("biodance.effects.blind_check", None)
 
 
 def test_the_library_can_lack_an_effect() -> None:

@@ -5,6 +5,7 @@ fitted (``effects``); those that a look at the recording settles before any stat
 """
 
 import importlib
+import inspect
 import pkgutil
 from collections.abc import Iterable
 from types import MappingProxyType
@@ -12,7 +13,7 @@ from typing import TypeVar
 
 from biodance.effects.effect import Effect
 from biodance.effects.gate import DiscreteEffect
-from biodance.errors import UnknownName
+from biodance.errors import BiodanceError, UnknownName
 
 Kind = TypeVar("Kind")
 
@@ -37,8 +38,16 @@ def effect(name: str) -> type[Effect]:
 
 def _family() -> dict[str, type[Effect] | type[DiscreteEffect]]:
     """Return what every file of this folder describes, by name."""
-    names = [info.name for info in pkgutil.iter_modules(__path__) if info.name not in CONTRACT]
-    return {name: importlib.import_module(f"{__name__}.{name}").EFFECT for name in names}
+    return {name: _described(name) for name in (info.name for info in pkgutil.iter_modules(__path__)) if name not in CONTRACT}
+
+
+def _described(name: str) -> type[Effect] | type[DiscreteEffect]:
+    """Return the effect that a file of this folder describes; BiodanceError where it leaves out what its author must write."""
+    kind: type[Effect] | type[DiscreteEffect] = importlib.import_module(f"{__name__}.{name}").EFFECT
+    if inspect.isabstract(kind):
+        missing = ", ".join(sorted(getattr(kind, "__abstractmethods__", ())))
+        raise BiodanceError(f"biodance/effects/{name}.py: {kind.__name__} lacks {missing}. Write it as effects/gate.py describes.")
+    return kind
 
 
 def _selection(family: dict[str, type[Kind]], chosen: Iterable[str] | None) -> MappingProxyType[str, type[Kind]]:

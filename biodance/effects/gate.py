@@ -5,6 +5,7 @@ ONE method, ``look``: what it checked, whether that is well, and in one plain se
 (no plate, no body) returns nothing.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -36,8 +37,8 @@ class Recorded:
     cases: tuple[Case, ...] = ()
 
 
-class DiscreteEffect:
-    """One cause that is there or not; the checks that find it are its ``look``."""
+class DiscreteEffect(ABC):
+    """One cause that is there or not; the checks that find it are its ``look``, and a file without it is refused when it is found."""
 
     name: ClassVar[str] = ""
     separated_by: ClassVar[str] = ""
@@ -46,9 +47,9 @@ class DiscreteEffect:
     """How it is mended."""
 
     @classmethod
+    @abstractmethod
     def look(cls, recorded: Recorded) -> tuple[Gate, ...]:
         """Return the checks that could be made on the recording."""
-        raise NotImplementedError(f"Discrete effect {cls.name} defines no look.")
 
 
 def unit_of(target: str) -> str:
