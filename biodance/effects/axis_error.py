@@ -8,7 +8,7 @@ import numpy as np
 
 from biodance.effects.case import Case, at_point
 from biodance.effects.gate import DiscreteEffect, Gate, Recorded
-from biodance.effects.reader_words import decided
+from biodance.effects.reader_words import overruled
 from biodance.records import CHANNELS, Array
 
 ALONE = 0.95
@@ -35,12 +35,9 @@ class AxisError(DiscreteEffect):
     @classmethod
     def look(cls, recorded: Recorded) -> tuple[Gate, ...]:
         """Return what the reader overruled, and the channels that mirror what the motion needs."""
-        overruled = tuple(
-            Gate("axes of the plates", False, sentence, cls.name, target, float(number) if number else float("nan"))
-            for target, sentence, number in decided(recorded.session, WORDS)
-        )
         names = list(dict.fromkeys(plate.name for case in recorded.cases for plate in case.trial.plates))
-        return (*overruled, *(gate for name in names for gate in cls._signs(recorded.cases, name)))
+        signs = (gate for name in names for gate in cls._signs(recorded.cases, name))
+        return (*overruled(recorded.session, WORDS, check="axes of the plates", effect=cls.name), *signs)
 
     @classmethod
     def _signs(cls, cases: tuple[Case, ...], plate: str) -> tuple[Gate, ...]:

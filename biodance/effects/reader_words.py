@@ -2,6 +2,7 @@
 
 import re
 
+from biodance.effects.gate import Gate
 from biodance.records import Session
 
 Found = tuple[str, str, str]
@@ -24,6 +25,14 @@ def decided(session: Session, patterns: dict[str, str]) -> tuple[Found, ...]:
                     target = f"{place}:{what}" if place else what
                     found.setdefault((target, match[0]), (target, sentence, match[1] if match.groups() else ""))
     return tuple(found.values())
+
+
+def overruled(session: Session, patterns: dict[str, str], *, check: str, effect: str) -> tuple[Gate, ...]:
+    """Return a failed ``check`` for each different decision that the reader took against the files, with ``effect`` as its cause."""
+    return tuple(
+        Gate(check, False, sentence, effect, target, float(number) if number else float("nan"))
+        for target, sentence, number in decided(session, patterns)
+    )
 
 
 def _plate(sentence: str) -> str:

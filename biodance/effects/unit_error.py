@@ -8,7 +8,7 @@ Separated by the scale's weight and by the size of the person and the plates.
 import numpy as np
 
 from biodance.effects.gate import DiscreteEffect, Gate, Recorded
-from biodance.effects.reader_words import decided
+from biodance.effects.reader_words import overruled
 from biodance.lab.weight import STANDARD_GRAVITY
 from biodance.records import Trial
 
@@ -44,11 +44,7 @@ class UnitError(DiscreteEffect):
     @classmethod
     def look(cls, recorded: Recorded) -> tuple[Gate, ...]:
         """Return what the reader overruled, and whether the plates carry the person's weight up to a factor."""
-        overruled = tuple(
-            Gate("units", False, sentence, cls.name, target, float(number) if number else float("nan"))
-            for target, sentence, number in decided(recorded.session, WORDS)
-        )
-        return (*overruled, *cls._weight(recorded))
+        return (*overruled(recorded.session, WORDS, check="units", effect=cls.name), *cls._weight(recorded))
 
     @classmethod
     def _weight(cls, recorded: Recorded) -> tuple[Gate, ...]:
