@@ -7,6 +7,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from biodance.cli.app import DONE, NEEDS_A_PERSON, Force, Json, Out, app, print_json, progress
+from biodance.cli.session import compared
 
 
 @app.command
@@ -58,18 +59,12 @@ def diagnose(
     """
     from rich.console import Console
 
-    from biodance.lab.results_folder import results_folder
-    from biodance.lab.session import read_session
     from biodance.pipeline.diagnosis import diagnose_session
-    from biodance.pipeline.session import examine, identified
     from biodance.report.terminal import print_diagnosis
     from biodance.report.write import write_diagnosis
 
     with progress() as tell:
-        before = identified(examine(read_session(reference, subject_name=subject, tell=tell), tell=tell)) if reference else None
-        recording = read_session(session, subject_name=subject, tell=tell)
-        folder = results_folder(out, session, force=force)
-        result = examine(recording, reference=before, tell=tell)
+        result, before, folder = compared(session, reference, out, subject=subject, force=force, tell=tell)
         found = diagnose_session(result, reference=before, tell=tell)
         tell("writing the page")
         document = write_diagnosis(result, found, folder, accepted=accept)

@@ -11,6 +11,7 @@ from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED, Force, Jso
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from biodance.pipeline.identification import SessionIdentification
     from biodance.pipeline.results import SessionResult
     from biodance.records import Session
 
@@ -42,6 +43,24 @@ def told(result: "SessionResult", folder: Path, found: "dict[str, Any]", json: b
         say(f"Stopped by Ctrl-C: {folder} holds the trials that were done, and names the others.")
         return STOPPED
     return NEEDS_A_PERSON if result.needs_a_person else DONE
+
+
+def compared(
+    session: Path, reference: Path | None, out: Path, *, subject: str | None, force: bool, tell: "Callable[[str], None]"
+) -> "tuple[SessionResult, SessionIdentification | None, Path]":
+    """Examine a session beside an earlier one of the same person; return what was found, what that one said, and the results' folder.
+
+    What cannot be read or written is said before the long work starts.
+    """
+    from biodance.lab.results_folder import results_folder
+    from biodance.lab.session import read_session
+    from biodance.pipeline.session import examine, identified
+
+    earlier = read_session(reference, subject_name=subject, tell=tell) if reference else None
+    recording = read_session(session, subject_name=subject, tell=tell)
+    folder = results_folder(out, session, force=force)
+    before = identified(examine(earlier, tell=tell)) if earlier else None
+    return examine(recording, reference=before, tell=tell), before, folder
 
 
 def _told_identified(result: "SessionResult", folder: Path, found: "dict[str, Any]", json: bool) -> int:
@@ -118,16 +137,11 @@ def identify(
     subject
         The person to identify where C3D files hold several.
     """
-    from biodance.lab.results_folder import results_folder
-    from biodance.lab.session import read_session
-    from biodance.pipeline.session import examine, identified
+    from biodance.pipeline.session import identified
     from biodance.report.write import write_identification
 
     with progress() as tell:
-        before = identified(examine(read_session(reference, subject_name=subject, tell=tell), tell=tell)) if reference else None
-        recording = read_session(session, subject_name=subject, tell=tell)
-        folder = results_folder(out, session, force=force)
-        result = examine(recording, reference=before, tell=tell)
+        result, _, folder = compared(session, reference, out, subject=subject, force=force, tell=tell)
         found = identified(result)
         tell("writing the page")
         document = write_identification(result, found, folder)
