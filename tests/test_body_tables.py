@@ -8,10 +8,10 @@ from biodance.body.human import human
 from biodance.body.inertia import TENSOR, Lump, lump_of, parameters, smallest_eigenvalues
 from biodance.body.limits import peak_torque
 from biodance.body.older_tables import regression
-from biodance.body.prior import parameter_jacobian
+from biodance.body.prior import MEASURED, disagreement, parameter_jacobian, primitive_covariance, scaled_lumps
 from biodance.body.reference import COUNT, KINDS
 from biodance.body.segment_tables import reference, table_names
-from biodance.body.skeleton import SEGMENTS
+from biodance.body.skeleton import SEGMENTS, generic_skeleton
 from biodance.body.tables import numbers, read_table
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import folder, names, read_toml
@@ -168,3 +168,29 @@ def test_women_have_no_zatsiorsky_regressions_and_unknown_tables_are_refused() -
 def test_marker_sets_are_readable_toml() -> None:
     for name in names("anthropometry/marker_sets"):
         assert read_toml(folder("anthropometry") / "marker_sets" / f"{name}.toml")["source"]
+
+
+@pytest.mark.parametrize("sex", ["F", "M"])
+def test_what_one_limb_shows_of_the_tables_disagreement_moves_all_limbs(sex: str) -> None:
+    subject = Subject(70.0, 1.72, sex)
+    table, other = (human(subject, table=name).sip for name in ("de_leva_1996", "dumas_2018"))
+    x = 10 * SEGMENTS.index("right_thigh") + 1
+    pulled = np.array(table.covariance[:, x]) / table.covariance[x, x] * (other.phi[x] - table.phi[x])
+    for segment in ("left_thigh", "right_shank", "right_foot", "left_foot"):
+        cut = slice(10 * SEGMENTS.index(segment) + 1, 10 * SEGMENTS.index(segment) + 3)
+        assert pulled[cut] @ (other.phi[cut] - table.phi[cut]) > 0, segment
+    assert np.linalg.eigvalsh(table.covariance).min() > -1e-12
+
+
+@pytest.mark.parametrize("table", ["de_leva_1996", "dumas_2018", "pavol_2002"])
+def test_the_disagreement_of_tables_does_not_widen_a_limb(table: str) -> None:
+    subject = Subject(70.0, 1.72, "F")
+    skeleton = generic_skeleton(reference(table, subject), subject)
+    lumps = scaled_lumps(reference(table, subject), skeleton, subject)
+    others = tuple(scaled_lumps(reference(name, subject), skeleton, subject) for name in MEASURED if name != table)
+    alone, together = (primitive_covariance(lumps, skeleton, some) for some in ((), others))
+    ways = np.sum([disagreement(lumps, other) ** 2 for other in others], axis=0)
+    place = np.arange(120) % 10 > 0
+    grown = np.diag(together)[place] - np.diag(alone)[place]
+    assert np.all(grown <= np.maximum(0.0, ways - 0.75 * np.diag(alone))[place] + 1e-15)
+    assert np.all(np.diag(together)[place] >= 0.25 * np.diag(alone)[place] - 1e-15)

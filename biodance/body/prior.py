@@ -1,9 +1,10 @@
 """The prior segment inertial parameters of a person: a table scaled to the skeleton, with a covariance that is consistent.
 
 Per segment the uncertain quantities are mass m, CoM c and inertia per unit mass J about the CoM, with the standard deviations of
-``spread`` and of ``anthropometry/segments/uncertainty.csv``. Left and right are correlated as mirror images; the masses are conditioned on
-the scale (their sum is the body mass within ``scale_sd``). The covariance of phi = [m, m c, m (J + |c|² 1 - c c')] is the Jacobian times
-that covariance times the Jacobian's transpose: positive semi-definite by construction.
+``spread`` and of ``anthropometry/segments/uncertainty.csv``. Left and right are correlated as mirror images. Tables that disagree do so
+as a whole (``disagreement``): what the data say of one limb in this respect, they say of all. The masses are conditioned on the scale
+(their sum is the body mass within ``scale_sd``). The covariance of phi = [m, m c, m (J + |c|² 1 - c c')] is the Jacobian times that
+covariance times the Jacobian's transpose: positive semi-definite by construction.
 """
 
 from dataclasses import replace
@@ -12,11 +13,15 @@ import numpy as np
 
 from biodance.body.inertia import TENSOR, Lump, mirrored, parameters, turned
 from biodance.body.reference import Reference
+from biodance.body.segment_tables import reference as reference_of
 from biodance.body.skeleton import SEGMENTS, Skeleton, kind_of, side_of
 from biodance.body.spread import spread
 from biodance.body.tables import read_table
 from biodance.records import Array, Sip, Subject
 
+MEASURED = ("de_leva_1996", "dumas_2018")
+"""Tables of whole bodies for both sexes: one laid every CoM on the line between the joint centres, the other measured where it lies."""
+TRUNK = ("pelvis", "trunk_head")
 MIRROR = np.array([1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0])
 """Signs of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] under reflection at z = 0."""
 
@@ -27,7 +32,8 @@ def prior(reference: Reference, skeleton: Skeleton, subject: Subject) -> Sip:
     jacobian = np.zeros((10 * len(lumps), 10 * len(lumps)))
     for i, lump in enumerate(lumps):
         jacobian[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] = parameter_jacobian(lump)
-    covariance = jacobian @ primitive_covariance(lumps, skeleton) @ jacobian.T
+    others = tuple(scaled_lumps(reference_of(name, subject), skeleton, subject) for name in MEASURED if name != reference.table)
+    covariance = jacobian @ primitive_covariance(lumps, skeleton, others) @ jacobian.T
     return Sip(SEGMENTS, np.concatenate([parameters(lump) for lump in lumps]), (covariance + covariance.T) / 2)
 
 
@@ -57,17 +63,34 @@ def _upright_to(point: Array) -> Array:
     return np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 
 
-def primitive_covariance(lumps: tuple[Lump, ...], skeleton: Skeleton) -> Array:
-    """Return the covariance (120, 120) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] of all segments (kg, m, m²)."""
-    sd = np.stack([primitive_sd(s, lump, skeleton) for s, lump in zip(SEGMENTS, lumps, strict=True)])
+def disagreement(lumps: tuple[Lump, ...], other: tuple[Lump, ...]) -> Array:
+    """Return how the limbs of another table differ, (120,) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] (kg, m, m²): one standard deviation.
+
+    Zero for pelvis and trunk, which tables divide at different heights.
+    """
+    rows = [np.zeros(10) if s in TRUNK else _primitives(b) - _primitives(a) for s, a, b in zip(SEGMENTS, lumps, other, strict=True)]
+    return np.concatenate(rows)
+
+
+def _primitives(lump: Lump) -> Array:
+    return np.array([lump.mass, *lump.com, *(lump.inertia[i, j] / lump.mass for i, j in TENSOR)])
+
+
+def primitive_covariance(lumps: tuple[Lump, ...], skeleton: Skeleton, others: tuple[tuple[Lump, ...], ...]) -> Array:
+    """Return the covariance (120, 120) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] of all segments (kg, m, m²); ``others`` other tables'.
+
+    The variance of ``primitive_sd`` is divided: what the disagreement of the tables explains moves together, the rest on its own.
+    """
+    ways = np.array([disagreement(lumps, other) for other in others]).reshape(-1, 10 * len(lumps))
+    variance = np.concatenate([primitive_sd(s, lump, skeleton) for s, lump in zip(SEGMENTS, lumps, strict=True)]) ** 2
+    own = np.sqrt(np.maximum(variance - np.sum(ways**2, axis=0), uncertainty("own_share") * variance))
     together = np.eye(len(SEGMENTS))
     for i, segment in enumerate(SEGMENTS):
         if segment.startswith("right_"):
-            other = SEGMENTS.index(segment.replace("right_", "left_"))
-            together[i, other] = together[other, i] = uncertainty("left_right_correlation")
-    signs = np.array([MIRROR if side_of(s) < 0 else np.ones(10) for s in SEGMENTS])
-    scale = (sd * signs).ravel()
-    covariance = np.kron(together, np.eye(10)) * np.outer(scale, scale)
+            left = SEGMENTS.index(segment.replace("right_", "left_"))
+            together[i, left] = together[left, i] = uncertainty("left_right_correlation")
+    scale = own * np.concatenate([MIRROR if side_of(s) < 0 else np.ones(10) for s in SEGMENTS])
+    covariance = np.kron(together, np.eye(10)) * np.outer(scale, scale) + ways.T @ ways
     total = np.tile(np.eye(10)[0], len(SEGMENTS))
     gain = covariance @ total
     return covariance - np.outer(gain, gain) / (total @ gain + uncertainty("scale_sd") ** 2)
