@@ -46,3 +46,21 @@ def write_trial(folder, name, *, mass=MASS, **kind):
     if mass is not None:
         write_mot(folder / f"{name}.mot", table_of((plate(mass=mass),)))
     return path
+
+
+def two_trials(place):
+    """Write a session folder with a static and a squat, by name; return it."""
+    session = place / "S01" / "visit"
+    write_trial(session, "static01")
+    write_trial(session, "squat_1", speed=1.0)
+    return session
+
+
+def roles(session):
+    """Roles of the trials by name."""
+    return {trial.name: trial.role for trial in session.trials}
+
+
+def said(session):
+    """All notes of a session as one text."""
+    return " ".join(session.notes)
