@@ -23,13 +23,6 @@ def conjugate(a: Array) -> Array:
     return np.concatenate([-a[:3], a[3:]])
 
 
-def exponential(vector: Array) -> Array:
-    """Return the quaternions (4, ...) of rotation vectors (3, ...) rad."""
-    half = 0.5 * vector
-    angle = np.sqrt(np.sum(half * half, axis=0))
-    return np.concatenate([np.sinc(angle / np.pi) * half, np.cos(angle)[None]])
-
-
 def normalised(a: Array) -> Array:
     """Return ``a`` (4, ...) divided by its norm."""
     return a / np.sqrt(np.sum(a * a, axis=0))
