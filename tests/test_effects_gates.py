@@ -12,6 +12,7 @@ from human_cases import CORNERS, human_case
 import biodance.effects as family
 from biodance.effects import discrete_effects, effect, effects
 from biodance.effects.case import Case, at_origin, at_point
+from biodance.effects.frame_rate import clock_beside_body
 from biodance.effects.gate import DiscreteEffect, Gate, Recorded, gates
 from biodance.effects.unit_error import FACTORS
 from biodance.errors import BiodanceError, UnknownName
@@ -155,6 +156,23 @@ def test_a_wrong_rate_is_named(ratio: float) -> None:
     found = discrete_effects()["frame_rate"].look(session_of(wrong, wrong))
     assert ("frame_rate", "") in failed(found)
     assert found[0].size == pytest.approx(ratio, rel=0.05)
+
+
+@pytest.mark.parametrize(("segment", "kilograms"), [("left_forearm_hand", 4.0), ("trunk_head", 10.0)])
+def test_a_load_is_no_clock(segment: str, kilograms: float) -> None:
+    """The same movement with a load needs more force, but also more weight where it hangs."""
+    case = human_case(600)
+    phi, start = np.array(case.phi), 10 * case.body.segments.index(segment)
+    place = np.array([0.0, -0.2, 0.05])
+    phi[start] += kilograms
+    phi[start + 1 : start + 4] += kilograms * place
+    value = case.trial.plates[0].wrench.value + case.regressor @ (phi - case.phi)
+    plate = replace(case.trial.plates[0], wrench=Wrench(case.motion.time, value))
+    loaded = replace(case, trial=replace(case.trial, plates=(plate,)))
+    ratio, explained = clock_beside_body([loaded])
+    assert ratio == pytest.approx(1.0, abs=0.03)
+    assert explained > 0.9
+    assert failed(discrete_effects()["frame_rate"].look(session_of(loaded, loaded))) == []
 
 
 def test_lost_frames_are_named() -> None:
