@@ -3,14 +3,16 @@
     python benchmarks/bench_diagnosis.py [--run NAME] [--minutes 30] [--out docs/diagnosis.md] [--prepare]
 
 Sessions are simulated and tracked once and kept on disk (`hidden_sessions.CACHE`); scores are kept per ``--run``, so that a run that was
-stopped goes on. ``--minutes`` ends the run early: the sessions come in an order in which every beginning is a sample of the whole, and the
-page says how many there were. ``--prepare`` only simulates and tracks.
+stopped goes on, and the same command may run twice at once: every session is claimed by one of them. ``--minutes`` ends the run early (0:
+only the page is written): the sessions come in an order in which every beginning is a sample of the whole, and the page says how many
+there were. ``--prepare`` only simulates and tracks.
 """
 
 import argparse
 import time
 from pathlib import Path
 
+from diagnosis_contamination import fault_free
 from diagnosis_page import draw, page
 from diagnosis_scores import Score, judged, stored
 from hidden_causes import everything
@@ -20,6 +22,16 @@ from hidden_sessions import Scenario, examined
 def without_culprit(scenarios: list[Scenario]) -> list[Scenario]:
     """Return the sessions that are diagnosed again with the hidden cause taken out of the family: large ones of the first person."""
     return [one for one in scenarios if one.group == "issue"]
+
+
+def prepared(scenario: Scenario) -> None:
+    """Simulate and track a session, and the same one without fault where masses are compared; what fails is told when it is judged."""
+    try:
+        examined(scenario)
+        if scenario.judged:
+            examined(fault_free(scenario))
+    except Exception as error:
+        print(f"{scenario.key} {scenario.hidden}: {type(error).__name__}: {error}", flush=True)
 
 
 def main() -> None:
@@ -37,9 +49,11 @@ def main() -> None:
         found = stored(scenario, chosen.run, absent=absent)
         if found is None and time.monotonic() - start < 60 * chosen.minutes:
             if chosen.prepare:
-                examined(scenario)
+                prepared(scenario)
                 continue
             found = judged(scenario, chosen.run, absent=absent)
+            if found is None:
+                continue
             print(f"{time.monotonic() - start:6.0f} s  {found.key} {found.hidden}: {found.verdict} {found.names} {found.note}", flush=True)
         scores += [found] if found else []
     if not chosen.prepare and scores:

@@ -1,6 +1,7 @@
 """What a diagnosis is worth, given what was hidden: one `Score` a session, stored as JSON so that a run that was stopped goes on."""
 
 import json
+import os
 import time
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
@@ -8,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from diagnosis_contamination import contamination
 from hidden_causes import Name, truth
 from hidden_sessions import CACHE, Scenario, examined
 
@@ -25,8 +27,8 @@ class Score:
 
     ``names`` what was named, in order, ``sets`` the sets; ``exact``, ``within`` per hidden cause: named as such, in a set; ``ratio`` size
     over the limit that this session computed for it, ``told`` over the size from which it is told from the others (NaN = not computed);
-    ``size_error`` relative, ``covered`` by the 95 % interval (NaN, None = no size to compare); ``gain`` as in the JSON; ``seconds`` of the
-    processor.
+    ``size_error`` relative, ``covered`` by the 95 % interval (NaN, None = no size to compare); ``gain`` as in the JSON, with the errors of
+    the masses; ``seconds`` of the processor; ``verdict`` "crashed" where there is no answer, ``note`` says why.
     """
 
     key: str
@@ -59,6 +61,12 @@ class Score:
         return bool(self.names) and not all(self.within)
 
 
+def share(hits: Iterable[bool]) -> str:
+    """Return "k of n (p %)" of true values."""
+    found = list(hits)
+    return f"{sum(found)} of {len(found)} ({100 * sum(found) / len(found):.0f} %)" if found else "none measured"
+
+
 def judge(scenario: Scenario, *, absent: bool = False) -> Score:
     """Diagnose a session and judge the answer; ``absent`` takes the hidden causes out of the family of effects first."""
     result = examined(scenario)
@@ -69,12 +77,12 @@ def judge(scenario: Scenario, *, absent: bool = False) -> Score:
     start = time.process_time()
     found = diagnose_session(result, chosen=chosen)
     seconds = time.process_time() - start
-    masses = _masses(found) if scenario.judged else {}
-    return score(scenario, found.diagnosis, seconds, group="absent" if absent else scenario.group, masses=masses)
+    harm = contamination(scenario, result, found) if scenario.judged and not absent else {}
+    return score(scenario, found.diagnosis, seconds, group="absent" if absent else scenario.group, harm=harm)
 
 
-def score(scenario: Scenario, found: Diagnosis, seconds: float, *, group: str, masses: dict[str, Any]) -> Score:
-    """Judge one diagnosis."""
+def score(scenario: Scenario, found: Diagnosis, seconds: float, *, group: str, harm: dict[str, Any]) -> Score:
+    """Judge one diagnosis; ``harm`` what the fault does to the identified body."""
     wanted = truth(scenario)
     names = tuple((finding.effect, finding.target) for finding in found.findings)
     sets = tuple(tuple((alias.effect, alias.target) for alias in finding.set) for finding in found.findings)
@@ -86,7 +94,7 @@ def score(scenario: Scenario, found: Diagnosis, seconds: float, *, group: str, m
     return Score(
         scenario.key, group, scenario.level, scenario.subject, scenario.hidden, found.verdict, names, sets, exact, within, ratio, told,
         error, covered, (f"{worst.channel} {worst.band_hz[0]:g}-{worst.band_hz[1]:g} Hz", worst.z) if worst else ("", 0.0), seconds,
-        gain=masses | _gain(found.findings),
+        gain=harm | _gain(found.findings),
     )  # fmt: skip
 
 
@@ -139,15 +147,6 @@ def _gain(findings: tuple[Finding, ...]) -> dict[str, Any]:
     return {"before": list(map(float, one.rms_before)), "after": list(map(float, one.rms_after)), "ci95": list(map(float, one.ci95))}
 
 
-def _masses(found: Any) -> dict[str, Any]:
-    """Return the segment masses kg: identified without the finding, and with it accepted."""
-    out = {}
-    for name, one in (("masses_before", found.before), ("masses_after", found.accepted)):
-        if one is not None:
-            out[name] = list(map(float, one.sip.mass))
-    return out
-
-
 def stored(scenario: Scenario, run: str, *, absent: bool = False) -> Score | None:
     """Return the score of an earlier run, or None."""
     path = _path(scenario, run, absent)
@@ -159,24 +158,57 @@ def stored(scenario: Scenario, run: str, *, absent: bool = False) -> Score | Non
     return Score(**raw)
 
 
-def judged(scenario: Scenario, run: str, *, absent: bool = False) -> Score:
-    """Return the score of a session in this ``run``, made now if it is not there; an error of the diagnosis is a score that says so."""
-    found = stored(scenario, run, absent=absent)
-    if found is None:
-        try:
-            found = judge(scenario, absent=absent)
-        except Exception as error:  # a benchmark goes on and tells
-            none = tuple(False for _ in scenario.hidden)
-            group = "absent" if absent else scenario.group
-            nan = float("nan")
-            found = Score(
-                scenario.key, group, scenario.level, scenario.subject, scenario.hidden, "error", (), (), none, none, nan, nan, nan, None,
-                ("", 0.0), 0.0, note=f"{type(error).__name__}: {error}"[:300],
-            )  # fmt: skip
-        path = _path(scenario, run, absent)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(asdict(found)))
+def judged(scenario: Scenario, run: str, *, absent: bool = False) -> Score | None:
+    """Return the score of a session in this ``run``, made now if it is not there; None where another process is making it.
+
+    An error of any kind is a score that says so: one session never stops the others.
+    """
+    found, path = stored(scenario, run, absent=absent), _path(scenario, run, absent)
+    if found is not None or not claimed(path):
+        return found
+    try:
+        found = judge(scenario, absent=absent)
+    except Exception as error:
+        found = crashed(scenario, f"{type(error).__name__}: {error}"[:300], group="absent" if absent else scenario.group)
+    finally:
+        if found is not None:
+            part = path.with_suffix(f".{os.getpid()}")
+            part.write_text(json.dumps(asdict(found)))
+            part.replace(path)
+        path.with_suffix(".claim").unlink(missing_ok=True)
     return found
+
+
+def crashed(scenario: Scenario, why: str, *, group: str) -> Score:
+    """Return the score of a session that gave no answer."""
+    nan, none = float("nan"), tuple(False for _ in scenario.hidden)
+    return Score(
+        scenario.key, group, scenario.level, scenario.subject, scenario.hidden, "crashed", (), (), none, none, nan, nan, nan, None,
+        ("", 0.0), 0.0, note=why,
+    )  # fmt: skip
+
+
+def claimed(path: Path) -> bool:
+    """Return whether this process may make the score at ``path``: the first to write its number beside it may, or one after it ended."""
+    claim = path.with_suffix(".claim")
+    claim.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        with open(claim, "x") as stream:
+            stream.write(str(os.getpid()))
+    except FileExistsError:
+        if _runs(claim):
+            return False
+        claim.write_text(str(os.getpid()))
+    return True
+
+
+def _runs(claim: Path) -> bool:
+    """Return whether the process that wrote the claim still runs; one that has not written its number yet does."""
+    try:
+        os.kill(int(claim.read_text() or os.getpid()), 0)
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+    return True
 
 
 def _path(scenario: Scenario, run: str, absent: bool) -> Path:

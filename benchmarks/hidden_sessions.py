@@ -89,7 +89,10 @@ def session_folder(scenario: Scenario) -> Path:
         visit, loads = hide(causes, subject, plan, seed=scenario.seed, visit=Visit(scenario.visit))
         with patch("biodance.virtual_lab.laboratory.perform", _performed):
             simulate(subject, plan, part, seed=scenario.seed, visit=visit, loads=loads)
-        part.rename(folder)
+        try:
+            part.rename(folder)
+        except OSError:  # another process made the same one meanwhile
+            shutil.rmtree(part)
     return folder
 
 
