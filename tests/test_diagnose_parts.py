@@ -8,11 +8,12 @@ from scipy.stats import multivariate_normal
 from biodance.diagnose.candidates import added, candidates, changes, slopes
 from biodance.diagnose.evidence import believe, evidence, smallest
 from biodance.diagnose.kinematic_errors import kinematic_errors
+from biodance.diagnose.learning import Null, learn
 from biodance.diagnose.model import model
 from biodance.diagnose.naming import screen
 from biodance.diagnose.observability import limits, visibility
 from biodance.diagnose.problem import problem
-from biodance.diagnose.tolerances import Null, Tolerances, key_of, learn, read_tolerances, shipped, to_toml
+from biodance.diagnose.tolerances import Tolerances, key_of, read_tolerances, shipped, to_toml
 from biodance.effects import effect
 from biodance.identify.twins import Twins, central_inertia, disturbance
 from biodance.motion.kinematics import poses, segment_motion

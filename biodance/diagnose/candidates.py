@@ -4,7 +4,7 @@ A cause that is linear in its parameters has its own columns. One that is not (t
 spanned by what it does at its typical size: the columns at zero, and the differences that the other parameters make there.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -110,7 +110,13 @@ def changes(problem: Problem, effect: Effect, theta: Array) -> Array:
     return np.concatenate([wrench.ravel(), problem.marker_rows(effect) @ theta])
 
 
-def slopes(problem: Problem, effect: Effect, theta: Array) -> Array:
-    """Return (r, p): derivative of `changes` at ``theta`` by central differences."""
+def removed(problem: Problem, effect: Effect, theta: Array) -> Array:
+    """Return (r,): what the cause of size ``theta`` (p,) has added to the rows, as far as it can be undone in what was measured."""
+    wrench = problem.spectrum.rows(tuple(effect.removed(case, theta)[:, :, None] for case in problem.cases))
+    return np.concatenate([wrench.ravel(), problem.marker_rows(effect) @ theta])
+
+
+def slopes(problem: Problem, effect: Effect, theta: Array, *, of: Callable[[Problem, Effect, Array], Array] = changes) -> Array:
+    """Return (r, p): derivative of `changes` or `removed` at ``theta`` by central differences."""
     steps = 0.02 * np.diag(effect.typical)
-    return np.stack([(changes(problem, effect, theta + s) - changes(problem, effect, theta - s)) / (2 * s.max()) for s in steps], axis=1)
+    return np.stack([(of(problem, effect, theta + s) - of(problem, effect, theta - s)) / (2 * s.max()) for s in steps], axis=1)

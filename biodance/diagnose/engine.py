@@ -13,7 +13,7 @@ from biodance.diagnose.naming import Naming, Round, name_causes
 from biodance.diagnose.observability import hidden, limits, visibility
 from biodance.diagnose.passing import with_passing
 from biodance.diagnose.problem import Look, problem
-from biodance.diagnose.tolerances import Tolerances, shipped
+from biodance.diagnose.tolerances import Tolerances, key_of, shipped
 from biodance.effects.gate import Gate
 from biodance.records import Sip
 
@@ -56,7 +56,7 @@ def diagnose(
     naming = with_passing(name_causes(put, known, asked), asked)
     rows = limits(visibility(naming.first, naming.first_causes), known.threshold)
     left = adequacy(naming.found)
-    findings = tuple(_finding(one, r) for one, r in zip(naming.found.named, naming.accepted, strict=True))
+    findings = tuple(_finding(one, r, known) for one, r in zip(naming.found.named, naming.accepted, strict=True))
     found = Diagnosis(
         verdict=verdict(len(findings), left[0].z, gates),
         findings=findings,
@@ -79,8 +79,9 @@ def _relative(row: Unobservable) -> float:
     return row.limit / row.typical
 
 
-def _finding(one: Named, found: Round) -> Finding:
-    """Return a named cause as a finding."""
-    sd = np.sqrt(np.diag(one.covariance))
+def _finding(one: Named, found: Round, known: Tolerances) -> Finding:
+    """Return a named cause as a finding; no size is surer than sessions without fault are alike."""
+    alike = known.size(key_of(one.effect.name, one.effect.target)) * one.effect.typical / one.effect.typical[0]
+    sd = np.maximum(np.sqrt(np.diag(one.covariance)), alike)
     parameters = tuple(Estimate(*row) for row in one.effect.reported(one.theta, sd))
     return Finding(one.effect.name, one.effect.target, parameters, found.set, found.suspects[0].visible, advice=one.effect.advice)

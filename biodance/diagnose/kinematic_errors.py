@@ -12,7 +12,7 @@ from scipy.interpolate import make_interp_spline
 
 from biodance.body.body import Body
 from biodance.identify.twins import Twins, central_inertia, disturbance, neighbours
-from biodance.motion.kinematics import Poses, poses, segment_motion
+from biodance.motion.kinematics import Poses, cross, poses, segment_motion
 from biodance.motion.marker_jacobian import chains, jacobian, skew
 from biodance.motion.regressor import GRAVITY
 from biodance.records import Array, Motion
@@ -147,7 +147,7 @@ def _sags(body: Body, motion: Motion, pose: Poses, response: _Response) -> Part:
             continue
         arm = move.rotation[:, s] @ body.markers.position[on].mean(axis=0)
         w = move.angular_velocity[:, s]
-        acceleration = move.acceleration[:, s] + np.cross(move.angular_acceleration[:, s], arm) + np.cross(w, np.cross(w, arm))
+        acceleration = move.acceleration[:, s] + cross(move.angular_acceleration[:, s], arm) + cross(w, cross(w, arm))
         moved = np.tile(acceleration - GRAVITY, (1, on.size))[:, :, None]
         rows = (3 * on[:, None] + np.arange(3)).ravel()
         tangent = response.gain[:, :, rows] @ moved

@@ -5,11 +5,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from biodance.diagnose.candidates import SCALE, Candidate, changes
+from biodance.diagnose.candidates import SCALE, Candidate, removed
 from biodance.diagnose.evidence import Belief, believe
 from biodance.diagnose.kinematic_errors import kind_of
 from biodance.diagnose.problem import Problem
-from biodance.diagnose.tolerances import Tolerances, key_of, whitened
+from biodance.diagnose.tolerances import Tolerances, key_of, mean_key, whitened
 from biodance.effects.effect import Effect
 from biodance.records import Array
 
@@ -28,7 +28,8 @@ class Named:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """``problem`` with the parameters in use, under ``tolerances``; ``belief`` about all that is no fault, the ``named`` causes taken off.
+    """``problem`` with the parameters in use, under ``tolerances``; ``belief`` about all that is no fault, the ``named`` causes and what is
+    ``expected`` (r,) of a session without fault taken off.
 
     ``log_likelihood`` of the target under it, up to a constant of the session.
     """
@@ -36,6 +37,7 @@ class Model:
     problem: Problem
     tolerances: Tolerances
     belief: Belief
+    expected: Array
     named: tuple[Named, ...] = ()
 
     @property
@@ -54,25 +56,44 @@ class Model:
 
     def less(self, named: tuple[Named, ...]) -> "Model":
         """Return the model with the causes ``named`` taken off the target."""
-        y = self.problem.target
+        y = self.problem.target - self.expected
         for one in named:
-            y = y - changes(self.problem, one.effect, one.theta)
+            y = y - removed(self.problem, one.effect, one.theta)
         X, factor = self.belief.X, self.belief.factor
         return replace(self, belief=Belief.known(X, factor, self.white(y[:, None])[:, 0]), named=named)
 
 
 def white(problem: Problem, tolerances: Tolerances, rows: Array) -> Array:
     """Return ``rows`` (r, n) of the problem in units of their standard deviation."""
+    mass = float(problem.cases[0].body.sip.mass.sum())
+    return whitened(rows, problem.spectrum.band, marker_keys(problem), mass, tolerances)
+
+
+def marker_keys(problem: Problem) -> tuple[str, ...]:
+    """Return the keys of the rows that follow those of the plates."""
     body = problem.cases[0].body
     keys = tuple(f"marker {kind_of(body.segments[s])}" for s in body.markers.segment for _ in range(3))
-    keys += tuple(f"shown {name}" for name, _ in problem.shown)
-    return whitened(rows, problem.spectrum.band, keys, float(body.sip.mass.sum()), tolerances)
+    return keys + tuple(f"shown {name}" for name, _ in problem.shown)
+
+
+def nuisances(problem: Problem, causes: tuple[Candidate, ...]) -> tuple[Array, tuple[str, ...], tuple[str, ...]]:
+    """Return columns (r, K) per unit of all that may be no fault, the keys of their sizes and of their means ("" for those that have none:
+    the signs of slides and tilts are mirrored between sides and persons).
+    """
+    parts, keys = [problem.kinematics], list(problem.groups)
+    means = [group if group.startswith("sag ") else "" for group in problem.groups]
+    for one in causes:
+        parts.append(one.basis / (SCALE * one.effect.typical[0]))
+        keys += [key_of(*one.names)] * one.basis.shape[1]
+        loud = [p.name for p, silent in zip(one.effect.parameters, one.silent, strict=True) if not silent]
+        means += [mean_key(*one.names, name) for name in loud] + [""] * (one.basis.shape[1] - len(loud))
+    return np.concatenate(parts, axis=1), tuple(keys), tuple(means)
 
 
 def model(problem: Problem, causes: tuple[Candidate, ...], tolerances: Tolerances) -> Model:
     """Return the model without any named cause; those of ``causes`` with a learned size are tolerances as well."""
-    kinematic = problem.kinematics * np.array([tolerances.size(group) for group in problem.groups])
-    shares = [(one, tolerances.size(key_of(*one.names)) / (SCALE * one.effect.typical[0])) for one in causes]
-    X = np.concatenate([problem.sip, kinematic, *(one.basis * share for one, share in shares if share > 0)], axis=1)
-    both = white(problem, tolerances, np.concatenate([X, problem.target[:, None]], axis=1))
-    return Model(problem, tolerances, believe(both[:, :-1], both[:, -1]))
+    columns, keys, mean_keys = nuisances(problem, tuple(one for one in causes if tolerances.size(key_of(*one.names)) > 0))
+    expected = columns @ np.array([tolerances.mean(key) for key in mean_keys])
+    X = np.concatenate([problem.sip, columns * np.array([tolerances.size(key) for key in keys])], axis=1)
+    both = white(problem, tolerances, np.concatenate([X, (problem.target - expected)[:, None]], axis=1))
+    return Model(problem, tolerances, believe(both[:, :-1], both[:, -1]), expected)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from biodance.diagnose.candidates import SCALE, Candidate, candidates, slopes
+from biodance.diagnose.candidates import SCALE, Candidate, candidates, removed, slopes
 from biodance.diagnose.diagnosis import Alias
 from biodance.diagnose.evidence import evidence
 from biodance.diagnose.model import Model, Named, model
@@ -151,7 +151,7 @@ def screen(found: Model, causes: tuple[Candidate, ...]) -> tuple[Suspect, ...]:
 
 def taken(found: Model) -> Array:
     """Return the whitened columns (r, k) of the named causes, per standard deviation of a fault."""
-    parts = [slopes(found.problem, one.effect, one.theta) * SCALE * one.effect.typical for one in found.named]
+    parts = [slopes(found.problem, one.effect, one.theta, of=removed) * SCALE * one.effect.typical for one in found.named]
     return found.white(np.concatenate(parts, axis=1)) if parts else np.empty((found.belief.y.size, 0))
 
 

@@ -63,7 +63,7 @@ def _with(naming: Naming, base: Model, accepted: tuple[Round, ...], chosen: Iter
     best = _loose(base, order[0])
     belief = believe(np.concatenate([base.belief.X, best.size * best.white], axis=1), base.belief.y)
     named = (*base.named, _named(base, best, belief.mean[-best.white.shape[1] :]))
-    model = Model(base.problem, base.tolerances, belief, named)
+    model = replace(base, belief=belief, named=named)
     return Naming(naming.first, model, (*accepted, Round(suspects)), naming.screening, naming.first_causes, naming.bare)
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from biodance.effects.geometry import Geometry
 
 
-OF_MOTION = ("regressor", "segments", "poses", "marker_columns", "measured_markers", "marker_residual")
+OF_MOTION = ("regressor", "segments", "poses", "marker_columns", "measured_markers", "marker_residual", "memory")
 """What a case computes once from body, motion and markers, whatever the forces and the parameters."""
 
 
@@ -93,7 +93,7 @@ class Case:
 
     @cached_property
     def memory(self) -> dict[str, object]:
-        """What was computed for this case and serves again, by name."""
+        """What was computed of the motion and the markers and serves again, by name; nothing that depends on forces or parameters."""
         return {}
 
     @cached_property

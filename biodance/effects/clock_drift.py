@@ -26,5 +26,10 @@ class ClockDrift(Effect):
         late = moved_in_time(case.motion.time, case.predicted, delay)
         return case.with_added(case.trial.plates[0], late - case.predicted)
 
+    def removed(self, case: Case, theta: Array) -> Array:
+        """Return what was measured less the same where it belongs in time."""
+        value, delay = case.trial.wrench.value, float(np.ravel(theta)[0]) * (case.session_time - 0.5)
+        return value - moved_in_time(case.motion.time, value, -delay)
+
 
 EFFECT = ClockDrift

@@ -86,13 +86,20 @@ class Effect:
         """
         return None
 
+    def removed(self, case: Case, theta: Array) -> Array:
+        """Return (T, 6): what this cause of size ``theta`` (p,) has added to what ``case`` measured, about the lab origin.
+
+        By default what it adds to the prediction; a cause that distorts time or frequency undoes itself in what was measured, because
+        it distorts the person's other errors and loads as well.
+        """
+        return self.transform(case, np.asarray(theta, dtype=float)).residual - case.residual
+
     def corrected(self, case: Case, theta: Array) -> Case:
         """Return the case without this cause of size ``theta`` (p,): what would have been measured, or the body that moves right.
 
-        By default the plates lose what ``transform`` would have added; a cause in the body returns another body and its motion instead.
+        By default the plates lose what was ``removed``; a cause in the body returns another body and its motion instead.
         """
-        added = self.transform(case, np.asarray(theta, dtype=float)).residual - case.residual
-        return case.with_added(self.plate_of(case), -added)
+        return case.with_added(self.plate_of(case), -self.removed(case, theta))
 
     def possible(self, theta: Array) -> bool:
         """Return whether a cause of size ``theta`` (p,) can be: by default every size, either way."""

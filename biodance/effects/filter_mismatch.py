@@ -30,18 +30,28 @@ class FilterMismatch(Effect):
 
     def transform(self, case: Case, theta: Array) -> Case:
         """Return the case whose forces lack what the lower low-pass took."""
-        change = STRENGTH * float(np.ravel(theta)[0])
-        value = case.predicted
-        steep = (np.arange(len(value)) * case.motion.rate / (2 * len(value))) ** 4
-        gain = 1 / (1 + change * steep) if change >= 0 else 1 - change * steep
-        filtered = idct(gain[:, None] * dct(value, axis=0, norm="ortho"), axis=0, norm="ortho")
-        return case.with_added(case.trial.plates[0], filtered - value)
+        return case.with_added(case.trial.plates[0], _passed(case, case.predicted, float(np.ravel(theta)[0])) - case.predicted)
+
+    def removed(self, case: Case, theta: Array) -> Array:
+        """Return what was measured less the same with what the lower low-pass took put back, as far as the reference passes it."""
+        value = case.trial.wrench.value
+        return value - _passed(case, value, -float(np.ravel(theta)[0]))
 
     def reported(self, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
         """Return the cut-off itself, Hz; its standard deviation to first order."""
         inverse = 1 / REFERENCE**4 + STRENGTH * max(float(theta[0]), 0.0)
         cutoff = inverse**-0.25
         return (("cutoff", cutoff, 0.25 * cutoff / inverse * STRENGTH * float(sd[0]), "Hz"),)
+
+
+def _passed(case: Case, value: Array, lower: float) -> Array:
+    """Return ``value`` (T, 6) through a filter whose cut-off lies ``lower`` Hz under the reference; a negative one does not
+    raise more what lies over the reference.
+    """
+    change = STRENGTH * lower
+    steep = (np.arange(len(value)) * case.motion.rate / (2 * len(value))) ** 4
+    gain = 1 / (1 + change * steep) if change >= 0 else 1 - change * np.minimum(steep, REFERENCE**4)
+    return np.asarray(idct(gain[:, None] * dct(value, axis=0, norm="ortho"), axis=0, norm="ortho"))
 
 
 EFFECT = FilterMismatch

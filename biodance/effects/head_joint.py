@@ -11,21 +11,17 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.branch import Cut, branch_off
 from biodance.effects.case import Case
-from biodance.effects.effect import Effect, Parameter
-from biodance.effects.missing_joint import Loosened, extended, loosened, share_of_body, shoulders
-from biodance.records import Array
+from biodance.effects.effect import Parameter
+from biodance.effects.missing_joint import MissingJoint, share_of_body, shoulders
 
 NECK = 0.41
 """Height, between shoulders and vertex, about which the head turns: the angle of the jaw (de Leva 1996: 0.39 men, 0.45 women). Nodding is
 shared by all of the neck; about its base the head's weight would move twice as far as it does in virtual persons."""
 AXES = {"neck_flexion": -np.eye(3)[2], "neck_bending": np.eye(3)[0], "neck_rotation": np.eye(3)[1]}
 MARKERS = 3
-NATURAL = 0.040
-"""rad rms that skin, breathing and habit make in any session
-(head: 0.0395 +- 0.0025 in 14 virtual sessions whose head nods by 2.5 deg on two axes)."""
 
 
-class HeadJoint(Effect):
+class HeadJoint(MissingJoint):
     """The head turns by ``angle`` (rad rms per axis) on the trunk, in the course of time that its markers show."""
 
     name = "head_joint"
@@ -35,31 +31,13 @@ class HeadJoint(Effect):
     )
     separated_by = "Nodding and turning the head alone, standing still."
     advice = "Accept a body with a neck, or ask the person to look at one point straight ahead."
+    natural = 0.040
+    """(head: 0.0395 +- 0.0025 in 14 virtual sessions whose head nods by 2.5 deg on two axes)."""
 
     @classmethod
-    def targets(cls, case: Case) -> tuple[str, ...]:
-        """Return one target where the head has three markers."""
-        return ("",) if with_neck(case) is not None else ()
-
-    def columns(self, case: Case) -> Array:
-        """Return the wrench that the head's motion adds, per radian: of what the markers show, and of what the wrench shows beyond."""
-        return self._loosened(case).columns
-
-    def marker_columns(self, case: Case) -> Array:
-        """Return the mean residual of the markers that the joint explains, per radian."""
-        return self._loosened(case).marker_columns
-
-    def shown(self, case: Case) -> Array:
-        """Return the angle that the head markers show beyond the natural one."""
-        return self._loosened(case).beyond(NATURAL)
-
-    def corrected(self, case: Case, theta: Array) -> Case:
-        """Return the trial tracked with a body that has a neck."""
-        body = with_neck(case)
-        return extended(case, body) if body is not None else case
-
-    def _loosened(self, case: Case) -> Loosened:
-        return loosened(case, with_neck(case))
+    def loosened(cls, case: Case) -> Body | None:
+        """Return `with_neck` of the case."""
+        return with_neck(case)
 
 
 def with_neck(case: Case) -> Body | None:

@@ -1,6 +1,10 @@
-"""A joint that the body has and the model lacks: tracked again with it, to see how it moves and what that changes in the wrench."""
+"""A joint that the body has and the model lacks: tracked again with it, to see how it moves and what that changes in the wrench.
+
+The author of such a cause writes the body with the joint (``loosened``) and the angle that everybody moves it by (``natural``).
+"""
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -9,11 +13,12 @@ from biodance.body.body import Body
 from biodance.body.inertia import Lump, parameters
 from biodance.body.tables import numbers, read_table
 from biodance.effects.case import Case
-from biodance.errors import TrialRefused
+from biodance.effects.effect import Effect
+from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab.filters import LowPass, low_pass
 from biodance.motion.inverse_kinematics import solve_ik
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.regressor import regressor
 from biodance.motion.smoothing import smooth
 from biodance.motion.track import track
 from biodance.records import Array, Markers
@@ -22,68 +27,118 @@ RATE = 25.0
 """Hz, at least: the low-pass leaves nothing that needs more."""
 
 
-@dataclass(frozen=True, eq=False)
-class Loosened:
-    """``wrench`` (T, 6) about the lab origin that the joint's motion adds to the predicted one; ``markers`` (K, 3) m by which the model's
-    markers come nearer on average, in segment axes; ``angle`` rad rms of the joint's axes.
+class MissingJoint(Effect):
+    """A joint that turns by an angle (rad rms per axis, the first parameter) in the course of time that its markers show; the second
+    parameter is what the wrench shows beyond that.
     """
 
-    wrench: Array
+    natural: ClassVar[float] = 0.0
+    """rad rms per axis that skin, breathing and habit make in any session."""
+
+    @classmethod
+    def loosened(cls, case: Case) -> Body | None:
+        """Return the body of ``case`` with the joint; None where the trial's markers do not show it."""
+        raise BiodanceError(f"Effect {cls.name} does not define loosened: the body with the joint.")
+
+    @classmethod
+    def targets(cls, case: Case) -> tuple[str, ...]:
+        """Return one target where the markers show the joint."""
+        return ("",) if cls.loosened(case) is not None else ()
+
+    def columns(self, case: Case) -> Array:
+        """Return (T, 6, 2) the wrench that the joint's motion adds, per radian: of the angle shown, and of more than that."""
+        found = _movement(case, self)
+        if found is None:
+            return np.zeros((case.motion.time.size, 6, 2))
+        added = make_interp_spline(found.time, found.wrench(case) / max(found.angle, 1e-6), k=5)(case.motion.time)
+        return np.repeat(added[:, :, None], 2, axis=2)
+
+    def marker_columns(self, case: Case) -> Array:
+        """Return (K, 3, 2) m per radian: the mean residual that the angle shown explains."""
+        found = _movement(case, self)
+        nearer = np.zeros_like(case.marker_residual) if found is None else found.markers / max(found.angle, 1e-6)
+        return np.stack([nearer, np.zeros_like(nearer)], axis=2)
+
+    def shown(self, case: Case) -> Array:
+        """Return (2,) rad: the angle that is left when the natural one is taken off (squares of independent movements add up), and NaN
+        for what only the wrench can show.
+        """
+        found = _movement(case, self)
+        angle = 0.0 if found is None else found.angle
+        return np.array([np.sqrt(max(angle**2 - self.natural**2, 0.0)), np.nan])
+
+    def corrected(self, case: Case, theta: Array) -> Case:
+        """Return the trial tracked with the body that has the joint."""
+        body = self.loosened(case)
+        return case if body is None else replace(case, body=body, motion=track(body, case.trial), phi=_parameters(case, body))
+
+
+@dataclass(frozen=True, eq=False)
+class Movement:
+    """A trial tracked with the joint, at ``time`` (F,) s: ``loose`` (F, 6, 10N') regressor of the ``body`` with it, ``stiff`` (F, 6, 10N)
+    of the one without; ``markers`` (K, 3) m by which the model's markers come nearer on average, in segment axes; ``angle`` rad rms of the
+    joint's axes.
+    """
+
+    time: Array
+    body: Body
+    loose: Array
+    stiff: Array
     markers: Array
     angle: float
 
-    @property
-    def columns(self) -> Array:
-        """(T, 6, 2) the wrench per radian: of the angle that the markers show, and of more than they show."""
-        return np.repeat(self.wrench[:, :, None] / max(self.angle, 1e-6), 2, axis=2)
-
-    @property
-    def marker_columns(self) -> Array:
-        """(K, 3, 2) m per radian: the mean residual that the angle shown explains."""
-        return np.stack([self.markers / max(self.angle, 1e-6), np.zeros_like(self.markers)], axis=2)
-
-    def beyond(self, natural: float) -> Array:
-        """Return (2,) rad: the angle that is left when the ``natural`` one is taken off (squares of independent movements add up), and
-        NaN for what only the wrench can show.
-        """
-        return np.array([np.sqrt(max(self.angle**2 - natural**2, 0.0)), np.nan])
+    def wrench(self, case: Case) -> Array:
+        """Return (F, 6) about the lab origin: what the joint's motion adds with the parameters in use."""
+        return np.asarray(self.loose @ _parameters(case, self.body) - self.stiff @ case.phi)
 
 
-def loosened(case: Case, body: Body | None) -> Loosened:
-    """Return what the markers show with the joints that ``body`` has beyond ``case.body``; nothing where they do not determine them (None:
-    the markers for it are not there).
-    """
-    nothing = Loosened(np.zeros((case.motion.time.size, 6)), np.zeros_like(case.marker_residual), 0.0)
-    if body is None:
-        return nothing
-    key = ", ".join(joint.name for joint in body.joints)
-    if key not in case.memory:
+def _movement(case: Case, effect: MissingJoint) -> Movement | None:
+    """Return how the joint moves; None where the markers do not determine it or are not there."""
+    if effect.name not in case.memory:
+        body = effect.loosened(case)
         try:
-            case.memory[key] = _tracked(case, body)
+            case.memory[effect.name] = None if body is None else _tracked(case, body)
         except TrialRefused:
-            case.memory[key] = nothing
-    found = case.memory[key]
-    assert isinstance(found, Loosened)
+            case.memory[effect.name] = None
+    found = case.memory[effect.name]
+    assert found is None or isinstance(found, Movement)
     return found
 
 
-def _tracked(case: Case, body: Body) -> Loosened:
-    every = slice(None, None, max(1, int(case.motion.rate / RATE + 1e-6)))
-    markers, time = case.trial.markers, case.motion.time[every]
-    assert markers is not None
-    rate = case.motion.rate / (every.step or 1)
-    calm = Markers(markers.names, time, low_pass(markers.xyz, case.motion.rate, LowPass())[every])
-    gentle = LowPass(cutoff=min(LowPass().cutoff, 0.45 * rate))
-    tracked = case.motion.q[every]
+@dataclass(frozen=True, eq=False)
+class _Slow:
+    """A trial at about `RATE`: ``markers`` low-passed, postures ``q`` (F, nq) as tracked, and the regressor (F, 6, 10N) of them."""
+
+    markers: Markers
+    q: Array
+    regressor: Array
+    settings: LowPass
+
+
+def _slow(case: Case) -> _Slow:
+    """Return the trial at about `RATE`, as it was tracked."""
+    if "slow" not in case.memory:
+        every = slice(None, None, max(1, int(case.motion.rate / RATE + 1e-6)))
+        markers, time = case.trial.markers, case.motion.time[every]
+        assert markers is not None
+        calm = Markers(markers.names, time, low_pass(markers.xyz, case.motion.rate, LowPass())[every])
+        settings = LowPass(cutoff=min(LowPass().cutoff, 0.45 * case.motion.rate / (every.step or 1)))
+        stiff = smooth(case.body, time, case.motion.q[every], settings=settings)
+        case.memory["slow"] = _Slow(calm, stiff.q, regressor(case.body, stiff), settings)
+    found = case.memory["slow"]
+    assert isinstance(found, _Slow)
+    return found
+
+
+def _tracked(case: Case, body: Body) -> Movement:
+    slow = _slow(case)
     names = {joint.name for joint in case.body.joints}
     new = np.flatnonzero([joint.name not in names for joint in body.joints]) + body.nq - len(body.joints)
-    guess = np.insert(tracked, new - np.arange(new.size), 0.0, axis=1)
-    loose = smooth(body, time, solve_ik(body, calm, guess=guess).q, settings=gentle)
-    stiff = smooth(case.body, time, tracked, settings=gentle)
-    change = predict_wrench(body, loose, _parameters(case, body)).value - predict_wrench(case.body, stiff, case.phi).value
+    guess = np.insert(slow.q, new - np.arange(new.size), 0.0, axis=1)
+    time = slow.markers.time
+    loose = smooth(body, time, solve_ik(body, slow.markers, guess=guess).q, settings=slow.settings)
     angle = float(np.sqrt(loose.q[:, new].var(axis=0).mean()))
-    nearer = _markers(case, body, loose.q, stiff.q)
-    return Loosened(make_interp_spline(time, change, k=5)(case.motion.time), nearer, angle)
+    return Movement(time, body, regressor(body, loose), slow.regressor, _markers(case, body, loose.q, slow.q), angle)
 
 
 def _markers(case: Case, body: Body, loose: Array, stiff: Array) -> Array:
@@ -101,11 +156,6 @@ def _parameters(case: Case, body: Body) -> Array:
     phi = np.array(body.sip.phi)
     phi[: case.phi.size] += case.phi - case.body.sip.phi
     return phi
-
-
-def extended(case: Case, body: Body) -> Case:
-    """Return the case of the body with more joints, tracked with them."""
-    return replace(case, body=body, motion=track(body, case.trial), phi=_parameters(case, body))
 
 
 def share_of_body(body: Body, segment: str, *, top: Array, bottom: Array) -> Array:

@@ -10,18 +10,14 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.branch import Cut, branch_off
 from biodance.effects.case import Case
-from biodance.effects.effect import Effect, Parameter
-from biodance.effects.missing_joint import Loosened, extended, loosened, shoulders
-from biodance.records import Array
+from biodance.effects.effect import Parameter
+from biodance.effects.missing_joint import MissingJoint, shoulders
 
 STERNOCLAVICULAR = np.array([0.2, 0.0, 0.12])
 """Forwards, upwards and sideways from the middle of the shoulders, in half shoulder widths."""
-NATURAL = 0.033
-"""rad rms that skin, breathing and habit make in any session
-(shoulders: 0.029 +- 0.010 in 14 virtual sessions whose collar bones follow the arms)."""
 
 
-class ShoulderGirdle(Effect):
+class ShoulderGirdle(MissingJoint):
     """Both shoulders turn by ``angle`` (rad rms per axis) about the inner end of the collar bone, as their markers show; 0.1 rad carry the
     shoulder by 15 mm.
     """
@@ -33,31 +29,13 @@ class ShoulderGirdle(Effect):
     )
     separated_by = "Shrugging alone, with hanging arms."
     advice = "Accept a body with collar bones; keep the shoulder markers on the acromion, not on the deltoid."
+    natural = 0.033
+    """(shoulders: 0.029 +- 0.010 in 14 virtual sessions whose collar bones follow the arms)."""
 
     @classmethod
-    def targets(cls, case: Case) -> tuple[str, ...]:
-        """Return one target where both shoulders have a marker."""
-        return ("",) if with_clavicles(case) is not None else ()
-
-    def columns(self, case: Case) -> Array:
-        """Return the wrench that the shoulders' motion adds, per radian: of what the markers show, and of what the wrench shows beyond."""
-        return self._loosened(case).columns
-
-    def marker_columns(self, case: Case) -> Array:
-        """Return the mean residual of the markers that the joint explains, per radian."""
-        return self._loosened(case).marker_columns
-
-    def shown(self, case: Case) -> Array:
-        """Return the angle that the shoulder markers show beyond the natural one."""
-        return self._loosened(case).beyond(NATURAL)
-
-    def corrected(self, case: Case, theta: Array) -> Case:
-        """Return the trial tracked with a body that has collar bones."""
-        body = with_clavicles(case)
-        return extended(case, body) if body is not None else case
-
-    def _loosened(self, case: Case) -> Loosened:
-        return loosened(case, with_clavicles(case))
+    def loosened(cls, case: Case) -> Body | None:
+        """Return `with_clavicles` of the case."""
+        return with_clavicles(case)
 
 
 def with_clavicles(case: Case) -> Body | None:

@@ -32,5 +32,10 @@ class TimeDelay(Effect):
         late = moved_in_time(time, case.predicted, np.full(time.size, float(np.ravel(theta)[0])))
         return case.with_added(case.trial.plates[0], late - case.predicted)
 
+    def removed(self, case: Case, theta: Array) -> Array:
+        """Return what was measured less the same ``theta[0]`` seconds earlier."""
+        value, time = case.trial.wrench.value, case.motion.time
+        return value - moved_in_time(time, value, np.full(time.size, -float(np.ravel(theta)[0])))
+
 
 EFFECT = TimeDelay

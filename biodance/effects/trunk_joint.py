@@ -11,20 +11,16 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.branch import Cut, branch_off
 from biodance.effects.case import Case
-from biodance.effects.effect import Effect, Parameter
-from biodance.effects.missing_joint import Loosened, extended, loosened, share_of_body, shoulders
-from biodance.records import Array
+from biodance.effects.effect import Parameter
+from biodance.effects.missing_joint import MissingJoint, share_of_body, shoulders
 
 XIPHION = 0.61
 """Height of the joint between the trunk's joint and the shoulders (de Leva 1996, omphalion to xiphion: 0.58 men, 0.65 women)."""
 AXES = {"thorax_flexion": -np.eye(3)[2], "thorax_bending": np.eye(3)[0]}
 MARKERS = 4
-NATURAL = 0.0165
-"""rad rms that skin, breathing and habit make in any session
-(thorax: 0.0162 +- 0.0014 in 14 virtual sessions whose thorax moves by 1.2 deg on two axes)."""
 
 
-class TrunkJoint(Effect):
+class TrunkJoint(MissingJoint):
     """The thorax bends by ``angle`` (rad rms per axis) on the loins, in the course of time that the trunk markers show; turning about the
     long axis cannot be told from the model's own joint.
     """
@@ -36,31 +32,13 @@ class TrunkJoint(Effect):
     )
     separated_by = "Rounding and arching the back alone, standing still."
     advice = "Accept a body with a thorax, and put two more markers on the loins (L1, L3)."
+    natural = 0.0165
+    """(thorax: 0.0162 +- 0.0014 in 14 virtual sessions whose thorax moves by 1.2 deg on two axes)."""
 
     @classmethod
-    def targets(cls, case: Case) -> tuple[str, ...]:
-        """Return one target where the trunk has four markers."""
-        return ("",) if with_thorax(case) is not None else ()
-
-    def columns(self, case: Case) -> Array:
-        """Return the wrench that the thorax's motion adds, per radian: of what the markers show, and of what the wrench shows beyond."""
-        return self._loosened(case).columns
-
-    def marker_columns(self, case: Case) -> Array:
-        """Return the mean residual of the markers that the joint explains, per radian."""
-        return self._loosened(case).marker_columns
-
-    def shown(self, case: Case) -> Array:
-        """Return the angle that the trunk markers show beyond the natural one."""
-        return self._loosened(case).beyond(NATURAL)
-
-    def corrected(self, case: Case, theta: Array) -> Case:
-        """Return the trial tracked with a body that has a thorax."""
-        body = with_thorax(case)
-        return extended(case, body) if body is not None else case
-
-    def _loosened(self, case: Case) -> Loosened:
-        return loosened(case, with_thorax(case))
+    def loosened(cls, case: Case) -> Body | None:
+        """Return `with_thorax` of the case."""
+        return with_thorax(case)
 
 
 def with_thorax(case: Case) -> Body | None:

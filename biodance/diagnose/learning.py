@@ -1,0 +1,137 @@
+"""Learn from sessions without fault how large everything is that is no fault: expectation maximisation over all of them at once.
+
+A coefficient of a nuisance is normal with the mean and the size of its key; one mean is believed to a third of itself, because virtual
+persons are no better known than that, and counted only where the sessions agree on it.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from biodance.diagnose.candidates import Candidate
+from biodance.diagnose.model import marker_keys, nuisances
+from biodance.diagnose.problem import Problem
+from biodance.diagnose.tolerances import FLOOR, REFERENCE, Tolerances, whitened
+from biodance.records import Array
+
+DOUBT = 1 / 3
+"""Standard deviation of a mean, as a share of itself."""
+AGREED = 4.0
+"""Standard errors from which on a mean is kept; smaller ones are chance."""
+
+
+@dataclass(frozen=True, eq=False)
+class Null:
+    """One session without fault: ``target`` (r,); ``columns`` (r, K) in unit size with their ``keys`` (K), "" for the parameters' prior
+    (unit normal), and ``mean_keys`` (K), "" for columns without a mean; ``band`` (m,) of the 6 m wrench rows; ``marker_keys`` of the rows
+    that follow; ``mass`` kg.
+    """
+
+    target: Array
+    columns: Array
+    keys: tuple[str, ...]
+    band: NDArray[np.intp]
+    marker_keys: tuple[str, ...]
+    mass: float
+    mean_keys: tuple[str, ...] = ()
+
+
+def null_of(problem: Problem, causes: tuple[Candidate, ...]) -> Null:
+    """Return a session without fault as `learn` wants it; ``causes`` all of the family."""
+    columns, keys, mean_keys = nuisances(problem, causes)
+    own = ("",) * problem.sip.shape[1]
+    mass = float(problem.cases[0].body.sip.mass.sum())
+    every: Array = np.concatenate([problem.sip, columns], axis=1).astype(np.float32)  # type: ignore[assignment]
+    return Null(problem.target, every, own + keys, problem.spectrum.band, marker_keys(problem), mass, own + mean_keys)
+
+
+def learn(nulls: Iterable[Null], start: Tolerances, *, rounds: int = 10) -> Tolerances:
+    """Return the sizes, means and noise under which the null sessions are most probable after ``rounds`` of expectation maximisation, and
+    the energies that they leave. Only what has a size in ``start`` is learned.
+    """
+    sessions, found = tuple(nulls), start
+    for _ in range(rounds):
+        found = _improved(sessions, found)
+    left = np.array([_energy(null, found) for null in sessions])
+    spread = left.std(axis=0, ddof=1) if len(sessions) > 1 else found.energy_sd
+    return replace(found, energy=left.mean(axis=0), energy_sd=spread)
+
+
+@dataclass(frozen=True, eq=False)
+class _Posterior:
+    """What one session says of its coefficients: ``value``, ``variance`` (K,) in their own units, NaN for those without a size; ``left``
+    (r,) what their means leave of the target; ``spread`` (r, k) a square root of the covariance of what they explain.
+    """
+
+    value: Array
+    variance: Array
+    left: Array
+    spread: Array
+
+
+def _posterior(null: Null, found: Tolerances) -> _Posterior:
+    """Return what one session says about all coefficients under the tolerances ``found``."""
+    size = np.array([1.0 if key == "" else found.size(key) for key in null.keys])
+    expected = np.array([found.mean(name) if name else 0.0 for name in null.mean_keys or null.keys])
+    known = np.flatnonzero(size > 0)
+    scaled = null.columns[:, known] * size[known].astype(null.columns.dtype)
+    target = null.target - null.columns[:, known] @ expected[known]
+    X = whitened(scaled, null.band, null.marker_keys, null.mass, found)
+    y = whitened(target[:, None].astype(X.dtype), null.band, null.marker_keys, null.mass, found)[:, 0]
+    factor = cho_factor((X.T @ X).astype(float) + np.eye(known.size), lower=True)
+    mean, covariance = cho_solve(factor, (X.T @ y).astype(float)), cho_solve(factor, np.eye(known.size))
+    value, variance = np.full((2, size.size), np.nan)
+    value[known], variance[known] = expected[known] + size[known] * mean, size[known] ** 2 * np.diag(covariance)
+    return _Posterior(value, variance, target - scaled @ mean, scaled @ np.linalg.cholesky(covariance).astype(scaled.dtype))
+
+
+def _improved(sessions: tuple[Null, ...], found: Tolerances) -> Tolerances:
+    """Return the tolerances after one round."""
+    rows: list[tuple[str, str, float, float]] = []
+    noise, count = np.zeros_like(found.noise), np.zeros(len(found.noise))
+    for null in sessions:
+        some = _posterior(null, found)
+        names = null.mean_keys or ("",) * len(null.keys)
+        rows += [row for row in zip(null.keys, names, some.value, some.variance, strict=True) if row[0] and np.isfinite(row[2])]
+        wrench = 6 * null.band.size
+        seen = some.left[wrench:] ** 2 + (some.spread[wrench:] ** 2).sum(axis=1)
+        rows += [(key, "", float(np.sqrt(square)), 0.0) for key, square in zip(null.marker_keys, seen, strict=True)]
+        parts = np.concatenate([some.left[:wrench, None], some.spread[:wrench]], axis=1).reshape(null.band.size, 6, -1)
+        for b in range(len(noise)):
+            here = parts[null.band == b].transpose(1, 0, 2).reshape(6, -1)
+            noise[b] += (here @ here.T).astype(float) * (REFERENCE / null.mass) ** 2
+            count[b] += np.sum(null.band == b)
+    means, sizes = _moments(rows)
+    return replace(found, sizes={**found.sizes, **sizes}, noise=noise / np.maximum(count, 1)[:, None, None] + FLOOR, means=means)
+
+
+def _moments(rows: list[tuple[str, str, float, float]]) -> tuple[dict[str, float], dict[str, float]]:
+    """Return means and sizes from rows of key, name of the mean, posterior mean and posterior variance."""
+    named: dict[str, list[tuple[float, float]]] = {}
+    for _, name, value, variance in rows:
+        if name:
+            named.setdefault(name, []).append((value, variance))
+    means = {name: mean for name, pairs in named.items() if (mean := _agreed(np.array(pairs)))}
+    square: dict[str, list[float]] = {}
+    for key, name, value, variance in rows:
+        centre = means.get(name, 0.0)
+        square.setdefault(key, []).append((value - centre) ** 2 + variance + (DOUBT * centre) ** 2)
+    return means, {key: float(np.sqrt(np.mean(some))) for key, some in square.items()}
+
+
+def _agreed(pairs: Array) -> float:
+    """Return the mean of values with variances (n, 2); 0 where it may be chance."""
+    value, variance = pairs.T
+    mean = float(value.mean())
+    error = np.sqrt(np.mean((value - mean) ** 2 + variance) / max(len(value) - 1, 1))
+    return mean if len(value) > 2 and abs(mean) > AGREED * error else 0.0
+
+
+def _energy(null: Null, found: Tolerances) -> Array:
+    """Return (B, 6): mean square of the whitened residual that a session leaves, per band and channel."""
+    left = _posterior(null, found).left[:, None]
+    square = whitened(left, null.band, null.marker_keys, null.mass, found)[: 6 * null.band.size].reshape(-1, 6) ** 2
+    return np.array([square[null.band == b].mean(axis=0) for b in range(len(found.noise))])
