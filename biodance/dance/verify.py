@@ -23,12 +23,14 @@ from biodance.records import Array, Motion, Wrench
 FRICTION = 0.5
 STILL = 1e-6
 """m, rad: how far a planted foot may be from where it stands: rounding."""
-TOUCH = 1e-7
+TOUCH = 1e-9
 """m by which a sole that has just left the ground may be below it: rounding."""
 STOOL = 0.03
 """m by which the knees of a seated person may hang below the hips."""
 GRIP = 0.04
 """m by which the palm of a hand that holds a frame may move about the grip."""
+EDGES = np.array([0.0025, 0.005])
+"""s after the start and before the end of every move that are judged, too: there a foot has just left the ground or is about to return."""
 JUMP = 1e-6
 """rad, rad/s, rad/s²: jumps of coordinates between phases: rounding."""
 
@@ -69,7 +71,7 @@ class _Stretch:
 
 
 def verify(body: Body, dance: Dance, plan: Plan, *, rate: float = 100.0) -> tuple[Margin, ...]:
-    """Return the margin of every limit over the whole dance, sampled at ``rate`` Hz and at the ends of all phases.
+    """Return the margin of every limit over the whole dance, sampled at ``rate`` Hz, at the ends of all phases and close to them.
 
     ``body`` whose limits count (usually ``dance.body``); ``plan`` gives the share of the base of support that may be used.
     """
@@ -92,7 +94,8 @@ def broken(margins: tuple[Margin, ...]) -> tuple[Margin, ...]:
 def _stretches(body: Body, dance: Dance, plan: Plan, rate: float) -> Iterator[_Stretch]:
     for k, phase in enumerate(dance.phases):
         inner = np.arange(np.ceil(phase.start * rate), np.floor(phase.end * rate) + 1) / rate
-        time = np.unique(np.round(np.clip([phase.start, *inner, phase.end], phase.start, phase.end), 9))
+        instants = [phase.start, *(phase.start + EDGES), *inner, *(phase.end - EDGES), phase.end]
+        time = np.unique(np.round(np.clip(instants, phase.start, phase.end), 9))
         time = time[:1] if phase.kind == "hold" else time  # nothing changes during a hold
         state = dance.state(phase, time)
         motion = dance.chain.motion(time, state.x, state.v, state.a)
