@@ -1,22 +1,28 @@
 """What is already found of a dance, on disk, so that a design that was interrupted goes on where it stopped."""
 
 import hashlib
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from biodance import __version__
+import biodance
 from biodance.body.body import Body
 from biodance.body.body_file import body_text
 from biodance.dance.plan import Plan
 from biodance.records import Array
 
+ROOMS = ("body", "dance", "identify", "motion")
+"""Rooms whose code decides what a dance becomes."""
+
 
 class Ledger:
-    """Named sets of arrays in a folder that belongs to one body, plan and seed; without a folder nothing is kept."""
+    """Named sets of arrays in a folder that belongs to one body, plan, seed and state of the code; without a folder nothing is kept."""
 
     def __init__(self, folder: Path | None, body: Body, plan: Plan, seed: int) -> None:
-        key = hashlib.sha256(f"{__version__}{body_text(body, '')}{plan!r}{seed}".encode()).hexdigest()[:16]
+        key = hashlib.sha256(f"{code()}{body_text(body, '')}{plan!r}{seed}".encode()).hexdigest()[:16]
         self.folder = folder / f"dance_{key}" if folder else None
         if self.folder:
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -32,9 +38,17 @@ class Ledger:
         except (OSError, ValueError, EOFError):
             return None
 
-    def put(self, name: str, **arrays: Array | float) -> None:
+    def put(self, name: str, **arrays: NDArray[Any]) -> None:
         """Keep arrays under ``name``."""
         if self.folder:
             part = self.folder / f"{name}.part.npz"
-            np.savez(part, allow_pickle=False, **{key: np.asarray(value) for key, value in arrays.items()})
+            np.savez(part, allow_pickle=False, **arrays)
             part.replace(self.folder / f"{name}.npz")
+
+
+@cache
+def code() -> str:
+    """Return a hash of the source of all `ROOMS`: parts that older code found do not fit those that newer code finds."""
+    rooms = Path(biodance.__file__).parent
+    files = sorted(file for room in ROOMS for file in (rooms / room).rglob("*.py"))
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
