@@ -9,8 +9,9 @@ import pytest
 from biodance.body.human import human
 from biodance.dance import postures
 from biodance.dance.chain import Chain
+from biodance.dance.exchange import Posture, exchange
 from biodance.dance.excitation import blocks, condition, smooth_condition
-from biodance.dance.postures import KEPT, Posture, anyhow, at, exchange, solve, start
+from biodance.dance.postures import KEPT, anyhow, at, solve, start
 from biodance.dance.stance import seat, stance
 from biodance.errors import BiodanceError
 from biodance.records import Subject
@@ -46,6 +47,14 @@ def test_postures_are_exchanged_until_none_of_all_found_helps():
         for other in found:
             if other not in chosen:
                 assert criterion([*chosen[:k], other, *chosen[k + 1 :]]) >= best - 1e-9
+
+
+def test_no_posture_is_taken_twice():
+    up = np.random.default_rng(2).normal(size=(12, 12, 3))
+    up /= np.linalg.norm(up, axis=2, keepdims=True)
+    found = [Posture(np.full(1, (k // 3) + 0.01 * (k % 3)), u) for k, u in enumerate(up)]  # four postures, each three times
+    chosen = exchange(BLOCKS, (FEET,) * 4, [found[:3], found[:6], found[3:9], found])
+    assert sorted(int(p.x[0]) for p in chosen) == [0, 1, 2, 3]
 
 
 def test_feet_keep_their_own_postures_when_exchanged():

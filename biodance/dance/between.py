@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.dance.chain import Chain
-from biodance.dance.postures import ATTEMPTS, KEPT, Posture, refuse, solve, start
+from biodance.dance.exchange import Posture
+from biodance.dance.postures import ATTEMPTS, KEPT, refuse, solve, start
 from biodance.dance.stance import Stance
 from biodance.dance.state import State
 from biodance.records import Array
@@ -28,8 +29,8 @@ class Near:
         return float(np.mean(gap**2)), by
 
 
-def middle_posture(chain: Chain, stance: Stance, neighbours: Array, *, seed: list[int]) -> Posture:
-    """Return a posture on the feet ``stance`` between ``neighbours`` (K, n) coordinates.
+def middle_posture(chain: Chain, stance: Stance, neighbours: Array, *, seed: list[int], mild: float = MILD) -> Posture:
+    """Return a posture on the feet ``stance`` between ``neighbours`` (K, n) coordinates; ``mild`` share of whose angles is the aim.
 
     Raises
     ------
@@ -38,7 +39,7 @@ def middle_posture(chain: Chain, stance: Stance, neighbours: Array, *, seed: lis
     """
     rng, tried = np.random.default_rng(seed), list[Array]()
     begin = start(chain, stance, rng)
-    begin[3:] = MILD * neighbours[:, 3:].mean(axis=0)
+    begin[3:] = mild * neighbours[:, 3:].mean(axis=0)
     for _ in range(ATTEMPTS):
         found = solve(chain, stance, begin, Near(begin), iterations=ITERATIONS)
         if found.violation <= KEPT:

@@ -4,7 +4,6 @@ cond has a kink where a segment is isotropic, at which one posture after the oth
 number of growing sharpness, and after two independent runs postures are exchanged for better ones among all that came by.
 """
 
-from collections.abc import Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -13,8 +12,10 @@ from typing import NoReturn
 import numpy as np
 
 from biodance.dance.chain import ROOT, Chain
+from biodance.dance.exchange import Posture, exchange
 from biodance.dance.excitation import Blocks, smooth_condition, static_grams, total, upright_slopes, uprights
 from biodance.dance.limits import limits
+from biodance.dance.mirror import image_feet, mirrored, mirrored_vectors, symmetric
 from biodance.dance.programme import Judged, Objective, Programme, closed
 from biodance.dance.refusal import PERSONAL, Excess, describe, told
 from biodance.dance.simplicity import hardness
@@ -51,19 +52,6 @@ class Postures:
     stances: tuple[Stance, ...]
     criterion: float
     bound: float
-
-
-@dataclass(frozen=True, eq=False)
-class Posture:
-    """``x`` (n,) coordinates, ``up`` (N, 3) the vertical in the segments; ``violation`` of the reserved limits in their scales and the
-    worst ``limit``; ``hard`` how hard it is to take.
-    """
-
-    x: Array
-    up: Array
-    violation: float = np.inf
-    limit: str = ""
-    hard: float = 0.0
 
 
 def free_coordinates(chain: Chain, stance: Stance) -> list[int]:
@@ -128,6 +116,7 @@ def find_postures(chain: Chain, blocks: Blocks, stances: tuple[Stance, ...], *, 
     tasks = [workers.submit(search.run, run) for run in range(RUNS)]
     pool = [[p for part in parts for p in part] for parts in zip(*(task.result() for task in tasks), strict=True)]
     kept = [[p for p in found if p.violation <= KEPT] or [replace(possible[s.name])] for s, found in zip(stances, pool, strict=True)]
+    kept = search.with_images(kept, kept)
     chosen = exchange(blocks, stances, kept)
     for n, (sharpness, iterations) in enumerate((*FRESH, *POLISH)):
         begin = [search.anywhere(k, 100 + n) for k in range(len(stances))] if n < len(FRESH) else [p.x for p in chosen]
@@ -136,6 +125,7 @@ def find_postures(chain: Chain, blocks: Blocks, stances: tuple[Stance, ...], *, 
         better = [part.result() for part in parts]
         found = [better[k % 2][k // 2] for k in range(len(stances))]
         kept = [[new, *rest] if new.violation <= KEPT else rest for new, rest in zip(found, kept, strict=True)]
+        kept = search.with_images(kept, [[new] for new in found])
         before = [[old, *(p for p in rest if p is not old)] for old, rest in zip(chosen, kept, strict=True)]
         chosen = min((exchange(blocks, stances, pool) for pool in (kept, before)), key=lambda some: _price(blocks, some))
     return Postures(np.array([p.x for p in chosen]), stances, criterion(blocks, chosen), float(blocks.weight.sum()))
@@ -193,6 +183,17 @@ class _Search:
         posture = next((p for p in found if p.violation <= KEPT), None)
         return posture or refuse(self.chain, stance, begin)
 
+    def with_images(self, kept: list[list[Posture]], found: list[list[Posture]]) -> list[list[Posture]]:
+        """Return the postures ``kept`` of every place and the mirror images of ``found`` (`mirror`), of a body whose sides are alike."""
+        out, body = [[*some] for some in kept], self.chain.body
+        for here, some in zip(self.stances, found if symmetric(body) else [], strict=False):
+            goal = image_feet(here, self.stances)
+            if goal is not None:
+                there = self.stances[goal]
+                images = (replace(p, x=mirrored(self.chain, p.x, here, there), up=mirrored_vectors(body, p.up)) for p in some)
+                out[goal] += [image for image in images if image.violation <= KEPT]
+        return out
+
     def run(self, run: int) -> list[list[Posture]]:
         """Return for every place the postures of one run, one per sweep."""
         now = [at(self.chain, s, self.anywhere(k, run)) for k, s in enumerate(self.stances)]
@@ -217,54 +218,6 @@ class _Search:
                     break
                 x, steps = self.anywhere(p, 3 + attempt), max(iterations, 20)
         return [now[p] for p in sorted(order)]
-
-
-def exchange(blocks: Blocks, stances: tuple[Stance, ...], pool: list[list[Posture]]) -> list[Posture]:
-    """Return one posture for each place: those that come first, exchanged for better ones of the same stance as long as any helps."""
-    kinds = [stance.name for stance in stances]
-    every: dict[str, list[Posture]] = {kind: [] for kind in kinds}
-    for kind, found in zip(kinds, pool, strict=True):
-        every[kind] += [posture for posture in found if posture not in every[kind]]
-    grams = {kind: np.eye(3) - np.einsum("pni,pnj->pnij", *[np.array([p.up for p in found])] * 2) for kind, found in every.items()}
-    taken: dict[str, list[int]] = {kind: [] for kind in every}
-    for kind, found in zip(kinds, pool, strict=True):
-        taken[kind].append(every[kind].index(found[0]))
-    worth = blocks.simplicity * float(blocks.weight.sum()) / len(stances)
-    hard = {kind: worth * np.array([p.hard for p in found]) for kind, found in every.items()}
-    whole = sum(grams[kind][picks].sum(axis=0) for kind, picks in taken.items())
-    effort = sum(hard[kind][picks].sum() for kind, picks in taken.items())
-    value = _values(blocks, whole[None])[0] + effort
-    for kind, place in _places(taken):
-        spare = [i for i in range(len(every[kind])) if i not in taken[kind]]
-        if spare:
-            now = taken[kind][place]
-            trial, efforts = whole - grams[kind][now] + grams[kind][spare], effort - hard[kind][now] + hard[kind][spare]
-            values = _values(blocks, trial) + efforts
-            if values.min() < value - 1e-6:
-                value, best = values.min(), int(values.argmin())
-                whole, effort, taken[kind][place] = trial[best], efforts[best], spare[best]
-    picks = {kind: iter(chosen) for kind, chosen in taken.items()}
-    return [every[kind][next(picks[kind])] for kind in kinds]
-
-
-def _places(taken: dict[str, list[int]]) -> Iterator[tuple[str, int]]:
-    """Yield all places in turn, again and again, until a round has changed nothing."""
-    before: dict[str, list[int]] = {}
-    while before != taken:
-        before = {kind: list(picks) for kind, picks in taken.items()}
-        for kind, picks in taken.items():
-            for place in range(len(picks)):
-                yield kind, place
-
-
-def _values(blocks: Blocks, grams: Array) -> Array:
-    """Return the criterion (K,) kg of K sets of Gram matrices (K, N, 3, 3)."""
-    out = np.zeros(len(grams))
-    for i, pick in enumerate(blocks.first):
-        if pick and blocks.weight[i] > 0:
-            value = np.linalg.eigvalsh(grams[:, i][np.ix_(range(len(grams)), pick, pick)])
-            out += blocks.weight[i] * np.sqrt(value[:, -1] / np.maximum(value[:, 0], 1e-12))
-    return out
 
 
 def solve(chain: Chain, stance: Stance, begin: Array, objective: Objective, *, iterations: int, names: tuple[str, ...] = STATIC) -> Posture:

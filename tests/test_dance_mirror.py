@@ -1,0 +1,49 @@
+"""Mirror images of postures: as possible as the posture, of another set of feet, and only for bodies whose sides are alike."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from biodance.body.human import human
+from biodance.dance.chain import ROOT, Chain
+from biodance.dance.mirror import image_feet, mirrored, mirrored_vectors, symmetric
+from biodance.dance.person import PersonLimits, limited
+from biodance.dance.plan import Plan
+from biodance.dance.postures import anyhow, solve, start
+from biodance.dance.sequence import sequence
+from biodance.dance.stance import holding
+from biodance.records import Subject
+
+BODY = human(Subject(65.0, 1.75, "F", 33.0))
+CHAIN = Chain(BODY)
+BLOCKS = ("parallel", "right_forward", "single_right", "single_left")
+FEET = tuple(s for s in sequence(BODY, Plan("all", "", tuple((name, 1) for name in BLOCKS))) if s.over is None)
+
+
+@pytest.mark.parametrize("place", [0, 2, 3])
+def test_an_image_keeps_every_limit_as_well_as_its_posture(place):
+    here, there = FEET[place], FEET[image_feet(FEET[place], FEET)]
+    posture = solve(CHAIN, here, start(CHAIN, here, np.random.default_rng(place)), anyhow, iterations=8)
+    image = solve(CHAIN, there, mirrored(CHAIN, posture.x, here, there), anyhow, iterations=0)
+    assert image.violation == pytest.approx(posture.violation, abs=1e-9)
+    np.testing.assert_allclose(image.up, mirrored_vectors(BODY, posture.up), atol=1e-12)
+    assert np.abs(image.x[ROOT:] - posture.x[ROOT:]).max() > 0.1
+    np.testing.assert_allclose(mirrored(CHAIN, image.x, there, here), posture.x, atol=1e-12)
+
+
+def test_images_stand_on_their_own_feet():
+    assert [image_feet(feet, FEET) for feet in FEET] == [0, None, 3, 2]
+    assert image_feet(FEET[2], FEET[:3]) is None
+    held = tuple(holding(feet, BODY, ("right",)) for feet in FEET)
+    assert image_feet(held[0], held) is None
+
+
+@pytest.mark.parametrize(
+    "person",
+    [PersonLimits(strengths=(("left_knee", 0.5),)), PersonLimits(range_shares=(("left_shoulder", 0.5),))],
+    ids=["strength", "range"],
+)
+def test_whoever_differs_from_side_to_side_has_no_images(person):
+    assert symmetric(BODY)
+    assert not symmetric(replace(BODY, limits=limited(BODY, person)))
