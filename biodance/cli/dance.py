@@ -56,7 +56,7 @@ def dance(
         sys.stdout.write(f"{folder}\n")
     if not result.feasible:
         say(f"There is no such dance. {result.reason}")
-    return DONE if result.feasible and not result.notes else NEEDS_A_PERSON
+    return DONE if result.feasible and result.complete else NEEDS_A_PERSON
 
 
 @contextmanager

@@ -44,7 +44,7 @@ class Dance:
     ``protocol`` its name; ``body`` whose it is; ``postures`` (P, n) coordinates of the chain (m, rad); ``stances`` (P,) the feet during
     each hold, with ``over`` set for postures in between that only carry the weight from one foot configuration to the next;
     ``hold`` (P,) s; ``via`` (P - 1, 2, n) via points of the moves, ``move`` (P - 1,) s how long each takes, ``under`` (P - 1,) the feet
-    meanwhile; ``seed`` of the random numbers.
+    meanwhile; ``seed`` of the random numbers; ``notes`` in plain sentences what differs from the plan, because a move was impossible.
     """
 
     protocol: str
@@ -56,6 +56,7 @@ class Dance:
     move: Array
     under: tuple[Stance, ...]
     seed: int
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         count, size = np.shape(self.postures)
@@ -127,7 +128,7 @@ class Dance:
 
     def save(self, path: str | Path) -> None:
         """Write the dance, its body included, as an npz file."""
-        words = {"biodance_dance": VERSION, "protocol": self.protocol, "seed": self.seed}
+        words = {"biodance_dance": VERSION, "protocol": self.protocol, "seed": self.seed, "notes": self.notes}
         words |= {"stances": [_told(s) for s in self.stances], "under": [_told(s) for s in self.under]}
         arrays = {name: getattr(self, name) for name in ("postures", "hold", "via", "move")}
         np.savez_compressed(path, allow_pickle=False, words=json.dumps(words), body=body_text(self.body, self.protocol), **arrays)
@@ -149,7 +150,7 @@ class Dance:
                 arrays = {name: found[name] for name in ("postures", "hold", "via", "move")}
                 body, _ = parse_body(str(found["body"]), str(path))
             feet: dict[str, Any] = {name: tuple(Stance(**s) for s in words[name]) for name in ("stances", "under")}
-            return cls(words["protocol"], body, seed=words["seed"], **feet, **arrays)
+            return cls(words["protocol"], body, seed=words["seed"], notes=tuple(words.get("notes", ())), **feet, **arrays)
         except OSError as error:
             raise FileRefused(f"{path}: cannot be read ({error.strerror or error}).") from error
         except FileRefused:

@@ -5,6 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from biodance.body.body import Body
 from biodance.body.human import human
 from biodance.body.limits import joint_limits
@@ -35,7 +37,8 @@ class DanceResult:
 
     ``plan`` and ``body`` as fitted to the person; ``dance`` with its ``margins`` (worst of every limit, checked by other code than the
     optimiser's), ``account`` and ``expectation``; where there is none that keeps all limits, ``reason`` says which constraint forbids it
-    and ``dance`` is None. ``notes`` what was left out for the person; ``seconds`` of computing.
+    and ``dance`` is None. ``notes`` what was left out for the person (``dance.notes``: what was exchanged or left out because a move was
+    impossible); ``seconds`` of computing.
     """
 
     body: Body
@@ -52,6 +55,12 @@ class DanceResult:
     def feasible(self) -> bool:
         """True where there is a dance and every margin of it is kept."""
         return self.dance is not None
+
+    @property
+    def complete(self) -> bool:
+        """True where nothing of the protocol was left out: neither for the person nor because a move was impossible."""
+        counted = self.dance.counted.sum() if self.dance else 0
+        return not self.notes and (np.isfinite(self.plan.budget) or counted == self.plan.count)
 
 
 LEGAL = {"mass": (30.0, 200.0, "kg"), "stature": (1.2, 2.2, "m")}

@@ -83,7 +83,7 @@ def dance_document(result: DanceResult) -> dict[str, Any]:
         "reason": result.reason,
         "expected_sd": rows,
         "expected_curve": _curve(result),
-        "notes": result.notes,
+        "notes": (*result.notes, *(dance.notes if dance else ())),
         "seed": dance.seed if dance else None,
         "compute_s": result.seconds,
     }

@@ -1,0 +1,118 @@
+"""What is done where a move cannot be made: another posture in place of one of its ends, then one posture less; a refusal only at last."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from biodance.dance.between import middle_posture
+from biodance.dance.exchange import alike
+from biodance.dance.excitation import static_grams
+from biodance.dance.moves import ways
+from biodance.dance.postures import KEPT, Exciting, at, criterion, solve, start
+from biodance.dance.refusal import told
+from biodance.dance.ways import Way
+from biodance.dance.work import Course, Work
+from biodance.errors import BiodanceError
+from biodance.records import Array
+
+ENDS = (1, 0, 1)
+"""Which end of a move that cannot be made is exchanged: where it goes to, where it comes from, the new one where it goes to again."""
+REST = (0.0, 0.6, 0.15)
+"""Share of their neighbours' joint angles that postures in between keep in these attempts (`between.MILD` at first)."""
+STARTS, SHARPNESS, ITERATIONS = 6, 8, 20
+"""Of the search for another posture: starts, sharpness of the condition number, iterations."""
+FEWER = 4
+"""Postures that may be left out, one after the other, as long as half of those on the same feet are left."""
+
+
+def passable(work: Work, course: Course) -> tuple[Course, list[Way], tuple[str, ...]]:
+    """Return a course all of whose ways keep the limits, these ways, and in plain sentences what differs from ``course``.
+
+    Raises
+    ------
+    BiodanceError
+        A move cannot be made whatever postures it joins; the message names it and the limit it breaks.
+    """
+    found, notes, first = ways(work, course, {}), list[str](), course
+    for attempt in range(1, len(ENDS) + FEWER + 1):
+        bad = [k for k, way in enumerate(found) if way.limit]
+        if not bad:
+            break
+        if attempt <= len(ENDS):
+            places = sorted({k + ENDS[attempt - 1] for k in bad})
+            course, known = _exchanged(work, course, places, attempt), {k: w for k, w in enumerate(found) if not {k, k + 1} & {*places}}
+            notes += [_said(course, place, "exchanged for another one", _limit(found, place)) for place in places]
+        else:
+            place = _spare(course, bad[0], found[bad[0]], first)
+            notes.append(_said(course, place, "left out", found[bad[0]].limit))
+            course, known = _without(course, place), {k - (k >= place): w for k, w in enumerate(found) if k not in (place - 1, place)}
+        found = ways(work, course, {k: w for k, w in known.items() if not w.limit}, attempt)
+    for k, way in enumerate(found):
+        if way.limit:
+            raise BiodanceError(_impossible(course, k, way))
+    return course, found, tuple(notes)
+
+
+def _exchanged(work: Work, course: Course, places: list[int], attempt: int) -> Course:
+    """Return the course with other postures at ``places``."""
+    for place in places:
+        x = course.x.copy()
+        if course.stances[place].over is None:
+            x[place] = _another(work, course, place, np.random.default_rng([work.seed, 4, attempt, place]))
+        else:
+            near, seed = _neighbours(x, place), [work.seed, 5, attempt, place]
+            x[place] = middle_posture(work.chain, course.stances[place], near, seed=seed, mild=REST[attempt - 1]).x
+        course = replace(course, x=x)
+    return course
+
+
+def _another(work: Work, course: Course, place: int, rng: np.random.Generator) -> Array:
+    """Return the most exciting posture (n,) beside all others from a few fresh starts; the old one where none is feasible."""
+    chain, blocks, stance = work.chain, work.blocks, course.stances[place]
+    pairs = zip(course.stances, course.x, range(len(course.x)), strict=True)
+    others = [at(chain, s, x) for s, x, k in pairs if s.over is None and k != place]
+    grams = static_grams(np.array([p.up for p in others]).reshape(-1, len(chain.body.segments), 3))
+    objective = Exciting(blocks, grams, 0.1 * float(blocks.weight.sum()) / (len(others) + 1), SHARPNESS)
+    found = (solve(chain, stance, start(chain, stance, rng), objective, iterations=ITERATIONS) for _ in range(STARTS))
+    same = [x for s, x, k in zip(course.stances, course.x, range(len(course.x)), strict=True) if s.name == stance.name and k != place]
+    kept = [p for p in found if p.violation <= KEPT and not alike(np.array([p.x, *same]))[0, 1:].any()]
+    return min(kept, key=lambda posture: criterion(blocks, [*others, posture])).x if kept else course.x[place]
+
+
+def _neighbours(x: Array, place: int) -> Array:
+    return x[[k for k in (place - 1, place + 1) if 0 <= k < len(x)]]
+
+
+def _spare(course: Course, k: int, way: Way, first: Course) -> int:
+    """Return the end of move ``k`` that can be left out: a posture that counts, of a kind of which half is left of the ``first`` course."""
+    now, before = ([stance.name for stance in one.stances if stance.over is None] for one in (course, first))
+    for place in (k + 1, k):
+        stance = course.stances[place]
+        if stance.over is None and 2 * (now.count(stance.name) - 1) >= before.count(stance.name):
+            return place
+    raise BiodanceError(_impossible(course, k, way))
+
+
+def _without(course: Course, place: int) -> Course:
+    return Course(np.delete(course.x, place, axis=0), course.stances[:place] + course.stances[place + 1 :])
+
+
+def _limit(found: list[Way], place: int) -> str:
+    """Return the limit that a way to or from ``place`` breaks."""
+    return next(found[k].limit for k in (place - 1, place) if 0 <= k < len(found) and found[k].limit)
+
+
+def _said(course: Course, place: int, what: str, limit: str) -> str:
+    number = sum(stance.over is None for stance in course.stances[: place + 1])
+    stance, limit = course.stances[place], limit.replace("_", " ")
+    which = f"Posture {number} ({told(stance)})" if stance.over is None else f"The posture in between after posture {number}"
+    return f"{which} was {what}: a move to or from it would have exceeded the limit on {limit}."
+
+
+def _impossible(course: Course, k: int, way: Way) -> str:
+    first, second = course.stances[k], course.stances[k + 1]
+    return (
+        f"The move from posture {k + 1} to {k + 2} of {len(course.stances)} ({first.name} to {second.name}) cannot be made: "
+        f"{way.limit.replace('_', ' ')} is exceeded even slowly, by way of a posture in between, and with other postures at its ends. "
+        "Leave these feet out of the protocol, or widen that limit."
+    )
