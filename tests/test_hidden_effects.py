@@ -5,7 +5,6 @@ The hiding side (`biodance.virtual_lab`) knows nothing of the effects; the findi
 
 import json
 import os
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -105,25 +104,39 @@ def data() -> Path:
     return Path(folder)
 
 
-def standing(data: Path, folder: Path, text: str = "") -> Path:
+def standing(data: Path, folder: Path, name: str, text: str = "") -> Path:
     """Write a session of a real person who stands on a plate, with a fault in the file if there is a ``text``."""
-    source = data / "biomechzoo" / "HC032A" / "HC032A01.c3d"
+    source = data / "biomechzoo" / name / f"{name}01.c3d"
     folder.mkdir()
-    shutil.copy(source, folder / "static.c3d")
-    inject(source, folder / "stand.c3d", fault_of(parse(text), {source.stem: (0.0, 1.0)}) if text else lambda recording: recording)
-    (folder / "session.toml").write_text('[trials.static]\nrole = "static"\n\n[trials.stand]\nrole = "fit"\n')
+    inject(source, folder / "static.c3d", fault_of(parse(text), {source.stem: (0.0, 1.0)}) if text else lambda recording: recording)
     return folder
 
 
 @pytest.mark.filterwarnings("ignore")
-def test_real_standing_is_not_accused_of_a_plate_fault_unless_the_file_has_one(
-    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("name", ["HC030A", "HC032A"])
+def test_real_standing_is_not_accused_of_a_plate_fault(name: str, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    clean = found(standing(data, tmp_path / "clean", name), monkeypatch, without=("labels_swapped",))
+    assert not clean.findings
+    assert any("centre of mass lies" in note for note in clean.notes)
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("name", ["HC030A", "HC032A"])
+@pytest.mark.parametrize(
+    ("text", "effect"),
+    [("plate_gain:target=plate1:Fz,gain=0.08", "plate_gain"), ("plate_offset:target=plate1:Fz,offset=30", "plate_offset")],
+)
+def test_a_fault_written_into_real_standing_is_in_the_set(
+    name: str, text: str, effect: str, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Standing shows nothing but weights: what is asked is the set, not the name."""
-    clean = found(standing(data, tmp_path / "clean"), monkeypatch)
-    assert not any(finding.effect.startswith("plate_") for finding in clean.findings)
-    for number, (text, effect) in enumerate(
-        [("plate_gain:target=plate1:Fz,gain=0.08", "plate_gain"), ("plate_offset:target=plate1:Fz,offset=30", "plate_offset")]
-    ):
-        diagnosis = found(standing(data, tmp_path / str(number), text), monkeypatch)
-        assert (effect, "plate1:Fz") in {(alias.effect, alias.target) for finding in diagnosis.findings for alias in finding.set}
+    diagnosis = found(standing(data, tmp_path / "faulty", name, text), monkeypatch, without=("labels_swapped",))
+    assert (effect, "plate1:Fz") in {(alias.effect, alias.target) for finding in diagnosis.findings for alias in finding.set}
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_exchanged_wrist_labels_of_a_real_recording_are_told(data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the static trial and the walk of HC030A the left wrist's bar points the mirrored right one's opposite way."""
+    diagnosis = found(standing(data, tmp_path / "s", "HC030A"), monkeypatch)
+    assert [(finding.effect, finding.target) for finding in diagnosis.findings] == [("labels_swapped", "LWRA/LWRB")]
+    assert not any(finding.effect == "labels_swapped" for finding in found(standing(data, tmp_path / "t", "HC032A"), monkeypatch).findings)

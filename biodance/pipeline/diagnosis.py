@@ -12,14 +12,15 @@ from biodance.diagnose.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnose.engine import Examined, diagnose
 from biodance.diagnose.foresight import Foresight, foresee, session_of
 from biodance.diagnose.problem import Look
-from biodance.diagnose.tolerances import Tolerances
+from biodance.diagnose.tolerances import Tolerances, shipped
 from biodance.effects.case import Case
 from biodance.effects.gate import Gate, gates
 from biodance.errors import BiodanceError, SessionRefused, TrialRefused
 from biodance.identify.added_mass import expected
 from biodance.identify.identification import Identification, identify, standing_point
 from biodance.pipeline.identification import FITTED, KEPT, SessionIdentification
-from biodance.pipeline.results import SessionResult, TrialResult
+from biodance.pipeline.looked_at import left_out, looked_at, looks, own_tolerances
+from biodance.pipeline.results import SessionResult
 from biodance.records import Role, Sip
 
 TRIAL_SECONDS = 20.0
@@ -40,19 +41,6 @@ class SessionDiagnosis:
     left: tuple[Judged, Judged] | None = None
 
 
-def looks(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[Look, ...]:
-    """Return the trials of the given roles that have motion and measured contact, each at its place in the session's time."""
-    moving = [one for one in results if one.motion is not None and one.trial.role != "static"]
-    ends = np.cumsum([float(one.motion.time[-1] - one.motion.time[0]) for one in moving if one.motion is not None])
-    found = []
-    for one, end in zip(moving, ends, strict=True):
-        if one.comparison is None or one.motion is None or one.trial.role not in roles or not one.comparison.used.any():
-            continue
-        start = end - float(one.motion.time[-1] - one.motion.time[0])
-        found.append(Look(one.trial, one.motion, one.comparison.used, start / ends[-1], end / ends[-1]))
-    return tuple(found)
-
-
 def diagnose_session(
     result: SessionResult,
     *,
@@ -71,7 +59,7 @@ def diagnose_session(
     SessionRefused
         No body, or no trial to look at, and no check found a cause either.
     """
-    fitted = looks(result.trials, FITTED) or looks(result.trials, KEPT)
+    fitted = looked_at(result.trials)
     tell("checking units, signs, labels and clocks")
     names = None if chosen is None else tuple(chosen)
     checks = gates(result.session, _cases(result.body, (*fitted, *looks(result.trials, KEPT))), chosen=_discrete(names))
@@ -81,21 +69,37 @@ def diagnose_session(
             return SessionDiagnosis(_by_checks(checks))
         raise SessionRefused(f"{result.session.folder}: there is nothing to diagnose. {result.body_source} {_reasons(result)}".strip())
     tell("looking for causes")
+    own, notes = own_tolerances(tolerances or shipped(), result.body, fitted)
     try:
-        examined = diagnose(
-            result.body, fitted, gates=checks, tolerances=tolerances, prior=_prior(reference, result), chosen=_continuous(names)
-        )
+        examined = diagnose(result.body, fitted, gates=checks, tolerances=own, prior=_prior(reference, result), chosen=_continuous(names))
     except TrialRefused:
         if failed:
             return SessionDiagnosis(_by_checks(checks))
         raise
+    examined = _noted(examined, *standing_notes(result), *left_out(result.trials), *notes)
     if failed:
         return SessionDiagnosis(_by_checks(checks, examined.diagnosis), examined)
     before = result.identification.identification if result.identification else None
     if not examined.named or before is None:
         return SessionDiagnosis(examined.diagnosis, examined, before)
     tell("measuring what the findings change")
-    return _accepted(result, examined, before)
+    try:
+        return _accepted(result, examined, before)
+    except TrialRefused as why:  # named in standing, and no movement to identify from
+        return SessionDiagnosis(_noted(examined, f"What accepting the findings changes is not known. {why}").diagnosis, examined, before)
+
+
+def standing_notes(result: SessionResult) -> tuple[str, ...]:
+    """Say where the table's centre of mass lies beside the measured centre of pressure in quiet standing."""
+    found = result.standing
+    if found is None or not found.com.size:
+        return ()
+    ahead, left = 1000 * found.com_ahead, 1000 * found.com_left
+    sides = "in front of" if ahead > 0 else "behind", "left" if left > 0 else "right"
+    return (
+        f"Standing still ({found.trial}), the table's centre of mass lies {abs(ahead):.0f} mm {sides[0]} the centre of pressure and "
+        f"{abs(left):.0f} mm to its {sides[1]}.",
+    )
 
 
 def diagnosed(result: SessionResult, *, tell: Callable[[str], None] = lambda _: None) -> SessionDiagnosis | None:
@@ -118,6 +122,11 @@ def foresee_dance(path: Path) -> Foresight:
 
     dance = Dance.load(path)
     return foresee(dance.body, session_of(dance.motion(50.0), TRIAL_SECONDS))
+
+
+def _noted(examined: Examined, *notes: str) -> Examined:
+    """Return the same with more ``notes`` for the reader."""
+    return replace(examined, diagnosis=replace(examined.diagnosis, notes=(*examined.diagnosis.notes, *notes)))
 
 
 def _discrete(names: tuple[str, ...] | None) -> tuple[str, ...] | None:

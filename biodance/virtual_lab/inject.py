@@ -115,7 +115,7 @@ def _refuse_other_changes(path: Path, before: Recording, after: Recording) -> No
     same = (
         set(before.markers.names) == set(after.markers.names)
         and np.array_equal(before.markers.time, after.markers.time)
-        and before.analog_rate == after.analog_rate
+        and np.array_equal(before.analog_rate, after.analog_rate, equal_nan=True)
         and before.parameters == after.parameters
         and all(a.channels.shape == b.channels.shape for a, b in zip(before.plates, after.plates, strict=True))
     )

@@ -1,0 +1,94 @@
+"""Write instrument faults into copies of real recordings, diagnose, and print a table of what was named.
+
+    BIODANCE_DATA=folder python benchmarks/bench_real_faults.py [--out FILE.md]
+
+The folder holds sessions of plug-in-gait (``biomechzoo/HC030A``: static trial and walk) and ``adl_gait``. The fault is in every file of the
+copy, as in a laboratory. HC030A has the labels LWRA and LWRB exchanged in both files, which the check of labels says; it is left out here.
+"""
+
+import argparse
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
+from biodance.diagnose.diagnosis import Diagnosis
+from biodance.effects import discrete_effects, effects
+from biodance.errors import BiodanceError
+from biodance.lab.plate_parameters import count_plates
+from biodance.lab.raw_c3d import read_raw
+from biodance.lab.session import read_session
+from biodance.pipeline.diagnosis import diagnose_session
+from biodance.pipeline.session import examine
+from biodance.virtual_lab.causes import fault_of
+from biodance.virtual_lab.hide import parse
+from biodance.virtual_lab.inject import inject
+
+SESSIONS = ("biomechzoo/HC030A", "biomechzoo/HC032A", "adl_gait")
+FAULTS = (
+    "", "plate_gain:target=plate1:Fz,gain=0.08", "plate_offset:target=plate1:Fz,offset=30", "plate_offset:target=plate1:Fx,offset=30",
+    "plate_position:target=plate1:x,shift=0.02", "plate_position:target=plate1:y,shift=0.02", "time_delay:delay=0.03",
+)  # fmt: skip
+
+
+def copied(source: Path, folder: Path, text: str) -> Path:
+    """Write a copy of a session with the fault that ``text`` says in every file; "" for none."""
+    folder.mkdir(parents=True)
+    files = sorted(source.glob("*.c3d"))
+    for number, path in enumerate(files):
+        clock = {path.stem: (number / len(files), (number + 1) / len(files))}
+        if text and count_plates(read_raw(path))[0]:
+            inject(path, folder / path.name, fault_of(parse(text), clock))
+        else:
+            shutil.copy(path, folder / path.name)
+    return folder
+
+
+def diagnosed(folder: Path) -> Diagnosis | str:
+    """Return the diagnosis of a session, or why there is none."""
+    names = tuple(name for name in (*effects(), *discrete_effects()) if name != "labels_swapped")
+    try:
+        return diagnose_session(examine(read_session(folder)), chosen=names).diagnosis
+    except BiodanceError as error:
+        return str(error)
+
+
+def row(session: str, text: str, found: Diagnosis | str) -> str:
+    """Return one line of the table: what was written, what was found, and the place of the truth among the causes."""
+    if isinstance(found, str):
+        return f"| {session} | {text or 'nothing'} | refused: {found} | | |"
+    true = tuple(text.partition(",")[0].partition(":target=")[::2]) if ":target=" in text else (text.partition(":")[0], "")
+    sets = [[(alias.effect, alias.target) for alias in finding.set] for finding in found.findings]
+    place = "-"
+    for number, names in enumerate(sets, start=1):
+        if true in names:
+            place = f"{names.index(true) + 1} of {len(names)} in finding {number}"
+    limit = next((f"{one.limit:.3g} {one.unit}" for one in found.limits if (one.effect, one.target) == true), "-") if text else ""
+    named = "; ".join(
+        f"{one.effect} {one.target} " + ", ".join(f"{p.name} {p.value:.3g} ± {p.sd:.2g} {p.unit}" for p in one.parameters)
+        for one in found.findings
+    )
+    return f"| {session} | {text or 'nothing'} | {found.verdict}{': ' + named if named else ''} | {place if text else ''} | {limit} |"
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path)
+    chosen = parser.parse_args()
+    data = os.environ.get("BIODANCE_DATA")
+    if not data:
+        parser.error("BIODANCE_DATA does not name the folder with real recordings.")
+    lines = ["| recording | written into the copy | verdict and names | place of the truth | computed limit |", "|---|---|---|---|---|"]
+    with tempfile.TemporaryDirectory() as place:
+        for session in SESSIONS:
+            for number, text in enumerate(FAULTS):
+                folder = copied(Path(data) / session, Path(place) / session.replace("/", "_") / str(number), text)
+                lines.append(row(session, text, diagnosed(folder)))
+                print(lines[-1], flush=True)
+    if chosen.out:
+        chosen.out.write_text("\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    main()

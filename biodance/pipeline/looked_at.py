@@ -1,0 +1,134 @@
+"""Which trials of a session the diagnosis looks at, and the tolerances that hold for the person in them."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.body.body import Body
+from biodance.diagnose.problem import Look
+from biodance.diagnose.spectrum import EDGES, SHORTEST, spectrum, thinned
+from biodance.diagnose.tolerances import REFERENCE, Tolerances
+from biodance.effects.case import Case
+from biodance.identify.identification import standing_point
+from biodance.identify.statistics import RATE, Fit
+from biodance.lab.filters import runs
+from biodance.pipeline.identification import FITTED, KEPT
+from biodance.pipeline.results import TrialResult
+from biodance.records import Array, Role
+
+ENOUGH = 10.0
+"""s of fully measured movement beside which quiet standing tells nothing more."""
+MARKERS = 0.004
+"""m: median over the markers of their RMS distance to the body in virtual sessions (0.0035 to 0.0047), on which tolerances are learned."""
+MORE = 1.5
+"""So many times as large it must be before soft tissue is believed to be larger than theirs (real walks: 2 to 5 times)."""
+SOFT = ("centre ", "flesh ", "sag ", "slide ", "tilt ", "marker ", "joint_centre ", "segment_length ", "marker_misplaced ", "shown ")
+"""Keys of the tolerances that grow with it."""
+SWAYING = 0.3
+"""Hz: above, what a person who stands still does to the plates is heart, breath and muscles, which no marker shows."""
+UNREST = 1.5
+"""N, N·m RMS per band and channel: no more than this is taken for it (three real persons: up to 0.8 N and 0.7 N·m)."""
+
+
+def looks(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[Look, ...]:
+    """Return the trials of the given roles that have motion and measured contact, each at its place in the session's time; static trials
+    belong to that time only where they are asked for.
+    """
+    moving = [one for one in results if one.motion is not None and (one.trial.role != "static" or "static" in roles)]
+    ends = np.cumsum([float(one.motion.time[-1] - one.motion.time[0]) for one in moving if one.motion is not None])
+    found = []
+    for one, end in zip(moving, ends, strict=True):
+        if one.comparison is None or one.motion is None or one.trial.role not in roles or not one.comparison.used.any():
+            continue
+        start = end - float(one.motion.time[-1] - one.motion.time[0])
+        found.append(Look(one.trial, one.motion, one.comparison.used, start / ends[-1], end / ends[-1]))
+    return tuple(found)
+
+
+def looked_at(results: tuple[TrialResult, ...]) -> tuple[Look, ...]:
+    """Return the trials to look at: those to fit, else those kept, and quiet standing beside them where they are short."""
+    roles = FITTED if looks(results, FITTED) else KEPT
+    moving = looks(results, roles)
+    return moving if sum(map(_seconds, moving)) >= ENOUGH else looks(results, ("static", *roles))
+
+
+def left_out(results: tuple[TrialResult, ...]) -> tuple[str, ...]:
+    """Say of every trial that is not looked at, though it should be, why."""
+    roles, notes = ("static", *FITTED), []
+    seen = {look.trial.name: _seconds(look) for look in looks(results, roles)}
+    for one in results:
+        name = one.trial.name
+        if one.trial.role == "static" or one.trial.role not in roles:
+            continue
+        if name not in seen:
+            notes.append(f"{name} was left out. {' '.join(one.reasons)}".strip())
+        elif seen[name] == 0:
+            notes.append(f"{name} was left out: no {SHORTEST:g} s in which the plates measure all ground contact without a break.")
+    return tuple(notes)
+
+
+def _seconds(look: Look) -> float:
+    """Return for how many seconds a trial can be compared, in runs that are long enough."""
+    rate = look.motion.rate
+    if not np.isfinite(rate):
+        return 0.0
+    return float(sum(stop - start for start, stop in runs(look.use) if stop - start >= SHORTEST * rate) / rate)
+
+
+def own_tolerances(known: Tolerances, body: Body, chosen: tuple[Look, ...]) -> tuple[Tolerances, tuple[str, ...]]:
+    """Return the tolerances that hold for these recordings and what changed, in words: markers that move more on the body than those of
+    virtual sessions, and the unrest of a person who stands still where standing is looked at.
+    """
+    found, notes = known, []
+    factor = soft_tissue(chosen) / MARKERS
+    if factor > MORE:
+        sizes = {key: size * (factor if key.startswith(SOFT) else 1.0) for key, size in known.sizes.items()}
+        found = replace(found, sizes=sizes)
+        notes.append(
+            f"Markers are {1000 * factor * MARKERS:.0f} mm from the body, {factor:.1f} times as far as where tolerances were learned: soft "
+            "tissue and joints may err as much more."
+        )
+    standing = tuple(look for look in chosen if look.trial.role == "static" and _seconds(look) > 0)
+    if standing:
+        shaken = unrest(body, standing, standing_point(tuple(map(_fit, chosen))))
+        found = replace(found, noise=found.noise + shaken * (REFERENCE / body.sip.mass.sum()) ** 2)
+        size = np.sqrt(np.einsum("b,bcc->c", 2 * np.diff(EDGES) / RATE, shaken))
+        notes.append(
+            f"Standing still, the person moves the forces by {size[:3].max():.1f} N and the moments by {size[3:].max():.1f} N·m above "
+            f"{SWAYING:g} Hz (heart, breath, muscles; root mean square), which no marker shows: a fault must be larger to be seen."
+        )
+    return found, tuple(notes)
+
+
+def soft_tissue(chosen: tuple[Look, ...]) -> float:
+    """Return the median over markers and moving trials of the RMS distance to the body, m: a single marker that is wrong does not count."""
+    moving = [look.motion.residual for look in chosen if look.trial.role != "static"]
+    with np.errstate(invalid="ignore"):
+        each = [np.sqrt(np.nanmean(residual**2, axis=0)) for residual in moving if residual.size]
+    return float(np.nanmedian(np.concatenate(each))) if each else 0.0
+
+
+def unrest(body: Body, standing: tuple[Look, ...], about: Array) -> Array:
+    """Return (B, 6, 6) covariance of a coefficient of what standing still leaves above `SWAYING`, per band, moments about ``about`` (3,) m;
+    zero below.
+    """
+    cases, uses = zip(*(_thinned(body, look) for look in standing), strict=True)
+    where = spectrum(cases, uses, about)
+    left = where.rows(tuple(case.residual[:, :, None] for case in cases))[:, :, 0]
+    out = np.zeros((len(EDGES) - 1, 6, 6))
+    for b in np.flatnonzero(np.array(EDGES[:-1]) >= SWAYING):
+        here = left[where.band == b]
+        size = np.sqrt(np.sum(here**2, axis=0) / (RATE * where.seconds))
+        believed = here * np.minimum(1.0, UNREST / np.maximum(size, 1e-9))
+        out[b] = believed.T @ believed / max(1, len(here))
+    return out
+
+
+def _fit(look: Look) -> Fit:
+    return Fit(look.trial.name, look.motion, look.trial.wrench, look.use)
+
+
+def _thinned(body: Body, look: Look) -> tuple[Case, NDArray[np.bool_]]:
+    time = np.linspace(look.start, look.end, look.motion.time.size)
+    return thinned(Case(body, look.trial, look.motion, body.sip.phi, time), look.use)

@@ -1,0 +1,80 @@
+"""Which trials the diagnosis looks at, and the tolerances of the person in them, on sessions whose truth is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosed_sessions import RATE, body, known, looks, motion
+
+from biodance.diagnose.problem import Look
+from biodance.diagnose.spectrum import EDGES
+from biodance.motion.regressor import predict_wrench
+from biodance.pipeline.looked_at import MARKERS, UNREST, left_out, looked_at, own_tolerances, soft_tissue, unrest
+from biodance.pipeline.results import Step, TrialResult, WrenchComparison
+from biodance.records import Array, Motion, Role, Wrench
+
+
+def still(seconds: float) -> Motion:
+    """Return somebody who does not move."""
+    moving, frames = motion(3), int(seconds * RATE)
+    q = np.repeat(moving.q[:1], frames, axis=0)
+    return Motion(np.arange(frames) / RATE, q, np.zeros((frames, moving.v.shape[1])), np.zeros((frames, moving.v.shape[1])))
+
+
+def standing(shaken: Array) -> Look:
+    """Return a static trial whose plates measure what the body needs and ``shaken`` (T, 6)."""
+    still_one = still(len(shaken) / RATE)
+    trial = looks(1, trials=1)[0].trial
+    plate = replace(trial.plates[0], wrench=Wrench(still_one.time, predict_wrench(body(), still_one).value + shaken))
+    return Look(replace(trial, name="static", role="static", plates=(plate,)), still_one, np.ones(len(shaken), dtype=bool), 0.0, 0.1)
+
+
+def result(look: Look, role: Role, use: Array | None = None) -> TrialResult:
+    used = look.use if use is None else use
+    value = look.trial.wrench.value
+    compared = WrenchComparison(look.motion.time, value, value, used, np.zeros(6), np.ones(6))
+    return TrialResult(replace(look.trial, role=role), (Step("compare", "done"),), motion=look.motion, comparison=compared)
+
+
+def test_standing_is_looked_at_where_movement_is_short() -> None:
+    moving, quiet = looks(1, trials=1)[0], standing(np.zeros((150, 6)))
+    short = np.zeros(moving.use.size, dtype=bool)
+    short[100:140] = True
+    assert [look.trial.name for look in looked_at((result(quiet, "static"), result(moving, "fit")))] == ["t0"]
+    some = (result(quiet, "static"), result(moving, "fit", short))
+    assert [look.trial.name for look in looked_at(some)] == ["static", "t0"]
+    assert left_out(some) == ("t0 was left out: no 1 s in which the plates measure all ground contact without a break.",)
+    assert looked_at(some)[0].start == 0.0
+    assert looked_at(some)[1].end == 1.0
+
+
+def test_the_unrest_of_standing_is_measured_and_bounded() -> None:
+    time = np.arange(int(60 * RATE)) / RATE
+    shaken = np.zeros((time.size, 6))
+    shaken[:, 0] = 0.8 * np.sqrt(2) * np.sin(2 * np.pi * 1.7 * time)
+    shaken[:, 1] = 10 * UNREST * np.sin(2 * np.pi * 4.0 * time)
+    shaken[:, 2] = 5 * np.sin(2 * np.pi * 0.1 * time)
+    covariance = unrest(body(), (standing(shaken),), np.zeros(3))
+    size = np.sqrt(2 * np.diff(EDGES)[:, None] / 25.0 * covariance.diagonal(axis1=1, axis2=2))
+    assert size[3, 0] == pytest.approx(0.8, rel=0.05)
+    assert size[4, 1] == pytest.approx(UNREST, rel=0.05)
+    assert not size[:2].any(), "slow sway is weight and posture, and no unrest"
+    found, notes = own_tolerances(known(), body(), (standing(shaken),))
+    assert np.all(np.linalg.eigvalsh(found.noise - known().noise) > -1e-9)
+    assert "Standing still" in notes[0]
+    assert found.sizes == known().sizes
+
+
+@pytest.mark.parametrize(("factor", "grows"), [(1.2, False), (3.0, True)])
+def test_soft_tissue_grows_with_the_markers_distance(factor: float, grows: bool) -> None:
+    look = looks(1, trials=1)[0]
+    residual = np.full((look.motion.time.size, 5), factor * MARKERS)
+    residual[:, 4] = 0.2
+    moving = look.motion
+    far = replace(look, motion=Motion(moving.time, moving.q, moving.v, moving.a, residual, tuple("abcde")))
+    assert soft_tissue((far,)) == pytest.approx(factor * MARKERS), "one marker that is wrong does not count"
+    before = replace(known(), sizes={"slide thigh": 0.004, "plate_gain Fz": 0.002})
+    found, notes = own_tolerances(before, body(), (far,))
+    assert found.size("slide thigh") == pytest.approx(0.004 * (factor if grows else 1.0))
+    assert found.size("plate_gain Fz") == 0.002
+    assert bool(notes) == grows
