@@ -20,6 +20,7 @@ from biodance.errors import SessionRefused, TrialRefused
 from biodance.lab.prepare import prepare
 from biodance.lab.raw_c3d import read_raw
 from biodance.lab.session import read_session
+from biodance.motion.inverse_kinematics import solve_ik
 from biodance.motion.kinematics import poses
 from biodance.records import Markers, Source, Subject, Trial
 
@@ -141,6 +142,24 @@ def test_ranges_of_hip_and_trunk_follow_the_tilt_of_the_pelvis_markers() -> None
     hip, trunk = tilted.joint_index("right_hip_flexion"), tilted.joint_index("trunk_flexion")
     assert tilted.limits.upper[hip] - upright.limits.upper[hip] == pytest.approx(tilt, abs=1e-6)
     assert tilted.limits.lower[trunk] - upright.limits.lower[trunk] == pytest.approx(-tilt, abs=1e-6)
+
+
+@pytest.mark.parametrize("joint", ["trunk_flexion", "trunk_bending", "right_hip_rotation", "left_ankle_inversion"])
+def test_whoever_passes_the_anatomical_range_is_followed_exactly(joint: str) -> None:
+    body, q = scaled(SUBJECT, standing_trial())
+    stop = human(SUBJECT).limits.upper[body.joint_index(joint)]
+    q[7 + body.joint_index(joint)] = stop + np.radians(20.0)
+    there = Markers(body.markers.names, [0.0], poses(body, q[None]).points(body.markers.segment, body.markers.position))
+    found = solve_ik(body, there)
+    assert found.residual.max() < 1e-6
+    assert found.q[0, 7 + body.joint_index(joint)] == pytest.approx(stop + np.radians(20.0), abs=1e-5)
+
+
+def test_knees_and_elbows_still_do_not_bend_backwards() -> None:
+    body, q = scaled(SUBJECT, standing_trial())
+    for joint in ("right_knee_flexion", "left_knee_flexion", "right_elbow_flexion", "left_elbow_flexion"):
+        j = body.joint_index(joint)
+        assert body.limits.lower[j] == pytest.approx(min(human(SUBJECT).limits.lower[j], q[7 + j] - np.radians(5.0)))
 
 
 def test_a_typed_width_that_contradicts_the_markers_is_warned_about() -> None:

@@ -7,6 +7,7 @@ from functools import partial
 from biodance.body.body import Body
 from biodance.body.human import DEFAULT_TABLE, human
 from biodance.body.scaling import Scaling, measure
+from biodance.body.tracking_limits import tracked
 from biodance.errors import TrialRefused
 from biodance.motion.functional_joints import functional_joints
 from biodance.pipeline.results import Step
@@ -37,7 +38,7 @@ def body_of(subject: Subject, read: tuple[Prepared, ...], steps: list[Step]) -> 
     sets = [one.trial.marker_set for one in read if one.trial.marker_set]
     if not sets:
         return None, "No body: no trial has markers of a known set."
-    body = attempt(steps, "body from stature", lambda: human(subject, markers=sets[0]))
+    body = attempt(steps, "body from stature", lambda: tracked(human(subject, markers=sets[0])))
     return body, f"From stature alone, with the usual places of the markers; masses and inertias from the table {DEFAULT_TABLE}."
 
 
