@@ -7,6 +7,7 @@ import pytest
 
 from biodance.body.body import JointError
 from biodance.body.body_file import body_text, read_body
+from biodance.body.hoap3 import hoap3
 from biodance.body.human import human
 from biodance.errors import FileRefused
 from biodance.records import Subject
@@ -29,6 +30,15 @@ def test_a_body_reads_back_exactly(tmp_path) -> None:
     assert np.array_equal(back.markers.position, WOMAN.markers.position)
     assert np.array_equal(back.feet["left"].outline, WOMAN.feet["left"].outline)
     assert np.array_equal(back.limits.torque_upper, WOMAN.limits.torque_upper)
+
+
+def test_a_robot_without_markers_reads_back(tmp_path) -> None:
+    path = tmp_path / "body.json"
+    path.write_text(body_text(hoap3(), "the maker"), encoding="utf-8")
+    back, _ = read_body(path)
+    assert back.markers.names == ()
+    assert back.markers.position.shape == (0, 3)
+    assert np.array_equal(back.sip.phi, hoap3().sip.phi)
 
 
 @pytest.mark.parametrize(

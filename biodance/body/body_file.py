@@ -60,9 +60,7 @@ def _body(found: dict[str, Any]) -> Body:
         joints=tuple(Joint(**joint) for joint in found["joints"]),
         sip=Sip(**{**found["sip"], "segments": tuple(found["sip"]["segments"])}),
         limits=JointLimits(**found["limits"]),
-        markers=SegmentMarkers(
-            tuple(found["markers"]["names"]), tuple(found["markers"]["segment"]), found["markers"]["position"], found["markers"]["weight"]
-        ),
+        markers=_markers(found["markers"]),
         boxes=found["boxes"],
         com_boxes=found["com_boxes"],
         feet={side: Foot(**foot) for side, foot in found["feet"].items()},
@@ -70,3 +68,8 @@ def _body(found: dict[str, Any]) -> Body:
         notes=tuple(found["notes"]),
         joint_errors=tuple(JointError(*error) for error in found["joint_errors"]),
     )
+
+
+def _markers(found: dict[str, Any]) -> SegmentMarkers:
+    place = np.reshape(found["position"], (-1, 3))  # a robot may have none
+    return SegmentMarkers(tuple(found["names"]), tuple(found["segment"]), place, np.array(found["weight"]))

@@ -8,7 +8,7 @@ import numpy as np
 
 from biodance.body.body import UPRIGHT, Body, Foot, Joint, JointLimits, SegmentMarkers
 from biodance.body.inertia import Lump, parameters
-from biodance.body.prior import parameter_jacobian
+from biodance.body.robot_prior import robot_covariance
 from biodance.body.static_frames import turn
 from biodance.body.tables import Row, numbers, read_table
 from biodance.records import Array, Sip
@@ -27,8 +27,8 @@ SHOULDER = 0.111
 """m, from the middle to either shoulder."""
 ANKLE_HEIGHT, SOLE_AHEAD, SOLE_WIDE = 0.040, (-0.040, 0.068), 0.036
 """m: sole under the ankle, from heel to toe, half its width about its middle line."""
-RELATIVE_MASS_SD, COM_SD, RELATIVE_INERTIA_SD = 0.15, 0.010, 0.30
-"""Prior standard deviations: covers, cables and cards come and go (judgement; the paper finds 0.4 kg of difference in all)."""
+COM_SD = 0.010
+"""m, prior standard deviation of every centre of mass; the others in `robot_prior`."""
 
 
 def hoap3() -> Body:
@@ -44,7 +44,7 @@ def hoap3() -> Body:
         "HOAP-3",
         SEGMENTS,
         joints,
-        Sip(SEGMENTS, np.concatenate([parameters(lump) for lump in lumps]), _covariance(lumps)),
+        Sip(SEGMENTS, np.concatenate([parameters(lump) for lump in lumps]), robot_covariance(lumps, [COM_SD] * len(lumps))),
         _limits(rows),
         SegmentMarkers((), (), np.empty((0, 3)), np.empty(0)),
         boxes,
@@ -103,16 +103,6 @@ def _lump(row: Row, turn: Array) -> Lump:
     xx, yy, zz, xy, xz, yz = numbers(row, "Ixx Iyy Izz Ixy Ixz Iyz")
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     return Lump(mass, turn.T @ np.array(com), turn.T @ inertia @ turn)
-
-
-def _covariance(lumps: list[Lump]) -> Array:
-    out = np.zeros((10 * len(lumps), 10 * len(lumps)))
-    for i, lump in enumerate(lumps):
-        size = RELATIVE_INERTIA_SD * np.trace(lump.inertia) / lump.mass / 3
-        jacobian = parameter_jacobian(lump)
-        block = slice(10 * i, 10 * i + 10)
-        out[block, block] = jacobian @ np.diag([RELATIVE_MASS_SD * lump.mass, *[COM_SD] * 3, *[size] * 6]) ** 2 @ jacobian.T
-    return out
 
 
 def _limits(rows: list[Row]) -> JointLimits:

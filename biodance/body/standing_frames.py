@@ -1,0 +1,119 @@
+"""The same body in other segment frames: a robot's root and feet in the axes of a person who stands.
+
+Whoever designs a dance wants root and feet with x forwards, y up, z right while the feet are flat (ISB, as in the human body). Frames
+of robots lie as their makers like; they are turned here, and what is written in them (parameters with covariance, boxes, soles, markers,
+joints that hang on them) is turned along, so that it is the same robot.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from biodance.body.body import Body, Foot
+from biodance.body.inertia import PSEUDO_INERTIA
+from biodance.errors import BiodanceError
+from biodance.records import Array, Sip
+
+LEANS = np.cos(np.radians(30.0))
+"""Cosine of the largest angle between a sole and the ground at zero joint angles."""
+
+
+def standing_frames(body: Body) -> Body:
+    """Return ``body`` with its feet in ISB axes: y along the sole's normal, x forwards at zero angles, origin where the last two axes meet.
+
+    The root must be in ISB axes already (`urdf.read_urdf` sees to it).
+
+    Raises
+    ------
+    BiodanceError
+        A sole is not under its foot at zero joint angles.
+    """
+    for side in ("right", "left"):
+        foot = body.feet[side]
+        turn = _turn_at_zero(body, foot.segment)
+        up = turn @ sole_normal(foot)
+        if not up[1] > LEANS:
+            away = np.degrees(np.arccos(np.clip(up[1], -1, 1)))
+            raise BiodanceError(
+                f"{body.name}: at zero joint angles the {side} sole faces {away:.0f} degrees away from the ground; the feet must be flat "
+                "within 30 degrees. Give the joints zeros at which the robot stands."
+            )
+        ahead = np.array([1.0, 0.0, 0.0]) - up[0] * up
+        ahead /= np.linalg.norm(ahead)
+        body = reframed(body, foot.segment, turn.T @ np.stack([ahead, up, np.cross(ahead, up)], axis=1), _ankle(body, foot.segment))
+    return body
+
+
+def sole_normal(foot: Foot) -> Array:
+    """Return the unit normal (3,) of a flat sole upwards, in the frame of the foot."""
+    edges = foot.outline - foot.outline.mean(axis=0)
+    normal = np.cross(edges, np.roll(edges, -1, axis=0)).sum(axis=0)
+    return np.asarray(normal / np.linalg.norm(normal))
+
+
+def reframed(body: Body, segment: int, turn: Array, shift: Array) -> Body:
+    """Return the body with the frame of one segment turned by ``turn`` (3, 3) = old_R_new, its origin at ``shift`` (3,) m in the old one.
+
+    For segments on a joint the shift must lie along the joint's axis. The lab pose of a root that is turned changes by the same turn.
+    """
+    carrier = body.segment_joint[segment]
+    joints = []
+    for i, joint in enumerate(body.joints):
+        if joint.parent == carrier:
+            joint = replace(joint, rotation=turn.T @ joint.rotation, translation=turn.T @ (joint.translation - shift))
+        if i == carrier:
+            place = joint.translation + joint.rotation @ shift
+            joint = replace(joint, rotation=joint.rotation @ turn, translation=place, axis=turn.T @ joint.axis)
+        joints.append(joint)
+    ten, table = slice(10 * segment, 10 * segment + 10), np.eye(body.sip.phi.size)
+    table[ten, ten] = reframed_parameters(turn, shift)
+    feet = {
+        side: replace(foot, outline=(foot.outline - shift) @ turn) if foot.segment == segment else foot for side, foot in body.feet.items()
+    }
+    on = (np.array(body.markers.segment, dtype=int) == segment)[:, None]
+    place = np.where(on, (body.markers.position - shift) @ turn, body.markers.position)
+    boxes, com_boxes = np.array(body.boxes), np.array(body.com_boxes)
+    for some in (boxes, com_boxes):
+        some[segment] = turned_box(some[segment] - shift, turn.T)
+    return replace(
+        body,
+        joints=tuple(joints),
+        sip=Sip(body.segments, table @ body.sip.phi, table @ body.sip.covariance @ table.T),
+        markers=replace(body.markers, position=place),
+        boxes=boxes,
+        com_boxes=com_boxes,
+        feet=feet,
+    )
+
+
+def reframed_parameters(turn: Array, shift: Array) -> Array:
+    """Return the map (10, 10) of a segment's parameters into a frame with axes ``turn`` (3, 3) = old_R_new and origin ``shift`` (3,) m."""
+    move = np.eye(4)
+    move[:3, :3], move[:3, 3] = turn.T, -turn.T @ shift
+    return np.asarray(np.linalg.lstsq(PSEUDO_INERTIA, np.kron(move, move) @ PSEUDO_INERTIA, rcond=None)[0])
+
+
+def turned_box(box: Array, turn: Array) -> Array:
+    """Return the smallest box (2, 3) along the axes around a ``box`` (2, 3) turned by ``turn`` (3, 3) = new_R_old."""
+    corners = np.array([[box[i, 0], box[j, 1], box[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)]) @ turn.T
+    return np.stack([corners.min(axis=0), corners.max(axis=0)])
+
+
+def _turn_at_zero(body: Body, segment: int) -> Array:
+    """Return root_R_segment (3, 3) at zero angles."""
+    turn, joint = np.eye(3), body.segment_joint[segment]
+    while joint >= 0:
+        turn, joint = body.joints[joint].rotation @ turn, body.joints[joint].parent
+    return turn
+
+
+def _ankle(body: Body, segment: int) -> Array:
+    """Return the point (3,) m, in the segment's frame, on the axis of its joint that is nearest to the axis before it."""
+    last = body.joints[body.segment_joint[segment]]
+    if last.parent < 0:
+        return np.zeros(3)
+    before = last.rotation.T @ body.joints[last.parent].axis
+    origin, across = -last.rotation.T @ last.translation, np.cross(last.axis, before)
+    if across @ across < 1e-6:
+        return np.zeros(3)
+    return np.asarray((np.cross(origin, before) @ across / (across @ across)) * last.axis)
