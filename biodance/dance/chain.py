@@ -15,6 +15,7 @@ from biodance.body.body import UPRIGHT, Body
 from biodance.body.pinocchio_model import load_pinocchio
 from biodance.dance.shapes import Solids
 from biodance.errors import BiodanceError
+from biodance.motion.general_legs import GeneralLeg
 from biodance.motion.kinematics import axis_rotation
 from biodance.motion.legs import Leg
 from biodance.motion.regressor import GRAVITY
@@ -42,9 +43,11 @@ class Chain:
         return ROOT + len(self.body.joints)
 
     @cached_property
-    def legs(self) -> tuple[Leg, Leg]:
-        """Right and left leg with closed-form angles."""
-        return Leg.of(self.body, "right"), Leg.of(self.body, "left")
+    def legs(self) -> tuple[Leg, Leg] | tuple[GeneralLeg, GeneralLeg]:
+        """Right and left leg: with closed-form angles where they are built like a person's, else closed numerically."""
+        if all(Leg.fits(self.body, side) for side in SIDES):
+            return Leg.of(self.body, "right"), Leg.of(self.body, "left")
+        return GeneralLeg.of(self.body, "right"), GeneralLeg.of(self.body, "left")
 
     @cached_property
     def leg_columns(self) -> tuple[list[int], list[int]]:

@@ -36,6 +36,19 @@ class Leg:
         sign = -1.0 if side == "left" else 1.0
         return cls(index, sign, hip.translation, hip.rotation, knee.translation, knee.rotation, ankle.translation, ankle.rotation)
 
+    @staticmethod
+    def fits(body: Body, side: str) -> bool:
+        """Return whether the ``side`` leg of a body has the joints of this closed form: names, order, axes, meeting in hip and ankle."""
+        names, s = [joint.name for joint in body.joints], -1.0 if side == "left" else 1.0
+        index = [names.index(name) if (name := f"{side}_{movement}") in names else -2 for movement in LEG]
+        if min(index) < 0 or any(body.joints[j].parent != p for j, p in zip(index, [-1, *index[:-1]], strict=True)):
+            return False
+        axes = np.array([body.joints[j].axis for j in index])
+        inner = [body.joints[index[k]] for k in (1, 2, 5)]
+        meet = all(np.array_equal(joint.rotation, np.eye(3)) and not joint.translation.any() for joint in inner)
+        wanted = np.array([[0, 0, 1], [s, 0, 0], [0, s, 0], [0, 0, -1], [0, 0, 1], [s, 0, 0]])
+        return meet and bool(np.array_equal(axes, wanted))
+
     def _length_terms(self) -> tuple[float, float, float]:
         """Return a, b, c with (hip-ankle distance)² = a + b cos(knee) + c sin(knee)."""
         x, y, z = self.knee_turn.T @ self.thigh
