@@ -5,44 +5,52 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
 from biodance.cli.app import DONE, NEEDS_A_PERSON, STOPPED, Force, Json, Out, app, print_json, progress, say
+from biodance.errors import BiodanceError
+
+if TYPE_CHECKING:
+    from biodance.records import Subject
 
 
 @app.command
 def dance(
     *,
-    sex: Literal["F", "M"],
-    height: Annotated[float, Parameter(help="Stature, m.")],
-    mass: Annotated[float, Parameter(help="Body mass, kg.")],
+    sex: Literal["F", "M"] | None = None,
+    height: Annotated[float | None, Parameter(help="Stature, m.")] = None,
+    mass: Annotated[float | None, Parameter(help="Body mass, kg.")] = None,
     age: Annotated[float, Parameter(help="Age, years; strength falls with it.")] = float("nan"),
     protocol: Annotated[str, Parameter(help="full, short, chair, one_segment, or a TOML file.")] = "full",
     limits: Annotated[Path | None, Parameter(help="TOML file with what this person can and may do.")] = None,
+    urdf: Annotated[Path | None, Parameter(help="URDF file of a robot that dances instead of a person.")] = None,
+    feet: Annotated[str | None, Parameter(help="Links of the robot's right and left foot: RIGHT,LEFT.")] = None,
     seed: Annotated[int, Parameter(help="The same seed gives the same dance.")] = 0,
     out: Out,
     json: Json = False,
     force: Force = False,
 ) -> int:
-    """Design a dance for one person: safe, balanced, and telling much about every segment.
+    """Design a dance for one person or robot: safe, balanced, and telling much about every segment.
 
-    Writes dance.npz, dance.c3d (virtual markers), cues.md, margins.md, figures and results.json. Ctrl-C keeps what is finished, and the
-    same command goes on from there. A dance that cannot exist is refused with the constraint that forbids it (exit code 1).
+    Writes dance.npz, dance.c3d (a person's virtual markers) or dance.csv (a robot's joint angles), cues.md, margins.md, figures and
+    results.json. Ctrl-C keeps what is finished, and the same command goes on from there. A dance that cannot exist is refused with the
+    constraint that forbids it (exit code 1).
     """
     from biodance.dance.person import HEALTHY, read_person
     from biodance.dance.protocol import read_plan
     from biodance.pipeline.dance import UNFINISHED, dance_folder, dancer, make_dance
-    from biodance.records import Subject
+    from biodance.pipeline.robot_dance import make_robot_dance, robot_dancer
     from biodance.report.dance_write import print_dance, write_dance
 
     plan, person = read_plan(protocol), read_person(limits) if limits else HEALTHY
-    body = dancer(Subject(mass, height, sex, age), plan)
+    who = _who(sex, height, mass, age, urdf, feet)
+    body, make = (robot_dancer(*who), make_robot_dance) if isinstance(who, tuple) else (dancer(who, plan), make_dance)
     folder = dance_folder(out, force=force)
     with counted_progress() as tell:
         try:
-            result = make_dance(body, plan, person, seed=seed, tell=tell, resume=folder / UNFINISHED)
+            result = make(body, plan, person, seed=seed, tell=tell, resume=folder / UNFINISHED)
         except KeyboardInterrupt:
             say(f"Stopped; {folder} keeps what is finished. The same command goes on from there.")
             return STOPPED
@@ -57,6 +65,20 @@ def dance(
     if not result.feasible:
         say(f"There is no such dance. {result.reason}")
     return DONE if result.feasible and result.complete else NEEDS_A_PERSON
+
+
+def _who(
+    sex: Literal["F", "M"] | None, height: float | None, mass: float | None, age: float, urdf: Path | None, feet: str | None
+) -> "Subject | tuple[Path, str]":
+    """Return the person, or the robot's file and feet; BiodanceError if it is neither or both."""
+    from biodance.records import Subject
+
+    person, robot = (sex, height, mass), (urdf, feet)
+    if urdf is not None and feet is not None and person == (None, None, None):
+        return urdf, feet
+    if sex is not None and height is not None and mass is not None and robot == (None, None):
+        return Subject(mass, height, sex, age)
+    raise BiodanceError("Say who dances: a person with --sex, --height and --mass, or a robot with --urdf FILE and --feet RIGHT,LEFT.")
 
 
 @contextmanager

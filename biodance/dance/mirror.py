@@ -35,7 +35,7 @@ def symmetric(body: Body) -> bool:
         return False
     across, sense = _joints(names)
     other = [segments.index(counterpart(name)) for name in segments]
-    places = np.array([joint.translation for joint in body.joints])
+    places, axes, turns = (np.array([getattr(joint, name) for joint in body.joints]) for name in ("translation", "axis", "rotation"))
     pairs: list[tuple[Array, Array]] = [
         (np.sort([sense * limits.lower[across], sense * limits.upper[across]], axis=0), np.array([limits.lower, limits.upper])),
         (
@@ -43,6 +43,8 @@ def symmetric(body: Body) -> bool:
             np.array([limits.torque_lower, limits.torque_upper]),
         ),
         (FLIP * places[across], places),
+        (-FLIP * axes[across], sense[:, None] * axes),  # of a robot's rolls and yaws, both sides may turn the same way
+        (FLIP[:, None] * turns[across] * FLIP, turns),
         (body.sip.mass[other], body.sip.mass),
         (FLIP * body.sip.com[other], body.sip.com),
         (np.sort(FLIP * body.boxes[other], axis=1), body.boxes),

@@ -11,6 +11,7 @@ from typing import NoReturn
 
 import numpy as np
 
+from biodance.body.body import UPRIGHT
 from biodance.dance.chain import ROOT, Chain
 from biodance.dance.exchange import Posture, exchange
 from biodance.dance.excitation import Blocks, smooth_condition, static_grams, total, upright_slopes, uprights
@@ -69,7 +70,8 @@ def start(chain: Chain, stance: Stance, rng: np.random.Generator) -> Array:
         x[2] = stance.seat
         return x
     reach = min(float(leg.length(np.radians(rng.uniform(15, 110)))) for leg in chain.legs)
-    x[:3] = [*(stance.centre - [0.02, 0.0]), stance.ankle[0, 2] + 0.97 * reach]
+    above = UPRIGHT @ np.mean([leg.hip for leg in chain.legs], axis=0)  # of a person's hips: zero, the root is in their middle
+    x[:3] = [*(stance.centre - [0.02, 0.0]), stance.ankle[0, 2] + 0.97 * reach] - above
     x[3:6] = rng.normal([0.0, 0.0, -0.2], [0.25, 0.25, 0.4])
     return x
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
+from biodance.dance.tree_pairs import capsule, tree_pairs
 from biodance.records import Array
 
 BOXES = ("pelvis", "trunk_head")
@@ -15,16 +16,6 @@ _KINDS = {
     *(("forearm_hand", "shank"), ("forearm_hand", "upper_arm"), ("shank", "shank"), ("foot", "foot"), ("upper_arm", "thigh")),
     *(("shank", "thigh"), ("forearm_hand", "foot")),
 }
-
-
-def capsule(body: Body, segment: int) -> tuple[Array, float]:
-    """Return the ends (2, 3) m of the axis, in the segment frame, and the radius m of a limb's capsule."""
-    low, high = body.boxes[segment]
-    half, centre = (high - low) / 2, (high + low) / 2
-    axis = int(np.argmax(half))
-    radius = float(np.sort(half)[0])
-    reach = (half[axis] - radius) * np.eye(3)[axis]
-    return np.array([centre - reach, centre + reach]), radius
 
 
 def capsule_pairs(body: Body) -> list[tuple[int, int]]:
@@ -47,6 +38,21 @@ def box_pairs(body: Body) -> list[tuple[int, int]]:
     return [(arm, body.segment_index(box)) for arm in arms for box in BOXES]
 
 
+def pairs_of(body: Body) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+    """Return the pairs of limbs, and of a limb and a box, that must not touch: by name in a person's body, else by the tree."""
+    return (capsule_pairs(body), box_pairs(body)) if _is_named(body) else tree_pairs(body)[:2]
+
+
+def unchecked_pairs(body: Body) -> tuple[str, ...]:
+    """Return the pairs of a robot's segments that should be kept apart and cannot, in words (`tree_pairs`)."""
+    return () if _is_named(body) else tree_pairs(body)[2]
+
+
+def _is_named(body: Body) -> bool:
+    named = {kind for pair in _KINDS for kind in pair} | set(BOXES)
+    return all(segment.removeprefix("right_").removeprefix("left_") in named for segment in body.segments)
+
+
 @dataclass(frozen=True, eq=False)
 class Solids:
     """What must not touch: capsules ``first`` and ``second`` (C,) of segments, limbs ``limb`` (B,) and boxes ``box`` (B,) of segments;
@@ -63,7 +69,7 @@ class Solids:
     @classmethod
     def of(cls, body: Body) -> "Solids":
         """Return the pairs of a body."""
-        capsules, boxes = (np.array(pairs, dtype=np.intp).reshape(-1, 2) for pairs in (capsule_pairs(body), box_pairs(body)))
+        capsules, boxes = (np.array(pairs, dtype=np.intp).reshape(-1, 2) for pairs in pairs_of(body))
         shape = [capsule(body, i) for i in range(len(body.segments))]
         axis, radius = np.array([ends for ends, _ in shape]), np.array([radius for _, radius in shape])
         return cls(capsules[:, 0], capsules[:, 1], boxes[:, 0], boxes[:, 1], axis, radius)

@@ -101,7 +101,7 @@ def stance(
 ) -> Stance:
     """Return a stance with the ankles ``left`` and ``right`` m ahead of the lab origin, side by side at the person's width."""
     height = -float(body.feet["right"].outline[:, 1].min())
-    half = WIDTH * stature_of(body) / 2
+    half = max(WIDTH * stature_of(body), hip_width(body)) / 2
     ankle = np.array([[right, -half, height], [left, half, -float(body.feet["left"].outline[:, 1].min())]])
     soles = [
         ankle[k] + np.stack([o[:, 0], -o[:, 2], o[:, 1]], axis=1)
@@ -124,6 +124,14 @@ def seat(body: Body, *, share: float = 0.6) -> Stance:
     feet = stance(body, "seated", planted=(), share=share)
     legs = [np.linalg.norm(body.joints[body.joint_index(f"{side}_ankle_dorsiflexion")].translation) for side in ("right", "left")]
     return replace(feet, props=STOOL, seat=float(max(legs) + feet.ankle[:, 2].max()) + HANGING)
+
+
+def hip_width(body: Body) -> float:
+    """Return the distance (m) sideways between the ankles of the upright body at zero angles: that of its hips where legs are straight."""
+    from biodance.motion.kinematics import poses
+
+    place = poses(body, body.neutral[None]).position[0]
+    return float(place[body.feet["left"].segment, 1] - place[body.feet["right"].segment, 1])
 
 
 def stature_of(body: Body) -> float:

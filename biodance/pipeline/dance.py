@@ -25,10 +25,21 @@ Tell = Callable[[str, int, int], None]
 UNFINISHED = "unfinished"
 """Folder with what is finished of a dance whose design was stopped."""
 OURS = (
-    *("results.json", "dance.npz", "dance.c3d", "cues.md", "margins.md"),
+    *("results.json", "dance.npz", "dance.c3d", "dance.csv", "cues.md", "margins.md"),
     *("postures.png", "criterion.png", "zmp.png", "expectation.png"),
 )
 """Files that a dance consists of."""
+
+
+@dataclass(frozen=True)
+class Makers:
+    """Who designs a dance, and who says what will be known after it: others for persons than for robots."""
+
+    design: Callable[..., Dance]
+    expect: Callable[[Dance], Expectation]
+
+
+PERSONS = Makers(design, expect)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +93,14 @@ def dancer(subject: Subject, plan: Plan) -> Body:
 
 
 def make_dance(
-    body: Body, plan: Plan, person: PersonLimits, *, seed: int = 0, tell: Tell = lambda *_: None, resume: Path | None = None
+    body: Body,
+    plan: Plan,
+    person: PersonLimits,
+    *,
+    seed: int = 0,
+    tell: Tell = lambda *_: None,
+    resume: Path | None = None,
+    makers: Makers = PERSONS,
 ) -> DanceResult:
     """Design, check and count a dance of ``plan`` for ``body`` with the limits of ``person``; ``resume`` keeps what is finished meanwhile.
 
@@ -95,7 +113,7 @@ def make_dance(
     own, plan, notes = fitted(body, plan, person)
     reason, margins, dance = "", tuple[Margin, ...](), None
     try:
-        dance = design(own, plan, seed=seed, tell=tell, resume=resume)
+        dance = makers.design(own, plan, seed=seed, tell=tell, resume=resume)
     except BiodanceError as error:
         reason = str(error)
     if dance is not None:
@@ -106,7 +124,7 @@ def make_dance(
     counted = expected = None
     if kept is not None:
         tell("counting what the dance tells", 0, 0)
-        counted, expected = account(kept, plan), expect(kept)
+        counted, expected = account(kept, plan), makers.expect(kept)
     return DanceResult(own, plan, kept, margins, counted, expected, reason, notes, time.perf_counter() - started)
 
 

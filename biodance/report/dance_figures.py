@@ -137,7 +137,7 @@ def expectation_figure(expectation: "Expectation") -> "Figure":
             for number, kind in enumerate(kinds):
                 mine = [i for i, name in enumerate(expectation.segments) if name.removeprefix("right_").removeprefix("left_") == kind]
                 share = 100 * (values[:, mine] / values[0, mine]).mean(axis=1)
-                style = ("-", "--", ":")[number // len(colours)]
+                style = ("-", "--", ":")[number // len(colours) % 3]
                 axes.plot(expectation.duration, share, style, color=colours[number % len(colours)], label=kind.replace("_", " "))
             axes.set(title=title, xlabel="duration of the dance, s", ylim=(0, 105))
         left.set_ylabel("expected sd, % of the table's")

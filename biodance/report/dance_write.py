@@ -17,6 +17,7 @@ from biodance.pipeline.dance import DanceResult
 from biodance.records import Markers
 from biodance.report.dance_figures import criterion_figure, expectation_figure, postures_figure, zmp_figure
 from biodance.report.results_json import plain, to_text
+from biodance.report.robot_dance import angle_sheet, write_angles
 
 RATE = 100.0
 """Hz of the preview's markers."""
@@ -34,7 +35,10 @@ def write_dance(result: DanceResult, folder: Path) -> dict[str, Any]:
     if result.dance is not None and result.account is not None and result.expectation is not None:
         dance = result.dance
         dance.save(folder / "dance.npz")
-        write_preview(dance, folder / "dance.c3d")
+        if dance.body.markers.names:
+            write_preview(dance, folder / "dance.c3d")
+        else:
+            write_angles(dance, folder / "dance.csv")
         (folder / "cues.md").write_text(cues(dance), encoding="utf-8", newline="\n")
         (folder / "margins.md").write_text(margin_table(result.margins), encoding="utf-8", newline="\n")
         counted = np.flatnonzero(dance.counted).tolist()
@@ -109,7 +113,9 @@ def _short(stance: Stance) -> str:
 
 
 def cues(dance: Dance) -> str:
-    """Return the cue sheet of all postures, those in between included."""
+    """Return the cue sheet of all postures, those in between included: in words for a person, joint angles for a robot without markers."""
+    if not dance.body.markers.names:
+        return angle_sheet(dance, _held(dance, range(len(dance.stances)))[0][:, 6:])
     words = tuple(told(s) if s.over is None else f"{told(s.on(0, 1))}, the weight on the {SIDES[s.over]} one" for s in dance.stances)
     angles = _held(dance, range(len(dance.stances)))[0][:, 6:]
     planted = tuple(tuple(SIDES[side] for side in s.planted) for s in dance.stances)

@@ -1,0 +1,100 @@
+"""Dances of robots: designed for the robot's person-sized likeness, danced by the robot itself.
+
+All that the design knows of noticeable sizes (scales of the limits, reserves, starts) is that of persons. So a robot is made as large and
+as heavy as a person, with all times, speeds and strengths as gravity demands (`body.similar`), its dance is designed, and shrunk again: the
+same angles, slower or faster. Nothing is approximated by that, and the dance is checked on the robot as it is.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.body.similar import Likeness, likeness
+from biodance.dance.chain import Chain
+from biodance.dance.dance import Dance
+from biodance.dance.design import design
+from biodance.dance.plan import Plan
+from biodance.dance.stance import Stance
+from biodance.errors import BiodanceError
+
+LEG, MASS = 0.9, 65.0
+"""m from hip to sole, kg: the person whose size a robot is given."""
+FORWARD = 2.0
+"""1/m: the right foot stands ahead by this times the protocol's m times the leg's: 0.1 m for 0.2 m and legs of 0.25 m (paper III.D)."""
+UNHURRIED = 2.5
+"""rad/s: a robot with a slower joint takes more time for its moves, in proportion: 5 s instead of 2 s at 1 rad/s (paper, Fig. 11)."""
+LIGHTEST = 4.0
+"""kg: what lighter robots press on the ground cannot be told from noise (`motion.dynamics.zmp` needs 20 N)."""
+Tell = Callable[[str, int, int], None]
+
+
+def robot_plan(body: Body, plan: Plan) -> Plan:
+    """Return the plan for the robot ``body`` (in standing frames): its own time for a move, its own distance between the feet.
+
+    Raises
+    ------
+    BiodanceError
+        The plan is one for persons only (on a stool, with hands on a frame), or the robot is too light.
+    """
+    if plan.seated or plan.holds:
+        raise BiodanceError(f"Protocol {plan.name}: is danced on a stool or with hands on a frame; a robot dances standing and free.")
+    weight = float(body.sip.mass.sum())
+    if weight < LIGHTEST:
+        raise BiodanceError(f"{body.name}: weighs {weight:.2f} kg; a dance is designed for robots of {LIGHTEST:g} kg and more.")
+    slowest = float(body.limits.velocity.min())
+    ahead = float(np.clip(plan.forward * FORWARD * leg_length(body), 0.05, 0.4))
+    return replace(plan, move=plan.move * max(1.0, UNHURRIED / slowest), forward=ahead)
+
+
+def leg_length(body: Body) -> float:
+    """Return the length m of the right leg from hip to sole, straight, of a body in standing frames."""
+    return float(Chain(body).legs[0].length(0.0)) - float(body.feet["right"].outline[:, 1].min())
+
+
+def person_sized(body: Body) -> Likeness:
+    """Return the factors that make a robot as large and as heavy as a person."""
+    return Likeness(LEG / leg_length(body), MASS / float(body.sip.mass.sum()))
+
+
+def design_robot(body: Body, plan: Plan, *, seed: int = 0, tell: Tell | None = None, resume: Path | None = None) -> Dance:
+    """Return the dance of the robot ``body`` (in standing frames; its limits count) after ``plan`` (`robot_plan`); see `design.design`.
+
+    Raises
+    ------
+    BiodanceError
+        There is no such dance: the message names the posture or move and the limit that forbids it.
+    """
+    to = person_sized(body)
+    time, length = to.time, to.length
+    long = replace(
+        plan,
+        move=time * plan.move,
+        hold=time * plan.hold,
+        budget=time * plan.budget,
+        forward=float(np.clip(length * plan.forward, 0.05, 0.4)),
+    )
+    return shrunk(design(likeness(body, to), long, seed=seed, tell=tell, resume=resume), body, to)
+
+
+def shrunk(dance: Dance, body: Body, to: Likeness) -> Dance:
+    """Return the dance of ``body`` that is like ``dance`` of its likeness."""
+    units = np.ones(dance.postures.shape[1])
+    units[:3] = to.length
+
+    def small(stance: Stance) -> Stance:
+        places = {name: getattr(stance, name) / to.length for name in ("ankle", "soles", "props", "hands", "seat")}
+        return replace(stance, **places)
+
+    return replace(
+        dance,
+        body=body,
+        postures=dance.postures / units,
+        via=dance.via / units,
+        hold=dance.hold / to.time,
+        move=dance.move / to.time,
+        stances=tuple(small(stance) for stance in dance.stances),
+        under=tuple(small(stance) for stance in dance.under),
+    )

@@ -1,0 +1,92 @@
+"""Which segments of any robot must not touch, judged by its tree: those that are neither neighbours nor in touch at zero angles.
+
+The root and every segment that carries two or more others are boxes, all others capsules. Limbs are held against limbs more than two
+segments away, arms against the boxes that they do not hang on. What overlaps at zero angles is shaped too coarsely to be checked; it is
+named.
+"""
+
+from itertools import combinations
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.records import Array
+
+NEAR = 2
+"""Segments away along the tree: closer limbs are neighbours, or neighbours of the same segment."""
+POINTS = np.linspace(0.0, 1.0, 41)
+"""Places on a limb's axis at which it is held against others at zero angles."""
+LEAST = 0.01
+"""Half length of a capsule in a cube, in its radius: a line of no length has no direction."""
+Pairs = list[tuple[int, int]]
+
+
+def capsule(body: Body, segment: int) -> tuple[Array, float]:
+    """Return the ends (2, 3) m of the axis, in the segment frame, and the radius m of a limb's capsule: the widest in its box."""
+    low, high = body.boxes[segment]
+    half, centre = (high - low) / 2, (high + low) / 2
+    axis = int(np.argmax(half))
+    radius = float(np.sort(half)[0])
+    reach = max(half[axis] - radius, LEAST * radius) * np.eye(3)[axis]
+    return np.array([centre - reach, centre + reach]), radius
+
+
+def tree_pairs(body: Body) -> tuple[Pairs, Pairs, tuple[str, ...]]:
+    """Return the pairs of limbs and of a limb and a box (segment indices) to keep apart, and the pairs that cannot be checked, in words."""
+    above = [_carrier(body, i) for i in range(len(body.segments))]
+    boxes = [i for i in range(len(above)) if i == 0 or above.count(i) > 1]
+    legs = {k for foot in body.feet.values() for k in _up(above, foot.segment)}
+    limbs = [i for i in range(len(above)) if i not in boxes]
+    solid = [(i, j) for i, j in combinations(limbs, 2) if _apart(above, i, j) > NEAR]
+    walls = [(i, j) for i in limbs if i not in legs for j in boxes if above[i] != j]
+    axes = {i: _axis_at_zero(body, i) for i in limbs}
+    free = [pair for pair in solid if _limbs_gap(body, axes, *pair) > 0]
+    clear = [pair for pair in walls if _box_gap(body, axes[pair[0]], *pair) > 0]
+    left = [pair for pair in solid + walls if pair not in free and pair not in clear]
+    return free, clear, tuple(f"{body.segments[i]} - {body.segments[j]}" for i, j in left)
+
+
+def _carrier(body: Body, segment: int) -> int:
+    """Return the segment on which one hangs, -1 for the root's."""
+    joint = body.segment_joint[segment]
+    while joint >= 0:
+        joint = body.joints[joint].parent
+        if joint < 0 or body.joints[joint].segment >= 0:
+            return 0 if joint < 0 else body.joints[joint].segment
+    return -1
+
+
+def _up(above: list[int], segment: int) -> list[int]:
+    path = [segment]
+    while above[path[-1]] >= 0:
+        path.append(above[path[-1]])
+    return path
+
+
+def _apart(above: list[int], i: int, j: int) -> int:
+    """Return how many segments apart two segments are along the tree."""
+    one, two = _up(above, i), _up(above, j)
+    return len(set(one) ^ set(two))
+
+
+def _axis_at_zero(body: Body, segment: int) -> Array:
+    """Return points (K, 3) m on the axis of a limb at zero angles, lab frame."""
+    from biodance.motion.kinematics import poses
+
+    (a, b), _ = capsule(body, segment)
+    return poses(body, body.neutral[None]).points([segment] * len(POINTS), a + POINTS[:, None] * (b - a))[0]
+
+
+def _limbs_gap(body: Body, axes: dict[int, Array], i: int, j: int) -> float:
+    distance = np.linalg.norm(axes[i][:, None] - axes[j][None], axis=2).min()
+    return float(distance - capsule(body, i)[1] - capsule(body, j)[1])
+
+
+def _box_gap(body: Body, axis: Array, limb: int, box: int) -> float:
+    from biodance.motion.kinematics import poses
+
+    pose = poses(body, body.neutral[None])
+    local = (axis - pose.position[0, box]) @ pose.rotation[0, box]
+    low, high = body.boxes[box]
+    beyond = np.maximum(np.maximum(low - local, local - high), 0.0)
+    return float(np.linalg.norm(beyond, axis=1).min() - capsule(body, limb)[1])

@@ -1,0 +1,201 @@
+"""Robots dance: the closure and slopes of persons, plans of their own size, one small dance from a URDF file to every file, refusals."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from robots import biped
+
+from biodance.body.export import write_model
+from biodance.body.hoap3 import hoap3
+from biodance.body.human import human
+from biodance.body.standing_frames import standing_frames
+from biodance.body.urdf import read_urdf
+from biodance.cli import run
+from biodance.dance.chain import Chain
+from biodance.dance.dance import Dance
+from biodance.dance.person import HEALTHY, fitted
+from biodance.dance.programme import closed, closure_slopes
+from biodance.dance.protocol import read_plan
+from biodance.dance.robot import leg_length, person_sized, robot_plan
+from biodance.dance.robot_expectation import ERROR, RATE, robot_rows
+from biodance.dance.shapes import capsule_pairs, pairs_of, unchecked_pairs
+from biodance.dance.stance import stance
+from biodance.dance.verify import broken, verify
+from biodance.errors import BiodanceError
+from biodance.identify.base_parameters import estimate_base, structural_base
+from biodance.identify.information import Information, fold
+from biodance.motion.regressor import predict_wrench, regressor
+from biodance.pipeline.robot_dance import robot_dancer
+from biodance.records import Subject
+
+HOAP = standing_frames(hoap3())
+PROTOCOL = 'name = "tiny"\nmove_s = 2.0\nhold_s = 1.0\n[postures]\nparallel = 1\nsingle_left = 1\n'
+FEET = ["--feet", "right_foot,left_foot"]
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, int]:
+    place = tmp_path_factory.mktemp("robot")
+    (place / "tiny.toml").write_text(PROTOCOL)
+    write_model(hoap3(), place / "hoap3.urdf", format="urdf")
+    words = ["--urdf", str(place / "hoap3.urdf"), *FEET, "--protocol", str(place / "tiny.toml"), "--seed", "1"]
+    return place, run(["dance", *words, "--out", str(place / "out")])
+
+
+def test_planted_feet_stay_and_slopes_are_exact() -> None:
+    chain, rng = Chain(HOAP), np.random.default_rng(0)
+    feet = stance(HOAP, "right_forward", right=0.1)
+    x = np.zeros((1, chain.size))
+    x[0, :3] = [0.05, 0.01, 0.26]
+    x[0, 3:6] = [0.1, -0.05, 0.1]
+    x[0, 18:] = rng.uniform(HOAP.limits.lower, HOAP.limits.upper)[12:]
+    v, a = rng.normal(size=(2, 1, chain.size))
+    state = closed(chain, feet, x, v, a)
+    legs = [c for side in feet.planted for c in chain.leg_columns[side]]
+    free = [c for c in range(chain.size) if c not in legs]
+    slopes, step = closure_slopes(state), 1e-6
+    for c in (0, 2, 3, 5, 20):
+        shifted = []
+        for sign in (1, -1):
+            moved = x.copy()
+            moved[0, c] += sign * step
+            shifted.append(closed(chain, feet, moved, v, a))
+        for k, name in enumerate(("x", "v", "a")):
+            difference = (getattr(shifted[0], name) - getattr(shifted[1], name))[0] / (2 * step)
+            np.testing.assert_allclose(
+                slopes[k, 0, legs, c], difference[legs], rtol=0, atol=2e-5 * max(1.0, float(np.abs(difference).max()))
+            )
+    assert len(free) == 15
+    links = [chain.carriers[HOAP.feet[side].segment] for side in ("right", "left")]
+    np.testing.assert_allclose(state.velocity[0, links], 0.0, atol=1e-9)
+    np.testing.assert_allclose(state.acceleration[0, links], 0.0, atol=1e-8)
+
+
+def test_a_plan_takes_the_size_and_the_speed_of_the_robot() -> None:
+    plan = robot_plan(HOAP, read_plan("full"))
+    assert plan.move == pytest.approx(5.0)  # Bonnet 2016, Fig. 11, at 1 rad/s
+    assert plan.forward == pytest.approx(0.1)  # III.D
+    assert leg_length(HOAP) == pytest.approx(0.25)
+    assert person_sized(HOAP).length * leg_length(HOAP) == pytest.approx(0.9)
+    quick = replace(HOAP, limits=replace(HOAP.limits, velocity=np.full(21, 6.0)))
+    assert robot_plan(quick, read_plan("full")).move == 2.0
+    with pytest.raises(BiodanceError, match="stool"):
+        robot_plan(HOAP, read_plan("chair"))
+    toy = replace(HOAP, sip=replace(HOAP.sip, phi=0.4 * HOAP.sip.phi))
+    with pytest.raises(BiodanceError, match=r"3\.18 kg"):
+        robot_plan(toy, read_plan("full"))
+
+
+def test_feet_stand_apart_as_the_hips_do() -> None:
+    feet = stance(HOAP, "parallel")
+    np.testing.assert_allclose(feet.ankle[:, 1], [-0.039, 0.039], atol=1e-9)
+    assert feet.soles[1, :, 1].min() - feet.soles[0, :, 1].max() == pytest.approx(0.016, abs=1e-6)
+
+
+def test_what_must_not_touch_follows_from_the_tree(tmp_path: Path) -> None:
+    person = human(Subject(65.0, 1.75, "F", 33.0))
+    assert pairs_of(person)[0] == capsule_pairs(person)
+    (tmp_path / "robot.urdf").write_text(biped())
+    body = standing_frames(read_urdf(tmp_path / "robot.urdf", feet=("r_sole", "l_sole")))
+    limbs, boxes = ({frozenset((body.segments[i], body.segments[j])) for i, j in pairs} for pairs in pairs_of(body))
+    assert {
+        frozenset(pair) for pair in (("r_tibia", "l_tibia"), ("r_pad", "l_tibia"), ("r_ulna", "l_ulna"), ("r_ulna", "l_femur"))
+    } <= limbs
+    assert frozenset(("r_femur", "r_tibia")) not in limbs
+    assert {frozenset(pair) for pair in (("r_ulna", "chest"), ("l_ulna", "base"))} <= boxes
+    assert frozenset(("r_clavicle", "chest")) not in boxes
+    assert unchecked_pairs(body) == unchecked_pairs(person) == ()
+    wide = np.array(body.boxes)
+    wide[body.segment_index("l_ulna")] *= 6.0
+    coarse = unchecked_pairs(replace(body, boxes=wide))
+    assert any("l_ulna" in pair for pair in coarse)
+    assert all("l_ulna" in pair for pair in coarse)
+
+
+def test_a_robot_dances_from_its_file(made: tuple[Path, int]) -> None:
+    place, code = made
+    found = json.loads((place / "out" / "results.json").read_text())
+    assert (code, found["feasible"], found["notes"]) == (0, True, [])
+    assert (found["postures"], found["criterion"]["static_bound"]) == (2, pytest.approx(7.942, abs=0.001))
+    assert all(margin["worst"] >= 0 for margin in found["margins"])
+    assert all(0 < row["mass_kg"] <= row["mass_table_kg"] for row in found["expected_sd"])
+    assert sorted(path.name for path in (place / "out").iterdir()) == sorted(
+        ["results.json", "dance.npz", "dance.csv", "cues.md", "margins.md", "postures.png", "criterion.png", "zmp.png", "expectation.png"]
+    )
+
+
+def test_the_dance_keeps_the_limits_of_the_file(made: tuple[Path, int]) -> None:
+    place, _ = made
+    dance, body = Dance.load(place / "out" / "dance.npz"), robot_dancer(place / "hoap3.urdf", "right_foot,left_foot")
+    _, plan, _ = fitted(body, robot_plan(body, read_plan(place / "tiny.toml")), HEALTHY)
+    assert not broken(verify(body, dance, plan))
+    assert np.all(dance.move >= 5.0)
+    weak = replace(body, limits=replace(body.limits, torque_upper=0.01 * body.limits.torque_upper))
+    assert {margin.limit for margin in broken(verify(weak, dance, plan))} == {"joint_torque"}
+
+
+def test_the_table_of_angles_is_the_dance(made: tuple[Path, int]) -> None:
+    place, _ = made
+    dance = Dance.load(place / "out" / "dance.npz")
+    lines = (place / "out" / "dance.csv").read_text().splitlines()
+    table, motion = np.array([[float(word) for word in line.split(",")] for line in lines[1:]]), dance.motion(100.0)
+    assert lines[0].split(",")[8:] == [f"{joint.name}_rad" for joint in dance.body.joints]
+    np.testing.assert_allclose(table, np.column_stack([motion.time, motion.q]), atol=1e-8)
+    sheet = (place / "out" / "cues.md").read_text()
+    assert "| with both feet side by side |" in sheet
+    assert "on the left leg alone" in sheet
+
+
+def test_parameters_come_back_from_the_wrench_of_the_dance(made: tuple[Path, int]) -> None:
+    place, _ = made
+    dance, rng = Dance.load(place / "out" / "dance.npz"), np.random.default_rng(4)
+    body, motion = dance.body, dance.motion(RATE)
+    truth = body.sip.phi * rng.uniform(0.8, 1.2, len(body.segments)).repeat(10)
+    exact = regressor(body, motion) @ truth
+    np.testing.assert_allclose(exact, predict_wrench(body, motion, truth).value, atol=1e-12)
+    noisy = exact + ERROR * rng.normal(size=exact.shape)
+    base = structural_base(body)
+    estimate = estimate_base(Information(fold(robot_rows(body, motion, noisy)), 6 * len(exact)), base)
+    known = np.isfinite(estimate.sd)
+    assert known.sum() > 80
+    z = (estimate.value - base.regroup @ truth)[known] / estimate.sd[known]
+    assert np.abs(z).max() < 4.5
+    assert 0.7 < np.sqrt(np.mean(z**2)) < 1.3
+    clean = estimate_base(Information(fold(robot_rows(body, motion, exact)), 6 * len(exact)), base)
+    assert np.abs((clean.value - base.regroup @ truth) / clean.sd)[known].max() < 1e-4
+
+
+def test_a_leg_that_does_not_carry_alone_is_refused_by_its_limit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_model(hoap3(), tmp_path / "hoap3.urdf", format="urdf")
+    (tmp_path / "weak.toml").write_text("[strength]\nright_hip = 0.003\nright_knee = 0.003\nright_ankle = 0.003\n")
+    (tmp_path / "one.toml").write_text('name = "one"\nhold_s = 1\n[postures]\nsingle_right = 1\n')
+    words = ["--urdf", str(tmp_path / "hoap3.urdf"), *FEET, "--protocol", str(tmp_path / "one.toml"), "--json"]
+    words += ["--limits", str(tmp_path / "weak.toml")]
+    assert run(["dance", *words, "--out", str(tmp_path / "out")]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert found["feasible"] is False
+    assert "on the right leg alone" in found["reason"]
+    assert "joint torque of right" in found["reason"]
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["results.json"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([], "Say who dances"),
+        (["--sex", "F"], "Say who dances"),
+        (["--urdf", "robot.urdf"], "Say who dances"),
+        (["--urdf", "robot.urdf", "--feet", "a,b", "--sex", "F"], "Say who dances"),
+        (["--urdf", "robot.urdf", "--feet", "a,b"], "robot.urdf: cannot be read"),
+        (["--urdf", "robot.urdf", "--feet", "a"], "separated by a comma"),
+    ],
+)
+def test_wrong_words_are_one_sentence(words: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["dance", *words, "--out", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert "Traceback" not in error
+    assert not (tmp_path / "out").exists()
