@@ -21,6 +21,7 @@ from biodance.records import Subject
 from biodance.virtual_lab.causes import fault_of
 from biodance.virtual_lab.hide import hide, parse
 from biodance.virtual_lab.inject import inject
+from biodance.virtual_lab.laboratory import Visit
 from biodance.virtual_lab.protocol_file import read_protocol
 from biodance.virtual_lab.simulate import simulate
 
@@ -28,12 +29,12 @@ SUBJECT = Subject(64.0, 1.72, "F", 30.0)
 TRIALS = ("static", "move_1", "move_3", "move_5")
 
 
-def hidden(folder: Path, *texts: str, seed: int = 41) -> Path:
-    """Write a session of three moving trials with something hidden in it."""
+def hidden(folder: Path, *texts: str, seed: int = 41, visit: int = 0) -> Path:
+    """Write a session of three moving trials with something hidden in it; ``visit`` another day of the same person."""
     plan = read_protocol("diagnosis")
     plan = replace(plan, trials=tuple(trial for trial in plan.trials if trial.name in TRIALS))
-    visit, loads = hide(tuple(parse(text) for text in texts), SUBJECT, plan, seed=seed)
-    return simulate(SUBJECT, plan, folder, seed=seed, visit=visit, loads=loads)
+    how, loads = hide(tuple(parse(text) for text in texts), SUBJECT, plan, seed=seed, visit=Visit(visit))
+    return simulate(SUBJECT, plan, folder, seed=seed, visit=how, loads=loads)
 
 
 def examined(folder: Path, monkeypatch: pytest.MonkeyPatch) -> SessionResult:
@@ -62,6 +63,20 @@ def test_late_forces_are_named_by_the_command(tmp_path: Path, capsys: pytest.Cap
     first = document["findings"][0]
     assert (first["effect"], first["target"]) == ("time_delay", "")
     assert first["parameters"]["delay"]["value"] == pytest.approx(0.025, rel=0.25)
+
+
+def test_a_reference_session_shows_a_load_below_the_limit_of_one_session(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """0.6 kg on a forearm stay unseen against the table (limit 0.79 kg); an unloaded session of the same person, another day, shows them."""
+    reference = hidden(tmp_path / "unloaded")
+    session = hidden(tmp_path / "loaded", "added_mass:target=left_forearm_hand,mass=0.6", visit=1)
+    assert run(["diagnose", str(session), "--reference", str(reference), "--out", str(tmp_path / "out"), "--json"]) == 1
+    document = json.loads(capsys.readouterr().out)
+    first = document["findings"][0]
+    assert (document["verdict"], len(document["findings"])) == ("named, complete", 1)
+    assert (first["effect"], first["target"]) == ("added_mass", "left_forearm_hand")
+    assert first["parameters"]["mass"]["value"] == pytest.approx(0.6, abs=0.15)
+    limits = {(row["effect"], row["target"]): row["limit"] for row in document["limits"]}
+    assert limits["added_mass", "left_forearm_hand"] < 0.5
 
 
 @pytest.mark.parametrize(
