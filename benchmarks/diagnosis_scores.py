@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from diagnosis_contamination import contamination
-from hidden_causes import Name, truth
+from hidden_causes import LASTING, Name, truth
 from hidden_sessions import CACHE, Scenario, examined
 
 from biodance.diagnose.diagnosis import Diagnosis, Finding
@@ -106,7 +106,8 @@ def _ratio(scenario: Scenario, found: Diagnosis) -> tuple[float, float]:
     rows = [row for row in found.limits if _is_among((row.effect, row.target), same)]
     if not rows or size is None:
         return float("nan"), float("nan")
-    return size[1] / min(row.limit for row in rows), size[1] / min(row.told_from for row in rows)
+    lasting = size[1] * LASTING.get(rows[0].effect, 1.0)
+    return lasting / min(row.limit for row in rows), lasting / min(row.told_from for row in rows)
 
 
 def _is_among(name: Name, same: set[Name]) -> bool:

@@ -66,7 +66,7 @@ def test_late_forces_are_named_by_the_command(tmp_path: Path, capsys: pytest.Cap
 
 
 def test_a_reference_session_shows_a_load_below_the_limit_of_one_session(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """0.6 kg on a forearm stay unseen against the table (limit 0.79 kg); an unloaded session of the same person, another day, shows them."""
+    """0.6 kg on a forearm stay unseen against the table (limit 0.79 kg); an unloaded session of that person, another day, shows them."""
     reference = hidden(tmp_path / "unloaded")
     session = hidden(tmp_path / "loaded", "added_mass:target=left_forearm_hand,mass=0.6", visit=1)
     assert run(["diagnose", str(session), "--reference", str(reference), "--out", str(tmp_path / "out"), "--json"]) == 1
