@@ -16,13 +16,16 @@ from biodance.body.urdf import read_urdf
 from biodance.cli import run
 from biodance.dance.chain import Chain
 from biodance.dance.dance import Dance
+from biodance.dance.excitation import blocks, dynamic_grams
 from biodance.dance.person import HEALTHY, fitted
+from biodance.dance.postures import anyhow
 from biodance.dance.programme import closed, closure_slopes
 from biodance.dance.protocol import read_plan
 from biodance.dance.robot import leg_length, person_sized, robot_plan
 from biodance.dance.robot_expectation import ERROR, RATE, robot_rows
 from biodance.dance.shapes import capsule_pairs, pairs_of, unchecked_pairs
 from biodance.dance.stance import stance
+from biodance.dance.transitions import Task, judged
 from biodance.dance.verify import broken, verify
 from biodance.errors import BiodanceError
 from biodance.identify.base_parameters import estimate_base, structural_base
@@ -87,6 +90,19 @@ def test_a_plan_takes_the_size_and_the_speed_of_the_robot() -> None:
     toy = replace(HOAP, sip=replace(HOAP.sip, phi=0.4 * HOAP.sip.phi))
     with pytest.raises(BiodanceError, match=r"3\.18 kg"):
         robot_plan(toy, read_plan("full"))
+
+
+def test_a_slow_move_is_judged_at_fewer_instants_and_tells_as_much() -> None:
+    chain, rng = Chain(HOAP), np.random.default_rng(1)
+    ends = np.tile([0.05, 0.0, 0.25, *np.zeros(24)], (2, 1))
+    ends[:, 18:] = rng.uniform(0.3, 0.7, (2, 9)) * (HOAP.limits.upper - HOAP.limits.lower)[12:] + HOAP.limits.lower[12:]
+    slow = Task(chain, blocks(HOAP), stance(HOAP, "parallel"), ends, 9.5)
+    assert len(slow.grid(10.0)) == len(replace(slow, duration=4.0).grid(10.0)) == 39
+    assert len(replace(slow, duration=2.8).grid(10.0)) == 27
+    move, _ = judged(slow, slow.straight())
+    time = np.linspace(0.0, 9.5, 2001)[1:-1]
+    fine = slow.programme(slow.straight(), [], time, reserve=0.0, objective=anyhow).state(np.empty(0))
+    np.testing.assert_allclose(move.gram, dynamic_grams(fine, list(range(12))) * 9.5 / 2000, rtol=0, atol=1e-4 * np.abs(move.gram).max())
 
 
 def test_feet_stand_apart_as_the_hips_do() -> None:

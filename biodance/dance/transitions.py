@@ -26,6 +26,8 @@ GRID = 10.0
 """Hz at which limits are kept while designing; instants that turn out worse in between are added."""
 CHECK = 50.0
 """Hz at which a move is judged before it is taken."""
+SLOW = 4.0
+"""s: longer moves, of slow robots, are judged at as many instants as a move of this time: it is the same spline through as many points."""
 RESERVE = 0.04
 """Share of every limit's scale that is kept in reserve for the instants in between; for a foot's clearance none at the ends."""
 LEGS = 0.3
@@ -86,8 +88,13 @@ class Task:
         return Programme(self.chain, self.stance, parts @ points, parts[:, :, 1:3], free, kept, objective, share)
 
     def grid(self, rate: float) -> Array:
-        """Return the instants (T,) s between the ends at about ``rate`` Hz."""
-        return np.linspace(0.0, self.duration, round(self.duration * rate) + 1)[1:-1]
+        """Return the instants (T,) s between the ends at about ``rate`` Hz, of a long move fewer."""
+        return np.linspace(0.0, self.duration, round(min(self.duration, SLOW) * rate) + 1)[1:-1]
+
+    @property
+    def stretch(self) -> float:
+        """How much more time an instant of a long move stands for."""
+        return max(1.0, self.duration / SLOW)
 
     def state(self, via: Array) -> State:
         """Return the move through ``via`` on the coarse grid."""
@@ -129,11 +136,11 @@ class Objective:
         segments = [i for i in self.task.segments if picks[i] and weight[i] > 0]
         if not self.share or not segments:
             return value, slope
-        grams = self.history + dynamic_grams(state, list(range(len(weight)))) / GRID + LITTLE * np.eye(6)
+        grams = self.history + dynamic_grams(state, list(range(len(weight)))) * self.task.stretch / GRID + LITTLE * np.eye(6)
         chosen = np.zeros(len(weight))
         chosen[segments] = self.share * weight[segments] / weight[segments].sum()
         found, by = total(chosen, grams, picks, measure=_logarithm)
-        return value + found, slope + dynamic_slopes(state, segments, by[segments] / GRID)
+        return value + found, slope + dynamic_slopes(state, segments, by[segments] * self.task.stretch / GRID)
 
 
 def _logarithm(gram: Array) -> tuple[Array, Array]:
@@ -194,7 +201,7 @@ def judged(task: Task, via: Array) -> tuple[Move, Array]:
     dips = (left[1:-1] < 0) & (left[1:-1] <= left[:-2]) & (left[1:-1] <= left[2:])
     plain = task.straight()
     plain[:, task.excited] = via[:, task.excited]
-    gram = dynamic_grams(found.state, list(range(len(task.chain.body.segments)))) / CHECK
+    gram = dynamic_grams(found.state, list(range(len(task.chain.body.segments)))) * task.stretch / CHECK
     before, after = (float(np.sqrt(off_centre(task.state(v))[0]) / 10) for v in (plain, via))
     return Move(via, task.duration, gram, before, after, max(0.0, worst), limit if worst > 0 else ""), time[dips]
 
