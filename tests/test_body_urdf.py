@@ -118,6 +118,7 @@ def test_what_is_guessed_is_said(tmp_path: Path) -> None:
         ('<mass value="6.0"/>', '<mass value="-6.0"/>', "-6 kg"),
         ('<mass value="6.0"/>', '<mass value="six"/>', "'six'"),
         ('ixx="0.006"', 'ixx="0.6"', "chest"),
+        ('ixx="0.006" ixy="0" ixz="0" iyy="0.006"', 'ixx="-0.6" ixy="0" ixz="0" iyy="-0.6"', "chest"),
         ('effort="40.0"/>', 'effort="0"/>', "effort of joint 'r_shoulder1' is 0"),
         ('lower="-0.3" upper="1.2"', 'lower="1.3" upper="1.2"', "1.3 to 1.2"),
         ('<axis xyz="0 1 0"/><limit lower="-0.3"', '<axis xyz="0 0 0"/><limit lower="-0.3"', "has no direction"),

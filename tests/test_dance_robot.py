@@ -83,6 +83,8 @@ def test_a_plan_takes_the_size_and_the_speed_of_the_robot() -> None:
     assert plan.forward == pytest.approx(0.1)  # III.D
     assert leg_length(HOAP) == pytest.approx(0.25)
     assert person_sized(HOAP).length * leg_length(HOAP) == pytest.approx(0.9)
+    gripper = replace(HOAP, limits=replace(HOAP.limits, velocity=np.array([0.1, *np.full(20, 1.0)])))
+    assert robot_plan(gripper, read_plan("full")).move == pytest.approx(5.0)  # one slow joint is kept by its own limit
     quick = replace(HOAP, limits=replace(HOAP.limits, velocity=np.full(21, 6.0)))
     assert robot_plan(quick, read_plan("full")).move == 2.0
     with pytest.raises(BiodanceError, match="stool"):

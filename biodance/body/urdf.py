@@ -67,12 +67,12 @@ def _body(file: UrdfFile, joints: list[Joint], limits: JointLimits, heavy: list[
     carried = {carrier.joint: i for i, carrier in enumerate(heavy)}
     boxes = np.array([_box(carrier, lump) for carrier, lump in zip(heavy, lumps, strict=True)])
     com = np.array([lump.com for lump in lumps])[:, None]
-    spread = robot_covariance(lumps, [com_deviation(lump) for lump in lumps])
+    phi = np.concatenate([parameters(lump) for lump in lumps])
     body = Body(
         file.name,
         segments,
         tuple(replace(joint, segment=carried.get(j, NO_SEGMENT)) for j, joint in enumerate(joints)),
-        Sip(segments, np.concatenate([parameters(lump) for lump in lumps]), spread),
+        Sip(segments, phi, np.zeros((phi.size, phi.size))),
         limits,
         SegmentMarkers((), (), np.empty((0, 3)), np.empty(0)),
         boxes,
@@ -83,7 +83,7 @@ def _body(file: UrdfFile, joints: list[Joint], limits: JointLimits, heavy: list[
         refuse_impossible(body)
     except BiodanceError as error:
         raise FileRefused(f"{file.path}: {error}") from error
-    return body
+    return replace(body, sip=Sip(segments, phi, robot_covariance(lumps, [com_deviation(lump) for lump in lumps])))
 
 
 def _tree(file: UrdfFile) -> tuple[list[Joint], JointLimits, list[_Carrier], dict[str, _Carrier]]:

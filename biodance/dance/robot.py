@@ -25,7 +25,7 @@ LEG, MASS = 0.9, 65.0
 FORWARD = 2.0
 """1/m: the right foot stands ahead by this times the protocol's m times the leg's: 0.1 m for 0.2 m and legs of 0.25 m (paper III.D)."""
 UNHURRIED = 2.5
-"""rad/s: a robot with a slower joint takes more time for its moves, in proportion: 5 s instead of 2 s at 1 rad/s (paper, Fig. 11)."""
+"""rad/s: a robot of slower joints (median) takes more time for its moves, in proportion: 5 s, not 2 s, at 1 rad/s (paper, Fig. 11)."""
 LIGHTEST = 4.0
 """kg: what lighter robots press on the ground cannot be told from noise (`motion.dynamics.zmp` needs 20 N)."""
 Tell = Callable[[str, int, int], None]
@@ -44,9 +44,9 @@ def robot_plan(body: Body, plan: Plan) -> Plan:
     weight = float(body.sip.mass.sum())
     if weight < LIGHTEST:
         raise BiodanceError(f"{body.name}: weighs {weight:.2f} kg; a dance is designed for robots of {LIGHTEST:g} kg and more.")
-    slowest = float(body.limits.velocity.min())
+    usual = float(np.median(body.limits.velocity))
     ahead = float(np.clip(plan.forward * FORWARD * leg_length(body), 0.05, 0.4))
-    return replace(plan, move=plan.move * max(1.0, UNHURRIED / slowest), forward=ahead)
+    return replace(plan, move=plan.move * max(1.0, UNHURRIED / usual), forward=ahead)
 
 
 def leg_length(body: Body) -> float:
