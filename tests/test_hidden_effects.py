@@ -150,6 +150,14 @@ def test_a_fault_written_into_real_standing_is_in_the_set(
 
 
 @pytest.mark.filterwarnings("ignore")
+def test_a_real_walk_gets_no_name_from_tolerances_that_do_not_hold_for_it(data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    diagnosis = found(data / "adl_gait", monkeypatch)
+    assert diagnosis.verdict == "unexplained"
+    assert not diagnosis.findings
+    assert any("not believed" in note for note in diagnosis.notes)
+
+
+@pytest.mark.filterwarnings("ignore")
 def test_exchanged_wrist_labels_of_a_real_recording_are_told(data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In the static trial and the walk of HC030A the left wrist's bar points the mirrored right one's opposite way."""
     diagnosis = found(standing(data, tmp_path / "s", "HC030A"), monkeypatch)

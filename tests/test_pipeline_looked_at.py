@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import RATE, body, known, looks, motion
+from diagnosed_sessions import RATE, body, looks, motion
 
 from biodance.diagnose.problem import Look
 from biodance.diagnose.spectrum import EDGES
+from biodance.diagnose.tolerances import shipped
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.looked_at import MARKERS, UNREST, left_out, looked_at, own_tolerances, soft_tissue, unrest
 from biodance.pipeline.results import Step, TrialResult, WrenchComparison
@@ -59,10 +60,11 @@ def test_the_unrest_of_standing_is_measured_and_bounded() -> None:
     assert size[3, 0] == pytest.approx(0.8, rel=0.05)
     assert size[4, 1] == pytest.approx(UNREST, rel=0.05)
     assert not size[:2].any(), "slow sway is weight and posture, and no unrest"
-    found, notes = own_tolerances(known(), body(), (standing(shaken),))
-    assert np.all(np.linalg.eigvalsh(found.noise - known().noise) > -1e-9)
-    assert "Standing still" in notes[0]
-    assert found.sizes == known().sizes
+    own = own_tolerances(body(), (standing(shaken),))
+    assert np.all(np.linalg.eigvalsh(own.tolerances.noise - shipped().noise) > -1e-9)
+    assert "Standing still" in own.notes[0]
+    assert own.believed
+    assert own.tolerances.sizes == shipped().sizes
 
 
 @pytest.mark.parametrize(("factor", "grows"), [(1.2, False), (3.0, True)])
@@ -73,8 +75,8 @@ def test_soft_tissue_grows_with_the_markers_distance(factor: float, grows: bool)
     moving = look.motion
     far = replace(look, motion=Motion(moving.time, moving.q, moving.v, moving.a, residual, tuple("abcde")))
     assert soft_tissue((far,)) == pytest.approx(factor * MARKERS), "one marker that is wrong does not count"
-    before = replace(known(), sizes={"slide thigh": 0.004, "plate_gain Fz": 0.002})
-    found, notes = own_tolerances(before, body(), (far,))
-    assert found.size("slide thigh") == pytest.approx(0.004 * (factor if grows else 1.0))
-    assert found.size("plate_gain Fz") == 0.002
-    assert bool(notes) == grows
+    own = own_tolerances(body(), (far,))
+    assert own.tolerances.size("slide thigh") == pytest.approx(shipped().size("slide thigh") * (factor if grows else 1.0))
+    assert own.tolerances.size("plate_gain Fz") == shipped().size("plate_gain Fz")
+    assert own.believed != grows
+    assert bool(own.notes) == grows

@@ -21,6 +21,10 @@ BEYOND = 20.0
 """Standard deviations beyond which a name does not tell the main part."""
 
 
+SECONDS = 70.0
+"""s of measured contact in the sessions from which the spread of null sessions was learned; in a shorter one chance alone spreads more."""
+
+
 def energies(found: Model) -> Array:
     """Return (B, 6): mean square of the whitened residual that is left, per band and channel."""
     band = found.problem.spectrum.band
@@ -28,10 +32,25 @@ def energies(found: Model) -> Array:
     return np.array([square[band == b].mean(axis=0) if (band == b).any() else np.ones(6) for b in range(len(EDGES) - 1)])
 
 
+def unlikely(found: Model) -> Array:
+    """Return (B, 6): how far `energies` are from sessions without fault that are as long as this one, in standard deviations.
+
+    The mean of n squares has the variance 2 energy² / n, of which the learned spread holds that of long sessions. Where chance rules
+    (short sessions, slow bands) the cube root is nearly normal (Wilson and Hilferty 1931, doi:10.1073/pnas.17.12.684).
+    """
+    where, known, mean = found.problem.spectrum, found.tolerances, energies(found)
+    count = np.maximum(1, np.bincount(where.band, minlength=len(EDGES) - 1))[:, None]
+    chance = 2 * known.energy**2 / count * max(0.0, 1 - where.seconds / SECONDS)
+    spread = np.sqrt(known.energy_sd**2 + chance)
+    root = spread / known.energy / 3
+    few = (np.cbrt(mean / known.energy) - 1 + root**2) / root
+    return np.asarray(np.where(chance > known.energy_sd**2, few, (mean - known.energy) / spread))
+
+
 def adequacy(found: Model) -> tuple[Adequacy, ...]:
     """Return how far every band of every channel is from null sessions, worst first."""
     spectrum, names = found.problem.spectrum, [case.trial.name for case in found.problem.cases]
-    z = (energies(found) - found.tolerances.energy) / found.tolerances.energy_sd
+    z = unlikely(found)
     square = found.belief.left[: 6 * spectrum.band.size].reshape(-1, 6) ** 2
     rows = []
     for b in range(len(z)):

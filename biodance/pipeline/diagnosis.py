@@ -12,14 +12,14 @@ from biodance.diagnose.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnose.engine import Examined, diagnose
 from biodance.diagnose.foresight import Foresight, foresee, session_of
 from biodance.diagnose.problem import Look
-from biodance.diagnose.tolerances import Tolerances, shipped
+from biodance.diagnose.tolerances import Tolerances
 from biodance.effects.case import Case
 from biodance.effects.gate import Gate, gates
 from biodance.errors import BiodanceError, SessionRefused, TrialRefused
 from biodance.identify.added_mass import expected
 from biodance.identify.identification import Identification, identify, standing_point
 from biodance.pipeline.identification import FITTED, KEPT, SessionIdentification
-from biodance.pipeline.looked_at import left_out, looked_at, looks, own_tolerances
+from biodance.pipeline.looked_at import Own, left_out, looked_at, looks, own_tolerances
 from biodance.pipeline.results import SessionResult
 from biodance.records import Role, Sip
 
@@ -69,24 +69,22 @@ def diagnose_session(
             return SessionDiagnosis(_by_checks(checks))
         raise SessionRefused(f"{result.session.folder}: there is nothing to diagnose. {result.body_source} {_reasons(result)}".strip())
     tell("looking for causes")
-    own, notes = own_tolerances(tolerances or shipped(), result.body, fitted)
+    own = Own(tolerances) if tolerances else own_tolerances(result.body, fitted)
     try:
-        examined = diagnose(result.body, fitted, gates=checks, tolerances=own, prior=_prior(reference, result), chosen=_continuous(names))
+        examined = diagnose(
+            result.body, fitted, gates=checks, tolerances=own.tolerances, prior=_prior(reference, result), chosen=_continuous(names)
+        )
     except TrialRefused:
         if failed:
             return SessionDiagnosis(_by_checks(checks))
         raise
-    examined = _noted(examined, *standing_notes(result), *left_out(result.trials), *notes)
+    examined = _noted(examined, *standing_notes(result), *left_out(result.trials), *own.notes)
     if failed:
         return SessionDiagnosis(_by_checks(checks, examined.diagnosis), examined)
-    before = result.identification.identification if result.identification else None
-    if not examined.named or before is None:
-        return SessionDiagnosis(examined.diagnosis, examined, before)
+    if examined.named and not own.believed:
+        return SessionDiagnosis(_disbelieved(examined.diagnosis), examined)
     tell("measuring what the findings change")
-    try:
-        return _accepted(result, examined, before)
-    except TrialRefused as why:  # named in standing, and no movement to identify from
-        return SessionDiagnosis(_noted(examined, f"What accepting the findings changes is not known. {why}").diagnosis, examined, before)
+    return _with_gains(result, examined)
 
 
 def standing_notes(result: SessionResult) -> tuple[str, ...]:
@@ -122,6 +120,12 @@ def foresee_dance(path: Path) -> Foresight:
 
     dance = Dance.load(path)
     return foresee(dance.body, session_of(dance.motion(50.0), TRIAL_SECONDS))
+
+
+def _disbelieved(one: Diagnosis) -> Diagnosis:
+    """Return the diagnosis without its names, which become a note: the tolerances under which they were found do not hold here."""
+    alike = ", ".join(f"{finding.effect} {finding.target}".strip() for finding in one.findings)
+    return replace(one, verdict="unexplained", findings=(), notes=(*one.notes, f"What is left resembles {alike}, which is not believed."))
 
 
 def _noted(examined: Examined, *notes: str) -> Examined:
@@ -185,6 +189,17 @@ def _finding(gate: Gate) -> Finding:
 
 def _reasons(result: SessionResult) -> str:
     return " ".join(dict.fromkeys(reason for trial in result.trials if trial.trial.role in FITTED for reason in trial.reasons))
+
+
+def _with_gains(result: SessionResult, examined: Examined) -> SessionDiagnosis:
+    """Return the diagnosis with what accepting its findings changes, where there are any and movement to identify from."""
+    before = result.identification.identification if result.identification else None
+    if not examined.named or before is None:
+        return SessionDiagnosis(examined.diagnosis, examined, before)
+    try:
+        return _accepted(result, examined, before)
+    except TrialRefused as why:  # named in standing, and no movement to identify from
+        return SessionDiagnosis(_noted(examined, f"What accepting the findings changes is not known. {why}").diagnosis, examined, before)
 
 
 def _accepted(result: SessionResult, examined: Examined, before: Identification) -> SessionDiagnosis:

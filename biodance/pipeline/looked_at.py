@@ -1,6 +1,6 @@
 """Which trials of a session the diagnosis looks at, and the tolerances that hold for the person in them."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.diagnose.problem import Look
 from biodance.diagnose.spectrum import EDGES, SHORTEST, spectrum, thinned
-from biodance.diagnose.tolerances import REFERENCE, Tolerances
+from biodance.diagnose.tolerances import REFERENCE, Tolerances, shipped
 from biodance.effects.case import Case
 from biodance.identify.identification import standing_point
 from biodance.identify.statistics import RATE, Fit
@@ -16,6 +16,16 @@ from biodance.lab.filters import runs
 from biodance.pipeline.identification import FITTED, KEPT
 from biodance.pipeline.results import TrialResult
 from biodance.records import Array, Role
+
+
+@dataclass(frozen=True, eq=False)
+class Own:
+    """``tolerances`` that hold for some recordings, ``notes`` on what changed, and whether a name found under them is ``believed``."""
+
+    tolerances: Tolerances
+    notes: tuple[str, ...] = ()
+    believed: bool = True
+
 
 ENOUGH = 10.0
 """s of fully measured movement beside which quiet standing tells nothing more."""
@@ -76,18 +86,19 @@ def _seconds(look: Look) -> float:
     return float(sum(stop - start for start, stop in runs(look.use) if stop - start >= SHORTEST * rate) / rate)
 
 
-def own_tolerances(known: Tolerances, body: Body, chosen: tuple[Look, ...]) -> tuple[Tolerances, tuple[str, ...]]:
-    """Return the tolerances that hold for these recordings and what changed, in words: markers that move more on the body than those of
-    virtual sessions, and the unrest of a person who stands still where standing is looked at.
+def own_tolerances(body: Body, chosen: tuple[Look, ...]) -> Own:
+    """Return the shipped tolerances as they hold for these recordings: with markers that move more on the body than those of virtual
+    sessions, and with the unrest of a person who stands still where standing is looked at.
     """
-    found, notes = known, []
+    found, notes = shipped(), []
     factor = soft_tissue(chosen) / MARKERS
     if factor > MORE:
-        sizes = {key: size * (factor if key.startswith(SOFT) else 1.0) for key, size in known.sizes.items()}
+        sizes = {key: size * (factor if key.startswith(SOFT) else 1.0) for key, size in found.sizes.items()}
         found = replace(found, sizes=sizes)
         notes.append(
             f"Markers are {1000 * factor * MARKERS:.0f} mm from the body, {factor:.1f} times as far as where tolerances were learned: soft "
-            "tissue and joints may err as much more."
+            "tissue and joints may err as much more, and no cause is named from such movement. Tolerances learned on sessions of your own "
+            "laboratory without fault (biodance.diagnose.learning) hold for it."
         )
     standing = tuple(look for look in chosen if look.trial.role == "static" and _seconds(look) > 0)
     if standing:
@@ -98,12 +109,12 @@ def own_tolerances(known: Tolerances, body: Body, chosen: tuple[Look, ...]) -> t
             f"Standing still, the person moves the forces by {size[:3].max():.1f} N and the moments by {size[3:].max():.1f} N·m above "
             f"{SWAYING:g} Hz (heart, breath, muscles; root mean square), which no marker shows: a fault must be larger to be seen."
         )
-    return found, tuple(notes)
+    return Own(found, tuple(notes), believed=factor <= MORE)
 
 
 def soft_tissue(chosen: tuple[Look, ...]) -> float:
     """Return the median over markers and moving trials of the RMS distance to the body, m: a single marker that is wrong does not count."""
-    moving = [look.motion.residual for look in chosen if look.trial.role != "static"]
+    moving = [look.motion.residual for look in chosen if look.trial.role != "static" and _seconds(look) > 0]
     with np.errstate(invalid="ignore"):
         each = [np.sqrt(np.nanmean(residual**2, axis=0)) for residual in moving if residual.size]
     return float(np.nanmedian(np.concatenate(each))) if each else 0.0
