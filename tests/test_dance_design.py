@@ -11,6 +11,7 @@ from biodance.dance import design as design_module
 from biodance.dance import postures
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
+from biodance.dance.exchange import alike
 from biodance.dance.plan import Plan
 from biodance.dance.rehearsal import bearing, rehearse
 from biodance.dance.verify import broken, verify
@@ -56,6 +57,12 @@ def test_every_limit_holds(dance):
     assert broken(margins) == ()
 
 
+def test_no_posture_comes_twice(dance):
+    for name in ("parallel", "single_left"):
+        same = [x for x, stance in zip(dance.postures, dance.stances, strict=True) if stance.name == name and stance.over is None]
+        assert not np.triu(alike(np.array(same)), 1).any()
+
+
 def test_velocities_and_accelerations_are_the_derivatives_of_the_motion(dance):
     motion, step = dance.motion(1000), 0.001
     for high, low in ((motion.q[:, 7:], motion.v[:, 6:]), (motion.v[:, 6:], motion.a[:, 6:])):
@@ -86,8 +93,9 @@ def test_it_goes_on_where_it_was_interrupted(dance, folder):
 
 
 def test_a_dance_reads_back_exactly(dance, tmp_path):
-    dance.save(tmp_path / "dance.npz")
+    replace(dance, notes=("one thing", "another")).save(tmp_path / "dance.npz")
     back = Dance.load(tmp_path / "dance.npz")
+    assert back.notes == ("one thing", "another")
     one, other = dance.motion(100), back.motion(100)
     for name in ("time", "q", "v", "a"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
