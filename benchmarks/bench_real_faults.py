@@ -2,7 +2,7 @@
 
     BIODANCE_DATA=folder python benchmarks/bench_real_faults.py [--out FILE.md]
 
-The folder holds sessions of plug-in-gait (``biomechzoo/HC030A``: static trial and walk) and ``adl_gait``. The fault is in every file of the
+The table is kept where bench_diagnosis.py finds it for its page. The folder holds sessions of plug-in-gait (``biomechzoo/HC030A``: static trial and walk) and ``adl_gait``. The fault is in every file of the
 copy, as in a laboratory. HC030A has the labels LWRA and LWRB exchanged in both files, which the check of labels says; it is left out here.
 """
 
@@ -12,8 +12,11 @@ import shutil
 import tempfile
 from pathlib import Path
 
+from hidden_sessions import REAL
+
 from biodance.diagnose.diagnosis import Diagnosis
 from biodance.effects import discrete_effects, effects
+from biodance.effects.gate import unit_of
 from biodance.errors import BiodanceError
 from biodance.lab.plate_parameters import count_plates
 from biodance.lab.raw_c3d import read_raw
@@ -63,18 +66,28 @@ def row(session: str, text: str, found: Diagnosis | str) -> str:
     for number, names in enumerate(sets, start=1):
         if true in names:
             place = f"{names.index(true) + 1} of {len(names)} in finding {number}"
-    limit = next((f"{one.limit:.3g} {one.unit}" for one in found.limits if (one.effect, one.target) == true), "-") if text else ""
+    limit = (
+        next((f"{one.limit:.3g} {_unit(one.unit, one.target)}" for one in found.limits if (one.effect, one.target) == true), "-")
+        if text
+        else ""
+    )
     named = "; ".join(
-        f"{one.effect} {one.target} " + ", ".join(f"{p.name} {p.value:.3g} ± {p.sd:.2g} {p.unit}" for p in one.parameters)
+        f"{one.effect} {one.target} "
+        + ", ".join(f"{p.name} {p.value:.3g} ± {p.sd:.2g} {_unit(p.unit, one.target)}" for p in one.parameters)
         for one in found.findings
     )
     return f"| {session} | {text or 'nothing'} | {found.verdict}{': ' + named if named else ''} | {place if text else ''} | {limit} |"
 
 
+def _unit(unit: str, target: str) -> str:
+    """Return the unit of a channel's offset, and any other as it is; "" for a ratio."""
+    return unit_of(target) if unit == "N or N·m" else unit.removesuffix("1")
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path)
+    parser.add_argument("--out", type=Path, default=REAL)
     chosen = parser.parse_args()
     data = os.environ.get("BIODANCE_DATA")
     if not data:
@@ -86,8 +99,8 @@ def main() -> None:
                 folder = copied(Path(data) / session, Path(place) / session.replace("/", "_") / str(number), text)
                 lines.append(row(session, text, diagnosed(folder)))
                 print(lines[-1], flush=True)
-    if chosen.out:
-        chosen.out.write_text("\n".join(lines) + "\n")
+    chosen.out.parent.mkdir(parents=True, exist_ok=True)
+    chosen.out.write_text("\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":

@@ -37,6 +37,8 @@ from biodance.virtual_lab.protocol_file import read_protocol
 from biodance.virtual_lab.simulate import simulate
 
 CACHE = Path(os.environ.get("BIODANCE_CACHE", tempfile.gettempdir())) / "biodance_diagnosis"
+REAL = CACHE / "real.md"
+"""Where bench_real_faults.py keeps its table."""
 PROTOCOL = "diagnosis"
 SUBJECTS = 20
 
