@@ -2,8 +2,9 @@
 
     BIODANCE_DATA=folder python benchmarks/bench_real_faults.py [--out FILE.md]
 
-The table is kept where bench_diagnosis.py finds it for its page. The folder holds sessions of plug-in-gait (``biomechzoo/HC030A``: static trial and walk) and ``adl_gait``. The fault is in every file of the
-copy, as in a laboratory. HC030A has the labels LWRA and LWRB exchanged in both files, which the check of labels says; it is left out here.
+The table is kept where bench_diagnosis.py finds it for its page. The folder holds sessions of plug-in-gait (``biomechzoo/HC030A``: static
+trial and walk) and ``adl_gait``. The fault is in every file of the copy, as in a laboratory. HC030A has the labels LWRA and LWRB exchanged
+in both files, which the check of labels says; it is left out here.
 """
 
 import argparse
@@ -14,7 +15,7 @@ from pathlib import Path
 
 from hidden_sessions import REAL
 
-from biodance.diagnose.diagnosis import Diagnosis
+from biodance.diagnose.diagnosis import Diagnosis, Finding
 from biodance.effects import discrete_effects, effects
 from biodance.effects.gate import unit_of
 from biodance.errors import BiodanceError
@@ -66,17 +67,14 @@ def row(session: str, text: str, found: Diagnosis | str) -> str:
     for number, names in enumerate(sets, start=1):
         if true in names:
             place = f"{names.index(true) + 1} of {len(names)} in finding {number}"
-    limit = (
-        next((f"{one.limit:.3g} {_unit(one.unit, one.target)}" for one in found.limits if (one.effect, one.target) == true), "-")
-        if text
-        else ""
-    )
-    named = "; ".join(
-        f"{one.effect} {one.target} "
-        + ", ".join(f"{p.name} {p.value:.3g} ± {p.sd:.2g} {_unit(p.unit, one.target)}" for p in one.parameters)
-        for one in found.findings
-    )
+    own = [one for one in found.limits if text and (one.effect, one.target) == true]
+    limit = f"{own[0].limit:.3g} {_unit(own[0].unit, own[0].target)}" if own else ""
+    named = "; ".join(f"{one.effect} {one.target} {_sizes(one)}" for one in found.findings)
     return f"| {session} | {text or 'nothing'} | {found.verdict}{': ' + named if named else ''} | {place if text else ''} | {limit} |"
+
+
+def _sizes(one: Finding) -> str:
+    return ", ".join(f"{p.name} {p.value:.3g} ± {p.sd:.2g} {_unit(p.unit, one.target)}" for p in one.parameters)
 
 
 def _unit(unit: str, target: str) -> str:

@@ -171,9 +171,9 @@ def real_lines(table: Path) -> list[str]:
     if not table.is_file():
         return []
     return [
-        "Two persons who stand still for 3 s, one who walks over the plates with 1.7 s of measured contact; the fault is in every file of the "
-        "copy. Standing shows weights and places, no time; a fault below the limit that is computed for the recording stays unseen, as it "
-        "must. The walk's markers lie 2.5 times as far from the body as those on which tolerances were learned, so nothing is named from it. "
+        "Two persons who stand still for 3 s, one who walks over the plates with 1.7 s of measured contact; the fault is in every file of "
+        "the copy. Standing shows weights and places, no time; a fault below the limit that is computed for the recording stays unseen, as "
+        "it must. The walk's markers lie 2.5 times as far from the body as where tolerances were learned, so nothing is named from it. "
         "Made by `benchmarks/bench_real_faults.py`.",
         "",
         *table.read_text().splitlines(),
