@@ -1,11 +1,12 @@
 """Hide everything, diagnose, judge: writes docs/diagnosis.md.
 
     python benchmarks/bench_diagnosis.py [--run NAME] [--minutes 30] [--out docs/diagnosis.md] [--prepare]
+                                        [--group null]
 
 Sessions are simulated and tracked once and kept on disk (`hidden_sessions.CACHE`); scores are kept per ``--run``, so that a run that was
 stopped goes on, and the same command may run twice at once: every session is claimed by one of them. ``--minutes`` ends the run early (0:
 only the page is written): the sessions come in an order in which every beginning is a sample of the whole, and the page says how many
-there were. ``--prepare`` only simulates and tracks.
+there were. ``--prepare`` only simulates and tracks; ``--group`` only makes the scores of one group.
 """
 
 import argparse
@@ -41,13 +42,15 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=1e9)
     parser.add_argument("--out", type=Path, default=Path("docs/diagnosis.md"))
     parser.add_argument("--prepare", action="store_true")
+    parser.add_argument("--group", default="")
     chosen = parser.parse_args()
     start, scenarios = time.monotonic(), everything()
     jobs = [(one, absent) for one in scenarios for absent in ((False, True) if one in without_culprit(scenarios) else (False,))]
     scores: list[Score] = []
     for scenario, absent in jobs:
         found = stored(scenario, chosen.run, absent=absent)
-        if found is None and time.monotonic() - start < 60 * chosen.minutes:
+        wanted = chosen.group in ("", scenario.group)
+        if found is None and wanted and time.monotonic() - start < 60 * chosen.minutes:
             if chosen.prepare:
                 prepared(scenario)
                 continue
