@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from biodance.body.human import human
-from biodance.dance import ledger, mend
+from biodance.dance import ledger, mend, ways
 from biodance.dance.chain import Chain
 from biodance.dance.exchange import alike
 from biodance.dance.excitation import blocks
@@ -15,6 +15,8 @@ from biodance.dance.mend import passable
 from biodance.dance.plan import Plan
 from biodance.dance.postures import KEPT, anyhow, solve, start
 from biodance.dance.sequence import sequence
+from biodance.dance.transitions import Move, Task
+from biodance.dance.verify import Margin
 from biodance.dance.ways import Way
 from biodance.dance.work import Course, Work
 from biodance.errors import BiodanceError
@@ -41,7 +43,7 @@ def forbidding(monkeypatch, forbidden):
     """Let the ways whose ends ``forbidden(first, second)`` break a limit; return the list of what was asked."""
     asked = []
 
-    def ways(work, course, known, attempt=0):
+    def asked_for(work, course, known, attempt=0):
         asked.append((attempt, sorted(known)))
         out = []
         for k in range(len(course.x) - 1):
@@ -50,15 +52,15 @@ def forbidding(monkeypatch, forbidden):
             out.append(known.get(k, Way(*nothing, limit)))
         return out
 
-    monkeypatch.setattr(mend, "ways", ways)
+    monkeypatch.setattr(mend, "ways", asked_for)
     return asked
 
 
 def test_a_course_without_impossible_moves_stays_as_it_is(course, work, monkeypatch):
     asked = forbidding(monkeypatch, lambda first, second: False)
-    found, ways, notes = passable(work, course)
+    found, between, notes = passable(work, course)
     assert found is course
-    assert len(ways) == 3
+    assert len(between) == 3
     assert notes == ()
     assert asked == [(0, [])]
 
@@ -69,8 +71,8 @@ def test_the_posture_that_cannot_be_reached_or_left_is_exchanged_for_another_one
         return (np.array_equal(first, course.x[1]) and trap == 1) or (np.array_equal(second, course.x[2]) and trap == 2)
 
     asked = forbidding(monkeypatch, forbidden)
-    found, ways, notes = passable(work, course)
-    assert not any(way.limit for way in ways)
+    found, between, notes = passable(work, course)
+    assert not any(way.limit for way in between)
     assert asked[1] == (1, [0])
     assert len(found.x) == 4
     assert not alike(np.array([course.x[trap], found.x[trap]]))[0, 1]
@@ -87,8 +89,8 @@ def test_a_posture_that_no_exchange_helps_is_left_out(course, work, monkeypatch)
     forbidding(monkeypatch, lambda first, second: np.array_equal(first, last) or (len(work_x) == 4 and np.array_equal(second, last)))
     work_x = course.x
     monkeypatch.setattr(mend, "ENDS", (0,))
-    found, ways, notes = passable(work, course)
-    assert len(found.x) == len(ways) + 1 == 3
+    found, between, notes = passable(work, course)
+    assert len(found.x) == len(between) + 1 == 3
     assert not any(np.array_equal(x, last) for x in found.x)
     assert "left out" in notes[-1]
 
@@ -102,6 +104,22 @@ def test_feet_on_which_no_move_can_be_made_are_refused_with_the_limit(course, wo
     forbidding(monkeypatch, lambda first, second: True)
     with pytest.raises(BiodanceError, match="joint range is exceeded even slowly"):
         passable(work, course)
+
+
+@pytest.mark.parametrize(("left", "taken"), [(9e-10, True), (2e-10, False)])
+def test_a_way_leaves_half_of_what_a_lifting_sole_may_press(course, monkeypatch, left, taken):
+    tried = []
+
+    def found(task, history, *, rng):
+        tried.append(task.duration)
+        return Move(task.straight(), task.duration, np.zeros((12, 6, 6)), 0.0, 0.0, 0.0, "")
+
+    monkeypatch.setattr(ways, "find_move", found)
+    monkeypatch.setattr(ways, "verify", lambda *_: (Margin("ground_clearance", left, 0.01, "m"),))
+    task = Task(CHAIN, blocks(BODY), course.stances[0], course.x[:2], 2.0)
+    way = ways.find_way(task, PLAN, np.zeros((12, 6, 6)), [1, 3, 0])
+    assert (way.limit == "") is taken
+    assert (tried == [2.0]) is taken
 
 
 def test_parts_of_older_code_are_not_gone_on_with(tmp_path, monkeypatch):

@@ -8,7 +8,7 @@ from biodance.dance.between import middle_posture
 from biodance.dance.dance import Dance
 from biodance.dance.plan import Plan
 from biodance.dance.transitions import Move, Task, find_move
-from biodance.dance.verify import broken, verify
+from biodance.dance.verify import verify
 from biodance.errors import BiodanceError
 from biodance.records import Array
 
@@ -16,6 +16,9 @@ SLOWER = (1.0, 1.4)
 """Factors on the duration of a move, one after the other."""
 DETOURS = 4
 """Postures in between that are tried."""
+PRESSED = 5e-10
+"""m that a way leaves of what a lifting sole may be below the ground (`verify.TOUCH`), because the check of the whole dance sees other
+instants of the same way."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +59,9 @@ def _doubted(task: Task, plan: Plan, way: Way) -> str:
     """Return the limit that the way breaks by the independent check, "" if it breaks none."""
     rows = np.array([task.ends[0], *way.stops, task.ends[1]])
     feet, body = (task.stance,) * len(rows), task.chain.body
-    wrong = broken(verify(body, Dance("way", body, rows, feet, np.zeros(len(rows)), way.via, way.duration, feet[1:], 0), plan))
-    return wrong[0].limit if wrong else ""
+    margins = verify(body, Dance("way", body, rows, feet, np.zeros(len(rows)), way.via, way.duration, feet[1:], 0), plan)
+    wrong = [margin.limit for margin in margins if not margin.worst >= (PRESSED if margin.limit == "ground_clearance" else 0.0)]
+    return wrong[0] if wrong else ""
 
 
 def _through(task: Task, history: Array, stop: Array, seed: list[int]) -> list[Move]:
