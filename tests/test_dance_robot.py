@@ -24,7 +24,7 @@ from biodance.dance.protocol import read_plan
 from biodance.dance.robot import leg_length, person_sized, robot_plan
 from biodance.dance.robot_expectation import ERROR, RATE, robot_rows
 from biodance.dance.shapes import capsule_pairs, pairs_of, unchecked_pairs
-from biodance.dance.stance import stance
+from biodance.dance.stance import WIDTH, apart, hip_width, stance, stature_of
 from biodance.dance.transitions import Task, judged
 from biodance.dance.verify import broken, verify
 from biodance.errors import BiodanceError
@@ -111,6 +111,21 @@ def test_feet_stand_apart_as_the_hips_do() -> None:
     feet = stance(HOAP, "parallel")
     np.testing.assert_allclose(feet.ankle[:, 1], [-0.039, 0.039], atol=1e-9)
     assert feet.soles[1, :, 1].min() - feet.soles[0, :, 1].max() == pytest.approx(0.016, abs=1e-6)
+
+
+def test_feet_stand_no_wider_than_weight_can_be_shifted() -> None:
+    person = human(Subject(65.0, 1.75, "F", 33.0))
+    assert apart(person, 0.6) == WIDTH * stature_of(person)
+    joints = [replace(j, translation=j.translation * [1, 1, 4]) if j.name in ("right_hip_yaw", "left_hip_yaw") else j for j in HOAP.joints]
+    wide = replace(HOAP, joints=tuple(joints))
+    assert hip_width(wide) == pytest.approx(4 * 0.078)
+    assert apart(wide, 1.0) == pytest.approx(4 * 0.078)
+    both = stance(wide, "parallel", share=0.6)
+    over = both.centre[1] - 0.6 * (both.support[:, 1].max() - both.centre[1])  # the right edge of what may be used
+    alone = both.on(0)
+    inner = alone.centre[1] + 0.6 * (alone.support[:, 1].max() - alone.centre[1])
+    assert inner - over == pytest.approx(0.1 * np.ptp(alone.support[:, 1]), rel=1e-6)
+    assert both.soles[1, :, 1].min() > both.soles[0, :, 1].max()
 
 
 def test_what_must_not_touch_follows_from_the_tree(tmp_path: Path) -> None:

@@ -10,6 +10,8 @@ from biodance.records import Array, frozen_array
 
 WIDTH = 0.12
 """Distance between the ankles, fraction of stature (about 1.3 times the width of the hips)."""
+STRIP, CLEAR = 0.1, 1.25
+"""Of the width of a sole: how much the reduced supports of both feet and of one overlap at least; of its inner half: room between feet."""
 FORWARD = 0.2
 """m: how far the right foot stands in front (paper III.D, human subject)."""
 SINGLE = {"single_right": (0,), "single_left": (1,)}
@@ -101,7 +103,7 @@ def stance(
 ) -> Stance:
     """Return a stance with the ankles ``left`` and ``right`` m ahead of the lab origin, side by side at the person's width."""
     height = -float(body.feet["right"].outline[:, 1].min())
-    half = max(WIDTH * stature_of(body), hip_width(body)) / 2
+    half = apart(body, share) / 2
     ankle = np.array([[right, -half, height], [left, half, -float(body.feet["left"].outline[:, 1].min())]])
     soles = [
         ankle[k] + np.stack([o[:, 0], -o[:, 2], o[:, 1]], axis=1)
@@ -124,6 +126,22 @@ def seat(body: Body, *, share: float = 0.6) -> Stance:
     feet = stance(body, "seated", planted=(), share=share)
     legs = [np.linalg.norm(body.joints[body.joint_index(f"{side}_ankle_dorsiflexion")].translation) for side in ("right", "left")]
     return replace(feet, props=STOOL, seat=float(max(legs) + feet.ankle[:, 2].max()) + HANGING)
+
+
+def apart(body: Body, share: float) -> float:
+    """Return the distance (m) between the ankles: of a person about 1.3 times the width of the hips; of a robot at least that of its hips.
+
+    Never so wide that the reduced support of both feet ends before that of one begins: then the weight could not be shifted. Never so
+    narrow that the feet touch.
+    """
+    sideways = body.feet["right"].outline[:, 2]
+    outer, inner = float(sideways.max()), -float(sideways.min())
+    usual = max(WIDTH * stature_of(body), hip_width(body))
+    if share >= 1.0:
+        return usual
+    middle, wide = (outer - inner) / 2, outer + inner
+    widest = 2 * (share * outer - middle + (share / 2 - STRIP) * wide) / (1 - share)
+    return min(usual, max(widest, CLEAR * 2 * inner))
 
 
 def hip_width(body: Body) -> float:
