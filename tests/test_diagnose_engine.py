@@ -13,6 +13,7 @@ from biodance.effects.case import Case
 from biodance.errors import BiodanceError, TrialRefused, UnknownName
 from biodance.identify.identification import standing_point
 from biodance.motion.kinematics import poses
+from biodance.records import Sip
 
 FAST = ("plate_gain", "plate_offset", "plate_position", "plate_rotation", "time_delay", "body_mass", "added_mass", "plate_drift")
 
@@ -126,19 +127,29 @@ def test_a_hand_that_comes_and_goes_is_named_with_its_force() -> None:
 
 
 def test_accepting_a_fault_gains_on_trials_that_were_not_used() -> None:
-    examined = found(about_plate(gained))
-    kept = looks(7, trials=2, hidden=about_plate(gained))
+    looked_at = looks(1, trials=6, hidden=about_plate(gained))
+    examined = diagnose(body(), looked_at[:4], tolerances=known(), chosen=FAST)
+    kept = looked_at[4:]
     cases = [
         Case(body(), look.trial, look.motion, body().sip.phi, np.linspace(look.start, look.end, look.motion.time.size)) for look in kept
     ]
     as_is = tuple(fit_of(case, look.use) for case, look in zip(cases, kept, strict=True))
     mended = tuple(fit_of(accept(case, examined.named), look.use) for case, look in zip(cases, kept, strict=True))
     about = standing_point(as_is)
-    before, after = judged(body(), as_is, about), judged(body(), mended, about)
+    before = judged(identified(examined.naming.first.phi), as_is, about)
+    after = judged(identified(examined.naming.found.phi), mended, about)
     measured = gain(before, after, fitted=(before, after))
     assert measured.proven
     assert measured.rms_after[2] < 0.6 * measured.rms_before[2]
     assert measured.score > 2 * measured.score_se > 0
+    share = 1 - measured.rms_after / measured.rms_before
+    assert ((measured.channels[:, 0] <= share + 1e-12) & (share <= measured.channels[:, 1] + 1e-12)).all()
+    assert measured.channels[2, 0] > 0.9, "the channel with the fault"
+    assert measured.ci95[0] > 0.5, "all channels, in units of what is left"
+
+
+def identified(phi):
+    return replace(body(), sip=Sip(body().sip.segments, phi, body().sip.covariance))
 
 
 def test_a_gain_needs_three_blocks() -> None:

@@ -18,6 +18,8 @@ from biodance.records import Array
 
 DRAWS = 1000
 """Bootstrap samples of the interval."""
+TINY = 1e-6
+"""N, N·m: least unit of a channel."""
 
 
 def accept(case: Case, named: tuple[Named, ...]) -> Case:
@@ -60,25 +62,35 @@ def judged(body: Body, fits: tuple[Fit, ...], about: Array) -> Judged:
 def gain(before: Judged, after: Judged, *, fitted: tuple[Judged, Judged], seed: int = 0) -> Gain:
     """Return what naming the causes gains on trials that were not used: ``before`` and ``after`` hold the same trials.
 
-    ``fitted`` the same two bodies on the trials that were used: their residual covariances per band are the two predictive densities.
+    ``fitted`` the same two bodies on the trials that were used: what the better one leaves there is the unit in which the channels are
+    added up, and their residual covariances per band are the two predictive densities.
 
     Raises
     ------
     BiodanceError
         There are fewer than three blocks of one second: no interval can be given.
     """
-    scale = np.sqrt(np.mean(np.concatenate([left[use] for left, use in zip(before.left, before.use, strict=True)]) ** 2, axis=0))
-    pairs = [(_blocks(left / scale, use, rate), _blocks(right / scale, use, rate)) for left, right, use, rate in _aligned(before, after)]
+    pairs = [(_blocks(left, use, rate), _blocks(right, use, rate)) for left, right, use, rate in _aligned(before, after)]
     a, b = (np.concatenate([pair[i] for pair in pairs]) for i in (0, 1))
     if len(a) < 3:
         raise BiodanceError(f"The kept trials hold {len(a)} blocks of {BLOCK_SECONDS:g} s; an interval of the gain needs 3.")
     drawn = np.random.default_rng(seed).integers(0, len(a), (DRAWS, len(a)))
-    share = 1 - np.sqrt(b[drawn].sum(axis=1) / a[drawn].sum(axis=1))
-    low, high = np.percentile(share, [2.5, 97.5])
-    change = _log_density(after, fitted[1]) - _log_density(before, fitted[0])
+    first, second = a[drawn].sum(axis=1), b[drawn].sum(axis=1)
+    channels = np.percentile(1 - np.sqrt(second / first), [2.5, 97.5], axis=0).T
+    unit = np.maximum(_rms(fitted[1]), TINY) ** 2
+    low, high = np.percentile(1 - np.sqrt((second / unit).sum(axis=1) / (first / unit).sum(axis=1)), [2.5, 97.5])
+    score, error = _density_gain(before, after, fitted)
+    return Gain(_rms(before), _rms(after), (float(low), float(high)), before.names, score, error, channels)
+
+
+def _density_gain(before: Judged, after: Judged, fitted: tuple[Judged, Judged]) -> tuple[float, float]:
+    """Return the change of the log predictive density per second and its standard error over the coefficients of each band."""
+    better, bands = _log_density(after, fitted[1])
+    change = better - _log_density(before, fitted[0])[0]
     seconds = sum(float(use.sum()) / rate for use, rate in zip(before.use, before.rate, strict=True))
-    score, error = float(change.sum() / seconds), float(np.sqrt(change.size) * change.std() / seconds)
-    return Gain(_rms(before), _rms(after), (float(low), float(high)), before.names, score, error)
+    spread = [change[bands == b] for b in np.unique(bands)]
+    error = np.sqrt(sum(some.size * some.var(ddof=1) for some in spread if some.size > 1))
+    return float(change.sum() / seconds), float(error / seconds)
 
 
 def _aligned(before: Judged, after: Judged) -> list[tuple[Array, Array, NDArray[np.bool_], float]]:
@@ -91,10 +103,10 @@ def _rms(found: Judged) -> Array:
 
 
 def _blocks(left: Array, use: NDArray[np.bool_], rate: float) -> Array:
-    """Return the summed squares (n,) of blocks of one second."""
+    """Return the summed squares (n, 6) of blocks of one second."""
     frames = np.flatnonzero(use)
     pieces = np.array_split(frames, max(1, frames.size // max(1, round(BLOCK_SECONDS * rate))))
-    return np.array([float(np.sum(left[piece] ** 2)) for piece in pieces if piece.size])
+    return np.array([np.sum(left[piece] ** 2, axis=0) for piece in pieces if piece.size])
 
 
 def _coefficients(found: Judged) -> tuple[Array, NDArray[np.intp]]:
@@ -110,8 +122,10 @@ def _coefficients(found: Judged) -> tuple[Array, NDArray[np.intp]]:
     return np.concatenate(values), np.concatenate(bands)
 
 
-def _log_density(found: Judged, fitted: Judged) -> Array:
-    """Return the log predictive density (n,) of every coefficient, under the residual covariance per band of the trials used."""
+def _log_density(found: Judged, fitted: Judged) -> tuple[Array, NDArray[np.intp]]:
+    """Return the log predictive density (n,) of every coefficient, under the residual covariance per band of the trials used, and the
+    bands (n,).
+    """
     values, bands = _coefficients(found)
     known, known_bands = _coefficients(fitted)
     out = np.zeros(len(values))
@@ -119,4 +133,4 @@ def _log_density(found: Judged, fitted: Judged) -> Array:
         here, there = values[bands == b], known[known_bands == b]
         spread = (there.T @ there + np.diag([1.0] * 3 + [0.25] * 3)) / (len(there) + 1)
         out[bands == b] = -0.5 * np.sum(here * np.linalg.solve(spread, here.T).T, axis=1) - 0.5 * np.linalg.slogdet(spread)[1]
-    return out
+    return out, bands

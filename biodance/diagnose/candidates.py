@@ -101,7 +101,7 @@ def local_basis(problem: Problem, effect: Effect) -> Array | None:
 
 def added(problem: Problem, effect: Effect, theta: Array) -> tuple[Array, ...]:
     """Return per case (T, 6): what the cause of size ``theta`` (p,) adds to measured minus predicted wrench, about the lab origin."""
-    return tuple(effect.transform(case, theta).residual - case.residual for case in problem.cases)
+    return tuple(effect.added(case, theta) for case in problem.cases)
 
 
 def changes(problem: Problem, effect: Effect, theta: Array) -> Array:

@@ -46,9 +46,10 @@ class Estimate:
 class Gain:
     """What a finding gains on trials that were not used to find it, against the model in use (identified body, nominal laboratory).
 
-    ``rms_before``, ``rms_after`` (6,) N, N·m, root mean square residual per channel; ``ci95`` (2,) interval of the share of the whitened
-    residual's root mean square that the finding removes (0.2 = a fifth; excludes 0: a proven gain); ``score``, ``score_se`` change of the
-    log predictive density per second, with standard error over blocks; ``trials`` judged on.
+    ``rms_before``, ``rms_after`` (6,) N, N·m, root mean square residual per channel; ``channels`` (6, 2) 95 % interval of the share of it
+    that the finding removes (0.2 = a fifth, negative = it adds); ``ci95`` (2,) the same for all channels together, each in units of what
+    the accepted model leaves of the trials that were used (excludes 0: a proven gain); ``score``, ``score_se`` change of the log
+    predictive density per second, natural logarithm, with standard error; ``trials`` judged on.
     """
 
     rms_before: Array
@@ -57,8 +58,10 @@ class Gain:
     trials: tuple[str, ...]
     score: float = float("nan")
     score_se: float = float("nan")
+    channels: Array = field(default_factory=lambda: np.full((6, 2), np.nan))
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "channels", frozen_array(self.channels, (6, 2), "Gain.channels"))
         for name in ("rms_before", "rms_after"):
             object.__setattr__(self, name, frozen_array(getattr(self, name), (6,), f"Gain.{name}"))
 

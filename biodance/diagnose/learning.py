@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from biodance.diagnose.candidates import Candidate
-from biodance.diagnose.model import marker_keys, nuisances
+from biodance.diagnose.model import marker_keys, nuisances, shown_left_out
 from biodance.diagnose.problem import Problem
 from biodance.diagnose.tolerances import FLOOR, REFERENCE, Tolerances, whitened
 from biodance.records import Array
@@ -78,7 +78,7 @@ def _posterior(null: Null, found: Tolerances) -> _Posterior:
     expected = np.array([found.mean(name) if name else 0.0 for name in null.mean_keys or null.keys])
     known = np.flatnonzero(size > 0)
     scaled = null.columns[:, known] * size[known].astype(null.columns.dtype)
-    target = null.target - null.columns[:, known] @ expected[known]
+    target = null.target - shown_left_out(null.columns[:, known] @ expected[known], null.marker_keys)
     X = whitened(scaled, null.band, null.marker_keys, null.mass, found)
     y = whitened(target[:, None].astype(X.dtype), null.band, null.marker_keys, null.mass, found)[:, 0]
     factor = cho_factor((X.T @ X).astype(float) + np.eye(known.size), lower=True)

@@ -90,10 +90,16 @@ def nuisances(problem: Problem, causes: tuple[Candidate, ...]) -> tuple[Array, t
     return np.concatenate(parts, axis=1), tuple(keys), tuple(means)
 
 
+def shown_left_out(expected: Array, marker_keys: tuple[str, ...]) -> Array:
+    """Return ``expected`` (r,) with zero in the rows of sizes shown: what everybody shows is taken off there already."""
+    shown = [key.startswith("shown ") for key in marker_keys]
+    return np.concatenate([expected[: len(expected) - len(shown)], np.where(shown, 0.0, expected[len(expected) - len(shown) :])])
+
+
 def model(problem: Problem, causes: tuple[Candidate, ...], tolerances: Tolerances) -> Model:
     """Return the model without any named cause; those of ``causes`` with a learned size are tolerances as well."""
     columns, keys, mean_keys = nuisances(problem, tuple(one for one in causes if tolerances.size(key_of(*one.names)) > 0))
-    expected = columns @ np.array([tolerances.mean(key) for key in mean_keys])
+    expected = shown_left_out(columns @ np.array([tolerances.mean(key) for key in mean_keys]), marker_keys(problem))
     X = np.concatenate([problem.sip, columns * np.array([tolerances.size(key) for key in keys])], axis=1)
     both = white(problem, tolerances, np.concatenate([X, (problem.target - expected)[:, None]], axis=1))
     return Model(problem, tolerances, believe(both[:, :-1], both[:, -1]), expected)

@@ -24,6 +24,8 @@ TOGETHER = 3.0
 """Natural logarithm: causes that are at most this much less probable than the best one are in its set."""
 HEAVIER = 0.3
 """Share of a segment's mass by which it must look heavier before its kinematic errors are computed again."""
+STALE = 0.03
+"""Share of the predicted wrench that may change before causes are predicted again: their sizes are then right to this share."""
 STEPS = 5
 """Gauss-Newton steps at most."""
 
@@ -80,9 +82,8 @@ def name_causes(problem: Problem, tolerances: Tolerances, chosen: Iterable[str] 
     screening = Round(screen(found, causes))
     accepted: list[Round] = []
     ranking = screening
-    if suspicious(screening, tolerances):
-        if heavier(found):
-            found = replace(found, problem=found.problem.with_matter(found.phi))
+    if suspicious(screening, tolerances) and heavier(found):
+        found = replace(found, problem=found.problem.with_matter(found.phi))
         found, causes = rebuilt(found, tolerances, chosen)
         ranking = Round(screen(found, causes))
     bare = found
@@ -93,7 +94,7 @@ def name_causes(problem: Problem, tolerances: Tolerances, chosen: Iterable[str] 
         if not suspicious(ranking, tolerances):
             break
         accepted.append(ranking)
-        found, causes = rebuilt(settled, tolerances, chosen)
+        found, causes = rebuilt(settled, tolerances, chosen) if stale(settled) else (settled, causes)
         ranking = Round(tuple(one for one in screen(found, causes) if one.cause.names not in {named_of(n) for n in found.named}))
     return Naming(first, found, tuple(accepted), screening, first_causes, bare)
 
@@ -116,6 +117,15 @@ def rebuilt(found: Model, tolerances: Tolerances, chosen: Iterable[str] | None) 
     """
     fresh, causes = built(found.problem.with_parameters(found.phi), tolerances, chosen)
     return settle(fresh, found.named), causes
+
+
+def stale(found: Model) -> bool:
+    """Return whether the parameters that ``found`` believes in predict movements otherwise than those in use, by more than `STALE`."""
+    both = np.zeros(2)
+    for case in found.problem.cases:
+        wrench = case.regressor @ np.stack([found.phi - case.phi, case.phi], axis=1)
+        both += np.sum((wrench - wrench.mean(axis=0)) ** 2, axis=(0, 1))
+    return bool(both[0] > STALE**2 * both[1])
 
 
 def built(problem: Problem, tolerances: Tolerances, chosen: Iterable[str] | None) -> tuple[Model, tuple[Candidate, ...]]:

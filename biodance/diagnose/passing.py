@@ -78,9 +78,16 @@ def _passing(base: Model, effect: Effect) -> _Passing | None:
         return None
     white = base.white(columns)
     s, G = base.belief.score(white)
-    tried = [(size, evidence(size * s, size**2 * G, size**2 * float(np.sum(white**2)))) for size in SIZES]
-    size, best = max(tried, key=lambda pair: pair[1].log_bayes_factor)
-    return _Passing(effect, white, size, best)
+    size = max(SIZES, key=_bayes_factors(s, G).__getitem__)
+    return _Passing(effect, white, size, evidence(size * s, size**2 * G, size**2 * float(np.sum(white**2))))
+
+
+def _bayes_factors(s: Array, G: Array) -> dict[float, float]:
+    """Return the log Bayes factor (see `evidence`) of every size of the course, from one decomposition."""
+    value, vector = np.linalg.eigh(G)
+    along = (vector.T @ s) ** 2
+    spread = {size: 1 + size**2 * np.maximum(value, 0.0) for size in SIZES}
+    return {size: float(0.5 * np.sum(size**2 * along / d) - 0.5 * np.sum(np.log(d))) for size, d in spread.items()}
 
 
 def _loose(base: Model, one: _Passing) -> _Passing:

@@ -126,7 +126,7 @@ def problem(body: Body, looks: tuple[Look, ...], *, prior: Sip | None = None) ->
     W = where.rows(tuple(case.regressor @ factor for case in cases))
     errors = _errors(body, cases, where)
     rows, markers = _kinematic_rows(where, errors)
-    shown = sizes_shown(cases, where)
+    shown = sizes_shown(cases)
     sip = np.concatenate([W.reshape(-1, W.shape[2]), np.zeros((len(markers) + len(shown), W.shape[2]))])
     groups = next(one.groups for some in errors for one in some)
     measured = where.rows(tuple(case.residual[:, :, None] for case in cases))
@@ -135,14 +135,13 @@ def problem(body: Body, looks: tuple[Look, ...], *, prior: Sip | None = None) ->
     return Problem(cases, where, target, before, factor, sip, rows, groups, len(markers), notes, tuple(shown))
 
 
-def sizes_shown(cases: tuple[Case, ...], where: Spectrum) -> dict[tuple[str, str], float]:
-    """Return by effect and target the size of the first parameter that the markers show by themselves: RMS over the session."""
+def sizes_shown(cases: tuple[Case, ...]) -> dict[tuple[str, str], float]:
+    """Return by effect and target the size of the first parameter that the markers of the session show by themselves."""
     found = {}
     for name, kind in effects().items():
         for target in kind.targets(cases[0]) if kind.shown is not Effect.shown else ():
-            sizes = [kind(target).shown(case) for case in cases]
-            squares = np.array([0.0 if size is None else size[0] ** 2 for size in sizes])
-            found[name, target] = float(np.sqrt(squares @ _shares(where, len(cases))))
+            size = kind(target).shown(*cases)
+            found[name, target] = 0.0 if size is None else float(size[0])
     return found
 
 

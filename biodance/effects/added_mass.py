@@ -36,10 +36,14 @@ class AddedMass(Effect):
 
     def transform(self, case: Case, theta: Array) -> Case:
         """Return the case whose plates also carry the load (the first plate takes it when there are several)."""
+        return case.with_added(case.trial.plates[0], self.added(case, theta))
+
+    def added(self, case: Case, theta: Array) -> Array:
+        """Return (T, 6) the wrench that the load needs."""
         index = case.body.segment_index(self.target)
         table = case.phi[10 * index : 10 * index + 10]
         load = point_mass(theta[0], table[1:4] / table[0] + np.asarray(theta[1:4]))
-        return case.with_added(case.trial.plates[0], case.regressor[:, :, 10 * index : 10 * index + 10] @ load)
+        return np.asarray(case.regressor[:, :, 10 * index : 10 * index + 10] @ load)
 
     def possible(self, theta: Array) -> bool:
         """Return whether the size is positive: a load weighs something."""

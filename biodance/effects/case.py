@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 
 OF_MOTION = ("regressor", "segments", "poses", "marker_columns", "measured_markers", "marker_residual", "memory")
 """What a case computes once from body, motion and markers, whatever the forces and the parameters."""
+ALIKE = 0.3
+"""Share of a segment's mass by which it may change before the answers to changes of the geometry are computed again: they are that much
+wrong at most, in causes whose sizes are uncertain to a tenth anyway; computing them is half of all work.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,8 +130,11 @@ class Case:
         return self._known(replace(self, trial=changed_trial), *OF_MOTION, "predicted", "geometry")
 
     def with_parameters(self, phi: Array) -> "Case":
-        """Return the case with the parameters ``phi`` (10N,) in use."""
-        return self._known(replace(self, phi=phi), *OF_MOTION)
+        """Return the case with the parameters ``phi`` (10N,) in use; what moved joints would do stays while the masses are `ALIKE`."""
+        known = self.__dict__.get("geometry")
+        before, now = (np.asarray(p)[::10] for p in (self.phi if known is None else known.phi, phi))
+        same = bool(np.all(np.abs(now - before) <= ALIKE * np.abs(before)))
+        return self._known(replace(self, phi=phi), *OF_MOTION, *(("geometry",) if same else ()))
 
     def _known(self, other: "Case", *names: str) -> "Case":
         """Return ``other``, a case of the same motion, with what was computed here already."""

@@ -62,13 +62,17 @@ class Effect:
     def columns(self, case: Case) -> Array:
         """Return (T, 6, p): what one unit of each parameter adds to the measured wrench minus the predicted one, about the lab origin."""
         steps = 1e-3 * np.diag(self.typical)
-        return np.stack([(self.transform(case, s).residual - self.transform(case, -s).residual) / (2 * s.max()) for s in steps], axis=2)
+        return np.stack([(self.added(case, s) - self.added(case, -s)) / (2 * s.max()) for s in steps], axis=2)
 
     def transform(self, case: Case, theta: Array) -> Case:
         """Return the case that this cause of size ``theta`` (p,) would have produced."""
         if type(self).columns is Effect.columns:
             raise BiodanceError(f"Effect {self.name} defines neither columns nor transform; write one of them.")
         return case.with_added(self.plate_of(case), self.columns(case) @ np.asarray(theta, dtype=float))
+
+    def added(self, case: Case, theta: Array) -> Array:
+        """Return (T, 6): what ``transform`` adds to measured minus predicted wrench; overridden only where that is quicker."""
+        return self.transform(case, np.asarray(theta, dtype=float)).residual - case.residual
 
     def local(self, case: Case) -> Array | None:
         """Return (T, 6, k): what one unit of each of k parameters of this trial alone adds, for a cause that comes and goes; None for the
@@ -80,9 +84,9 @@ class Effect:
         """Return (K, 3, p) m per unit: what one unit adds to ``case.marker_residual``; None where the markers say nothing."""
         return None
 
-    def shown(self, case: Case) -> Array | None:
-        """Return (p,) the size that the markers show by themselves, without any force, NaN for a parameter that they do not show; None
-        where they say nothing.
+    def shown(self, *cases: Case) -> Array | None:
+        """Return (p,) the size that the markers of all ``cases`` show by themselves, without any force, NaN for a parameter that they do
+        not show; None where they say nothing.
         """
         return None
 
@@ -92,7 +96,7 @@ class Effect:
         By default what it adds to the prediction; a cause that distorts time or frequency undoes itself in what was measured, because
         it distorts the person's other errors and loads as well.
         """
-        return self.transform(case, np.asarray(theta, dtype=float)).residual - case.residual
+        return self.added(case, theta)
 
     def corrected(self, case: Case, theta: Array) -> Case:
         """Return the case without this cause of size ``theta`` (p,): what would have been measured, or the body that moves right.

@@ -8,7 +8,6 @@ import numpy as np
 
 from biodance.effects.case import Case
 from biodance.effects.effect import Effect, Parameter
-from biodance.motion.kinematics import poses
 from biodance.records import Array
 
 STEP = 0.4
@@ -36,7 +35,7 @@ class ExternalContact(Effect):
         low, high = case.body.boxes[index]
         far = 0.5 * (low + high)
         far[1] = low[1] if index else 0.0
-        point = poses(case.body, case.motion.q).points([index], far[None])[:, 0]
+        point = case.poses.points([index], far[None])[:, 0]
         moment = np.stack([np.cross(point, axis) for axis in np.eye(3)], axis=2)
         force = np.broadcast_to(np.eye(3), moment.shape)
         return -np.concatenate([force, moment], axis=1)

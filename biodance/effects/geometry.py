@@ -35,7 +35,7 @@ class Geometry:
 
     ``time`` (F,) s of the chosen frames, ``wanted`` (T,) s of all; ``answer`` of the posture; ``matter`` P, Q, S (F, 9, nv) per unit of
     every coordinate; ``direct`` (F, 9, N, 3) per metre of every segment; ``turns`` (F, N, 3, nv) rad of the segments per unit of every
-    coordinate; ``seen`` (F, K) 1 where a marker was seen.
+    coordinate; ``seen`` (F, K) 1 where a marker was seen; ``phi`` (10N,) the parameters of the matter.
     """
 
     time: Array
@@ -45,6 +45,7 @@ class Geometry:
     direct: Array
     turns: Array
     seen: Array
+    phi: Array
 
     @cached_property
     def marker_changes(self) -> "Changes":
@@ -130,7 +131,14 @@ def geometry(case: "Case") -> Geometry:
     speed = (place @ _tangent_speed(case, pose, every)[..., None]).reshape(shape[:3])
     parts = moved_matter(_move(case.segments, every), case.phi, speed)
     return Geometry(
-        case.motion.time[every], case.motion.time, answer, _by_posture(parts, place, turn), parts.by_place, turn.reshape(shape), seen
+        case.motion.time[every],
+        case.motion.time,
+        answer,
+        _by_posture(parts, place, turn),
+        parts.by_place,
+        turn.reshape(shape),
+        seen,
+        case.phi,
     )
 
 

@@ -3,6 +3,7 @@
 The author of such a cause writes the body with the joint (``loosened``) and the angle that everybody moves it by (``natural``).
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -25,6 +26,9 @@ from biodance.records import Array, Markers
 
 RATE = 25.0
 """Hz, at least: the low-pass leaves nothing that needs more."""
+
+SLACK = 0.05
+"""Weight of markers that are not to be relied on, as a share of their own."""
 
 
 class MissingJoint(Effect):
@@ -59,13 +63,13 @@ class MissingJoint(Effect):
         nearer = np.zeros_like(case.marker_residual) if found is None else found.markers / max(found.angle, 1e-6)
         return np.stack([nearer, np.zeros_like(nearer)], axis=2)
 
-    def shown(self, case: Case) -> Array:
-        """Return (2,) rad: the angle that is left when the natural one is taken off (squares of independent movements add up), and NaN
-        for what only the wrench can show.
+    def shown(self, *cases: Case) -> Array:
+        """Return (2,) rad: the angle in all ``cases`` that is left when the natural one is taken off (squares of independent movements add
+        up), and NaN for what only the wrench can show.
         """
-        found = _movement(case, self)
-        angle = 0.0 if found is None else found.angle
-        return np.array([np.sqrt(max(angle**2 - self.natural**2, 0.0)), np.nan])
+        found = [(case.motion.time.size, _movement(case, self)) for case in cases]
+        square = sum(frames * one.angle**2 for frames, one in found if one is not None) / sum(frames for frames, _ in found)
+        return np.array([np.sqrt(max(square - self.natural**2, 0.0)), np.nan])
 
     def corrected(self, case: Case, theta: Array) -> Case:
         """Return the trial tracked with the body that has the joint."""
@@ -174,3 +178,9 @@ def shoulders(body: Body) -> Array | None:
     """Return the middle (3,) m between the shoulder joints in the trunk's frame; None for a body without them."""
     places = [joint.translation for joint in body.joints if joint.name.endswith("shoulder_flexion")]
     return np.mean(places, axis=0) if len(places) == 2 and "trunk_head" in body.segments else None
+
+
+def doubting(body: Body, names: Iterable[str]) -> Body:
+    """Return the body whose markers ``names`` hardly count: what they show is not this joint, but skin or another joint."""
+    weight = np.where(np.isin(body.markers.names, list(names)), SLACK, 1.0) * body.markers.weight
+    return replace(body, markers=replace(body.markers, weight=weight))

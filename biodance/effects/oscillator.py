@@ -8,6 +8,7 @@ import numpy as np
 from scipy.signal import cont2discrete, lfilter, lfilter_zi, ss2tf
 
 from biodance.effects.case import Case
+from biodance.motion.kinematics import cross
 from biodance.motion.regressor import GRAVITY
 from biodance.records import Array
 
@@ -32,11 +33,11 @@ def point_motion(case: Case, segment: int, local: Array) -> tuple[Array, Array]:
     move = case.segments
     arm = move.rotation[:, segment] @ local
     omega, alpha = move.angular_velocity[:, segment], move.angular_acceleration[:, segment]
-    acceleration = move.acceleration[:, segment] + np.cross(alpha, arm) + np.cross(omega, np.cross(omega, arm))
+    acceleration = move.acceleration[:, segment] + cross(alpha, arm) + cross(omega, cross(omega, arm))
     return move.position[:, segment] + arm, acceleration
 
 
 def riding_wrench(place: Array, acceleration: Array, moved: tuple[Array, Array]) -> Array:
     """Return (T, 6) per kilogram about the lab origin: what the relative motion ``moved`` (x, x'') adds at a point (T, 3)."""
     x, relative = moved
-    return np.concatenate([relative, np.cross(place, relative) + np.cross(x, acceleration - GRAVITY)], axis=1)
+    return np.concatenate([relative, cross(place, relative) + cross(x, acceleration - GRAVITY)], axis=1)

@@ -15,19 +15,22 @@ from biodance.records import Array
 
 FREQUENCY = 1.5
 """Hz: open vessels of 10 to 30 cm slosh at 1 to 2.5 Hz (w² = pi g / length, deep water)."""
+RANGE = (0.7, 3.0)
+"""Hz: from a bath to a cup."""
 DAMPING = 0.08
 CARRIERS = ("pelvis", "trunk_head", "right_forearm_hand", "left_forearm_hand")
 
 
 class SloshingLoad(Effect):
     """A load of ``mass`` (kg) behind (trunk, pelvis) or at the end of (arms) segment ``target``, of which ``sloshing`` (kg) moves freely
-    in the horizontal plane.
+    in the horizontal plane at its own ``frequency`` (Hz).
     """
 
     name = "sloshing_load"
     parameters = (
         Parameter("mass", "kg", 2.0, "1-4 kg: hydration bags, bottles, shopping"),
         Parameter("sloshing", "kg", 1.0, "about half of the liquid in a half-filled vessel moves (first mode of a rectangular tank)"),
+        Parameter("frequency", "Hz", 0.3, "vessels of 10 to 30 cm: 2.5 to 1.4 Hz; what is fitted is the difference from `FREQUENCY`"),
     )
     separated_by = "A sudden stop and five seconds of standing still: the load goes on swinging, the person does not."
     advice = "Take the load off, or empty it, and repeat one trial."
@@ -38,18 +41,41 @@ class SloshingLoad(Effect):
         return tuple(name for name in case.body.segments if name in CARRIERS) or case.body.segments
 
     def columns(self, case: Case) -> Array:
-        """Return the wrench per kilogram carried, and per kilogram that sloshes."""
+        """Return the wrench per kilogram carried, and per kilogram that sloshes; nothing for the frequency of what is not there."""
+        rigid, sloshing = self._parts(case, FREQUENCY)
+        return np.stack([rigid, sloshing, np.zeros_like(rigid)], axis=2)
+
+    def added(self, case: Case, theta: Array) -> Array:
+        """Return (T, 6) the wrench of a load that sloshes at the frequency asked for, within `RANGE`."""
+        rigid, sloshing = self._parts(case, _frequency(theta))
+        return np.asarray(theta[0] * rigid + theta[1] * sloshing)
+
+    def transform(self, case: Case, theta: Array) -> Case:
+        """Return the case whose plates also carry the load."""
+        return case.with_added(self.plate_of(case), self.added(case, theta))
+
+    def _parts(self, case: Case, frequency: float) -> tuple[Array, Array]:
+        """Return the wrenches (T, 6) per kilogram carried and per kilogram that sloshes."""
         index = case.body.segment_index(self.target)
         local = carried_at(case, index)
         rigid = case.regressor[:, :, 10 * index : 10 * index + 10] @ point_mass(1.0, local)
         place, acceleration = point_motion(case, index, local)
-        x, relative = relative_motion(acceleration, case.motion.rate, frequency=FREQUENCY, damping=DAMPING)
+        x, relative = relative_motion(acceleration, case.motion.rate, frequency=frequency, damping=DAMPING)
         level = np.array([1.0, 1.0, 0.0])
-        return np.stack([rigid, riding_wrench(place, acceleration, (x * level, relative * level))], axis=2)
+        return rigid, riding_wrench(place, acceleration, (x * level, relative * level))
+
+    def reported(self, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
+        """Return the frequency itself instead of its difference."""
+        mass, sloshing, _ = super().reported(theta, sd)
+        return mass, sloshing, ("frequency", _frequency(theta), float(sd[2]), "Hz")
 
     def possible(self, theta: Array) -> bool:
         """Return whether the sizes are positive: a load weighs something, and so does what moves in it."""
         return bool(theta[0] > 0 and theta[1] > 0)
+
+
+def _frequency(theta: Array) -> float:
+    return float(np.clip(FREQUENCY + theta[2], *RANGE))
 
 
 def carried_at(case: Case, index: int) -> Array:
