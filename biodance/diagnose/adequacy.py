@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 LIMIT = 4.5
 """Standard deviations of null sessions beyond which one band of one channel is not adequate."""
-BEYOND = 20.0
+BEYOND = 9.0
 """Standard deviations beyond which a name does not tell the main part."""
 
 
@@ -35,16 +35,15 @@ def energies(found: Model) -> Array:
 def unlikely(found: Model) -> Array:
     """Return (B, 6): how far `energies` are from sessions without fault that are as long as this one, in standard deviations.
 
-    The mean of n squares has the variance 2 energy² / n, of which the learned spread holds that of long sessions. Where chance rules
-    (short sessions, slow bands) the cube root is nearly normal (Wilson and Hilferty 1931, doi:10.1073/pnas.17.12.684).
+    The mean of n squares has the variance 2 energy² / n, of which the learned spread holds that of long sessions. Mean squares are skewed;
+    their cube root is nearly normal (Wilson and Hilferty 1931, doi:10.1073/pnas.17.12.684).
     """
     where, known, mean = found.problem.spectrum, found.tolerances, energies(found)
     count = np.maximum(1, np.bincount(where.band, minlength=len(EDGES) - 1))[:, None]
     chance = 2 * known.energy**2 / count * max(0.0, 1 - where.seconds / SECONDS)
     spread = np.sqrt(known.energy_sd**2 + chance)
     root = spread / known.energy / 3
-    few = (np.cbrt(mean / known.energy) - 1 + root**2) / root
-    return np.asarray(np.where(chance > known.energy_sd**2, few, (mean - known.energy) / spread))
+    return np.asarray((np.cbrt(mean / known.energy) - 1 + root**2) / root)
 
 
 def adequacy(found: Model) -> tuple[Adequacy, ...]:

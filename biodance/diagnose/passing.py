@@ -20,6 +20,8 @@ from biodance.records import Array
 
 SIZES = (2.0, 8.0, 30.0)
 """Standard deviations of the course before the data (units of the parameter): the most probable one is taken."""
+OTHER_SIDE = 0.1
+"""Share of its squares that a touch may lie on the other side."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,9 +64,20 @@ def _with(naming: Naming, base: Model, accepted: tuple[Round, ...], chosen: Iter
     suspects = tuple(_suspect(one, score) for one in order)
     best = _loose(base, order[0])
     belief = believe(np.concatenate([base.belief.X, best.size * best.white], axis=1), base.belief.y)
-    named = (*base.named, _named(base, best, belief.mean[-best.white.shape[1] :]))
+    course = belief.mean[-best.white.shape[1] :]
+    if not one_sided(course.reshape(-1, len(best.effect.parameters))):
+        return None
+    named = (*base.named, _named(base, best, course))
     model = replace(base, belief=belief, named=named)
     return Naming(naming.first, model, (*accepted, Round(suspects)), naming.screening, naming.first_causes, naming.bare)
+
+
+def one_sided(course: Array) -> bool:
+    """Return whether a force (n, 3) over time keeps to one side of its main direction, as what is touched does; a slow swell does not."""
+    _, _, directions = np.linalg.svd(course, full_matrices=False)
+    along = course @ directions[0]
+    sides = np.sum(np.maximum(along, 0) ** 2), np.sum(np.minimum(along, 0) ** 2)
+    return bool(min(sides) <= OTHER_SIDE * sum(sides))
 
 
 def _suspect(one: _Passing, penalty: float) -> Suspect:
