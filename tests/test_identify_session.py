@@ -59,6 +59,18 @@ def test_a_body_at_rest_cannot_be_known() -> None:
     assert any("Cannot be known from this session" in note for note in found.notes)
 
 
+@pytest.mark.parametrize(("size", "believed"), [(0.02, False), (0.5, True)])
+def test_sway_that_may_be_skin_moves_no_mass(size: float, believed: bool) -> None:
+    body, _, rng = person(5)
+    moved = smooth_motion(body, rng, frames=1500, size=size)
+    fit = noisy_fit(body, moved, body.sip.phi, rng, size=0.1)
+    away = moved.q - body.neutral
+    skin = Motion(moved.time, body.neutral + 1.5 * away, 1.5 * moved.v, 1.5 * moved.a)
+    moved_mass = np.abs(identify(body, (replace(fit, motion=skin),)).sip.mass / body.sip.mass - 1).max()
+    assert (moved_mass > 0.1) == believed
+    assert (moved_mass < 0.02) == (not believed)
+
+
 def test_statistics_alone_say_that_their_intervals_are_short() -> None:
     body, _, fits = session(1, frames=600)
     layout = layout_for(standing_point(fits))

@@ -20,6 +20,9 @@ from biodance.records import Array, Motion, Wrench
 
 RATE = 25.0
 """Hz at which low-passed recordings are sampled for identification: more than twice the highest band."""
+STILL, POSTURE_BANDS = 0.03, 2
+"""A run whose segments all stay within this RMS displacement (m) is standing: soft tissue and marker noise are as large as its sway, and
+regressors that are themselves wrong pull masses towards smaller sway. Its posture tells of CoM, so that only the slowest bands count."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +91,7 @@ def empty(parameters: int, layout: Noise) -> Statistics:
 
 
 def statistics(body: Body, fit: Fit, layout: Noise) -> Statistics:
-    """Return the statistics of one trial; memory does not grow with its length.
+    """Return the statistics of one trial; memory does not grow with its length. Of standing only the posture counts (``STILL``).
 
     Raises
     ------
@@ -102,12 +105,20 @@ def statistics(body: Body, fit: Fit, layout: Noise) -> Statistics:
     size = gram.shape[2]
     for pick in blocks(fit.use, fit.motion.rate, layout):
         part = Motion(fit.motion.time[pick], fit.motion.q[pick], fit.motion.v[pick], fit.motion.a[pick])
-        W = regressor_of(segment_motion(body, part))
+        moved = segment_motion(body, part)
+        W = regressor_of(moved)
         rows = np.concatenate([W, fit.wrench.value[pick][:, :, None]], axis=2)
         X = layout.coefficients(layout.shift @ rows)
         band = layout.at(fit.motion.rate).bands_of(len(X))
-        for b in np.unique(band[band >= 0]):
+        last = POSTURE_BANDS if _is_standing(moved.position) and not layout.is_white else len(gram)
+        for b in np.unique(band[(band >= 0) & (band < last)]):
             flat = X[band == b].reshape(-1, 6 * size)
             gram[b] += (flat.T @ flat).reshape(6, size, 6, size)
             count[b] += len(flat)
     return Statistics(gram, count, layout)
+
+
+def _is_standing(position: Array) -> bool:
+    """Return whether all segments at ``position`` (T, N, 3) m stay where they are."""
+    away = position - position.mean(axis=0)
+    return bool(np.sqrt(np.max(np.mean(np.sum(away**2, axis=-1), axis=0))) < STILL)
