@@ -52,7 +52,7 @@ from biodance.motion.regressor import GRAVITY, predict_wrench, regressor_of
 from biodance.records import Array, Motion, Sip, Subject, Wrench
 from biodance.virtual_lab.merge import MERGED
 
-FULL = 4
+FULL = 10
 """Subjects on whom every load is put on every segment; the arm's load is put on all."""
 STILL = 4
 """Subjects who also stand quietly."""
