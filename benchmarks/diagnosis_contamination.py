@@ -21,19 +21,19 @@ def fault_free(scenario: Scenario) -> Scenario:
 
 
 def contamination(scenario: Scenario, result: SessionResult, found: SessionDiagnosis) -> dict[str, Any]:
-    """Return ``mass_error``, the mean relative error of the 12 segment masses: of the ``table``, identified with the fault in the data
-    (``sip_alone``), with the findings ``accepted``, and in the same person's session without fault (``fault_free``); and ``table`` (6) N,
-    N·m, what the table's body leaves of the kept trials.
+    """Return ``masses`` (12) kg: ``true``, of the ``table``, identified with the fault in the data (``sip_alone``), with the findings
+    ``accepted``, and in the same person's session without fault (``fault_free``); and ``table`` (6) N, N·m, what the table's body leaves of
+    the kept trials.
     """
-    true, clean = _true_masses(scenario), examined(fault_free(scenario)).identification
+    clean = examined(fault_free(scenario)).identification
     bodies = {
         "table": result.body.sip if result.body else None,
         "sip_alone": found.before.sip if found.before else None,
         "accepted": found.accepted.sip if found.accepted else None,
         "fault_free": clean.identification.sip if clean else None,
     }
-    errors = {name: float(np.mean(np.abs(sip.mass / true - 1))) for name, sip in bodies.items() if sip is not None}
-    return {"mass_error": errors, "table": _left_by_table(result)}
+    masses = {name: list(map(float, sip.mass)) for name, sip in bodies.items() if sip is not None}
+    return {"masses": {"true": list(map(float, _true_masses(scenario)))} | masses, "table": _left_by_table(result)}
 
 
 def _true_masses(scenario: Scenario) -> Array:

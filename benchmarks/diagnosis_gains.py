@@ -10,19 +10,29 @@ CLEAN = 1.2
 def gain_demands(issue: list[Score]) -> list[tuple[str, str, str]]:
     """Return the rows on what accepting the cause gains."""
     proven = [one.gain["ci95"][0] > 0 for one in issue if "ci95" in one.gain]
-    ratios = [_ratio(one) for one in issue if np.isfinite(_ratio(one))]
-    back = f"; median {np.median(ratios):.2f}" if ratios else ""
+    pairs = [two for one in issue if np.isfinite(two := ratios(one)).all()]
+    back = f"; median {np.median([kg for kg, _ in pairs]):.2f}" if pairs else ""
     return [
         ("faults of the issue: named, so that a gain is measured", "", share("ci95" in one.gain for one in issue)),
         ("... interval of the gain excludes zero", "all", share(proven)),
-        (f"... error of the masses within {CLEAN:g} x of fault-free", "all", share(ratio <= CLEAN for ratio in ratios) + back),
+        (f"... error of the masses (kg) within {CLEAN:g} x of fault-free", "all", share(kg <= CLEAN for kg, _ in pairs) + back),
+        (f"... relative error of the masses within {CLEAN:g} x of fault-free", "all", share(part <= CLEAN for _, part in pairs)),
     ]
 
 
-def _ratio(one: Score) -> float:
-    """Return the error of the masses with the cause accepted over that without fault; NaN where nothing was accepted."""
-    errors = one.gain.get("mass_error", {})
-    return errors["accepted"] / errors["fault_free"] if {"accepted", "fault_free"} <= set(errors) else float("nan")
+def errors(one: Score, body: str) -> tuple[float, float]:
+    """Return the mean error of the twelve segment masses of a ``body``, kg, and relative to each segment's own; NaN where it is not known."""
+    masses = one.gain.get("masses", {})
+    if body not in masses:
+        return float("nan"), float("nan")
+    away, true = np.abs(np.array(masses[body]) - np.array(masses["true"])), np.array(masses["true"])
+    return float(away.mean()), float((away / true).mean())
+
+
+def ratios(one: Score) -> tuple[float, float]:
+    """Return both errors with the cause accepted over those without fault; NaN where nothing was accepted."""
+    accepted, clean = errors(one, "accepted"), errors(one, "fault_free")
+    return accepted[0] / clean[0], accepted[1] / clean[1]
 
 
 def gain_lines(issue: list[Score]) -> list[str]:
@@ -47,22 +57,26 @@ def gain_lines(issue: list[Score]) -> list[str]:
 
 def mass_lines(issue: list[Score]) -> list[str]:
     """Return the errors of the segment masses with the fault, with its cause accepted and without fault."""
-    known = [one for one in issue if "mass_error" in one.gain]
+    known = [one for one in issue if "masses" in one.gain]
     if not known:
         return []
     out = [
-        "Mean relative error of the twelve segment masses, in per cent; the last column is the error with the cause accepted over that of "
-        "the same person, movement and instruments without fault.",
+        "Mean error of the twelve segment masses, in kg and relative to each segment's mass (the feet of 0.7 kg rule the latter); the last "
+        "column is the error with the cause accepted over that of the same person, movement and instruments without fault.",
         "",
-        "| hidden | person | table | with the fault | cause accepted | without fault | ratio |",
+        "| hidden | person | table | with the fault | cause accepted | without fault | ratio kg, relative |",
         "|---|---|---|---|---|---|---|",
     ]
     for one in sorted(known, key=lambda one: one.hidden):
-        errors = one.gain["mass_error"]
-        cells = [f"{100 * errors[key]:.1f}" if key in errors else "not named" for key in ("table", "sip_alone", "accepted", "fault_free")]
-        ratio = f"{_ratio(one):.2f}" if np.isfinite(_ratio(one)) else "-"
-        out.append(f"| {one.hidden[0]} | {one.subject} | {' | '.join(cells)} | {ratio} |")
+        cells = [_said(*errors(one, body)) for body in ("table", "sip_alone", "accepted", "fault_free")]
+        kg, part = ratios(one)
+        both = f"{kg:.2f}, {part:.2f}" if np.isfinite(kg) else "-"
+        out.append(f"| {one.hidden[0]} | {one.subject} | {' | '.join(cells)} | {both} |")
     return out
+
+
+def _said(kg: float, part: float) -> str:
+    return f"{kg:.2f} kg, {100 * part:.0f} %" if np.isfinite(kg) else "not named"
 
 
 def _mean(rms: np.ndarray) -> float:
