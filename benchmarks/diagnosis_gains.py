@@ -21,7 +21,7 @@ def gain_demands(issue: list[Score]) -> list[tuple[str, str, str]]:
 
 
 def errors(one: Score, body: str) -> tuple[float, float]:
-    """Return the mean error of the twelve segment masses of a ``body``, kg, and relative to each segment's own; NaN where it is not known."""
+    """Return the mean error of the twelve segment masses of a ``body``, kg, and relative to each segment's own; NaN where unknown."""
     masses = one.gain.get("masses", {})
     if body not in masses:
         return float("nan"), float("nan")
