@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from diagnosis_contamination import contamination
@@ -68,14 +69,13 @@ def share(hits: Iterable[bool]) -> str:
 
 
 def judge(scenario: Scenario, *, absent: bool = False) -> Score:
-    """Diagnose a session and judge the answer; ``absent`` takes the hidden causes out of the family of effects first."""
+    """Diagnose a session and judge the answer; ``absent`` takes the files of the hidden causes out of the family of effects first."""
     result = examined(scenario)
-    chosen: Iterable[str] | None = None
-    if absent:
-        gone = {name for names in truth(scenario) for name, _ in names}
-        chosen = tuple(name for name in (*effects(), *discrete_effects()) if name not in gone)
+    gone = {name for names in truth(scenario) for name, _ in names} if absent else set()
+    left = {name: kind for name, kind in {**effects(), **discrete_effects()}.items() if name not in gone}
     start = time.process_time()
-    found = diagnose_session(result, chosen=chosen)
+    with patch("biodance.effects._family", lambda: left):
+        found = diagnose_session(result)
     seconds = time.process_time() - start
     harm = contamination(scenario, result, found) if scenario.judged and not absent else {}
     return score(scenario, found.diagnosis, seconds, group="absent" if absent else scenario.group, harm=harm)
