@@ -84,13 +84,33 @@ def gain(before: Judged, after: Judged, *, fitted: tuple[Judged, Judged], seed: 
 
 
 def _density_gain(before: Judged, after: Judged, fitted: tuple[Judged, Judged]) -> tuple[float, float]:
-    """Return the change of the log predictive density per second and its standard error over the coefficients of each band."""
-    better, bands = _log_density(after, fitted[1])
-    change = better - _log_density(before, fitted[0])[0]
+    """Return the change of the log predictive density per second and its standard error over the coefficients of each band.
+
+    The spread expected in a kept trial is what the same body leaves of all others, used and kept: in those that were used it is too good.
+    """
+    changes, bands, count = [], [], len(before.names)
+    for k in range(count):
+        others = [i for i in range(count) if i != k]
+        then, now = (
+            _log_density(part(kept, [k]), joined(used, part(kept, others))) for kept, used in zip((before, after), fitted, strict=True)
+        )
+        changes.append(now[0] - then[0])
+        bands.append(now[1])
+    change, band = np.concatenate(changes), np.concatenate(bands)
     seconds = sum(float(use.sum()) / rate for use, rate in zip(before.use, before.rate, strict=True))
-    spread = [change[bands == b] for b in np.unique(bands)]
+    spread = [change[band == b] for b in np.unique(band)]
     error = np.sqrt(sum(some.size * some.var(ddof=1) for some in spread if some.size > 1))
     return float(change.sum() / seconds), float(error / seconds)
+
+
+def part(found: Judged, trials: list[int]) -> Judged:
+    """Return some of the trials, by their index."""
+    return Judged(*(tuple(getattr(found, name)[k] for k in trials) for name in ("names", "left", "use", "rate")))
+
+
+def joined(first: Judged, second: Judged) -> Judged:
+    """Return the trials of both."""
+    return Judged(*(getattr(first, name) + getattr(second, name) for name in ("names", "left", "use", "rate")))
 
 
 def _aligned(before: Judged, after: Judged) -> list[tuple[Array, Array, NDArray[np.bool_], float]]:

@@ -1,0 +1,80 @@
+"""A cause that distorts time or frequency is undone in what was measured, with all that the prediction lacks."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from human_cases import human_case
+
+from biodance.diagnose.passing import one_sided
+from biodance.effects import effect
+from biodance.effects.case import Case
+from biodance.effects.filter_mismatch import STRENGTH
+from biodance.effects.sloshing_load import FREQUENCY
+from biodance.effects.time_delay import moved_in_time
+from biodance.records import Array, Wrench
+
+INSIDE = slice(30, -30)
+
+
+def unmodelled(case: Case) -> Array:
+    """Return (T, 6) what no parameter explains: an unknown load that swings."""
+    time = case.motion.time[:, None]
+    return np.array([20.0, 10.0, 40.0, 5.0, 8.0, 3.0]) * np.sin(2 * np.pi * 1.5 * time + np.arange(6))
+
+
+def with_measured(case: Case, value: Array) -> Case:
+    plate = replace(case.trial.plates[0], wrench=Wrench(case.motion.time, value))
+    return replace(case, trial=replace(case.trial, plates=(plate,)))
+
+
+@pytest.mark.parametrize(("name", "size"), [("time_delay", 0.02), ("clock_drift", 0.03)])
+def test_a_delay_is_undone_with_what_the_prediction_lacks(name: str, size: float) -> None:
+    case = human_case(300)
+    right = case.predicted + unmodelled(case)
+    share = 1.0 if name == "time_delay" else case.session_time - 0.5
+    late = moved_in_time(case.motion.time, right, size * share * np.ones(len(right)))
+    wrong = with_measured(case, late)
+    found = effect(name)("")
+    mended = found.corrected(wrong, np.array([size])).trial.wrench.value
+    np.testing.assert_allclose(mended[INSIDE], right[INSIDE], atol=0.02 * np.abs(late - right)[INSIDE].max())
+    predicted_only = late - found.added(wrong, np.array([size]))
+    assert np.abs(predicted_only - right)[INSIDE].max() > 3 * np.abs(mended - right)[INSIDE].max()
+
+
+def test_a_lower_filter_is_undone() -> None:
+    """A cosine of 5 Hz that fits the trial passes a filter with a known gain."""
+    case = human_case(300)
+    frames, order = 300, 30
+    frequency = order * case.motion.rate / (2 * frames)
+    wave = np.cos(np.pi * order * (np.arange(frames) + 0.5) / frames)[:, None] * np.arange(1.0, 7.0)
+    gain = 1 / (1 + 4.0 * STRENGTH * frequency**4)
+    found = effect("filter_mismatch")("")
+    mended = found.corrected(with_measured(case, gain * wave), np.array([4.0])).trial.wrench.value
+    assert gain < 0.95
+    np.testing.assert_allclose(mended, wave, rtol=0.02 * (1 - gain), atol=0.02 * (1 - gain))
+
+
+@pytest.mark.parametrize("name", ["added_mass", "sloshing_load", "plate_gain", "time_delay"])
+def test_added_is_what_transform_adds(name: str) -> None:
+    case = human_case(120)
+    found = effect(name).at(effect(name).targets(case)[-1], case)
+    theta = found.typical
+    np.testing.assert_allclose(found.added(case, theta), found.transform(case, theta).residual - case.residual, atol=1e-8)
+
+
+def test_a_load_sloshes_at_the_frequency_that_is_reported() -> None:
+    found = effect("sloshing_load")("trunk_head")
+    rows = found.reported(np.array([2.0, 1.0, 0.5]), np.array([0.1, 0.1, 0.05]))
+    assert rows[2] == ("frequency", FREQUENCY + 0.5, 0.05, "Hz")
+    case = human_case(300)
+    slow, quick = (found.added(case, np.array([0.0, 1.0, step])) for step in (-0.4, 0.4))
+    assert np.linalg.norm(slow - quick) > 0.1 * np.linalg.norm(slow)
+
+
+def test_a_touch_pushes_to_one_side_and_a_swell_does_not() -> None:
+    touch = np.clip(np.sin(np.arange(40) / 3), 0, None)[:, None] * [0.0, 0.3, 1.0]
+    swell = np.linspace(-1, 1, 40)[:, None] * [0.0, 0.3, 1.0]
+    assert one_sided(touch)
+    assert one_sided(-touch)
+    assert not one_sided(swell)
