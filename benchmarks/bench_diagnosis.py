@@ -62,7 +62,8 @@ def main() -> None:
     if not chosen.prepare and scores:
         figure = chosen.out.parent / "figures" / "diagnosis_confusion.png"
         draw(scores, figure)
-        chosen.out.write_text("\n".join(page(scores, run=chosen.run, figure="figures/diagnosis_confusion.png")) + "\n")
+        lines = page(scores, run=chosen.run, figure="figures/diagnosis_confusion.png", total=len(jobs))
+        chosen.out.write_text("\n".join(lines) + "\n")
         print(f"wrote {chosen.out}")
 
 

@@ -15,8 +15,8 @@ BAR = 10.0
 """s of a processor for one diagnosis."""
 
 
-def page(scores: list[Score], *, run: str, figure: str) -> list[str]:
-    """Return the page as lines; ``run`` names the version that was measured."""
+def page(scores: list[Score], *, run: str, figure: str, total: int) -> list[str]:
+    """Return the page as lines; ``run`` names the version that was measured, ``total`` is the number of sessions in the full list."""
     groups: dict[str, list[Score]] = {}
     for one in scores:
         groups.setdefault(one.group, []).append(one)
@@ -39,8 +39,9 @@ def page(scores: list[Score], *, run: str, figure: str) -> list[str]:
     head = [
         "# Diagnosis of hidden effects",
         "",
-        f"Protocol diagnosis (eight trials of ten seconds), {len(scores)} sessions of virtual subjects, each written as C3D files, read, "
-        f"prepared, scaled, tracked and diagnosed through the public pipeline. Version {run}. Made by `benchmarks/bench_diagnosis.py`.",
+        f"Protocol diagnosis (eight trials of ten seconds), {len(scores)} of the {total} sessions of the full list, virtual subjects, each "
+        f"written as C3D files, read, prepared, scaled, tracked and diagnosed through the public pipeline. Version {run}. Made by "
+        "`benchmarks/bench_diagnosis.py`.",
         f"Diagnosis of a session after reading and tracking: median {np.median(seconds):.1f} s of one processor, largest "
         f"{np.max(seconds):.1f} s; at most {BAR:g} s in {share(seconds <= BAR)}.",
         "What is hidden is made by `biodance/virtual_lab`, which cannot import the effects: raw samples, corners and labels for "

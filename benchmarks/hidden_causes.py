@@ -74,6 +74,8 @@ FILTERS = {"below": 8.5, "at": 7.5, "above": 4.0}
 """Hz; a lower cut-off is a larger fault."""
 LASTING = {"external_contact": 0.4}
 """Share of its nominal size that a cause has on average, where the limit is that of a lasting one: touches last 1.6 s in 4 s."""
+SAME = {"dropped_frames": (("frame_rate", ""),)}
+"""Names of the check that finds a fault which has no file of its own."""
 PAIRS = (
     ("time_delay:delay=0.02", "added_mass:target=left_forearm_hand,mass=2.4"),
     ("plate_gain:target=Fz,gain=0.06", "plate_position:target=plate1:x,shift=0.025"),
@@ -167,5 +169,5 @@ def truth(scenario: Scenario) -> list[set[Name]]:
     out = []
     for text in scenario.hidden:
         name = Cause(text, 0.0).name
-        out.append({name, *(table[name].alike if name in table else ())})
+        out.append({name, *(table[name].alike if name in table else ()), *SAME.get(name[0], ())})
     return out
