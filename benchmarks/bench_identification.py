@@ -10,13 +10,26 @@ import argparse
 import hashlib
 import pickle
 import time
-from dataclasses import dataclass, replace
 from pathlib import Path
 
+import biodance.identify
 import numpy as np
+from biodance.body.inertia import smallest_eigenvalues
+from biodance.identify.added_mass import AddedMass, added_mass
+from biodance.identify.identification import Identification, identify, standing_point
+from biodance.identify.knowledge import SIGMAS, segment_quantities
+from biodance.identify.mismatch import evidence_of_scale
+from biodance.identify.paper_programme import paper_programme
+from biodance.identify.physical import physical_fit
+from biodance.identify.posterior import posterior
+from biodance.identify.statistics import Fit, layout_for, statistics
+from biodance.identify.torques import torque_bands, torque_regressor
+from biodance.motion.regressor import predict_wrench
+from biodance.records import Array, Motion, Sip, Subject, Wrench
+
+from gathered_visits import Gathered, gather
+from identification_loads import loaded_arm, loads_table
 from identification_tables import (
-    ARM,
-    LOADS,
     SCALES,
     Load,
     Row,
@@ -29,82 +42,12 @@ from identification_tables import (
     standing_lines,
     torque_lines,
 )
-from virtual_visits import CACHE, FRESH, TUNED, TrackedVisit, subjects, visit
-
-import biodance.identify
-from biodance.body.inertia import smallest_eigenvalues
-from biodance.identify.added_mass import AddedMass, added_mass
-from biodance.identify.caution import widened
-from biodance.identify.identification import Identification, conclude, identify, standing_point, usable
-from biodance.identify.knowledge import SIGMAS, segment_quantities
-from biodance.identify.learning import learn
-from biodance.identify.loads import may_carry
-from biodance.identify.mismatch import Mismatch, evidence_of_scale, mismatch
-from biodance.identify.noise import Noise, blocks
-from biodance.identify.paper_programme import paper_programme
-from biodance.identify.physical import physical_fit
-from biodance.identify.posterior import posterior
-from biodance.identify.statistics import Fit, Statistics, empty, layout_for, statistics
-from biodance.identify.torques import torque_bands, torque_regressor
-from biodance.lab.filters import LowPass, low_pass
-from biodance.motion.kinematics import segment_motion
-from biodance.motion.regressor import GRAVITY, predict_wrench, regressor_of
-from biodance.records import Array, Motion, Sip, Subject, Wrench
-from biodance.virtual_lab.merge import MERGED
+from virtual_visits import CACHE, FRESH, TUNED, TrackedVisit, subjects
 
 FULL = 10
 """Subjects on whom every load is put on every segment; the arm's load is put on all."""
 STILL = 4
 """Subjects who also stand quietly."""
-
-
-@dataclass(frozen=True, eq=False)
-class Gathered:
-    """A visit with what identification needs of it: statistics, learned noise, disturbances."""
-
-    visit: TrackedVisit
-    total: Statistics
-    noise: Noise
-    found: Mismatch
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the fitted trials."""
-        return tuple(fit.name for fit in self.visit.fits)
-
-    def identified(self) -> Identification:
-        """Return the identification."""
-        return conclude(self.visit.body, self.total, self.names, noise=self.noise, found=self.found)
-
-
-SOURCES = ("statistics", "noise", "learning", "loads", "twins", "mismatch", "kinematic_scores", "caution")
-"""Modules of identify/ on which what is gathered depends."""
-
-
-def gather(subject: Subject, protocol: str, seed: int, *, session: int = 0, load: tuple[str, float] | None = None) -> Gathered:
-    """Return the statistics, the noise and the disturbances of a visit, from the cache while their code is unchanged."""
-    folder = Path(biodance.identify.__file__).parent
-    code = b"".join((folder / f"{name}.py").read_bytes() for name in SOURCES)
-    key = f"{subject}-{protocol}-{seed}-{session}-{load}".encode() + code
-    path = CACHE / f"gathered-{hashlib.sha256(key).hexdigest()[:20]}.pickle"
-    if path.is_file():
-        with open(path, "rb") as stream:
-            return pickle.load(stream)
-    made = _gathered(visit(subject, protocol, seed=seed, session=session, load=load))
-    with open(path, "wb") as stream:
-        pickle.dump(made, stream)
-    return made
-
-
-def _gathered(one: TrackedVisit) -> Gathered:
-    used, about, _ = usable(one.body, one.fits)
-    one = replace(one, fits=used)
-    layout = layout_for(about)
-    total = empty(10 * len(one.body.segments), layout)
-    for fit in one.fits:
-        total = total + statistics(one.body, fit, layout)
-    noise, _ = learn(total, may_carry(one.body, widened(one.body.sip)))
-    return Gathered(one, total, noise, mismatch(one.body, one.fits, noise))
 
 
 def errors(phi: Array, true: Array) -> Array:
@@ -134,9 +77,9 @@ def rms(body, fits: tuple[Fit, ...], about: Array, phi: Array) -> Array:
 
 def own_truth(one: TrackedVisit) -> Array:
     """Return the truth about the true joint centres, in the model's axes (the pelvis in the model's frame)."""
-    from virtual_visits import _orthogonal
-
     from biodance.virtual_lab.flesh import of_parameters, parameters, placed
+
+    from virtual_visits import _orthogonal
 
     return np.concatenate(
         [
@@ -190,81 +133,6 @@ def torques(one: TrackedVisit, found: Identification) -> dict:
         "torque_cover": np.concatenate(inside).mean(axis=0),
         "joints": tuple(joint.name for joint in one.body.joints),
     }
-
-
-def loads_table(reference: Identification, later: Gathered) -> list[Load]:
-    """Return for every segment and load what is found with the reference and without, at the noise of the unloaded session."""
-    extra = _with_loads(later)
-    kinds = [(segment, mass) for segment in MERGED for mass in LOADS]
-    return [_load(reference, later, _combined(later, extra, segment, mass), segment, mass) for segment, mass in kinds]
-
-
-def loaded_arm(reference: Identification, later: Gathered) -> Load:
-    """Return the same for the arm's load, with noise and disturbances learned from the loaded session itself."""
-    total = _combined(later, _with_loads(later), *ARM)
-    noise, _ = learn(total, may_carry(later.visit.body, widened(later.visit.body.sip)))
-    found = mismatch(later.visit.body, later.visit.fits, noise)
-    return _load(reference, replace(later, noise=noise, found=found), total, *ARM)
-
-
-def _load(reference: Identification, later: Gathered, total: Statistics, segment: str, mass: float) -> Load:
-    one = later.visit
-    session = conclude(one.body, total, later.names, noise=later.noise, found=later.found)
-    place = _place_in_model(one, one.body.segment_index(segment))
-    return segment, mass, added_mass(session, reference=reference), added_mass(session), place
-
-
-def _place_in_model(one: TrackedVisit, s: int) -> Array:
-    """Return the load's place (3,) m in the model's frame of segment ``s``."""
-    frame = one.frames[s]
-    return frame[:, :3] @ _place(one, s) + frame[:, 3]
-
-
-def _place(one: TrackedVisit, s: int) -> Array:
-    """Return where a load sits, in the true joint frame: 6 cm outwards of the true CoM of a segment (trunk, pelvis: 10 cm behind)."""
-    away = {"r": (0.0, 0.0, 0.06), "l": (0.0, 0.0, -0.06)}.get(tuple(MERGED)[s][0], (-0.10, 0.0, 0.0))
-    own = one.true_own.reshape(-1, 10)[s]
-    return own[1:4] / own[0] + away
-
-
-def _with_loads(got: Gathered) -> Statistics:
-    """Return the statistics of [W, wrench of 1 kg on each segment, y]."""
-    one, layout = got.visit, got.total.layout
-    p = 10 * len(one.body.segments) + len(one.body.segments)
-    gram, count = np.zeros((len(got.total.count), 6, p + 1, 6, p + 1)), np.zeros_like(got.total.count)
-    for fit in one.fits:
-        unit = np.stack([_unit_wrench(one, fit, s) for s in range(len(one.body.segments))], axis=2)
-        for pick in blocks(fit.use, fit.motion.rate, layout):
-            part = Motion(fit.motion.time[pick], fit.motion.q[pick], fit.motion.v[pick], fit.motion.a[pick])
-            W = regressor_of(segment_motion(one.body, part))
-            X = layout.coefficients(layout.shift @ np.concatenate([W, unit[pick], fit.wrench.value[pick][:, :, None]], axis=2))
-            band = layout.bands_of(len(X))
-            for b in np.unique(band[band >= 0]):
-                flat = X[band == b].reshape(-1, 6 * (p + 1))
-                gram[b] += (flat.T @ flat).reshape(6, p + 1, 6, p + 1)
-                count[b] += len(flat)
-    return Statistics(gram, count, layout)
-
-
-def _unit_wrench(one: TrackedVisit, fit: Fit, s: int) -> Array:
-    """Return the wrench (T, 6) of 1 kg at its place on a segment, as it truly moves, low-passed like the plates."""
-    from scipy.interpolate import make_interp_spline
-
-    turn, origin = one.true_poses[fit.name]
-    place = origin[:, s] + turn[:, s] @ _place(one, s)
-    force = make_interp_spline(fit.motion.time, place, k=5).derivative(2)(fit.motion.time) - GRAVITY
-    return low_pass(np.concatenate([force, np.cross(place, force)], axis=1), fit.motion.rate, LowPass())
-
-
-def _combined(later: Gathered, extra: Statistics, segment: str, mass: float) -> Statistics:
-    """Return the statistics with ``mass`` kg on ``segment``: y + mass times its unit wrench; ``extra`` from `_with_loads`."""
-    count, s = len(later.visit.body.segments), later.visit.body.segment_index(segment)
-    p = 10 * count
-    turn = np.zeros((p + count + 1, p + 1))
-    turn[:p, :p] = np.eye(p)
-    turn[-1, -1], turn[p + s, -1] = 1.0, mass
-    gram = np.einsum("bcidj,ik,jl->bckdl", extra.gram, turn, turn, optimize=True)
-    return Statistics(gram, later.total.count, later.total.layout)
 
 
 def timing(found: Identification, one: TrackedVisit) -> dict[str, float]:

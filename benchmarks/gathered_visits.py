@@ -1,0 +1,67 @@
+"""A visit with what identification needs of it, from the cache while the code of identify/ on which it depends is unchanged."""
+
+import hashlib
+import pickle
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import biodance.identify
+from biodance.identify.caution import widened
+from biodance.identify.identification import Identification, conclude, usable
+from biodance.identify.learning import learn
+from biodance.identify.loads import may_carry
+from biodance.identify.mismatch import Mismatch, mismatch
+from biodance.identify.noise import Noise
+from biodance.identify.statistics import Statistics, empty, layout_for, statistics
+from biodance.records import Subject
+
+from virtual_visits import CACHE, TrackedVisit, visit
+
+
+@dataclass(frozen=True, eq=False)
+class Gathered:
+    """A visit with what identification needs of it: statistics, learned noise, disturbances."""
+
+    visit: TrackedVisit
+    total: Statistics
+    noise: Noise
+    found: Mismatch
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the fitted trials."""
+        return tuple(fit.name for fit in self.visit.fits)
+
+    def identified(self) -> Identification:
+        """Return the identification."""
+        return conclude(self.visit.body, self.total, self.names, noise=self.noise, found=self.found)
+
+
+SOURCES = ("statistics", "noise", "learning", "loads", "twins", "mismatch", "kinematic_scores", "caution")
+"""Modules of identify/ on which what is gathered depends."""
+
+
+def gather(subject: Subject, protocol: str, seed: int, *, session: int = 0, load: tuple[str, float] | None = None) -> Gathered:
+    """Return the statistics, the noise and the disturbances of a visit, from the cache while their code is unchanged."""
+    folder = Path(biodance.identify.__file__).parent
+    code = b"".join((folder / f"{name}.py").read_bytes() for name in SOURCES)
+    key = f"{subject}-{protocol}-{seed}-{session}-{load}".encode() + code
+    path = CACHE / f"gathered-{hashlib.sha256(key).hexdigest()[:20]}.pickle"
+    if path.is_file():
+        with open(path, "rb") as stream:
+            return pickle.load(stream)
+    made = _gathered(visit(subject, protocol, seed=seed, session=session, load=load))
+    with open(path, "wb") as stream:
+        pickle.dump(made, stream)
+    return made
+
+
+def _gathered(one: TrackedVisit) -> Gathered:
+    used, about, _ = usable(one.body, one.fits)
+    one = replace(one, fits=used)
+    layout = layout_for(about)
+    total = empty(10 * len(one.body.segments), layout)
+    for fit in one.fits:
+        total = total + statistics(one.body, fit, layout)
+    noise, _ = learn(total, may_carry(one.body, widened(one.body.sip)))
+    return Gathered(one, total, noise, mismatch(one.body, one.fits, noise))
