@@ -12,21 +12,7 @@ import pickle
 import time
 from pathlib import Path
 
-import biodance.identify
 import numpy as np
-from biodance.body.inertia import smallest_eigenvalues
-from biodance.identify.added_mass import AddedMass, added_mass
-from biodance.identify.identification import Identification, identify, standing_point
-from biodance.identify.knowledge import SIGMAS, segment_quantities
-from biodance.identify.mismatch import evidence_of_scale
-from biodance.identify.paper_programme import paper_programme
-from biodance.identify.physical import physical_fit
-from biodance.identify.posterior import posterior
-from biodance.identify.statistics import Fit, layout_for, statistics
-from biodance.identify.torques import torque_bands, torque_regressor
-from biodance.motion.regressor import predict_wrench
-from biodance.records import Array, Motion, Sip, Subject, Wrench
-
 from gathered_visits import Gathered, gather
 from identification_loads import loaded_arm, loads_table
 from identification_tables import (
@@ -43,6 +29,20 @@ from identification_tables import (
     torque_lines,
 )
 from virtual_visits import CACHE, FRESH, TUNED, TrackedVisit, subjects
+
+import biodance.identify
+from biodance.body.inertia import smallest_eigenvalues
+from biodance.identify.added_mass import AddedMass, added_mass
+from biodance.identify.identification import Identification, identify, standing_point
+from biodance.identify.knowledge import SIGMAS, segment_quantities
+from biodance.identify.mismatch import evidence_of_scale
+from biodance.identify.paper_programme import paper_programme
+from biodance.identify.physical import physical_fit
+from biodance.identify.posterior import posterior
+from biodance.identify.statistics import Fit, layout_for, statistics
+from biodance.identify.torques import torque_bands, torque_regressor
+from biodance.motion.regressor import predict_wrench
+from biodance.records import Array, Motion, Sip, Subject, Wrench
 
 FULL = 10
 """Subjects on whom every load is put on every segment; the arm's load is put on all."""
@@ -77,9 +77,9 @@ def rms(body, fits: tuple[Fit, ...], about: Array, phi: Array) -> Array:
 
 def own_truth(one: TrackedVisit) -> Array:
     """Return the truth about the true joint centres, in the model's axes (the pelvis in the model's frame)."""
-    from biodance.virtual_lab.flesh import of_parameters, parameters, placed
-
     from virtual_visits import _orthogonal
+
+    from biodance.virtual_lab.flesh import of_parameters, parameters, placed
 
     return np.concatenate(
         [

@@ -5,6 +5,8 @@ import pickle
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from virtual_visits import CACHE, TrackedVisit, visit
+
 import biodance.identify
 from biodance.identify.caution import widened
 from biodance.identify.identification import Identification, conclude, usable
@@ -14,8 +16,6 @@ from biodance.identify.mismatch import Mismatch, mismatch
 from biodance.identify.noise import Noise
 from biodance.identify.statistics import Statistics, empty, layout_for, statistics
 from biodance.records import Subject
-
-from virtual_visits import CACHE, TrackedVisit, visit
 
 
 @dataclass(frozen=True, eq=False)

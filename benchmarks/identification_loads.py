@@ -3,6 +3,10 @@
 from dataclasses import replace
 
 import numpy as np
+from gathered_visits import Gathered
+from identification_tables import ARM, LOADS, Load
+from virtual_visits import TrackedVisit
+
 from biodance.identify.added_mass import added_mass
 from biodance.identify.caution import widened
 from biodance.identify.identification import Identification, conclude
@@ -16,10 +20,6 @@ from biodance.motion.kinematics import segment_motion
 from biodance.motion.regressor import GRAVITY, regressor_of
 from biodance.records import Array, Motion
 from biodance.virtual_lab.merge import MERGED
-
-from gathered_visits import Gathered
-from identification_tables import ARM, LOADS, Load
-from virtual_visits import TrackedVisit
 
 
 def loads_table(reference: Identification, later: Gathered) -> list[Load]:
