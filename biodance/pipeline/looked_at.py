@@ -29,10 +29,11 @@ class Own:
 
 ENOUGH = 10.0
 """s of fully measured movement beside which quiet standing tells nothing more."""
-MARKERS = 0.004
-"""m: median over the markers of their RMS distance to the body in virtual sessions (0.0035 to 0.0047), on which tolerances are learned."""
-MORE = 1.5
-"""So many times as large it must be before soft tissue is believed to be larger than theirs (real walks: 2 to 5 times)."""
+MARKERS = 0.0026
+"""m: first quartile over the markers of their RMS distance to the body in virtual sessions, on which tolerances are learned (0.0021 to
+0.0034 with and without faults; a fault moves some markers, soft tissue all)."""
+MORE = 1.6
+"""So many times as large it must be before soft tissue is believed to be larger than theirs (five real walks: 2.4 to 4.8 times)."""
 SOFT = ("centre ", "flesh ", "sag ", "slide ", "tilt ", "marker ", "joint_centre ", "segment_length ", "marker_misplaced ", "shown ")
 """Keys of the tolerances that grow with it."""
 SWAYING = 0.3
@@ -96,7 +97,7 @@ def own_tolerances(body: Body, chosen: tuple[Look, ...]) -> Own:
         sizes = {key: size * (factor if key.startswith(SOFT) else 1.0) for key, size in found.sizes.items()}
         found = replace(found, sizes=sizes)
         notes.append(
-            f"Markers are {1000 * factor * MARKERS:.0f} mm from the body, {factor:.1f} times as far as where tolerances were learned: soft "
+            f"Markers are farther from the body than where tolerances were learned ({factor:.1f} times in the first quartile): soft "
             "tissue and joints may err as much more, and no cause is named from such movement. Tolerances learned on sessions of your own "
             "laboratory without fault (biodance.diagnose.learning) hold for it."
         )
@@ -113,11 +114,11 @@ def own_tolerances(body: Body, chosen: tuple[Look, ...]) -> Own:
 
 
 def soft_tissue(chosen: tuple[Look, ...]) -> float:
-    """Return the median over markers and moving trials of the RMS distance to the body, m: a single marker that is wrong does not count."""
+    """Return the first quartile over markers and moving trials of the RMS distance to the body, m: markers that are wrong do not count."""
     moving = [look.motion.residual for look in chosen if look.trial.role != "static" and _seconds(look) > 0]
     with np.errstate(invalid="ignore"):
         each = [np.sqrt(np.nanmean(residual**2, axis=0)) for residual in moving if residual.size]
-    return float(np.nanmedian(np.concatenate(each))) if each else 0.0
+    return float(np.nanquantile(np.concatenate(each), 0.25)) if each else 0.0
 
 
 def unrest(body: Body, standing: tuple[Look, ...], about: Array) -> Array:
