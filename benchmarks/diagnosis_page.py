@@ -77,6 +77,11 @@ def demands(groups: dict[str, list[Score]], singles: list[Score]) -> list[str]:
         ("false name or alarm in sessions without fault", "<= 5 %", share(not one.silent for one in nulls)),
         ("twice the limit or more: detected", ">= 98 %", share(not one.silent for one in high)),
         ("... exact name", ">= 90 %", share(one.exact[0] for one in high)),
+        (
+            "... exact name, and a verdict that stands by it (not unexplained)",
+            "",
+            share(o.exact[0] and o.verdict[:5] == "named" for o in high),
+        ),
         ("... exact name, where also twice the size from which it is told from all others", "", share(one.exact[0] for one in told)),
         ("... truth in the named set", ">= 95 %", share(one.within[0] for one in high)),
         ("... and nothing else named beside it", "", share(alone(one) for one in high)),
