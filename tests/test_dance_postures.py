@@ -9,7 +9,7 @@ import pytest
 from biodance.body.human import human
 from biodance.dance import postures
 from biodance.dance.chain import Chain
-from biodance.dance.exchange import Posture, exchange
+from biodance.dance.exchange import Posture, exchange, extremes
 from biodance.dance.excitation import blocks, condition, smooth_condition
 from biodance.dance.postures import KEPT, anyhow, at, solve, start
 from biodance.dance.stance import seat, stance
@@ -102,3 +102,14 @@ def test_a_person_too_weak_to_stand_is_refused_by_the_name_of_the_limit(monkeypa
     weak = replace(BODY, limits=replace(limits, torque_lower=0.02 * limits.torque_lower, torque_upper=0.02 * limits.torque_upper))
     with ThreadPoolExecutor(1) as workers, pytest.raises(BiodanceError, match="joint torque"):
         postures.find_postures(Chain(weak), BLOCKS, (FEET,), seed=0, workers=workers)
+
+
+def test_extreme_eigenvalues_in_closed_form():
+    rng = np.random.default_rng(3)
+    x = rng.normal(size=(200, 20, 3))
+    x[0, :, 2] = x[0, :, 0]  # singular
+    some = np.concatenate([np.einsum("kpi,kpj->kij", x, x), np.eye(3)[None], np.diag([1.0, 1.0, 5.0])[None]])
+    values = np.linalg.eigvalsh(some)
+    least, most = extremes(some)
+    np.testing.assert_allclose(least, values[:, 0], atol=1e-6)
+    np.testing.assert_allclose(most, values[:, -1], rtol=1e-9)

@@ -23,13 +23,18 @@ STANCES = ("parallel",) * 6 + ("single_right",) * 6
 PLAN = Plan("p", "", (("parallel", 6), ("single_right", 6)), hold=1.0)
 
 
-@pytest.fixture(scope="module")
-def x() -> Array:
-    rng = np.random.default_rng(1)
+def postures(seed: int) -> Array:
+    """Return twelve random postures (12, n)."""
+    rng = np.random.default_rng(seed)
     out = np.zeros((12, CHAIN.size))
     out[:, ROOT:] = rng.uniform(BODY.limits.lower, BODY.limits.upper, (12, 23)) * 0.8
     out[:, 2] = 0.9
     return out
+
+
+@pytest.fixture(scope="module")
+def x() -> Array:
+    return postures(1)
 
 
 def information(x: Array, order: tuple[int, ...]) -> Array:
@@ -84,17 +89,19 @@ def test_blocks_stay_together_and_the_budget_is_kept(x: Array) -> None:
     assert (np.diff(whole.spread) < 0).all()
 
 
-def test_emphasis_is_on_the_segment_that_counts(x: Array) -> None:
-    only = replace(PLAN, weights=(("left_shank", 1.0),), other_weight=0.0)
+@pytest.mark.parametrize("segment", ["left_shank", "right_thigh", "trunk_head", "left_forearm_hand"])
+def test_emphasis_is_on_the_segment_that_counts(segment: str) -> None:
+    only = replace(PLAN, weights=((segment, 1.0),), other_weight=0.0)
     S = prior_factor(BODY.sip)
-    shank = slice(10 * BODY.segment_index("left_shank"), 10 * BODY.segment_index("left_shank") + 10)
+    own = slice(10 * BODY.segment_index(segment), 10 * BODY.segment_index(segment) + 10)
 
-    def sd(plan: Plan) -> float:
+    def unknown(plan: Plan, x: Array) -> float:
         rows = information(x, choose(CHAIN, x, STANCES, replace(plan, budget=24.0)).picked) @ S
         after = np.sum(S * np.linalg.solve(np.eye(S.shape[1]) + rows.T @ rows, S.T).T, axis=1)
-        return float(np.mean((after / np.maximum(np.sum(S**2, axis=1), 1e-30))[shank]))
+        return float(np.mean((after / np.maximum(np.sum(S**2, axis=1), 1e-30))[own]))
 
-    assert sd(only) < sd(PLAN)
+    choices = [postures(seed) for seed in range(1, 6)]  # a greedy choice is not the best one of every single set
+    assert np.mean([unknown(only, x) for x in choices]) < np.mean([unknown(PLAN, x) for x in choices])
 
 
 def test_learned_is_the_textbook_update() -> None:

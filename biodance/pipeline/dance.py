@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -116,16 +117,17 @@ def make_dance(
         dance = makers.design(own, plan, seed=seed, tell=tell, resume=resume)
     except BiodanceError as error:
         reason = str(error)
-    if dance is not None:
-        tell("checking every limit", 0, 0)
-        margins = verify(own, dance, plan)
-        reason = " ".join(_told(margin) for margin in broken(margins))
-    kept = dance if not reason else None
     counted = expected = None
-    if kept is not None:
-        tell("counting what the dance tells", 0, 0)
-        counted, expected = account(kept, plan), makers.expect(kept)
-    return DanceResult(own, plan, kept, margins, counted, expected, reason, notes, time.perf_counter() - started)
+    if dance is not None:
+        tell("checking every limit, counting what the dance tells", 0, 0)
+        with ProcessPoolExecutor(1) as aside:
+            checked = aside.submit(verify, own, dance, plan)
+            counted, expected = account(dance, plan), makers.expect(dance)
+            margins = checked.result()
+        reason = " ".join(_told(margin) for margin in broken(margins))
+    if reason:
+        dance = counted = expected = None
+    return DanceResult(own, plan, dance, margins, counted, expected, reason, notes, time.perf_counter() - started)
 
 
 def _told(m: Margin) -> str:
