@@ -216,14 +216,17 @@ def test_a_turned_wrist_is_named_in_the_static_trial(side: str) -> None:
         assert failed(found) == expected
 
 
-def test_a_check_that_does_not_look_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    text = "from biodance.effects.gate import DiscreteEffect\n\n\nclass Blind(DiscreteEffect):\n    pass\n\n\nEFFECT = Blind\n"
-    (tmp_path / "blind_check.py").write_text(text, encoding="utf-8")
+@pytest.mark.parametrize(("module", "base", "missing"), [("gate", "DiscreteEffect", "look"), ("missing_joint", "MissingJoint", "loosened")])
+def test_a_file_that_leaves_out_what_its_author_must_write_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: str, base: str, missing: str
+) -> None:
+    text = f"from biodance.effects.{module} import {base}\n\n\nclass Blind({base}):\n    pass\n\n\nEFFECT = Blind\n"
+    (tmp_path / "blind.py").write_text(text, encoding="utf-8")
     monkeypatch.setattr(family, "__path__", [*family.__path__, str(tmp_path)])
     importlib.invalidate_caches()
-    with pytest.raises(BiodanceError, match=r"blind_check\.py: Blind lacks look"):
-        discrete_effects()
-    sys.modules.pop("biodance.effects.blind_check", None)
+    with pytest.raises(BiodanceError, match=rf"blind\.py: Blind lacks {missing}. Write it as {base} describes"):
+        effects()
+    sys.modules.pop("biodance.effects.blind", None)
 
 
 def test_the_library_can_lack_an_effect() -> None:

@@ -46,7 +46,7 @@ def _described(name: str) -> type[Effect] | type[DiscreteEffect]:
     kind: type[Effect] | type[DiscreteEffect] = importlib.import_module(f"{__name__}.{name}").EFFECT
     if inspect.isabstract(kind):
         missing = ", ".join(sorted(getattr(kind, "__abstractmethods__", ())))
-        raise BiodanceError(f"biodance/effects/{name}.py: {kind.__name__} lacks {missing}. Write it as effects/gate.py describes.")
+        raise BiodanceError(f"biodance/effects/{name}.py: {kind.__name__} lacks {missing}. Write it as {kind.mro()[1].__name__} describes.")
     return kind
 
 

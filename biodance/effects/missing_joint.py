@@ -3,6 +3,7 @@
 The author of such a cause writes the body with the joint (``loosened``) and the angle that everybody moves it by (``natural``).
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -15,7 +16,7 @@ from biodance.body.inertia import Lump, parameters
 from biodance.body.tables import numbers, read_table
 from biodance.effects.case import Case
 from biodance.effects.effect import Effect
-from biodance.errors import BiodanceError, TrialRefused
+from biodance.errors import TrialRefused
 from biodance.lab.filters import LowPass, low_pass
 from biodance.motion.inverse_kinematics import solve_ik
 from biodance.motion.kinematics import poses
@@ -31,7 +32,7 @@ SLACK = 0.05
 """Weight of markers that are not to be relied on, as a share of their own."""
 
 
-class MissingJoint(Effect):
+class MissingJoint(Effect, ABC):
     """A joint that turns by an angle (rad rms per axis, the first parameter) in the course of time that its markers show; the second
     parameter is what the wrench shows beyond that.
     """
@@ -40,9 +41,9 @@ class MissingJoint(Effect):
     """rad rms per axis that skin, breathing and habit make in any session."""
 
     @classmethod
+    @abstractmethod
     def loosened(cls, case: Case) -> Body | None:
         """Return the body of ``case`` with the joint; None where the trial's markers do not show it."""
-        raise BiodanceError(f"Effect {cls.name} does not define loosened: the body with the joint.")
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:
