@@ -22,6 +22,7 @@ def recording(corners: np.ndarray = CORNERS) -> PlateRecording:
 
 
 def write(path: Path, markers: Markers | None, *plates: PlateRecording) -> None:
+    """Write a C3D file of markers and plates at 1000 Hz."""
     write_c3d(path, markers=markers, plates=plates, analog_rate=1000.0 if plates else 0.0)
 
 

@@ -15,6 +15,7 @@ def dec_float(value):
 
 
 def pack_floats(values, processor):
+    """Return numbers as the bytes of a processor's 4-byte floats."""
     values = np.asarray(values, dtype=np.float32).ravel()
     if processor == DEC:
         return b"".join(map(dec_float, values))
@@ -22,19 +23,23 @@ def pack_floats(values, processor):
 
 
 def pack_words(values, processor):
+    """Return integers as the bytes of a processor's 16-bit words."""
     return (np.asarray(values).ravel().astype(np.int64) & 0xFFFF).astype(">u2" if processor == MIPS else "<u2").tobytes()
 
 
 def text(*rows):
+    """Return a text parameter: kind, shape and bytes."""
     width = max((len(row) for row in rows), default=0)
     return ("text", (width, len(rows)), "".join(row.ljust(width) for row in rows).encode())
 
 
 def whole(*values, shape=None):
+    """Return an integer parameter: kind, shape and values."""
     return ("whole", shape or (len(values),), values)
 
 
 def real(*values, shape=None):
+    """Return a floating point parameter: kind, shape and values."""
     return ("real", shape or (len(values),), values)
 
 

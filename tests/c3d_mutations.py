@@ -28,6 +28,7 @@ class Original:
 
 
 def original(path: Path):
+    """Return a sound file with what its bytes and its parameters mean."""
     raw = read_raw(path)
     gain, offset = transform(raw, raw.analog.shape[1])
     return Original(path.read_bytes(), raw, read_c3d(path), raw.analog / gain + offset)

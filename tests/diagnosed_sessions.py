@@ -24,6 +24,7 @@ NOISE = np.array([0.6, 0.6, 0.8, 0.4, 0.4, 0.3])
 
 @cache
 def body():
+    """Return the body of the subject."""
     return human(SUBJECT)
 
 

@@ -22,6 +22,7 @@ NAMES = tuple(f"M{i:02d}" for i in range(1, 34))
 
 
 def comparison(rng: np.random.Generator) -> WrenchComparison:
+    """Return 3 s of a measured wrench beside a simulated one that is nearly right."""
     time = np.arange(300) / 100
     phase = 2 * np.pi * time[:, None] * np.array([0.7, 1.1, 0.4, 0.9, 0.5, 1.3])
     measured = np.array([20, 15, 120, 30, 40, 5]) * np.sin(phase) + np.array([0, 0, 640, 10, -20, 0])
@@ -35,6 +36,7 @@ def comparison(rng: np.random.Generator) -> WrenchComparison:
 
 
 def standing(rng: np.random.Generator) -> Standing:
+    """Return 2 s of standing, the CoM 30 mm in front of the CoP."""
     cop = 0.1 + np.cumsum(rng.normal(0, 0.0005, (200, 2)), axis=0)
     feet = np.array([[0.15, 0.25], [-0.05, 0.25], [0.15, -0.02], [-0.05, -0.02]])
     names = ("left_toe", "left_heel", "right_toe", "right_heel")
@@ -57,6 +59,7 @@ def standing(rng: np.random.Generator) -> Standing:
 
 
 def still() -> Still:
+    """Return one instant with three bones, markers and one plate; one marker was not seen."""
     bones = np.array([[[0, 0, 0.9], [0, 0, 1.5]], [[0, 0.1, 0.9], [0, 0.1, 0.05]], [[0, -0.1, 0.9], [0, -0.1, 0.05]]])
     markers = np.concatenate([bones.reshape(-1, 3) + 0.05, [[np.nan] * 3]])
     com, force, cop = np.array([0, 0, 1.0]), np.array([0, 0, 640.0]), np.array([0.01, 0, 0])
@@ -64,6 +67,7 @@ def still() -> Still:
 
 
 def trial(name: str, *, warnings: tuple[str, ...] = ()) -> Trial:
+    """Return a trial with markers at the origin and one plate that carries 640 N."""
     time = np.arange(300) / 100
     plate = Plate("plate1", 2, SQUARE, Wrench(time, np.tile([0, 0, 640.0, 0, 0, 0], (300, 1))), ("sign turned: the raw force pulled down",))
     source = Source(Path(f"/sessions/S01/{name}.c3d"), "ab" * 32, "C3D", 100.0, 1000.0)

@@ -20,6 +20,7 @@ RATE = 50.0
 
 
 def body():
+    """Return the generic body of the subject."""
     return human(SUBJECT)
 
 
@@ -48,6 +49,7 @@ def truth(*, load: float = 0.0) -> np.ndarray:
 
 
 def trial_result(name: str, role: str, seed: int, *, seconds: float = 15.0, load: float = 0.0) -> TrialResult:
+    """Return a tracked trial whose plates measured the true parameters' wrench, with noise."""
     one = body()
     motion = movement(one, seed, seconds=seconds)
     noise = np.random.default_rng(100 + seed).normal(size=(motion.time.size, 6)) * [1, 1, 2, 0.5, 0.5, 0.3]

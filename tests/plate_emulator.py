@@ -31,6 +31,7 @@ class Emulated:
 
 
 def yaw(angle):
+    """Return the rotation (3, 3) by an angle, rad, about the vertical."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
 

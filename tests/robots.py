@@ -12,10 +12,12 @@ JOINT = (
 
 
 def link(name: str, mass: float, *, com: str = "0 0 0", place: str = "0 0 0", size: str = "") -> str:
+    """Return a link with an inertia of 0.001 kg·m² per kilogram and, given a size, a box."""
     return LINK.format(name=name, mass=mass, com=com, i=0.001 * mass, shape=BOX.format(place=place, size=size) if size else "")
 
 
 def joint(name: str, parent: str, child: str, xyz: str, axis: str, low: float = -1.5, high: float = 1.5, effort: float = 120.0) -> str:
+    """Return a joint that turns."""
     return JOINT.format(name=name, parent=parent, child=child, xyz=xyz, axis=axis, low=low, high=high, effort=effort)
 
 
@@ -42,6 +44,7 @@ def leg(side: str, sign: int, hip_offset: float) -> str:
 
 
 def arm(side: str, sign: int) -> str:
+    """Return an arm of four joints in two pairs."""
     parts = [
         joint(f"{side}_shoulder1", "chest", f"{side}_clavicle", f"0 {sign * 0.17} 0.25", "0 1 0", -2.5, 2.5, 40.0),
         link(f"{side}_clavicle", 0.3),
