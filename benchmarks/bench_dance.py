@@ -57,7 +57,7 @@ def made(body: Body, plan: Plan, folder: Path, name: str) -> tuple[Dance, dict[s
     path, times = folder / f"{name}.npz", folder / f"{name}.json"
     if not path.exists():
         before, start = _spent(), time.time()
-        dance = design(body, plan, seed=1, resume=folder / "parts", tell=lambda *what: print(name, *what, file=sys.stderr))
+        dance, _ = design(body, plan, seed=1, resume=folder / "parts", tell=lambda *what: print(name, *what, file=sys.stderr))
         dance.save(path)
         times.write_text(json.dumps({"wall_s": time.time() - start, "cpu_s": _spent() - before}), encoding="utf-8")
     return Dance.load(path), json.loads(times.read_text(encoding="utf-8"))

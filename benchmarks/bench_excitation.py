@@ -86,7 +86,7 @@ def designed(protocol: str) -> Dance:
     def make() -> tuple[Dance, float]:
         began = time.perf_counter()
         plan = read_plan(protocol)
-        dance = design(dancer(SHOWN_TO, plan), plan, resume=CACHE / "unfinished")
+        dance, _ = design(dancer(SHOWN_TO, plan), plan, resume=CACHE / "unfinished")
         return dance, time.perf_counter() - began
 
     dance, seconds = cached(f"dance {SHOWN_TO} {protocol}", make)

@@ -19,7 +19,7 @@ from biodance.dance.dance import Dance
 from biodance.dance.excitation import blocks, dynamic_grams
 from biodance.dance.person import HEALTHY, fitted
 from biodance.dance.postures import anyhow
-from biodance.dance.programme import closed, closure_slopes
+from biodance.dance.programme import Closure, closed
 from biodance.dance.protocol import read_plan
 from biodance.dance.robot import leg_length, person_sized, robot_plan
 from biodance.dance.robot_expectation import ERROR, RATE, robot_rows
@@ -59,7 +59,9 @@ def test_planted_feet_stay_and_slopes_are_exact() -> None:
     state = closed(chain, feet, x, v, a)
     legs = [c for side in feet.planted for c in chain.leg_columns[side]]
     free = [c for c in range(chain.size) if c not in legs]
-    slopes, step = closure_slopes(state), 1e-6
+    closure, step, no_time = Closure(state), 1e-6, np.zeros(len(legs), dtype=int)
+    picks = np.eye(chain.size)[legs]
+    slopes = [closure.followed(picks, no_time), *(closure.turned(picks, kind, no_time) for kind in ("v", "ax"))]
     for c in (0, 2, 3, 5, 20):
         shifted = []
         for sign in (1, -1):
@@ -68,9 +70,7 @@ def test_planted_feet_stay_and_slopes_are_exact() -> None:
             shifted.append(closed(chain, feet, moved, v, a))
         for k, name in enumerate(("x", "v", "a")):
             difference = (getattr(shifted[0], name) - getattr(shifted[1], name))[0] / (2 * step)
-            np.testing.assert_allclose(
-                slopes[k, 0, legs, c], difference[legs], rtol=0, atol=2e-5 * max(1.0, float(np.abs(difference).max()))
-            )
+            np.testing.assert_allclose(slopes[k][:, c], difference[legs], rtol=0, atol=2e-5 * max(1.0, float(np.abs(difference).max())))
     assert len(free) == 15
     links = [chain.carriers[HOAP.feet[side].segment] for side in ("right", "left")]
     np.testing.assert_allclose(state.velocity[0, links], 0.0, atol=1e-9)

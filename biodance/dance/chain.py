@@ -37,6 +37,10 @@ class Chain:
         if not self.body.n_root or set(SIDES) - set(self.body.feet):
             raise BiodanceError(f"{self.body.name}: a dance needs a body with a free root and two feet; this one has none.")
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what goes to other processes: all but what pinocchio computes in, which takes longer to send than to make."""
+        return {name: value for name, value in self.__dict__.items() if name != "data"}
+
     @property
     def size(self) -> int:
         """Number of coordinates, 6 + joints."""
@@ -104,6 +108,11 @@ class Chain:
         for name, carrier in zip(self.body.segments, self.carriers, strict=True):
             model.appendBodyToJoint(carrier + 1, pin.Inertia.FromDynamicParameters(np.array(self.body.sip.of(name))), none)
         return model
+
+    @cached_property
+    def data(self) -> Any:
+        """What pinocchio computes in; every call overwrites it."""
+        return self.model.createData()
 
     def root_rotation(self, x: Array) -> Array:
         """Return lab_R_root (T, 3, 3) of coordinates (T, n)."""

@@ -23,7 +23,7 @@ from biodance.dance.postures import find_postures
 from biodance.dance.selection import choose
 from biodance.dance.sequence import sequence, under
 from biodance.dance.stance import Stance
-from biodance.dance.verify import broken, verify
+from biodance.dance.verify import Margin, broken, verify_with
 from biodance.dance.ways import Way
 from biodance.dance.work import Course, Tell, Work
 from biodance.errors import BiodanceError
@@ -35,8 +35,8 @@ SHORT = 1.0
 
 def design(
     body: Body, plan: Plan, *, seed: int = 0, tell: Tell | None = None, resume: Path | None = None, workers: Executor | None = None
-) -> Dance:
-    """Return the dance of ``body`` (its limits count) after ``plan``; every limit holds on a grid of 100 Hz (`verify`).
+) -> tuple[Dance, tuple[Margin, ...]]:
+    """Return the dance of ``body`` (its limits count) after ``plan``, and what is left of every limit on a grid of 100 Hz (`verify`).
 
     ``tell`` is told the progress; with ``resume``, a folder, an interrupted design of the same body, plan and seed goes on; ``workers``
     run the searches (default: two processes).
@@ -53,13 +53,14 @@ def design(
     parts = replace(parts, weight=parts.weight * plan.emphasis(body.segments), simplicity=plan.simplicity)
     work = Work(chain, parts, plan, seed, Ledger(resume, body, plan, seed), workers, tell or (lambda what, done, of: None))
     dance = _joined(work, *passable(work, _postures(work)))
-    wrong = broken(verify(body, dance, plan))
-    if wrong:
+    work.tell("checking every limit", 0, 0)
+    margins = verify_with(workers, body, dance, plan)
+    if wrong := broken(margins):
         told = "; ".join(f"{m.limit.replace('_', ' ')} by {-m.worst:.3g} {m.unit} at {m.where_s:.2f} s {m.what}" for m in wrong)
         raise BiodanceError(
             f"The designed dance breaks limits when it is checked: {told}. Try another seed or a longer move in the protocol."
         )
-    return dance
+    return dance, margins
 
 
 def _postures(work: Work) -> Course:

@@ -73,7 +73,9 @@ def _another(work: Work, course: Course, place: int, rng: np.random.Generator) -
     others = [at(chain, s, x) for s, x, k in pairs if s.over is None and k != place]
     grams = static_grams(np.array([p.up for p in others]).reshape(-1, len(chain.body.segments), 3))
     objective = Exciting(blocks, grams, 0.1 * float(blocks.weight.sum()) / (len(others) + 1), SHARPNESS)
-    found = (solve(chain, stance, start(chain, stance, rng), objective, iterations=ITERATIONS) for _ in range(STARTS))
+    starts = [start(chain, stance, rng) for _ in range(STARTS)]
+    tasks = [work.workers.submit(solve, chain, stance, begin, objective, iterations=ITERATIONS) for begin in starts]
+    found = [task.result() for task in tasks]
     same = [x for s, x, k in zip(course.stances, course.x, range(len(course.x)), strict=True) if s.name == stance.name and k != place]
     kept = [p for p in found if p.violation <= KEPT and not alike(np.array([p.x, *same]))[0, 1:].any()]
     return min(kept, key=lambda posture: criterion(blocks, [*others, posture])).x if kept else course.x[place]

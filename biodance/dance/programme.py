@@ -23,6 +23,8 @@ def closed(chain: Chain, stance: Stance, x: Array, v: Array, a: Array) -> State:
     for columns in legs:
         v[:, columns] = a[:, columns] = 0.0
     still = State(chain, stance, x, v, a)
+    if still.still:
+        return still
     twists = still.twists
     for columns in legs:
         v[:, columns] = _solve(twists[:, columns], -np.einsum("tic,ti->tc", twists[:, :ROOT], v[:, :ROOT]))
@@ -39,26 +41,44 @@ def _solve(twists: Array, right: Array) -> Array:
     return np.asarray(np.linalg.solve(np.swapaxes(twists, 1, 2), right[..., None])[..., 0])
 
 
-def closure_slopes(state: State) -> Array:
-    """Return (4, T, n, n): dx/dx, dv/dx, da/dx and da/dv of all coordinates by the free ones, when planted feet stay still."""
-    n, J, V, A = state.chain.size, state.twists, state.velocity, state.acceleration
-    out = np.zeros((4, len(state.x), n, n))
-    out[0] = np.eye(n)
-    turned = cross(V, J)
-    rows = {"v": -cross(J, V), "ax": -cross(J, A) - cross(turned, V), "av": 2 * turned}
-    rows = {key: np.swapaxes(value, 1, 2) for key, value in rows.items()}
-    twist, root = np.swapaxes(J, 1, 2), slice(0, ROOT)
-    for side in state.stance.planted:
-        leg = state.chain.leg_columns[side]
-        inverse = -np.linalg.inv(twist[:, :, leg])
-        x = inverse @ twist[:, :, root]
-        v = inverse @ (rows["v"][:, :, root] + rows["v"][:, :, leg] @ x)
-        ax = inverse @ (rows["ax"][:, :, root] + rows["ax"][:, :, leg] @ x + rows["av"][:, :, leg] @ v)
-        av = inverse @ (rows["av"][:, :, root] + rows["av"][:, :, leg] @ x)
-        for k, block in enumerate((x, v, ax, av)):
-            out[k][:, leg] = 0.0
-            out[k][:, leg, root] = block
-    return out
+class Closure:
+    """How planted legs follow the pelvis: slopes of their angles, rates and accelerations by those of the root, when the feet stay still.
+
+    For each planted leg its columns and ``x`` (dx/dx, dv/dv and da/da), ``v`` (dv/dx), ``ax`` (da/dx), ``av`` (da/dv), each (T, 6, 6).
+    """
+
+    def __init__(self, state: State) -> None:
+        J = np.swapaxes(state.twists, 1, 2)
+        legs = [state.chain.leg_columns[side] for side in state.stance.planted]
+        inverse = [-np.linalg.inv(J[:, :, leg]) for leg in legs]
+        root = slice(0, ROOT)
+        self.legs = [(leg, {"x": inv @ J[:, :, root]}) for leg, inv in zip(legs, inverse, strict=True)]
+        if state.still:
+            return
+        V, A = state.velocity, state.acceleration
+        turned = cross(V, state.twists)
+        by_v, by_ax = -cross(state.twists, V), -cross(state.twists, A) - cross(turned, V)
+        rows_v, rows_ax, rows_av = (np.swapaxes(rows, 1, 2) for rows in (by_v, by_ax, 2 * turned))
+        for (leg, blocks), inv in zip(self.legs, inverse, strict=True):
+            x = blocks["x"]
+            blocks["v"] = v = inv @ (rows_v[:, :, root] + rows_v[:, :, leg] @ x)
+            blocks["ax"] = inv @ (rows_ax[:, :, root] + rows_ax[:, :, leg] @ x + rows_av[:, :, leg] @ v)
+            blocks["av"] = inv @ (rows_av[:, :, root] + rows_av[:, :, leg] @ x)
+
+    def followed(self, slopes: Array, time: NDArray[np.intp]) -> Array:
+        """Return slopes (R, n) by coordinates (or rates, or accelerations), each at its instant ``time`` (R,), with those of the planted
+        legs handed on to the root.
+        """
+        return self._handed(slopes.copy(), slopes, "x", time)
+
+    def turned(self, slopes: Array, kind: str, time: NDArray[np.intp]) -> Array:
+        """Return what slopes (R, n) by rates ("v") or accelerations ("ax", "av") become by coordinates or, last, by rates of the root."""
+        return self._handed(np.zeros_like(slopes), slopes, kind, time)
+
+    def _handed(self, out: Array, slopes: Array, kind: str, time: NDArray[np.intp]) -> Array:
+        for leg, blocks in self.legs:
+            out[:, :ROOT] += (slopes[:, None, leg] @ blocks[kind][time])[:, 0]
+        return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +132,7 @@ class Judged:
 
     def slopes(self, rows: NDArray[np.intp]) -> tuple[Array, Array]:
         """Return the gradient and the chosen rows of the Jacobian."""
-        closure = closure_slopes(self.state)
+        closure = Closure(self.state)
         frames, first, parts = len(self.state.x), 0, []
         for margin, scale in self._found:
             size = margin.value.size
@@ -123,16 +143,16 @@ class Judged:
         gradient = self._chain(list(self._slope), np.arange(frames), closure).sum(axis=0)
         return gradient, np.concatenate([np.empty((0, gradient.size)), *parts])
 
-    def _chain(self, slopes: list[Array], time: NDArray[np.intp], closure: Array) -> Array:
+    def _chain(self, slopes: list[Array], time: NDArray[np.intp], closure: Closure) -> Array:
+        """Return slopes (R, K * free) by the points of slopes (R, n) by coordinates, rates and accelerations at instants ``time`` (R,)."""
         free, basis = self.programme.free, self.programme.basis
-        table = closure[:, :, :, free]
-        by = [np.einsum("rn,rnf->rf", slopes[0], table[0, time]), None, None]
+        by = [closure.followed(slopes[0], time)]
         if len(slopes) > 1 and basis[1].any():
-            by[0] = by[0] + np.einsum("rn,rnf->rf", slopes[1], table[1, time])
-            by[1] = np.einsum("rn,rnf->rf", slopes[1], table[0, time])
+            by[0] += closure.turned(slopes[1], "v", time)
+            by.append(closure.followed(slopes[1], time))
         if len(slopes) > 2 and basis[2].any():
-            by[0] = by[0] + np.einsum("rn,rnf->rf", slopes[2], table[2, time])
-            by[1] = by[1] + np.einsum("rn,rnf->rf", slopes[2], table[3, time])
-            by[2] = np.einsum("rn,rnf->rf", slopes[2], table[0, time])
-        total = sum(basis[k][time][:, :, None] * part[:, None] for k, part in enumerate(by) if part is not None)
-        return np.asarray(total).reshape(len(time), basis.shape[2] * len(free))
+            by[0] += closure.turned(slopes[2], "ax", time)
+            by[1] += closure.turned(slopes[2], "av", time)
+            by.append(closure.followed(slopes[2], time))
+        out = sum(basis[k][time][:, :, None] * part[:, None, free] for k, part in enumerate(by))
+        return np.asarray(out).reshape(len(time), basis.shape[2] * len(free))

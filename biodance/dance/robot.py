@@ -18,6 +18,7 @@ from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.plan import Plan
 from biodance.dance.stance import Stance
+from biodance.dance.verify import Margin, verify
 from biodance.errors import BiodanceError
 
 LEG, MASS = 0.9, 65.0
@@ -59,8 +60,11 @@ def person_sized(body: Body) -> Likeness:
     return Likeness(LEG / leg_length(body), MASS / float(body.sip.mass.sum()))
 
 
-def design_robot(body: Body, plan: Plan, *, seed: int = 0, tell: Tell | None = None, resume: Path | None = None) -> Dance:
-    """Return the dance of the robot ``body`` (in standing frames; its limits count) after ``plan`` (`robot_plan`); see `design.design`.
+def design_robot(
+    body: Body, plan: Plan, *, seed: int = 0, tell: Tell | None = None, resume: Path | None = None
+) -> tuple[Dance, tuple[Margin, ...]]:
+    """Return the dance of the robot ``body`` (in standing frames; its limits count) after ``plan`` (`robot_plan`), and what is left of
+    every limit; see `design.design`.
 
     Raises
     ------
@@ -76,7 +80,9 @@ def design_robot(body: Body, plan: Plan, *, seed: int = 0, tell: Tell | None = N
         budget=time * plan.budget,
         forward=float(np.clip(length * plan.forward, 0.05, 0.4)),
     )
-    return shrunk(design(likeness(body, to), long, seed=seed, tell=tell, resume=resume), body, to)
+    large, _ = design(likeness(body, to), long, seed=seed, tell=tell, resume=resume)
+    dance = shrunk(large, body, to)
+    return dance, verify(body, dance, plan)
 
 
 def shrunk(dance: Dance, body: Body, to: Likeness) -> Dance:

@@ -49,8 +49,7 @@ class State:
     @cached_property
     def _frames(self) -> tuple[Array, Array, Array]:
         pin = load_pinocchio()
-        model, count = self.chain.model, self.chain.size
-        data = model.createData()
+        model, data, count = self.chain.model, self.chain.data, self.chain.size
         twists = np.empty((len(self.x), count, 6))
         rotation, position = np.empty((len(self.x), count, 3, 3)), np.empty((len(self.x), count, 3))
         links = sorted({*self.chain.carriers})
@@ -104,21 +103,22 @@ class State:
     @cached_property
     def _dynamics(self) -> tuple[Array, Array]:
         pin = load_pinocchio()
-        model, n = self.chain.model, self.chain.size
-        data = model.createData()
+        model, data, n = self.chain.model, self.chain.data, self.chain.size
         force, slopes = np.empty((len(self.x), n)), np.empty((3, len(self.x), n, n))
         for t, (x, v, a) in enumerate(zip(self.x, self.v, self.a, strict=True)):
             slopes[0, t], slopes[1, t], slopes[2, t] = pin.computeRNEADerivatives(model, data, x, v, a)
             force[t] = data.tau
         return force, slopes
 
-    @cached_property
+    @property
     def force(self) -> Array:
         """(T, n) N, N·m generalised force on every coordinate without the ground."""
-        pin = load_pinocchio()
-        model = self.chain.model
-        data = model.createData()
-        return np.array([pin.rnea(model, data, x, v, a) for x, v, a in zip(self.x, self.v, self.a, strict=True)])
+        return self._dynamics[0]
+
+    @cached_property
+    def still(self) -> bool:
+        """True where nothing moves: a posture."""
+        return not (self.v.any() or self.a.any())
 
     @cached_property
     def wrench(self) -> Array:
@@ -143,7 +143,7 @@ class State:
         """The same motion with everything on the foot over which the weight is."""
         assert self.stance.over is not None
         other = State(self.chain, self.stance.on(self.stance.over), self.x, self.v, self.a)
-        shared = ("_frames", "velocity", "acceleration", "_dynamics", "force", "wrench", "wrench_slopes")
+        shared = ("_frames", "velocity", "acceleration", "_dynamics", "wrench", "wrench_slopes")
         other.__dict__.update({name: self.__dict__[name] for name in shared if name in self.__dict__})
         return other
 

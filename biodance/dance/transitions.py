@@ -36,16 +36,16 @@ BETWEEN = 0.004
 """The same where a move is judged, for what is between those instants."""
 THIRDS = np.array([0.20987654, 0.79012346])
 """Of the way at one and two thirds of the time, for least jerk (10 s³ - 15 s⁴ + 6 s⁵)."""
-ATTEMPTS = ((0.2, 1.0), (0.1, 1.0), (0.0, 0.0))
-"""Spread (rad) of the via points' start about the straight move, and share of excitation in the objective."""
-ROUNDS = (14, 8, 8, 8)
-"""Iterations; after each round the worst instants are added and the reserve grows."""
+ATTEMPTS = ((0.2, 1.0, (14, 8, 8)), (0.0, 0.2, (40, 12, 12)))
+"""Spread (rad) of the via points' start about the straight move, share of excitation in the objective, and iterations of the rounds: after
+each the worst instants are added and the reserve grows by a quarter."""
 CENTRE = 0.1
 """Worth of 1 dm² of mean squared distance of the zero-moment point from the middle, beside log cond."""
 LITTLE = 0.01
 """s·(rad/s²)², information on every inertia that is supposed before the first move."""
 HOPELESS = 0.5
-"""Violation after a round, in scales, with which a start is given up."""
+"""Violation after a round, in scales, with which a start is given up; so is one whose limits cannot even be kept without the reserve on the
+coarse grid."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,29 +166,31 @@ def off_centre(state: State) -> tuple[float, Array]:
 def find_move(task: Task, history: Array, *, rng: np.random.Generator) -> Move:
     """Return the best feasible move found after the information ``history`` (N, 6, 6); if there is none, the one that violates least."""
     best = None
-    for spread, share in ATTEMPTS:
+    for spread, share, rounds in ATTEMPTS:
         via, time, objective = task.straight(), task.grid(GRID), Objective(task, history, share)
         via[:, task.excited] += rng.normal(0, spread, (2, len(task.excited)))
-        for k, iterations in enumerate(ROUNDS):
-            via = _improved(task, via, time, objective, iterations, RESERVE * (1 + k / 2))
+        for k, iterations in enumerate(rounds):
+            reserve = RESERVE * (1 + k / 4)
+            via, violation = _improved(task, via, time, objective, iterations, reserve)
             found, instants = judged(task, via)
             if best is None or found.violation < best.violation:
                 best = found
             if best.violation == 0:
                 return best
-            if found.violation > HOPELESS:
+            if violation > reserve or found.violation > HOPELESS:
                 break
             time = np.union1d(time, instants)
     assert best is not None
     return best
 
 
-def _improved(task: Task, via: Array, time: Array, objective: Objective, iterations: int, reserve: float) -> Array:
+def _improved(task: Task, via: Array, time: Array, objective: Objective, iterations: int, reserve: float) -> tuple[Array, float]:
+    """Return the via points found from ``via`` (2, n), and by how much they violate the limits with their ``reserve`` at ``time`` s."""
     free = free_coordinates(task.chain, task.stance)
     programme = task.programme(via, free, time, reserve=reserve, objective=objective)
-    out = via.copy()
-    out[:, free] = minimise(programme.judge, via[:, free].ravel(), iterations=iterations).y.reshape(2, -1)
-    return out
+    found, out = minimise(programme.judge, via[:, free].ravel(), iterations=iterations), via.copy()
+    out[:, free] = found.y.reshape(2, -1)
+    return out, found.violation
 
 
 def judged(task: Task, via: Array) -> tuple[Move, Array]:

@@ -6,6 +6,7 @@ support is drawn anew from where the soles really are.
 """
 
 from collections.abc import Iterator
+from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,13 +71,14 @@ class _Stretch:
         return right, left
 
 
-def verify(body: Body, dance: Dance, plan: Plan, *, rate: float = 100.0) -> tuple[Margin, ...]:
+def verify(body: Body, dance: Dance, plan: Plan, *, rate: float = 100.0, part: slice = slice(None)) -> tuple[Margin, ...]:
     """Return the margin of every limit over the whole dance, sampled at ``rate`` Hz, at the ends of all phases and close to them.
 
-    ``body`` whose limits count (usually ``dance.body``); ``plan`` gives the share of the base of support that may be used.
+    ``body`` whose limits count (usually ``dance.body``); ``plan`` gives the share of the base of support that may be used; ``part`` only
+    these phases.
     """
     worst: dict[str, Margin] = {}
-    for stretch in _stretches(body, dance, plan, rate):
+    for stretch in _stretches(body, dance, plan, rate, range(len(dance.phases))[part]):
         for limit, unit, value, what in _judge(stretch):
             if value.size:
                 t, k = np.unravel_index(int(np.argmin(value)), value.shape)
@@ -86,13 +88,23 @@ def verify(body: Body, dance: Dance, plan: Plan, *, rate: float = 100.0) -> tupl
     return tuple(worst[name] for name in sorted(worst))
 
 
+def verify_with(workers: Executor, body: Body, dance: Dance, plan: Plan) -> tuple[Margin, ...]:
+    """Return what `verify` does, found by two ``workers`` side by side: one looks at every second phase, one at the others."""
+    tasks = [workers.submit(verify, body, dance, plan, part=slice(first, None, 2)) for first in range(2)]
+    worst: dict[str, Margin] = {}
+    for margin in (margin for task in tasks for margin in task.result()):
+        if margin.limit not in worst or margin.worst < worst[margin.limit].worst:
+            worst[margin.limit] = margin
+    return tuple(worst[name] for name in sorted(worst))
+
+
 def broken(margins: tuple[Margin, ...]) -> tuple[Margin, ...]:
     """Return the margins that are negative."""
     return tuple(margin for margin in margins if not margin.worst >= 0)
 
 
-def _stretches(body: Body, dance: Dance, plan: Plan, rate: float) -> Iterator[_Stretch]:
-    for k, phase in enumerate(dance.phases):
+def _stretches(body: Body, dance: Dance, plan: Plan, rate: float, chosen: range) -> Iterator[_Stretch]:
+    for k, phase in ((k, dance.phases[k]) for k in chosen):
         inner = np.arange(np.ceil(phase.start * rate), np.floor(phase.end * rate) + 1) / rate
         instants = [phase.start, *(phase.start + EDGES), *inner, *(phase.end - EDGES), phase.end]
         time = np.unique(np.round(np.clip(instants, phase.start, phase.end), 9))

@@ -14,7 +14,7 @@ from biodance.records import Array
 
 SLOWER = (1.0, 1.4)
 """Factors on the duration of a move, one after the other."""
-DETOURS = 4
+DETOURS = 2
 """Postures in between that are tried."""
 PRESSED = 5e-10
 """m that a way leaves of what a lifting sole may be below the ground (`verify.TOUCH`), because the check of the whole dance sees other
@@ -65,15 +65,12 @@ def _doubted(task: Task, plan: Plan, way: Way) -> str:
 
 
 def _through(task: Task, history: Array, stop: Array, seed: list[int]) -> list[Move]:
-    """Return the two moves by way of ``stop`` (n,), none if one of them is not possible."""
+    """Return the two moves by way of ``stop`` (n,), slow ones since the direct way was impossible even so, none if one is not possible."""
     parts: list[Move] = []
     for ends in ((task.ends[0], stop), (stop, task.ends[1])):
-        tried = (
-            find_move(replace(task, ends=np.array(ends), duration=task.duration * factor), history, rng=np.random.default_rng(seed))
-            for factor in SLOWER
-        )
-        move = next((move for move in tried if move.violation == 0), None)
-        if move is None:
+        slow = replace(task, ends=np.array(ends), duration=task.duration * SLOWER[-1])
+        move = find_move(slow, history, rng=np.random.default_rng(seed))
+        if move.violation > 0:
             return []
         parts.append(move)
         history = history + move.gram

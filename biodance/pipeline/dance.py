@@ -17,7 +17,7 @@ from biodance.dance.design import design
 from biodance.dance.expectation import Expectation, expect
 from biodance.dance.person import PersonLimits, fitted
 from biodance.dance.plan import Plan
-from biodance.dance.verify import Margin, broken, verify
+from biodance.dance.verify import Margin, broken
 from biodance.errors import BiodanceError
 from biodance.records import Subject
 
@@ -36,7 +36,7 @@ OURS = (
 class Makers:
     """Who designs a dance, and who says what will be known after it: others for persons than for robots."""
 
-    design: Callable[..., Dance]
+    design: Callable[..., tuple[Dance, tuple[Margin, ...]]]
     expect: Callable[[Dance], Expectation]
 
 
@@ -114,16 +114,15 @@ def make_dance(
     own, plan, notes = fitted(body, plan, person)
     reason, margins, dance = "", tuple[Margin, ...](), None
     try:
-        dance = makers.design(own, plan, seed=seed, tell=tell, resume=resume)
+        dance, margins = makers.design(own, plan, seed=seed, tell=tell, resume=resume)
     except BiodanceError as error:
         reason = str(error)
     counted = expected = None
     if dance is not None:
-        tell("checking every limit, counting what the dance tells", 0, 0)
+        tell("counting what the dance tells", 0, 0)
         with ProcessPoolExecutor(1) as aside:
-            checked = aside.submit(verify, own, dance, plan)
-            counted, expected = account(dance, plan), makers.expect(dance)
-            margins = checked.result()
+            numbers = aside.submit(account, dance, plan)
+            expected, counted = makers.expect(dance), numbers.result()
         reason = " ".join(_told(margin) for margin in broken(margins))
     if reason:
         dance = counted = expected = None

@@ -73,12 +73,17 @@ def _on(ends: Array, share: Array) -> Array:
 def outside(point: Array, half: Array) -> tuple[Array, Array]:
     """Return the signed distance (...) of points (..., 3) from a box about the origin with half sides ``half`` (..., 3), and its slope."""
     over = np.abs(point) - half
-    beyond = np.maximum(over, 0.0)
-    distance = np.linalg.norm(beyond, axis=-1)
-    free = distance > 0
+    depth = _depth(over)
     nearest_side = np.eye(3)[np.argmax(over, axis=-1)]
-    slope = np.where(free[..., None], beyond / np.where(free, distance, 1.0)[..., None], nearest_side) * np.sign(point)
-    return np.where(free, distance, over.max(axis=-1)), slope
+    free = depth[..., None] > 0
+    return depth, np.where(free, np.maximum(over, 0.0) / np.where(free, depth[..., None], 1.0), nearest_side) * np.sign(point)
+
+
+def _depth(over: Array) -> Array:
+    """Return the signed distance (...) from a box of points that lie ``over`` (..., 3) its three pairs of sides."""
+    x, y, z = (np.maximum(over[..., k], 0.0) for k in range(3))
+    beyond = np.sqrt(x * x + y * y + z * z)
+    return np.where(beyond > 0, beyond, over.max(axis=-1))
 
 
 def deepest(ends: Array, half: Array) -> Array:
@@ -89,7 +94,7 @@ def deepest(ends: Array, half: Array) -> Array:
     start, width = np.zeros(ends.shape[:2]), np.ones(ends.shape[:2])
     for _ in range(ROUNDS):
         share = start + width * SAMPLES[:, None, None]
-        best = np.argmin(outside(_on(ends[None], share), half)[0], axis=0)
+        best = np.argmin(_depth(np.abs(_on(ends[None], share)) - half), axis=0)
         start = np.clip(start + width * (best - 1) / (len(SAMPLES) - 1), 0.0, 1.0)
         width = np.minimum(width * 2 / (len(SAMPLES) - 1), 1.0 - start)
     return start + width / 2
