@@ -3,18 +3,21 @@
 import json
 import os
 import time
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
 import numpy as np
 from diagnosis_contamination import contamination
-from hidden_causes import LASTING, Name, truth
+from hidden_causes import LASTING, MEASURED, Name, truth
 from hidden_sessions import CACHE, Scenario, examined
 
+from biodance.diagnose.candidates import candidates
 from biodance.diagnose.diagnosis import Diagnosis, Finding
+from biodance.diagnose.observability import limits
+from biodance.diagnose.problem import problem
 from biodance.effects import discrete_effects, effects
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.virtual_lab.hide import parse
@@ -29,7 +32,8 @@ class Score:
     ``names`` what was named, in order, ``sets`` the sets; ``exact``, ``within`` per hidden cause: named as such, in a set; ``ratio`` size
     over the limit that this session computed for it, ``told`` over the size from which it is told from the others (NaN = not computed);
     ``size_error`` relative, ``covered`` by the 95 % interval (NaN, None = no size to compare); ``gain`` as in the JSON, with the errors of
-    the masses; ``seconds`` of the processor; ``verdict`` "crashed" where there is no answer, ``note`` says why.
+    the masses; ``seconds`` of the processor, ``planned`` of them for what the movement alone decides, before any force is looked at;
+    ``verdict`` "crashed" where there is no answer, ``note`` says why.
     """
 
     key: str
@@ -50,6 +54,7 @@ class Score:
     seconds: float
     gain: dict[str, Any] = field(default_factory=dict)
     note: str = ""
+    planned: float = 0.0
 
     @property
     def silent(self) -> bool:
@@ -73,12 +78,41 @@ def judge(scenario: Scenario, *, absent: bool = False) -> Score:
     result = examined(scenario)
     gone = {name for names in truth(scenario) for name, _ in names} if absent else set()
     left = {name: kind for name, kind in {**effects(), **discrete_effects()}.items() if name not in gone}
+    planned = Clock()
     start = time.process_time()
-    with patch("biodance.effects._family", lambda: left):
+    with (
+        patch("biodance.effects._family", lambda: left),
+        patch("biodance.diagnose.engine.problem", planned.timed(problem)),
+        patch("biodance.diagnose.naming.candidates", planned.timed(candidates)),
+        patch("biodance.diagnose.engine.limits", planned.timed(limits)),
+    ):
         found = diagnose_session(result)
     seconds = time.process_time() - start
     harm = contamination(scenario, result, found) if scenario.judged and not absent else {}
-    return score(scenario, found.diagnosis, seconds, group="absent" if absent else scenario.group, harm=harm)
+    one = score(scenario, found.diagnosis, seconds, group="absent" if absent else scenario.group, harm=harm)
+    return replace(one, planned=planned.seconds)
+
+
+class Clock:
+    """Processor time of the first calls of some functions: what they make of the movement and the table could be made before a session."""
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+
+    def timed(self, call: Callable[..., Any]) -> Callable[..., Any]:
+        """Return ``call`` with its first use on the clock."""
+        used = False
+
+        def same(*parts: Any, **named: Any) -> Any:
+            nonlocal used
+            start = time.process_time()
+            try:
+                return call(*parts, **named)
+            finally:
+                self.seconds += 0.0 if used else time.process_time() - start
+                used = True
+
+        return same
 
 
 def score(scenario: Scenario, found: Diagnosis, seconds: float, *, group: str, harm: dict[str, Any]) -> Score:
@@ -103,7 +137,8 @@ def _ratio(scenario: Scenario, found: Diagnosis) -> tuple[float, float]:
     if len(scenario.hidden) != 1:
         return float("nan"), float("nan")
     same, size = truth(scenario)[0], _hidden_size(scenario.hidden[0])
-    rows = [row for row in found.limits if _is_among((row.effect, row.target), same)]
+    counts = MEASURED.get(parse(scenario.hidden[0]).name)
+    rows = [row for row in found.limits if _is_among((row.effect, row.target), same) and row.effect == (counts or row.effect)]
     if not rows or size is None:
         return float("nan"), float("nan")
     lasting = size[1] * LASTING.get(rows[0].effect, 1.0)
@@ -125,6 +160,15 @@ def _hidden_size(text: str) -> tuple[str, float] | None:
 
 def _size(scenario: Scenario, findings: tuple[Finding, ...], same: set[Name]) -> tuple[float, bool | None]:
     """Return relative error of the size and whether the interval covers it, where the cause was named and has that parameter."""
+    found = measured(scenario, findings, same)
+    if found is None:
+        return float("nan"), None
+    value, sd, true = found
+    return abs(value - true) / true, bool(abs(value - true) <= SIGMAS * sd)
+
+
+def measured(scenario: Scenario, findings: tuple[Finding, ...], same: set[Name]) -> tuple[float, float, float] | None:
+    """Return size found, its standard deviation and the true size; None where the cause was not named or has no such parameter."""
     size = _hidden_size(scenario.hidden[0])
     for finding in findings:
         if size is None or (finding.effect, finding.target) not in same or scenario.group == "discrete":
@@ -137,8 +181,8 @@ def _size(scenario: Scenario, findings: tuple[Finding, ...], same: set[Name]) ->
             value = float(np.linalg.norm([p.value for p in parts]))
             sd = float(np.sqrt(sum((p.value * p.sd) ** 2 for p in parts)) / max(value, 1e-12))
             value = parts[0].value if len(parts) == 1 else value
-            return abs(value - true) / true, bool(abs(value - true) <= SIGMAS * sd)
-    return float("nan"), None
+            return value, sd, true
+    return None
 
 
 def _gain(findings: tuple[Finding, ...]) -> dict[str, Any]:

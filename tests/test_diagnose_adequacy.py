@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 from diagnosed_sessions import RATE, body, known, looks
 
-from biodance.diagnose.adequacy import LIMIT, adequacy
+from biodance.diagnose.adequacy import LIMIT, STRAINED, adequacy, strain, verdict
+from biodance.diagnose.evidence import Belief
 from biodance.diagnose.naming import built
 from biodance.diagnose.problem import problem
 
@@ -21,3 +22,28 @@ def test_chance_spreads_more_in_a_short_session() -> None:
         worst.append(adequacy(found)[0].z)
     assert max(worst) < LIMIT
     assert max(worst) > 1.0, "the rows still spread"
+
+
+def test_a_body_as_people_are_is_no_strain_and_a_strange_one_is() -> None:
+    """Bodies drawn from the prior strain it as a standard normal number does; one with twice the deviations does not pass."""
+    found, _ = built(problem(body(), looks(3)), known(), ("plate_offset",))
+    belief, k = found.belief, found.problem.factor.shape[1]
+    rng = np.random.default_rng(7)
+
+    def strained(size: float) -> float:
+        u = rng.normal(size=belief.X.shape[1])
+        u[:k] *= size
+        y = belief.X @ u + rng.normal(size=len(belief.y))
+        return strain(replace(found, belief=Belief.known(belief.X, belief.factor, y)))
+
+    usual = np.array([strained(1.0) for _ in range(200)])
+    assert abs(usual.mean()) < 0.25
+    assert 0.8 < usual.std() < 1.2
+    assert usual.max() < STRAINED
+    assert np.median([strained(2.0) for _ in range(20)]) > STRAINED
+
+
+def test_a_strained_body_is_never_complete() -> None:
+    assert verdict(1, 1.0, ()) == "named, complete"
+    assert verdict(1, 1.0, (), strained=True) == "named, incomplete"
+    assert verdict(0, 1.0, (), strained=True) == "unexplained"

@@ -119,7 +119,8 @@ def test_a_hand_that_comes_and_goes_is_named_with_its_force() -> None:
     assert [(f.effect, f.target) for f in examined.diagnosis.findings] == [("external_contact", "left_forearm_hand")]
     assert examined.diagnosis.verdict in ("named, complete", "named, incomplete")
     size = [p.value for p in examined.diagnosis.findings[0].parameters]
-    np.testing.assert_allclose(size, [0.0, 4.5, 15.0], atol=2.0)
+    middle = 0.5 ** (1 / 3)  # of a force that rises and falls in proportion to time, half of the squares lie above this share of its peak
+    np.testing.assert_allclose(size, middle * np.array([0.0, 4.5, 15.0]), atol=1.5)
     look = looks(1, hidden=touched)[0]
     case = Case(one, look.trial, look.motion, one.sip.phi, np.linspace(0, 0.25, look.motion.time.size))
     added = accept(case, examined.named).trial.wrench.value - look.trial.wrench.value

@@ -1,17 +1,20 @@
 """The parts of the diagnosis against brute force: evidence, limits, kinematic errors, rows, tolerances."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from diagnosed_sessions import body, known, looks, motion
 from scipy.stats import multivariate_normal
 
-from biodance.diagnose.candidates import added, candidates, changes, slopes
+from biodance.body.body import JointError
+from biodance.diagnose.candidates import Candidate, added, candidates, changes, slopes
 from biodance.diagnose.evidence import believe, evidence, smallest
 from biodance.diagnose.kinematic_errors import kinematic_errors
 from biodance.diagnose.learning import Null, learn
 from biodance.diagnose.model import model
 from biodance.diagnose.naming import screen
-from biodance.diagnose.observability import limits, visibility
+from biodance.diagnose.observability import Visibility, limits, placed, placing_leaves, visibility
 from biodance.diagnose.problem import problem
 from biodance.diagnose.tolerances import Tolerances, key_of, read_tolerances, shipped, to_toml
 from biodance.effects import effect
@@ -138,9 +141,36 @@ def test_screening_ranks_every_cause_and_limits_them_all(put) -> None:
     found = model(put, causes, known())
     suspects = screen(found, causes)
     assert len(suspects) == 12
-    rows = limits(visibility(found, causes), 10.0)
+    rows = limits(visibility(found, causes), put.cases[0].body, 10.0)
     assert {(row.effect, row.target) for row in rows} == {one.cause.names for one in suspects}
     assert all(row.told_from >= row.limit > 0 for row in rows)
+
+
+def test_what_placing_has_repaired_needs_a_larger_fault_to_be_seen() -> None:
+    rng = np.random.default_rng(4)
+    kinds = (
+        ("joint_centre", "right_shoulder", 3),
+        ("joint_centre", "left_ankle", 3),
+        ("marker_misplaced", "RSHO", 3),
+        ("plate_offset", "Fz", 1),
+    )
+    Z = [rng.normal(size=(400, width)) for *_, width in kinds]
+    Z[2] = 0.9 * Z[0] + 0.1 * Z[2]  # a marker beside the joint looks much like its centre
+    causes = tuple(Candidate(effect(name)(target), z, (False,) * z.shape[1]) for (name, target, _), z in zip(kinds, Z, strict=True))
+    cuts = (slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 10))
+    whole = np.concatenate(Z, axis=1)
+    seen = Visibility(causes, whole.T @ whole, cuts)
+    error = JointError("right_shoulder", 0.0095, 0.0)
+    share = placing_leaves(error)
+    assert share == pytest.approx((0.0095**2 - 0.008**2) / 0.015**2)
+    shoulder = replace(body(), joint_errors=(error,))
+    after = placed(seen, shoulder)
+    np.testing.assert_allclose(np.diag(after.G)[cuts[0]] / np.diag(seen.G)[cuts[0]], share, rtol=0.1)
+    plain, now = ({row.target: row.limit for row in limits(seen, one, 10.0)} for one in (body(), shoulder))
+    assert now["right_shoulder"] > 2 * plain["right_shoulder"]
+    assert now["RSHO"] > 1.5 * plain["RSHO"]
+    assert now["left_ankle"] == pytest.approx(plain["left_ankle"], rel=0.05)
+    assert now["Fz"] == plain["Fz"]
 
 
 def test_learning_finds_the_sizes_that_made_the_nulls() -> None:

@@ -17,6 +17,7 @@ from biodance.errors import TrialRefused
 from biodance.lab.prepare import prepare
 from biodance.lab.session import read_session
 from biodance.motion.functional_joints import evaluate, functional_joints, spread_postures
+from biodance.motion.inverse_kinematics import solve_ik
 from biodance.motion.joint_unknowns import HINGES, SIZE, JointUnknowns, own_centre, own_turn
 from biodance.motion.kinematics import poses
 from biodance.records import Array, Markers, Source, Subject, Trial
@@ -154,3 +155,20 @@ def test_a_real_walk_of_two_seconds_leaves_the_joints_alone(folder: str) -> None
     found = functional_joints(before, [prepare(walk).markers])
     assert {"trunk", "right_hip", "left_hip", "right_elbow", "left_elbow"} <= set(found.kept)
     assert max(found.moved.values(), default=0.0) < 0.005
+
+
+def test_a_marker_that_moved_since_the_static_trial_does_not_pull_the_joints_along() -> None:
+    true = displaced(hidden())
+    markers = moving(true, seconds=80.0)
+    clean = functional_joints(scaling(), (markers,))
+    xyz = np.array(markers.xyz)
+    body, _ = true.body()
+    pose = poses(body, solve_ik(body, markers).q)
+    k = markers.names.index("RKNE")
+    xyz[:, k] += pose.rotation[:, body.segment_index("right_thigh"), :, 0] * 0.08
+    pulled = functional_joints(scaling(), (replace(markers, xyz=xyz),))
+    assert "The marker RKNE does not count" in pulled.notes[-1]
+    assert "right knee would lie" in pulled.notes[-1]
+    for joint in ("right_hip", "right_knee"):
+        assert abs(pulled.moved[joint] - clean.moved[joint]) < 0.008
+    assert not any("does not count" in note for note in clean.notes)

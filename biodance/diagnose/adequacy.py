@@ -19,7 +19,8 @@ LIMIT = 4.5
 """Standard deviations of null sessions beyond which one band of one channel is not adequate."""
 BEYOND = 9.0
 """Standard deviations beyond which a name does not tell the main part."""
-
+STRAINED = 3.5
+"""Standard deviations by which the body may be more unlike the table than people are (sessions without fault: 1.4 at most of 14)."""
 
 SECONDS = 70.0
 """s of measured contact in the sessions from which the spread of null sessions was learned; in a shorter one chance alone spreads more."""
@@ -80,10 +81,25 @@ def _when(found: Model, row: Adequacy) -> float:
     return second
 
 
-def verdict(named: int, worst: float, gates: "tuple[Gate, ...]") -> Verdict:
-    """Return the verdict from how many causes were named, the ``worst`` z that is left, and the gates."""
+def strain(found: Model) -> float:
+    """Return how much more unlike the prior the body had to become than people are, as a standard normal deviate.
+
+    Its unit-normal coefficients u are found as N(0, 1 - C) with C their posterior covariance, so |u|² is a sum of squares with the
+    eigenvalues of 1 - C as weights; its cube root is nearly normal. A fault that hides in the body leaves no residual, but a strange body.
+    """
+    k = found.problem.factor.shape[1]
+    u, unit = found.belief.mean[:k], np.eye(len(found.belief.mean))[:k]
+    weight = np.clip(1 - np.linalg.eigvalsh(found.belief.covariance(unit)), 0.0, 1.0)
+    if weight.sum() < 1e-9:
+        return 0.0
+    spread = 2 / 9 * float(np.sum(weight**2) / weight.sum() ** 2)
+    return float((np.cbrt(u @ u / weight.sum()) - 1 + spread) / np.sqrt(spread))
+
+
+def verdict(named: int, worst: float, gates: "tuple[Gate, ...]", *, strained: bool = False) -> Verdict:
+    """Return the verdict from how many causes were named, the ``worst`` z that is left, the gates, and whether the body is ``strained``."""
     failed = any(not gate.ok for gate in gates)
-    if worst <= LIMIT:
+    if worst <= LIMIT and not strained:
         return "named, complete" if named or failed else "nothing wrong"
     if (named or failed) and worst <= BEYOND:
         return "named, incomplete"

@@ -6,16 +6,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.diagnose.adequacy import adequacy, verdict
+from biodance.diagnose.adequacy import STRAINED, adequacy, strain, verdict
 from biodance.diagnose.diagnosis import Diagnosis, Estimate, Finding, Unobservable
 from biodance.diagnose.model import Named
-from biodance.diagnose.naming import Naming, Round, name_causes
+from biodance.diagnose.naming import Naming, Round, name_causes, suspicious
 from biodance.diagnose.observability import hidden, limits, visibility
 from biodance.diagnose.passing import with_passing
 from biodance.diagnose.problem import Look, problem
 from biodance.diagnose.tolerances import Tolerances, key_of, shipped
 from biodance.effects.gate import Gate
 from biodance.records import Sip
+
+STRANGE = (
+    "What the plates measured fits only a body that is more unlike the table than people are. Something that looks like a body is wrong: "
+    "a load that nobody noted, a gain, or the declared mass or stature."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +35,11 @@ class Examined:
         """The named causes with their sizes."""
         return self.naming.found.named
 
+    @property
+    def suspicious(self) -> bool:
+        """Whether a cause passes the threshold before any is named."""
+        return suspicious(self.naming.screening, self.naming.first.tolerances)
+
 
 def diagnose(
     body: Body,
@@ -39,11 +49,13 @@ def diagnose(
     tolerances: Tolerances | None = None,
     prior: Sip | None = None,
     chosen: Iterable[str] | None = None,
+    search: bool = True,
 ) -> Examined:
     """Return what the simulation of ``body`` (with the SIP known before, by default the table's) gets wrong in the trials ``looks``.
 
     ``gates`` the checks made before; ``tolerances`` of everything that is no fault (those of virtual subjects by default);
-    ``prior`` of the parameters (an earlier session's; by default the table's); ``chosen`` limits the causes to some effects by name.
+    ``prior`` of the parameters (an earlier session's; by default the table's); ``chosen`` limits the causes to some effects by name;
+    without ``search`` nothing is named: only what is left is judged.
 
     Raises
     ------
@@ -53,18 +65,18 @@ def diagnose(
     known = tolerances or shipped()
     asked = None if chosen is None else tuple(chosen)
     put = problem(body, looks, prior=prior)
-    naming = with_passing(name_causes(put, known, asked), asked)
-    rows = limits(visibility(naming.first, naming.first_causes), known.threshold)
-    left = adequacy(naming.found)
+    naming = with_passing(name_causes(put, known, asked), asked) if search else name_causes(put, known, asked, rounds=0)
+    rows = limits(visibility(naming.first, naming.first_causes), body, known.threshold)
+    left, strained = adequacy(naming.found), strain(naming.found) > STRAINED
     findings = tuple(_finding(one, r, known) for one, r in zip(naming.found.named, naming.accepted, strict=True))
     found = Diagnosis(
-        verdict=verdict(len(findings), left[0].z, gates),
+        verdict=verdict(len(findings), left[0].z, gates, strained=strained),
         findings=findings,
         gates=gates,
         adequacy=left,
         unobservable=hidden(rows),
         limits=tuple(sorted(rows, key=_relative)),
-        notes=put.notes,
+        notes=(*put.notes, *([STRANGE] if strained else [])),
         candidates=tuple(one.alias for one in naming.screening.suspects),
     )
     return Examined(found, naming)
@@ -80,8 +92,10 @@ def _relative(row: Unobservable) -> float:
 
 
 def _finding(one: Named, found: Round, known: Tolerances) -> Finding:
-    """Return a named cause as a finding; no size is surer than sessions without fault are alike."""
+    """Return a named cause as a finding; no size is surer than sessions without fault are alike, nor than faults are like their models."""
     alike = known.size(key_of(one.effect.name, one.effect.target)) * one.effect.typical / one.effect.typical[0]
-    sd = np.maximum(np.sqrt(np.diag(one.covariance)), alike)
+    units = np.array([parameter.unit for parameter in one.effect.parameters])
+    length = np.array([np.linalg.norm(one.theta[units == unit]) for unit in units])
+    sd = np.hypot(np.maximum(np.sqrt(np.diag(one.covariance)), alike), known.accuracy.get(one.effect.name, 0.0) * length)
     parameters = tuple(Estimate(*row) for row in one.effect.reported(one.theta, sd))
     return Finding(one.effect.name, one.effect.target, parameters, found.set, found.suspects[0].visible, advice=one.effect.advice)

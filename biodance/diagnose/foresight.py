@@ -72,7 +72,7 @@ def foresee(
     put = problem(body, looks)
     found, causes = built(put, known, chosen)
     seen = visibility(found, causes)
-    rows = tuple(sorted(limits(seen, known.threshold), key=lambda row: row.limit / row.typical))
+    rows = tuple(sorted(limits(seen, body, known.threshold), key=lambda row: row.limit / row.typical))
     return Foresight(rows, hidden(rows), _confusions(seen, rows))
 
 

@@ -16,7 +16,8 @@ from biodance.records import Array
 
 @dataclass(frozen=True, eq=False)
 class Named:
-    """A cause of size ``theta`` (p,) with ``covariance`` (p, p); for a cause that comes and goes the largest force, and per trial the
+    """A cause of size ``theta`` (p,) with ``covariance`` (p, p); for a cause that comes and goes the force while it
+    acts, and per trial the
     ``course`` of its parameters, as in `Effect.local`.
     """
 

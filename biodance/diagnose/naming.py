@@ -56,9 +56,10 @@ class Round:
 
     @property
     def set(self) -> tuple[Alias, ...]:
-        """The most probable cause and those that are nearly as probable."""
-        best = self.suspects[0].score
-        return tuple(one.alias for one in self.suspects if best - one.score <= TOGETHER)
+        """The most probable cause and those that are nearly as probable, or would be if nobody had asked about so many targets."""
+        best = self.suspects[0]
+        near = [min(best.score - one.score, best.log_bayes_factor - one.log_bayes_factor) for one in self.suspects]
+        return tuple(one.alias for one, far in zip(self.suspects, near, strict=True) if far <= TOGETHER)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,19 +76,19 @@ class Naming:
     bare: Model
 
 
-def name_causes(problem: Problem, tolerances: Tolerances, chosen: Iterable[str] | None = None) -> Naming:
-    """Return the causes that the session shows, at most `ROUNDS`; ``chosen`` limits the family to some effects by name."""
+def name_causes(problem: Problem, tolerances: Tolerances, chosen: Iterable[str] | None = None, *, rounds: int = ROUNDS) -> Naming:
+    """Return the causes that the session shows, at most ``rounds``; ``chosen`` limits the family to some effects by name."""
     first, first_causes = built(problem, tolerances, chosen)
     found, causes = first, first_causes
     screening = Round(screen(found, causes))
     accepted: list[Round] = []
     ranking = screening
-    if suspicious(screening, tolerances) and heavier(found):
+    if rounds and suspicious(screening, tolerances) and heavier(found):
         found = replace(found, problem=found.problem.with_matter(found.phi))
         found, causes = rebuilt(found, tolerances, chosen)
         ranking = Round(screen(found, causes))
     bare = found
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         if not suspicious(ranking, tolerances):
             break
         ranking, settled = refine(found, ranking)

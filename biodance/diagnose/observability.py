@@ -10,11 +10,14 @@ from itertools import pairwise
 
 import numpy as np
 
+from biodance.body.body import Body, JointError
 from biodance.diagnose.candidates import SCALE, Candidate
 from biodance.diagnose.diagnosis import Unobservable
 from biodance.diagnose.evidence import smallest
 from biodance.diagnose.model import Model
 from biodance.diagnose.naming import TOGETHER
+from biodance.motion.functional_joints import FIXED_POINT
+from biodance.motion.joint_unknowns import centre_sd
 from biodance.records import Array
 
 LARGE = 4.0
@@ -85,16 +88,41 @@ def visibility(found: Model, causes: tuple[Candidate, ...]) -> Visibility:
     return Visibility(causes, G, tuple(slice(a, b) for a, b in pairwise(widths.tolist())))
 
 
-def limits(seen: Visibility, threshold: float) -> tuple[Unobservable, ...]:
-    """Return from which size on every cause is seen and told from the others."""
+def placed(seen: Visibility, body: Body) -> Visibility:
+    """Return what is left to see after the joints of ``body`` were placed by movement (``body.joint_errors``).
+
+    Of a wrong centre the placing leaves the share (posterior / prior standard deviation)². So these centres may vary here, by as much as
+    makes that share of each visible: they take with them what looks like a wrong centre.
+    """
+    left = {error.joint: placing_leaves(error) for error in body.joint_errors}
+    at = {one.effect.target: cut for one, cut in zip(seen.causes, seen.cuts, strict=True) if one.names[0] == "joint_centre"}
+    picks = np.concatenate([np.arange(at[joint].start, at[joint].stop) for joint in left if joint in at] or [np.zeros(0, dtype=int)])
+    share = np.repeat([left[joint] for joint in left if joint in at], 3)
+    own = np.diag(seen.G)[picks]
+    size = np.sqrt((1 / share - 1) / np.maximum(own, 1e-12))
+    taken = seen.G[:, picks] * size
+    inner = np.eye(len(picks)) + size[:, None] * seen.G[np.ix_(picks, picks)] * size
+    return Visibility(seen.causes, seen.G - taken @ np.linalg.solve(inner, taken.T), seen.cuts)
+
+
+def placing_leaves(error: JointError) -> float:
+    """Return the share of a wrong joint centre that placing the joint by movement has left, 0..1."""
+    fixed = FIXED_POINT.get(error.joint.split("_")[-1], 0.0)
+    return float(np.clip((error.centre**2 - fixed**2) / centre_sd(error.joint) ** 2, 0.01, 1.0))
+
+
+def limits(seen: Visibility, body: Body, threshold: float) -> tuple[Unobservable, ...]:
+    """Return from which size on every cause is seen and told from the others, by who looks at ``body`` with its joints where they are."""
     targets: dict[str, int] = {}
     for one in seen.causes:
         targets[one.names[0]] = targets.get(one.names[0], 0) + 1
     rows = []
+    after = placed(seen, body)
     for i, one in enumerate(seen.causes):
-        limit = seen.seen(i, threshold + float(np.log(targets[one.names[0]])))
+        here = after if one.effect.placed else seen
+        limit = here.seen(i, threshold + float(np.log(targets[one.names[0]])))
         first = one.effect.parameters[one.silent.index(False)]
-        rows.append(Unobservable(*one.names, limit, first.unit, max(limit, seen.told(i)), first.typical))
+        rows.append(Unobservable(*one.names, limit, first.unit, max(limit, here.told(i)), first.typical))
     return tuple(rows)
 
 

@@ -20,7 +20,7 @@ from biodance.records import Array
 
 SIZES = (2.0, 8.0, 30.0)
 """Standard deviations of the course before the data (units of the parameter): the most probable one is taken."""
-OTHER_SIDE = 0.1
+OTHER_SIDE = 0.2
 """Share of its squares that a touch may lie on the other side."""
 
 
@@ -65,9 +65,9 @@ def _with(naming: Naming, base: Model, accepted: tuple[Round, ...], chosen: Iter
     best = _loose(base, order[0])
     belief = believe(np.concatenate([base.belief.X, best.size * best.white], axis=1), base.belief.y)
     course = belief.mean[-best.white.shape[1] :]
-    if not one_sided(course.reshape(-1, len(best.effect.parameters))):
+    if not one_sided(order[0].found.mean.reshape(-1, len(best.effect.parameters))):
         return None
-    named = (*base.named, _named(base, best, course))
+    named = (*base.named, _named(base, best, course, order[0]))
     model = replace(base, belief=belief, named=named)
     return Naming(naming.first, model, (*accepted, Round(suspects)), naming.screening, naming.first_causes, naming.bare)
 
@@ -110,18 +110,19 @@ def _loose(base: Model, one: _Passing) -> _Passing:
     return replace(one, size=size, found=evidence(size * s, size**2 * G, size**2 * float(np.sum(one.white**2))))
 
 
-def _named(base: Model, one: _Passing, coefficients: Array) -> Named:
-    """Return the cause with its course per trial and, as its size, the force at the moment when it is largest."""
-    count = len(one.effect.parameters)
-    values, spread = one.size * coefficients, one.size**2 * np.diag(one.found.covariance)
-    course, start, peak, sd = {}, 0, np.zeros(count), np.zeros(count)
+def _named(base: Model, one: _Passing, course: Array, sized: _Passing) -> Named:
+    """Return the cause with its ``course`` (k,) of coefficients of ``one`` cut by trials; as its size, the force while it acts, as ``sized``
+    sees it: half of its squares belong to larger ones (the largest of hundreds of values would be mostly noise).
+    """
+    count, parts, start = len(one.effect.parameters), {}, 0
     for case in base.problem.cases:
         columns = one.effect.local(case)
         width = 0 if columns is None else columns.shape[2]
-        course[case.trial.name] = values[start : start + width]
-        steps = course[case.trial.name].reshape(-1, count)
-        k = int(np.argmax(np.linalg.norm(steps, axis=1)))
-        if np.linalg.norm(steps[k]) > np.linalg.norm(peak):
-            peak, sd = steps[k], np.sqrt(spread[start + count * k : start + count * (k + 1)])
+        parts[case.trial.name] = one.size * course[start : start + width]
         start += width
-    return Named(one.effect, peak, np.diag(sd**2), course)
+    steps = sized.size * sized.found.mean.reshape(-1, count)
+    spread = sized.size**2 * np.diag(sized.found.covariance).reshape(-1, count)
+    square = np.sum(steps**2, axis=1)
+    order = np.argsort(square)
+    k = int(order[np.searchsorted(np.cumsum(square[order]), 0.5 * square.sum())])
+    return Named(one.effect, steps[k], np.diag(spread[k]), parts)

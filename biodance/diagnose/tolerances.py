@@ -32,7 +32,8 @@ class Tolerances:
     a marker's segment (``marker thigh``), in the unit of its column; ``noise`` (B, 6, 6) covariance of one coefficient at `REFERENCE`;
     ``energy``, ``energy_sd`` (B, 6) mean square of the whitened residual in null sessions and its standard deviation; ``threshold`` of
     the evidence (natural logarithm) that no more than a few null sessions reach; ``origin`` in words; ``means`` what every null session
-    shows of a nuisance, by `mean_key` or group, in the unit of its column (flesh sags downwards in everybody).
+    shows of a nuisance, by `mean_key` or group, in the unit of its column (flesh sags downwards in everybody); ``accuracy`` by effect:
+    share of its size by which a named cause errs beyond its own standard deviation, because no fault is quite like its model.
     """
 
     sizes: Mapping[str, float]
@@ -42,11 +43,13 @@ class Tolerances:
     threshold: float
     origin: str = ""
     means: Mapping[str, float] = field(default_factory=dict)
+    accuracy: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         bands = len(self.noise)
         object.__setattr__(self, "sizes", MappingProxyType(dict(self.sizes)))
         object.__setattr__(self, "means", MappingProxyType(dict(self.means)))
+        object.__setattr__(self, "accuracy", MappingProxyType(dict(self.accuracy)))
         object.__setattr__(self, "noise", frozen_array(self.noise, (bands, 6, 6), "Tolerances.noise"))
         for name in ("energy", "energy_sd"):
             object.__setattr__(self, name, frozen_array(getattr(self, name), (bands, 6), f"Tolerances.{name}"))
@@ -78,7 +81,9 @@ def read_tolerances(text: str) -> Tolerances:
     """Return the tolerances from the text of a TOML file."""
     raw = tomllib.loads(text)
     noise, energy, energy_sd = (np.array(raw[name]) for name in ("noise", "energy", "energy_sd"))
-    return Tolerances(raw["sizes"], noise, energy, energy_sd, raw["threshold"], raw["origin"], raw.get("means", {}))
+    return Tolerances(
+        raw["sizes"], noise, energy, energy_sd, raw["threshold"], raw["origin"], raw.get("means", {}), raw.get("accuracy", {})
+    )
 
 
 def to_toml(found: Tolerances) -> str:
@@ -92,6 +97,7 @@ def to_toml(found: Tolerances) -> str:
     lines += ["]", "", "[sizes]"]
     lines += [f'"{key}" = {value:.4g}' for key, value in sorted(found.sizes.items())]
     lines += ["", "[means]"] + [f'"{key}" = {value:.4g}' for key, value in sorted(found.means.items())]
+    lines += ["", "[accuracy]"] + [f'"{key}" = {value:.4g}' for key, value in sorted(found.accuracy.items())]
     return "\n".join(lines) + "\n"
 
 

@@ -23,6 +23,7 @@ class JointCentre(Effect):
     parameters = tuple(
         Parameter(f"shift_{axis}", "m", 0.015, "hip: 12.3 mm (Harrington) to 25 mm (Davis) of error (Mantovani 2016)") for axis in "xyz"
     )
+    placed = True
     separated_by = "The joint alone through its whole range, about all its axes, the rest standing still."
     advice = "Record a functional calibration of this joint (for the hip a star and an arc), or palpate and re-place its markers."
 

@@ -18,7 +18,7 @@ from biodance.errors import TrialRefused
 from biodance.motion.inverse_kinematics import FrameStatus, solve_ik
 from biodance.motion.joint_unknowns import HINGES, SIZE, JointUnknowns, own_centre, own_turn
 from biodance.motion.kinematics import poses
-from biodance.motion.marker_jacobian import jacobian
+from biodance.motion.marker_jacobian import chains, jacobian
 from biodance.records import Array, Markers
 
 POSTURES = 150
@@ -35,6 +35,9 @@ little the markers say of such a joint is soft tissue."""
 FIXED_POINT = {"shoulder": 0.008, "trunk": 0.008}
 """m per axis: what no fixed point of the trunk can give; the shoulder rides on its blade, the trunk bends along its length. Added to the
 standard deviations, which are then those of 12 virtual dances."""
+FAR = 4.5
+"""Standard deviations from the static trial's place beyond which a joint is not believed (12 dances without fault: 1.5 at most): a marker
+has moved since then, and pulls the joint along."""
 STEPS, SMALLEST = 8, 5e-4
 """Most Gauss-Newton steps; m or rad below which a step ends the search."""
 
@@ -77,15 +80,56 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> Functional
     TrialRefused
         The trials show no marker of the body, or no frame determines a posture.
     """
-    postures = spread_postures(trials, scaling.body()[0].markers.names)
-    fresh = evaluate(scaling, postures, np.zeros(SIZE), None, noise=SOFT_TISSUE)
+    body = scaling.body()[0]
+    postures = spread_postures(trials, body.markers.names)
     seconds = sum(one.time.size / one.rate for one in trials if one.time.size > 1)
+    placed, found = _placed(scaling, postures, seconds)
+    joint, far = _farthest(scaling, found)
+    if far <= FAR:
+        return placed
+    without = {name: _placed(scaling, _without(postures, name), seconds) for name in _beside(body, joint)}
+    left_out = min(without, key=lambda name: _farthest(scaling, without[name][1])[1])
+    better, found = without[left_out]
+    if _farthest(scaling, found)[1] > FAR:
+        return placed
+    note = (
+        f"The marker {left_out} does not count in placing the joints: with it the {joint.replace('_', ' ')} would lie "
+        f"{1e3 * placed.moved[joint]:.0f} mm from the static trial's place. It seems to have moved since that trial."
+    )
+    return replace(better, scaling=replace(better.scaling, notes=(*better.scaling.notes, note)), notes=(*better.notes, note))
+
+
+def _without(postures: Markers, name: str) -> Markers:
+    """Return the postures with one marker hidden."""
+    xyz = np.array(postures.xyz)
+    xyz[:, postures.names.index(name)] = np.nan
+    return replace(postures, xyz=xyz)
+
+
+def _placed(scaling: Scaling, postures: Markers, seconds: float) -> tuple[FunctionalJoints, State]:
+    """Return the joints that ``postures`` from so many ``seconds`` of movement show, and the unknowns found."""
+    fresh = evaluate(scaling, postures, np.zeros(SIZE), None, noise=SOFT_TISSUE)
     alike = max(1.0, postures.time.size * ALIKE / seconds)
     noise = max(SOFT_TISSUE, fresh.rms / np.sqrt(3)) * np.sqrt(alike)
     start = evaluate(scaling, postures, np.zeros(SIZE), fresh.q, noise=noise)
     shown = excited(scaling, start)
     found = descend(scaling, postures, start, shown, noise=noise)
-    return _told(scaling, start, found, shown)
+    return _told(scaling, start, found, shown), found
+
+
+def _farthest(scaling: Scaling, found: State) -> tuple[str, float]:
+    """Return the joint that lies farthest from the static trial's place, in its standard deviations, and how far."""
+    off = JointUnknowns(scaling.centres).prior(found.theta)[0]
+    far = {joint: float(np.linalg.norm(off[own_centre(joint)])) for joint in JOINTS}
+    return max(far.items(), key=lambda pair: pair[1])
+
+
+def _beside(body: Body, joint: str) -> tuple[str, ...]:
+    """Return the markers on the two segments that meet in a joint."""
+    chain = next(one for one in chains(body) if body.joints[one[0]].name.startswith(f"{joint}_"))
+    parent = body.joints[chain[0]].parent
+    meet = {0 if parent < 0 else body.joints[parent].segment, body.joints[chain[-1]].segment}
+    return tuple(name for name, segment in zip(body.markers.names, body.markers.segment, strict=True) if segment in meet)
 
 
 def spread_postures(trials: Sequence[Markers], names: tuple[str, ...]) -> Markers:

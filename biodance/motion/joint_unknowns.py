@@ -23,6 +23,11 @@ SIZE = TURNS + len(HINGES)
 """Unknowns: 3 m per joint of ``JOINTS`` (displacement, lab axes, in the static posture), then rad per hinge about the bone above it."""
 
 
+def centre_sd(joint: str) -> float:
+    """Return the standard deviation (m per axis) of a ``joint``'s centre as the static trial places it, before any movement."""
+    return CENTRE_SD.get(joint.split("_")[-1], HINGE_SD)
+
+
 @dataclass(frozen=True, eq=False)
 class JointUnknowns:
     """The unknowns theta (37,) about the static trial's ``centres``, theta = 0."""
@@ -51,7 +56,7 @@ class JointUnknowns:
         """
         residual, slope = np.empty(SIZE), np.zeros((SIZE, SIZE))
         for joint in JOINTS:
-            rows, sd = own_centre(joint), CENTRE_SD.get(joint.split("_")[-1], HINGE_SD)
+            rows, sd = own_centre(joint), centre_sd(joint)
             residual[rows] = theta[rows] / sd
             slope[rows, rows] = np.eye(3) / sd
         for hinge in HINGES:

@@ -72,7 +72,13 @@ def diagnose_session(
     own = Own(tolerances) if tolerances else own_tolerances(result.body, fitted)
     try:
         examined = diagnose(
-            result.body, fitted, gates=checks, tolerances=own.tolerances, prior=_prior(reference, result), chosen=_continuous(names)
+            result.body,
+            fitted,
+            gates=checks,
+            tolerances=own.tolerances,
+            prior=_prior(reference, result),
+            chosen=_continuous(names),
+            search=not failed,
         )
     except TrialRefused:
         if failed:
@@ -80,7 +86,7 @@ def diagnose_session(
         raise
     examined = _noted(examined, *standing_notes(result), *left_out(result.trials), *own.notes)
     if failed:
-        return SessionDiagnosis(_by_checks(checks, examined.diagnosis), examined)
+        return SessionDiagnosis(_by_checks(checks, examined), examined)
     if examined.named and not own.believed:
         return SessionDiagnosis(_disbelieved(examined.diagnosis), examined)
     tell("measuring what the findings change")
@@ -161,11 +167,12 @@ def _cases(body: Body | None, found: tuple[Look, ...]) -> tuple[Case, ...]:
     )
 
 
-def _by_checks(checks: tuple[Gate, ...], left: Diagnosis | None = None) -> Diagnosis:
+def _by_checks(checks: tuple[Gate, ...], examined: Examined | None = None) -> Diagnosis:
     """Return the diagnosis of a session in which a check failed: what it found, and nothing built on unmended recordings."""
+    left = examined.diagnosis if examined else None
     findings = tuple(_finding(gate) for gate in checks if not gate.ok)
     note = "A check named its cause before any statistics. Mend it and diagnose again: nothing is fitted to recordings that are wrong."
-    clean = left is not None and left.verdict == "named, complete" and not left.findings
+    clean = examined is not None and left is not None and left.verdict == "named, complete" and not examined.suspicious
     return Diagnosis(
         verdict="named, complete" if clean else "named, incomplete",
         findings=findings,
