@@ -14,7 +14,7 @@ from biodance.dance.design import design
 from biodance.dance.exchange import alike
 from biodance.dance.plan import Plan
 from biodance.dance.rehearsal import bearing, rehearse
-from biodance.dance.verify import broken, verify
+from biodance.dance.verify import broken, verify, verify_with
 from biodance.errors import BiodanceError, FileRefused
 from biodance.motion.kinematics import poses, quaternion_matrix
 from biodance.records import Subject
@@ -55,6 +55,11 @@ def test_every_limit_holds(dance):
     told = "balance continuity foot_placement friction ground_clearance joint_range joint_speed joint_torque self_collision"
     assert [m.limit for m in margins] == told.split()
     assert broken(margins) == ()
+
+
+def test_two_workers_find_the_same_margins(dance):
+    with ThreadPoolExecutor(2) as workers:
+        assert verify_with(workers, BODY, dance, PLAN) == verify(BODY, dance, PLAN)
 
 
 def test_no_posture_comes_twice(dance):

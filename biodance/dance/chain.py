@@ -7,6 +7,7 @@ pinocchio's analytic derivatives hold for every coordinate alike.
 
 from dataclasses import dataclass
 from functools import cached_property
+from threading import local
 from typing import Any
 
 import numpy as np
@@ -39,7 +40,7 @@ class Chain:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what goes to other processes: all but what pinocchio computes in, which takes longer to send than to make."""
-        return {name: value for name, value in self.__dict__.items() if name != "data"}
+        return {name: value for name, value in self.__dict__.items() if name != "_own"}
 
     @property
     def size(self) -> int:
@@ -109,10 +110,16 @@ class Chain:
             model.appendBodyToJoint(carrier + 1, pin.Inertia.FromDynamicParameters(np.array(self.body.sip.of(name))), none)
         return model
 
-    @cached_property
+    @property
     def data(self) -> Any:
-        """What pinocchio computes in; every call overwrites it."""
-        return self.model.createData()
+        """What pinocchio computes in, one for each thread: every call overwrites it."""
+        if not hasattr(self._own, "data"):
+            self._own.data = self.model.createData()
+        return self._own.data
+
+    @cached_property
+    def _own(self) -> local:
+        return local()
 
     def root_rotation(self, x: Array) -> Array:
         """Return lab_R_root (T, 3, 3) of coordinates (T, n)."""

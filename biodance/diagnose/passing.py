@@ -111,8 +111,8 @@ def _loose(base: Model, one: _Passing) -> _Passing:
 
 
 def _named(base: Model, one: _Passing, course: Array, sized: _Passing) -> Named:
-    """Return the cause with its ``course`` (k,) of coefficients of ``one`` cut by trials; as its size, the force while it acts, as ``sized``
-    sees it: half of its squares belong to larger ones (the largest of hundreds of values would be mostly noise).
+    """Return the cause with its ``course`` (k,) of coefficients of ``one`` cut by trials; as its size, the force while it acts: half of the
+    squares, as ``sized`` sees them, belong to larger ones (the largest of hundreds of values would be mostly noise).
     """
     count, parts, start = len(one.effect.parameters), {}, 0
     for case in base.problem.cases:
