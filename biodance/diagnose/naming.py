@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from biodance.diagnose.adequacy import STRAINED, strain
 from biodance.diagnose.candidates import SCALE, Candidate, candidates, removed, slopes
 from biodance.diagnose.diagnosis import Alias
 from biodance.diagnose.evidence import evidence
@@ -77,7 +78,10 @@ class Naming:
 
 
 def name_causes(problem: Problem, tolerances: Tolerances, chosen: Iterable[str] | None = None, *, rounds: int = ROUNDS) -> Naming:
-    """Return the causes that the session shows, at most ``rounds``; ``chosen`` limits the family to some effects by name."""
+    """Return the causes that the session shows, at most ``rounds``; ``chosen`` limits the family to some effects by name.
+
+    What a body predicts that is unlike people is not believed: causes are then not predicted again.
+    """
     first, first_causes = built(problem, tolerances, chosen)
     found, causes = first, first_causes
     screening = Round(screen(found, causes))
@@ -95,7 +99,8 @@ def name_causes(problem: Problem, tolerances: Tolerances, chosen: Iterable[str] 
         if not suspicious(ranking, tolerances):
             break
         accepted.append(ranking)
-        found, causes = rebuilt(settled, tolerances, chosen) if stale(settled) else (settled, causes)
+        again = stale(settled) and strain(settled) <= STRAINED
+        found, causes = rebuilt(settled, tolerances, chosen) if again else (settled, causes)
         ranking = Round(tuple(one for one in screen(found, causes) if one.cause.names not in {named_of(n) for n in found.named}))
     return Naming(first, found, tuple(accepted), screening, first_causes, bare)
 
