@@ -71,6 +71,9 @@ def test_planted_feet_stay_and_slopes_are_exact() -> None:
         for k, name in enumerate(("x", "v", "a")):
             difference = (getattr(shifted[0], name) - getattr(shifted[1], name))[0] / (2 * step)
             np.testing.assert_allclose(slopes[k][:, c], difference[legs], rtol=0, atol=2e-5 * max(1.0, float(np.abs(difference).max())))
+    rest = Closure(closed(chain, feet, x, np.zeros_like(v), np.zeros_like(a)))
+    np.testing.assert_allclose(rest.followed(picks, no_time), slopes[0], atol=1e-12)
+    assert not rest.turned(picks, "ax", no_time).any()
     assert len(free) == 15
     links = [chain.carriers[HOAP.feet[side].segment] for side in ("right", "left")]
     np.testing.assert_allclose(state.velocity[0, links], 0.0, atol=1e-9)

@@ -44,7 +44,8 @@ def _solve(twists: Array, right: Array) -> Array:
 class Closure:
     """How planted legs follow the pelvis: slopes of their angles, rates and accelerations by those of the root, when the feet stay still.
 
-    For each planted leg its columns and ``x`` (dx/dx, dv/dv and da/da), ``v`` (dv/dx), ``ax`` (da/dx), ``av`` (da/dv), each (T, 6, 6).
+    For each planted leg its columns and ``x`` (dx/dx, dv/dv and da/da), ``v`` (dv/dx), ``ax`` (da/dx), ``av`` (da/dv), each (T, 6, 6);
+    at rest only ``x``, the others are zero.
     """
 
     def __init__(self, state: State) -> None:
@@ -77,7 +78,8 @@ class Closure:
 
     def _handed(self, out: Array, slopes: Array, kind: str, time: NDArray[np.intp]) -> Array:
         for leg, blocks in self.legs:
-            out[:, :ROOT] += (slopes[:, None, leg] @ blocks[kind][time])[:, 0]
+            if kind in blocks:
+                out[:, :ROOT] += (slopes[:, None, leg] @ blocks[kind][time])[:, 0]
         return out
 
 
