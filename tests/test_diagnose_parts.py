@@ -8,7 +8,7 @@ from diagnosed_sessions import body, known, looks, motion
 from scipy.stats import multivariate_normal
 
 from biodance.body.body import JointError
-from biodance.diagnose.candidates import Candidate, added, candidates, changes, slopes
+from biodance.diagnose.candidates import Candidate, candidates, changes, removed, slopes
 from biodance.diagnose.evidence import believe, evidence, smallest
 from biodance.diagnose.kinematic_errors import kinematic_errors
 from biodance.diagnose.learning import Null, learn
@@ -125,7 +125,16 @@ def test_differences_of_a_cause_agree_with_its_columns(put) -> None:
     columns = put.columns([late])[0]
     np.testing.assert_allclose(slopes(put, late, np.zeros(1)), columns, atol=0.02 * np.abs(columns).max())
     np.testing.assert_allclose(changes(put, late, np.zeros(1)), 0.0, atol=1e-9)
-    assert len(added(put, late, np.array([0.01]))) == 2
+    assert not late.linear
+
+
+def test_a_linear_cause_is_its_columns(put) -> None:
+    gain = effect("plate_gain")("Fz")
+    assert gain.linear
+    size = np.array([0.03])
+    expected = put.spectrum.rows(tuple(gain.added(case, size)[:, :, None] for case in put.cases)).ravel()
+    for rows in (changes(put, gain, size), removed(put, gain, size), slopes(put, gain, size) @ size):
+        np.testing.assert_allclose(rows[: expected.size], expected, atol=1e-9 * np.abs(expected).max())
 
 
 def test_a_load_is_spanned_by_mass_and_place(put) -> None:

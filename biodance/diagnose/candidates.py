@@ -11,6 +11,7 @@ import numpy as np
 
 from biodance.diagnose.problem import Problem
 from biodance.effects import effects
+from biodance.effects.case import Case
 from biodance.effects.effect import Effect
 from biodance.records import Array
 
@@ -99,24 +100,27 @@ def local_basis(problem: Problem, effect: Effect) -> Array | None:
     return out
 
 
-def added(problem: Problem, effect: Effect, theta: Array) -> tuple[Array, ...]:
-    """Return per case (T, 6): what the cause of size ``theta`` (p,) adds to measured minus predicted wrench, about the lab origin."""
-    return tuple(effect.added(case, theta) for case in problem.cases)
-
-
 def changes(problem: Problem, effect: Effect, theta: Array) -> Array:
     """Return (r,): what the cause of size ``theta`` (p,) adds to the rows."""
-    wrench = problem.spectrum.rows(tuple(part[:, :, None] for part in added(problem, effect, theta)))
-    return np.concatenate([wrench.ravel(), problem.marker_rows(effect) @ theta])
+    return _in_rows(problem, effect, theta, effect.added)
 
 
 def removed(problem: Problem, effect: Effect, theta: Array) -> Array:
     """Return (r,): what the cause of size ``theta`` (p,) has added to the rows, as far as it can be undone in what was measured."""
-    wrench = problem.spectrum.rows(tuple(effect.removed(case, theta)[:, :, None] for case in problem.cases))
-    return np.concatenate([wrench.ravel(), problem.marker_rows(effect) @ theta])
+    return _in_rows(problem, effect, theta, effect.removed)
+
+
+def _in_rows(problem: Problem, effect: Effect, theta: Array, wrench: Callable[[Case, Array], Array]) -> Array:
+    """Return (r,): the rows of ``wrench`` (T, 6) of every case, and of the markers."""
+    if effect.linear:
+        return np.asarray(problem.unit(effect) @ theta)
+    rows = problem.spectrum.rows(tuple(wrench(case, theta)[:, :, None] for case in problem.cases))
+    return np.concatenate([rows.ravel(), problem.marker_rows(effect) @ theta])
 
 
 def slopes(problem: Problem, effect: Effect, theta: Array, *, of: Callable[[Problem, Effect, Array], Array] = changes) -> Array:
-    """Return (r, p): derivative of `changes` or `removed` at ``theta`` by central differences."""
+    """Return (r, p): derivative of `changes` or `removed` at ``theta``, of a cause that is not linear by central differences."""
+    if effect.linear:
+        return problem.unit(effect)
     steps = 0.02 * np.diag(effect.typical)
     return np.stack([(of(problem, effect, theta + s) - of(problem, effect, theta - s)) / (2 * s.max()) for s in steps], axis=1)

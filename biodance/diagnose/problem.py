@@ -7,6 +7,7 @@ Columns of faults come from `candidates`; sizes of everything from `tolerances`.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,6 +74,16 @@ class Problem:
         ends = np.cumsum([len(one.parameters) for one in some])
         parts = np.split(wrench.reshape(self.wrench_rows, -1), ends[:-1], axis=1)
         return [np.concatenate([part, self.marker_rows(one)]) for part, one in zip(parts, some, strict=True)]
+
+    def unit(self, effect: Effect) -> Array:
+        """Return the columns (r, p) of one effect, computed once."""
+        if effect not in self._units:
+            self._units[effect] = self.columns([effect])[0]
+        return self._units[effect]
+
+    @cached_property
+    def _units(self) -> dict[Effect, Array]:
+        return {}
 
     def marker_rows(self, effect: Effect) -> Array:
         """Return (m + s, p): what one unit of each parameter of ``effect`` adds to the marker rows and to the sizes shown."""

@@ -57,6 +57,14 @@ class Effect:
         return cls(target)
 
     @property
+    def linear(self) -> bool:
+        """Whether ``columns`` says all: what is added, and what can be removed, is in proportion to the parameters."""
+        kind = type(self)
+        return kind.columns is not Effect.columns and all(
+            getattr(kind, name) is getattr(Effect, name) for name in ("transform", "added", "removed")
+        )
+
+    @property
     def typical(self) -> Array:
         """(p,) typical sizes, in the parameters' units."""
         return np.array([parameter.typical for parameter in self.parameters])
