@@ -11,7 +11,7 @@ from unittest.mock import patch
 
 import numpy as np
 from diagnosis_contamination import contamination
-from hidden_causes import LASTING, MEASURED, Name, truth
+from hidden_causes import MEASURED, Name, truth
 from hidden_sessions import CACHE, Scenario, examined
 
 from biodance.diagnose.candidates import candidates
@@ -141,8 +141,7 @@ def _ratio(scenario: Scenario, found: Diagnosis) -> tuple[float, float]:
     rows = [row for row in found.limits if _is_among((row.effect, row.target), same) and row.effect == (counts or row.effect)]
     if not rows or size is None:
         return float("nan"), float("nan")
-    lasting = size[1] * LASTING.get(rows[0].effect, 1.0)
-    return lasting / min(row.limit for row in rows), lasting / min(row.told_from for row in rows)
+    return size[1] / min(row.limit for row in rows), size[1] / min(row.told_from for row in rows)
 
 
 def _is_among(name: Name, same: set[Name]) -> bool:

@@ -72,8 +72,6 @@ SINGLE = (
 )  # fmt: skip
 FILTERS = {"below": 8.5, "at": 7.5, "above": 4.0}
 """Hz; a lower cut-off is a larger fault."""
-LASTING = {"external_contact": 0.4}
-"""Share of its nominal size that a cause has on average, where the limit is that of a lasting one: touches last 1.6 s in 4 s."""
 MEASURED = {"segment_length": "joint_centre"}
 """Cause whose limit counts instead: the static trial has measured the whole leg, so a longer thigh is a knee that lies elsewhere."""
 SAME = {"dropped_frames": (("frame_rate", ""),)}
