@@ -46,7 +46,8 @@ def page(scores: list[Score], *, run: str, figure: str, total: int) -> list[str]
         f"Diagnosis of a session after reading and tracking: median {np.median(seconds):.1f} s of one processor, largest "
         f"{np.max(seconds):.1f} s. Of that, what the movement alone decides (regressors, columns of all causes, limits) takes "
         f"{np.median(seconds - after):.1f} s; what follows once forces are looked at: median {np.median(after):.1f} s, largest "
-        f"{np.max(after):.1f} s, at most {BAR:g} s in {share(after <= BAR)}. Two sessions were diagnosed at a time on two processors.",
+        f"{np.max(after):.1f} s, at most {BAR:g} s in {share(after <= BAR)}. Two sessions were diagnosed at a time on two processors: a "
+        "session then takes half of these times on average.",
         "What is hidden is made by `biodance/virtual_lab`, which cannot import the effects: raw samples, corners and labels for "
         "instruments, a richer body (16 segments, soft tissue) for the person. The limit of a cause is what the diagnosis computes for "
         "that very session: for joint centres and markers with what placing the joints by movement has repaired or taken up before; for a "
@@ -75,6 +76,7 @@ def demands(groups: dict[str, list[Score]], singles: list[Score]) -> list[str]:
     """Return the table of demands."""
     high, low, nulls, unknown, pairs = above(singles), below(singles), *(groups.get(g, []) for g in ("null", "unknown", "pair"))
     told = [one for one in high if one.told >= TWICE]
+    after = [one.seconds - one.planned for some in groups.values() for one in some if one.verdict != "crashed"]
     sizes = [one.size_error for one in high if np.isfinite(one.size_error)]
     covered = [one.covered for one in high if one.covered is not None]
     rows = [
@@ -98,11 +100,8 @@ def demands(groups: dict[str, list[Score]], singles: list[Score]) -> list[str]:
         ("two causes: both in the sets", "", share(all(one.within) for one in pairs)),
         ("two causes: both named and nothing else", "", share(all(one.exact) and alone(one) for one in pairs)),
         *gain_demands(groups.get("issue", [])),
-        (
-            "diagnosis within 10 s, after what the movement alone decides",
-            "all",
-            share(one.seconds - one.planned <= BAR for some in groups.values() for one in some if one.verdict != "crashed"),
-        ),
+        ("diagnosis within 10 s of one processor, after what the movement alone decides", "all", share(s <= BAR for s in after)),
+        ("... time per session, two at a time on two processors", "all", share(s / 2 <= BAR for s in after)),
         (
             "sessions that gave no answer",
             "none",
