@@ -9,6 +9,7 @@ import pytest
 from biodance.body.human import human
 from biodance.dance import design as design_module
 from biodance.dance import postures
+from biodance.dance import verify as verify_module
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.exchange import alike
@@ -60,6 +61,17 @@ def test_every_limit_holds(dance):
 def test_two_workers_find_the_same_margins(dance):
     with ThreadPoolExecutor(2) as workers:
         assert verify_with(workers, BODY, dance, PLAN) == verify(BODY, dance, PLAN)
+
+
+def test_a_margin_that_is_no_number_is_never_lost(dance, monkeypatch):
+    judge = verify_module._judge
+
+    def spoiled(stretch):
+        for limit, unit, value, what in judge(stretch):
+            yield limit, unit, value * np.nan if limit == "balance" and stretch.phase == 3 else value, what
+
+    monkeypatch.setattr(verify_module, "_judge", spoiled)
+    assert {margin.limit for margin in broken(verify(BODY, dance, PLAN))} == {"balance"}
 
 
 def test_no_posture_comes_twice(dance):

@@ -206,8 +206,3 @@ def judged(task: Task, via: Array) -> tuple[Move, Array]:
     gram = dynamic_grams(found.state, list(range(len(task.chain.body.segments)))) * task.stretch / CHECK
     before, after = (float(np.sqrt(off_centre(task.state(v))[0]) / 10) for v in (plain, via))
     return Move(via, task.duration, gram, before, after, max(0.0, worst), limit if worst > 0 else ""), time[dips]
-
-
-def dynamic_criterion(blocks: Blocks, gram: Array) -> float:
-    """Return the sum of M_i cond(W_bi^D), kg, for the information ``gram`` (N, 6, 6)."""
-    return total(blocks.weight, gram + LITTLE * np.eye(6), blocks.second)[0]

@@ -5,7 +5,7 @@ of the body, forces come from the regressor, torques from pinocchio's inverse dy
 support is drawn anew from where the soles really are.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
@@ -77,25 +77,30 @@ def verify(body: Body, dance: Dance, plan: Plan, *, rate: float = 100.0, part: s
     ``body`` whose limits count (usually ``dance.body``); ``plan`` gives the share of the base of support that may be used; ``part`` only
     these phases.
     """
-    worst: dict[str, Margin] = {}
-    for stretch in _stretches(body, dance, plan, rate, range(len(dance.phases))[part]):
-        for limit, unit, value, what in _judge(stretch):
-            if value.size:
-                t, k = np.unravel_index(int(np.argmin(value)), value.shape)
-                if limit not in worst or value[t, k] < worst[limit].worst:
-                    worst[limit] = Margin(limit, float(value[t, k]), float(stretch.motion.time[t]), unit, what[k])
-    worst["continuity"] = _continuity(dance)
-    return tuple(worst[name] for name in sorted(worst))
+    stretches = _stretches(body, dance, plan, rate, range(len(dance.phases))[part])
+    return _least([_continuity(dance), *(margin for stretch in stretches for margin in _margins(stretch))])
 
 
 def verify_with(workers: Executor, body: Body, dance: Dance, plan: Plan) -> tuple[Margin, ...]:
     """Return what `verify` does, found by two ``workers`` side by side: one looks at every second phase, one at the others."""
     tasks = [workers.submit(verify, body, dance, plan, part=slice(first, None, 2)) for first in range(2)]
+    return _least(margin for task in tasks for margin in task.result())
+
+
+def _least(margins: Iterable[Margin]) -> tuple[Margin, ...]:
+    """Return the worst margin of every limit, by name; of equal ones the first in time; one that is no number is the worst."""
     worst: dict[str, Margin] = {}
-    for margin in (margin for task in tasks for margin in task.result()):
-        if margin.limit not in worst or margin.worst < worst[margin.limit].worst:
-            worst[margin.limit] = margin
+    for margin in sorted(margins, key=lambda one: (np.nan_to_num(one.worst, nan=-np.inf), one.where_s)):
+        worst.setdefault(margin.limit, margin)
     return tuple(worst[name] for name in sorted(worst))
+
+
+def _margins(stretch: _Stretch) -> Iterator[Margin]:
+    """Yield the worst margin of every limit in one phase."""
+    for limit, unit, value, what in _judge(stretch):
+        if value.size:
+            t, k = np.unravel_index(int(np.argmin(value)), value.shape)
+            yield Margin(limit, float(value[t, k]), float(stretch.motion.time[t]), unit, what[k])
 
 
 def broken(margins: tuple[Margin, ...]) -> tuple[Margin, ...]:

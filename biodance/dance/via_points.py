@@ -8,7 +8,6 @@ the samples, and SLSQP does the rest. The paper's planar example (III.C) is solv
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 from scipy.optimize import minimize
 
 from biodance.body.body import Body
@@ -72,14 +71,6 @@ class Excitation:
         by_state = 2 * np.einsum("itcp,tcp->it", (ahead - behind) / (2 * STEP), W @ slope).reshape(kinds, joints, frames)
         matrices = (self.basis.position, self.basis.velocity, self.basis.acceleration)
         return value, sum((m.T @ g.T for m, g in zip(matrices, by_state, strict=True)), np.zeros_like(points))
-
-
-def interpolating_basis(duration: float, *, via: int, rate: float = 50.0) -> Basis:
-    """Return the cubic B-spline through ``via`` points at equal distances over the whole ``duration``, ends free (paper III.C)."""
-    through = np.linspace(0, duration, via)
-    time = np.linspace(0, duration, round(duration * rate) + 1)
-    spline = make_interp_spline(through, np.eye(via), k=min(3, via - 1))
-    return Basis(time, *(spline(time, nu=nu) for nu in range(3)))
 
 
 def design(problem: Excitation, start: Array, history: Array, *, movable: slice = ALL_POINTS, iterations: int = 200) -> Array:

@@ -1,7 +1,7 @@
 """A session's diagnosis: name causes, ask whether what is left is like a session without fault, and say what could not be seen."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -82,11 +82,6 @@ def diagnose(
     return Examined(found, naming)
 
 
-def with_gains(examined: Examined, findings: tuple[Finding, ...]) -> Examined:
-    """Return the diagnosis with ``findings`` in place of its own, after their gains were measured."""
-    return replace(examined, diagnosis=replace(examined.diagnosis, findings=findings))
-
-
 def _relative(row: Unobservable) -> float:
     return row.limit / row.typical
 
@@ -96,6 +91,6 @@ def _finding(one: Named, found: Round, known: Tolerances) -> Finding:
     alike = known.size(key_of(one.effect.name, one.effect.target)) * one.effect.typical / one.effect.typical[0]
     units = np.array([parameter.unit for parameter in one.effect.parameters])
     length = np.array([np.linalg.norm(one.theta[units == unit]) for unit in units])
-    sd = np.hypot(np.maximum(np.sqrt(np.diag(one.covariance)), alike), known.accuracy.get(one.effect.name, 0.0) * length)
+    sd = np.hypot(np.maximum(np.sqrt(np.diag(one.covariance)), alike), known.unlike(one.effect.name) * length)
     parameters = tuple(Estimate(*row) for row in one.effect.reported(one.theta, sd))
     return Finding(one.effect.name, one.effect.target, parameters, found.set, found.suspects[0].visible, advice=one.effect.advice)

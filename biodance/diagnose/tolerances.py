@@ -62,6 +62,10 @@ class Tolerances:
         """Return what is expected of ``key`` in a session without fault; 0 where nothing was learned."""
         return self.means.get(key, 0.0)
 
+    def unlike(self, effect: str) -> float:
+        """Return the share of its size by which ``effect`` errs beyond noise; of one never measured that of "other" ones."""
+        return self.accuracy.get(effect, self.accuracy.get("other", 0.0))
+
     def knows(self, effect: str) -> bool:
         """Return whether any size of ``effect`` was learned."""
         return any(key.split()[0] == effect for key in self.sizes)

@@ -72,17 +72,6 @@ def moved(wrench: Wrench, about: Array) -> Wrench:
     return Wrench(wrench.time, np.concatenate([wrench.force, wrench.moment - np.cross(about, wrench.force)], axis=1))
 
 
-def rms_norm(agreements: tuple[Agreement, ...]) -> tuple[float, float]:
-    """Return the RMS of force (N) and moment (N·m): the norm over the three channels, over the frames of all trials (paper's "RMS").
-
-    The paper prints means over channels beside it; divide by sqrt(3) to compare one channel.
-    """
-    frames = np.array([a.frames for a in agreements], dtype=float)
-    squares = np.array([a.rms**2 for a in agreements])
-    mean = frames @ squares / frames.sum()
-    return float(np.sqrt(mean[:3].mean())), float(np.sqrt(mean[3:].mean()))
-
-
 def gain(trials: tuple[TrialValidation, ...], *, draws: int = 1000, seed: int = 0) -> Gain:
     """Return the ratio of RMS residuals table / identified over all ``trials`` with a block-bootstrap interval.
 

@@ -36,7 +36,7 @@ FIXED_POINT = {"shoulder": 0.008, "trunk": 0.008}
 """m per axis: what no fixed point of the trunk can give; the shoulder rides on its blade, the trunk bends along its length. Added to the
 standard deviations, which are then those of 12 virtual dances."""
 FAR = 4.5
-"""Standard deviations from the static trial's place beyond which a joint is not believed (12 dances without fault: 1.5 at most): a marker
+"""Standard deviations from the static trial's place beyond which a joint is not believed (5 sessions without fault: 1.5 at most): a marker
 has moved since then, and pulls the joint along."""
 STEPS, SMALLEST = 8, 5e-4
 """Most Gauss-Newton steps; m or rad below which a step ends the search."""
@@ -87,10 +87,15 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> Functional
     joint, far = _farthest(scaling, found)
     if far <= FAR:
         return placed
-    without = {name: _placed(scaling, _without(postures, name), seconds) for name in _beside(body, joint)}
-    left_out = min(without, key=lambda name: _farthest(scaling, without[name][1])[1])
-    better, found = without[left_out]
-    if _farthest(scaling, found)[1] > FAR:
+    near, left_out, better = FAR, "", placed
+    for name in _beside(body, joint):
+        try:
+            tried, found = _placed(scaling, _without(postures, name), seconds)
+        except TrialRefused:  # this marker cannot be spared
+            continue
+        if _farthest(scaling, found)[1] <= near:
+            near, left_out, better = _farthest(scaling, found)[1], name, tried
+    if not left_out:
         return placed
     note = (
         f"The marker {left_out} does not count in placing the joints: with it the {joint.replace('_', ' ')} would lie "

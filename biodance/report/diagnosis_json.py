@@ -6,7 +6,6 @@ import numpy as np
 
 from biodance.diagnose.diagnosis import Alias, Finding, Gain, Unobservable
 from biodance.diagnose.foresight import Foresight
-from biodance.effects.gate import Gate
 from biodance.identify.identification import Identification
 from biodance.pipeline.diagnosis import SessionDiagnosis
 
@@ -39,10 +38,6 @@ def _finding(one: Finding) -> dict[str, Any]:
         "changes": one.changes,
         "advice": one.advice,
     }
-
-
-def _gate(gate: Gate) -> dict[str, Any]:
-    return {"check": gate.check, "ok": gate.ok, "text": gate.text, "effect": gate.effect, "target": gate.target, "size": gate.size}
 
 
 def _limit(row: Unobservable) -> dict[str, Any]:
