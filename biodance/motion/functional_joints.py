@@ -98,7 +98,7 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> Functional
     if not left_out:
         return placed
     note = (
-        f"The marker {left_out} does not count in placing the joints: with it the {joint.replace('_', ' ')} would lie "
+        f"Warning: the marker {left_out} does not count in placing the joints: with it the {joint.replace('_', ' ')} would lie "
         f"{1e3 * placed.moved[joint]:.0f} mm from the static trial's place. It seems to have moved since that trial."
     )
     return replace(better, scaling=replace(better.scaling, notes=(*better.scaling.notes, note)), notes=(*better.notes, note))

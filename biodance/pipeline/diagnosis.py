@@ -84,7 +84,7 @@ def diagnose_session(
         if failed:
             return SessionDiagnosis(_by_checks(checks))
         raise
-    examined = _noted(examined, *standing_notes(result), *left_out(result.trials), *own.notes)
+    examined = _noted(examined, *result.doubts, *standing_notes(result), *left_out(result.trials), *own.notes)
     if failed:
         return SessionDiagnosis(_by_checks(checks, examined), examined)
     if examined.named and not own.believed:
