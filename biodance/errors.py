@@ -21,6 +21,10 @@ class SessionRefused(BiodanceError):
     """A session folder from which no step can be done (empty, no readable trial, contradictory session.toml)."""
 
 
+class NotSolved(BiodanceError):
+    """Parameters were asked of an estimate that failed and has none: its cause and cure. Look at ``status`` before."""
+
+
 class UnknownName(BiodanceError):
     """A name that is not in the library or record it was looked up in; lists the legal names."""
 

@@ -73,4 +73,4 @@ def diagnose(
     else:
         print_diagnosis(document, Console())
         sys.stdout.write(f"{folder / 'report.html'}\n")
-    return DONE if document["verdict"] == "nothing wrong" else NEEDS_A_PERSON
+    return DONE if document["verdict"] == "nothing wrong" and not document["failures"] else NEEDS_A_PERSON

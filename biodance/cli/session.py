@@ -74,7 +74,7 @@ def _told_identified(result: "SessionResult", folder: Path, found: "dict[str, An
     else:
         print_identification(found, Console())
         sys.stdout.write(f"{folder / 'report.html'}\n")
-    return NEEDS_A_PERSON if result.needs_a_person or found["status"] != "solved" else DONE
+    return NEEDS_A_PERSON if result.needs_a_person else DONE
 
 
 @app.command

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.errors import TrialRefused
+from biodance.errors import NotSolved, TrialRefused
 from biodance.identify.base_parameters import BaseEstimate, estimate_base, structural_base
 from biodance.identify.caution import about_true_centres, widened
 from biodance.identify.gate import believable
@@ -21,7 +21,7 @@ from biodance.identify.learning import learn
 from biodance.identify.loads import may_carry
 from biodance.identify.mismatch import Mismatch, Sizes, evident_sizes, mismatch, temper
 from biodance.identify.noise import Noise
-from biodance.identify.physical import PhysicalFit, physical_fit
+from biodance.identify.physical import FailedFit, PhysicalFit, physical_fit
 from biodance.identify.posterior import Posterior, posterior
 from biodance.identify.statistics import Fit, Statistics, empty, layout_for, statistics
 from biodance.records import Array, Sip
@@ -33,32 +33,51 @@ NOISE_ALONE = "The intervals count the noise alone, not soft tissue, joint centr
 class Identification:
     """What a session says about a body.
 
-    ``body`` as given, with the table as its SIP; ``sip`` the identified parameters, physically consistent, with their covariance
-    about the true joint centres;
-    ``belief`` the Gaussian posterior before the consistency constraint; ``data`` what the trials alone say (whitened, disturbances
-    discounted); ``base`` the weighted least-squares estimate of the base parameters; ``noise`` as learned; ``sizes`` of the disturbances;
-    ``fit`` what the constraint did; ``trials`` used, ``frames`` coefficients counted; ``known`` every quantity with interval and verdict;
-    ``status``, with ``cause`` and cure in words; ``notes`` what a person should know.
+    ``body`` as given, with the table as its SIP; ``belief`` the Gaussian posterior before the consistency constraint; ``data`` what the
+    trials alone say (whitened, disturbances discounted); ``base`` the weighted least-squares estimate of the base parameters; ``noise`` as
+    learned; ``sizes`` of the disturbances; ``fit`` the nearest body that can exist, its covariance about the true joint centres, or why
+    there is none; ``trials`` used, ``frames`` coefficients counted; ``known`` every quantity with interval and verdict, empty where the fit
+    failed; ``notes`` what a person should know.
     """
 
     body: Body
-    sip: Sip
     belief: Posterior
     data: Information
     base: BaseEstimate
     noise: Noise
     sizes: Sizes
-    fit: PhysicalFit
+    fit: PhysicalFit | FailedFit
     trials: tuple[str, ...]
     frames: int
     known: tuple[Known, ...]
-    status: Literal["solved", "failed"]
-    cause: str
     notes: tuple[str, ...]
 
     @property
+    def status(self) -> Literal["solved", "failed"]:
+        """Whether a body that can exist was found; if it "failed", `cause` says why and what to do."""
+        return self.fit.status
+
+    @property
+    def cause(self) -> str:
+        """Cause and cure of a failure in words, "" if there is none."""
+        return self.fit.cause
+
+    @property
+    def sip(self) -> Sip:
+        """The identified parameters, physically consistent, with their covariance about the true joint centres.
+
+        Raises
+        ------
+        NotSolved
+            The fit failed, so there are none.
+        """
+        if self.fit.status == "failed":
+            raise NotSolved(f"Nothing was identified from {', '.join(self.trials)}. {self.fit.cause}")
+        return self.fit.sip
+
+    @property
     def identified(self) -> Body:
-        """The body with the identified parameters."""
+        """The body with the identified parameters; raises `NotSolved` like `sip`."""
         return replace(self.body, sip=self.sip, notes=(*self.body.notes, f"SIP identified from {', '.join(self.trials)}."))
 
     @property
@@ -135,10 +154,13 @@ def conclude(
     belief = posterior(data, before)
     fit = physical_fit(belief, body)
     base = estimate_base(data, structural_base(body))
-    sip = about_true_centres(fit.sip, body.joint_errors)
-    known = knowledge(sip, about_true_centres(before, body.joint_errors), belief)
-    words = (*(() if found else (NOISE_ALONE,)), *_notes(known, fit))
-    return Identification(body, sip, belief, data, base, noise, sizes, fit, trials, data.frames, known, fit.status, fit.cause, words)
+    known: tuple[Known, ...] = ()
+    words: tuple[str, ...] = () if found else (NOISE_ALONE,)
+    if fit.status == "solved":
+        fit = replace(fit, sip=about_true_centres(fit.sip, body.joint_errors))
+        known = knowledge(fit.sip, about_true_centres(before, body.joint_errors), belief)
+        words += _notes(known, fit)
+    return Identification(body, belief, data, base, noise, sizes, fit, trials, data.frames, known, words)
 
 
 def standing_point(fits: tuple[Fit, ...]) -> Array:
@@ -154,6 +176,6 @@ def _notes(known: tuple[Known, ...], fit: PhysicalFit) -> tuple[str, ...]:
     if lost:
         notes.append(f"Cannot be known from this session (the table's value stands): {', '.join(lost)}.")
     moved = [name for name, acts in zip(fit.sip.segments, fit.moved, strict=True) if acts]
-    if moved and fit.status == "solved":
+    if moved:
         notes.append(f"At the edge of what a body can be: {', '.join(moved)}.")
     return tuple(notes)

@@ -92,11 +92,11 @@ class Stream:
         found = settled.statistics
         if not found.count.any():
             raise TrialRefused("No frame of this stream could be used yet: ground contact not measured, or markers hidden.")
-        known = conclude(self.body, found, ("stream",), found=settled.disturbed).known
-        verdicts = {
-            name: [k.verdict == "known" for k in known if k.segment == name and k.quantity in ENOUGH] for name in self.body.segments
-        }
-        return Progress(known, tuple(name for name, all_known in verdicts.items() if all(all_known)))
+        one = conclude(self.body, found, ("stream",), found=settled.disturbed)
+        if one.status == "failed":
+            return Progress((), (), one.cause)
+        open_ = {k.segment for k in one.known if k.quantity in ENOUGH and k.verdict != "known"}
+        return Progress(one.known, tuple(name for name in self.body.segments if name not in open_))
 
     def identification(self, fits: tuple[Fit, ...] = ()) -> Identification:
         """Return the identification from all frames so far: the batch's.
@@ -112,10 +112,14 @@ class Stream:
 
 @dataclass(frozen=True)
 class Progress:
-    """What a stream knows: every quantity with its interval, and the segments whose mass and centre of mass are known well enough."""
+    """What a stream knows: every quantity with its interval, and the segments whose mass and centre of mass are known well enough.
+
+    Both are empty where the frames so far contradict every possible body: ``cause`` then says why and what to do.
+    """
 
     known: tuple[Known, ...]
     enough: tuple[str, ...]
+    cause: str = ""
 
     @property
     def missing(self) -> tuple[tuple[str, str], ...]:

@@ -1,7 +1,7 @@
 """What the simulation of a session gets wrong: checks first, then causes; what accepting them changes in the body and gains elsewhere."""
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ from biodance.diagnose.problem import Look
 from biodance.diagnose.tolerances import Tolerances
 from biodance.effects.case import Case
 from biodance.effects.gate import Gate, gates
-from biodance.errors import BiodanceError, SessionRefused, TrialRefused
+from biodance.errors import BiodanceError, NotSolved, SessionRefused, TrialRefused
 from biodance.identify.added_mass import expected
 from biodance.identify.identification import Identification, identify, standing_point
 from biodance.pipeline.identification import FITTED, KEPT, SessionIdentification
@@ -31,7 +31,8 @@ TRIAL_SECONDS = 20.0
 class SessionDiagnosis:
     """``diagnosis``; ``accepted`` what is identified once the findings are accepted (None without findings), ``before`` without them;
     ``examined`` what the engine looked at (None where a check stopped it); ``left`` what the body in use leaves of the kept trials,
-    and what is left once the findings are accepted.
+    and what is left once the findings are accepted; ``failures`` what could not be computed ("what accepting changes"), with
+    cause and cure.
     """
 
     diagnosis: Diagnosis
@@ -39,6 +40,7 @@ class SessionDiagnosis:
     before: Identification | None = None
     accepted: Identification | None = None
     left: tuple[Judged, Judged] | None = None
+    failures: Mapping[str, str] = field(default_factory=dict)
 
 
 def diagnose_session(
@@ -84,7 +86,7 @@ def diagnose_session(
         if failed:
             return SessionDiagnosis(_by_checks(checks))
         raise
-    examined = _noted(examined, *result.doubts, *standing_notes(result), *left_out(result.trials), *own.notes)
+    examined = _noted(examined, *_untold(reference), *result.doubts, *standing_notes(result), *left_out(result.trials), *own.notes)
     if failed:
         return SessionDiagnosis(_by_checks(checks, examined), examined)
     if examined.named and not own.believed:
@@ -152,10 +154,17 @@ def _continuous(names: tuple[str, ...] | None) -> tuple[str, ...] | None:
 
 
 def _prior(reference: SessionIdentification | None, result: SessionResult) -> Sip | None:
-    """Return what an earlier session lets expect of the body; None without one."""
-    if reference is None or result.identification is None:
+    """Return what an earlier session lets expect of the body; None without one, or where nothing was identified from it."""
+    if reference is None or result.identification is None or reference.identification.status == "failed":
         return None
     return expected(reference.identification, result.identification.identification)
+
+
+def _untold(reference: SessionIdentification | None) -> tuple[str, ...]:
+    """Say that the reference tells nothing of the body, if so."""
+    if reference is None or reference.identification.status == "solved":
+        return ()
+    return (f"Session {reference.name} tells nothing of the body, so the table is what is known before. {reference.identification.cause}",)
 
 
 def _cases(body: Body | None, found: tuple[Look, ...]) -> tuple[Case, ...]:
@@ -207,6 +216,8 @@ def _with_gains(result: SessionResult, examined: Examined) -> SessionDiagnosis:
         return _accepted(result, examined, before)
     except TrialRefused as why:  # named in standing, and no movement to identify from
         return SessionDiagnosis(_noted(examined, f"What accepting the findings changes is not known. {why}").diagnosis, examined, before)
+    except NotSolved as why:
+        return SessionDiagnosis(examined.diagnosis, examined, before, failures={"what accepting changes": str(why)})
 
 
 def _accepted(result: SessionResult, examined: Examined, before: Identification) -> SessionDiagnosis:

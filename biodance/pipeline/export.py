@@ -75,6 +75,8 @@ def body_of_result(result: SessionResult) -> tuple[Body, str]:
     ------
     SessionRefused
         The session gives no body.
+    NotSolved
+        The identification failed.
     """
     name = result.session.folder.name
     if result.body is None:

@@ -1,12 +1,12 @@
 """What the session says about the body: identification from the fit trials, validation on the others, search for a load."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.errors import BiodanceError, TrialRefused
+from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identify.added_mass import AddedMass, added_mass
 from biodance.identify.identification import Identification, identify, standing_point
 from biodance.identify.sessions import Difference, differences
@@ -34,11 +34,11 @@ class SessionIdentification:
     identified body on every compared trial by name, about the lab origin; ``gain`` table / identified over the validations (None without
     an interval); ``search`` the loads looked for, against ``search.reference``; ``changes`` since the reference session, empty without one;
     ``torques`` of the joints in the first trial kept (else fitted), None where the feet's wrenches are not known; ``name`` of the session;
-    ``notes`` what a person should know.
+    ``notes`` what a person should know; ``failures`` what could not be computed ("segments", "reference", "differences"), each with cause
+    and cure: without segments there is nothing to compare, to validate or to drive joints with, and those fields are empty.
     """
 
     name: str
-
     identification: Identification
     fitted: tuple[TrialValidation, ...]
     validations: tuple[TrialValidation, ...]
@@ -48,6 +48,7 @@ class SessionIdentification:
     changes: tuple[Difference, ...] = ()
     torques: TorqueBands | None = None
     notes: tuple[str, ...] = ()
+    failures: Mapping[str, str] = field(default_factory=dict)
 
 
 def fit_of(result: TrialResult) -> Fit | None:
@@ -83,22 +84,56 @@ def identify_trials(
             "Record movement on the plates, or set roles in session.toml."
         )
     found = identify(body, fits)
-    about, identified = standing_point(fits), found.identified
-    fitted, kept = (tuple(validate(body, identified, fit, about=about) for fit in some) for some in (fits, others))
-    notes = list(found.notes)
+    failures = {"segments": found.cause} if found.status == "failed" else {}
+    if reference is not None and "segments" in reference.failures:
+        failures["reference"] = (
+            f"Session {reference.name} tells no body to compare with, so loads are looked for against the table and no change is told. "
+            f"{reference.failures['segments']}"
+        )
+        reference = None
+    search = added_mass(found, reference=reference.identification if reference else None)
+    one = SessionIdentification(
+        name,
+        found,
+        (),
+        (),
+        {},
+        None,
+        replace(search, reference=f"session {reference.name}") if reference else search,
+        changes=_changes(reference, found, failures),
+        notes=found.notes,
+        failures=failures,
+    )
+    return one if found.status == "failed" else _predicted(one, results, fits, others)
+
+
+def _changes(reference: SessionIdentification | None, found: Identification, failures: dict[str, str]) -> tuple[Difference, ...]:
+    """Return what changed since the session ``reference``; why that cannot be told is added to ``failures``."""
+    if reference is None or found.status == "failed":
+        return ()
+    try:
+        return differences(reference.identification, found)
+    except NotSolved as why:
+        failures["differences"] = str(why)
+        return ()
+
+
+def _predicted(
+    one: SessionIdentification, results: tuple[TrialResult, ...], fits: tuple[Fit, ...], others: tuple[Fit, ...]
+) -> SessionIdentification:
+    """Return the same with what the identified body predicts of all trials."""
+    found, about, identified = one.identification, standing_point(fits), one.identification.identified
+    fitted, kept = (tuple(validate(found.body, identified, fit, about=about) for fit in some) for some in (fits, others))
+    notes = list(one.notes)
     if not kept:
         notes.append("No trial was kept for validation, so the gain is not proven. Record squats, or give a trial the role validate.")
     notes += _weight(fitted)
-    search = added_mass(found, reference=reference.identification if reference else None)
-    return SessionIdentification(
-        name,
-        found,
-        fitted,
-        kept,
+    return replace(
+        one,
+        fitted=fitted,
+        validations=kept,
         agreements={fit.name: _at_origin(identified, fit) for fit in _fits(results, ROLES)},
         gain=_gain(kept, notes),
-        search=replace(search, reference=f"session {reference.name}") if reference else search,
-        changes=differences(reference.identification, found) if reference else (),
         torques=_torques(found, results),
         notes=tuple(notes),
     )

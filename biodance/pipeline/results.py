@@ -205,7 +205,12 @@ class SessionResult:
         return tuple(note for note in (self.body.notes if self.body else ()) if note.startswith("Warning"))
 
     @property
+    def failures(self) -> Mapping[str, str]:
+        """What identification could not compute, each with cause and cure."""
+        return self.identification.failures if self.identification else {}
+
+    @property
     def needs_a_person(self) -> bool:
-        """Whether anything was refused, warned about or outside its limit."""
-        trouble = any(step.status != "done" for step in self.steps) or any(t.status != "ok" for t in self.trials)
+        """Whether anything was refused, warned about, not computed or outside its limit."""
+        trouble = bool(self.failures) or any(step.status != "done" for step in self.steps) or any(t.status != "ok" for t in self.trials)
         return trouble or bool(self.session.refused or self.doubts) or any(not check.inside for check in self.all_checks)

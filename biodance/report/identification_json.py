@@ -146,14 +146,16 @@ def identification_document(found: SessionIdentification) -> dict[str, Any]:
     ``about_m``, the mean centre of pressure. ``added_mass`` null: no load is announced; ``added_mass_search`` says what was looked for;
     ``joint_torques`` of one trial with what the
     parameters leave uncertain (not this trial's own skin and plates); ``differences`` to the reference session, empty without one.
+    ``failures`` what could not be computed, with cause and cure; after a failed fit (``status``) there are no segments.
     """
     one = found.identification
     return {
         "status": one.status,
         "cause": one.cause,
+        "failures": found.failures,
         "trials": one.trials,
         "frames": one.frames,
-        "segments": [_segment(one, name) for name in one.sip.segments],
+        "segments": [_segment(one, name) for name in one.sip.segments] if one.status == "solved" else [],
         "inertia_order": TENSOR,
         "base_parameters": {"count": one.base.base.count, "well_known": len(one.base.well_known), "rank": one.base.rank},
         "disturbances": {"kinematics": one.sizes.kinematics, "noise_variance": one.sizes.noise},
