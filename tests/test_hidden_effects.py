@@ -13,6 +13,7 @@ import pytest
 from biodance.cli import run
 from biodance.diagnose.diagnosis import Diagnosis
 from biodance.effects import discrete_effects, effects
+from biodance.identify.physical import FailedFit
 from biodance.lab.session import read_session
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.results import SessionResult
@@ -55,10 +56,18 @@ def test_a_session_without_fault_is_left_alone(tmp_path: Path, monkeypatch: pyte
     assert all(gate.ok for gate in diagnosis.gates)
 
 
-def test_late_forces_are_named_by_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_late_forces_are_named_by_the_command_also_where_no_body_can_be_identified(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("biodance.identify.identification.physical_fit", lambda *_: FailedFit("No possible body, by force."))
     folder = hidden(tmp_path / "s", "time_delay:delay=0.025")
-    assert run(["diagnose", str(folder), "--out", str(tmp_path / "out"), "--json"]) == 1
+    assert run(["diagnose", str(folder), "--accept", "--out", str(tmp_path / "out"), "--json"]) == 1
     document = json.loads(capsys.readouterr().out)
+    assert set(document["failures"]) == {"segments", "what accepting changes"}
+    assert all("by force" in cause for cause in document["failures"].values())
+    assert document["masses"] == {"before": None, "accepted": None}
+    assert (tmp_path / "out" / "report.html").read_text().count("by force") >= 2
+    assert not (tmp_path / "out" / "body.json").exists()
     assert document["verdict"].startswith("named")
     first = document["findings"][0]
     assert (first["effect"], first["target"]) == ("time_delay", "")

@@ -30,7 +30,9 @@ RELATIVE_FLOOR = 1e-3
 TOLERANCE = 1e-7
 """How far outside its limits a segment may lie by rounding, in its own units (CoM in m): ten times the solver's tolerance."""
 GAP = 1e-6
-"""How far inside the limits the programme stays where there is room, so that what it returns is inside for everybody."""
+"""How far inside the cone of possible bodies the programme stays, so that what it returns is inside for everybody."""
+NOTHING = 1e-9
+"""Relative size of what rounding leaves of a zero."""
 THIN = 1e-2
 """Least second moment of a segment about an axis, relative to its largest, in the units: a rod has none."""
 
@@ -124,16 +126,16 @@ def _limits(prior: Sip, body: "Body") -> _Limits:
 def _nearest(belief: Posterior, limits: _Limits, bound: NDArray[np.intp]) -> tuple[Array | None, str]:
     """Solve min |x|² s.t. the segments ``bound`` of mean + factor x are inside their limits; return x (k,) and the solver's word.
 
-    x lies in the span of those segments' rows of the factor, so that the programme has ten unknowns per segment. Where there is no room for
-    the gap (a rod that the prior fixes) or the solver stops, it is asked again without gap and in the unit of the distance to the prior.
+    x lies in the span of those segments' rows of the factor, so that the programme has ten unknowns per segment. If the solver stops, it
+    is asked again in units of the distance to the prior.
     """
     rows = (10 * bound[:, None] + np.arange(10)).ravel()
     span = np.linalg.qr(belief.factor[rows].T)[0]
     local, mean = belief.factor[rows] @ span, belief.mean[rows]
-    far = max(1.0, float(np.linalg.norm(np.linalg.lstsq(local, belief.prior.phi[rows] - mean)[0])))
+    far = float(np.linalg.norm(np.linalg.lstsq(local, belief.prior.phi[rows] - mean)[0]))
     words = []
-    for gap, unit in ((GAP, 1.0), (GAP, far), (0.0, 1.0), (0.0, far)):
-        z, word = _solve(local * unit, mean, limits, bound, gap)
+    for unit in (1.0, 0.1 * far, far):
+        z, word = _solve(local * unit, mean, limits, bound)
         if z is not None:
             x = span @ z * unit
             if limits.room(belief.mean + belief.factor @ x)[bound].min() >= -TOLERANCE:
@@ -143,18 +145,30 @@ def _nearest(belief: Posterior, limits: _Limits, bound: NDArray[np.intp]) -> tup
     return None, ", then ".join(dict.fromkeys(words))
 
 
-def _solve(local: Array, mean: Array, limits: _Limits, bound: NDArray[np.intp], gap: float) -> tuple[Array | None, str]:
-    """Return the smallest z for which mean + local z of the segments ``bound`` is at least ``gap`` inside, and the solver's word."""
+def _solve(local: Array, mean: Array, limits: _Limits, bound: NDArray[np.intp]) -> tuple[Array | None, str]:
+    """Return the smallest z for which mean + local z of the segments ``bound`` is inside the limits, and the solver's word."""
     import cvxpy as cp
 
     z = cp.Variable(local.shape[1])
     constraints, sides, levels = [], [], []
     for k, i in enumerate(bound):
-        cut = slice(10 * k, 10 * k + 10)
-        level = (limits.cone[i] @ mean[cut]).reshape(4, 4) - limits.floor[i] - gap * np.eye(4)
-        constraints.append(cp.reshape((limits.cone[i] @ local[cut]) @ z, (4, 4), order="C") + level >> 0)
-        sides.append(limits.sides[i] @ local[cut])
-        levels.append(limits.sides[i] @ mean[cut])
-    constraints.append(np.concatenate(sides) @ z + np.concatenate(levels) >= gap)
+        slope, level = local[10 * k : 10 * k + 10], mean[10 * k : 10 * k + 10]
+        free = _free_axes(limits.cone[i] @ np.column_stack([slope, level]))
+        axes, count = np.kron(free, free), len(free)
+        least = axes @ limits.floor[i].ravel() + GAP * np.eye(count).ravel()
+        matrix = (axes @ limits.cone[i] @ slope) @ z + (axes @ limits.cone[i] @ level - least)
+        constraints.append(cp.reshape(matrix, (count, count), order="C") >> 0)
+        sides.append(limits.sides[i] @ slope)
+        levels.append(limits.sides[i] @ level)
+    constraints.append(np.concatenate(sides) @ z + np.concatenate(levels) >= 0)
     word = solve_convex(cp.Problem(cp.Minimize(cp.sum_squares(z)), constraints))
     return (np.asarray(z.value) if word == "optimal" else None), word
+
+
+def _free_axes(matrices: Array) -> Array:
+    """Return the axes (r, 4) along which any of the pseudo-inertias ``matrices`` (16, k) has something.
+
+    Along the others a segment is as thin as the prior fixes it (a plate, a rod): there it has no room for a gap, and needs no limit.
+    """
+    _, size, axes = np.linalg.svd(matrices.T.reshape(-1, 4))
+    return np.asarray(axes[size > NOTHING * size.max()])
