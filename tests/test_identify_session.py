@@ -152,6 +152,19 @@ def test_equal_sessions_do_not_differ() -> None:
         assert all(abs(row.value) < 0.3 for name, row in masses.items() if name != "s2")
 
 
+@pytest.mark.parametrize("seed", [0, 2, 5, 6, 9, 12])
+def test_what_changed_hangs_on_no_rounding(seed: int) -> None:
+    body, truth, rng = person(seed)
+    fits = [noisy_fit(body, smooth_motion(body, rng, frames=500), truth, rng) for _ in range(2)]
+    moved = [replace(f, wrench=Wrench(f.wrench.time, f.wrench.value * (1 + 1e-12 * rng.normal(size=f.wrench.value.shape)))) for f in fits]
+    sessions = [identify(body, (fit,)) for fit in (*fits, *moved)]
+    for pair, shaken in ((sessions[:2], sessions[2:]), ((sessions[0], sessions[0]), (sessions[2], sessions[0]))):
+        for one, other in zip(differences(*pair), differences(*shaken), strict=True):
+            assert abs(one.value - other.value) < 1e-3 * one.sd
+            assert one.sd == pytest.approx(other.sd, rel=1e-4)
+            assert one.known == other.known
+
+
 def test_gain_has_the_known_ratio_in_its_interval() -> None:
     body, truth, rng = person(8)
     fit = noisy_fit(body, smooth_motion(body, rng, frames=2000), truth, rng, size=0.0)

@@ -90,6 +90,9 @@ def _possible(belief: Posterior, one: Identification) -> Array:
 
 
 def _with_room(one: Identification, other: Identification) -> Posterior:
-    """Return the belief of session ``one`` with room for the loads that it carries beyond ``other``."""
-    chance = {found.segment: found.probability * (found.mass > 0) for found in added_mass(one, reference=other).suspects}
+    """Return the belief of session ``one`` with room for the loads that it carries beyond ``other``.
+
+    A load is positive: its probability counts as far as its mass is above zero, by degrees, so that rounding opens and closes no room.
+    """
+    chance = {found.segment: found.probability * norm.cdf(found.mass / found.sd) for found in added_mass(one, reference=other).suspects}
     return posterior(one.data, may_carry(one.body, one.belief.prior, share=np.array([chance[s] for s in one.body.segments])))
