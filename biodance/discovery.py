@@ -19,12 +19,14 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeAlias, TypeVar
 
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import PACKAGE, folder
 
 Member = TypeVar("Member")
+Chosen: TypeAlias = Iterable[str | Member] | Mapping[str, Member] | None
+"""Names of members, objects, or both; a selection made before; None for all (`Family.choose`)."""
 
 
 def missing_of(protocol: type) -> Callable[[object], tuple[str, ...]]:
@@ -77,10 +79,11 @@ class Family(Generic[Member]):
         found = (*_of_folder(self, tuple(package.__path__)), *_of_entry_points(self, tuple(sys.path)), *((m, _where(m)) for m in given))
         return self._by_name(found)
 
-    def choose(self, chosen: Iterable["str | Member"] | None = None) -> Mapping[str, Member]:
-        """Return the members that are ``chosen`` by name or given as objects, and only these; all for None.
+    def choose(self, chosen: "Chosen[Member]" = None) -> Mapping[str, Member]:
+        """Return a selection: names choose from the family, objects join what is chosen (the whole family where no name is given).
 
-        The members of the family keep their order, objects follow. An object may replace the family's member of the same name.
+        None is the whole family, an empty sequence nothing; a mapping is a selection that was made before, and returned as it is. The
+        members keep the family's order, objects follow.
 
         Raises
         ------
@@ -91,13 +94,18 @@ class Family(Generic[Member]):
         """
         if chosen is None:
             return self.members()
+        if isinstance(chosen, Mapping):
+            return chosen
         asked = tuple(chosen)
-        family, names = self.members(), [item for item in asked if isinstance(item, str)]
+        names, given = [item for item in asked if isinstance(item, str)], [item for item in asked if not isinstance(item, str)]
+        if given and not names:
+            return self.members(given)
+        family = self.members()
         for name in names:
             if name not in family:
                 raise UnknownName.of(self.kind, name, tuple(family))
-        kept = [(member, f"the {self.kind} of that name") for name, member in family.items() if name in names]
-        return self._by_name((*kept, *((item, _where(item)) for item in asked if not isinstance(item, str))))
+        kept = [(member, f"the {self.kind} of the family") for name, member in family.items() if name in names]
+        return self._by_name((*kept, *((member, _where(member)) for member in given)))
 
     def _by_name(self, found: Iterable[tuple[Any, str]]) -> Mapping[str, Member]:
         """Return members with the place they come from by name; refuse who is none, and two of one name."""

@@ -67,7 +67,9 @@ def test_members_of_folder_other_packages_and_arguments(shapes: Path, tmp_path: 
     own = Given("own")
     assert SHAPES.members([own])["own"] is own
     assert list(SHAPES.choose(["circle", own])) == ["circle", "own"]
-    assert list(SHAPES.choose([Given("square")])) == ["square"], "an object may stand for the family's member of its name"
+    assert list(SHAPES.choose([own])) == ["square", "circle", "own"], "objects join the family where no name is given"
+    assert list(SHAPES.choose([])) == [], "nothing is a selection, too"
+    assert SHAPES.choose({"one": own}) == {"one": own}, "a selection is returned as it is"
     with pytest.raises(UnknownName, match=r"'squre' is not a shape\. Did you mean 'square'"):
         SHAPES.choose(["squre"])
 

@@ -14,8 +14,8 @@ from scipy.interpolate import make_interp_spline
 from biodance.body.body import Body
 from biodance.body.inertia import Lump, parameters
 from biodance.body.tables import numbers, read_table
-from biodance.effects.case import Case
-from biodance.effects.effect import Effect
+from biodance.effects._base.case import Case
+from biodance.effects._base.effect import Effect
 from biodance.errors import TrialRefused
 from biodance.lab.filters import LowPass, low_pass
 from biodance.motion.inverse_kinematics import solve_ik
