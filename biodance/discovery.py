@@ -146,6 +146,11 @@ class DataFamily:
     folder: str
     suffix: str
 
+    def shipped(self) -> Mapping[str, Path]:
+        """Return the files in the folder of biodance by name."""
+        first, _, rest = self.folder.partition("/")
+        return MappingProxyType({path.stem: path for path in sorted((folder(first) / rest).glob(f"*{self.suffix}"))})
+
     def files(self) -> Mapping[str, Path]:
         """Return the files of all members by name: the shipped ones, then those of the entry points.
 
@@ -154,8 +159,7 @@ class DataFamily:
         BiodanceError
             An entry point cannot be imported or points at no such file, or two members have one name.
         """
-        first, _, rest = self.folder.partition("/")
-        found = {path.stem: path for path in sorted((folder(first) / rest).glob(f"*{self.suffix}"))}
+        found = dict(self.shipped())
         for entry in _offered(self.group, tuple(sys.path)):
             path, place = _loaded(entry, self.kind), _place(entry, self.kind)
             if not isinstance(path, str | Path) or not str(path).endswith(self.suffix) or not Path(path).is_file():
