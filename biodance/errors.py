@@ -35,7 +35,8 @@ class UnknownName(BiodanceError):
 
         close = get_close_matches(name, legal, n=1)
         hint = f" Did you mean {close[0]!r}?" if close else ""
-        return cls(f"{name!r} is not a {kind}.{hint} Legal: {', '.join(sorted(legal)) or 'none'}.")
+        article = "an" if kind[0] in "aeio" else "a"
+        return cls(f"{name!r} is not {article} {kind}.{hint} Legal: {', '.join(sorted(legal)) or 'none'}.")
 
 
 class MissingLibrary(BiodanceError):

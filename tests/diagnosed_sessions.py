@@ -11,7 +11,7 @@ from biodance.body.human import human
 from biodance.diagnose.problem import Look
 from biodance.diagnose.spectrum import EDGES
 from biodance.diagnose.tolerances import Tolerances
-from biodance.effects.case import at_origin
+from biodance.effects import at_origin
 from biodance.motion.regressor import predict_wrench
 from biodance.records import CHANNELS, Motion, Plate, Source, Subject, Trial, Wrench
 

@@ -17,13 +17,13 @@ CHOSEN = ("plate_gain", "plate_offset", "body_mass", "time_delay", "added_mass")
 
 def test_a_planned_movement_says_what_it_will_see() -> None:
     moves = tuple(motion(s) for s in (1, 2, 3))
-    found = foresee(body(), moves, tolerances=known(), chosen=CHOSEN)
+    found = foresee(body(), moves, tolerances=known(), effects=CHOSEN)
     limit = {(row.effect, row.target): row.limit for row in found.limits}
     assert 0 < limit["plate_gain", "Fz"] < 0.05
     assert limit["added_mass", "left_forearm_hand"] < limit["added_mass", "pelvis"]
     assert found.confusions[0].difference == found.separation
     assert {"body_mass", "added_mass"} >= {found.confusions[0].cause[0]} | {found.confusions[0].other[0]}
-    more = foresee(body(), (*moves, *(motion(s) for s in (4, 5, 6))), tolerances=known(), chosen=CHOSEN)
+    more = foresee(body(), (*moves, *(motion(s) for s in (4, 5, 6))), tolerances=known(), effects=CHOSEN)
     later = {(row.effect, row.target): row.limit for row in more.limits}
     assert later["plate_gain", "Fz"] < limit["plate_gain", "Fz"]
 
@@ -31,7 +31,7 @@ def test_a_planned_movement_says_what_it_will_see() -> None:
 def test_standing_still_sees_no_delay() -> None:
     still = motion(1)
     frozen = type(still)(still.time, np.tile(still.q[0], (still.time.size, 1)), 0 * still.v, 0 * still.a)
-    found = foresee(body(), (frozen,), tolerances=known(), chosen=("plate_gain", "plate_offset"))
+    found = foresee(body(), (frozen,), tolerances=known(), effects=("plate_gain", "plate_offset"))
     assert {row.effect for row in found.hidden} >= {"plate_gain"}
 
 

@@ -121,7 +121,7 @@ def test_rows_are_white_under_the_noise_they_were_made_with(put) -> None:
 
 
 def test_differences_of_a_cause_agree_with_its_columns(put) -> None:
-    late = effect("time_delay")("")
+    late = effect("time_delay")
     columns = put.columns([late])[0]
     np.testing.assert_allclose(slopes(put, late, np.zeros(1)), columns, atol=0.02 * np.abs(columns).max())
     np.testing.assert_allclose(changes(put, late, np.zeros(1)), 0.0, atol=1e-9)
@@ -129,7 +129,7 @@ def test_differences_of_a_cause_agree_with_its_columns(put) -> None:
 
 
 def test_a_linear_cause_is_its_columns(put) -> None:
-    gain = effect("plate_gain")("Fz")
+    gain = replace(effect("plate_gain"), target="Fz")
     assert gain.linear
     size = np.array([0.03])
     expected = put.spectrum.rows(tuple(gain.added(case, size)[:, :, None] for case in put.cases)).ravel()
@@ -165,7 +165,9 @@ def test_what_placing_has_repaired_needs_a_larger_fault_to_be_seen() -> None:
     )
     Z = [rng.normal(size=(400, width)) for *_, width in kinds]
     Z[2] = 0.9 * Z[0] + 0.1 * Z[2]  # a marker beside the joint looks much like its centre
-    causes = tuple(Candidate(effect(name)(target), z, (False,) * z.shape[1]) for (name, target, _), z in zip(kinds, Z, strict=True))
+    causes = tuple(
+        Candidate(replace(effect(name), target=target), z, (False,) * z.shape[1]) for (name, target, _), z in zip(kinds, Z, strict=True)
+    )
     cuts = (slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 10))
     whole = np.concatenate(Z, axis=1)
     seen = Visibility(causes, whole.T @ whole, cuts)

@@ -46,7 +46,7 @@ def examined(folder: Path, monkeypatch: pytest.MonkeyPatch) -> SessionResult:
 
 def found(folder: Path, monkeypatch: pytest.MonkeyPatch, *, without: tuple[str, ...] = ()) -> Diagnosis:
     chosen = tuple(name for name in (*effects(), *discrete_effects()) if name not in without) if without else None
-    return diagnose_session(examined(folder, monkeypatch), chosen=chosen).diagnosis
+    return diagnose_session(examined(folder, monkeypatch), effects=chosen).diagnosis
 
 
 def test_a_session_without_fault_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -115,7 +115,7 @@ def test_without_the_culprit_nobody_else_is_called_the_whole_truth(tmp_path: Pat
 def test_a_clipped_channel_is_named_before_any_statistics(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = hidden(tmp_path / "s", "clipping:target=Fz,limit=640")
     result = examined(folder, monkeypatch)
-    diagnosis = diagnose_session(result, chosen=("clipping", "plate_offset")).diagnosis
+    diagnosis = diagnose_session(result, effects=("clipping", "plate_offset")).diagnosis
     assert diagnosis.findings[0].effect == "clipping"
     assert [gate.effect for gate in diagnosis.gates if not gate.ok] == ["clipping"]
 

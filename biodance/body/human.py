@@ -6,9 +6,8 @@ from biodance.body.body import Body, SegmentMarkers
 from biodance.body.boxes import com_boxes, shape_boxes, sole
 from biodance.body.limits import joint_limits
 from biodance.body.prior import prior
-from biodance.body.segment_tables import reference
+from biodance.body.segment_tables import measured_whole, reference, studies, trunk_joint
 from biodance.body.skeleton import SEGMENTS, SIDES, Skeleton, generic_skeleton, joint_tree, side_of
-from biodance.body.tables import read_table
 from biodance.lab.marker_sets import MarkerSet, read_marker_set
 from biodance.records import Subject
 
@@ -54,13 +53,13 @@ def assemble(subject: Subject, skeleton: Skeleton, *, table: str, markers: Segme
 
 
 def _prior_notes(subject: Subject, table: str) -> tuple[str, ...]:
-    joint = "L5/S1" if table in ("dumas_2018", "winter_2009") else "the navel"
+    joint = trunk_joint(table)
     sex = {"F": "woman", "M": "man"}[subject.sex]
     notes = [
         f"Prior SIP: {table} for a {sex} of {subject.mass:.2f} kg, standard deviations from the spread of tables; trunk joint at {joint}."
     ]
-    if table in ("de_leva_1996", "dumas_2018") and not (np.isnan(subject.age) or ADULT[0] <= subject.age <= ADULT[1]):
-        groups = {row["study"] for row in read_table("segments", "mass_studies").rows if row["group"] in ("child", "older")}
+    if table in measured_whole() and not (np.isnan(subject.age) or ADULT[0] <= subject.age <= ADULT[1]):
+        groups = {study for sex in ("F", "M") for study, group in studies(sex).items() if group in ("child", "older")}
         notes.append(f"Table {table} is of young adults, the subject is {subject.age:.0f} years old; consider {', '.join(sorted(groups))}.")
     return tuple(notes)
 

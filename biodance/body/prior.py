@@ -13,14 +13,13 @@ import numpy as np
 
 from biodance.body.inertia import TENSOR, Lump, mirrored, parameters, turned
 from biodance.body.reference import Reference
+from biodance.body.segment_tables import measured_whole
 from biodance.body.segment_tables import reference as reference_of
 from biodance.body.skeleton import SEGMENTS, Skeleton, kind_of, side_of
 from biodance.body.spread import spread
 from biodance.body.tables import read_table
 from biodance.records import Array, Sip, Subject
 
-MEASURED = ("de_leva_1996", "dumas_2018")
-"""Tables of whole bodies for both sexes: one laid every CoM on the line between the joint centres, the other measured where it lies."""
 TRUNK = ("pelvis", "trunk_head")
 MIRROR = np.array([1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0])
 """Signs of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] under reflection at z = 0."""
@@ -32,7 +31,7 @@ def prior(reference: Reference, skeleton: Skeleton, subject: Subject) -> Sip:
     jacobian = np.zeros((10 * len(lumps), 10 * len(lumps)))
     for i, lump in enumerate(lumps):
         jacobian[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] = parameter_jacobian(lump)
-    others = tuple(scaled_lumps(reference_of(name, subject), skeleton, subject) for name in MEASURED if name != reference.table)
+    others = tuple(scaled_lumps(reference_of(name, subject), skeleton, subject) for name in measured_whole() if name != reference.table)
     covariance = jacobian @ primitive_covariance(lumps, skeleton, others) @ jacobian.T
     return Sip(SEGMENTS, np.concatenate([parameters(lump) for lump in lumps]), (covariance + covariance.T) / 2)
 

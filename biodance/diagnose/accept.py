@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.diagnose.diagnosis import Gain
 from biodance.diagnose.model import Named
-from biodance.effects.case import Case
+from biodance.effects import Case
 from biodance.errors import BiodanceError
 from biodance.identify.noise import BANDS, blocks
 from biodance.identify.statistics import Fit, layout_for

@@ -13,7 +13,7 @@ from biodance.diagnose.spectrum import EDGES
 from biodance.records import CHANNELS, Array
 
 if TYPE_CHECKING:
-    from biodance.effects.gate import Gate
+    from biodance.effects import Gate
 
 LIMIT = 4.5
 """Standard deviations of null sessions beyond which one band of one channel is not adequate."""

@@ -11,7 +11,7 @@ import numpy as np
 from biodance.records import Array, frozen_array
 
 if TYPE_CHECKING:
-    from biodance.effects.gate import Gate
+    from biodance.effects import Gate
 
 Verdict = Literal["nothing wrong", "named, complete", "named, incomplete", "unexplained"]
 SIGMAS = 1.959964

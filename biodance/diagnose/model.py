@@ -10,7 +10,7 @@ from biodance.diagnose.evidence import Belief, believe
 from biodance.diagnose.kinematic_errors import kind_of
 from biodance.diagnose.problem import Problem
 from biodance.diagnose.tolerances import Tolerances, key_of, mean_key, whitened
-from biodance.effects.effect import Effect
+from biodance.effects import Effect
 from biodance.records import Array
 
 

@@ -5,7 +5,7 @@
 Columns of faults come from `candidates`; sizes of everything from `tolerances`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.diagnose.kinematic_errors import Errors, kinematic_errors
 from biodance.diagnose.spectrum import Spectrum, spectrum, thinned
-from biodance.effects import effects
-from biodance.effects.case import Case
-from biodance.effects.effect import Effect
+from biodance.discovery import Chosen
+from biodance.effects import Case, Effect, effects
 from biodance.identify.caution import widened
 from biodance.identify.identification import usable
 from biodance.identify.posterior import prior_factor
@@ -114,8 +113,10 @@ class Problem:
         return replace(self, kinematics=np.concatenate([rows, markers, np.zeros((len(self.shown), rows.shape[1]))]))
 
 
-def problem(body: Body, looks: tuple[Look, ...], *, prior: Sip | None = None) -> Problem:
+def problem(body: Body, looks: tuple[Look, ...], *, prior: Sip | None = None, chosen: Chosen[Effect] = None) -> Problem:
     """Return the problem of ``looks`` at a session of ``body``; ``prior`` of its parameters, by default the table's with widened sd.
+
+    What the markers show by themselves is read for the whole family and for the ``chosen`` effects (`effects`).
 
     Raises
     ------
@@ -137,7 +138,7 @@ def problem(body: Body, looks: tuple[Look, ...], *, prior: Sip | None = None) ->
     W = where.rows(tuple(case.regressor @ factor for case in cases))
     errors = _errors(body, cases, where)
     rows, markers = _kinematic_rows(where, errors)
-    shown = sizes_shown(cases)
+    shown = sizes_shown(cases, {**effects(), **effects(chosen)})
     sip = np.concatenate([W.reshape(-1, W.shape[2]), np.zeros((len(markers) + len(shown), W.shape[2]))])
     groups = next(one.groups for some in errors for one in some)
     measured = where.rows(tuple(case.residual[:, :, None] for case in cases))
@@ -146,13 +147,13 @@ def problem(body: Body, looks: tuple[Look, ...], *, prior: Sip | None = None) ->
     return Problem(cases, where, target, before, factor, sip, rows, groups, len(markers), notes, tuple(shown))
 
 
-def sizes_shown(cases: tuple[Case, ...]) -> dict[tuple[str, str], float]:
+def sizes_shown(cases: tuple[Case, ...], causes: Mapping[str, Effect]) -> dict[tuple[str, str], float]:
     """Return by effect and target the size of the first parameter that the markers of the session show by themselves."""
     found = {}
-    for name, kind in effects().items():
-        for target in kind.targets(cases[0]) if kind.shown is not Effect.shown else ():
-            size = kind(target).shown(*cases)
-            found[name, target] = 0.0 if size is None else float(size[0])
+    for name, kind in causes.items():
+        for one in kind.everywhere(cases[0]) if type(kind).shown is not Effect.shown else ():
+            size = one.shown(*cases)
+            found[name, one.target] = 0.0 if size is None else float(size[0])
     return found
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.effects.case import Case
+from biodance.effects import Case
 from biodance.errors import TrialRefused
 from biodance.identify.noise import Noise, blocks
 from biodance.identify.statistics import layout_for

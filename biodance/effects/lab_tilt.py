@@ -7,8 +7,8 @@ by a plumb line with two markers.
 
 import numpy as np
 
-from biodance.effects.case import Case
-from biodance.effects.effect import Effect, Parameter, axis_vector
+from biodance.effects._base.case import Case
+from biodance.effects._base.effect import Effect, Parameter, axis_vector
 from biodance.motion.regressor import GRAVITY
 from biodance.records import Array
 

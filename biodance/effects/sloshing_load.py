@@ -7,10 +7,10 @@ seconds of standing still: what rings down there is not the person.
 
 import numpy as np
 
+from biodance.effects._base.case import Case
+from biodance.effects._base.effect import Effect, Parameter
+from biodance.effects._base.oscillator import point_motion, relative_motion, riding_wrench
 from biodance.effects.added_mass import point_mass
-from biodance.effects.case import Case
-from biodance.effects.effect import Effect, Parameter
-from biodance.effects.oscillator import point_motion, relative_motion, riding_wrench
 from biodance.records import Array
 
 FREQUENCY = 1.5

@@ -6,9 +6,9 @@ Look-alikes: another filter on forces than on markers; a delay; an error of that
 excite more than 5 Hz; below that even ten kilograms hardly show.
 """
 
-from biodance.effects.case import Case
-from biodance.effects.effect import Effect, Parameter
-from biodance.effects.oscillator import point_motion, relative_motion, riding_wrench
+from biodance.effects._base.case import Case
+from biodance.effects._base.effect import Effect, Parameter
+from biodance.effects._base.oscillator import point_motion, relative_motion, riding_wrench
 from biodance.records import Array
 
 FREQUENCY = {"trunk_head": 5.0}

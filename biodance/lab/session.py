@@ -4,8 +4,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from biodance.discovery import Chosen
 from biodance.errors import BiodanceError, SessionRefused
-from biodance.lab.read import FORMATS, read_trial
+from biodance.lab.read import read_trial
+from biodance.lab.readers import Reader, extensions
 from biodance.lab.recordings import find_recordings, recordings_in, vicon_notes
 from biodance.lab.roles import guess_static, role_by_eclipse, role_by_name
 from biodance.lab.session_file import SessionFile, read_session_file
@@ -15,13 +17,20 @@ from biodance.lab.weight import is_still, movement
 from biodance.records import Role, Session, Trial
 
 
-def read_session(folder: str | Path, *, subject_name: str | None = None, tell: Callable[[str], None] | None = None) -> Session:
+def read_session(
+    folder: str | Path,
+    *,
+    subject_name: str | None = None,
+    readers: Chosen[Reader] = None,
+    tell: Callable[[str], None] | None = None,
+) -> Session:
     """Return the session in a folder: the subject and every trial that can be read.
 
     Roles come from session.toml, else from the Eclipse notes (.enf), else from the names (static*, cal* = static; squat* = validate;
     others = fit); without a static by these, the stillest trial is taken. The subject comes from session.toml, .mp, .vsk and the files' own
-    parameters, in this order. ``subject_name`` chooses the person in C3D files that hold several; ``tell`` is called with the name of each
-    file before it is read. A file that cannot be read never stops the session: it stands in ``Session.refused`` with the reason. What was
+    parameters, in this order. ``subject_name`` chooses the person in C3D files that hold several; ``readers`` as for
+    `read_trial`; ``tell`` is called with the name of each file before it is read.
+    A file that cannot be read never stops the session: it stands in ``Session.refused`` with the reason. What was
     followed, guessed or left aside stands in ``Session.notes``.
 
     Raises
@@ -31,7 +40,7 @@ def read_session(folder: str | Path, *, subject_name: str | None = None, tell: C
     """
     folder = _checked(Path(folder))
     settings = read_session_file(folder)
-    files, notes = find_recordings(folder)
+    files, notes = find_recordings(folder, readers)
     eclipse, measurements, refused = vicon_notes({folder, *(file.parent for file in files)})
     trials: list[Trial] = []
     reasons: dict[str, str] = {}
@@ -44,14 +53,14 @@ def read_session(folder: str | Path, *, subject_name: str | None = None, tell: C
         if tell:
             tell(file.name)
         try:
-            trial = _with_strikes(read_trial(file, role=role, subject=subject_name), operator)
+            trial = _with_strikes(read_trial(file, role=role, subject=subject_name, readers=readers), operator)
         except BiodanceError as error:
             refused[file.name] = str(error)
             continue
         trials.append(replace(trial, name=f"{file.parent.name}_{trial.name}") if trial.name in reasons else trial)
         reasons[trials[-1].name] = reason
     if not trials:
-        raise SessionRefused(_nothing_left(folder, refused))
+        raise SessionRefused(_nothing_left(folder, refused, readers))
     trials = _settle_static(trials, settings, reasons, notes)
     subject, guesses = identify_subject(settings.subject, measurements, trials, name=subject_name or folder.resolve().name)
     read = [f"{path.name} in {path.parent.name} was followed." for path in settings.read]
@@ -109,12 +118,12 @@ def _settle_static(trials: list[Trial], settings: SessionFile, reasons: dict[str
     return [replace(trial, role="static") if trial is guess else trial for trial in trials]
 
 
-def _nothing_left(folder: Path, refused: Mapping[str, str]) -> str:
+def _nothing_left(folder: Path, refused: Mapping[str, str], readers: Chosen[Reader]) -> str:
     """Return the sentence for a folder of which no recording is left: nothing there, or nothing that can be read."""
     if refused:
         name, reason = next(iter(refused.items()))
         return f"{folder}: none of its {len(refused)} files can be read. The first, {name}: {reason}"
-    inside = [part.name for part in sorted(folder.iterdir()) if part.is_dir() and recordings_in(part)]
+    inside = [part.name for part in sorted(folder.iterdir()) if part.is_dir() and recordings_in(part, readers)]
     if inside:
         return f"{folder}: holds no recording itself, but these folders do: {', '.join(inside[:8])}. Point at one of them."
-    return f"{folder}: holds no recording. Legal are files of the formats {', '.join(FORMATS)}."
+    return f"{folder}: holds no recording. Legal are files of the formats {', '.join(extensions(readers))}."

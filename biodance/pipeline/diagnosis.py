@@ -1,6 +1,6 @@
 """What the simulation of a session gets wrong: checks first, then causes; what accepting them changes in the body and gains elsewhere."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -13,6 +13,8 @@ from biodance.diagnose.engine import Examined, diagnose
 from biodance.diagnose.foresight import Foresight, foresee, session_of
 from biodance.diagnose.problem import Look
 from biodance.diagnose.tolerances import Tolerances
+from biodance.discovery import Chosen
+from biodance.effects import Case, DiscreteEffect, Effect, Gate, causes, gates
 from biodance.effects.case import Case
 from biodance.effects.gate import Gate, gates
 from biodance.errors import BiodanceError, NotSolved, SessionRefused, TrialRefused
@@ -48,13 +50,13 @@ def diagnose_session(
     *,
     reference: SessionIdentification | None = None,
     tolerances: Tolerances | None = None,
-    chosen: Iterable[str] | None = None,
+    effects: Chosen[Effect | DiscreteEffect] = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> SessionDiagnosis:
     """Return the diagnosis of an examined session, with the gain of every finding on the trials that were kept.
 
     ``reference`` an earlier session of the same person without fault or load: its posterior is then what is known of the body;
-    ``tolerances`` as learned by the laboratory; ``chosen`` limits the causes to some effects by name.
+    ``tolerances`` as learned by the laboratory; ``effects`` names limit the causes to these, objects (``[MyEffect()]``) join the family.
 
     Raises
     ------
@@ -63,8 +65,8 @@ def diagnose_session(
     """
     fitted = looked_at(result.trials)
     tell("checking units, signs, labels and clocks")
-    names = None if chosen is None else tuple(chosen)
-    checks = gates(result.session, _cases(result.body, (*fitted, *looks(result.trials, KEPT))), chosen=_discrete(names))
+    asked = causes(effects)
+    checks = gates(result.session, _cases(result.body, (*fitted, *looks(result.trials, KEPT))), chosen=asked)
     failed = tuple(gate for gate in checks if not gate.ok)
     if result.body is None or not fitted:
         if failed:
@@ -79,7 +81,7 @@ def diagnose_session(
             gates=checks,
             tolerances=own.tolerances,
             prior=_prior(reference, result),
-            chosen=_continuous(names),
+            effects=asked,
             search=not failed,
         )
     except TrialRefused:
@@ -141,18 +143,6 @@ def _noted(examined: Examined, *notes: str) -> Examined:
     return replace(examined, diagnosis=replace(examined.diagnosis, notes=(*examined.diagnosis.notes, *notes)))
 
 
-def _discrete(names: tuple[str, ...] | None) -> tuple[str, ...] | None:
-    from biodance.effects import discrete_effects
-
-    return None if names is None else tuple(name for name in names if name in discrete_effects())
-
-
-def _continuous(names: tuple[str, ...] | None) -> tuple[str, ...] | None:
-    from biodance.effects import effects
-
-    return None if names is None else tuple(name for name in names if name in effects())
-
-
 def _prior(reference: SessionIdentification | None, result: SessionResult) -> Sip | None:
     """Return what an earlier session lets expect of the body; None without one, or where nothing was identified from it."""
     if reference is None or result.identification is None or reference.identification.status == "failed":
@@ -195,12 +185,9 @@ def _by_checks(checks: tuple[Gate, ...], examined: Examined | None = None) -> Di
 
 def _finding(gate: Gate) -> Finding:
     """Return a failed check as a finding."""
-    from biodance.effects import discrete_effects
-
-    kind = discrete_effects().get(gate.effect)
     size = () if np.isnan(gate.size) else (Estimate(gate.quantity, gate.size, float("nan"), gate.unit),)
     cause = Alias(gate.effect, gate.target, float("inf"))
-    return Finding(gate.effect, gate.target, size, (cause,), 1.0, advice=f"{gate.text} {kind.advice if kind else ''}".strip())
+    return Finding(gate.effect, gate.target, size, (cause,), 1.0, advice=f"{gate.text} {gate.advice}".strip())
 
 
 def _reasons(result: SessionResult) -> str:

@@ -9,7 +9,7 @@ from biodance.body.body import Body
 from biodance.diagnose.problem import Look
 from biodance.diagnose.spectrum import EDGES, SHORTEST, spectrum, thinned
 from biodance.diagnose.tolerances import REFERENCE, Tolerances, shipped
-from biodance.effects.case import Case
+from biodance.effects import Case
 from biodance.identify.identification import standing_point
 from biodance.identify.statistics import RATE, Fit
 from biodance.lab.filters import runs

@@ -7,7 +7,7 @@ of rest. The ground then carries m (a + x'') instead of m a, at the place c + x 
 import numpy as np
 from scipy.signal import cont2discrete, lfilter, lfilter_zi, ss2tf
 
-from biodance.effects.case import Case
+from biodance.effects._base.case import Case
 from biodance.motion.kinematics import cross
 from biodance.motion.regressor import GRAVITY
 from biodance.records import Array

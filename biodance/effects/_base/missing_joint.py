@@ -13,9 +13,9 @@ from scipy.interpolate import make_interp_spline
 
 from biodance.body.body import Body
 from biodance.body.inertia import Lump, parameters
-from biodance.body.tables import numbers, read_table
-from biodance.effects.case import Case
-from biodance.effects.effect import Effect
+from biodance.body.segment_data import read_segment_table
+from biodance.effects._base.case import Case
+from biodance.effects._base.effect import Effect
 from biodance.errors import TrialRefused
 from biodance.lab.filters import LowPass, low_pass
 from biodance.motion.inverse_kinematics import solve_ik
@@ -167,9 +167,16 @@ def share_of_body(body: Body, segment: str, *, top: Array, bottom: Array) -> Arr
     """Return the ten parameters (10,) of a part of the trunk between ``bottom`` and ``top`` (3,) m, by its name in de Leva's table (mean of
     women and men), in the frame of the two points; masses in proportion to the body's.
     """
-    rows = [read_table("segments", "de_leva_1996").row(segment=segment, sex=sex) for sex in ("F", "M")]
-    columns = "mass_fraction com_fraction gyration_sagittal gyration_transverse gyration_longitudinal"
-    fraction, place, sagittal, transverse, along = np.mean([numbers(row, columns) for row in rows], axis=0)
+    table = read_segment_table("de_leva_1996")
+    rows = [
+        (
+            table.value(segment, "mass", sex=sex),
+            table.value(segment, "com", "longitudinal", sex=sex),
+            *table.values(segment, "gyration", "sagittal transverse longitudinal", sex=sex),
+        )
+        for sex in ("F", "M")
+    ]
+    fraction, place, sagittal, transverse, along = np.mean(rows, axis=0)
     mass, length = fraction * float(body.sip.mass.sum()), float(np.linalg.norm(top - bottom))
     inertia = mass * length**2 * np.diag([sagittal**2, along**2, transverse**2])
     return parameters(Lump(mass, top + place * (bottom - top), inertia))

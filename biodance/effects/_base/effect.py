@@ -6,15 +6,15 @@ The author of an effect writes its parameters and ONE of two methods; the other 
 - otherwise: ``transform(case, theta)``, the case that this cause would have produced; ``columns`` is its central difference at zero.
 
 What the markers say about a cause is optional: ``marker_columns`` (a change of their mean residual) or ``shown`` (a size by themselves).
-Causes that are found by a check instead of a fit (units, labels, clipping ...) are ``DiscreteEffect`` in ``gate``.
+Causes that are found by a check instead of a fit (units, labels, clipping ...) are ``DiscreteEffect``.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
-from biodance.effects.case import Case
+from biodance.effects._base.case import Case
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import CHANNELS, Array
 
@@ -33,7 +33,7 @@ class Parameter:
 class Effect:
     """One cause at one ``target``: a segment, a channel (``Fz``), a pair (``Fz->My``), a plate and axis (``plate1:x``), or "" for none."""
 
-    target: str
+    target: str = ""
     name: ClassVar[str] = ""
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     separated_by: ClassVar[str] = ""
@@ -48,13 +48,16 @@ class Effect:
         """Return the legal targets in ``case``."""
         return ("",)
 
-    @classmethod
-    def at(cls, target: str, case: Case) -> "Effect":
+    def at(self, target: str, case: Case) -> "Effect":
         """Return the effect at ``target``; UnknownName lists the legal targets."""
-        legal = cls.targets(case)
+        legal = self.targets(case)
         if target not in legal:
-            raise UnknownName.of(f"target of {cls.name}", target, legal)
-        return cls(target)
+            raise UnknownName.of(f"target of {self.name}", target, legal)
+        return replace(self, target=target)
+
+    def everywhere(self, case: Case) -> tuple["Effect", ...]:
+        """Return the effect at every legal target in ``case``."""
+        return tuple(replace(self, target=target) for target in self.targets(case))
 
     @property
     def linear(self) -> bool:

@@ -9,14 +9,15 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
-from biodance.effects.case import Case
+from biodance.effects._base.case import Case
 from biodance.records import Session
 
 
 @dataclass(frozen=True)
 class Gate:
     """One check: ``check`` what was looked at, ``ok``, ``text`` one plain sentence of what was seen; where it is not well the cause:
-    ``effect`` and ``target`` as in the family, and the ``size`` of its ``quantity`` in ``unit`` (NaN = no number).
+    ``effect`` and ``target`` as in the family, and the ``size`` of its ``quantity`` in ``unit`` (NaN = no number); ``advice`` how the
+    effect is mended (filled in by `gates`).
     """
 
     check: str
@@ -27,6 +28,7 @@ class Gate:
     size: float = float("nan")
     quantity: str = "size"
     unit: str = ""
+    advice: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,12 +57,3 @@ class DiscreteEffect(ABC):
 def unit_of(target: str) -> str:
     """Return the unit of the channel that a target names last: N or N·m."""
     return "N·m" if target.rpartition(":")[2].startswith("M") else "N"
-
-
-def gates(session: Session, cases: tuple[Case, ...] = (), *, chosen: tuple[str, ...] | None = None) -> tuple[Gate, ...]:
-    """Return all checks of a session, those that are not well first; ``chosen`` limits them to some discrete effects by name."""
-    from biodance.effects import discrete_effects
-
-    recorded = Recorded(session, cases)
-    found = [gate for kind in discrete_effects(chosen).values() for gate in kind.look(recorded)]
-    return tuple(sorted(found, key=lambda gate: gate.ok))

@@ -2,7 +2,7 @@
 
 import re
 
-from biodance.effects.gate import Gate
+from biodance.effects._base.gate import Gate
 from biodance.records import Session
 
 Found = tuple[str, str, str]

@@ -13,7 +13,7 @@ from biodance.motion.regressor import regressor_of
 from biodance.records import Array, Motion, Plate, Trial, Wrench, frozen_array
 
 if TYPE_CHECKING:
-    from biodance.effects.geometry import Geometry
+    from biodance.effects._base.geometry import Geometry
 
 
 OF_MOTION = ("regressor", "segments", "poses", "marker_columns", "measured_markers", "marker_residual", "memory")
@@ -103,7 +103,7 @@ class Case:
     @cached_property
     def geometry(self) -> "Geometry":
         """How posture, wrench and markers answer to changes of the body's geometry."""
-        from biodance.effects.geometry import geometry
+        from biodance.effects._base.geometry import geometry
 
         return geometry(self)
 

@@ -11,15 +11,15 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.moved import carried_by, neutral_turn
-from biodance.effects.moved_matter import MovedMatter, centres, moved_matter, wrench_of
-from biodance.effects.posture_answer import PostureAnswer
+from biodance.effects._base.moved_matter import MovedMatter, centres, moved_matter, wrench_of
+from biodance.effects._base.posture_answer import PostureAnswer
 from biodance.identify.twins import skew
 from biodance.motion.kinematics import Poses, SegmentMotion
 from biodance.motion.marker_jacobian import below, chains, jacobian
 from biodance.records import Array, Index
 
 if TYPE_CHECKING:
-    from biodance.effects.case import Case
+    from biodance.effects._base.case import Case
 
 RATE = 25.0
 """Hz, at least, of the frames in which the answer is computed."""
