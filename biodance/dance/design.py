@@ -70,7 +70,7 @@ def _postures(work: Work) -> Course:
     kept = work.ledger.get("postures")
     if kept is None:
         work.tell("postures", 0, len(counted))
-        found = find_postures(chain, work.blocks, tuple(counted), seed=work.seed, workers=work.workers)
+        found = find_postures(chain, work.blocks, tuple(counted), plan.limits, seed=work.seed, workers=work.workers)
         kept = {"x": found.x}
         work.ledger.put("postures", **kept)
     work.tell("postures", len(counted), len(counted))
@@ -87,7 +87,7 @@ def _postures(work: Work) -> Course:
     known = np.flatnonzero(~np.isnan(rows[:, 0]))
     for k in sorted(set(range(len(stances))) - set(known)):
         near = [known[known < k][-1], *known[known > k][:1]]
-        rows[k] = middle_posture(chain, stances[k], rows[near], seed=[work.seed, 2, k]).x
+        rows[k] = middle_posture(chain, stances[k], rows[near], plan.limits, seed=[work.seed, 2, k]).x
     return Course(rows, stances)
 
 
