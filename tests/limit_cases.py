@@ -28,11 +28,17 @@ def feet() -> tuple[Stance, ...]:
     return both, ahead, both.on(0), both.on(1), replace(ahead, over=0), replace(both, over=1), held, held.on(0), seat(BODY)
 
 
-def movements(count: int, *, seed: int = 0) -> Iterator[State]:
-    """Yield ``count`` random movements of 3 samples each, gentle and violent ones, on all kinds of feet in turn.
+@cache
+def movements(count: int, *, seed: int = 0) -> tuple[tuple[State, CheckedMotion], ...]:
+    """Return ``count`` random movements of 3 samples each, gentle and violent ones, on all kinds of feet in turn, for both sides.
 
-    Planted knees are bent by 8.2 degrees (less bends the reach of the closed legs) to 70, palms are up to about 6 cm from grips; nobody jumps (100 N on the ground at least).
+    Planted knees are bent by 8.2 degrees (less bends the reach of the closed legs) to 70, palms are up to about 6 cm from
+    grips; nobody jumps (100 N on the ground at least).
     """
+    return tuple((state, checked(state)) for state in _movements(count, seed))
+
+
+def _movements(count: int, seed: int) -> Iterator[State]:
     rng, found = np.random.default_rng(seed), 0
     while found < count:
         where, violence = feet()[found % len(feet())], 10.0 ** rng.uniform(-1.5, 0.5)
