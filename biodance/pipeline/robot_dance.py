@@ -43,7 +43,9 @@ def make_robot_dance(
     tell: Tell = lambda *_: None,
     resume: Path | None = None,
 ) -> DanceResult:
-    """Design, check and count a dance for a robot (`robot_dancer`) with the limits of ``person`` beyond those of its file; see `dance.make_dance`.
+    """Design, check and count a dance for a robot (`robot_dancer`), with the limits of ``person`` beyond those of its file.
+
+    See `dance.make_dance`.
 
     Raises
     ------
