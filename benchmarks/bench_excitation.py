@@ -104,11 +104,12 @@ def random_dance(like: Dance, plan: Plan) -> Dance:
     for k, stance in enumerate(stances):
         while stance.over is None and np.isnan(x[k, 0]):
             begin = start(chain, stance, rng)
-            found = solve(chain, stance, begin, Near(begin), iterations=40)
+            found = solve(chain, stance, begin, Near(begin), plan.limits, iterations=40)
             if found.violation <= KEPT:
                 x[k] = found.x
     for k in np.flatnonzero(np.isnan(x[:, 0])):
-        x[k] = middle_posture(chain, stances[k], x[[max(k - 1, 0)]] if k and not np.isnan(x[k - 1, 0]) else x[:1], seed=[3, int(k)]).x
+        near = x[[max(k - 1, 0)]] if k and not np.isnan(x[k - 1, 0]) else x[:1]
+        x[k] = middle_posture(chain, stances[k], near, plan.limits, seed=[3, int(k)]).x
     hold = np.array([plan.hold if s.over is None else min(SHORT, plan.hold) for s in stances])
     move = np.full(len(x) - 1, (like.duration - hold.sum()) / (len(x) - 1))
     feet = tuple(under(a, b) for a, b in pairwise(stances))

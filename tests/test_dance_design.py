@@ -9,10 +9,10 @@ import pytest
 from biodance.body.human import human
 from biodance.dance import design as design_module
 from biodance.dance import postures
-from biodance.dance import verify as verify_module
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.exchange import alike
+from biodance.dance.limits.balance import Balance
 from biodance.dance.plan import Plan
 from biodance.dance.rehearsal import bearing, rehearse
 from biodance.dance.verify import broken, verify, verify_with
@@ -64,13 +64,13 @@ def test_two_workers_find_the_same_margins(dance):
 
 
 def test_a_margin_that_is_no_number_is_never_lost(dance, monkeypatch):
-    judge = verify_module._judge
+    judge, start = Balance.check, dance.phases[3].start
 
-    def spoiled(stretch):
-        for limit, unit, value, what in judge(stretch):
-            yield limit, unit, value * np.nan if limit == "balance" and stretch.phase == 3 else value, what
+    def spoiled(self, motion):
+        left = judge(self, motion)
+        return replace(left, value=left.value * np.nan) if motion.motion.time[0] == start else left
 
-    monkeypatch.setattr(verify_module, "_judge", spoiled)
+    monkeypatch.setattr(Balance, "check", spoiled)
     assert {margin.limit for margin in broken(verify(BODY, dance, PLAN))} == {"balance"}
 
 

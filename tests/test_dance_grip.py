@@ -10,7 +10,8 @@ import pytest
 from biodance.body.human import human
 from biodance.dance.chain import ROOT, Chain
 from biodance.dance.dance import Dance
-from biodance.dance.limits import grip
+from biodance.dance.limits import family
+from biodance.dance.limits.grip import Grip
 from biodance.dance.person import fitted, read_person
 from biodance.dance.plan import Plan
 from biodance.dance.postures import ATTEMPTS, KEPT, anyhow, at, solve, start
@@ -32,7 +33,7 @@ FRAME = holding(stance(BODY, "parallel"), BODY, ("right",))
 def held() -> Array:
     rng = np.random.default_rng(0)
     for _ in range(4 * ATTEMPTS):
-        found = solve(CHAIN, FRAME, start(CHAIN, FRAME, rng), anyhow, iterations=60)
+        found = solve(CHAIN, FRAME, start(CHAIN, FRAME, rng), anyhow, family(), iterations=60)
         if found.violation <= KEPT:
             return found.x
     raise AssertionError("no posture reaches the grip")
@@ -45,21 +46,21 @@ def test_slopes_are_exact_and_a_free_hand_does_not_count() -> None:
     both = holding(FRAME, BODY, ("right", "left"))
 
     def value(x: Array) -> Array:
-        return grip.margins(State(CHAIN, both, x, *np.zeros((2, *x.shape)))).value
+        return Grip().margins(State(CHAIN, both, x, *np.zeros((2, *x.shape)))).value
 
     turn, step = rng.normal(size=x.shape), 1e-6
-    found = grip.margins(State(CHAIN, both, x, *np.zeros((2, *x.shape))))
+    found = Grip().margins(State(CHAIN, both, x, *np.zeros((2, *x.shape))))
     difference = (value(x + step * turn) - value(x - step * turn)) / (2 * step)
     np.testing.assert_allclose(np.einsum("tkn,tn->tk", found.slopes[0], turn), difference, rtol=1e-6)
     assert found.value.shape == (2, 2)
-    assert grip.margins(State(CHAIN, stance(BODY, "parallel"), x, *np.zeros((2, *x.shape)))).value.shape == (2, 0)
+    assert Grip().margins(State(CHAIN, stance(BODY, "parallel"), x, *np.zeros((2, *x.shape)))).value.shape == (2, 0)
 
 
 def test_a_posture_holds_the_frame_judged_by_other_code() -> None:
     x = held()
     pose = poses(BODY, CHAIN.motion(np.zeros(1), x[None], *np.zeros((2, 1, CHAIN.size))).q)
     segment, local = palm(BODY, "right")
-    assert np.linalg.norm(pose.points([segment], local[None])[0, 0] - FRAME.hands[0]) < grip.LOOSE
+    assert np.linalg.norm(pose.points([segment], local[None])[0, 0] - FRAME.hands[0]) < Grip().loose
     assert np.isnan(FRAME.hands[1]).all()
 
 

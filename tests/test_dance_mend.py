@@ -11,6 +11,7 @@ from biodance.dance.chain import Chain
 from biodance.dance.exchange import alike
 from biodance.dance.excitation import blocks
 from biodance.dance.ledger import Ledger
+from biodance.dance.limits import family
 from biodance.dance.mend import passable
 from biodance.dance.plan import Plan
 from biodance.dance.postures import KEPT, anyhow, solve, start
@@ -30,7 +31,7 @@ PLAN = Plan("small", "", (("parallel", 4),), hold=1.0)
 @pytest.fixture(scope="module")
 def course():
     rng, stances = np.random.default_rng(3), sequence(BODY, PLAN)
-    return Course(np.array([solve(CHAIN, s, start(CHAIN, s, rng), anyhow, iterations=30).x for s in stances]), stances)
+    return Course(np.array([solve(CHAIN, s, start(CHAIN, s, rng), anyhow, family(), iterations=30).x for s in stances]), stances)
 
 
 @pytest.fixture
@@ -76,7 +77,7 @@ def test_the_posture_that_cannot_be_reached_or_left_is_exchanged_for_another_one
     assert asked[1] == (1, [0])
     assert len(found.x) == 4
     assert not alike(np.array([course.x[trap], found.x[trap]]))[0, 1]
-    again = solve(CHAIN, found.stances[trap], found.x[trap], anyhow, iterations=0)
+    again = solve(CHAIN, found.stances[trap], found.x[trap], anyhow, family(), iterations=0)
     assert again.violation <= KEPT
     assert f"Posture {trap + 1} (with both feet side by side) was exchanged for another one" in notes[-1]
     assert "joint range" in notes[-1]
@@ -116,7 +117,7 @@ def test_a_way_leaves_half_of_what_a_lifting_sole_may_press(course, monkeypatch,
 
     monkeypatch.setattr(ways, "find_move", found)
     monkeypatch.setattr(ways, "verify", lambda *_: (Margin("ground_clearance", left, 0.01, "m"),))
-    task = Task(CHAIN, blocks(BODY), course.stances[0], course.x[:2], 2.0)
+    task = Task(CHAIN, blocks(BODY), course.stances[0], course.x[:2], 2.0, family())
     way = ways.find_way(task, PLAN, np.zeros((12, 6, 6)), [1, 3, 0])
     assert (way.limit == "") is taken
     assert (tried == [2.0]) is taken

@@ -7,6 +7,7 @@ import pytest
 
 from biodance.body.human import human
 from biodance.dance.chain import ROOT, Chain
+from biodance.dance.limits import family
 from biodance.dance.mirror import image_feet, mirrored, mirrored_vectors, symmetric
 from biodance.dance.person import PersonLimits, limited
 from biodance.dance.plan import Plan
@@ -24,8 +25,8 @@ FEET = tuple(s for s in sequence(BODY, Plan("all", "", tuple((name, 1) for name 
 @pytest.mark.parametrize("place", [0, 2, 3])
 def test_an_image_keeps_every_limit_as_well_as_its_posture(place):
     here, there = FEET[place], FEET[image_feet(FEET[place], FEET)]
-    posture = solve(CHAIN, here, start(CHAIN, here, np.random.default_rng(place)), anyhow, iterations=8)
-    image = solve(CHAIN, there, mirrored(CHAIN, posture.x, here, there), anyhow, iterations=0)
+    posture = solve(CHAIN, here, start(CHAIN, here, np.random.default_rng(place)), anyhow, family(), iterations=8)
+    image = solve(CHAIN, there, mirrored(CHAIN, posture.x, here, there), anyhow, family(), iterations=0)
     assert image.violation == pytest.approx(posture.violation, abs=1e-9)
     np.testing.assert_allclose(image.up, mirrored_vectors(BODY, posture.up), atol=1e-12)
     assert np.abs(image.x[ROOT:] - posture.x[ROOT:]).max() > 0.1

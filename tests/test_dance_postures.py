@@ -11,6 +11,7 @@ from biodance.dance import postures
 from biodance.dance.chain import Chain
 from biodance.dance.exchange import Posture, exchange, extremes
 from biodance.dance.excitation import blocks, condition, smooth_condition
+from biodance.dance.limits import family
 from biodance.dance.postures import KEPT, anyhow, at, solve, start
 from biodance.dance.stance import seat, stance
 from biodance.errors import BiodanceError
@@ -79,8 +80,8 @@ def test_a_search_lowers_the_criterion_and_the_same_seed_gives_the_same_postures
         monkeypatch.setattr(postures, name, sweeps)
     stances = (FEET, FEET.on(0), FEET.on(1))
     with ThreadPoolExecutor(1) as workers:
-        found = postures.find_postures(CHAIN, BLOCKS, stances, seed=3, workers=workers)
-        twice = postures.find_postures(CHAIN, BLOCKS, stances, seed=3, workers=workers)
+        found = postures.find_postures(CHAIN, BLOCKS, stances, family(), seed=3, workers=workers)
+        twice = postures.find_postures(CHAIN, BLOCKS, stances, family(), seed=3, workers=workers)
     np.testing.assert_array_equal(found.x, twice.x)
     rng = np.random.default_rng(0)
     anywhere = [at(CHAIN, s, start(CHAIN, s, rng)) for s in stances]
@@ -91,7 +92,7 @@ def test_a_search_lowers_the_criterion_and_the_same_seed_gives_the_same_postures
 
 def test_a_seated_person_keeps_the_pelvis_still_and_the_knees_up():
     stool = seat(BODY)
-    found = solve(CHAIN, stool, start(CHAIN, stool, np.random.default_rng(0)), anyhow, iterations=30)
+    found = solve(CHAIN, stool, start(CHAIN, stool, np.random.default_rng(0)), anyhow, family(), iterations=30)
     assert found.violation <= KEPT
     np.testing.assert_allclose(found.x[:6], [0, 0, stool.seat, 0, 0, 0], atol=1e-12)
 
@@ -101,7 +102,7 @@ def test_a_person_too_weak_to_stand_is_refused_by_the_name_of_the_limit(monkeypa
     limits = BODY.limits
     weak = replace(BODY, limits=replace(limits, torque_lower=0.02 * limits.torque_lower, torque_upper=0.02 * limits.torque_upper))
     with ThreadPoolExecutor(1) as workers, pytest.raises(BiodanceError, match="joint torque"):
-        postures.find_postures(Chain(weak), BLOCKS, (FEET,), seed=0, workers=workers)
+        postures.find_postures(Chain(weak), BLOCKS, (FEET,), family(), seed=0, workers=workers)
 
 
 def test_extreme_eigenvalues_in_closed_form():

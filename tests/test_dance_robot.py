@@ -17,6 +17,7 @@ from biodance.cli import run
 from biodance.dance.chain import Chain
 from biodance.dance.dance import Dance
 from biodance.dance.excitation import blocks, dynamic_grams
+from biodance.dance.limits import family
 from biodance.dance.person import HEALTHY, fitted
 from biodance.dance.postures import anyhow
 from biodance.dance.programme import Closure, closed
@@ -101,7 +102,7 @@ def test_a_slow_move_is_judged_at_fewer_instants_and_tells_as_much() -> None:
     chain, rng = Chain(HOAP), np.random.default_rng(1)
     ends = np.tile([0.05, 0.0, 0.25, *np.zeros(24)], (2, 1))
     ends[:, 18:] = rng.uniform(0.3, 0.7, (2, 9)) * (HOAP.limits.upper - HOAP.limits.lower)[12:] + HOAP.limits.lower[12:]
-    slow = Task(chain, blocks(HOAP), stance(HOAP, "parallel"), ends, 9.5)
+    slow = Task(chain, blocks(HOAP), stance(HOAP, "parallel"), ends, 9.5, family())
     assert len(slow.grid(10.0)) == len(replace(slow, duration=4.0).grid(10.0)) == 39
     assert len(replace(slow, duration=2.8).grid(10.0)) == 27
     move, _ = judged(slow, slow.straight())

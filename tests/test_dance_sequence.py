@@ -44,10 +44,10 @@ def test_sitting_and_standing_do_not_mix():
 
 def test_weight_over_one_foot_is_inside_both_bases():
     feet = sequence(BODY, Plan("one", "", (("parallel", 1), ("single_left", 1))))[1]
-    normals, offsets = feet.edges
+    normals, offsets = feet.reduced(0.6)
     assert (normals @ feet.centre + offsets).min() > 0
     for base in (feet.on(0, 1), feet.on(1)):
-        inner, offset = base.edges
+        inner, offset = base.reduced(0.6)
         assert (inner @ feet.centre + offset).min() > 0
 
 

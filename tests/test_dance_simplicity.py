@@ -7,6 +7,7 @@ import numpy as np
 from biodance.body.human import human
 from biodance.dance.chain import ROOT, Chain
 from biodance.dance.excitation import blocks, static_grams
+from biodance.dance.limits import family
 from biodance.dance.postures import KEPT, Exciting, Posture, at, exchange, solve, start
 from biodance.dance.simplicity import hardness
 from biodance.dance.stance import stance
@@ -65,7 +66,7 @@ def test_who_asks_for_simple_postures_gets_simpler_ones() -> None:
     found = {}
     for simplicity in (0.0, 2.0):
         objective = Exciting(replace(plain, simplicity=simplicity), others, 0.1 * 65.0 / 4, 8)
-        found[simplicity] = [solve(CHAIN, FEET, begun(seed), objective, iterations=30) for seed in (4, 5)]
+        found[simplicity] = [solve(CHAIN, FEET, begun(seed), objective, family(), iterations=30) for seed in (4, 5)]
     for usual, simple in zip(found[0.0], found[2.0], strict=True):
         assert usual.violation <= KEPT
         assert simple.violation <= KEPT

@@ -1,15 +1,16 @@
 """What a movement will be able to see, before any force is measured."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from diagnosed_sessions import body, known, motion
 from random_bodies import random_body, random_motion
 
-from biodance.dance.target import target
 from biodance.diagnose.foresight import foresee, planned, session_of
 from biodance.diagnose.separation import evaluate
-from biodance.identify.base_parameters import structural_base
 from biodance.identify.information import fold
+from biodance.identify.posterior import prior_factor
 from biodance.motion.regressor import regressor
 
 CHOSEN = ("plate_gain", "plate_offset", "body_mass", "time_delay", "added_mass")
@@ -49,7 +50,7 @@ def test_a_long_movement_is_cut_into_trials() -> None:
 
 def test_the_gradient_of_the_separation_agrees_with_differences() -> None:
     one = random_body(np.random.default_rng(0), n_segments=3)
-    aim = target(one, structural_base(one))
+    aim = SimpleNamespace(prior_factor=prior_factor(one.sip))
     R = fold(regressor(one, random_motion(one, np.random.default_rng(1), frames=40)).reshape(-1, 30))
     value, gradient = evaluate(R, aim)
     rng = np.random.default_rng(2)

@@ -13,6 +13,7 @@ from biodance.body.limits import joint_limits
 from biodance.dance.between import Near
 from biodance.dance.chain import Chain
 from biodance.dance.dance import Dance
+from biodance.dance.limits import family
 from biodance.dance.plan import Plan
 from biodance.dance.postures import KEPT, solve, start
 from biodance.dance.sequence import sequence, under
@@ -42,7 +43,7 @@ def dance() -> Dance:
         for _ in range(40):
             begin = start(chain, stance, rng)
             begin[3:] *= 0.3
-            found = solve(chain, stance, begin, Near(begin), iterations=40)
+            found = solve(chain, stance, begin, Near(begin), family(), iterations=40)
             if found.violation <= KEPT:
                 break
         rows.append(found.x)

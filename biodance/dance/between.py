@@ -6,6 +6,7 @@ import numpy as np
 
 from biodance.dance.chain import Chain
 from biodance.dance.exchange import Posture
+from biodance.dance.limits import Limit
 from biodance.dance.postures import ATTEMPTS, KEPT, refuse, solve, start
 from biodance.dance.stance import Stance
 from biodance.dance.state import State
@@ -29,7 +30,9 @@ class Near:
         return float(np.mean(gap**2)), by
 
 
-def middle_posture(chain: Chain, stance: Stance, neighbours: Array, *, seed: list[int], mild: float = MILD) -> Posture:
+def middle_posture(
+    chain: Chain, stance: Stance, neighbours: Array, limits: tuple[Limit, ...], *, seed: list[int], mild: float = MILD
+) -> Posture:
     """Return a posture on the feet ``stance`` between ``neighbours`` (K, n) coordinates; ``mild`` share of whose angles is the aim.
 
     Raises
@@ -41,9 +44,9 @@ def middle_posture(chain: Chain, stance: Stance, neighbours: Array, *, seed: lis
     begin = start(chain, stance, rng)
     begin[3:] = mild * neighbours[:, 3:].mean(axis=0)
     for _ in range(ATTEMPTS):
-        found = solve(chain, stance, begin, Near(begin), iterations=ITERATIONS)
+        found = solve(chain, stance, begin, Near(begin), limits, iterations=ITERATIONS)
         if found.violation <= KEPT:
             return found
         tried.append(begin)
         begin = start(chain, stance, rng)
-    refuse(chain, stance, tried)
+    refuse(chain, stance, tried, limits)

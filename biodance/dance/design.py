@@ -4,6 +4,7 @@ Two processes work side by side: the searches for postures, then the moves, wher
 all others do not wait for them. The result depends on body, plan and seed only, not on who was faster or how often it was interrupted.
 """
 
+from collections.abc import Iterable
 from concurrent.futures import Executor, ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +17,7 @@ from biodance.dance.chain import Chain
 from biodance.dance.dance import Dance
 from biodance.dance.excitation import blocks
 from biodance.dance.ledger import Ledger
+from biodance.dance.limits import Limit
 from biodance.dance.mend import passable
 from biodance.dance.order import walk
 from biodance.dance.plan import Plan
@@ -34,12 +36,20 @@ SHORT = 1.0
 
 
 def design(
-    body: Body, plan: Plan, *, seed: int = 0, tell: Tell | None = None, resume: Path | None = None, workers: Executor | None = None
+    body: Body,
+    plan: Plan,
+    *,
+    limits: Iterable[Limit | type[Limit]] = (),
+    seed: int = 0,
+    tell: Tell | None = None,
+    resume: Path | None = None,
+    workers: Executor | None = None,
 ) -> tuple[Dance, tuple[Margin, ...]]:
     """Return the dance of ``body`` (its limits count) after ``plan``, and what is left of every limit on a grid of 100 Hz (`verify`).
 
-    ``tell`` is told the progress; with ``resume``, a folder, an interrupted design of the same body, plan and seed goes on; ``workers``
-    run the searches (default: two processes).
+    ``limits`` are kept beside those of the plan, or in place of one of the same name; ``tell`` is told the progress; with
+    ``resume``, a folder, an interrupted design of the same body, plan and seed goes on; ``workers`` run the searches (default:
+    two processes).
 
     Raises
     ------
@@ -48,7 +58,8 @@ def design(
     """
     if workers is None:
         with ProcessPoolExecutor(WORKERS) as pool:
-            return design(body, plan, seed=seed, tell=tell, resume=resume, workers=pool)
+            return design(body, plan, limits=limits, seed=seed, tell=tell, resume=resume, workers=pool)
+    plan = plan.with_limits(limits)
     chain, parts = Chain(body), blocks(body)
     parts = replace(parts, weight=parts.weight * plan.emphasis(body.segments), simplicity=plan.simplicity)
     work = Work(chain, parts, plan, seed, Ledger(resume, body, plan, seed), workers, tell or (lambda what, done, of: None))
@@ -70,7 +81,7 @@ def _postures(work: Work) -> Course:
     kept = work.ledger.get("postures")
     if kept is None:
         work.tell("postures", 0, len(counted))
-        found = find_postures(chain, work.blocks, tuple(counted), seed=work.seed, workers=work.workers)
+        found = find_postures(chain, work.blocks, tuple(counted), plan.limits, seed=work.seed, workers=work.workers)
         kept = {"x": found.x}
         work.ledger.put("postures", **kept)
     work.tell("postures", len(counted), len(counted))
@@ -87,7 +98,7 @@ def _postures(work: Work) -> Course:
     known = np.flatnonzero(~np.isnan(rows[:, 0]))
     for k in sorted(set(range(len(stances))) - set(known)):
         near = [known[known < k][-1], *known[known > k][:1]]
-        rows[k] = middle_posture(chain, stances[k], rows[near], seed=[work.seed, 2, k]).x
+        rows[k] = middle_posture(chain, stances[k], rows[near], plan.limits, seed=[work.seed, 2, k]).x
     return Course(rows, stances)
 
 

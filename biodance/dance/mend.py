@@ -61,7 +61,7 @@ def _exchanged(work: Work, course: Course, places: list[int], attempt: int) -> C
             x[place] = _another(work, course, place, np.random.default_rng([work.seed, 4, attempt, place]))
         else:
             near, seed = _neighbours(x, place), [work.seed, 5, attempt, place]
-            x[place] = middle_posture(work.chain, course.stances[place], near, seed=seed, mild=REST[attempt - 1]).x
+            x[place] = middle_posture(work.chain, course.stances[place], near, work.plan.limits, seed=seed, mild=REST[attempt - 1]).x
         course = replace(course, x=x)
     return course
 
@@ -74,7 +74,7 @@ def _another(work: Work, course: Course, place: int, rng: np.random.Generator) -
     grams = static_grams(np.array([p.up for p in others]).reshape(-1, len(chain.body.segments), 3))
     objective = Exciting(blocks, grams, 0.1 * float(blocks.weight.sum()) / (len(others) + 1), SHARPNESS)
     starts = [start(chain, stance, rng) for _ in range(STARTS)]
-    tasks = [work.workers.submit(solve, chain, stance, begin, objective, iterations=ITERATIONS) for begin in starts]
+    tasks = [work.workers.submit(solve, chain, stance, begin, objective, work.plan.limits, iterations=ITERATIONS) for begin in starts]
     found = [task.result() for task in tasks]
     same = [x for s, x, k in zip(course.stances, course.x, range(len(course.x)), strict=True) if s.name == stance.name and k != place]
     kept = [p for p in found if p.violation <= KEPT and not alike(np.array([p.x, *same]))[0, 1:].any()]

@@ -31,7 +31,7 @@ class _Search:
         chain, ends = work.chain, list(pairwise(course.x))
         feet = [under(first, second) for first, second in pairwise(course.stances)]
         self.work, self.attempt, self.found = work, attempt, dict(known)
-        self.tasks = [Task(chain, work.blocks, f, np.array(e), work.plan.move) for f, e in zip(feet, ends, strict=True)]
+        self.tasks = [Task(chain, work.blocks, f, np.array(e), work.plan.move, work.plan.limits) for f, e in zip(feet, ends, strict=True)]
         nothing = np.zeros((len(chain.body.segments), 6, 6))
         self.queue: dict[tuple[int, ...], list[int]] = {task.stance.planted: [] for task in self.tasks}
         self.history: dict[tuple[int, ...], Array] = dict.fromkeys(self.queue, nothing)

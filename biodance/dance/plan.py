@@ -4,12 +4,14 @@ A Plan comes from a protocol file (`protocol_file.read_dance`); a person's reduc
 person who may not stand on one leg takes blocks out of the plan (`person.fitted`), so that whoever designs needs the two records only.
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from typing import get_args
 
 import numpy as np
 
 from biodance.body.limits import Range
+from biodance.dance.limits import Limit, family, joined
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import Array
 
@@ -22,13 +24,13 @@ class Plan:
     """A protocol of a dance.
 
     ``blocks``: (stance, number of postures) in the order in which they are danced, each stance of ``STANCES`` at most once;
-    ``move``, ``hold`` s of a transition and of a posture (the paper: 2 and 5); ``forward`` m by which the right foot stands in front;
-    ``share`` of every half width of the base of support that may be used (paper 0.6); ``budget`` s: from the
-    postures found, those that inform most per second are danced until the time is used up (inf: all); ``weights`` (segment, factor) in
-    eq. 12 on top of the masses, ``other_weight`` the factor of all segments not named; ``simplicity`` >= 0 of the performer's term beside
-    the excitation; ``alone`` the legs on which the person may stand alone, be it for a step;
-    ``holds`` the hands that stay on the grips of a frame; ``ranges`` what joints may use: what is reached without effort, or all that a
-    healthy joint allows (the paper).
+    ``move``, ``hold`` s of a transition and of a posture (the paper: 2 and 5); ``forward`` m by which the right foot stands
+    in front; ``limits`` that all of it keeps, with their numbers; ``budget`` s: from the postures found, those that inform
+    most per second are danced until the time is used up (inf: all); ``weights`` (segment, factor) in eq. 12 on top of the
+    masses, ``other_weight`` the factor of all segments not named; ``simplicity`` >= 0 of the performer's term beside the
+    excitation; ``alone`` the legs on which the person may stand alone, be it for a step; ``holds`` the hands that stay on
+    the grips of a frame; ``ranges`` what joints may use: what is reached without effort, or all that a healthy joint allows
+    (the paper).
     """
 
     name: str
@@ -37,7 +39,6 @@ class Plan:
     move: float = 2.0
     hold: float = 5.0
     forward: float = 0.2
-    share: float = 0.6
     budget: float = float("inf")
     weights: tuple[tuple[str, float], ...] = ()
     other_weight: float = 1.0
@@ -45,6 +46,7 @@ class Plan:
     alone: tuple[str, ...] = ("right", "left")
     holds: tuple[str, ...] = ()
     ranges: Range = "comfortable"
+    limits: tuple[Limit, ...] = field(default_factory=family)
 
     def __post_init__(self) -> None:
         names = [name for name, _ in self.blocks]
@@ -62,7 +64,6 @@ class Plan:
             ("move", 0.5, 20.0, "s"),
             ("hold", 0.0, 60.0, "s"),
             ("forward", 0.05, 0.4, "m"),
-            ("share", 0.1, 1.0, ""),
             ("simplicity", 0.0, 100.0, ""),
         ):
             value = getattr(self, name)
@@ -83,6 +84,15 @@ class Plan:
     def seated(self) -> bool:
         """True where the whole dance is on a stool."""
         return all(name == "seated" for name, _ in self.blocks)
+
+    @property
+    def share(self) -> float:
+        """Share of every half width of the base of support that all limits leave: for it the feet are set."""
+        return min((limit.support_share for limit in self.limits), default=1.0)
+
+    def with_limits(self, more: Iterable[Limit | type[Limit]]) -> "Plan":
+        """Return the plan with ``more`` limits, objects or classes; one of a name that is there already takes its place."""
+        return replace(self, limits=joined(self.limits, more))
 
     def emphasis(self, segments: tuple[str, ...]) -> Array:
         """Return the factor (N,) of each of the ``segments`` in eq. 12; UnknownName if a weight names none of them."""

@@ -15,10 +15,10 @@ from biodance.body.body import UPRIGHT
 from biodance.dance.chain import ROOT, Chain
 from biodance.dance.exchange import Posture, exchange
 from biodance.dance.excitation import Blocks, smooth_condition, static_grams, total, upright_slopes, uprights
-from biodance.dance.limits import limits
+from biodance.dance.limits import Limit
 from biodance.dance.mirror import image_feet, mirrored, mirrored_vectors, symmetric
 from biodance.dance.programme import Judged, Objective, Programme, closed
-from biodance.dance.refusal import PERSONAL, Excess, describe, told
+from biodance.dance.refusal import Excess, describe, told
 from biodance.dance.simplicity import hardness
 from biodance.dance.sqp import minimise
 from biodance.dance.stance import Stance
@@ -26,11 +26,6 @@ from biodance.dance.state import State
 from biodance.errors import BiodanceError
 from biodance.records import Array
 
-STATIC = ("balance", "foot_placement", "grip", "ground_clearance", "joint_range", "joint_torque", "seat", "self_collision")
-RESERVE = 0.06
-"""Share of every limit's scale that is kept in reserve, for the moves that begin and end here."""
-WIDER = {"balance": 0.2, "foot_placement": 0.4}
-"""Larger ones: whoever leaves the edge of the support first pushes the zero-moment point towards it; straight legs are singular."""
 KEPT = 0.01
 """Violation, in scales of the limits, of the reserved margins that is accepted."""
 RUNS = 2
@@ -63,8 +58,7 @@ def free_coordinates(chain: Chain, stance: Stance) -> list[int]:
 
 def start(chain: Chain, stance: Stance, rng: np.random.Generator) -> Array:
     """Return the coordinates (n,) of a squat of any depth over the support, arms and trunk anywhere; seated: all joints anywhere."""
-    limits_, x = chain.body.limits, np.zeros(chain.size)
-    low, high = limits_.lower, limits_.upper
+    low, high, x = chain.body.limits.lower, chain.body.limits.upper, np.zeros(chain.size)
     x[ROOT:] = low + (high - low) * rng.uniform(0.15, 0.85, len(low))
     if stance.seat:
         x[2] = stance.seat
@@ -103,16 +97,17 @@ class Exciting:
         return value + 10 * self.blocks.simplicity * hard, by + 10 * self.blocks.simplicity * slopes
 
 
-def find_postures(chain: Chain, blocks: Blocks, stances: tuple[Stance, ...], *, seed: int, workers: Executor) -> Postures:
-    """Return one posture per entry of ``stances``, together the most exciting for all first moments.
-
+def find_postures(
+    chain: Chain, blocks: Blocks, stances: tuple[Stance, ...], limits: tuple[Limit, ...], *, seed: int, workers: Executor
+) -> Postures:
+    """Return one posture per entry of ``stances`` that keeps the ``limits``, together the most exciting for all first moments.
 
     Raises
     ------
     BiodanceError
         On some feet there is no posture within the limits; the message names the limit.
     """
-    search, named = _Search(chain, blocks, stances, seed), {stance.name: k for k, stance in enumerate(stances)}
+    search, named = _Search(chain, blocks, stances, limits, seed), {stance.name: k for k, stance in enumerate(stances)}
     checked = {name: workers.submit(search.possible, k) for name, k in named.items()}
     possible = {name: task.result() for name, task in checked.items()}
     tasks = [workers.submit(search.run, run) for run in range(RUNS)]
@@ -148,14 +143,15 @@ def anyhow(state: State) -> tuple[float, Array]:
     return 0.0, np.zeros((3, *state.x.shape))
 
 
-def refuse(chain: Chain, stance: Stance, begin: list[Array]) -> NoReturn:
+def refuse(chain: Chain, stance: Stance, begin: list[Array], limits: tuple[Limit, ...]) -> NoReturn:
     """Raise the BiodanceError that says which limit forbids every posture on these feet: the first without which there would be one."""
-    for name in PERSONAL:
-        names = tuple(other for other in STATIC if other != name)
+    kept = [limit for limit in limits if limit.at_rest]
+    for limit in sorted(kept, key=lambda limit: limit.suspicion):
+        others = tuple(other for other in kept if other is not limit)
         for x in begin:
-            posture = solve(chain, stance, x, Excess(name), iterations=60, names=names)
+            posture = solve(chain, stance, x, Excess(limit), others, iterations=60)
             if posture.violation <= KEPT:
-                what = describe(State(chain, stance, posture.x[None], *np.zeros((2, 1, chain.size))), name)
+                what = describe(State(chain, stance, posture.x[None], *np.zeros((2, 1, chain.size))), limit)
                 raise BiodanceError(
                     f"No posture {told(stance)} keeps all limits; there would be one without the limit on {what}. "
                     "Widen that limit, or leave this stance out of the protocol."
@@ -172,6 +168,7 @@ class _Search:
     chain: Chain
     blocks: Blocks
     stances: tuple[Stance, ...]
+    limits: tuple[Limit, ...]
     seed: int
 
     def anywhere(self, place: int, run: int) -> Array:
@@ -181,9 +178,9 @@ class _Search:
     def possible(self, place: int) -> Posture:
         """Return a posture that keeps all limits at this place, or raise the BiodanceError that names the limit that forbids it."""
         begin, stance = [self.anywhere(place, run) for run in range(ATTEMPTS)], self.stances[place]
-        found = (solve(self.chain, stance, x, anyhow, iterations=30) for x in begin)
+        found = (solve(self.chain, stance, x, anyhow, self.limits, iterations=30) for x in begin)
         posture = next((p for p in found if p.violation <= KEPT), None)
-        return posture or refuse(self.chain, stance, begin)
+        return posture or refuse(self.chain, stance, begin, self.limits)
 
     def with_images(self, kept: list[list[Posture]], found: list[list[Posture]]) -> list[list[Posture]]:
         """Return the postures ``kept`` of every place and the mirror images of ``found`` (`mirror`), of a body whose sides are alike."""
@@ -215,23 +212,24 @@ class _Search:
             objective = Exciting(self.blocks, static_grams(others), unit, sharpness)
             x, steps = begin[p], iterations
             for attempt in range(ATTEMPTS):
-                now[p] = solve(self.chain, self.stances[p], x, objective, iterations=steps)
+                now[p] = solve(self.chain, self.stances[p], x, objective, self.limits, iterations=steps)
                 if now[p].violation <= KEPT:
                     break
                 x, steps = self.anywhere(p, 3 + attempt), max(iterations, 20)
         return [now[p] for p in sorted(order)]
 
 
-def solve(chain: Chain, stance: Stance, begin: Array, objective: Objective, *, iterations: int, names: tuple[str, ...] = STATIC) -> Posture:
-    """Return the posture on the feet ``stance`` that is best for ``objective`` near ``begin`` (n,) and keeps the limits ``names``."""
+def solve(chain: Chain, stance: Stance, begin: Array, objective: Objective, limits: tuple[Limit, ...], *, iterations: int) -> Posture:
+    """Return the posture on the feet ``stance`` that is best for ``objective`` near ``begin`` (n,) and keeps those of the ``limits`` that
+    count at rest.
+    """
     free = free_coordinates(chain, stance)
     base, basis = np.zeros((3, 1, chain.size)), np.zeros((3, 1, 1))
     base[0, 0] = begin
     base[0, 0, free] = 0.0
     basis[0] = 1.0
-    kept = tuple(limit for limit in limits() if limit.NAME in names)
-    wider = WIDER if stance.over is None else {**WIDER, "balance": RESERVE}  # with the weight over one foot there is no more room
-    reserve = np.array([[wider.get(limit.NAME, RESERVE) for limit in kept]])
+    kept = tuple(limit for limit in limits if limit.at_rest)
+    reserve = np.array([[limit.hold_reserve(stance) for limit in kept]])
     programme = Programme(chain, stance, base, basis, free, kept, objective, reserve)
     found = minimise(programme.judge, begin[free], iterations=iterations)
     state = programme.state(found.y)

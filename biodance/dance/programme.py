@@ -2,12 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from biodance.dance.chain import ROOT, Chain
+from biodance.dance.limits import Limit
 from biodance.dance.stance import Stance
 from biodance.dance.state import State, cross
 from biodance.records import Array
@@ -94,7 +94,7 @@ class Programme:
     base: Array
     basis: Array
     free: list[int]
-    limits: tuple[ModuleType, ...]
+    limits: tuple[Limit, ...]
     objective: Objective
     reserve: Array
 
@@ -115,7 +115,7 @@ class Judged:
     def __init__(self, programme: Programme, state: State) -> None:
         self.programme, self.state = programme, state
         self.value, self._slope = programme.objective(state)
-        self._found = [(limit.margins(state), limit.SCALE) for limit in programme.limits]
+        self._found = [(limit.margins(state), limit.scale) for limit in programme.limits]
         spare = programme.reserve.T[:, :, None]
         self._spare = [m.value / scale - r for (m, scale), r in zip(self._found, spare, strict=True)]
         self.margins = np.concatenate([np.empty(0), *(spare.ravel() for spare in self._spare)])
@@ -125,7 +125,7 @@ class Judged:
         """The largest violation in the scale of its limit (negative: room left), and the name of the limit."""
         least = [float(spare.min(initial=np.inf)) for spare in self._spare]
         k = int(np.argmin(least))
-        return -least[k], str(self.programme.limits[k].NAME)
+        return -least[k], self.programme.limits[k].name
 
     @property
     def least(self) -> Array:

@@ -5,7 +5,7 @@
     move_s = 2.0                 seconds from posture to posture
     hold_s = 1.5                 seconds of standing still in each
     forward_m = 0.2              how far the right foot stands in front in "right_forward"
-    share_of_support = 0.6       of every half width of the base of support that may be used
+    share_of_support = 0.6       short for the share under [limits.balance]
     budget_s = 115               the postures that inform most per second are danced until the time is used up; without it: all
     simplicity = 0.0             the performer's term: 0 = excitation only; 1 = a simple dance is worth as much as an exciting one
     other_weight = 1.0           emphasis of the segments that [weights] does not name
@@ -18,6 +18,9 @@
     single_left = 15             on the left leg
     seated = 20                  on a stool
 
+    [limits.friction]            numbers of the limits, each named as its file in biodance/dance/limits
+    mu = 0.4
+
     [weights]                    emphasis of segments, on top of their masses
     trunk_head = 2.0
 
@@ -29,6 +32,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from biodance.dance.limits import Limit, limits_with
 from biodance.dance.plan import Plan
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import locate, read_toml
@@ -37,13 +41,14 @@ NUMBERS = {
     "move_s": "move",
     "hold_s": "hold",
     "forward_m": "forward",
-    "share_of_support": "share",
     "budget_s": "budget",
     "simplicity": "simplicity",
     "other_weight": "other_weight",
 }
 """Key of the file: field of the Plan."""
-KEYS = ("name", "description", "postures", "weights", "ranges", *NUMBERS)
+SHORT = {"share_of_support": ("balance", "share")}
+"""Key of the file: limit and its number."""
+KEYS = ("name", "description", "postures", "limits", "weights", "ranges", *NUMBERS, *SHORT)
 
 
 def read_plan(name_or_path: str | Path) -> Plan:
@@ -71,7 +76,22 @@ def read_plan(name_or_path: str | Path) -> Plan:
             raise BiodanceError(f"{path}: postures.{stance} = {count!r}; expected a whole number of postures.")
     weights = {name: number(path, f"weights.{name}", value) for name, value in table(path, raw, "weights").items()}
     plan = Plan(str(raw.get("name", path.stem)), str(raw.get("description", "")), tuple(counts.items()), weights=tuple(weights.items()))
-    return replace(plan, **fields)
+    return replace(plan, limits=_limits(path, raw), **fields)
+
+
+def _limits(path: Path, raw: dict[str, Any]) -> tuple[Limit, ...]:
+    """Return all limits with the numbers that the file gives them."""
+    given = table(path, raw, "limits")
+    found = {
+        name: {key: number(path, f"limits.{name}.{key}", value) for key, value in table(path, given, name, of="limits.").items()}
+        for name in given
+    }
+    for short, (name, key) in SHORT.items():
+        if short in raw and key in found.get(name, {}):
+            raise BiodanceError(f"{path}: {short} and limits.{name}.{key} say the same; keep one of them.")
+        if short in raw:
+            found.setdefault(name, {})[key] = number(path, short, raw[short])
+    return limits_with(found, where=str(path))
 
 
 def number(path: Path, where: str, value: object) -> float:
@@ -81,9 +101,9 @@ def number(path: Path, where: str, value: object) -> float:
     return float(value)
 
 
-def table(path: Path, raw: dict[str, Any], key: str) -> dict[str, Any]:
+def table(path: Path, raw: dict[str, Any], key: str, *, of: str = "") -> dict[str, Any]:
     """Return a table of a TOML file, empty if it is missing; BiodanceError if it is something else."""
     value = raw.get(key, {})
     if not isinstance(value, dict):
-        raise BiodanceError(f"{path}: [{key}] must be a table, found {value!r}.")
+        raise BiodanceError(f"{path}: [{of}{key}] must be a table, found {value!r}.")
     return value

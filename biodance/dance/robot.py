@@ -5,7 +5,7 @@ as heavy as a person, with all times, speeds and strengths as gravity demands (`
 same angles, slower or faster. Nothing is approximated by that, and the dance is checked on the robot as it is.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from biodance.body.similar import Likeness, likeness
 from biodance.dance.chain import Chain
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
+from biodance.dance.limits import Limit
 from biodance.dance.plan import Plan
 from biodance.dance.stance import Stance
 from biodance.dance.verify import Margin, verify
@@ -61,7 +62,13 @@ def person_sized(body: Body) -> Likeness:
 
 
 def design_robot(
-    body: Body, plan: Plan, *, seed: int = 0, tell: Tell | None = None, resume: Path | None = None
+    body: Body,
+    plan: Plan,
+    *,
+    limits: Iterable[Limit | type[Limit]] = (),
+    seed: int = 0,
+    tell: Tell | None = None,
+    resume: Path | None = None,
 ) -> tuple[Dance, tuple[Margin, ...]]:
     """Return the dance of the robot ``body`` (in standing frames; its limits count) after ``plan`` (`robot_plan`), and what is left of
     every limit; see `design.design`.
@@ -71,7 +78,7 @@ def design_robot(
     BiodanceError
         There is no such dance: the message names the posture or move and the limit that forbids it.
     """
-    to = person_sized(body)
+    plan, to = plan.with_limits(limits), person_sized(body)
     time, length = to.time, to.length
     long = replace(
         plan,

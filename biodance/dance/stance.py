@@ -29,8 +29,8 @@ class Stance:
     """One foot configuration.
 
     ``name``; ``ankle`` (2, 3) m lab frame, right and left, where each foot stands or would stand, flat and facing lab x; ``planted`` the
-    feet on the ground (0 right, 1 left); ``soles`` (2, P, 3) m their outlines; ``share`` of every half width of the support that may be
-    used (0.6 in the paper); ``props`` (K, 2) m corners on the ground of what else bears weight: the legs of a stool;
+    feet on the ground (0 right, 1 left); ``soles`` (2, P, 3) m their outlines; ``share`` of every half width of the support for which the
+    stance is laid out (`Limit.support_share`); ``props`` (K, 2) m corners on the ground of what else bears weight: the legs of a stool;
     ``hands`` (2, 3) m grips that the right and the left hand hold, NaN = free;
     ``seat`` m height of the hip centres of a person on a stool, pelvis upright and still over the lab origin; 0 standing;
     ``over`` the one of two planted feet (0, 1) over which the weight is, so that the other could be lifted; None anywhere.
@@ -40,7 +40,7 @@ class Stance:
     ankle: Array
     planted: tuple[int, ...]
     soles: Array
-    share: float = 0.6
+    share: float = 1.0
     props: Array = field(default_factory=lambda: np.empty((0, 2)))
     seat: float = 0.0
     over: int | None = None
@@ -68,21 +68,28 @@ class Stance:
         if self.over is not None:
             from scipy.optimize import linprog
 
-            normals, offsets = self.edges
+            normals, offsets = self.reduced(self.share)
             rows = np.column_stack([-normals, np.ones(len(normals))])
             return np.asarray(linprog([0.0, 0.0, -1.0], rows, offsets, bounds=(None, None)).x[:2])
         return (self.support.min(axis=0) + self.support.max(axis=0)) / 2
 
-    @cached_property
-    def edges(self) -> tuple[Array, Array]:
-        """Unit inward normals (P, 2) and offsets (P,) m of the reduced support: ``normals @ p + offsets`` is the distance inside.
-
-        With the weight over one foot: of the reduced supports of both feet and of that one.
+    def reduced(self, share: float) -> tuple[Array, Array]:
+        """Return unit inward normals (P, 2) and offsets (P,) m of the base of support, drawn together to ``share`` about its middle:
+        ``normals @ p + offsets`` is the distance inside. With the weight over one foot: of both feet's base and of that one's.
         """
+        if share not in self._reduced:
+            self._reduced[share] = self._edges(share)
+        return self._reduced[share]
+
+    @cached_property
+    def _reduced(self) -> dict[float, tuple[Array, Array]]:
+        return {}
+
+    def _edges(self, share: float) -> tuple[Array, Array]:
         if self.over is not None:
-            normals, offsets = zip(self.on(0, 1).edges, self.on(self.over).edges, strict=True)
+            normals, offsets = zip(self.on(0, 1).reduced(share), self.on(self.over).reduced(share), strict=True)
             return np.concatenate(normals), np.concatenate(offsets)
-        corners = self.centre + self.share * (self.support - self.centre)
+        corners = self.centre + share * (self.support - self.centre)
         along = np.roll(corners, -1, axis=0) - corners
         normals = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.linalg.norm(along, axis=1, keepdims=True)
         return normals, -np.einsum("ij,ij->i", normals, corners)
@@ -99,7 +106,7 @@ class Stance:
 
 
 def stance(
-    body: Body, name: str, *, left: float = 0.0, right: float = 0.0, planted: tuple[int, ...] = (0, 1), share: float = 0.6
+    body: Body, name: str, *, left: float = 0.0, right: float = 0.0, planted: tuple[int, ...] = (0, 1), share: float = 1.0
 ) -> Stance:
     """Return a stance with the ankles ``left`` and ``right`` m ahead of the lab origin, side by side at the person's width."""
     height = -float(body.feet["right"].outline[:, 1].min())
@@ -121,7 +128,7 @@ def holding(feet: Stance, body: Body, hands: tuple[str, ...]) -> Stance:
     return replace(feet, hands=grips)
 
 
-def seat(body: Body, *, share: float = 0.6) -> Stance:
+def seat(body: Body, *, share: float = 1.0) -> Stance:
     """Return the stance of a person on a stool, hips over the lab origin, feet hanging above the ground."""
     feet = stance(body, "seated", planted=(), share=share)
     legs = [np.linalg.norm(body.joints[body.joint_index(f"{side}_ankle_dorsiflexion")].translation) for side in ("right", "left")]

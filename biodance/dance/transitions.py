@@ -11,7 +11,7 @@ import numpy as np
 
 from biodance.dance.chain import Chain
 from biodance.dance.excitation import Blocks, condition, dynamic_grams, dynamic_slopes, total
-from biodance.dance.limits import limits
+from biodance.dance.limits import Limit
 from biodance.dance.postures import free_coordinates
 from biodance.dance.programme import Judged, Programme
 from biodance.dance.programme import Objective as Judge
@@ -29,9 +29,7 @@ CHECK = 50.0
 SLOW = 4.0
 """s: longer moves, of slow robots, are judged at as many instants as a move of this time: it is the same spline through as many points."""
 RESERVE = 0.04
-"""Share of every limit's scale that is kept in reserve for the instants in between; for a foot's clearance none at the ends."""
-LEGS = 0.3
-"""The same for the reach of planted legs, which are singular when straight, if it is more."""
+"""Share of every limit's scale that is kept in reserve for the instants in between."""
 BETWEEN = 0.004
 """The same where a move is judged, for what is between those instants."""
 THIRDS = np.array([0.20987654, 0.79012346])
@@ -50,13 +48,14 @@ coarse grid."""
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A move to find: from ``ends[0]`` to ``ends[1]`` (2, n) in ``duration`` s on the feet of ``stance``."""
+    """A move to find: from ``ends[0]`` to ``ends[1]`` (2, n) in ``duration`` s on the feet of ``stance``, within the ``limits``."""
 
     chain: Chain
     blocks: Blocks
     stance: Stance
     ends: Array
     duration: float
+    limits: tuple[Limit, ...]
 
     @property
     def excited(self) -> list[int]:
@@ -75,16 +74,15 @@ class Task:
 
     def programme(self, via: Array, free: list[int], time: Array, *, reserve: float, objective: Judge) -> Programme:
         """Return the programme of the via points of the ``free`` coordinates at instants ``time`` s, the others as in ``via`` (2, n)."""
-        basis, kept = basis_at(time, self.duration), limits()
+        basis, kept = basis_at(time, self.duration), tuple(limit for limit in self.limits if limit.in_motion)
         points = np.stack([self.ends[0], *via, self.ends[1]])
         points[1:3, free] = 0.0
         parts = np.stack([basis.position, basis.velocity, basis.acceleration])
         s = time / self.duration
         way = s**3 * (10 - 15 * s + 6 * s**2)
-        lifting, legs = (np.array([name == limit.NAME for limit in kept]) for name in ("ground_clearance", "foot_placement"))
-        share = np.where(
-            lifting, reserve * (4 * way * (1 - way))[:, None], np.where(legs & (reserve > BETWEEN), max(LEGS, reserve), reserve)
-        )
+        least = [max(reserve, limit.move_reserve) if reserve > BETWEEN else reserve for limit in kept]
+        bell = np.where([limit.tapers for limit in kept], (4 * way * (1 - way))[:, None], 1.0)
+        share = np.array(least) * bell
         return Programme(self.chain, self.stance, parts @ points, parts[:, :, 1:3], free, kept, objective, share)
 
     def grid(self, rate: float) -> Array:

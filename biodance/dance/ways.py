@@ -16,9 +16,9 @@ SLOWER = (1.0, 1.4)
 """Factors on the duration of a move, one after the other."""
 DETOURS = 2
 """Postures in between that are tried."""
-PRESSED = 5e-10
-"""m that a way leaves of what a lifting sole may be below the ground (`verify.TOUCH`), because the check of the whole dance sees other
-instants of the same way."""
+SPARE = 0.5
+"""Share of what a limit's check forgives (`Limit.rounding`) that a way leaves, because the check of the whole dance sees other instants of
+the same way."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ def find_way(task: Task, plan: Plan, history: Array, seed: list[int]) -> Way:
             return way
     for attempt in range(DETOURS):
         try:
-            stop = middle_posture(task.chain, task.stance, task.ends, seed=[*seed, attempt]).x
+            stop = middle_posture(task.chain, task.stance, task.ends, task.limits, seed=[*seed, attempt]).x
         except BiodanceError:
             continue
         parts = _through(task, history, stop, [*seed, attempt])
@@ -60,7 +60,8 @@ def _doubted(task: Task, plan: Plan, way: Way) -> str:
     rows = np.array([task.ends[0], *way.stops, task.ends[1]])
     feet, body = (task.stance,) * len(rows), task.chain.body
     margins = verify(body, Dance("way", body, rows, feet, np.zeros(len(rows)), way.via, way.duration, feet[1:], 0), plan)
-    wrong = [margin.limit for margin in margins if not margin.worst >= (PRESSED if margin.limit == "ground_clearance" else 0.0)]
+    spare = {limit.name: SPARE * limit.rounding for limit in plan.limits}
+    wrong = [margin.limit for margin in margins if not margin.worst >= spare.get(margin.limit, 0.0)]
     return wrong[0] if wrong else ""
 
 

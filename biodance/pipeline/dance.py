@@ -1,7 +1,7 @@
 """A dance for one person, from what is known of the person to the numbers of the finished dance, all steps in order."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,6 +15,7 @@ from biodance.dance.account import Account, account
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.expectation import Expectation, expect
+from biodance.dance.limits import Limit
 from biodance.dance.person import PersonLimits, fitted
 from biodance.dance.plan import Plan
 from biodance.dance.verify import Margin, broken
@@ -98,6 +99,7 @@ def make_dance(
     plan: Plan,
     person: PersonLimits,
     *,
+    limits: Iterable[Limit | type[Limit]] = (),
     seed: int = 0,
     tell: Tell = lambda *_: None,
     resume: Path | None = None,
@@ -105,13 +107,15 @@ def make_dance(
 ) -> DanceResult:
     """Design, check and count a dance of ``plan`` for ``body`` with the limits of ``person``; ``resume`` keeps what is finished meanwhile.
 
+    ``limits`` are kept beside those of the plan, or in place of one of the same name (`dance.limits`).
+
     Raises
     ------
     BiodanceError
         The protocol and the person contradict each other (`person.fitted`).
     """
     started = time.perf_counter()
-    own, plan, notes = fitted(body, plan, person)
+    own, plan, notes = fitted(body, plan.with_limits(limits), person)
     reason, margins, dance = "", tuple[Margin, ...](), None
     try:
         dance, margins = makers.design(own, plan, seed=seed, tell=tell, resume=resume)

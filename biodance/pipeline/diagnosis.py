@@ -15,8 +15,6 @@ from biodance.diagnose.problem import Look
 from biodance.diagnose.tolerances import Tolerances
 from biodance.discovery import Chosen
 from biodance.effects import Case, DiscreteEffect, Effect, Gate, causes, gates
-from biodance.effects.case import Case
-from biodance.effects.gate import Gate, gates
 from biodance.errors import BiodanceError, NotSolved, SessionRefused, TrialRefused
 from biodance.identify.added_mass import expected
 from biodance.identify.identification import Identification, identify, standing_point

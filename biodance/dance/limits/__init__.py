@@ -1,37 +1,89 @@
-"""FAMILY: one constraint per file, found automatically.
+"""FAMILY: one constraint of a dance per file, found automatically; others come as objects or by the entry points ``biodance.limits``.
 
-A limit has a ``NAME``, a ``UNIT``, a ``SCALE`` (a noticeable amount in that unit) and one function ``margins(state)``, which returns what
-is left of it in every sample, negative where it is broken, with exact derivatives. The optimiser uses these.
+A member is a frozen dataclass that derives from `Limit`, given as ``LIMIT`` by its file: its numbers are fields (``[limits.friction]
+mu = 0.4`` in a protocol), ``margins`` is for the optimiser, ``check`` judges the finished motion by other code. Design, verification,
+refusal and report go through the family and know no name; `tests/test_dance_limits.py` holds every member to its contract.
 """
 
-import importlib
-import pkgutil
-from dataclasses import dataclass
-from types import ModuleType
+import inspect
+from collections.abc import Iterable, Mapping
+from dataclasses import fields, replace
 
-import numpy as np
+from biodance.dance.limits._checked import NOTHING, CheckedMotion, Remaining
+from biodance.dance.limits._limit import FAR, Limit, Margins, bounded, unconcerned
+from biodance.discovery import Family
+from biodance.errors import BiodanceError, UnknownName
 
-from biodance.records import Array
+__all__ = [
+    "FAR",
+    "NOTHING",
+    "CheckedMotion",
+    "Limit",
+    "Margins",
+    "Remaining",
+    "bounded",
+    "family",
+    "joined",
+    "limits_with",
+    "unconcerned",
+]
 
-FAR = 2.0
+
+def missing(candidate: object) -> tuple[str, ...]:
+    """Return what an object or class lacks to be a limit."""
+    kind = candidate if isinstance(candidate, type) else type(candidate)
+    if not issubclass(kind, Limit):
+        return ("the base class Limit",)
+    lacks = [name for name in ("name", "unit", "scale") if not hasattr(kind, name)]
+    return (*lacks, *(sorted(getattr(kind, "__abstractmethods__", ())) if inspect.isabstract(kind) else ()))
 
 
-@dataclass(frozen=True, eq=False)
-class Margins:
-    """``value`` (T, m) >= 0 where the limit holds; ``slopes`` (k, T, m, n) by x, v, a in this order, k = 1, 2 or 3 as far as needed.
+FAMILY: Family[Limit | type[Limit]] = Family("limit of a dance", "biodance.limits", __name__, "LIMIT", missing, lambda kind: kind.name)
 
-    Columns that are further than ``FAR`` scales from their limit in all samples may have slopes of zero.
+
+def family() -> tuple[Limit, ...]:
+    """Return all limits of the folder and of other packages with their usual numbers, by name.
+
+    Raises
+    ------
+    BiodanceError
+        A file of the folder or an entry point is no limit; the sentence says which and what to do.
     """
-
-    value: Array
-    slopes: Array
+    return joined(FAMILY.members().values(), ())
 
 
-def limits() -> tuple[ModuleType, ...]:
-    """Return all limits of this folder in alphabetical order."""
-    return tuple(importlib.import_module(f"{__name__}.{info.name}") for info in pkgutil.iter_modules(__path__))
+def joined(limits: Iterable[Limit | type[Limit]], more: Iterable[Limit | type[Limit]]) -> tuple[Limit, ...]:
+    """Return ``limits`` and ``more``, objects or classes, by name; where a name is in both, the one of ``more``.
+
+    Raises
+    ------
+    BiodanceError
+        One of ``more`` is no limit.
+    """
+    found: dict[str, Limit] = {}
+    for one in (*limits, *more):
+        if lacks := missing(one):
+            raise BiodanceError(f"{one!r}: lacks {', '.join(lacks)}, so it is no limit of a dance. See biodance.dance.limits.Limit.")
+        found[one.name] = one() if isinstance(one, type) else one
+    return tuple(found[name] for name in sorted(found))
 
 
-def repeated(rows: Array, frames: int) -> Array:
-    """Return constant slopes (m, n) for every sample, (1, T, m, n)."""
-    return np.broadcast_to(rows, (1, frames, *rows.shape))
+def limits_with(numbers: Mapping[str, Mapping[str, float]], *, where: str) -> tuple[Limit, ...]:
+    """Return the family with other ``numbers`` (limit -> field -> value), found ``where``.
+
+    Raises
+    ------
+    UnknownName
+        There is no such limit, or it has no such number; the message lists the legal ones.
+    BiodanceError
+        A number is outside its legal range.
+    """
+    usual = {limit.name: limit for limit in family()}
+    for name, given in numbers.items():
+        if name not in usual:
+            raise UnknownName.of(f"limit in {where}", name, tuple(usual))
+        legal = tuple(one.name for one in fields(usual[name]))
+        for key in given:
+            if key not in legal:
+                raise UnknownName.of(f"number of limits.{name} in {where}", key, legal)
+    return tuple(replace(limit, **numbers.get(name, {})) for name, limit in usual.items())

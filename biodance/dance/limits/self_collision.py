@@ -3,26 +3,44 @@
 Exact distances: of two line segments for two capsules, of a line segment from a box for a capsule and a box.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from biodance.dance.limits import FAR, Margins
+from biodance.dance.limits._checked import CheckedMotion, Remaining
+from biodance.dance.limits._limit import FAR, Limit, Margins, bounded
+from biodance.dance.solid_distance import distances
 from biodance.dance.state import State
 from biodance.records import Array
 
-NAME, UNIT, SCALE = "self_collision", "m", 0.05
 SAMPLES = np.linspace(0.0, 1.0, 33)
 """Places on the axis of a capsule that are held against a box in each round of the search."""
 ROUNDS = 6
 """Of the search, which leaves a sixteenth of the line each time."""
 
 
-def margins(state: State) -> Margins:
-    """Return the distances (T, pairs) m between surfaces."""
-    near, far = _capsules(state), _boxes(state)
-    return Margins(np.concatenate([near.value, far.value], axis=1), np.concatenate([near.slopes, far.slopes], axis=2))
+@dataclass(frozen=True)
+class SelfCollision(Limit):
+    """``gap`` m that is left between the surfaces of any two segments at least."""
+
+    gap: float = bounded(0.0, 0.0, 0.04, "m")
+    name, unit, scale, suspicion = "self_collision", "m", 0.05, 50
+
+    def margins(self, state: State) -> Margins:
+        """Return the distances (T, pairs) m between surfaces, less the gap."""
+        near, far = (part(state, self.gap + FAR * self.scale) for part in (_capsules, _boxes))
+        return Margins(np.concatenate([near.value, far.value], axis=1) - self.gap, np.concatenate([near.slopes, far.slopes], axis=2))
+
+    def check(self, motion: CheckedMotion) -> Remaining:
+        """Return the distances (T, pairs) m between surfaces by coal, less the gap; a large one is a lower bound."""
+        apart, pairs = distances(motion.body, motion.pose)
+        return Remaining(apart - self.gap, tuple(pairs))
 
 
-def _capsules(state: State) -> Margins:
+LIMIT = SelfCollision
+
+
+def _capsules(state: State, near: float) -> Margins:
     solids = state.chain.solids
     first, second = solids.first, solids.second
     a, b = (state.placed(np.repeat(side, 2), solids.axis[side].reshape(-1, 3)) for side in (first, second))
@@ -32,7 +50,7 @@ def _capsules(state: State) -> Margins:
     apart = here - there
     distance = np.maximum(np.linalg.norm(apart, axis=2), 1e-9)
     value = distance - solids.radius[first] - solids.radius[second]
-    slopes, close = np.zeros((1, *value.shape, state.chain.size)), (value < FAR * SCALE).any(axis=0)
+    slopes, close = np.zeros((1, *value.shape, state.chain.size)), (value < near).any(axis=0)
     normal = (apart / distance[..., None])[:, close]
     slopes[0][:, close] = state.along(first[close], here[:, close], normal) - state.along(second[close], there[:, close], normal)
     return Margins(value, slopes)
@@ -49,7 +67,7 @@ def nearest(a: Array, b: Array) -> tuple[Array, Array]:
     return s, np.clip((B * s + F) / E, 0.0, 1.0)
 
 
-def _boxes(state: State) -> Margins:
+def _boxes(state: State, near: float) -> Margins:
     solids = state.chain.solids
     limb, box = solids.limb, solids.box
     ends = state.placed(np.repeat(limb, 2), solids.axis[limb].reshape(-1, 3)).reshape(len(state.x), -1, 2, 3)
@@ -59,7 +77,7 @@ def _boxes(state: State) -> Margins:
     share = deepest(local, half)
     depth, away = outside(_on(local, share), half)
     value = depth - solids.radius[limb]
-    slopes, close = np.zeros((1, *value.shape, state.chain.size)), (value < FAR * SCALE).any(axis=0)
+    slopes, close = np.zeros((1, *value.shape, state.chain.size)), (value < near).any(axis=0)
     normal, place = np.einsum("tkij,tkj->tki", turn, away)[:, close], _on(ends, share)[:, close]
     slopes[0][:, close] = state.along(limb[close], place, normal) - state.along(box[close], place, normal)
     return Margins(value, slopes)

@@ -8,12 +8,12 @@ the samples, and SLSQP does the rest. The paper's planar example (III.C) is solv
 from dataclasses import dataclass
 
 import numpy as np
+from criteria import Criterion
 from scipy.optimize import minimize
+from target import Target
 
 from biodance.body.body import Body
-from biodance.dance.criteria import Criterion
 from biodance.dance.splines import Basis
-from biodance.dance.target import Target
 from biodance.identify.information import fold
 from biodance.motion.kinematics import segment_motion
 from biodance.motion.regressor import regressor_of

@@ -1,9 +1,9 @@
 """The paper's Fig. 4: six motions of a planar chain, designed by different criteria, all judged by cond(W_b).
 
 Left from the paper's start (all joints move in proportion, W_b is singular), right from seeded via points. Joint ranges, masses and
-ends of the motions are assumed (see biodance.dance.planar); the dots are the values that the paper prints.
+ends of the motions are assumed (see series.py); the dots are the values that the paper prints.
 
-python examples/04_planar_excitation.py [FIGURE.png]
+python examples/planar/01_excitation.py [FIGURE.png]
 """
 
 import sys
@@ -11,9 +11,8 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
-
-from biodance.body.planar import planar_chain
-from biodance.dance.planar import paper_series, planar_base, seeded_series
+from planar_chain import planar_chain
+from series import paper_series, planar_base, seeded_series
 
 LEFT = {"condition": "cond(W_b)", "mass_weighted": "sum of M cond(W_bi), eq. 12", "log_condition": "log cond(W_b)"}
 RIGHT = {**LEFT, "d_optimal": "D-optimal", "a_optimal": "A-optimal"}
@@ -42,4 +41,4 @@ def main(picture: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "04_planar_excitation.png"))
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "01_excitation.png"))

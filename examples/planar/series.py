@@ -2,21 +2,21 @@
 
 Six motions of 2 s follow each other; each is designed on top of all before it; cond(W_b) at 50 Hz judges every criterion alike. Four via
 points per joint at equal distances, so 12 variables, as printed. NOT printed, hence chosen here: joint ranges and masses (see
-``body.planar``), rest at both ends of each motion (sixth-order splines as in III.A: a cubic through four points has accelerations linear
+``planar_chain``), rest at both ends of each motion (sixth-order splines as in III.A: a cubic through four points has accelerations linear
 in time and leaves ZZ1, ZZ2, ZZ3 dependent whatever the points), and where the motions begin and end (see the two functions).
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from comparison import Comparison, compare_criteria
+from criteria import criterion
+from planar_chain import PLANAR_CHANNELS, PLANAR_GRAVITY
+from target import target
+from via_points import Excitation, design, within_ranges
 
 from biodance.body.body import Body
-from biodance.body.planar import PLANAR_CHANNELS, PLANAR_GRAVITY
-from biodance.dance.compare import Comparison, compare_criteria
-from biodance.dance.criteria import criterion
 from biodance.dance.splines import rest_to_rest
-from biodance.dance.target import target
-from biodance.dance.via_points import Excitation, design, within_ranges
 from biodance.identify.base_parameters import BaseParameters, base_parameters, parameter_names
 from biodance.motion.kinematics import segment_motion
 from biodance.motion.regressor import regressor_of

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from planar_chain import PLANAR_GRAVITY, RANGES, planar_chain
+from series import VIA, paper_series, planar_base, planar_problem, seeded_series
 
-from biodance.body.planar import PLANAR_GRAVITY, RANGES, planar_chain
-from biodance.dance.planar import VIA, paper_series, planar_base, planar_problem, seeded_series
 from biodance.errors import UnknownName
 from biodance.motion.regressor import regressor
 from biodance.records import Motion

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from criteria import criterion
 from random_bodies import random_body
+from target import target
+from via_points import Excitation, design
 
-from biodance.dance.criteria import criterion
 from biodance.dance.splines import rest_to_rest
-from biodance.dance.target import target
-from biodance.dance.via_points import Excitation, design
 from biodance.identify.base_parameters import structural_base
 from biodance.motion.regressor import GRAVITY
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from criteria import CRITERIA, criterion
 from random_bodies import random_body, random_motion
+from target import target
 
-from biodance.dance.criteria import criteria, criterion
-from biodance.dance.target import target
 from biodance.errors import UnknownName
 from biodance.identify.base_parameters import structural_base
 from biodance.identify.information import fold
@@ -19,7 +19,7 @@ def rows(seed: int, frames: int = 40) -> np.ndarray:
     return regressor(BODY, random_motion(BODY, np.random.default_rng(seed), frames=frames)).reshape(-1, 30)
 
 
-@pytest.mark.parametrize("name", sorted(criteria()))
+@pytest.mark.parametrize("name", sorted(CRITERIA))
 @pytest.mark.parametrize("kind", ["static", "dynamic", "all"])
 def test_gradient_agrees_with_finite_differences(name: str, kind: str) -> None:
     aim = target(BODY, BASE, kind=kind)
@@ -36,7 +36,7 @@ def test_gradient_agrees_with_finite_differences(name: str, kind: str) -> None:
 
 def test_a_fold_is_judged_like_all_its_rows() -> None:
     aim = target(BODY, BASE)
-    for name, evaluate in criteria().items():
+    for name, evaluate in CRITERIA.items():
         whole = evaluate(rows(1), aim)[0]
         assert evaluate(fold(rows(1)), aim)[0] == pytest.approx(whole, rel=1e-6), name
 

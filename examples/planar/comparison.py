@@ -8,9 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from criteria import CRITERIA
+from via_points import Excitation, design
 
-from biodance.dance.criteria import criteria
-from biodance.dance.via_points import Excitation, design
 from biodance.records import Array, frozen_array
 
 
@@ -58,7 +58,7 @@ def compare_criteria(
 
     ``starts`` are points (k, joints) rad; only ``movable`` points are designed.
     """
-    chosen = names or tuple(criteria())
+    chosen = names or tuple(CRITERIA)
     problems = [problem_of(name) for name in chosen]
     empty = np.zeros((problems[0].target.prior_factor.shape[0],) * 2)
 

@@ -1,6 +1,6 @@
 """All excitation criteria on one body: each designs a motion, each judges all of them, and what would be known afterwards.
 
-python examples/05_compare_criteria.py [FIGURE.png]
+python examples/planar/02_compare_criteria.py [FIGURE.png]
 """
 
 import sys
@@ -8,9 +8,8 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
-
-from biodance.body.planar import planar_chain
-from biodance.dance.planar import compared
+from planar_chain import planar_chain
+from series import compared
 
 SHOWN = {"MX": 1, "MY": 2, "ZZ": 9}
 
@@ -34,4 +33,4 @@ def main(picture: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "05_compare_criteria.png"))
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "02_compare_criteria.png"))
