@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from biodance.errors import BiodanceError, SessionRefused, TrialRefused, UnknownName
+from biodance.settings import COP_FORCE, USUAL, Settings
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -126,7 +127,7 @@ class Wrench:
         """(T, 3) N·m about the lab origin, lab frame."""
         return self.value[:, 3:]
 
-    def cop(self, *, height: float = 0.0, threshold: float = 20.0) -> Array:
+    def cop(self, *, height: float = 0.0, threshold: float = COP_FORCE) -> Array:
         """Centre of pressure (T, 3) m on the horizontal plane ``z = height``; NaN where |Fz| < ``threshold`` N."""
         (fx, fy, fz), (mx, my, _) = self.force.T, self.moment.T
         loaded = np.abs(fz) >= threshold
@@ -243,6 +244,7 @@ class Trial:
     measurements: Mapping[str, float] = field(default_factory=dict)
     history: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    settings: Settings = USUAL
 
     def __post_init__(self) -> None:
         if self.role not in ROLES:
@@ -309,6 +311,15 @@ class Session:
     folder: Path
     refused: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if any(trial.settings != self.settings for trial in self.trials):
+            raise BiodanceError("The trials of this session were read with different settings. Read them again together.")
+
+    @property
+    def settings(self) -> Settings:
+        """What the analyst chose, the same for all trials."""
+        return self.trials[0].settings if self.trials else USUAL
 
     def of_role(self, *roles: Role) -> tuple[Trial, ...]:
         """Return the trials with one of the given roles, in order."""

@@ -13,6 +13,7 @@ import numpy as np
 
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import Array, Sip, frozen_array
+from biodance.settings import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
     import pinocchio as pin
@@ -113,7 +114,8 @@ class Body:
     ``limits`` per joint; ``markers`` on segments; ``boxes`` (N, 2, 3) m, lower and upper corner of the shape box in the segment frame;
     ``com_boxes`` (N, 2, 3) m, where the CoM may be; ``feet`` soles by side ("left", "right"); ``root`` "free_flyer" (nq = 7 + n, nv =
     6 + n) or "fixed" (nq = nv = n; the root joint carries no segment then); ``notes`` how the body was made: table, scaling, warnings;
-    ``joint_errors`` of the joints that a movement placed, none of those that only landmarks did.
+    ``joint_errors`` of the joints that a movement placed, none of those that only landmarks did; ``gravity`` (3,) m/s² where it moves, lab
+    frame, as a pinocchio model has it.
     """
 
     name: str
@@ -128,10 +130,12 @@ class Body:
     root: Literal["free_flyer", "fixed"] = "free_flyer"
     notes: tuple[str, ...] = ()
     joint_errors: tuple[JointError, ...] = ()
+    gravity: Array = field(default_factory=lambda: np.array([0.0, 0.0, -STANDARD_GRAVITY]))
 
     def __post_init__(self) -> None:
         count = len(self.segments)
         object.__setattr__(self, "boxes", frozen_array(self.boxes, (count, 2, 3), f"{self.name}.boxes"))
+        object.__setattr__(self, "gravity", frozen_array(self.gravity, (3,), f"{self.name}.gravity"))
         object.__setattr__(self, "com_boxes", frozen_array(self.com_boxes, (count, 2, 3), f"{self.name}.com_boxes"))
         if self.sip.segments != self.segments:
             raise BiodanceError(f"{self.name}: the SIP name other segments ({self.sip.segments}) than the body ({self.segments}).")

@@ -11,13 +11,13 @@ from biodance.body.skeleton import SEGMENTS, SIDES, Skeleton, generic_skeleton, 
 from biodance.body.tables import read_table
 from biodance.lab.marker_sets import MarkerSet, read_marker_set
 from biodance.records import Subject
+from biodance.settings import STANDARD_GRAVITY, Settings
 
-DEFAULT_TABLE = "de_leva_1996"
 ADULT = (18.0, 65.0)
-"""years: the ages that the default table speaks for."""
+"""years: the ages that the usual table speaks for."""
 
 
-def human(subject: Subject, *, table: str = DEFAULT_TABLE, markers: str = "plug_in_gait") -> Body:
+def human(subject: Subject, *, table: str = Settings.table, markers: str = "plug_in_gait", gravity: float = STANDARD_GRAVITY) -> Body:
     """Return a generic person of the subject's stature, mass and sex, with the markers of a marker set at their usual places.
 
     Lengths, masses, CoM and inertias come from ``table`` (see ``segment_tables``), widths and feet from ``anthropometry/human``. For a
@@ -33,10 +33,19 @@ def human(subject: Subject, *, table: str = DEFAULT_TABLE, markers: str = "plug_
     subject.require("mass", "stature")
     skeleton = generic_skeleton(reference(table, subject), subject)
     note = f"Segment lengths: table {table} at stature {subject.stature:.3f} m; nobody was measured. Markers: usual places of {markers}."
-    return assemble(subject, skeleton, table=table, markers=generic_markers(skeleton, read_marker_set(markers)), notes=(note,))
+    worn = generic_markers(skeleton, read_marker_set(markers))
+    return assemble(subject, skeleton, table=table, markers=worn, notes=(note,), gravity=gravity)
 
 
-def assemble(subject: Subject, skeleton: Skeleton, *, table: str, markers: SegmentMarkers, notes: tuple[str, ...]) -> Body:
+def assemble(
+    subject: Subject,
+    skeleton: Skeleton,
+    *,
+    table: str,
+    markers: SegmentMarkers,
+    notes: tuple[str, ...],
+    gravity: float = STANDARD_GRAVITY,
+) -> Body:
     """Return the Body of a skeleton: joint tree, prior SIP, limits, boxes and soles."""
     sip, boxes = prior(reference(table, subject), skeleton, subject), shape_boxes(skeleton)
     return Body(
@@ -50,6 +59,7 @@ def assemble(subject: Subject, skeleton: Skeleton, *, table: str, markers: Segme
         com_boxes=com_boxes(sip, skeleton, boxes),
         feet={side: sole(skeleton, subject, side) for side in SIDES},
         notes=(*notes, *_prior_notes(subject, table)),
+        gravity=np.array([0.0, 0.0, -gravity]),
     )
 
 

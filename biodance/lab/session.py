@@ -13,9 +13,16 @@ from biodance.lab.subject import identify_subject
 from biodance.lab.vicon import EclipseNotes
 from biodance.lab.weight import is_still, movement
 from biodance.records import Role, Session, Trial
+from biodance.settings import Settings
 
 
-def read_session(folder: str | Path, *, subject_name: str | None = None, tell: Callable[[str], None] | None = None) -> Session:
+def read_session(
+    folder: str | Path,
+    *,
+    subject_name: str | None = None,
+    settings: Settings | Mapping[str, object] | None = None,
+    tell: Callable[[str], None] | None = None,
+) -> Session:
     """Return the session in a folder: the subject and every trial that can be read.
 
     Roles come from session.toml, else from the Eclipse notes (.enf), else from the names (static*, cal* = static; squat* = validate;
@@ -30,21 +37,22 @@ def read_session(folder: str | Path, *, subject_name: str | None = None, tell: C
         Not a folder, no recording in it, none that can be read, or a session.toml with a mistake.
     """
     folder = _checked(Path(folder))
-    settings = read_session_file(folder)
+    file_says = read_session_file(folder)
+    chosen = settings if isinstance(settings, Settings) else file_says.settings.changed(settings or {})
     files, notes = find_recordings(folder)
     eclipse, measurements, refused = vicon_notes({folder, *(file.parent for file in files)})
     trials: list[Trial] = []
     reasons: dict[str, str] = {}
     for file in files:
         operator = eclipse.get(file.stem.lower())
-        role, reason = _role(file, folder, settings, operator)
+        role, reason = _role(file, folder, file_says, operator)
         if role == "skip":
             notes.append(f"{file.name} was left aside: {reason}.")
             continue
         if tell:
             tell(file.name)
         try:
-            trial = _with_strikes(read_trial(file, role=role, subject=subject_name), operator)
+            trial = _with_strikes(replace(read_trial(file, role=role, subject=subject_name), settings=chosen), operator)
         except BiodanceError as error:
             refused[file.name] = str(error)
             continue
@@ -52,11 +60,11 @@ def read_session(folder: str | Path, *, subject_name: str | None = None, tell: C
         reasons[trials[-1].name] = reason
     if not trials:
         raise SessionRefused(_nothing_left(folder, refused))
-    trials = _settle_static(trials, settings, reasons, notes)
-    subject, guesses = identify_subject(settings.subject, measurements, trials, name=subject_name or folder.resolve().name)
-    read = [f"{path.name} in {path.parent.name} was followed." for path in settings.read]
+    trials = _settle_static(trials, file_says, reasons, notes)
+    subject, guesses = identify_subject(file_says.subject, measurements, trials, name=subject_name or folder.resolve().name)
+    read = [f"{path.name} in {path.parent.name} was followed." for path in file_says.read]
     roles = [f"{trial.name} has the role {trial.role}: {reasons[trial.name]}." for trial in trials]
-    slips = settings.unused([file.stem for file in files])
+    slips = file_says.unused([file.stem for file in files])
     return Session(subject, tuple(trials), folder, refused, (*read, *slips, *roles, *notes, *guesses))
 
 

@@ -15,7 +15,7 @@ from biodance.identify.torques import TorqueBands, torque_bands
 from biodance.identify.validation import Gain, TrialValidation, gain, validate
 from biodance.motion.comparison import Agreement, compare
 from biodance.motion.contact import foot_wrenches, ground_contact
-from biodance.motion.regressor import GRAVITY, predict_wrench
+from biodance.motion.regressor import predict_wrench
 from biodance.motion.soles import SIDES, soles_from_body
 from biodance.pipeline.results import TrialResult
 from biodance.records import ROLES, Role, Wrench
@@ -55,7 +55,7 @@ def fit_of(result: TrialResult) -> Fit | None:
     found = result.comparison
     if found is None or result.motion is None or not found.used.any():
         return None
-    return Fit(result.trial.name, result.motion, Wrench(found.time, found.measured), found.used)
+    return Fit(result.trial.name, result.motion, Wrench(found.time, found.measured), found.used, result.trial.settings.outlier)
 
 
 def can_identify(results: tuple[TrialResult, ...]) -> bool:
@@ -88,7 +88,7 @@ def identify_trials(
     notes = list(found.notes)
     if not kept:
         notes.append("No trial was kept for validation, so the gain is not proven. Record squats, or give a trial the role validate.")
-    notes += _weight(fitted)
+    notes += _weight(fitted, -float(body.gravity[2]))
     search = added_mass(found, reference=reference.identification if reference else None)
     return SessionIdentification(
         name,
@@ -117,9 +117,9 @@ def _torques(found: Identification, results: tuple[TrialResult, ...]) -> TorqueB
     return None
 
 
-def _weight(fitted: tuple[TrialValidation, ...]) -> list[str]:
+def _weight(fitted: tuple[TrialValidation, ...], gravity: float) -> list[str]:
     """Say it where the plates carry another weight than the identified body has: the table's total is pinned to the declared mass."""
-    missing = np.concatenate([(trial.measured.force - trial.identified.force)[trial.use, 2] for trial in fitted]).mean() / -GRAVITY[2]
+    missing = np.concatenate([(trial.measured.force - trial.identified.force)[trial.use, 2] for trial in fitted]).mean() / gravity
     if abs(missing) <= UNEXPLAINED:
         return []
     return [

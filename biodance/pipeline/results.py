@@ -3,7 +3,6 @@
 All records are frozen; arrays are in SI units in the lab frame (z up); a wrench is the ground's action on the subject about the lab origin.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.lab.gaps import MarkerGaps
 from biodance.records import Array, Motion, Session, Subject, Trial
+from biodance.settings import Settings
 
 if TYPE_CHECKING:
     from biodance.pipeline.identification import SessionIdentification
@@ -163,7 +163,7 @@ class SessionResult:
     """The whole session.
 
     ``body`` that moved (None: no markers or no stature) and ``body_source`` in words; ``standing`` the one whose weight is compared with
-    the declared mass; ``settings`` name -> value of every number that shaped the result; ``identification`` None where no trial is to be
+    the declared mass; ``identification`` None where no trial is to be
     identified from, or it was refused.
     """
 
@@ -176,8 +176,12 @@ class SessionResult:
     checks: tuple[Check, ...]
     standing: Standing | None
     still: Still | None
-    settings: Mapping[str, str]
     identification: "SessionIdentification | None" = None
+
+    @property
+    def settings(self) -> Settings:
+        """All that the analyst chose."""
+        return self.session.settings
 
     @property
     def all_checks(self) -> tuple[Check, ...]:
