@@ -20,8 +20,23 @@ ADULT = (18.0, 65.0)
 def human(subject: Subject, *, table: str = Settings.table, markers: str = "plug_in_gait", gravity: float = STANDARD_GRAVITY) -> Body:
     """Return a generic person of the subject's stature, mass and sex, with the markers of a marker set at their usual places.
 
-    Lengths, masses, CoM and inertias come from ``table`` (see ``segment_tables``), widths and feet from ``anthropometry/human``. For a
-    person who was measured use ``scale``: generic lengths miss by centimetres, and the wand markers have no usual place.
+    For a person who was measured use `scale`: generic lengths miss by centimetres, and the wand markers have no usual place.
+
+    Parameters
+    ----------
+    subject : Subject
+        Mass kg, stature m, sex; the age where strength matters.
+    table : str
+        Table of segment inertial parameters, which also gives the lengths.
+    markers : str
+        Name of a marker set, or the path of its file.
+    gravity : float
+        Of the laboratory, m/s² along -z.
+
+    Returns
+    -------
+    Body
+        12 segments, 23 joint angles, inertial parameters with covariance.
 
     Raises
     ------
@@ -29,6 +44,19 @@ def human(subject: Subject, *, table: str = Settings.table, markers: str = "plug
         There is no such table for this sex, or no such marker set.
     SessionRefused
         The mass or the stature is not known.
+
+    See Also
+    --------
+    scale : the body of a person with a static trial.
+
+    References
+    ----------
+    The usual table: de Leva 1996, doi:10.1016/0021-9290(95)00178-6.
+
+    Examples
+    --------
+    >>> biodance.human(biodance.Subject(62.0, 1.70, "F", name="S01"))
+    Body('S01', 12 segments, 23 joint angles, 62.0 kg)
     """
     subject.require("mass", "stature")
     skeleton = generic_skeleton(reference(table, subject), subject)

@@ -88,7 +88,42 @@ def measure(subject: Subject, static: Trial, *, hip: Hip | None = None, table: s
 
 
 def scale(subject: Subject, static: Trial, *, hip: Hip | None = None, table: str | None = None) -> Body:
-    """Return the body of a subject, scaled on the static trial alone, with every marker calibrated in its segment; see ``measure``."""
+    """Return the body of a subject, scaled on the static trial alone, with every marker calibrated in its segment.
+
+    Parameters
+    ----------
+    subject : Subject
+        Mass kg, stature m, sex.
+    static : Trial
+        Standing still, with markers of a known set.
+    hip : {"harrington", "davis"}, optional
+        Regression of the hip joint centres; by default as ``static.settings`` say.
+    table : str, optional
+        Table of segment inertial parameters; by default as ``static.settings`` say.
+
+    Returns
+    -------
+    Body
+        In the static posture every marker and joint centre has residual zero.
+
+    Raises
+    ------
+    TrialRefused
+        The static trial has no markers, no known marker set, or misses a landmark; all missing ones are named.
+    UnknownName
+        There is no such table.
+    SessionRefused
+        The mass or the stature of the subject is not known.
+
+    References
+    ----------
+    Harrington et al. 2007, doi:10.1016/j.jbiomech.2006.02.003; Davis et al. 1991, doi:10.1016/0167-9457(91)90046-Z.
+
+    Examples
+    --------
+    >>> biodance.scale(session.subject, session["static"])
+    Body('visit', 12 segments, 23 joint angles, 62.0 kg)
+    """
     return measure(subject, static, hip=hip, table=table).body()[0]
 
 

@@ -23,18 +23,47 @@ def read_session(
     settings: Settings | Mapping[str, object] | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> Session:
-    """Return the session in a folder: the subject and every trial that can be read.
+    """Read the session in a folder: the subject and every trial that can be read.
 
     Roles come from session.toml, else from the Eclipse notes (.enf), else from the names (static*, cal* = static; squat* = validate;
     others = fit); without a static by these, the stillest trial is taken. The subject comes from session.toml, .mp, .vsk and the files' own
-    parameters, in this order. ``subject_name`` chooses the person in C3D files that hold several; ``tell`` is called with the name of each
-    file before it is read. A file that cannot be read never stops the session: it stands in ``Session.refused`` with the reason. What was
-    followed, guessed or left aside stands in ``Session.notes``.
+    parameters, in this order. A file that cannot be read never stops the session: it stands in ``Session.refused`` with the reason. What
+    was followed, guessed or left aside stands in ``Session.notes``.
+
+    Parameters
+    ----------
+    folder : str or pathlib.Path
+        With the recordings of one visit, and session.toml where there is one.
+    subject_name : str, optional
+        Chooses the person in C3D files that hold several.
+    settings : Settings or mapping, optional
+        A record: these and no others. A mapping, ``{"filter.cutoff": 6}``: as session.toml says, with these changed.
+    tell : callable, optional
+        Called with the name of each file before it is read.
+
+    Returns
+    -------
+    Session
+        ``session["squat_1"]`` is a trial.
 
     Raises
     ------
     SessionRefused
         Not a folder, no recording in it, none that can be read, or a session.toml with a mistake.
+    UnknownName
+        There is no such setting.
+    BiodanceError
+        A setting is not legal.
+
+    See Also
+    --------
+    examine : take it through all stages.
+
+    Examples
+    --------
+    >>> session = biodance.read_session("visit", settings={"filter.cutoff": 6})
+    >>> session.settings
+    Settings(filter.cutoff=6.0)
     """
     folder = _checked(Path(folder))
     file_says = read_session_file(folder)

@@ -71,6 +71,31 @@ def regressor(body: Body, motion: Motion) -> Array:
 
 
 def predict_wrench(body: Body, motion: Motion, phi: Array | None = None) -> Wrench:
-    """Return the wrench that ``motion`` needs from the ground with the parameters ``phi`` (10N,), by default the body's prior."""
+    """Return the wrench that a motion needs from the ground.
+
+    Parameters
+    ----------
+    body : Body
+        Who moves, and under which gravity.
+    motion : Motion
+        At T instants.
+    phi : numpy.ndarray, optional
+        (10N,) inertial parameters, see `Sip`; by default the body's.
+
+    Returns
+    -------
+    Wrench
+        (T, 6) N, N·m ON the subject about the lab origin, force first.
+
+    References
+    ----------
+    Ground wrench of a tree of rigid bodies, linear in the inertial parameters; docs/derivations.md.
+
+    Examples
+    --------
+    >>> needed = biodance.predict_wrench(result.body, result["squat_1"].motion)
+    >>> round(float(needed.force[:, 2].mean()), -1)
+    610.0
+    """
     W = regressor(body, motion)
     return Wrench(motion.time, W @ (body.sip.phi if phi is None else phi))

@@ -2,9 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from biodance import display
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identify.added_mass import AddedMass, added_mass
@@ -20,6 +22,9 @@ from biodance.motion.soles import SIDES, soles_from_body
 from biodance.pipeline.results import TrialResult
 from biodance.records import ROLES, Role, Wrench
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 UNEXPLAINED = 0.5
 """kg between plates and identified body over the fit trials: more than the scale's uncertainty, shoes and a zero allow."""
 FITTED: tuple[Role, ...] = ("fit",)
@@ -28,17 +33,36 @@ KEPT: tuple[Role, ...] = ("validate", "check")
 
 @dataclass(frozen=True, eq=False)
 class SessionIdentification:
-    """All that identification found in a session.
+    """All that identification found in a visit.
 
-    ``fitted`` and ``validations`` compare the trials used and the trials kept, about the mean centre of pressure; ``agreements`` the
-    identified body on every compared trial by name, about the lab origin; ``gain`` table / identified over the validations (None without
-    an interval); ``search`` the loads looked for, against ``search.reference``; ``changes`` since the reference session, empty without one;
-    ``torques`` of the joints in the first trial kept (else fitted), None where the feet's wrenches are not known; ``name`` of the session;
-    ``notes`` what a person should know.
+    Parameters
+    ----------
+    name : str
+        Of the session.
+    identification : Identification
+        What the segments weigh.
+    fitted, validations : tuple
+        The trials used and the trials kept, each with table and identified body, about the mean centre of pressure.
+    agreements : mapping
+        Trial -> how well the identified body agrees with the plates, about the lab origin.
+    gain
+        RMS residual of the table over that of the identified body on the trials kept; None without an interval.
+    search
+        The loads looked for, against ``search.reference``.
+    changes : tuple
+        Since the reference session; () without one.
+    torques
+        Of the joints in the first trial kept (else fitted); None where the feet's wrenches are not known.
+    notes : tuple of str
+        What a person should know.
+
+    Examples
+    --------
+    >>> identified.status
+    'solved'
     """
 
     name: str
-
     identification: Identification
     fitted: tuple[TrialValidation, ...]
     validations: tuple[TrialValidation, ...]
@@ -48,6 +72,38 @@ class SessionIdentification:
     changes: tuple[Difference, ...] = ()
     torques: TorqueBands | None = None
     notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        sip = self.identification.sip
+        return f"SessionIdentification({self.name!r}: {self.status}, {len(sip.segments)} segments, {sip.mass.sum():.1f} kg)"
+
+    def _repr_html_(self) -> str:
+        return display.card(repr(self), self.table(), self.notes)
+
+    @property
+    def status(self) -> Literal["solved", "failed"]:
+        """Whether the fit was solved; a failed one keeps the table's values and says so."""
+        return self.identification.status
+
+    def table(self, quantity: str = "mass") -> "pd.DataFrame":
+        """Return one row for each segment, see `Identification.table`.
+
+        Parameters
+        ----------
+        quantity : str
+            "mass", "com x" ... or "Ixx" ....
+
+        Returns
+        -------
+        pandas.DataFrame
+            Table and identified value with intervals, each with its unit.
+
+        Examples
+        --------
+        >>> list(identified.table().columns[:3])
+        ['table (kg)', 'table sd (kg)', 'identified (kg)']
+        """
+        return self.identification.table(quantity)
 
 
 def fit_of(result: TrialResult) -> Fit | None:

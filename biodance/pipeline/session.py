@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
+from biodance.body.segment_tables import reference as reference_person
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.pipeline.body import body_of
 from biodance.pipeline.checks import mass_check, standing_check, trial_checks
@@ -24,12 +25,41 @@ def examine(
     reference: SessionIdentification | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> SessionResult:
-    """Take a session through all stages and return all that was found; ``tell`` is called with what is being done.
-
-    ``reference`` is what an earlier, unloaded session of the same person said: a load is then looked for against it, not the table.
+    """Take a session through all stages: prepare, scale, track, compare, identify; one trial that fails never stops the others.
 
     Ctrl-C ends the work after the trials that are done; the others say so (``SessionResult.stopped``).
+
+    Parameters
+    ----------
+    session : Session
+        As `read_session` returns it, with its settings.
+    reference : SessionIdentification, optional
+        What an earlier, unloaded session of the same person said: a load is then looked for against it, not the table.
+    tell : callable, optional
+        Called with what is being done, in words.
+
+    Returns
+    -------
+    SessionResult
+        All that was found; what the data could not carry is a step with its reason.
+
+    Raises
+    ------
+    UnknownName
+        There is no such table of segment inertial parameters for the subject's sex.
+
+    See Also
+    --------
+    identify : what the segments weigh.
+    diagnose : what the simulation gets wrong.
+
+    Examples
+    --------
+    >>> result = biodance.examine(session)
+    >>> result["squat_1"].motion
+    Motion(23 joint angles, 611 frames at 100 Hz, 6.10 s)
     """
+    reference_person(session.settings.table, session.subject)
     steps: list[Step] = []
     read = []
     for trial in sorted(session.trials, key=lambda trial: trial.role != "static"):
