@@ -57,7 +57,18 @@ class _Group:
                 object.__setattr__(self, one.name, _legal_value(_key(self.name, one.name), getattr(self, one.name), one))
 
     def rows(self) -> tuple[Setting, ...]:
-        """Return the group's settings in order."""
+        """Return the group's own settings in order.
+
+        Returns
+        -------
+        tuple of Setting
+            Named tuples ``(key, value, unit, meaning, legal)``.
+
+        Examples
+        --------
+        >>> biodance.Settings().filter.rows()[2].unit
+        'Hz'
+        """
         told = [(one.name, one.metadata) for one in fields(self) if "legal" in one.metadata]
         return tuple(Setting(_key(self.name, name), getattr(self, name), a["unit"], a["meaning"], _legal_words(a)) for name, a in told)
 
@@ -247,12 +258,20 @@ class Settings(_Group):
         m/s² in the laboratory, along -z.
     outlier : float
         Share of body weight: frames in which table and plates differ by more are left out of the identification.
-    filter, gaps, contact, standing, checks
-        Groups of settings, see their classes.
+    filter : FilterSettings
+        The low-pass of joint coordinates and forces.
+    gaps : GapSettings
+        Markers that were not seen for a while.
+    contact : ContactRules
+        When a foot may touch the ground, and when a plate is loaded.
+    standing : StandingRules
+        What counts as quiet standing on the plates.
+    checks : CheckLimits
+        The limits of the quality table.
 
     See Also
     --------
-    read_session : takes the settings from session.toml.
+    read_session : Takes the settings from session.toml.
 
     Examples
     --------

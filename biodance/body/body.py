@@ -122,9 +122,9 @@ class Body:
         (n) joints of one degree of freedom, in topological order = Pinocchio's order.
     sip : Sip
         What is known of the inertial parameters, with covariance.
-    limits
+    limits : JointLimits
         Per joint: range rad, speed rad/s, torque N·m.
-    markers
+    markers : SegmentMarkers
         Where each marker sits: segment, position m in its frame, weight.
     boxes : array_like
         (N, 2, 3) m, lower and upper corner of the segment's shape box in its frame.
@@ -144,7 +144,7 @@ class Body:
     Examples
     --------
     >>> result.body
-    Body('visit', 12 segments, 23 joint angles, 62.0 kg)
+    Body('visit', 12 segments, 23 joint angles, 61.9 kg)
     """
 
     name: str
@@ -189,7 +189,7 @@ class Body:
 
         Examples
         --------
-        >>> result.body.table().loc["left_thigh", "box y (m)"] > 0.3
+        >>> bool(result.body.table().loc["left_thigh", "box y (m)"] > 0.3)
         True
         """
         out = self.sip.table()

@@ -47,7 +47,7 @@ def human(subject: Subject, *, table: str = Settings.table, markers: str = "plug
 
     See Also
     --------
-    scale : the body of a person with a static trial.
+    scale : The body of a person with a static trial.
 
     References
     ----------

@@ -122,7 +122,7 @@ def scale(subject: Subject, static: Trial, *, hip: Hip | None = None, table: str
     Examples
     --------
     >>> biodance.scale(session.subject, session["static"])
-    Body('visit', 12 segments, 23 joint angles, 62.0 kg)
+    Body('visit', 12 segments, 23 joint angles, 61.9 kg)
     """
     return measure(subject, static, hip=hip, table=table).body()[0]
 

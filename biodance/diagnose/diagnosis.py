@@ -89,7 +89,7 @@ class Finding:
         All causes that the data cannot tell apart, the named one first.
     visible_fraction : float
         Share of its effect that remains visible when the body's own parameters and tolerances may adapt (0 = hides in the body).
-    gain
+    gain : Gain or None
         On trials that were kept; None without one.
     advice : str
         What settles it in the laboratory.
@@ -98,7 +98,7 @@ class Finding:
 
     Examples
     --------
-    >>> for finding in biodance.diagnose(result).findings:
+    >>> for finding in found.findings:
     ...     print(finding)
     """
 
@@ -177,7 +177,7 @@ class Diagnosis:
 
     Examples
     --------
-    >>> biodance.diagnose(result).diagnosis
+    >>> found.diagnosis
     Diagnosis(nothing wrong)
     """
 
@@ -212,7 +212,7 @@ class Diagnosis:
 
         Examples
         --------
-        >>> list(biodance.diagnose(result).diagnosis.table().columns[:4])
+        >>> list(found.diagnosis.table().columns[:4])
         ['effect', 'target', 'parameter', 'value']
         """
         import pandas as pd
@@ -240,7 +240,7 @@ class Diagnosis:
 
         Examples
         --------
-        >>> biodance.diagnose(result).diagnosis.plot_adequacy().get_xlabel()
+        >>> found.diagnosis.plot_adequacy().get_xlabel()
         'z of what is left'
         """
         drawn = display.axes_or_new(axes)

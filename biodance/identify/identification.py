@@ -44,17 +44,17 @@ class Identification:
         As given, with the table as its inertial parameters.
     sip : Sip
         The identified parameters, physically consistent, with their covariance about the true joint centres.
-    belief
+    belief : Posterior
         The Gaussian posterior before the consistency constraint.
-    data
+    data : Information
         What the trials alone say: whitened, disturbances discounted.
-    base
+    base : BaseEstimate
         Weighted least-squares estimate of the base parameters.
-    noise
+    noise : Noise
         As learned.
-    sizes
+    sizes : Sizes
         Of the disturbances.
-    fit
+    fit : PhysicalFit
         What the constraint did.
     trials : tuple of str
         Used.
@@ -121,7 +121,7 @@ class Identification:
 
         Examples
         --------
-        >>> identified.identification.table("com y").loc["left_thigh", "identified (m)"] < 0
+        >>> bool(identified.identification.table("com y").loc["left_thigh", "identified (m)"] < 0)
         True
         """
         import pandas as pd

@@ -46,7 +46,7 @@ def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None
     Examples
     --------
     >>> biodance.read_c3d("visit/static.c3d", role="static").markers
-    Markers(37 markers, 301 frames at 100 Hz, 3.00 s)
+    Markers(39 markers, 301 frames at 100 Hz, 3.00 s)
     """
     raw = read_raw(path)
     labels = marker_labels(raw, subject=subject)

@@ -79,7 +79,7 @@ def read_trial(path: str | Path, *, role: Role = "fit", subject: str | None = No
 
     See Also
     --------
-    read_session : a whole folder, with the subject.
+    read_session : A whole folder, with the subject.
 
     Examples
     --------

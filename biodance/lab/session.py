@@ -57,7 +57,7 @@ def read_session(
 
     See Also
     --------
-    examine : take it through all stages.
+    examine : Take it through all stages.
 
     Examples
     --------

@@ -40,7 +40,7 @@ class SessionDiagnosis:
     ----------
     diagnosis : Diagnosis
         Verdict and findings.
-    examined
+    examined : Examined or None
         What the engine looked at; None where a check stopped it.
     before, accepted : Identification or None
         What is identified without the findings and once they are accepted; None without findings.
@@ -49,7 +49,7 @@ class SessionDiagnosis:
 
     Examples
     --------
-    >>> biodance.diagnose(result).verdict
+    >>> found.verdict
     'nothing wrong'
     """
 
@@ -85,7 +85,7 @@ class SessionDiagnosis:
 
         Examples
         --------
-        >>> len(biodance.diagnose(result).table())
+        >>> len(found.table())
         0
         """
         return self.diagnosis.table()

@@ -111,7 +111,7 @@ def identify(session: Visit, *, reference: Earlier | None = None, tell: Tell = _
 
     See Also
     --------
-    diagnose : what the simulation gets wrong.
+    diagnose : What the simulation gets wrong.
 
     References
     ----------
@@ -122,7 +122,7 @@ def identify(session: Visit, *, reference: Earlier | None = None, tell: Tell = _
     --------
     >>> identified = biodance.identify(result)
     >>> identified
-    SessionIdentification('visit': solved, 12 segments, 62.0 kg)
+    SessionIdentification('visit': solved, 12 segments, 61.7 kg)
     """
     result = _examined(session, tell)
     if reference is None:
@@ -167,7 +167,7 @@ def diagnose(
 
     See Also
     --------
-    identify : what the segments weigh.
+    identify : What the segments weigh.
 
     References
     ----------
@@ -181,10 +181,8 @@ def diagnose(
     """
     chosen = None if effects is None else tuple(effects)
     _known_effects(chosen or ())
-    result, before = _examined(session, tell), None
-    if reference is not None:
-        before = _earlier(reference, tell)
-        result = _against(result, before) if result.identification else result
+    result = _examined(session, tell)
+    before = None if reference is None else _earlier(reference, tell)
     return diagnose_session(result, reference=before, tolerances=tolerances, chosen=chosen, tell=tell)
 
 
@@ -258,7 +256,7 @@ def design_dance(
 
     See Also
     --------
-    verify_dance : judge a dance by code that its design did not use.
+    verify_dance : Judge a dance by code that its design did not use.
 
     References
     ----------
@@ -353,7 +351,7 @@ def simulate(subject: Subject, protocol: str, out: str | Path, *, seed: int = 0,
     --------
     >>> folder = biodance.simulate(biodance.Subject(62.0, 1.70, "F", 31.0), "standing", "simulated", seed=1)
     >>> sorted(path.name for path in folder.iterdir())
-    ['session.toml', 'standing_1.c3d', 'static.c3d', 'truth']
+    ['session.toml', 'standing_1.c3d', 'standing_2.c3d', 'static.c3d', 'truth']
     """
     from biodance.virtual_lab.hide import hide, parse
     from biodance.virtual_lab.protocol_file import read_protocol

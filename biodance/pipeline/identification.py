@@ -45,13 +45,13 @@ class SessionIdentification:
         The trials used and the trials kept, each with table and identified body, about the mean centre of pressure.
     agreements : mapping
         Trial -> how well the identified body agrees with the plates, about the lab origin.
-    gain
+    gain : Gain or None
         RMS residual of the table over that of the identified body on the trials kept; None without an interval.
-    search
+    search : AddedMass
         The loads looked for, against ``search.reference``.
     changes : tuple
         Since the reference session; () without one.
-    torques
+    torques : TorqueBands or None
         Of the joints in the first trial kept (else fitted); None where the feet's wrenches are not known.
     notes : tuple of str
         What a person should know.

@@ -228,9 +228,9 @@ class SessionResult:
         What was found in every trial: motion, comparison of the wrenches, quality.
     checks : tuple
         The session's own rows of the quality table.
-    standing
+    standing : Standing or None
         The quiet standing whose weight is compared with the declared mass, or None.
-    still
+    still : Still or None
         One instant to draw, or None.
     identification : SessionIdentification or None
         None where no trial is to be identified from, or it was refused.
@@ -238,9 +238,9 @@ class SessionResult:
     Examples
     --------
     >>> result
-    SessionResult('visit': dance_1 ok, squat_1 ok, static ok)
+    SessionResult('visit': static ok, dance_1 ok, squat_1 ok)
     >>> result["squat_1"]
-    TrialResult('squat_1', validate, ok, markers 3.3 mm from the body)
+    TrialResult('squat_1', validate, ok, markers 6.8 mm from the body)
     """
 
     session: Session

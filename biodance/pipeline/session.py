@@ -50,8 +50,8 @@ def examine(
 
     See Also
     --------
-    identify : what the segments weigh.
-    diagnose : what the simulation gets wrong.
+    identify : What the segments weigh.
+    diagnose : What the simulation gets wrong.
 
     Examples
     --------

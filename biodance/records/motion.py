@@ -117,7 +117,7 @@ class Motion:
 
         Examples
         --------
-        >>> result["squat_1"].motion.table()["left_knee_flexion (deg)"].max() > 60
+        >>> bool(result["squat_1"].motion.table()["left_knee_flexion (deg)"].max() > 60)
         True
         """
         root = (*(f"root {axis} (m)" for axis in "xyz"), *(f"root q{axis}" for axis in "xyzw"))[: self._root]

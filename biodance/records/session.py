@@ -79,7 +79,7 @@ class Trial:
     Examples
     --------
     >>> session["squat_1"]
-    Trial('squat_1', validate, 37 markers (plug_in_gait), 1 plate, 6.10 s)
+    Trial('squat_1', validate, 39 markers (plug_in_gait), 1 plate, 6.10 s)
     """
 
     name: str
