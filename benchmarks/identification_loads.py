@@ -66,7 +66,7 @@ def _with_loads(got: Gathered) -> Statistics:
         unit = np.stack([_unit_wrench(one, fit, s) for s in range(len(one.body.segments))], axis=2)
         for pick in blocks(fit.use, fit.motion.rate, layout):
             part = Motion(fit.motion.time[pick], fit.motion.q[pick], fit.motion.v[pick], fit.motion.a[pick])
-            W = regressor_of(segment_motion(one.body, part))
+            W = regressor_of(segment_motion(one.body, part), gravity=one.body.gravity)
             X = layout.coefficients(layout.shift @ np.concatenate([W, unit[pick], fit.wrench.value[pick][:, :, None]], axis=2))
             band = layout.bands_of(len(X))
             for b in np.unique(band[band >= 0]):

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -10,8 +9,8 @@ from biodance.body.body import JointError
 from biodance.body.joint_centres import chord, davis_hip, elbow, harrington_hip, pelvis_frame, shoulder, unit, wrist
 from biodance.body.measures import Measures
 from biodance.records import Array
+from biodance.settings import Hip
 
-Hip = Literal["harrington", "davis"]
 SIGN = {"right": 1.0, "left": -1.0}
 UP = np.array([0.0, 0.0, 1.0])
 WRIST_BAR = 0.03

@@ -26,6 +26,11 @@ Json = Annotated[bool, Parameter(name="--json", negative="", help="Print one JSO
 Force = Annotated[bool, Parameter(name="--force", negative="", help="Write into a folder that already holds files.")]
 Out = Annotated[Path, Parameter(name="--out", help="Folder for the results; it is made if it is missing.")]
 
+Set = Annotated[
+    tuple[str, ...],
+    Parameter(name="--set", negative=(), help="Choose a setting: --set filter.cutoff=6; may be repeated. `biodance settings` prints all."),
+]
+
 
 def say(sentence: str) -> None:
     """Write one line to stderr."""

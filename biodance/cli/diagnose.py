@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, Force, Json, Out, app, print_json, progress
+from biodance.cli.app import DONE, NEEDS_A_PERSON, Force, Json, Out, Set, app, print_json, progress
 from biodance.cli.session import compared
 
 
@@ -43,6 +43,7 @@ def diagnose(
     reference: Path | None = None,
     accept: Annotated[bool, Parameter(name="--accept", negative="", help="Also write the body with the findings accepted.")] = False,
     subject: str | None = None,
+    chosen: Set = (),
     json: Json = False,
     force: Force = False,
 ) -> int:
@@ -59,13 +60,13 @@ def diagnose(
     """
     from rich.console import Console
 
-    from biodance.pipeline.diagnosis import diagnose_session
+    from biodance.pipeline import front
     from biodance.report.terminal import print_diagnosis
     from biodance.report.write import write_diagnosis
 
     with progress() as tell:
-        result, before, folder = compared(session, reference, out, subject=subject, force=force, tell=tell)
-        found = diagnose_session(result, reference=before, tell=tell)
+        result, before, folder = compared(session, reference, out, subject=subject, chosen=chosen, force=force, tell=tell)
+        found = front.diagnose(result, reference=before, tell=tell)
         tell("writing the page")
         document = write_diagnosis(result, found, folder, accepted=accept)
     if json:

@@ -1,4 +1,4 @@
-"""Commands on a recorded session: inspect, report, identify, export."""
+"""Commands on a recorded session: inspect, report, identify, settings, export."""
 
 import sys
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED, Force, Json, Out, app, print_json, progress, say
+from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED, Force, Json, Out, Set, app, print_json, progress, say
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -46,7 +46,7 @@ def told(result: "SessionResult", folder: Path, found: "dict[str, Any]", json: b
 
 
 def compared(
-    session: Path, reference: Path | None, out: Path, *, subject: str | None, force: bool, tell: "Callable[[str], None]"
+    session: Path, reference: Path | None, out: Path, *, subject: str | None, chosen: Set, force: bool, tell: "Callable[[str], None]"
 ) -> "tuple[SessionResult, SessionIdentification | None, Path]":
     """Examine a session beside an earlier one of the same person; return what was found, what that one said, and the results' folder.
 
@@ -54,12 +54,15 @@ def compared(
     """
     from biodance.lab.results_folder import results_folder
     from biodance.lab.session import read_session
-    from biodance.pipeline.session import examine, identified
+    from biodance.pipeline.front import identify
+    from biodance.pipeline.session import examine
+    from biodance.settings import assignments
 
-    earlier = read_session(reference, subject_name=subject, tell=tell) if reference else None
-    recording = read_session(session, subject_name=subject, tell=tell)
+    settings = assignments(chosen)
+    earlier = read_session(reference, subject_name=subject, settings=settings, tell=tell) if reference else None
+    recording = read_session(session, subject_name=subject, settings=settings, tell=tell)
     folder = results_folder(out, session, force=force)
-    before = identified(examine(earlier, tell=tell)) if earlier else None
+    before = identify(earlier, tell=tell) if earlier else None
     return examine(recording, reference=before, tell=tell), before, folder
 
 
@@ -102,7 +105,7 @@ def inspect(*paths: Path, json: Json = False) -> int:
 
 
 @app.command
-def report(session: Path, *, out: Out, subject: str | None = None, json: Json = False, force: Force = False) -> int:
+def report(session: Path, *, out: Out, subject: str | None = None, chosen: Set = (), json: Json = False, force: Force = False) -> int:
     """Take a session through all stages and write report.html and results.json.
 
     Parameters
@@ -114,9 +117,10 @@ def report(session: Path, *, out: Out, subject: str | None = None, json: Json = 
     """
     from biodance.lab.results_folder import results_folder
     from biodance.lab.session import read_session
+    from biodance.settings import assignments
 
     with progress() as tell:
-        recording = read_session(session, subject_name=subject, tell=tell)
+        recording = read_session(session, subject_name=subject, settings=assignments(chosen), tell=tell)
         folder = results_folder(out, session, force=force)
         result, found = reported(recording, folder, tell)
     return told(result, folder, found, json)
@@ -124,7 +128,14 @@ def report(session: Path, *, out: Out, subject: str | None = None, json: Json = 
 
 @app.command
 def identify(
-    session: Path, *, out: Out, reference: Path | None = None, subject: str | None = None, json: Json = False, force: Force = False
+    session: Path,
+    *,
+    out: Out,
+    reference: Path | None = None,
+    subject: str | None = None,
+    chosen: Set = (),
+    json: Json = False,
+    force: Force = False,
 ) -> int:
     """Identify what every segment weighs, with intervals, validate it on the trials kept, and look for an added mass.
 
@@ -137,15 +148,35 @@ def identify(
     subject
         The person to identify where C3D files hold several.
     """
-    from biodance.pipeline.session import identified
+    from biodance.pipeline import front
     from biodance.report.write import write_identification
 
     with progress() as tell:
-        result, _, folder = compared(session, reference, out, subject=subject, force=force, tell=tell)
-        found = identified(result)
+        result, _, folder = compared(session, reference, out, subject=subject, chosen=chosen, force=force, tell=tell)
+        found = front.identify(result)
         tell("writing the page")
         document = write_identification(result, found, folder)
     return _told_identified(result, folder, document, json)
+
+
+@app.command
+def settings(session: Path | None = None, *, chosen: Set = (), json: Json = False) -> int:
+    """Print everything an analyst may choose: value, unit, meaning and legal range, as it may stand in session.toml.
+
+    Parameters
+    ----------
+    session
+        A session folder, whose session.toml is then followed.
+    """
+    from biodance.lab.session_file import read_session_file
+    from biodance.settings import USUAL, assignments
+
+    found = (read_session_file(session).settings if session else USUAL).changed(assignments(chosen))
+    if json:
+        print_json([row._asdict() for row in found.all()])
+    else:
+        sys.stdout.write(found.to_toml())
+    return DONE
 
 
 @app.command

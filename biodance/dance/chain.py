@@ -157,4 +157,4 @@ class Chain:
         q = np.concatenate([x[:, :3], quaternion, x[:, ROOT:]], axis=1)
         v = np.concatenate([linear, spin, rate[:, ROOT:]], axis=1)
         a = np.concatenate([linear2, spin2, rate2[:, ROOT:]], axis=1)
-        return Motion(time, q, v, a)
+        return Motion(time, q, v, a, joint_names=tuple(joint.name for joint in self.body.joints))

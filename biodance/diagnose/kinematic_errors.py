@@ -14,7 +14,6 @@ from biodance.body.body import Body
 from biodance.identify.twins import Twins, central_inertia, disturbance, neighbours
 from biodance.motion.kinematics import Poses, cross, poses, segment_motion
 from biodance.motion.marker_jacobian import chains, jacobian, skew
-from biodance.motion.regressor import GRAVITY
 from biodance.records import Array, Motion
 
 REACH = 0.1
@@ -101,7 +100,7 @@ def functionals(body: Body, motion: Motion) -> tuple[Array, Array]:
     place[:, :, 0, :3] = mass * np.eye(3)
     place[:, :, 0, 3:] = mass * skew(com)
     place[:, :, 1, 3:] = -2 * mass * skew(np.gradient(com, 1.0 / motion.rate, axis=0))
-    place[:, :, 2, 3:] = mass * skew(GRAVITY)
+    place[:, :, 2, 3:] = mass * skew(body.gravity)
     turn[:, :, 0, 3:] = inertia
     turn[:, :, 1, 3:] = -skew(spin) - (whirl @ inertia - inertia @ whirl)
     return place, turn
@@ -159,7 +158,7 @@ def _sags(body: Body, motion: Motion, pose: Poses, response: _Response) -> Part:
         arm = move.rotation[:, s] @ body.markers.position[on].mean(axis=0)
         w = move.angular_velocity[:, s]
         acceleration = move.acceleration[:, s] + cross(move.angular_acceleration[:, s], arm) + cross(w, cross(w, arm))
-        moved = np.tile(acceleration - GRAVITY, (1, on.size))[:, :, None]
+        moved = np.tile(acceleration - body.gravity, (1, on.size))[:, :, None]
         rows = (3 * on[:, None] + np.arange(3)).ravel()
         tangent = response.gain[:, :, rows] @ moved
         values.append((response.tangent.reshape(frames, 18, -1) @ tangent).reshape(frames, 3, 6, 1))

@@ -62,7 +62,7 @@ class SloshingLoad(Effect):
         place, acceleration = point_motion(case, index, local)
         x, relative = relative_motion(acceleration, case.motion.rate, frequency=frequency, damping=DAMPING)
         level = np.array([1.0, 1.0, 0.0])
-        return rigid, riding_wrench(place, acceleration, (x * level, relative * level))
+        return rigid, riding_wrench(place, acceleration, (x * level, relative * level), gravity=case.body.gravity)
 
     def reported(self, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
         """Return the frequency itself instead of its difference."""

@@ -38,7 +38,7 @@ class WobblingMass(Effect):
         table = case.phi[10 * index : 10 * index + 10]
         place, acceleration = point_motion(case, index, table[1:4] / table[0])
         moved = relative_motion(acceleration, case.motion.rate, frequency=FREQUENCY.get(self.target, LIMBS), damping=DAMPING)
-        return riding_wrench(place, acceleration, moved)[:, :, None]
+        return riding_wrench(place, acceleration, moved, gravity=case.body.gravity)[:, :, None]
 
     def possible(self, theta: Array) -> bool:
         """Return whether the size is positive: only a mass that is there wobbles."""

@@ -87,7 +87,7 @@ def whitened_rows(body: Body, motion: Motion, wrench: Wrench, noise: Noise, used
     """Yield whitened rows (m, 6, 10N + 1) of [W y], block by block."""
     for pick in blocks(used, motion.rate, noise):
         part = Motion(motion.time[pick], motion.q[pick], motion.v[pick], motion.a[pick])
-        W = regressor_of(segment_motion(body, part))
+        W = regressor_of(segment_motion(body, part), gravity=body.gravity)
         yield noise.at(motion.rate).whiten(np.concatenate([W, wrench.value[pick][:, :, None]], axis=2))
 
 

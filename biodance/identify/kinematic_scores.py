@@ -14,7 +14,6 @@ from biodance.body.body import Body
 from biodance.identify.twins import central_inertia
 from biodance.motion.kinematics import Poses, poses, segment_motion
 from biodance.motion.marker_jacobian import below, chains, jacobian, skew
-from biodance.motion.regressor import GRAVITY
 from biodance.records import Array, Motion
 
 
@@ -59,7 +58,7 @@ def _backward(body: Body, motion: Motion, weight: Array) -> tuple[Array, Array]:
     force, moment = weight[:, None, :3], weight[:, None, 3:]
     late = _gradient_adjoint(moment, step)
     pushed = _gradient_adjoint(_gradient_adjoint(force, step) - skew(com) @ late, step)
-    place = mass[:, None, None] * (pushed - skew(GRAVITY) @ moment) + skew(momentum) @ late
+    place = mass[:, None, None] * (pushed - skew(body.gravity) @ moment) + skew(momentum) @ late
     return place, skew(spin) @ late + _gradient_adjoint(inertia @ late, step)
 
 

@@ -94,7 +94,7 @@ def mismatch(body: Body, fits: tuple[Fit, ...], noise: Noise) -> Mismatch:
             if pick.size < SHORTEST:
                 continue
             motion = Motion(fit.motion.time[pick], fit.motion.q[pick], fit.motion.v[pick], fit.motion.a[pick])
-            W = regressor_of(segment_motion(body, motion))
+            W = regressor_of(segment_motion(body, motion), gravity=body.gravity)
             weight = white.weighted(W)
             found = kinematic_scores(body, motion, weight)
             scores = found if scores is None else scores + found

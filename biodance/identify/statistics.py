@@ -17,6 +17,7 @@ from biodance.identify.noise import BANDS, Noise, blocks
 from biodance.motion.kinematics import segment_motion
 from biodance.motion.regressor import regressor_of
 from biodance.records import Array, Motion, Wrench
+from biodance.settings import Settings
 
 RATE = 25.0
 """Hz at which low-passed recordings are sampled for identification: more than twice the highest band."""
@@ -27,12 +28,15 @@ regressors that are themselves wrong pull masses towards smaller sway. Its postu
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """One trial to identify from: ``motion`` and ``wrench`` (about the lab origin) at the same times, ``use`` (T,) True where both hold."""
+    """One trial to identify from: ``motion`` and ``wrench`` (about the lab origin) at the same times, ``use`` (T,) True where both hold;
+    ``outlier`` the share of body weight by which a frame may differ from the table's prediction (`Settings.outlier`).
+    """
 
     name: str
     motion: Motion
     wrench: Wrench
     use: NDArray[np.bool_]
+    outlier: float = Settings.outlier
 
     def __post_init__(self) -> None:
         frames = self.motion.time.size
@@ -106,7 +110,7 @@ def statistics(body: Body, fit: Fit, layout: Noise) -> Statistics:
     for pick in blocks(fit.use, fit.motion.rate, layout):
         part = Motion(fit.motion.time[pick], fit.motion.q[pick], fit.motion.v[pick], fit.motion.a[pick])
         moved = segment_motion(body, part)
-        W = regressor_of(moved)
+        W = regressor_of(moved, gravity=body.gravity)
         rows = np.concatenate([W, fit.wrench.value[pick][:, :, None]], axis=2)
         X = layout.coefficients(layout.shift @ rows)
         band = layout.at(fit.motion.rate).bands_of(len(X))

@@ -15,9 +15,7 @@ from biodance.lab.recordings import recordings_below
 from biodance.lab.subject import declared_mass, declared_stature
 from biodance.lab.weight import standing_mass
 from biodance.records import Markers, Plate, Trial
-
-LOADED = 20.0
-"""Vertical force in N from which on the centre of pressure counts."""
+from biodance.settings import COP_FORCE
 
 SHORTEST_STEP = 0.05
 """Seconds under load from which on a plate has a centre of pressure; less is noise."""
@@ -118,7 +116,7 @@ def _subjects(path: Path) -> list[str]:
 
 def _plate(plate: Plate) -> dict[str, Any]:
     force = plate.wrench.force.mean(axis=0) if plate.wrench.time.size else np.full(3, math.nan)
-    cop = plate.wrench.cop(height=plate.height, threshold=LOADED)[:, :2]
+    cop = plate.wrench.cop(height=plate.height, threshold=COP_FORCE)[:, :2]
     loaded = cop[np.isfinite(cop).all(axis=1)]
     stepped_on = loaded.size > 0 and len(loaded) >= SHORTEST_STEP * plate.wrench.rate
     return {

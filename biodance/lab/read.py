@@ -71,15 +71,39 @@ def sniffed(head: bytes, chosen: Chosen[Reader] = None) -> Reader | None:
 
 
 def read_trial(path: str | Path, *, role: Role = "fit", subject: str | None = None, readers: Chosen[Reader] = None) -> Trial:
-    """Return the trial in a file of any format; ``subject`` chooses the person in a C3D file that holds several.
+    """Read the trial in a file of any format.
 
-    The forces of a .trc file are looked for beside it, in a .mot or .sto file of the same stem (or stem_grf, stem_forces). ``readers``
-    are objects that read further formats (`biodance.lab.readers.Reader`), or names that limit the family to some.
+    The forces of a .trc file are looked for beside it, in a .mot or .sto file of the same stem (or stem_grf, stem_forces).
+
+    Parameters
+    ----------
+    path : str or pathlib.Path
+        One recording.
+    role : {"fit", "static", "validate", "check", "skip"}
+        What it is for.
+    subject : str, optional
+        Chooses the person in a C3D file that holds several.
+    readers : iterable, optional
+        Objects that read further formats (`biodance.lab.readers.Reader`), or names that limit the family to some.
+
+    Returns
+    -------
+    Trial
+        In m, N, N·m, z up; ``history`` and ``warnings`` say what was decided.
 
     Raises
     ------
     FileRefused
         The file cannot be read or cannot be trusted, or its format is unknown; the message lists the legal formats.
+
+    See Also
+    --------
+    read_session : A whole folder, with the subject.
+
+    Examples
+    --------
+    >>> biodance.read_trial("visit/squat_1.c3d").source.format
+    'C3D'
     """
     path = Path(path)
     reader = reader_of(path, chosen=readers)

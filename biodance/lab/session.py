@@ -15,45 +15,79 @@ from biodance.lab.subject import identify_subject
 from biodance.lab.vicon import EclipseNotes
 from biodance.lab.weight import is_still, movement
 from biodance.records import Role, Session, Trial
+from biodance.settings import Settings
 
 
 def read_session(
     folder: str | Path,
     *,
     subject_name: str | None = None,
+    settings: Settings | Mapping[str, object] | None = None,
     readers: Chosen[Reader] = None,
     tell: Callable[[str], None] | None = None,
 ) -> Session:
-    """Return the session in a folder: the subject and every trial that can be read.
+    """Read the session in a folder: the subject and every trial that can be read.
 
     Roles come from session.toml, else from the Eclipse notes (.enf), else from the names (static*, cal* = static; squat* = validate;
     others = fit); without a static by these, the stillest trial is taken. The subject comes from session.toml, .mp, .vsk and the files' own
-    parameters, in this order. ``subject_name`` chooses the person in C3D files that hold several; ``readers`` as for
-    `read_trial`; ``tell`` is called with the name of each file before it is read.
-    A file that cannot be read never stops the session: it stands in ``Session.refused`` with the reason. What was
-    followed, guessed or left aside stands in ``Session.notes``.
+    parameters, in this order. A file that cannot be read never stops the session: it stands in ``Session.refused`` with the reason. What
+    was followed, guessed or left aside stands in ``Session.notes``.
+
+    Parameters
+    ----------
+    folder : str or pathlib.Path
+        With the recordings of one visit, and session.toml where there is one.
+    subject_name : str, optional
+        Chooses the person in C3D files that hold several.
+    settings : Settings or mapping, optional
+        A record: these and no others. A mapping, ``{"filter.cutoff": 6}``: as session.toml says, with these changed.
+    readers : iterable, optional
+        As for `read_trial`.
+    tell : callable, optional
+        Called with the name of each file before it is read.
+
+    Returns
+    -------
+    Session
+        ``session["squat_1"]`` is a trial.
 
     Raises
     ------
     SessionRefused
         Not a folder, no recording in it, none that can be read, or a session.toml with a mistake.
+    UnknownName
+        There is no such setting.
+    BiodanceError
+        A setting is not legal.
+
+    See Also
+    --------
+    examine : Take it through all stages.
+
+    Examples
+    --------
+    >>> session = biodance.read_session("visit", settings={"filter.cutoff": 6})
+    >>> session.settings
+    Settings(filter.cutoff=6.0)
     """
     folder = _checked(Path(folder))
-    settings = read_session_file(folder)
+    file_says = read_session_file(folder)
+    chosen = settings if isinstance(settings, Settings) else file_says.settings.changed(settings or {})
     files, notes = find_recordings(folder, readers)
     eclipse, measurements, refused = vicon_notes({folder, *(file.parent for file in files)})
     trials: list[Trial] = []
     reasons: dict[str, str] = {}
     for file in files:
         operator = eclipse.get(file.stem.lower())
-        role, reason = _role(file, folder, settings, operator)
+        role, reason = _role(file, folder, file_says, operator)
         if role == "skip":
             notes.append(f"{file.name} was left aside: {reason}.")
             continue
         if tell:
             tell(file.name)
         try:
-            trial = _with_strikes(read_trial(file, role=role, subject=subject_name, readers=readers), operator)
+            trial = replace(read_trial(file, role=role, subject=subject_name, readers=readers), settings=chosen)
+            trial = _with_strikes(trial, operator)
         except BiodanceError as error:
             refused[file.name] = str(error)
             continue
@@ -61,11 +95,11 @@ def read_session(
         reasons[trials[-1].name] = reason
     if not trials:
         raise SessionRefused(_nothing_left(folder, refused, readers))
-    trials = _settle_static(trials, settings, reasons, notes)
-    subject, guesses = identify_subject(settings.subject, measurements, trials, name=subject_name or folder.resolve().name)
-    read = [f"{path.name} in {path.parent.name} was followed." for path in settings.read]
+    trials = _settle_static(trials, file_says, reasons, notes)
+    subject, guesses = identify_subject(file_says.subject, measurements, trials, name=subject_name or folder.resolve().name)
+    read = [f"{path.name} in {path.parent.name} was followed." for path in file_says.read]
     roles = [f"{trial.name} has the role {trial.role}: {reasons[trial.name]}." for trial in trials]
-    slips = settings.unused([file.stem for file in files])
+    slips = file_says.unused([file.stem for file in files])
     return Session(subject, tuple(trials), folder, refused, (*read, *slips, *roles, *notes, *guesses))
 
 

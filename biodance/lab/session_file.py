@@ -10,6 +10,9 @@ name = "S01"
 
 [trials."static*"]    # file name without extension, * and ? allowed; the exact name wins over a pattern
 role = "static"       # static, fit, validate, check or skip
+
+[settings]            # as `biodance settings` prints them
+filter.cutoff = 6
 ```
 
 A ``subject.toml`` or ``session.toml`` in the folder above (the subject's folder) has the same keys and fills in what the session's own
@@ -24,9 +27,10 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from biodance.errors import SessionRefused
+from biodance.errors import BiodanceError, SessionRefused
 from biodance.library import read_toml
 from biodance.records import Role
+from biodance.settings import USUAL, Settings
 
 FILES = ("subject.toml", "session.toml")
 
@@ -54,15 +58,19 @@ class TrialEntry(_Entry):
 class _Contents(_Entry):
     subject: SubjectEntry = SubjectEntry()
     trials: dict[str, TrialEntry] = {}
+    settings: dict[str, Any] = {}
 
 
 @dataclass(frozen=True)
 class SessionFile:
-    """What all files of the chain say together: ``subject``, ``trials`` by name or pattern (the innermost file first), ``read`` paths."""
+    """What all files of the chain say together: ``subject``, ``trials`` by name or pattern (the innermost file first), ``read`` paths,
+    ``settings`` with what ``[settings]`` changes.
+    """
 
     subject: SubjectEntry = field(default_factory=SubjectEntry)
     trials: tuple[tuple[str, TrialEntry], ...] = ()
     read: tuple[Path, ...] = field(default=())
+    settings: Settings = USUAL
 
     def role(self, name: str) -> Role | None:
         """Return the role of a trial: by its exact name, else by the first pattern that fits; upper and lower case count the same."""
@@ -96,7 +104,18 @@ def read_session_file(folder: Path) -> SessionFile:
     for content in contents:
         said |= content.subject.model_dump(exclude_none=True)
     trials = tuple((key, entry) for content in reversed(contents) for key, entry in content.trials.items())
-    return SessionFile(SubjectEntry(**said), trials, tuple(paths))
+    return SessionFile(SubjectEntry(**said), trials, tuple(paths), _settings(paths, contents))
+
+
+def _settings(paths: list[Path], contents: list[_Contents]) -> Settings:
+    """Return the settings with what the files change, the innermost file last."""
+    settings = USUAL
+    for path, content in zip(paths, contents, strict=True):
+        try:
+            settings = settings.changed(content.settings)
+        except BiodanceError as error:
+            raise SessionRefused(f"{path}: [settings] {error}") from None
+    return settings
 
 
 def _read(path: Path) -> _Contents:

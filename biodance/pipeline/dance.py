@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from biodance import display
 from biodance.body.body import Body
 from biodance.body.human import human
 from biodance.body.limits import joint_limits
@@ -48,10 +49,30 @@ PERSONS = Makers(design, expect)
 class DanceResult:
     """What came of designing a dance.
 
-    ``plan`` and ``body`` as fitted to the person; ``dance`` with its ``margins`` (worst of every limit, checked by other code than the
-    optimiser's), ``account`` and ``expectation``; where there is none that keeps all limits, ``reason`` says which constraint forbids it
-    and ``dance`` is None. ``notes`` what was left out for the person (``dance.notes``: what was exchanged or left out because a move was
-    impossible); ``seconds`` of computing.
+    Parameters
+    ----------
+    body : Body
+        As fitted to the person.
+    plan : Plan
+        The protocol, as fitted to the person.
+    dance : Dance or None
+        None where none keeps all limits.
+    margins : tuple
+        Worst of every limit, judged by other code than the optimiser's.
+    account, expectation : Account, Expectation or None
+        What the dance tells, and what will be known after it; None without a dance.
+    reason : str
+        Which limit forbids the dance; "" with one.
+    notes : tuple of str
+        What was left out for the person (``dance.notes``: because a move was impossible).
+    seconds : float
+        Of computing.
+
+    Examples
+    --------
+    >>> made = biodance.design_dance(biodance.Subject(65.0, 1.75, "F"), "one_segment")  # doctest: +SKIP
+    >>> made.feasible  # doctest: +SKIP
+    True
     """
 
     body: Body
@@ -63,6 +84,12 @@ class DanceResult:
     reason: str
     notes: tuple[str, ...]
     seconds: float
+
+    def __repr__(self) -> str:
+        return f"DanceResult({self.dance!r})" if self.dance is not None else f"DanceResult(no dance: {self.reason})"
+
+    def _repr_html_(self) -> str:
+        return display.card(repr(self), self.dance.table() if self.dance is not None else None, self.notes)
 
     @property
     def feasible(self) -> bool:

@@ -3,12 +3,14 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from biodance import display
 from biodance.body.body import Body
 from biodance.diagnose.accept import Judged, accept, fit_of, gain, judged
-from biodance.diagnose.diagnosis import Alias, Diagnosis, Estimate, Finding
+from biodance.diagnose.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
 from biodance.diagnose.engine import Examined, diagnose
 from biodance.diagnose.foresight import Foresight, foresee, session_of
 from biodance.diagnose.problem import Look
@@ -23,16 +25,34 @@ from biodance.pipeline.looked_at import Own, left_out, looked_at, looks, own_tol
 from biodance.pipeline.results import SessionResult
 from biodance.records import Role, Sip
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 TRIAL_SECONDS = 20.0
 """s: a designed dance is looked at as trials of about this length."""
 
 
 @dataclass(frozen=True, eq=False)
 class SessionDiagnosis:
-    """``diagnosis``; ``accepted`` what is identified once the findings are accepted (None without findings), ``before`` without them;
-    ``examined`` what the engine looked at (None where a check stopped it); ``left`` what the body in use leaves of the kept trials,
-    and what is left once the findings are accepted; ``failures`` what could not be computed ("what accepting changes"), with
-    cause and cure.
+    """What the simulation of a visit gets wrong, and what accepting it changes.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Verdict and findings.
+    examined : Examined or None
+        What the engine looked at; None where a check stopped it.
+    before, accepted : Identification or None
+        What is identified without the findings and once they are accepted; None without findings.
+    left : tuple or None
+        What the body in use leaves of the kept trials, and what is left once the findings are accepted.
+    failures : mapping
+        What could not be computed ("what accepting changes"), with cause and cure.
+
+    Examples
+    --------
+    >>> found.verdict
+    'nothing wrong'
     """
 
     diagnosis: Diagnosis
@@ -41,6 +61,37 @@ class SessionDiagnosis:
     accepted: Identification | None = None
     left: tuple[Judged, Judged] | None = None
     failures: Mapping[str, str] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        return f"SessionDiagnosis({self.diagnosis.told})"
+
+    def _repr_html_(self) -> str:
+        return display.card(repr(self), self.table(), self.diagnosis.notes)
+
+    @property
+    def verdict(self) -> Verdict:
+        """One of "nothing wrong", "named, complete", "named, incomplete", "unexplained"."""
+        return self.diagnosis.verdict
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """The causes named, in the order found."""
+        return self.diagnosis.findings
+
+    def table(self) -> "pd.DataFrame":
+        """Return one row for each parameter of each finding, see `Diagnosis.table`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Empty where nothing is wrong.
+
+        Examples
+        --------
+        >>> len(found.table())
+        0
+        """
+        return self.diagnosis.table()
 
 
 def diagnose_session(

@@ -2,9 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from biodance import display
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identify.added_mass import AddedMass, added_mass
@@ -15,10 +17,13 @@ from biodance.identify.torques import TorqueBands, torque_bands
 from biodance.identify.validation import Gain, TrialValidation, gain, validate
 from biodance.motion.comparison import Agreement, compare
 from biodance.motion.contact import foot_wrenches, ground_contact
-from biodance.motion.regressor import GRAVITY, predict_wrench
+from biodance.motion.regressor import predict_wrench
 from biodance.motion.soles import SIDES, soles_from_body
 from biodance.pipeline.results import TrialResult
 from biodance.records import ROLES, Role, Wrench
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 UNEXPLAINED = 0.5
 """kg between plates and identified body over the fit trials: more than the scale's uncertainty, shoes and a zero allow."""
@@ -28,14 +33,36 @@ KEPT: tuple[Role, ...] = ("validate", "check")
 
 @dataclass(frozen=True, eq=False)
 class SessionIdentification:
-    """All that identification found in a session.
+    """All that identification found in a visit.
 
-    ``fitted`` and ``validations`` compare the trials used and the trials kept, about the mean centre of pressure; ``agreements`` the
-    identified body on every compared trial by name, about the lab origin; ``gain`` table / identified over the validations (None without
-    an interval); ``search`` the loads looked for, against ``search.reference``; ``changes`` since the reference session, empty without one;
-    ``torques`` of the joints in the first trial kept (else fitted), None where the feet's wrenches are not known; ``name`` of the session;
-    ``notes`` what a person should know; ``failures`` what could not be computed ("segments", "reference", "differences"), each with cause
-    and cure: without segments there is nothing to compare, to validate or to drive joints with, and those fields are empty.
+    Parameters
+    ----------
+    name : str
+        Of the session.
+    identification : Identification
+        What the segments weigh.
+    fitted, validations : tuple
+        The trials used and the trials kept, each with table and identified body, about the mean centre of pressure.
+    agreements : mapping
+        Trial -> how well the identified body agrees with the plates, about the lab origin.
+    gain : Gain or None
+        RMS residual of the table over that of the identified body on the trials kept; None without an interval.
+    search : AddedMass
+        The loads looked for, against ``search.reference``.
+    changes : tuple
+        Since the reference session; () without one.
+    torques : TorqueBands or None
+        Of the joints in the first trial kept (else fitted); None where the feet's wrenches are not known.
+    notes : tuple of str
+        What a person should know.
+    failures : mapping
+        What could not be computed ("segments", "reference", "differences"), each with cause and cure: without segments there is nothing
+        to compare, to validate or to drive joints with, and those fields are empty.
+
+    Examples
+    --------
+    >>> identified.status
+    'solved'
     """
 
     name: str
@@ -50,13 +77,45 @@ class SessionIdentification:
     notes: tuple[str, ...] = ()
     failures: Mapping[str, str] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        sip = self.identification.sip
+        return f"SessionIdentification({self.name!r}: {self.status}, {len(sip.segments)} segments, {sip.mass.sum():.1f} kg)"
+
+    def _repr_html_(self) -> str:
+        return display.card(repr(self), self.table(), self.notes)
+
+    @property
+    def status(self) -> Literal["solved", "failed"]:
+        """Whether the fit was solved; a failed one keeps the table's values and says so."""
+        return self.identification.status
+
+    def table(self, quantity: str = "mass") -> "pd.DataFrame":
+        """Return one row for each segment, see `Identification.table`.
+
+        Parameters
+        ----------
+        quantity : str
+            "mass", "com x" ... or "Ixx" ....
+
+        Returns
+        -------
+        pandas.DataFrame
+            Table and identified value with intervals, each with its unit.
+
+        Examples
+        --------
+        >>> list(identified.table().columns[:3])
+        ['table (kg)', 'table sd (kg)', 'identified (kg)']
+        """
+        return self.identification.table(quantity)
+
 
 def fit_of(result: TrialResult) -> Fit | None:
     """Return what a trial gives to identify from or to validate on; None without motion, wrench or a frame to compare."""
     found = result.comparison
     if found is None or result.motion is None or not found.used.any():
         return None
-    return Fit(result.trial.name, result.motion, Wrench(found.time, found.measured), found.used)
+    return Fit(result.trial.name, result.motion, Wrench(found.time, found.measured), found.used, result.trial.settings.outlier)
 
 
 def can_identify(results: tuple[TrialResult, ...]) -> bool:
@@ -127,7 +186,7 @@ def _predicted(
     notes = list(one.notes)
     if not kept:
         notes.append("No trial was kept for validation, so the gain is not proven. Record squats, or give a trial the role validate.")
-    notes += _weight(fitted)
+    notes += _weight(fitted, -float(found.body.gravity[2]))
     return replace(
         one,
         fitted=fitted,
@@ -152,9 +211,9 @@ def _torques(found: Identification, results: tuple[TrialResult, ...]) -> TorqueB
     return None
 
 
-def _weight(fitted: tuple[TrialValidation, ...]) -> list[str]:
+def _weight(fitted: tuple[TrialValidation, ...], gravity: float) -> list[str]:
     """Say it where the plates carry another weight than the identified body has: the table's total is pinned to the declared mass."""
-    missing = np.concatenate([(trial.measured.force - trial.identified.force)[trial.use, 2] for trial in fitted]).mean() / -GRAVITY[2]
+    missing = np.concatenate([(trial.measured.force - trial.identified.force)[trial.use, 2] for trial in fitted]).mean() / gravity
     if abs(missing) <= UNEXPLAINED:
         return []
     return [

@@ -9,7 +9,6 @@ from biodance.errors import TrialRefused
 from biodance.lab.gaps import MarkerGaps, report_gaps
 from biodance.lab.marker_sets import canonical, read_marker_set
 from biodance.lab.prepare import prepare
-from biodance.lab.weight import LOADED
 from biodance.motion.comparison import compare
 from biodance.motion.contact import Contact, ground_contact
 from biodance.motion.regressor import predict_wrench
@@ -87,7 +86,7 @@ def compare_wrenches(trial: Trial, body: Body, motion: Motion, contact: Contact)
         No frame is fully measured; the message says why.
     """
     measured, simulated = trial.wrench, predict_wrench(body, motion)
-    if np.nanmax(measured.force[:, 2], initial=0.0) < LOADED:
+    if np.nanmax(measured.force[:, 2], initial=0.0) < trial.settings.standing.force:
         raise TrialRefused(f"Trial {trial.name}: nobody stands on the plates, so there is no wrench to compare with.")
     if not contact.measured.any():
         raise TrialRefused(f"Trial {trial.name}: {' '.join(contact.notes)} So measured and simulated wrench cannot be compared.")

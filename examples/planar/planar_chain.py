@@ -12,12 +12,13 @@ import numpy as np
 from biodance.body.body import Body, Joint, JointLimits, SegmentMarkers
 from biodance.errors import UnknownName
 from biodance.records import Array, Sip
+from biodance.settings import STANDARD_GRAVITY
 
 LENGTHS = (0.8, 0.2, 0.2)
 """m: the first two as printed in eq. 13, the hand's (it is in no base parameter) assumed."""
 MASSES = (37.57, 2.86, 0.39)
 """kg, assumed: 0.578, 0.044 and 0.006 of 65 kg (head and trunk, arm without hand, hand; Winter 2009, Table 4.1)."""
-PLANAR_GRAVITY = np.array([0.0, -9.80665, 0.0])
+PLANAR_GRAVITY = np.array([0.0, -STANDARD_GRAVITY, 0.0])
 """(3,) m/s² in the lab frame of the chain."""
 PLANAR_CHANNELS = (0, 1, 5)
 """Fx, Fy, Mz: the three channels of the base wrench that a planar motion drives."""
@@ -58,6 +59,7 @@ def planar_chain(*, ranges: str = "frontal") -> Body:
         boxes=boxes,
         com_boxes=boxes,
         root="fixed",
+        gravity=PLANAR_GRAVITY,
         notes=(
             "Link lengths 0.8 m and 0.2 m are the paper's (eq. 13); masses, centres of mass and inertias are assumed (Winter 2009, rods).",
             f"Joint ranges {ranges!r} are assumed: the paper does not print them. No speed and no torque limit, as in the paper.",

@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from biodance.body.body import Body
+from biodance.body.body import UPRIGHT, Body
 from biodance.body.inertia import lump_of
 from biodance.body.segment_tree import WORLD, Branch, segment_tree
 from biodance.body.xml_text import add, document, plain, row, six
@@ -34,7 +34,7 @@ def text(body: Body, source: str) -> str:
     root = Element("OpenSimDocument", Version="40000")
     model = add(root, "Model", name=plain(body.name))
     add(model, "credits", source or "written by biodance")
-    add(model, "gravity", "0 -9.80665 0" if body.n_root else "0 0 -9.80665")
+    add(model, "gravity", row(UPRIGHT.T @ body.gravity if body.n_root else body.gravity))
     bodies = add(add(model, "BodySet", name="bodyset"), "objects")
     joints = add(add(model, "JointSet", name="jointset"), "objects")
     for branch in segment_tree(body):

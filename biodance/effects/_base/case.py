@@ -47,7 +47,7 @@ class Case:
     @cached_property
     def regressor(self) -> Array:
         """(T, 6, 10N) root regressor about the lab origin."""
-        return regressor_of(self.segments)
+        return regressor_of(self.segments, gravity=self.body.gravity)
 
     @cached_property
     def segments(self) -> SegmentMotion:

@@ -14,6 +14,7 @@ from biodance.body.moved import carried_by, neutral_turn
 from biodance.effects._base.moved_matter import MovedMatter, centres, moved_matter, wrench_of
 from biodance.effects._base.posture_answer import PostureAnswer
 from biodance.identify.twins import skew
+from biodance.lab.filters import LowPass, motion_filter
 from biodance.motion.kinematics import Poses, SegmentMotion
 from biodance.motion.marker_jacobian import below, chains, jacobian
 from biodance.records import Array, Index
@@ -35,7 +36,8 @@ class Geometry:
 
     ``time`` (F,) s of the chosen frames, ``wanted`` (T,) s of all; ``answer`` of the posture; ``matter`` P, Q, S (F, 9, nv) per unit of
     every coordinate; ``direct`` (F, 9, N, 3) per metre of every segment; ``turns`` (F, N, 3, nv) rad of the segments per unit of every
-    coordinate; ``seen`` (F, K) 1 where a marker was seen; ``phi`` (10N,) the parameters of the matter.
+    coordinate; ``seen`` (F, K) 1 where a marker was seen; ``phi`` (10N,) the parameters of the matter;
+    ``smoothed`` the low-pass of the motion.
     """
 
     time: Array
@@ -46,6 +48,7 @@ class Geometry:
     turns: Array
     seen: Array
     phi: Array
+    smoothed: LowPass
 
     @cached_property
     def marker_changes(self) -> "Changes":
@@ -74,7 +77,7 @@ class Geometry:
         return Changes(wrench, self._residual(posture, np.concatenate(moved, axis=3)))
 
     def _wrench(self, nine: Array) -> Array:
-        return wrench_of(nine, self.time, self.wanted)
+        return wrench_of(nine, self.time, self.wanted, smoothed=self.smoothed, gravity=self.answer.body.gravity)
 
     def _residual(self, posture: Array, moved: Array) -> Array:
         """Return the change (K, 3, P) m of the mean marker residual (measured less model, segment axes) when the model's markers move by
@@ -139,6 +142,7 @@ def geometry(case: "Case") -> Geometry:
         turn.reshape(shape),
         seen,
         case.phi,
+        motion_filter(case.trial.settings),
     )
 
 

@@ -17,7 +17,7 @@ from biodance.body.segment_data import read_segment_table
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect
 from biodance.errors import TrialRefused
-from biodance.lab.filters import LowPass, low_pass
+from biodance.lab.filters import LowPass, low_pass, motion_filter
 from biodance.motion.inverse_kinematics import solve_ik
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import regressor
@@ -126,8 +126,9 @@ def _slow(case: Case) -> _Slow:
         every = slice(None, None, max(1, int(case.motion.rate / RATE + 1e-6)))
         markers, time = case.trial.markers, case.motion.time[every]
         assert markers is not None
-        calm = Markers(markers.names, time, low_pass(markers.xyz, case.motion.rate, LowPass())[every])
-        settings = LowPass(cutoff=min(LowPass().cutoff, 0.45 * case.motion.rate / (every.step or 1)))
+        usual = motion_filter(case.trial.settings)
+        calm = Markers(markers.names, time, low_pass(markers.xyz, case.motion.rate, usual)[every])
+        settings = replace(usual, cutoff=min(usual.cutoff, 0.45 * case.motion.rate / (every.step or 1)))
         stiff = smooth(case.body, time, case.motion.q[every], settings=settings)
         case.memory["slow"] = _Slow(calm, stiff.q, regressor(case.body, stiff), settings)
     found = case.memory["slow"]

@@ -18,7 +18,6 @@ from biodance.body.inertia import TENSOR
 from biodance.identify.twins import skew
 from biodance.lab.filters import LowPass, low_pass
 from biodance.motion.kinematics import SegmentMotion
-from biodance.motion.regressor import GRAVITY
 from biodance.records import Array
 
 DEGREE = 5
@@ -57,14 +56,14 @@ def centres(phi: Array) -> Array:
     return np.asarray(table[:, 1:4] / np.where(table[:, :1] != 0, table[:, :1], np.inf))
 
 
-def wrench_of(nine: Array, time: Array, wanted: Array, settings: LowPass | None = None) -> Array:
+def wrench_of(nine: Array, time: Array, wanted: Array, *, smoothed: LowPass, gravity: Array) -> Array:
     """Return the change (T, 6, P) of the ground wrench about the lab origin at the even times ``wanted`` (T,) s from P, Q, S ``nine``
-    (F, 9, P) at some ``time`` (F,) s, low-passed and differentiated as the motion was (see `biodance.motion.smoothing`).
+    (F, 9, P) at some ``time`` (F,) s, low-passed and differentiated as the motion was (``smoothed``, see `biodance.motion.smoothing`).
     """
     rough = make_interp_spline(time, nine.reshape(len(nine), -1), k=DEGREE)(wanted)
-    smooth = low_pass(rough, (len(wanted) - 1) / (wanted[-1] - wanted[0]), settings or LowPass())
+    smooth = low_pass(rough, (len(wanted) - 1) / (wanted[-1] - wanted[0]), smoothed)
     ends = [(order, np.zeros(smooth.shape[1])) for order in (3, 4)]
     spline = make_interp_spline(wanted, smooth, k=DEGREE, bc_type=(ends, ends))
     first, second = (spline(wanted, nu=order).reshape(len(wanted), 9, -1) for order in (1, 2))
-    moment = second[:, 3:6] + first[:, 6:] + skew(GRAVITY) @ smooth.reshape(first.shape)[:, :3]
+    moment = second[:, 3:6] + first[:, 6:] + skew(gravity) @ smooth.reshape(first.shape)[:, :3]
     return np.concatenate([second[:, :3], moment], axis=1)

@@ -9,7 +9,6 @@ from scipy.signal import cont2discrete, lfilter, lfilter_zi, ss2tf
 
 from biodance.effects._base.case import Case
 from biodance.motion.kinematics import cross
-from biodance.motion.regressor import GRAVITY
 from biodance.records import Array
 
 
@@ -37,7 +36,7 @@ def point_motion(case: Case, segment: int, local: Array) -> tuple[Array, Array]:
     return move.position[:, segment] + arm, acceleration
 
 
-def riding_wrench(place: Array, acceleration: Array, moved: tuple[Array, Array]) -> Array:
+def riding_wrench(place: Array, acceleration: Array, moved: tuple[Array, Array], *, gravity: Array) -> Array:
     """Return (T, 6) per kilogram about the lab origin: what the relative motion ``moved`` (x, x'') adds at a point (T, 3)."""
     x, relative = moved
-    return np.concatenate([relative, cross(place, relative) + cross(x, acceleration - GRAVITY)], axis=1)
+    return np.concatenate([relative, cross(place, relative) + cross(x, acceleration - gravity)], axis=1)
