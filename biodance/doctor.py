@@ -52,7 +52,7 @@ PROBES = (
     Probe("pandas with pyarrow", "import pandas, pyarrow; print(pandas.__version__)", "pip install pandas pyarrow"),
     Probe("trimesh", _importing("trimesh"), "pip install trimesh"),
     Probe("matplotlib", _importing("matplotlib"), "pip install matplotlib"),
-    Probe("GL stills (pyvista)", STILL, "pip install pyvista; apt-get install libgl1 libegl1; without it pages carry drawings.", needed=False),
+    Probe("GL stills (pyvista)", STILL, "pip install pyvista; apt-get install libgl1 libegl1.", needed=False),
     Probe("opensim (comparisons)", _importing("opensim"), "pip install opensim; only the tests and benchmarks use it.", needed=False),
     Probe("mujoco (comparisons)", _importing("mujoco"), "pip install mujoco; only the tests use it.", needed=False),
 )  # fmt: skip

@@ -69,9 +69,9 @@ def test_a_child_that_dies_hangs_or_fails_costs_nothing(read, monkeypatch, child
     assert said in read(jumping()).warnings[0]
 
 
-@pytest.mark.parametrize("line", ['data["points"][0, 1, 7] += 1', 'data["analogs"][0, 2, 7] += 1', 'data["points"] = data["points"][:, 1:]'])
+@pytest.mark.parametrize("line", ["points[0, 1, 7] += 1", "analogs[0, 2, 7] += 1", "points = points[:, 1:]"])
 def test_other_numbers_refuse_the_file(read, monkeypatch, line):
-    monkeypatch.setattr(second_opinion, "READ", second_opinion.READ.replace("numpy.save", line + "\nnumpy.save", 1))
+    monkeypatch.setattr(second_opinion, "READ", second_opinion.READ.replace("numpy.save", f"{line}\nnumpy.save", 1))
     with pytest.raises(FileRefused, match="ezc3d reads other numbers than biodance"):
         read(jumping(scale=-1.0))
 

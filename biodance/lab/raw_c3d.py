@@ -28,7 +28,7 @@ class RawC3d:
     ``points`` (T, K, 3) in file units and file axes, NaN = not seen; ``rate`` Hz, NaN = none; ``first_frame`` number of the first frame;
     ``analog`` (S, C) scaled as the file says, ``(number - OFFSET) * SCALE * GEN_SCALE``; ``analog_rate`` Hz, NaN = none;
     ``analog_units`` (C) as written ("" = none). ``parameters[GROUP][NAME]`` (upper case): arrays with the file's own dimensions, first
-    dimension fastest, or lists of stripped strings. ``reader`` names the readers that agree on the numbers, "biodance" or "biodance, ezc3d";
+    dimension fastest, or lists of stripped strings. ``reader`` names who agrees on the numbers, "biodance" or "biodance, ezc3d";
     ``warnings`` say where the file contradicts itself or smells of a misread, and how that was decided.
     """
 
@@ -89,9 +89,7 @@ def read_raw(path: str | Path) -> RawC3d:
     )
 
 
-def _smells(
-    numbers: Numbers, labels: tuple[str, ...], layout: Layout, parameters: Parameters, path: Path
-) -> tuple[tuple[str, ...], str]:
+def _smells(numbers: Numbers, labels: tuple[str, ...], layout: Layout, parameters: Parameters, path: Path) -> tuple[tuple[str, ...], str]:
     """Have suspicious numbers judged by a second reader; return what it says and who agrees; refuse the file if it reads others."""
     no_markers = {*model_outputs(labels, parameters), *unlabelled(labels)}
     leaps = _leaps(numbers[0][:, [column for column in range(layout.points) if column not in no_markers]], parameters)

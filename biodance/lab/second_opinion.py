@@ -25,15 +25,17 @@ try:
     data = ezc3d.c3d(sys.argv[1])["data"]
 except Exception as error:
     sys.exit(" ".join(str(error).split())[:120] or type(error).__name__)
-numpy.save(sys.stdout.buffer, data["points"][:3].transpose(2, 1, 0).astype("f4"))
-numpy.save(sys.stdout.buffer, data["analogs"][0].T.astype("f4"))
+points, analogs = data["points"], data["analogs"]
+numpy.save(sys.stdout.buffer, points[:3].transpose(2, 1, 0).astype("f4"))
+numpy.save(sys.stdout.buffer, analogs[0].T.astype("f4"))
 """
 
 
 def second_opinion(path: Path, numbers: Numbers, layout: Layout) -> str:
     """Return "confirmed" if ezc3d reads the same numbers, "refuted" if it reads others, else why it does not read the file.
 
-    ezc3d finds the layout on its own, so it also judges ours. Left out are analog channels that ezc3d 1.7.2 is known to read wrong: those
+    ezc3d finds the layout on its own, so it also judges ours; where header and parameters disagree it believes one of them without
+    looking at the length of the file, as biodance does, which then is no judgement. Left out are analog channels that ezc3d 1.7.2 is known to read wrong: those
     with a negative OFFSET, whose sign it loses, and unsigned integers, which it takes for signed ones.
 
     Parameters
@@ -58,7 +60,14 @@ def second_opinion(path: Path, numbers: Numbers, layout: Layout) -> str:
         return f"ezc3d does not take the file ({lines[-1] if lines else f'exit code {child.returncode}'})"
     with io.BytesIO(child.stdout) as answer:
         points, analog = np.load(answer).astype(float), np.load(answer).astype(float)
+    if layout.notes and (points.shape, analog.shape) != (numbers[0].shape, _shape(numbers[1], len(points))):
+        return f"ezc3d believes the other of the two ({points.shape[1]} points, {analog.shape[1]} channels, {len(points)} frames)"
     return "confirmed" if _same_points(numbers[0], points) and _same_analog(numbers[1], analog, layout) else "refuted"
+
+
+def _shape(analog: Array, frames: int) -> tuple[int, ...]:
+    """Return the shape in which ezc3d gives analog values: without channels it still has one row a frame."""
+    return analog.shape if analog.size else (frames, 0)
 
 
 def _same_points(ours: Array, theirs: Array) -> bool:

@@ -11,7 +11,7 @@ from typing import Any
 from biodance import __version__
 from biodance.pipeline.results import SessionResult
 
-LIBRARIES = ("numpy", "scipy", "pin", "c3d", "cvxpy", "clarabel", "matplotlib")
+LIBRARIES = ("numpy", "scipy", "pin", "ezc3d", "cvxpy", "clarabel", "matplotlib")
 
 
 @dataclass(frozen=True)
