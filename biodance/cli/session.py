@@ -152,9 +152,9 @@ def identify(
 def export(
     source: Path,
     *,
-    format: Annotated[str, Parameter(help="osim, urdf, mjcf, biomod, csv; or trc, mot of one trial.")],
+    format: Annotated[str, Parameter(help="osim, urdf, mjcf, biomod, csv; or trc, mot, c3d of one trial.")],
     out: Annotated[Path, Parameter(help="The file to write.")],
-    trial: Annotated[str | None, Parameter(help="Name of the trial for trc and mot.")] = None,
+    trial: Annotated[str | None, Parameter(help="Name of the trial for trc, mot and c3d.")] = None,
     subject: Annotated[str | None, Parameter(help="The person to export where C3D files hold several.")] = None,
     force: Annotated[bool, Parameter(name="--force", negative="", help="Replace the file if it exists.")] = False,
 ) -> int:

@@ -13,13 +13,14 @@ from biodance.lab.session import read_session
 from biodance.lab.trc import write_trc
 from biodance.motion.opensim_coordinates import opensim_coordinates
 from biodance.pipeline.results import SessionResult, TrialResult
+from biodance.pipeline.results_c3d import results_into_c3d
 from biodance.pipeline.session import examine
 from biodance.pipeline.trial import prepared
 from biodance.records import Session, Trial
 
 BODY = "body.json"
 """File in which `biodance identify` keeps the identified body."""
-MOTION_FORMATS = ("trc", "mot")
+MOTION_FORMATS = ("trc", "mot", "c3d")
 
 
 def legal_formats() -> tuple[str, ...]:
@@ -39,8 +40,9 @@ def export(
     """Write ``source`` to the file ``out`` and return its path and one sentence on what it holds.
 
     ``source`` a session folder, or the results folder (or its body.json) of `biodance identify`. Model formats write the body with the
-    identified parameters, where there are trials to identify from, else with the table's; ``trc`` writes the prepared markers and ``mot``
-    the joint coordinates (of the model that ``osim`` writes) of one trial. ``subject`` names the person where files hold several.
+    identified parameters, where there are trials to identify from, else with the table's; ``trc`` writes the prepared markers, ``mot``
+    the joint coordinates (of the model that ``osim`` writes) of one trial, and ``c3d`` a copy of its recording that holds the results of
+    the whole session for it: angles, moments, wrenches, centre of mass, events. ``subject`` names the person where files hold several.
 
     Raises
     ------
@@ -64,6 +66,8 @@ def export(
         one = _chosen(session, trial)
         session = Session(session.subject, tuple(t for t in session.trials if t.role == "static" or t is one), session.folder)
         return _motion(examine(session, tell=tell), one.name, out)
+    if format == "c3d":
+        return _results(session, _chosen(session, trial), out, subject=subject, tell=tell)
     body, words = body_of_result(examine(session, tell=tell))
     return write_model(body, out, format=format, source=words), words
 
@@ -127,3 +131,10 @@ def _motion(result: SessionResult, name: str, out: Path) -> tuple[Path, str]:
         raise TrialRefused(f"Trial {name}: it gives no motion. {one.reason or result.body_source}")
     table = opensim_coordinates(result.body, one.motion)
     return write_mot(out, table), f"Joint coordinates of trial {name}, rad and m, y up; the model is exported with --format osim."
+
+
+def _results(session: Session, trial: Trial, out: Path, *, subject: str | None, tell: Callable[[str], None]) -> tuple[Path, str]:
+    result = examine(session, tell=tell)
+    one = next(found for found in result.trials if found.trial.name == trial.name)
+    body, words = body_of_result(result)
+    return results_into_c3d(one, body, out, source=words, subject=subject)
