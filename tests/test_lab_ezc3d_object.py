@@ -24,7 +24,8 @@ def trial():
     xyz = rng.uniform(0.1, 1.6, (1, 6, 3)) + 0.02 * np.sin(time)[:, None, None]
     xyz[5:8, 0] = np.nan
     force = np.stack([10 * np.sin(fine), 5 * np.cos(fine), 588 + 20 * np.sin(3 * fine)], axis=1)
-    moment = np.cross([0.6, 0.35, 0.0] + 0.03 * np.sin(fine)[:, None] * [1, 1, 0], force) + [0, 0, 1.5]
+    place = np.array([0.6, 0.35, 0.0]) + 0.03 * np.sin(fine)[:, None] * [1, 1, 0]
+    moment = np.cross(place, force) + np.array([0, 0, 1.5])
     plate = Plate("plate1", 2, DOWN, Wrench(fine, np.hstack([force, moment])))
     source = Source(Path("walk.c3d"), "0" * 64, "C3D", RATE, RATE * SAMPLES, 7)
     names = tuple(f"LAB{i}" for i in range(6))

@@ -1,4 +1,4 @@
-"""What a session found for a trial stands in the copy of its recording: angles, moments, wrenches and centre of mass agree with each other."""
+"""What a session found for a trial stands in the copy of its recording: angles, moments, wrenches and centre of mass agree."""
 
 import numpy as np
 import pytest
@@ -70,10 +70,10 @@ def test_moments_are_those_of_another_formula(result, written):
 
 
 def test_predicted_force_is_what_moves_the_centre_of_mass(result, written):
-    squat, raw = written
+    _, raw = written
     com, force = of(raw, "BodyCentreOfMass") / 1000, of(raw, "PredictedGroundForce")
     acceleration = np.gradient(np.gradient(com, 1 / raw.rate, axis=0), 1 / raw.rate, axis=0)
-    expected = result.body.sip.mass.sum() * (acceleration + [0, 0, 9.80665])
+    expected = result.body.sip.mass.sum() * (acceleration + np.array([0, 0, 9.80665]))
     inner = np.isfinite(force).all(axis=1)
     inner[:30] = inner[-30:] = False
     assert inner.sum() > 100

@@ -218,7 +218,7 @@ def _add_points(file: Any, values: Array) -> None:
 
 def _add_events(file: Any, events: list[Any]) -> None:
     """Add the events that the file does not have yet."""
-    group = file["parameters"]["EVENT"] if "EVENT" in file["parameters"] else {}
+    group = file["parameters"].get("EVENT", {})
     known = []
     if "TIMES" in group and np.size(group["TIMES"]["value"]):
         minutes, seconds = np.reshape(group["TIMES"]["value"], (2, -1))

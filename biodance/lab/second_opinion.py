@@ -34,8 +34,8 @@ numpy.save(sys.stdout.buffer, analogs[0].T.astype("f4"))
 def second_opinion(path: Path, numbers: Numbers, layout: Layout) -> str:
     """Return "confirmed" if ezc3d reads the same numbers, "refuted" if it reads others, else why it does not read the file.
 
-    ezc3d finds the layout on its own, so it also judges ours; where header and parameters disagree it believes one of them without
-    looking at the length of the file, as biodance does, which then is no judgement. Left out are analog channels that ezc3d 1.7.2 is known to read wrong: those
+    ezc3d finds the layout on its own, so it also judges ours. Where header and parameters disagree it believes one of them without looking
+    at the length of the file, as biodance does: no judgement. Left out are analog channels that ezc3d 1.7.2 is known to read wrong: those
     with a negative OFFSET, whose sign it loses, and unsigned integers, which it takes for signed ones.
 
     Parameters

@@ -95,7 +95,8 @@ def _angles(body: Body, one: TrialResult) -> Iterator[Output]:
 
 
 def _moments(body: Body, one: TrialResult, contact: Contact) -> Iterator[Output]:
-    assert one.motion is not None and one.comparison is not None
+    assert one.motion is not None
+    assert one.comparison is not None
     feet = foot_wrenches(one.trial, contact, soles_from_body(body, one.motion))
     ground = {f"{side}_foot": wrench for side, wrench in zip(SIDES, feet, strict=True)}
     torque = np.where(one.comparison.used[:, None], joint_torques(body, one.motion, ground).torque, np.nan)
@@ -104,7 +105,8 @@ def _moments(body: Body, one: TrialResult, contact: Contact) -> Iterator[Output]
 
 
 def _wrenches(body: Body, one: TrialResult) -> Iterator[Output]:
-    assert one.motion is not None and one.comparison is not None
+    assert one.motion is not None
+    assert one.comparison is not None
     found = one.comparison
     predicted = predict_wrench(body, one.motion)
     for word, wrench in (("Measured", Wrench(found.time, found.measured)), ("Predicted", replace(predicted, time=found.time))):
