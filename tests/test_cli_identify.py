@@ -89,7 +89,7 @@ def test_an_existing_file_is_replaced_only_by_force_and_only_by_a_whole_one(lab,
     out.write_text("old")
     assert run(["export", str(lab / "S01"), "--format", "urdf", "--out", str(out)]) == NOT_DONE
     assert run(["export", str(lab / "S01"), "--format", "obj", "--out", str(out), "--force"]) == NOT_DONE
-    assert "Legal: biomod, c3d, csv" in capsys.readouterr().err
+    assert "Legal: biomod, c3d, csv, glb" in capsys.readouterr().err
     assert out.read_text() == "old"
     assert run(["export", str(lab / "S01"), "--format", "urdf", "--out", str(out), "--force"]) == DONE
     assert out.read_text().startswith("<?xml")

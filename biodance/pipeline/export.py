@@ -7,6 +7,7 @@ from pathlib import Path
 from biodance.body.body import Body
 from biodance.body.body_file import read_body
 from biodance.body.export import formats, write_model
+from biodance.body.solids import segment_solids
 from biodance.errors import SessionRefused, TrialRefused, UnknownName
 from biodance.lab.mot import write_mot
 from biodance.lab.session import read_session
@@ -35,6 +36,7 @@ def export(
     format: str,
     trial: str | None = None,
     subject: str | None = None,
+    meshes: Path | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> tuple[Path, str]:
     """Write ``source`` to the file ``out`` and return its path and one sentence on what it holds.
@@ -42,7 +44,8 @@ def export(
     ``source`` a session folder, or the results folder (or its body.json) of `biodance identify`. Model formats write the body with the
     identified parameters, where there are trials to identify from, else with the table's; ``trc`` writes the prepared markers, ``mot``
     the joint coordinates (of the model that ``osim`` writes) of one trial, and ``c3d`` a copy of its recording that holds the results of
-    the whole session for it: angles, moments, wrenches, centre of mass, events. ``subject`` names the person where files hold several.
+    the whole session for it: angles, moments, wrenches, centre of mass, events. ``subject`` names the person where files
+    hold several; ``meshes`` a folder with a closed mesh a segment (``right_thigh.stl``, m, in the segment's axes), shown by glb and osim.
 
     Raises
     ------
@@ -58,7 +61,7 @@ def export(
         if format in MOTION_FORMATS:
             raise SessionRefused(f"{source}: holds a body and no trial. Give the session folder to export {format}.")
         body, words = read_body(kept)
-        return write_model(body, out, format=format, source=words), words
+        return _model(body, out, format, words, meshes), words
     session = read_session(source, subject_name=subject, tell=tell)
     if format == "trc":
         return _markers(_chosen(session, trial), out)
@@ -69,7 +72,12 @@ def export(
     if format == "c3d":
         return _results(session, _chosen(session, trial), out, subject=subject, tell=tell)
     body, words = body_of_result(examine(session, tell=tell))
-    return write_model(body, out, format=format, source=words), words
+    return _model(body, out, format, words, meshes), words
+
+
+def _model(body: Body, out: Path, format: str, source: str, meshes: Path | None) -> Path:
+    solids = None if meshes is None else segment_solids(body, meshes)
+    return write_model(body, out, format=format, source=source, solids=solids)
 
 
 def body_of_result(result: SessionResult) -> tuple[Body, str]:
