@@ -74,10 +74,10 @@ def read_mesh(path: str | Path, *, scale: float | Array = 1.0) -> "Trimesh":
     path = Path(path)
     if path.suffix.lower() not in MESHES:
         raise FileRefused(f"{path}: is no mesh that is read. Legal are {', '.join(MESHES)}.")
+    if not path.is_file():
+        raise FileRefused(f"{path}: there is no such file. Check the path.")
     try:
         mesh = trimesh.load(path, force="mesh")
-    except OSError as error:
-        raise FileRefused(f"{path}: cannot be read ({error.strerror or error}). Check the path.") from error
     except Exception as error:  # the parsers of six formats raise what they like
         raise FileRefused(f"{path}: is damaged ({type(error).__name__}: {str(error)[:120]}). Export the mesh again.") from error
     if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces) or not np.isfinite(mesh.vertices).all():

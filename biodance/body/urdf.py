@@ -1,7 +1,7 @@
 """A robot from its URDF file: links to segments, fixed joints merged, limits from the file, soles under the links that are named as feet.
 
-The root's frame is turned to x forwards, y up, z right (as the human pelvis) where the file has z up (ROS REP 103) or x backwards. All other segments keep
-the frames of their links, so that a file that biodance wrote comes back as it was.
+The root's frame is turned to x forwards, y up, z right (as the human pelvis) where the file has z up (ROS REP 103) or x backwards. All
+other segments keep the frames of their links, so that a file that biodance wrote comes back as it was.
 """
 
 from dataclasses import dataclass, field, replace
