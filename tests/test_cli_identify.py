@@ -94,3 +94,11 @@ def test_an_existing_file_is_replaced_only_by_force_and_only_by_a_whole_one(lab,
     assert run(["export", str(lab / "S01"), "--format", "urdf", "--out", str(out), "--force"]) == DONE
     assert out.read_text().startswith("<?xml")
     assert [path.name for path in lab.glob(".*")] == []
+
+
+def test_tables_lie_beside_the_page(lab, no_page, capsys):
+    words = ["identify", str(lab / "S01"), "--out", str(lab / "out"), "--tables", str(lab / "tables")]
+    assert run(words) in (DONE, NEEDS_A_PERSON)
+    assert {"segments.csv", "segments.parquet", "wrench.csv", "angles.parquet"} <= {path.name for path in (lab / "tables").iterdir()}
+    assert run([*words[:3], str(lab / "more"), *words[4:]]) == NOT_DONE
+    assert "--force" in capsys.readouterr().err

@@ -6,18 +6,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED, Force, Json, Out, app, print_json, progress, say
+from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED, Force, Json, Out, Tables, app, print_json, progress, say
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from biodance.diagnose.diagnosis import Diagnosis
     from biodance.pipeline.identification import SessionIdentification
     from biodance.pipeline.results import SessionResult
     from biodance.records import Session
 
 
-def reported(recording: "Session", folder: Path, tell: "Callable[[str], None]") -> "tuple[SessionResult, dict[str, Any]]":
-    """Examine a session and report it into ``folder``; return the result and the content of results.json."""
+def reported(
+    recording: "Session", folder: Path, tell: "Callable[[str], None]", *, tables: Path | None = None
+) -> "tuple[SessionResult, dict[str, Any]]":
+    """Examine a session and report it into ``folder``, as tables into ``tables``; return the result and the content of results.json."""
     from biodance.pipeline.diagnosis import diagnosed
     from biodance.pipeline.session import examine
     from biodance.report.write import write_report
@@ -25,7 +28,24 @@ def reported(recording: "Session", folder: Path, tell: "Callable[[str], None]") 
     result = examine(recording, tell=tell)
     found = diagnosed(result, tell=tell) if not result.stopped else None
     tell("writing the page")
+    tabled(result, tables, found.diagnosis if found else None)
     return result, write_report(result, folder, diagnosis=found)
+
+
+def tabled(result: "SessionResult", folder: Path | None, diagnosis: "Diagnosis | None" = None) -> None:
+    """Write the tables of a result into a folder that is ready for them; nothing without one."""
+    from biodance.pipeline.tables import session_tables
+    from biodance.report.tables import write_tables
+
+    if folder is not None:
+        write_tables(session_tables(result, diagnosis), folder)
+
+
+def ready(tables: Path | None, session: Path, *, force: bool) -> Path | None:
+    """Return the folder for tables, made; None where none are wanted."""
+    from biodance.report.tables import tables_folder
+
+    return None if tables is None else tables_folder(tables, session, force=force)
 
 
 def told(result: "SessionResult", folder: Path, found: "dict[str, Any]", json: bool) -> int:
@@ -102,7 +122,7 @@ def inspect(*paths: Path, json: Json = False) -> int:
 
 
 @app.command
-def report(session: Path, *, out: Out, subject: str | None = None, json: Json = False, force: Force = False) -> int:
+def report(session: Path, *, out: Out, subject: str | None = None, tables: Tables = None, json: Json = False, force: Force = False) -> int:
     """Take a session through all stages and write report.html and results.json.
 
     Parameters
@@ -117,14 +137,21 @@ def report(session: Path, *, out: Out, subject: str | None = None, json: Json = 
 
     with progress() as tell:
         recording = read_session(session, subject_name=subject, tell=tell)
-        folder = results_folder(out, session, force=force)
-        result, found = reported(recording, folder, tell)
+        folder, place = results_folder(out, session, force=force), ready(tables, session, force=force)
+        result, found = reported(recording, folder, tell, tables=place)
     return told(result, folder, found, json)
 
 
 @app.command
 def identify(
-    session: Path, *, out: Out, reference: Path | None = None, subject: str | None = None, json: Json = False, force: Force = False
+    session: Path,
+    *,
+    out: Out,
+    reference: Path | None = None,
+    subject: str | None = None,
+    tables: Tables = None,
+    json: Json = False,
+    force: Force = False,
 ) -> int:
     """Identify what every segment weighs, with intervals, validate it on the trials kept, and look for an added mass.
 
@@ -141,9 +168,11 @@ def identify(
     from biodance.report.write import write_identification
 
     with progress() as tell:
+        place = ready(tables, session, force=force)
         result, _, folder = compared(session, reference, out, subject=subject, force=force, tell=tell)
         found = identified(result)
         tell("writing the page")
+        tabled(result, place)
         document = write_identification(result, found, folder)
     return _told_identified(result, folder, document, json)
 
