@@ -20,7 +20,7 @@ lint: $(STAMP)
 $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e ".[test,lint,peers,viz]"
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e ".[test,lint,peers]"
 	touch $(STAMP)
 
 clean:

@@ -6,8 +6,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, Force, Json, Out, Set, app, print_json, progress
-from biodance.cli.session import compared
+from biodance.cli.app import DONE, NEEDS_A_PERSON, Force, Json, Out, Set, Tables, app, print_json, progress
+from biodance.cli.session import compared, ready, tabled
 
 
 @app.command
@@ -44,6 +44,7 @@ def diagnose(
     accept: Annotated[bool, Parameter(name="--accept", negative="", help="Also write the body with the findings accepted.")] = False,
     subject: str | None = None,
     chosen: Set = (),
+    tables: Tables = None,
     json: Json = False,
     force: Force = False,
 ) -> int:
@@ -65,9 +66,11 @@ def diagnose(
     from biodance.report.write import write_diagnosis
 
     with progress() as tell:
+        place = ready(tables, session, force=force)
         result, before, folder = compared(session, reference, out, subject=subject, chosen=chosen, force=force, tell=tell)
         found = front.diagnose(result, reference=before, tell=tell)
         tell("writing the page")
+        tabled(result, place, found.diagnosis)
         document = write_diagnosis(result, found, folder, accepted=accept)
     if json:
         print_json(document)

@@ -6,18 +6,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED, Force, Json, Out, Set, app, print_json, progress, say
+from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED, Force, Json, Out, Set, Tables, app, print_json, progress, say
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from biodance.diagnose.diagnosis import Diagnosis
     from biodance.pipeline.identification import SessionIdentification
     from biodance.pipeline.results import SessionResult
     from biodance.records import Session
 
 
-def reported(recording: "Session", folder: Path, tell: "Callable[[str], None]") -> "tuple[SessionResult, dict[str, Any]]":
-    """Examine a session and report it into ``folder``; return the result and the content of results.json."""
+def reported(
+    recording: "Session", folder: Path, tell: "Callable[[str], None]", *, tables: Path | None = None
+) -> "tuple[SessionResult, dict[str, Any]]":
+    """Examine a session and report it into ``folder``, as tables into ``tables``; return the result and the content of results.json."""
     from biodance.pipeline.diagnosis import diagnosed
     from biodance.pipeline.session import examine
     from biodance.report.write import write_report
@@ -25,7 +28,24 @@ def reported(recording: "Session", folder: Path, tell: "Callable[[str], None]") 
     result = examine(recording, tell=tell)
     found = diagnosed(result, tell=tell) if not result.stopped else None
     tell("writing the page")
+    tabled(result, tables, found.diagnosis if found else None)
     return result, write_report(result, folder, diagnosis=found)
+
+
+def tabled(result: "SessionResult", folder: Path | None, diagnosis: "Diagnosis | None" = None) -> None:
+    """Write the tables of a result into a folder that is ready for them; nothing without one."""
+    from biodance.pipeline.tables import session_tables
+    from biodance.report.tables import write_tables
+
+    if folder is not None:
+        write_tables(session_tables(result, diagnosis), folder)
+
+
+def ready(tables: Path | None, session: Path, *, force: bool) -> Path | None:
+    """Return the folder for tables, made; None where none are wanted."""
+    from biodance.report.tables import tables_folder
+
+    return None if tables is None else tables_folder(tables, session, force=force)
 
 
 def told(result: "SessionResult", folder: Path, found: "dict[str, Any]", json: bool) -> int:
@@ -105,7 +125,16 @@ def inspect(*paths: Path, json: Json = False) -> int:
 
 
 @app.command
-def report(session: Path, *, out: Out, subject: str | None = None, chosen: Set = (), json: Json = False, force: Force = False) -> int:
+def report(
+    session: Path,
+    *,
+    out: Out,
+    subject: str | None = None,
+    chosen: Set = (),
+    tables: Tables = None,
+    json: Json = False,
+    force: Force = False,
+) -> int:
     """Take a session through all stages and write report.html and results.json.
 
     Parameters
@@ -121,8 +150,8 @@ def report(session: Path, *, out: Out, subject: str | None = None, chosen: Set =
 
     with progress() as tell:
         recording = read_session(session, subject_name=subject, settings=assignments(chosen), tell=tell)
-        folder = results_folder(out, session, force=force)
-        result, found = reported(recording, folder, tell)
+        folder, place = results_folder(out, session, force=force), ready(tables, session, force=force)
+        result, found = reported(recording, folder, tell, tables=place)
     return told(result, folder, found, json)
 
 
@@ -134,6 +163,7 @@ def identify(
     reference: Path | None = None,
     subject: str | None = None,
     chosen: Set = (),
+    tables: Tables = None,
     json: Json = False,
     force: Force = False,
 ) -> int:
@@ -152,9 +182,11 @@ def identify(
     from biodance.report.write import write_identification
 
     with progress() as tell:
+        place = ready(tables, session, force=force)
         result, _, folder = compared(session, reference, out, subject=subject, chosen=chosen, force=force, tell=tell)
         found = front.identify(result)
         tell("writing the page")
+        tabled(result, place)
         document = write_identification(result, found, folder)
     return _told_identified(result, folder, document, json)
 
@@ -183,10 +215,11 @@ def settings(session: Path | None = None, *, chosen: Set = (), json: Json = Fals
 def export(
     source: Path,
     *,
-    format: Annotated[str, Parameter(help="osim, urdf, mjcf, biomod, csv; or trc, mot of one trial.")],
+    format: Annotated[str, Parameter(help="osim, urdf, mjcf, biomod, glb, csv; or trc, mot, c3d of one trial.")],
     out: Annotated[Path, Parameter(help="The file to write.")],
-    trial: Annotated[str | None, Parameter(help="Name of the trial for trc and mot.")] = None,
+    trial: Annotated[str | None, Parameter(help="Name of the trial for trc, mot and c3d.")] = None,
     subject: Annotated[str | None, Parameter(help="The person to export where C3D files hold several.")] = None,
+    meshes: Annotated[Path | None, Parameter(help="Folder with a closed mesh a segment (right_thigh.stl, m) for glb and osim.")] = None,
     force: Annotated[bool, Parameter(name="--force", negative="", help="Replace the file if it exists.")] = False,
 ) -> int:
     """Write a session, or the results of `biodance identify`, for another program.
@@ -200,7 +233,7 @@ def export(
     from biodance.pipeline.export import replaceable
 
     with progress() as tell, replaceable(out, force=force) as place:
-        _, sentence = write(source, place, format=format, trial=trial, subject=subject, tell=tell)
+        _, sentence = write(source, place, format=format, trial=trial, subject=subject, meshes=meshes, tell=tell)
     say(sentence)
     sys.stdout.write(f"{out}\n")
     return DONE

@@ -72,6 +72,20 @@ def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None
     )
 
 
+def file_frame(raw: RawC3d, *, subject: str | None = None) -> tuple[float, Array]:
+    """Return the file's unit of length in m and lab_R_file (3, 3), as `read_c3d` takes them.
+
+    Raises
+    ------
+    FileRefused
+        As `read_c3d`.
+    """
+    labels = marker_labels(raw, subject=subject)
+    points = raw.points[:, list(labels.columns)]
+    metres, _, _ = metres_per_unit(raw.parameters, points, where=str(raw.path))
+    return metres, turn_to_z_up(raw, _markers(raw, labels, points))[0]
+
+
 def _read(raw: RawC3d) -> tuple[str, ...]:
     rate = f" at {raw.rate:g} Hz" if math.isfinite(raw.rate) else ""
     analog = f", {raw.analog.shape[1]} analog channels at {raw.analog_rate:g} Hz" if raw.analog.size else ", no analog channels"

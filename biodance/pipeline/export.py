@@ -8,19 +8,21 @@ from pathlib import Path
 from biodance.body.body import Body
 from biodance.body.body_file import read_body
 from biodance.body.export import formats, write_model
+from biodance.body.solids import segment_solids
 from biodance.errors import SessionRefused, TrialRefused, UnknownName
 from biodance.lab.mot import write_mot
 from biodance.lab.session import read_session
 from biodance.lab.trc import write_trc
 from biodance.motion.opensim_coordinates import opensim_coordinates
 from biodance.pipeline.results import SessionResult
+from biodance.pipeline.results_c3d import results_into_c3d
 from biodance.pipeline.session import examine
 from biodance.pipeline.trial import prepared
 from biodance.records import Session, Trial
 
 BODY = "body.json"
 """File in which `biodance identify` keeps the identified body."""
-MOTION_FORMATS = ("trc", "mot")
+MOTION_FORMATS = ("trc", "mot", "c3d")
 
 
 def legal_formats() -> tuple[str, ...]:
@@ -35,6 +37,7 @@ def export(
     format: str,
     trial: str | None = None,
     subject: str | None = None,
+    meshes: Path | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> tuple[Path, str]:
     """Write a session, or what was identified from it, in the format of another program.
@@ -47,11 +50,14 @@ def export(
         The file to write; it must not exist.
     format : str
         ``osim``, ``urdf``, ``mjcf``, ``biomod``, ``csv``: the body with the identified parameters, where there are trials to identify from,
-        else with the table's. ``trc``: the prepared markers of a trial, ``mot``: its joint coordinates, of the model that ``osim`` writes.
+        else with the table's. ``trc``: the prepared markers of a trial, ``mot``: its joint coordinates, of the model that ``osim`` writes;
+        ``c3d``: a copy of its recording with angles, moments, wrenches, centre of mass and events.
     trial : str, optional
         Name of the trial for ``trc`` and ``mot``; by default the only one that moves.
     subject : str, optional
         The person where files hold several.
+    meshes : pathlib.Path, optional
+        Folder with a closed mesh a segment (``right_thigh.stl``, m, in the segment's axes), shown by glb and osim.
     tell : callable, optional
         Called with what is being done, in words.
 
@@ -79,7 +85,7 @@ def export(
         raise UnknownName.of("format", format, legal_formats())
     out = Path(out)
     if isinstance(source, SessionResult):
-        return _of_result(source, out, format, trial)
+        return _of_result(source, out, format, trial, meshes, subject=subject)
     session = source if isinstance(source, Session) else None
     if session is None:
         folder = Path(source) if isinstance(source, str | Path) else Path()
@@ -88,7 +94,7 @@ def export(
             if format in MOTION_FORMATS:
                 raise SessionRefused(f"{folder}: holds a body and no trial. Give the session folder to export {format}.")
             body, words = read_body(kept)
-            return write_model(body, out, format=format, source=words), words
+            return _model(body, out, format, words, meshes), words
         session = read_session(folder, subject_name=subject, tell=tell)
     if format == "trc":
         return _markers(_chosen(session, trial), out)
@@ -96,17 +102,29 @@ def export(
         one = _chosen(session, trial)
         session = replace(session, trials=tuple(t for t in session.trials if t.role == "static" or t is one))
         return _motion(examine(session, tell=tell), one.name, out)
-    return _of_result(examine(session, tell=tell), out, format, trial)
+    return _of_result(examine(session, tell=tell), out, format, trial, meshes, subject=subject)
 
 
-def _of_result(result: SessionResult, out: Path, format: str, trial: str | None) -> tuple[Path, str]:
+def _of_result(
+    result: SessionResult, out: Path, format: str, trial: str | None, meshes: Path | None, *, subject: str | None
+) -> tuple[Path, str]:
     """Write what was found in a session, see `export`."""
     if format == "trc":
         return _markers(_chosen(result.session, trial), out)
     if format == "mot":
         return _motion(result, _chosen(result.session, trial).name, out)
     body, words = body_of_result(result)
-    return write_model(body, out, format=format, source=words), words
+    if format == "c3d":
+        name = _chosen(result.session, trial).name
+        one = next(found for found in result.trials if found.trial.name == name)
+        return results_into_c3d(one, body, out, source=words, subject=subject)
+    return _model(body, out, format, words, meshes), words
+
+
+def _model(body: Body, out: Path, format: str, source: str, meshes: Path | None) -> Path:
+    """Write the body in a model format, with the solids of ``meshes`` where there are some."""
+    solids = None if meshes is None else segment_solids(body, meshes)
+    return write_model(body, out, format=format, source=source, solids=solids)
 
 
 def body_of_result(result: SessionResult) -> tuple[Body, str]:

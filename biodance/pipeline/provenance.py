@@ -15,7 +15,7 @@ from biodance.library import PACKAGE
 from biodance.pipeline.results import SessionResult
 from biodance.settings import Value
 
-LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "pin", "cvxpy", "clarabel", "pandas", "c3d", "matplotlib")
+LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "pin", "cvxpy", "clarabel", "pandas", "ezc3d", "trimesh", "pyvista", "matplotlib")
 UNKNOWN = "unknown"
 
 

@@ -1,11 +1,14 @@
 """FAMILY: one model format per file, found automatically.
 
-A format has a ``FORMAT`` name, the usual ``SUFFIX`` of its files and one function ``text(body, source)``, which returns the whole file:
-the joints of the body, its inertial parameters and, where the format knows them, markers, limits and boxes. ``source`` is one line that
-says where the parameters come from. All lengths in m, angles in rad, masses in kg.
+A format has a ``FORMAT`` name, the usual ``SUFFIX`` of its files and one function ``text(body, source)``, which returns the whole file,
+or ``data(body, source)``, which returns its bytes: the joints of the body, its inertial parameters and, where the format knows them,
+markers, limits and boxes. ``source`` is one line that says where the parameters come from. A format that shows the shapes of segments
+takes ``solids`` as a third argument, a closed mesh by segment; if it keeps them in files of their own, ``beside(body, solids)`` returns
+those by their path beside the file. All lengths in m, angles in rad, masses in kg.
 """
 
 import importlib
+import inspect
 import pkgutil
 from pathlib import Path
 from types import MappingProxyType, ModuleType
@@ -14,6 +17,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.inertia import pseudo_inertia
+from biodance.body.solids import Solids
 from biodance.errors import BiodanceError, FileRefused, UnknownName
 
 ROUNDING = 1e-9
@@ -42,28 +46,53 @@ def refuse_impossible(body: Body) -> None:
             )
 
 
-def write_model(body: Body, path: str | Path, *, format: str, source: str = "") -> Path:
+def write_model(body: Body, path: str | Path, *, format: str, source: str = "", solids: Solids | None = None) -> Path:
     """Write ``body`` as a model file and return the path.
+
+    ``solids`` a closed mesh by segment (m, in its axes) for the formats that show shapes (osim, glb).
 
     Raises
     ------
     UnknownName
         There is no such format.
     BiodanceError
-        The inertia of a segment cannot exist, or the format cannot hold the joints of this body.
+        The inertia of a segment cannot exist, or the format cannot hold the joints or the solids of this body.
     FileRefused
-        The file exists (nothing is overwritten), or cannot be written.
+        The file, or one that belongs beside it, exists (nothing is overwritten), or cannot be written.
     """
     family, path = formats(), Path(path)
     if format not in family:
         raise UnknownName.of("model format", format, tuple(family))
     refuse_impossible(body)
-    content = family[format].text(body, source)
+    member = family[format]
+    _write_new(path, _content(member, body, source, solids))
+    for name, content in _beside(member, body, solids).items():
+        file = path.parent / name
+        if not (file.is_file() and file.read_bytes() == content):
+            file.parent.mkdir(exist_ok=True)
+            _write_new(file, content)
+    return path
+
+
+def _content(member: ModuleType, body: Body, source: str, solids: Solids | None) -> bytes:
+    """Return the file as bytes, by ``data`` or by ``text``."""
+    write = member.data if hasattr(member, "data") else member.text
+    if solids is not None and "solids" not in inspect.signature(write).parameters:
+        raise BiodanceError(f"The format {member.FORMAT} shows no meshes. Leave them out, or choose glb or osim.")
+    content = write(body, source) if solids is None else write(body, source, solids)
+    return content if isinstance(content, bytes) else str(content).encode()
+
+
+def _beside(member: ModuleType, body: Body, solids: Solids | None) -> dict[str, bytes]:
+    return dict(member.beside(body, solids)) if solids is not None and hasattr(member, "beside") else {}
+
+
+def _write_new(path: Path, content: bytes) -> None:
+    """Write a file that does not exist yet."""
     try:
-        with open(path, "x", encoding="utf-8", newline="\n") as stream:
+        with open(path, "xb") as stream:
             stream.write(content)
     except FileExistsError:
         raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.") from None
     except OSError as error:
         raise FileRefused(f"{path}: cannot be written ({error.strerror or error}). Choose a place where you may write.") from error
-    return path
