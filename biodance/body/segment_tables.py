@@ -41,8 +41,8 @@ def table_names(sex: str) -> tuple[str, ...]:
 
 
 def measured_whole() -> tuple[str, ...]:
-    """Return the shipped tables of whole bodies for both sexes (``measured_whole`` in their .toml): one laid every CoM on the line between the
-    joint centres, the other measured where it lies.
+    """Return the shipped tables of whole bodies for both sexes (``measured_whole`` in their .toml): one laid every CoM on the line
+    between the joint centres, the other measured where it lies.
     """
     shipped = FAMILY.shipped()
     return tuple(table.name for table in tables() if table.name in shipped and table.provenance.get("measured_whole"))

@@ -26,6 +26,10 @@ Json = Annotated[bool, Parameter(name="--json", negative="", help="Print one JSO
 Force = Annotated[bool, Parameter(name="--force", negative="", help="Write into a folder that already holds files.")]
 Out = Annotated[Path, Parameter(name="--out", help="Folder for the results; it is made if it is missing.")]
 
+MarkersFile = Annotated[
+    str | None, Parameter(name="--markers", help="The marker set that was worn: a TOML file of your own (see CONTRIBUTING.md), or a name.")
+]
+
 
 def say(sentence: str) -> None:
     """Write one line to stderr."""

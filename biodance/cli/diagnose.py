@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, Force, Json, Out, app, print_json, progress
+from biodance.cli.app import DONE, NEEDS_A_PERSON, Force, Json, MarkersFile, Out, app, print_json, progress
 from biodance.cli.session import compared
 
 
@@ -43,6 +43,7 @@ def diagnose(
     reference: Path | None = None,
     accept: Annotated[bool, Parameter(name="--accept", negative="", help="Also write the body with the findings accepted.")] = False,
     subject: str | None = None,
+    markers: MarkersFile = None,
     json: Json = False,
     force: Force = False,
 ) -> int:
@@ -64,7 +65,7 @@ def diagnose(
     from biodance.report.write import write_diagnosis
 
     with progress() as tell:
-        result, before, folder = compared(session, reference, out, subject=subject, force=force, tell=tell)
+        result, before, folder = compared(session, reference, out, subject=subject, markers=markers, force=force, tell=tell)
         found = diagnose_session(result, reference=before, tell=tell)
         tell("writing the page")
         document = write_diagnosis(result, found, folder, accepted=accept)

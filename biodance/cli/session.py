@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED, Force, Json, Out, app, print_json, progress, say
+from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED, Force, Json, MarkersFile, Out, app, print_json, progress, say
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -46,7 +46,14 @@ def told(result: "SessionResult", folder: Path, found: "dict[str, Any]", json: b
 
 
 def compared(
-    session: Path, reference: Path | None, out: Path, *, subject: str | None, force: bool, tell: "Callable[[str], None]"
+    session: Path,
+    reference: Path | None,
+    out: Path,
+    *,
+    subject: str | None,
+    markers: str | None,
+    force: bool,
+    tell: "Callable[[str], None]",
 ) -> "tuple[SessionResult, SessionIdentification | None, Path]":
     """Examine a session beside an earlier one of the same person; return what was found, what that one said, and the results' folder.
 
@@ -56,8 +63,8 @@ def compared(
     from biodance.lab.session import read_session
     from biodance.pipeline.session import examine, identified
 
-    earlier = read_session(reference, subject_name=subject, tell=tell) if reference else None
-    recording = read_session(session, subject_name=subject, tell=tell)
+    earlier = read_session(reference, subject_name=subject, markers=markers, tell=tell) if reference else None
+    recording = read_session(session, subject_name=subject, markers=markers, tell=tell)
     folder = results_folder(out, session, force=force)
     before = identified(examine(earlier, tell=tell)) if earlier else None
     return examine(recording, reference=before, tell=tell), before, folder
@@ -78,7 +85,7 @@ def _told_identified(result: "SessionResult", folder: Path, found: "dict[str, An
 
 
 @app.command
-def inspect(*paths: Path, json: Json = False) -> int:
+def inspect(*paths: Path, markers: MarkersFile = None, json: Json = False) -> int:
     """Say what is in recordings: markers, gaps, plates, the weight on them, and every decision the readers take.
 
     Parameters
@@ -92,7 +99,7 @@ def inspect(*paths: Path, json: Json = False) -> int:
     from biodance.report.terminal import print_inspected
 
     with progress() as tell:
-        records = inspect_paths(paths, tell=tell)
+        records = inspect_paths(paths, markers=markers, tell=tell)
     if json:
         print_json(records)
     else:
@@ -102,7 +109,9 @@ def inspect(*paths: Path, json: Json = False) -> int:
 
 
 @app.command
-def report(session: Path, *, out: Out, subject: str | None = None, json: Json = False, force: Force = False) -> int:
+def report(
+    session: Path, *, out: Out, subject: str | None = None, markers: MarkersFile = None, json: Json = False, force: Force = False
+) -> int:
     """Take a session through all stages and write report.html and results.json.
 
     Parameters
@@ -116,7 +125,7 @@ def report(session: Path, *, out: Out, subject: str | None = None, json: Json = 
     from biodance.lab.session import read_session
 
     with progress() as tell:
-        recording = read_session(session, subject_name=subject, tell=tell)
+        recording = read_session(session, subject_name=subject, markers=markers, tell=tell)
         folder = results_folder(out, session, force=force)
         result, found = reported(recording, folder, tell)
     return told(result, folder, found, json)
@@ -124,7 +133,14 @@ def report(session: Path, *, out: Out, subject: str | None = None, json: Json = 
 
 @app.command
 def identify(
-    session: Path, *, out: Out, reference: Path | None = None, subject: str | None = None, json: Json = False, force: Force = False
+    session: Path,
+    *,
+    out: Out,
+    reference: Path | None = None,
+    subject: str | None = None,
+    markers: MarkersFile = None,
+    json: Json = False,
+    force: Force = False,
 ) -> int:
     """Identify what every segment weighs, with intervals, validate it on the trials kept, and look for an added mass.
 
@@ -141,7 +157,7 @@ def identify(
     from biodance.report.write import write_identification
 
     with progress() as tell:
-        result, _, folder = compared(session, reference, out, subject=subject, force=force, tell=tell)
+        result, _, folder = compared(session, reference, out, subject=subject, markers=markers, force=force, tell=tell)
         found = identified(result)
         tell("writing the page")
         document = write_identification(result, found, folder)

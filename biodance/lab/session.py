@@ -6,6 +6,7 @@ from pathlib import Path
 
 from biodance.discovery import Chosen
 from biodance.errors import BiodanceError, SessionRefused
+from biodance.lab.marker_sets import read_marker_set
 from biodance.lab.read import read_trial
 from biodance.lab.readers import Reader, extensions
 from biodance.lab.recordings import find_recordings, recordings_in, vicon_notes
@@ -22,16 +23,17 @@ def read_session(
     *,
     subject_name: str | None = None,
     readers: Chosen[Reader] = None,
+    markers: str | Path | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> Session:
     """Return the session in a folder: the subject and every trial that can be read.
 
     Roles come from session.toml, else from the Eclipse notes (.enf), else from the names (static*, cal* = static; squat* = validate;
     others = fit); without a static by these, the stillest trial is taken. The subject comes from session.toml, .mp, .vsk and the files' own
-    parameters, in this order. ``subject_name`` chooses the person in C3D files that hold several; ``readers`` as for
-    `read_trial`; ``tell`` is called with the name of each file before it is read.
-    A file that cannot be read never stops the session: it stands in ``Session.refused`` with the reason. What was
-    followed, guessed or left aside stands in ``Session.notes``.
+    parameters, in this order. ``subject_name`` chooses the person in C3D files that hold several; ``readers`` as for `read_trial`;
+    ``markers`` is the marker set that was worn (a name, or the path of a file), before what session.toml says of it; ``tell`` is called
+    with the name of each file before it is read. A file that cannot be read never stops the session: it stands in ``Session.refused`` with
+    the reason. What was followed, guessed or left aside stands in ``Session.notes``.
 
     Raises
     ------
@@ -40,6 +42,8 @@ def read_session(
     """
     folder = _checked(Path(folder))
     settings = read_session_file(folder)
+    worn = str(markers) if markers is not None else settings.marker_set
+    marker_set = read_marker_set(worn) if worn else None
     files, notes = find_recordings(folder, readers)
     eclipse, measurements, refused = vicon_notes({folder, *(file.parent for file in files)})
     trials: list[Trial] = []
@@ -53,7 +57,7 @@ def read_session(
         if tell:
             tell(file.name)
         try:
-            trial = _with_strikes(read_trial(file, role=role, subject=subject_name, readers=readers), operator)
+            trial = _with_strikes(read_trial(file, role=role, subject=subject_name, readers=readers, markers=marker_set), operator)
         except BiodanceError as error:
             refused[file.name] = str(error)
             continue
