@@ -112,7 +112,7 @@ def test_the_option_reaches_every_command(
         ("[markers]\nmap = {}\n", r"\[markers\] has no map. Write map ="),
         (
             '[markers]\nfile = "absent.toml"\n',
-            "absent.toml: there is no such marker set. Check the path; sets known by name are isb_landmarks",
+            "absent.toml: cannot be opened, there is no such marker set. Check the path; sets known by name are isb_landmarks",
         ),
         ('[markers]\nfile = "plug_in_gate"\n', "Did you mean 'plug_in_gait'.*A file of your own is given by its path"),
         ('[markers]\nfiles = "a.toml"\n', r"\[markers\] has the unknown key 'files'. Did you mean 'file'. Legal: file, map"),

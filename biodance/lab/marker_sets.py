@@ -99,7 +99,9 @@ def read_marker_set(name_or_path: str | Path) -> MarkerSet:
     """
     path = FAMILY.locate(name_or_path)
     if not path.is_file():
-        raise FileRefused(f"{path}: there is no such marker set. Check the path; sets known by name are {', '.join(FAMILY.files())}.")
+        raise FileRefused(
+            f"{path}: cannot be opened, there is no such marker set. Check the path; sets known by name are {', '.join(FAMILY.files())}."
+        )
     return _read(str(name_or_path), path, path.stat().st_mtime_ns)
 
 

@@ -1,29 +1,42 @@
-"""FAMILY: one model format per file, found automatically.
+"""FAMILY: one model format per file, found automatically; other packages join by the entry points ``biodance.exports``.
 
-A format has a ``FORMAT`` name, the usual ``SUFFIX`` of its files and one function ``text(body, source)``, which returns the whole file:
-the joints of the body, its inertial parameters and, where the format knows them, markers, limits and boxes. ``source`` is one line that
-says where the parameters come from. All lengths in m, angles in rad, masses in kg.
+A member is a module or object of the form `ModelFormat`; it writes the joints of the body, its inertial parameters and, where the format
+knows them, markers, limits and boxes. All lengths in m, angles in rad, masses in kg.
 """
 
-import importlib
-import pkgutil
+from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType, ModuleType
+from typing import Protocol
 
 import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.inertia import pseudo_inertia
-from biodance.errors import BiodanceError, FileRefused, UnknownName
+from biodance.discovery import Chosen, Family, missing_of
+from biodance.errors import BiodanceError, FileRefused
 
 ROUNDING = 1e-9
 """Share of a pseudo-inertia's largest eigenvalue by which its smallest may be negative from rounding alone."""
 
 
-def formats() -> MappingProxyType[str, ModuleType]:
-    """Return the modules of this folder by the name of their format."""
-    modules = [importlib.import_module(f"{__name__}.{info.name}") for info in pkgutil.iter_modules(__path__)]
-    return MappingProxyType({module.FORMAT: module for module in modules})
+class ModelFormat(Protocol):
+    """One format of models: a module, a class or an object."""
+
+    FORMAT: str
+    """Its name on the command line."""
+    SUFFIX: str
+    """The usual suffix of its files, with the dot."""
+
+    def text(self, body: Body, source: str) -> str:
+        """Return the whole file; ``source`` is one line that says where the parameters come from."""
+
+
+FAMILY: Family[ModelFormat] = Family("model format", "biodance.exports", __name__, "", missing_of(ModelFormat), lambda one: one.FORMAT)
+
+
+def formats(chosen: Chosen[ModelFormat] = None) -> Mapping[str, ModelFormat]:
+    """Return the formats by name; ``chosen`` names choose from the family, objects join it."""
+    return FAMILY.choose(chosen)
 
 
 def refuse_impossible(body: Body) -> None:
@@ -42,8 +55,8 @@ def refuse_impossible(body: Body) -> None:
             )
 
 
-def write_model(body: Body, path: str | Path, *, format: str, source: str = "") -> Path:
-    """Write ``body`` as a model file and return the path.
+def write_model(body: Body, path: str | Path, *, format: str | ModelFormat, source: str = "") -> Path:
+    """Write ``body`` as a model file and return the path; ``format`` is the name of one, or an object that writes it.
 
     Raises
     ------
@@ -54,11 +67,10 @@ def write_model(body: Body, path: str | Path, *, format: str, source: str = "") 
     FileRefused
         The file exists (nothing is overwritten), or cannot be written.
     """
-    family, path = formats(), Path(path)
-    if format not in family:
-        raise UnknownName.of("model format", format, tuple(family))
+    path = Path(path)
+    (kind,) = (FAMILY.choose([format]) if isinstance(format, str) else FAMILY.judged([format])).values()
     refuse_impossible(body)
-    content = family[format].text(body, source)
+    content = kind.text(body, source)
     try:
         with open(path, "x", encoding="utf-8", newline="\n") as stream:
             stream.write(content)
