@@ -107,6 +107,10 @@ class Family(Generic[Member]):
         kept = [(member, f"the {self.kind} of the family") for name, member in family.items() if name in names]
         return self._by_name((*kept, *((member, _where(member)) for member in given)))
 
+    def judged(self, given: Iterable[Member]) -> Mapping[str, Member]:
+        """Return objects by name, without the family; BiodanceError for one that is no member."""
+        return self._by_name((member, _where(member)) for member in given)
+
     def _by_name(self, found: Iterable[tuple[Any, str]]) -> Mapping[str, Member]:
         """Return members with the place they come from by name; refuse who is none, and two of one name."""
         members: dict[str, Member] = {}

@@ -119,6 +119,7 @@ def test_a_broken_entry_point_is_refused(
 def test_objects_that_are_no_members_or_have_one_name_are_refused(shapes: Path) -> None:
     with pytest.raises(BiodanceError, match=r"The object given \(.*Path\): lacks area"):
         SHAPES.choose([Path("x")])  # type: ignore[list-item]
+    assert list(SHAPES.judged([Given("own")])) == ["own"]
     with pytest.raises(BiodanceError, match=r"the shape 'own' is the object given .*Given.* and again the object given"):
         SHAPES.choose([Given("own"), Given("own")])
     with pytest.raises(BiodanceError, match=r"'square' is shapes/square\.py and again the object given"):

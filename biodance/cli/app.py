@@ -31,6 +31,9 @@ Set = Annotated[
     tuple[str, ...],
     Parameter(name="--set", negative=(), help="Choose a setting: --set filter.cutoff=6; may be repeated. `biodance settings` prints all."),
 ]
+MarkersFile = Annotated[
+    str | None, Parameter(name="--markers", help="The marker set that was worn: a TOML file of your own (see CONTRIBUTING.md), or a name.")
+]
 
 
 def say(sentence: str) -> None:

@@ -6,8 +6,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, Force, Json, Out, Set, Tables, app, print_json, progress
-from biodance.cli.session import compared, ready, tabled
+from biodance.cli.app import DONE, NEEDS_A_PERSON, Force, Json, MarkersFile, Out, Set, Tables, app, print_json, progress
+from biodance.cli.session import Reading, compared, ready, tabled
 
 
 @app.command
@@ -45,6 +45,7 @@ def diagnose(
     subject: str | None = None,
     chosen: Set = (),
     tables: Tables = None,
+    markers: MarkersFile = None,
     json: Json = False,
     force: Force = False,
 ) -> int:
@@ -67,7 +68,8 @@ def diagnose(
 
     with progress() as tell:
         place = ready(tables, session, force=force)
-        result, before, folder = compared(session, reference, out, subject=subject, chosen=chosen, force=force, tell=tell)
+        options = Reading(subject, markers, chosen)
+        result, before, folder = compared(session, reference, out, options, force=force, tell=tell)
         found = front.diagnose(result, reference=before, tell=tell)
         tell("writing the page")
         tabled(result, place, found.diagnosis)

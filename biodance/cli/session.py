@@ -1,12 +1,28 @@
 """Commands on a recorded session: inspect, report, identify, settings, export."""
 
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED, Force, Json, Out, Set, Tables, app, print_json, progress, say
+from biodance.cli.app import (
+    DONE,
+    NEEDS_A_PERSON,
+    NOT_DONE,
+    STOPPED,
+    Force,
+    Json,
+    MarkersFile,
+    Out,
+    Set,
+    Tables,
+    app,
+    print_json,
+    progress,
+    say,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -15,6 +31,22 @@ if TYPE_CHECKING:
     from biodance.pipeline.identification import SessionIdentification
     from biodance.pipeline.results import SessionResult
     from biodance.records import Session
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How a folder is read: the person where files hold several, the marker set that was worn, the settings chosen."""
+
+    subject: str | None
+    markers: str | None
+    chosen: tuple[str, ...]
+
+    def read(self, folder: Path, tell: "Callable[[str], None]") -> "Session":
+        """Return the session in ``folder``."""
+        from biodance.lab.session import read_session
+        from biodance.settings import assignments
+
+        return read_session(folder, subject_name=self.subject, markers=self.markers, settings=assignments(self.chosen), tell=tell)
 
 
 def reported(
@@ -66,21 +98,24 @@ def told(result: "SessionResult", folder: Path, found: "dict[str, Any]", json: b
 
 
 def compared(
-    session: Path, reference: Path | None, out: Path, *, subject: str | None, chosen: Set, force: bool, tell: "Callable[[str], None]"
+    session: Path,
+    reference: Path | None,
+    out: Path,
+    options: Reading,
+    *,
+    force: bool,
+    tell: "Callable[[str], None]",
 ) -> "tuple[SessionResult, SessionIdentification | None, Path]":
     """Examine a session beside an earlier one of the same person; return what was found, what that one said, and the results' folder.
 
     What cannot be read or written is said before the long work starts.
     """
     from biodance.lab.results_folder import results_folder
-    from biodance.lab.session import read_session
     from biodance.pipeline.front import identify
     from biodance.pipeline.session import examine
-    from biodance.settings import assignments
 
-    settings = assignments(chosen)
-    earlier = read_session(reference, subject_name=subject, settings=settings, tell=tell) if reference else None
-    recording = read_session(session, subject_name=subject, settings=settings, tell=tell)
+    earlier = options.read(reference, tell) if reference else None
+    recording = options.read(session, tell)
     folder = results_folder(out, session, force=force)
     before = identify(earlier, tell=tell) if earlier else None
     return examine(recording, reference=before, tell=tell), before, folder
@@ -101,7 +136,7 @@ def _told_identified(result: "SessionResult", folder: Path, found: "dict[str, An
 
 
 @app.command
-def inspect(*paths: Path, json: Json = False) -> int:
+def inspect(*paths: Path, markers: MarkersFile = None, json: Json = False) -> int:
     """Say what is in recordings: markers, gaps, plates, the weight on them, and every decision the readers take.
 
     Parameters
@@ -115,7 +150,7 @@ def inspect(*paths: Path, json: Json = False) -> int:
     from biodance.report.terminal import print_inspected
 
     with progress() as tell:
-        records = inspect_paths(paths, tell=tell)
+        records = inspect_paths(paths, markers=markers, tell=tell)
     if json:
         print_json(records)
     else:
@@ -130,6 +165,7 @@ def report(
     *,
     out: Out,
     subject: str | None = None,
+    markers: MarkersFile = None,
     chosen: Set = (),
     tables: Tables = None,
     json: Json = False,
@@ -145,11 +181,9 @@ def report(
         The person to report where C3D files hold several; without it a file with several persons is refused and names them.
     """
     from biodance.lab.results_folder import results_folder
-    from biodance.lab.session import read_session
-    from biodance.settings import assignments
 
     with progress() as tell:
-        recording = read_session(session, subject_name=subject, settings=assignments(chosen), tell=tell)
+        recording = Reading(subject, markers, chosen).read(session, tell)
         folder, place = results_folder(out, session, force=force), ready(tables, session, force=force)
         result, found = reported(recording, folder, tell, tables=place)
     return told(result, folder, found, json)
@@ -164,6 +198,7 @@ def identify(
     subject: str | None = None,
     chosen: Set = (),
     tables: Tables = None,
+    markers: MarkersFile = None,
     json: Json = False,
     force: Force = False,
 ) -> int:
@@ -183,7 +218,8 @@ def identify(
 
     with progress() as tell:
         place = ready(tables, session, force=force)
-        result, _, folder = compared(session, reference, out, subject=subject, chosen=chosen, force=force, tell=tell)
+        options = Reading(subject, markers, chosen)
+        result, _, folder = compared(session, reference, out, options, force=force, tell=tell)
         found = front.identify(result)
         tell("writing the page")
         tabled(result, place)

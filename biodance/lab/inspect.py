@@ -9,7 +9,7 @@ import numpy as np
 
 from biodance.errors import BiodanceError
 from biodance.lab.gaps import report_gaps
-from biodance.lab.marker_sets import canonical, read_marker_set
+from biodance.lab.marker_sets import MarkerSet, canonical, read_marker_set
 from biodance.lab.read import format_of, read_trial
 from biodance.lab.recordings import recordings_below
 from biodance.lab.subject import declared_mass, declared_stature
@@ -21,8 +21,12 @@ SHORTEST_STEP = 0.05
 """Seconds under load from which on a plate has a centre of pressure; less is noise."""
 
 
-def inspect_paths(paths: Sequence[str | Path], *, tell: Callable[[str], None] | None = None) -> list[dict[str, Any]]:
+def inspect_paths(
+    paths: Sequence[str | Path], *, markers: str | Path | None = None, tell: Callable[[str], None] | None = None
+) -> list[dict[str, Any]]:
     """Return one record (see `inspect_file`) for each file, and for each recording in each folder and below it.
+
+    ``markers`` is the name or file of the marker set that was worn.
 
     Raises
     ------
@@ -31,6 +35,7 @@ def inspect_paths(paths: Sequence[str | Path], *, tell: Callable[[str], None] | 
     """
     if not paths:
         raise BiodanceError("There is nothing to inspect: name files, or folders with recordings.")
+    worn = read_marker_set(markers) if markers is not None else None
     records = []
     for path in map(Path, paths):
         files = recordings_below(path) if path.is_dir() else [path]
@@ -39,11 +44,11 @@ def inspect_paths(paths: Sequence[str | Path], *, tell: Callable[[str], None] | 
         for file in files:
             if tell:
                 tell(file.name)
-            records.append(inspect_file(file))
+            records.append(inspect_file(file, markers=worn))
     return records
 
 
-def inspect_file(path: str | Path) -> dict[str, Any]:
+def inspect_file(path: str | Path, *, markers: MarkerSet | None = None) -> dict[str, Any]:
     """Return what is in one recording; a file that cannot be read gives the status "refused" and the reason.
 
     Keys: ``file``; ``status`` "ok", "warning" or "refused"; ``reason`` (None if ok); ``format``; ``frames``, ``rate_hz``,
@@ -55,7 +60,7 @@ def inspect_file(path: str | Path) -> dict[str, Any]:
     """
     path = Path(path)
     try:
-        trial = read_trial(path)
+        trial = read_trial(path, markers=markers)
     except BiodanceError as error:
         return _refused(path, str(error))
     warnings = [*trial.warnings, *_never_seen(trial)]

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from biodance.discovery import Chosen
 from biodance.errors import BiodanceError, FileRefused
+from biodance.lab.marker_sets import MarkerSet, wearing
 from biodance.lab.plain_text import refuse_special
 from biodance.lab.readers import Reader, extensions, head_text, readers
 from biodance.records import Role, Trial
@@ -70,7 +71,14 @@ def sniffed(head: bytes, chosen: Chosen[Reader] = None) -> Reader | None:
     return next((reader for reader in readers(chosen) if reader.sniff(head)), None)
 
 
-def read_trial(path: str | Path, *, role: Role = "fit", subject: str | None = None, readers: Chosen[Reader] = None) -> Trial:
+def read_trial(
+    path: str | Path,
+    *,
+    role: Role = "fit",
+    subject: str | None = None,
+    readers: Chosen[Reader] = None,
+    markers: MarkerSet | None = None,
+) -> Trial:
     """Read the trial in a file of any format.
 
     The forces of a .trc file are looked for beside it, in a .mot or .sto file of the same stem (or stem_grf, stem_forces).
@@ -85,6 +93,8 @@ def read_trial(path: str | Path, *, role: Role = "fit", subject: str | None = No
         Chooses the person in a C3D file that holds several.
     readers : iterable, optional
         Objects that read further formats (`biodance.lab.readers.Reader`), or names that limit the family to some.
+    markers : MarkerSet, optional
+        The set that was worn; by default the known set whose labels are there.
 
     Returns
     -------
@@ -108,7 +118,8 @@ def read_trial(path: str | Path, *, role: Role = "fit", subject: str | None = No
     path = Path(path)
     reader = reader_of(path, chosen=readers)
     try:
-        return reader.read(path, role=role, subject=subject)
+        trial = reader.read(path, role=role, subject=subject)
+        return wearing(trial, markers) if markers else trial
     except BiodanceError:
         raise
     except Exception as error:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from biodance.discovery import Chosen
 from biodance.errors import BiodanceError, SessionRefused
+from biodance.lab.marker_sets import read_marker_set
 from biodance.lab.read import read_trial
 from biodance.lab.readers import Reader, extensions
 from biodance.lab.recordings import find_recordings, recordings_in, vicon_notes
@@ -24,6 +25,7 @@ def read_session(
     subject_name: str | None = None,
     settings: Settings | Mapping[str, object] | None = None,
     readers: Chosen[Reader] = None,
+    markers: str | Path | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> Session:
     """Read the session in a folder: the subject and every trial that can be read.
@@ -43,6 +45,8 @@ def read_session(
         A record: these and no others. A mapping, ``{"filter.cutoff": 6}``: as session.toml says, with these changed.
     readers : iterable, optional
         As for `read_trial`.
+    markers : str or pathlib.Path, optional
+        The marker set that was worn, a name or the path of a file; before what session.toml says of it.
     tell : callable, optional
         Called with the name of each file before it is read.
 
@@ -73,6 +77,8 @@ def read_session(
     folder = _checked(Path(folder))
     file_says = read_session_file(folder)
     chosen = settings if isinstance(settings, Settings) else file_says.settings.changed(settings or {})
+    worn = str(markers) if markers is not None else file_says.marker_set
+    marker_set = read_marker_set(worn) if worn else None
     files, notes = find_recordings(folder, readers)
     eclipse, measurements, refused = vicon_notes({folder, *(file.parent for file in files)})
     trials: list[Trial] = []
@@ -86,8 +92,8 @@ def read_session(
         if tell:
             tell(file.name)
         try:
-            trial = replace(read_trial(file, role=role, subject=subject_name, readers=readers), settings=chosen)
-            trial = _with_strikes(trial, operator)
+            trial = read_trial(file, role=role, subject=subject_name, readers=readers, markers=marker_set)
+            trial = _with_strikes(replace(trial, settings=chosen), operator)
         except BiodanceError as error:
             refused[file.name] = str(error)
             continue
