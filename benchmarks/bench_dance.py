@@ -17,12 +17,11 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.human import human
-from biodance.dance.account import account
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
-from biodance.dance.person import HEALTHY, PersonLimits, fitted
-from biodance.dance.plan import Plan
-from biodance.dance.protocol import read_plan
+from biodance.dance.metrics import dance_metrics
+from biodance.dance.problem.person import HEALTHY, PersonLimits, fitted
+from biodance.dance.problem.plan import Plan, read_plan
 from biodance.dance.rehearsal import rehearse
 from biodance.dance.verify import verify
 from biodance.errors import BiodanceError
@@ -77,8 +76,8 @@ def told(name: str, folder: Path) -> str:
         dance, spent = made(body, plan, folder, name)
     except BiodanceError as error:
         return f"{who} | refused: {error} |"
-    margins, numbers = verify(body, dance, plan), account(dance, plan)
-    numbers = account(dance, replace(plan, weights=tuple((name, 0.0) for name in numbers.hardly)))  # feet that never leave the ground
+    margins, numbers = verify(body, dance, plan), dance_metrics(dance, plan)
+    numbers = dance_metrics(dance, replace(plan, weights=tuple((name, 0.0) for name in numbers.hardly)))  # feet that never leave the ground
     worst = min((m for m in margins if m.limit not in ROUNDING), key=lambda m: m.worst)
     slow, stops = int(np.sum(dance.move > plan.move + 1e-9)), int(np.sum(dance.hold == 0))
     holds = sum(m.worst >= 0 for m in margins)

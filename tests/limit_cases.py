@@ -7,13 +7,13 @@ from functools import cache
 import numpy as np
 
 from biodance.body.human import human
-from biodance.dance.chain import Chain
 from biodance.dance.limits import CheckedMotion
-from biodance.dance.postures import start
-from biodance.dance.programme import closed
-from biodance.dance.shapes import palm
-from biodance.dance.stance import Stance, holding, seat, stance
-from biodance.dance.state import State
+from biodance.dance.postures.posture import initial_guess
+from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.closure import close_legs
+from biodance.dance.problem.shapes import palm
+from biodance.dance.problem.stance import Stance, holding, seat, stance
+from biodance.dance.problem.state import State
 from biodance.records import Array, Subject
 
 BODY = human(Subject(65.0, 1.75, "F", 33.0))
@@ -42,7 +42,7 @@ def _movements(count: int, seed: int) -> Iterator[State]:
     rng, found = np.random.default_rng(seed), 0
     while found < count:
         where, violence = feet()[found % len(feet())], 10.0 ** rng.uniform(-1.5, 0.5)
-        x = start(CHAIN, where, rng) + rng.normal(0.0, 0.02, (3, CHAIN.size))
+        x = initial_guess(CHAIN, where, rng) + rng.normal(0.0, 0.02, (3, CHAIN.size))
         v, a = violence * rng.normal(size=(2, 3, CHAIN.size))
         if where.seat:
             x[:, :6], v[:, :6], a[:, :6] = [0.0, 0.0, where.seat, 0.0, 0.0, 0.0], 0.0, 0.0
@@ -51,8 +51,8 @@ def _movements(count: int, seed: int) -> Iterator[State]:
             x[:, 3:6] *= 0.5
             x = _standing(x, where, np.radians(rng.choice([rng.uniform(8.2, 10.0, 3), rng.uniform(10.0, 70.0, 3)])))
         if np.isfinite(where.hands).all():
-            where = replace(where, hands=_palms(closed(CHAIN, where, x, v, a))[0] + rng.normal(0.0, 0.02, (2, 3)))
-        state = closed(CHAIN, where, x, v, a)
+            where = replace(where, hands=_palms(close_legs(CHAIN, where, x, v, a))[0] + rng.normal(0.0, 0.02, (2, 3)))
+        state = close_legs(CHAIN, where, x, v, a)
         if state.wrench[:, 2].min() > 100.0 and np.abs(state.a).max() < 1e3:
             found += 1
             yield state

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from biodance.cli import run
-from biodance.dance.account import account, criterion_of
 from biodance.dance.dance import Dance
-from biodance.dance.protocol import read_plan
+from biodance.dance.metrics import criterion_of, dance_metrics
+from biodance.dance.problem.plan import read_plan
 from biodance.dance.verify import broken, verify
 from biodance.errors import BiodanceError
 from biodance.lab.inspect import inspect_file
@@ -137,4 +137,4 @@ def test_the_criterion_of_a_motion_is_that_of_the_dance(made: tuple[Path, Path, 
     folder, protocol, _ = made
     dance = Dance.load(folder / "dance.npz")
     _, dynamic = criterion_of(dance.body, dance.motion(50.0))
-    assert dynamic == pytest.approx(account(dance, read_plan(protocol)).dynamic[-1], rel=2e-3)
+    assert dynamic == pytest.approx(dance_metrics(dance, read_plan(protocol)).dynamic[-1], rel=2e-3)

@@ -8,12 +8,12 @@ import pytest
 
 from biodance.body.human import human
 from biodance.dance import design as design_module
-from biodance.dance import postures
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
-from biodance.dance.exchange import alike
 from biodance.dance.limits.balance import Balance
-from biodance.dance.plan import Plan
+from biodance.dance.postures import search
+from biodance.dance.postures.exchange import alike
+from biodance.dance.problem.plan import Plan
 from biodance.dance.rehearsal import bearing, rehearse
 from biodance.dance.verify import broken, verify, verify_with
 from biodance.errors import BiodanceError, FileRefused
@@ -28,7 +28,7 @@ PLAN = Plan("small", "", (("parallel", 2), ("single_left", 2)), hold=1.0)
 def quick():
     with pytest.MonkeyPatch.context() as patch:
         for name, sweeps in (("SWEEPS", ((4, 8),)), ("FRESH", ((8, 8),)), ("POLISH", ((8, 4),))):
-            patch.setattr(postures, name, sweeps)
+            patch.setattr(search, name, sweeps)
         yield
 
 

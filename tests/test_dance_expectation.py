@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from biodance.body.human import human
-from biodance.dance.chain import ROOT, Chain
 from biodance.dance.expectation import RATE, SIZES, expected, typical_noise
-from biodance.dance.splines import rest_to_rest
+from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.splines import rest_to_rest
 from biodance.identify.caution import widened
 from biodance.identify.knowledge import segment_quantities
 from biodance.identify.mismatch import mismatch, temper

@@ -12,12 +12,12 @@ import pytest
 
 from biodance.body.human import human
 from biodance.cli import run
-from biodance.dance import limits, postures
+from biodance.dance import limits
 from biodance.dance.design import design
 from biodance.dance.limits import NOTHING, Limit, family, limits_with, unconcerned
 from biodance.dance.limits.friction import Friction
-from biodance.dance.plan import Plan
-from biodance.dance.protocol import read_plan
+from biodance.dance.postures import search
+from biodance.dance.problem.plan import Plan, read_plan
 from biodance.dance.verify import broken, verify
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import Subject
@@ -30,8 +30,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.dance.limits import CheckedMotion, Limit, Margins, Remaining, bounded
-from biodance.dance.shapes import palm
-from biodance.dance.state import State
+from biodance.dance.problem.shapes import palm
+from biodance.dance.problem.state import State
 
 SIDES = ("right", "left")
 
@@ -77,7 +77,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, sweeps in (("SWEEPS", ((4, 8),)), ("FRESH", ((8, 8),)), ("POLISH", ((8, 4),)), ("ATTEMPTS", 3)):
-        monkeypatch.setattr(postures, name, sweeps)
+        monkeypatch.setattr(search, name, sweeps)
 
 
 def danced(tmp_path: Path, height: float) -> tuple[int, dict[str, object], Path]:

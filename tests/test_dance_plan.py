@@ -8,9 +8,8 @@ import pytest
 
 from biodance import library
 from biodance.body.human import human
-from biodance.dance.person import HEALTHY, PersonLimits, fitted, joints, limited, read_person
-from biodance.dance.plan import Plan
-from biodance.dance.protocol import read_plan
+from biodance.dance.problem.person import HEALTHY, PersonLimits, fitted, joints, limited, read_person
+from biodance.dance.problem.plan import Plan, read_plan
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import Subject
 

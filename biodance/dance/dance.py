@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.body.body_file import body_text, parse_body
-from biodance.dance.chain import Chain
-from biodance.dance.programme import closed
-from biodance.dance.splines import basis_at
-from biodance.dance.stance import Stance
-from biodance.dance.state import State
+from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.closure import close_legs
+from biodance.dance.problem.splines import basis_at
+from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.state import State
 from biodance.errors import BiodanceError, FileRefused
 from biodance.records import Array, Motion, frozen_array
 
@@ -99,11 +99,11 @@ class Dance:
         """Return the coordinates at instants ``time`` (T,) s of the dance that lie in ``phase``."""
         if phase.kind == "hold":
             x = np.repeat(self.postures[None, phase.posture], len(time), axis=0)
-            return closed(self.chain, phase.stance, x, *np.zeros((2, *x.shape)))
+            return close_legs(self.chain, phase.stance, x, *np.zeros((2, *x.shape)))
         move = phase.posture - 1
         points = np.stack([self.postures[move], *self.via[move], self.postures[move + 1]])
         basis = basis_at(np.clip(time - phase.start, 0.0, phase.end - phase.start), phase.end - phase.start)
-        return closed(self.chain, phase.stance, basis.position @ points, basis.velocity @ points, basis.acceleration @ points)
+        return close_legs(self.chain, phase.stance, basis.position @ points, basis.velocity @ points, basis.acceleration @ points)
 
     def motion(self, rate: float) -> Motion:
         """Return the whole dance, holds included, sampled at ``rate`` Hz from 0 to its end.

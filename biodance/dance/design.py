@@ -12,22 +12,20 @@ from pathlib import Path
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.dance.between import middle_posture
-from biodance.dance.chain import Chain
 from biodance.dance.dance import Dance
-from biodance.dance.excitation import blocks
-from biodance.dance.ledger import Ledger
 from biodance.dance.limits import Limit
-from biodance.dance.mend import passable
-from biodance.dance.order import walk
-from biodance.dance.plan import Plan
-from biodance.dance.postures import find_postures
-from biodance.dance.selection import choose
-from biodance.dance.sequence import sequence, under
-from biodance.dance.stance import Stance
+from biodance.dance.postures.ordering import support_sequence, under, walk
+from biodance.dance.postures.posture import intermediate_posture
+from biodance.dance.postures.search import find_postures
+from biodance.dance.postures.selection import choose
+from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.excitation import blocks
+from biodance.dance.problem.plan import Plan
+from biodance.dance.problem.stance import Stance
+from biodance.dance.transitions.context import Checkpoint, Course, DesignContext, Tell
+from biodance.dance.transitions.planner import Way
+from biodance.dance.transitions.replan import replan
 from biodance.dance.verify import Margin, broken, verify_with
-from biodance.dance.ways import Way
-from biodance.dance.work import Course, Tell, Work
 from biodance.errors import BiodanceError
 
 WORKERS = 2
@@ -62,8 +60,8 @@ def design(
     plan = plan.with_limits(limits)
     chain, parts = Chain(body), blocks(body)
     parts = replace(parts, weight=parts.weight * plan.emphasis(body.segments), simplicity=plan.simplicity)
-    work = Work(chain, parts, plan, seed, Ledger(resume, body, plan, seed), workers, tell or (lambda what, done, of: None))
-    dance = _joined(work, *passable(work, _postures(work)))
+    work = DesignContext(chain, parts, plan, seed, Checkpoint(resume, body, plan, seed), workers, tell or (lambda what, done, of: None))
+    dance = _joined(work, *replan(work, _postures(work)))
     work.tell("checking every limit", 0, 0)
     margins = verify_with(workers, body, dance, plan)
     if wrong := broken(margins):
@@ -74,10 +72,10 @@ def design(
     return dance, margins
 
 
-def _postures(work: Work) -> Course:
+def _postures(work: DesignContext) -> Course:
     """Return all postures in the order of the dance, those in between included."""
     plan, chain = work.plan, work.chain
-    counted = [s for s in sequence(chain.body, plan) if s.over is None]
+    counted = [s for s in support_sequence(chain.body, plan) if s.over is None]
     kept = work.ledger.get("postures")
     if kept is None:
         work.tell("postures", 0, len(counted))
@@ -90,7 +88,7 @@ def _postures(work: Work) -> Course:
     groups = [[p for p in chosen if names[p] == name] for name in dict.fromkeys(names)]
     order = walk(x, [group for group in groups if group])
     blocks_ = tuple((name, len(group)) for name, group in zip(dict.fromkeys(names), groups, strict=True) if group)
-    stances = sequence(chain.body, replace(plan, blocks=blocks_))
+    stances = support_sequence(chain.body, replace(plan, blocks=blocks_))
     rows, walked = np.full((len(stances), chain.size), np.nan), iter(order)
     for k, stance in enumerate(stances):
         if stance.over is None:
@@ -98,11 +96,11 @@ def _postures(work: Work) -> Course:
     known = np.flatnonzero(~np.isnan(rows[:, 0]))
     for k in sorted(set(range(len(stances))) - set(known)):
         near = [known[known < k][-1], *known[known > k][:1]]
-        rows[k] = middle_posture(chain, stances[k], rows[near], plan.limits, seed=[work.seed, 2, k]).x
+        rows[k] = intermediate_posture(chain, stances[k], rows[near], plan.limits, seed=[work.seed, 2, k]).x
     return Course(rows, stances)
 
 
-def _joined(work: Work, course: Course, ways: list[Way], notes: tuple[str, ...]) -> Dance:
+def _joined(work: DesignContext, course: Course, ways: list[Way], notes: tuple[str, ...]) -> Dance:
     """Return the dance of the postures of a course and the ways between them, stops on the way included, which are not held."""
     plan, (x, stances) = work.plan, (course.x, course.stances)
     rows, feet, hold, under_ = [x[0]], [stances[0]], [plan.hold], list[Stance]()

@@ -36,7 +36,6 @@ TYPICAL = np.array(
 danced with realistic tolerances (root mean square)."""
 SIZES = Sizes(kinematics=1.0, noise=7.0)
 """Sizes of the disturbances that the evidence chose in those sessions (noise: 4.5, 7, 7)."""
-
 RATE = 12.5
 """Hz at which a plan is judged: moves of 2 s from rest to rest have nothing to say above 6 Hz."""
 STILL = 1.5

@@ -14,7 +14,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
 from biodance.dance.limits import NOTHING, CheckedMotion
-from biodance.dance.plan import Plan
+from biodance.dance.problem.plan import Plan
 
 EDGES = np.array([0.0025, 0.005])
 """s after the start and before the end of every move that are judged, too: there a foot has just left the ground or is about to return."""

@@ -11,13 +11,13 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.human import human
 from biodance.body.limits import joint_limits
-from biodance.dance.account import Account, account
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.expectation import Expectation, expect
 from biodance.dance.limits import Limit
-from biodance.dance.person import PersonLimits, fitted
-from biodance.dance.plan import Plan
+from biodance.dance.metrics import DanceMetrics, dance_metrics
+from biodance.dance.problem.person import PersonLimits, fitted
+from biodance.dance.problem.plan import Plan
 from biodance.dance.verify import Margin, broken
 from biodance.errors import BiodanceError
 from biodance.records import Subject
@@ -58,7 +58,7 @@ class DanceResult:
     plan: Plan
     dance: Dance | None
     margins: tuple[Margin, ...]
-    account: Account | None
+    account: DanceMetrics | None
     expectation: Expectation | None
     reason: str
     notes: tuple[str, ...]
@@ -125,7 +125,7 @@ def make_dance(
     if dance is not None:
         tell("counting what the dance tells", 0, 0)
         with ProcessPoolExecutor(1) as aside:
-            numbers = aside.submit(account, dance, plan)
+            numbers = aside.submit(dance_metrics, dance, plan)
             expected, counted = makers.expect(dance), numbers.result()
         reason = " ".join(_told(margin) for margin in broken(margins))
     if reason:

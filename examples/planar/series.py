@@ -16,7 +16,7 @@ from target import target
 from via_points import Excitation, design, within_ranges
 
 from biodance.body.body import Body
-from biodance.dance.splines import rest_to_rest
+from biodance.dance.problem.splines import rest_to_rest
 from biodance.identify.base_parameters import BaseParameters, base_parameters, parameter_names
 from biodance.motion.kinematics import segment_motion
 from biodance.motion.regressor import regressor_of

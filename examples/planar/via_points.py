@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 from target import Target
 
 from biodance.body.body import Body
-from biodance.dance.splines import Basis
+from biodance.dance.problem.splines import Basis
 from biodance.identify.information import fold
 from biodance.motion.kinematics import segment_motion
 from biodance.motion.regressor import regressor_of

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.dance.stance import Stance
+from biodance.dance.problem.stance import Stance
 from biodance.motion.dynamics import distribute, joint_torques
 from biodance.motion.kinematics import Poses, poses
 from biodance.motion.regressor import predict_wrench

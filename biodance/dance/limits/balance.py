@@ -4,10 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.dance.limits._checked import CheckedMotion, Remaining
-from biodance.dance.limits._limit import Limit, Margins, bounded
-from biodance.dance.stance import Stance
-from biodance.dance.state import State
+from biodance.dance.limits import CheckedMotion, Limit, Margins, Remaining, bounded
+from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.state import State
 from biodance.motion.dynamics import zmp
 from biodance.records import Array
 

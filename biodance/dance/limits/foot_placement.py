@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import UPRIGHT, Body
-from biodance.dance.limits._checked import SIDES, CheckedMotion, Remaining
-from biodance.dance.limits._limit import Limit, Margins, bounded, unconcerned
-from biodance.dance.stance import Stance
-from biodance.dance.state import State
+from biodance.dance.limits import CheckedMotion, Limit, Margins, Remaining, bounded, unconcerned
+from biodance.dance.limits._checked import SIDES
+from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.state import State
 from biodance.motion.kinematics import poses
 
 STILL = 1e-6

@@ -1,30 +1,22 @@
-"""The best set of postures among all that were found: exchanged one for one until nothing helps, and no two of them alike."""
+"""The best set of postures among all that were found and their mirror images: exchanged one for one until nothing helps, no two alike.
+
+Only postures whose image stands on feet of the protocol have one: side by side, on the other leg, seated. The right foot in front has none.
+"""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.dance.excitation import Blocks
-from biodance.dance.stance import Stance
+from biodance.body.body import Body
+from biodance.dance.postures.posture import Posture
+from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.excitation import Blocks
+from biodance.dance.problem.stance import Stance
 from biodance.records import Array
 
 APART = np.radians(10.0)
 """rad: two postures on the same feet differ by this much in one joint at least; a smaller difference nobody would see."""
-
-
-@dataclass(frozen=True, eq=False)
-class Posture:
-    """``x`` (n,) coordinates, ``up`` (N, 3) the vertical in the segments; ``violation`` of the reserved limits in their scales and the
-    worst ``limit``; ``hard`` how hard it is to take.
-    """
-
-    x: Array
-    up: Array
-    violation: float = np.inf
-    limit: str = ""
-    hard: float = 0.0
 
 
 def exchange(blocks: Blocks, stances: tuple[Stance, ...], pool: list[list[Posture]]) -> list[Posture]:
@@ -99,3 +91,74 @@ def extremes(A: Array) -> tuple[Array, Array]:
     half = (a * (b * c - e * e) - d * (d * c - e * f) + f * (d * e - b * f)) / 2
     angle = np.arccos(np.clip(half / np.maximum(radius**3, 1e-300), -1.0, 1.0)) / 3
     return mean + 2 * radius * np.cos(angle + 2 * np.pi / 3), mean + 2 * radius * np.cos(angle)
+
+
+ACROSS = {"parallel": "parallel", "single_right": "single_left", "single_left": "single_right", "seated": "seated"}
+"""Feet of a posture, and of its image."""
+FLIP = np.array([1.0, 1.0, -1.0])
+"""Sense of the axes of a segment in the image (z to the right)."""
+SIDEWAYS = ("_bending", "_rotation")
+"""Ends of the names of middle joints that change their sense; those in pairs have the anatomical sense on both sides."""
+SAME = 1e-9
+"""m, kg, rad, N·m: differences between the sides that are rounding."""
+
+
+def counterpart(name: str) -> str:
+    """Return the name of the joint or segment on the other side; middle ones are their own."""
+    for side, other in (("right_", "left_"), ("left_", "right_")):
+        if name.startswith(side):
+            return other + name.removeprefix(side)
+    return name
+
+
+def symmetric(body: Body) -> bool:
+    """Return whether the body is the same on both sides: joints, limits, masses and boxes."""
+    names, limits, segments = [joint.name for joint in body.joints], body.limits, list(body.segments)
+    if set(map(counterpart, names)) != set(names) or set(map(counterpart, segments)) != set(segments):
+        return False
+    across, sense = _joints(names)
+    other = [segments.index(counterpart(name)) for name in segments]
+    places, axes, turns = (np.array([getattr(joint, name) for joint in body.joints]) for name in ("translation", "axis", "rotation"))
+    pairs: list[tuple[Array, Array]] = [
+        (np.sort([sense * limits.lower[across], sense * limits.upper[across]], axis=0), np.array([limits.lower, limits.upper])),
+        (
+            np.sort([sense * limits.torque_lower[across], sense * limits.torque_upper[across]], axis=0),
+            np.array([limits.torque_lower, limits.torque_upper]),
+        ),
+        (FLIP * places[across], places),
+        (-FLIP * axes[across], sense[:, None] * axes),  # of a robot's rolls and yaws, both sides may turn the same way
+        (FLIP[:, None] * turns[across] * FLIP, turns),
+        (body.sip.mass[other], body.sip.mass),
+        (FLIP * body.sip.com[other], body.sip.com),
+        (np.sort(FLIP * body.boxes[other], axis=1), body.boxes),
+    ]
+    return all(np.allclose(image, own, rtol=0.0, atol=SAME) for image, own in pairs)
+
+
+def _joints(names: list[str]) -> tuple[list[int], Array]:
+    """Return for every joint the index of the one whose angle it has in the image, and the sense (n,) of that angle."""
+    middle = [counterpart(name) == name for name in names]
+    sense = np.array([-1.0 if alone and name.endswith(SIDEWAYS) else 1.0 for alone, name in zip(middle, names, strict=True)])
+    return [names.index(counterpart(name)) for name in names], sense
+
+
+def image_feet(here: Stance, stances: tuple[Stance, ...]) -> int | None:
+    """Return the place of the first of ``stances`` on which images of postures on the feet ``here`` stand, None if there is none."""
+    free = np.isnan(here.hands[::-1])
+    alike = (k for k, there in enumerate(stances) if there.name == ACROSS.get(here.name) and np.array_equal(np.isnan(there.hands), free))
+    return next(alike, None)
+
+
+def mirrored(chain: Chain, x: Array, here: Stance, there: Stance) -> Array:
+    """Return the coordinates (n,) of the image, on the feet ``there``, of a posture with coordinates ``x`` (n,) on the feet ``here``."""
+    across, sense = _joints([joint.name for joint in chain.body.joints])
+    out = np.concatenate([x[:ROOT] * [1, -1, 1, -1, -1, 1], sense * x[ROOT:][across]])
+    gap = there.ankle - here.ankle[::-1] * [1, -1, 1]
+    out[:2] += gap[list(there.planted), :2].mean(axis=0) if there.planted else 0.0
+    return np.asarray(out)
+
+
+def mirrored_vectors(body: Body, vectors: Array) -> Array:
+    """Return the image (N, 3) of one vector for each segment, ``vectors`` (N, 3) in the segments' frames."""
+    other = [body.segments.index(counterpart(name)) for name in body.segments]
+    return np.asarray(FLIP * vectors[other])

@@ -7,35 +7,24 @@ number of growing sharpness, and after two independent runs postures are exchang
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NoReturn
 
 import numpy as np
 
-from biodance.body.body import UPRIGHT
-from biodance.dance.chain import ROOT, Chain
-from biodance.dance.exchange import Posture, exchange
-from biodance.dance.excitation import Blocks, smooth_condition, static_grams, total, upright_slopes, uprights
 from biodance.dance.limits import Limit
-from biodance.dance.mirror import image_feet, mirrored, mirrored_vectors, symmetric
-from biodance.dance.programme import Judged, Objective, Programme, closed
-from biodance.dance.refusal import Excess, describe, told
-from biodance.dance.simplicity import hardness
-from biodance.dance.sqp import minimise
-from biodance.dance.stance import Stance
-from biodance.dance.state import State
-from biodance.errors import BiodanceError
+from biodance.dance.postures.exchange import exchange, image_feet, mirrored, mirrored_vectors, symmetric
+from biodance.dance.postures.posture import ATTEMPTS, KEPT, Posture, anyhow, initial_guess, posture_at, refuse, solve
+from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.excitation import Blocks, effort, smooth_condition, static_grams, total, upright_slopes, uprights
+from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.state import State
 from biodance.records import Array
 
-KEPT = 0.01
-"""Violation, in scales of the limits, of the reserved margins that is accepted."""
 RUNS = 2
 """Independent searches whose postures are put together."""
 SWEEPS = ((4, 20), (4, 10))
 """Sharpness of the smooth condition number and iterations for every posture, of the sweeps of a run."""
 FRESH, POLISH = ((8, 20),), ((8, 10), (8, 10), (16, 10), (16, 10), (32, 8))
 """The same for the sweeps after the exchange, first one from fresh starts, then from where the postures are."""
-ATTEMPTS = 8
-"""Starts of a posture that is not feasible."""
 EASE = 5e-4
 """Worth of a joint at its stop against the criterion: postures near mid range are easier to take."""
 
@@ -48,26 +37,6 @@ class Postures:
     stances: tuple[Stance, ...]
     criterion: float
     bound: float
-
-
-def free_coordinates(chain: Chain, stance: Stance) -> list[int]:
-    """Return the coordinates that are free when the planted legs follow the pelvis, and a seated pelvis rests."""
-    held = {c for side in stance.planted for c in chain.leg_columns[side]} | set(range(ROOT if stance.seat else 0))
-    return [c for c in range(chain.size) if c not in held]
-
-
-def start(chain: Chain, stance: Stance, rng: np.random.Generator) -> Array:
-    """Return the coordinates (n,) of a squat of any depth over the support, arms and trunk anywhere; seated: all joints anywhere."""
-    low, high, x = chain.body.limits.lower, chain.body.limits.upper, np.zeros(chain.size)
-    x[ROOT:] = low + (high - low) * rng.uniform(0.15, 0.85, len(low))
-    if stance.seat:
-        x[2] = stance.seat
-        return x
-    reach = min(float(leg.length(np.radians(rng.uniform(15, 110)))) for leg in chain.legs)
-    above = UPRIGHT @ np.mean([leg.hip for leg in chain.legs], axis=0)  # of a person's hips: zero, the root is in their middle
-    x[:3] = [*(stance.centre - [0.02, 0.0]), stance.ankle[0, 2] + 0.97 * reach] - above
-    x[3:6] = rng.normal([0.0, 0.0, -0.2], [0.25, 0.25, 0.4])
-    return x
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +62,7 @@ class Exciting:
         value = value / self.unit + EASE * float(np.sum(off**2))
         if not self.blocks.simplicity:
             return value, by
-        hard, slopes = hardness(state)
+        hard, slopes = effort(state)
         return value + 10 * self.blocks.simplicity * hard, by + 10 * self.blocks.simplicity * slopes
 
 
@@ -138,29 +107,6 @@ def _price(blocks: Blocks, chosen: list[Posture]) -> float:
     return criterion(blocks, chosen) + blocks.simplicity * float(blocks.weight.sum() * np.mean([p.hard for p in chosen]))
 
 
-def anyhow(state: State) -> tuple[float, Array]:
-    """Objective of a posture that need only keep its limits."""
-    return 0.0, np.zeros((3, *state.x.shape))
-
-
-def refuse(chain: Chain, stance: Stance, begin: list[Array], limits: tuple[Limit, ...]) -> NoReturn:
-    """Raise the BiodanceError that says which limit forbids every posture on these feet: the first without which there would be one."""
-    kept = [limit for limit in limits if limit.at_rest]
-    for limit in sorted(kept, key=lambda limit: limit.suspicion):
-        others = tuple(other for other in kept if other is not limit)
-        for x in begin:
-            posture = solve(chain, stance, x, Excess(limit), others, iterations=60)
-            if posture.violation <= KEPT:
-                what = describe(State(chain, stance, posture.x[None], *np.zeros((2, 1, chain.size))), limit)
-                raise BiodanceError(
-                    f"No posture {told(stance)} keeps all limits; there would be one without the limit on {what}. "
-                    "Widen that limit, or leave this stance out of the protocol."
-                )
-    raise BiodanceError(
-        f"No posture {told(stance)} keeps all limits, whichever of them is left out. Leave this stance out of the protocol."
-    )
-
-
 @dataclass(frozen=True, eq=False)
 class _Search:
     """What all searches share; random numbers depend on ``seed`` and the place of a posture only."""
@@ -173,7 +119,7 @@ class _Search:
 
     def anywhere(self, place: int, run: int) -> Array:
         """Return the start (n,) of one posture in one run."""
-        return start(self.chain, self.stances[place], np.random.default_rng([self.seed, run, place]))
+        return initial_guess(self.chain, self.stances[place], np.random.default_rng([self.seed, run, place]))
 
     def possible(self, place: int) -> Posture:
         """Return a posture that keeps all limits at this place, or raise the BiodanceError that names the limit that forbids it."""
@@ -195,7 +141,7 @@ class _Search:
 
     def run(self, run: int) -> list[list[Posture]]:
         """Return for every place the postures of one run, one per sweep."""
-        now = [at(self.chain, s, self.anywhere(k, run)) for k, s in enumerate(self.stances)]
+        now = [posture_at(self.chain, s, self.anywhere(k, run)) for k, s in enumerate(self.stances)]
         order = list(np.random.default_rng([self.seed, run]).permutation(len(now)))
         out: list[list[Posture]] = [[] for _ in now]
         for sharpness, iterations in SWEEPS:
@@ -217,26 +163,3 @@ class _Search:
                     break
                 x, steps = self.anywhere(p, 3 + attempt), max(iterations, 20)
         return [now[p] for p in sorted(order)]
-
-
-def solve(chain: Chain, stance: Stance, begin: Array, objective: Objective, limits: tuple[Limit, ...], *, iterations: int) -> Posture:
-    """Return the posture on the feet ``stance`` that is best for ``objective`` near ``begin`` (n,) and keeps those of the ``limits`` that
-    count at rest.
-    """
-    free = free_coordinates(chain, stance)
-    base, basis = np.zeros((3, 1, chain.size)), np.zeros((3, 1, 1))
-    base[0, 0] = begin
-    base[0, 0, free] = 0.0
-    basis[0] = 1.0
-    kept = tuple(limit for limit in limits if limit.at_rest)
-    reserve = np.array([[limit.hold_reserve(stance) for limit in kept]])
-    programme = Programme(chain, stance, base, basis, free, kept, objective, reserve)
-    found = minimise(programme.judge, begin[free], iterations=iterations)
-    state = programme.state(found.y)
-    return Posture(state.x[0], uprights(state)[0], *Judged(programme, state).worst, hard=hardness(state)[0])
-
-
-def at(chain: Chain, stance: Stance, x: Array) -> Posture:
-    """Return the posture with the coordinates x (n,), its planted feet in place, not judged."""
-    state = closed(chain, stance, x[None], *np.zeros((2, 1, chain.size)))
-    return Posture(state.x[0], uprights(state)[0])

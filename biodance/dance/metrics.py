@@ -9,9 +9,9 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
-from biodance.dance.excitation import blocks, condition, dynamic_grams, moments, static_grams, total, uprights
-from biodance.dance.plan import Plan
-from biodance.dance.stance import Stance
+from biodance.dance.problem.excitation import blocks, condition, dynamic_grams, moments, static_grams, total, uprights
+from biodance.dance.problem.plan import Plan
+from biodance.dance.problem.stance import Stance
 from biodance.motion.kinematics import segment_motion
 from biodance.records import Array, Motion
 
@@ -38,7 +38,7 @@ class ZmpPath:
 
 
 @dataclass(frozen=True, eq=False)
-class Account:
+class DanceMetrics:
     """``static`` sum of w_i M_i cond(W_bi^S) of the postures that count, kg, ``dynamic`` (K,) sum of w_i M_i cond(W_bi^D) after each move,
     kg; ``static_bound``, ``dynamic_bound`` kg: what they would be if every condition number were 1; ``hardly`` the segments whose static
     condition number is above ``POOR``; ``paths`` (K) of the zero-moment point.
@@ -52,7 +52,7 @@ class Account:
     paths: tuple[ZmpPath, ...]
 
 
-def account(dance: Dance, plan: Plan) -> Account:
+def dance_metrics(dance: Dance, plan: Plan) -> DanceMetrics:
     """Return the numbers of ``dance``; the weights of the segments are those of ``plan``, on top of their masses."""
     parts = blocks(dance.body)
     weight = parts.weight * plan.emphasis(dance.body.segments)
@@ -70,12 +70,12 @@ def account(dance: Dance, plan: Plan) -> Account:
         state = dance.state(phase, time)
         gram = gram + dynamic_grams(state, every) / RATE
         dynamic.append(total(weight, gram, parts.second)[0])
-        paths.append(ZmpPath(phase.posture - 1, phase.stance, zmp(straight.state(phase, time).wrench), zmp(state.wrench)))
+        paths.append(ZmpPath(phase.posture - 1, phase.stance, zmp_path(straight.state(phase, time).wrench), zmp_path(state.wrench)))
     bounds = [float(sum(w for w, pick in zip(weight, picks, strict=True) if pick)) for picks in (parts.first, parts.second)]
-    return Account(static, bounds[0], np.array(dynamic), bounds[1], tuple(dance.body.segments[i] for i in poor), tuple(paths))
+    return DanceMetrics(static, bounds[0], np.array(dynamic), bounds[1], tuple(dance.body.segments[i] for i in poor), tuple(paths))
 
 
-def zmp(wrench: Array) -> Array:
+def zmp_path(wrench: Array) -> Array:
     """Return the zero-moment point (T, 2) m on the ground of wrenches (T, 6) about the lab origin."""
     return np.stack([-wrench[:, 4], wrench[:, 3]], axis=1) / wrench[:, 2:3]
 

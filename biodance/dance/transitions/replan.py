@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from biodance.dance.between import middle_posture
-from biodance.dance.exchange import alike
-from biodance.dance.excitation import static_grams
-from biodance.dance.moves import ways
-from biodance.dance.postures import KEPT, Exciting, at, criterion, solve, start
-from biodance.dance.refusal import told
-from biodance.dance.ways import Way
-from biodance.dance.work import Course, Work
+from biodance.dance.postures.exchange import alike
+from biodance.dance.postures.posture import KEPT, initial_guess, intermediate_posture, posture_at, solve
+from biodance.dance.postures.search import Exciting, criterion
+from biodance.dance.problem.excitation import static_grams
+from biodance.dance.problem.stance import stance_words
+from biodance.dance.transitions.context import Course, DesignContext
+from biodance.dance.transitions.planner import Way, schedule
 from biodance.errors import BiodanceError
 from biodance.records import Array
 
@@ -25,7 +24,7 @@ FEWER = 4
 """Postures that may be left out, one after the other, as long as half of those on the same feet are left."""
 
 
-def passable(work: Work, course: Course) -> tuple[Course, list[Way], tuple[str, ...]]:
+def replan(work: DesignContext, course: Course) -> tuple[Course, list[Way], tuple[str, ...]]:
     """Return a course all of whose ways keep the limits, these ways, and in plain sentences what differs from ``course``.
 
     Raises
@@ -33,7 +32,7 @@ def passable(work: Work, course: Course) -> tuple[Course, list[Way], tuple[str, 
     BiodanceError
         A move cannot be made whatever postures it joins; the message names it and the limit it breaks.
     """
-    found, notes, first = ways(work, course, {}), list[str](), course
+    found, notes, first = schedule(work, course, {}), list[str](), course
     for attempt in range(1, len(ENDS) + FEWER + 1):
         bad = [k for k, way in enumerate(found) if way.limit]
         if not bad:
@@ -46,14 +45,14 @@ def passable(work: Work, course: Course) -> tuple[Course, list[Way], tuple[str, 
             place = _spare(course, bad[0], found[bad[0]], first)
             notes.append(_said(course, place, "left out", found[bad[0]].limit))
             course, known = _without(course, place), {k - (k >= place): w for k, w in enumerate(found) if k not in (place - 1, place)}
-        found = ways(work, course, {k: w for k, w in known.items() if not w.limit}, attempt)
+        found = schedule(work, course, {k: w for k, w in known.items() if not w.limit}, attempt)
     for k, way in enumerate(found):
         if way.limit:
             raise BiodanceError(_impossible(course, k, way))
     return course, found, tuple(notes)
 
 
-def _exchanged(work: Work, course: Course, places: list[int], attempt: int) -> Course:
+def _exchanged(work: DesignContext, course: Course, places: list[int], attempt: int) -> Course:
     """Return the course with other postures at ``places``."""
     for place in places:
         x = course.x.copy()
@@ -61,19 +60,19 @@ def _exchanged(work: Work, course: Course, places: list[int], attempt: int) -> C
             x[place] = _another(work, course, place, np.random.default_rng([work.seed, 4, attempt, place]))
         else:
             near, seed = _neighbours(x, place), [work.seed, 5, attempt, place]
-            x[place] = middle_posture(work.chain, course.stances[place], near, work.plan.limits, seed=seed, mild=REST[attempt - 1]).x
+            x[place] = intermediate_posture(work.chain, course.stances[place], near, work.plan.limits, seed=seed, mild=REST[attempt - 1]).x
         course = replace(course, x=x)
     return course
 
 
-def _another(work: Work, course: Course, place: int, rng: np.random.Generator) -> Array:
+def _another(work: DesignContext, course: Course, place: int, rng: np.random.Generator) -> Array:
     """Return the most exciting posture (n,) beside all others from a few fresh starts; the old one where none is feasible."""
     chain, blocks, stance = work.chain, work.blocks, course.stances[place]
     pairs = zip(course.stances, course.x, range(len(course.x)), strict=True)
-    others = [at(chain, s, x) for s, x, k in pairs if s.over is None and k != place]
+    others = [posture_at(chain, s, x) for s, x, k in pairs if s.over is None and k != place]
     grams = static_grams(np.array([p.up for p in others]).reshape(-1, len(chain.body.segments), 3))
     objective = Exciting(blocks, grams, 0.1 * float(blocks.weight.sum()) / (len(others) + 1), SHARPNESS)
-    starts = [start(chain, stance, rng) for _ in range(STARTS)]
+    starts = [initial_guess(chain, stance, rng) for _ in range(STARTS)]
     tasks = [work.workers.submit(solve, chain, stance, begin, objective, work.plan.limits, iterations=ITERATIONS) for begin in starts]
     found = [task.result() for task in tasks]
     same = [x for s, x, k in zip(course.stances, course.x, range(len(course.x)), strict=True) if s.name == stance.name and k != place]
@@ -107,7 +106,7 @@ def _limit(found: list[Way], place: int) -> str:
 def _said(course: Course, place: int, what: str, limit: str) -> str:
     number = sum(stance.over is None for stance in course.stances[: place + 1])
     stance, limit = course.stances[place], limit.replace("_", " ")
-    which = f"Posture {number} ({told(stance)})" if stance.over is None else f"The posture in between after posture {number}"
+    which = f"Posture {number} ({stance_words(stance)})" if stance.over is None else f"The posture in between after posture {number}"
     return f"{which} was {what}: a move to or from it would have exceeded the limit on {limit}."
 
 

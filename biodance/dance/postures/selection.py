@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.dance.chain import Chain
-from biodance.dance.plan import Plan
-from biodance.dance.splines import rest_to_rest
+from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.plan import Plan
+from biodance.dance.problem.splines import rest_to_rest
 from biodance.identify.posterior import prior_factor
 from biodance.motion.regressor import regressor
 from biodance.records import Array

@@ -26,8 +26,7 @@ from pathlib import Path
 import numpy as np
 
 from biodance.body.body import Body, JointLimits
-from biodance.dance.plan import Plan
-from biodance.dance.protocol import number, table
+from biodance.dance.problem.plan import Plan, number, table
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import read_toml
 

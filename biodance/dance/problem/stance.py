@@ -19,7 +19,6 @@ STOOL = np.array([[-0.15, -0.2], [0.25, -0.2], [0.25, 0.2], [-0.15, 0.2]])
 """(4, 2) m where the legs of a stool stand, from below the hips: a seat of 0.4 m by 0.4 m that bears the thighs to their middle."""
 HANGING = 0.08
 """m between the ground and the soles of hanging legs on a stool."""
-
 GRIP = (0.18, 0.28, 0.50)
 """Grips of a walking frame: m ahead of the heels' line, m to the side, and height over stature (crease of the wrist, as they are set)."""
 
@@ -167,3 +166,18 @@ def stature_of(body: Body) -> float:
     tops = [float((pose.position[0, i] + pose.rotation[0, i] @ box[1])[2]) for i, box in enumerate(body.boxes)]
     foot = body.feet["right"]
     return max(tops) - float(pose.points([foot.segment], foot.outline[:1])[0, 0, 2])
+
+
+FEET = {
+    "parallel": "with both feet side by side",
+    "right_forward": "with the right foot in front",
+    "single_right": "on the right leg alone",
+    "single_left": "on the left leg alone",
+    "seated": "on the stool",
+}
+
+
+def stance_words(stance: Stance) -> str:
+    """Return where the feet are, in words, and on which of them the weight is where it must be over one."""
+    weight = "" if stance.over is None else f", the weight on the {('right', 'left')[stance.over]} one"
+    return FEET[stance.name] + weight

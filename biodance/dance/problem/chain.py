@@ -14,7 +14,6 @@ import numpy as np
 
 from biodance.body.body import UPRIGHT, Body
 from biodance.body.pinocchio_model import load_pinocchio
-from biodance.dance.shapes import Solids
 from biodance.errors import BiodanceError
 from biodance.motion.general_legs import GeneralLeg
 from biodance.motion.kinematics import axis_rotation
@@ -79,11 +78,6 @@ class Chain:
             above = self.body.joints[k - ROOT].parent if k >= ROOT else k - 1 - ROOT
             table[k] += table[max(above, -1) + ROOT if k >= ROOT else k - 1]
         return table
-
-    @cached_property
-    def solids(self) -> Solids:
-        """The segments that must not touch each other."""
-        return Solids.of(self.body)
 
     @cached_property
     def axes(self) -> Array:
