@@ -25,10 +25,11 @@ from virtual_visits import subjects
 from biodance.dance.dance import Dance
 from biodance.dance.design import SHORT, design
 from biodance.dance.metrics import criterion_of
-from biodance.dance.postures.ordering import support_sequence, under
+from biodance.dance.postures.ordering import support_sequence
 from biodance.dance.postures.posture import KEPT, Near, initial_guess, intermediate_posture, solve
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.plan import Plan, read_plan
+from biodance.dance.problem.stance import under
 from biodance.lab.session import read_session
 from biodance.motion.kinematics import poses
 from biodance.pipeline.dance import dancer

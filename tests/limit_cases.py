@@ -1,4 +1,6 @@
-"""Movements on which every limit of a dance is judged twice: by its margins (the optimiser's) and by its check (the judge's)."""
+"""Movements on which every limit of a dance is judged twice: by its margins (the optimiser's) and by its check (the
+judge's).
+"""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -10,10 +12,9 @@ from biodance.body.human import human
 from biodance.dance.limits import CheckedMotion
 from biodance.dance.postures.posture import initial_guess
 from biodance.dance.problem.chain import Chain
-from biodance.dance.problem.closure import close_legs
 from biodance.dance.problem.shapes import palm
 from biodance.dance.problem.stance import Stance, holding, seat, stance
-from biodance.dance.problem.state import State
+from biodance.dance.problem.state import State, close_legs
 from biodance.records import Array, Subject
 
 BODY = human(Subject(65.0, 1.75, "F", 33.0))
@@ -30,10 +31,11 @@ def feet() -> tuple[Stance, ...]:
 
 @cache
 def movements(count: int, *, seed: int = 0) -> tuple[tuple[State, CheckedMotion], ...]:
-    """Return ``count`` random movements of 3 samples each, gentle and violent ones, on all kinds of feet in turn, for both sides.
+    """Return ``count`` random movements of 3 samples each, gentle and violent ones, on all kinds of feet in turn, for
+    both sides.
 
-    Planted knees are bent by 8.2 degrees (less bends the reach of the closed legs) to 70, palms are up to about 6 cm from
-    grips; nobody jumps (100 N on the ground at least).
+    Planted knees are bent by 8.2 degrees (less bends the reach of the closed legs) to 70, palms are up to about 6 cm
+    from grips; nobody jumps (100 N on the ground at least).
     """
     return tuple((state, checked(state)) for state in _movements(count, seed))
 
@@ -59,7 +61,9 @@ def _movements(count: int, seed: int) -> Iterator[State]:
 
 
 def _standing(x: Array, where: Stance, knee: Array) -> Array:
-    """Return coordinates (T, n) whose pelvis is at the height where the longest planted leg has its ``knee`` (T,) rad bent."""
+    """Return coordinates (T, n) whose pelvis is at the height where the longest planted leg has its ``knee`` (T,) rad
+    bent.
+    """
     x = x.copy()
     for _ in range(20):
         turn = CHAIN.root_rotation(x)

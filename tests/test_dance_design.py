@@ -52,7 +52,7 @@ def test_the_dance_has_its_postures_its_feet_and_its_time(dance):
 
 
 def test_every_limit_holds(dance):
-    margins = verify(BODY, dance, PLAN)
+    margins = verify(BODY, dance, PLAN.limits)
     told = "balance continuity foot_placement friction ground_clearance joint_range joint_speed joint_torque self_collision"
     assert [m.limit for m in margins] == told.split()
     assert broken(margins) == ()
@@ -60,7 +60,7 @@ def test_every_limit_holds(dance):
 
 def test_two_workers_find_the_same_margins(dance):
     with ThreadPoolExecutor(2) as workers:
-        assert verify_with(workers, BODY, dance, PLAN) == verify(BODY, dance, PLAN)
+        assert verify_with(workers, BODY, dance, PLAN.limits) == verify(BODY, dance, PLAN.limits)
 
 
 def test_a_margin_that_is_no_number_is_never_lost(dance, monkeypatch):
@@ -71,7 +71,7 @@ def test_a_margin_that_is_no_number_is_never_lost(dance, monkeypatch):
         return replace(left, value=left.value * np.nan) if motion.motion.time[0] == start else left
 
     monkeypatch.setattr(Balance, "check", spoiled)
-    assert {margin.limit for margin in broken(verify(BODY, dance, PLAN))} == {"balance"}
+    assert {margin.limit for margin in broken(verify(BODY, dance, PLAN.limits))} == {"balance"}
 
 
 def test_no_posture_comes_twice(dance):
@@ -147,7 +147,7 @@ def moved(stance):
     ],
 )
 def test_what_breaks_a_limit_is_seen(dance, limit, change):
-    assert limit in {m.limit for m in broken(verify(BODY, change(dance), PLAN))}
+    assert limit in {m.limit for m in broken(verify(BODY, change(dance), PLAN.limits))}
 
 
 def test_a_dance_that_fails_the_check_is_not_returned(dance, folder, monkeypatch):

@@ -1,4 +1,6 @@
-"""One number for every limit of a dance that a person works out by hand, for a woman of 65 kg and 1.75 m: by margins and by check."""
+"""One number for every limit of a dance that a person works out by hand, for a woman of 65 kg and 1.75 m: by margins
+and by check.
+"""
 
 from dataclasses import replace
 
@@ -8,16 +10,17 @@ from limit_cases import BODY, CHAIN, checked, feet
 
 from biodance.body.body import Body
 from biodance.dance.limits import CheckedMotion, Limit, family
-from biodance.dance.problem.closure import close_legs
 from biodance.dance.problem.stance import Stance, holding, seat, stance
-from biodance.dance.problem.state import State
+from biodance.dance.problem.state import State, close_legs
 from biodance.motion.kinematics import poses
 
 FAMILY = {limit.name: limit for limit in family()}
 
 
 def upright(**angles: float) -> np.ndarray:
-    """Return coordinates (1, n) of a person who stands upright, ankles over the lab origin, soles on the ground, but for ``angles`` rad."""
+    """Return coordinates (1, n) of a person who stands upright, ankles over the lab origin, soles on the ground, but
+    for ``angles`` rad.
+    """
     x = np.zeros((1, CHAIN.size))
     x[0, 2] = 0.371686 + 0.442392 + 0.067375  # thigh, shank, ankle
     for name, value in angles.items():

@@ -1,5 +1,5 @@
-"""One contract for every limit of a dance: its margins are what its check finds, its slopes are differences, and what a protocol says of it
-reaches both sides. Numbers that a person works out by hand are in test_dance_limit_numbers.py.
+"""One contract for every limit of a dance: its margins are what its check finds, its slopes are differences, and what a
+protocol says of it reaches both sides. Numbers that a person works out by hand are in test_dance_limit_numbers.py.
 """
 
 from dataclasses import fields, replace
@@ -9,19 +9,20 @@ import pytest
 from limit_cases import BODY, CHAIN, feet, movements
 
 from biodance.dance.limits import FAR, CheckedMotion, Limit, family
-from biodance.dance.postures.posture import free_coordinates, initial_guess
-from biodance.dance.postures.search import Exciting
-from biodance.dance.problem.excitation import blocks, dynamic_grams, dynamic_slopes, static_grams
-from biodance.dance.problem.nlp import NonlinearProgramme
+from biodance.dance.postures.posture import Exciting, initial_guess
+from biodance.dance.problem.excitation import dynamic_grams, dynamic_slopes, excitation_blocks, static_grams
+from biodance.dance.problem.nlp import NonlinearProgramme, free_coordinates
 from biodance.dance.problem.stance import Stance, stance
 from biodance.dance.problem.state import State
 from biodance.motion.regressor import predict_wrench
 
-BLOCKS = blocks(BODY)
+BLOCKS = excitation_blocks(BODY)
 STEP = 1e-6
 MOVEMENTS = 198
 NEVER, DEEP = 0.05, -0.02
-"""m: coal gives bounds of distances above the first, and another measure of overlap (the way out, not the depth) below the second."""
+"""m: coal gives bounds of distances above the first, and another measure of overlap (the way out, not the depth) below
+the second.
+"""
 FAMILY = {limit.name: limit for limit in family()}
 each_limit = pytest.mark.parametrize("limit", FAMILY.values(), ids=FAMILY.keys())
 

@@ -11,14 +11,14 @@ from biodance.dance.postures.exchange import alike
 from biodance.dance.postures.ordering import support_sequence
 from biodance.dance.postures.posture import KEPT, anyhow, initial_guess, solve
 from biodance.dance.problem.chain import Chain
-from biodance.dance.problem.excitation import blocks
+from biodance.dance.problem.excitation import excitation_blocks
 from biodance.dance.problem.plan import Plan
 from biodance.dance.transitions import context, planner
-from biodance.dance.transitions import replan as replan_module
+from biodance.dance.transitions import schedule as schedule_module
 from biodance.dance.transitions.context import Checkpoint, Course, DesignContext
 from biodance.dance.transitions.move import Move, Task
 from biodance.dance.transitions.planner import Way
-from biodance.dance.transitions.replan import replan
+from biodance.dance.transitions.schedule import replan
 from biodance.dance.verify import Margin
 from biodance.errors import BiodanceError
 from biodance.records import Subject
@@ -37,7 +37,7 @@ def course():
 @pytest.fixture
 def work():
     with ThreadPoolExecutor(1) as workers:
-        yield DesignContext(CHAIN, blocks(BODY), PLAN, 1, Checkpoint(None, BODY, PLAN, 1), workers, lambda *_: None)
+        yield DesignContext(CHAIN, excitation_blocks(BODY), PLAN, 1, Checkpoint(None, BODY, PLAN, 1), workers, lambda *_: None)
 
 
 def forbidding(monkeypatch, forbidden):
@@ -53,7 +53,7 @@ def forbidding(monkeypatch, forbidden):
             out.append(known.get(k, Way(*nothing, limit)))
         return out
 
-    monkeypatch.setattr(replan_module, "schedule", asked_for)
+    monkeypatch.setattr(schedule_module, "schedule", asked_for)
     return asked
 
 
@@ -89,7 +89,7 @@ def test_a_posture_that_no_exchange_helps_is_left_out(course, work, monkeypatch)
     last = course.x[3]
     forbidding(monkeypatch, lambda first, second: np.array_equal(first, last) or (len(work_x) == 4 and np.array_equal(second, last)))
     work_x = course.x
-    monkeypatch.setattr(replan_module, "ENDS", (0,))
+    monkeypatch.setattr(schedule_module, "ENDS", (0,))
     found, between, notes = replan(work, course)
     assert len(found.x) == len(between) + 1 == 3
     assert not any(np.array_equal(x, last) for x in found.x)
@@ -117,8 +117,8 @@ def test_a_way_leaves_half_of_what_a_lifting_sole_may_press(course, monkeypatch,
 
     monkeypatch.setattr(planner, "find_move", found)
     monkeypatch.setattr(planner, "verify", lambda *_: (Margin("ground_clearance", left, 0.01, "m"),))
-    task = Task(CHAIN, blocks(BODY), course.stances[0], course.x[:2], 2.0, family())
-    way = planner.find_way(task, PLAN, np.zeros((12, 6, 6)), [1, 3, 0])
+    task = Task(CHAIN, excitation_blocks(BODY), course.stances[0], course.x[:2], 2.0, family())
+    way = planner.find_way(task, np.zeros((12, 6, 6)), [1, 3, 0])
     assert (way.limit == "") is taken
     assert (tried == [2.0]) is taken
 

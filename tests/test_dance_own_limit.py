@@ -1,4 +1,6 @@
-"""A limit that nobody planned for: one file in the folder, and it is kept, verified, listed and named where it forbids a dance."""
+"""A limit that nobody planned for: one file in the folder, and it is kept, verified, listed and named where it forbids
+a dance.
+"""
 
 import json
 import sys
@@ -141,8 +143,8 @@ def test_an_object_is_kept_like_a_member_of_the_family() -> None:
     assert told["quiet"].worst >= 0
     assert told["quiet"].what in {joint.name for joint in BODY.joints}
     asked = plan.with_limits([Quiet, Friction(mu=0.3)])
-    assert broken(verify(BODY, dance, asked)) == ()
-    assert {margin.limit for margin in broken(verify(BODY, free, plan.with_limits([Quiet(most=0.1)])))} == {"quiet"}
+    assert broken(verify(BODY, dance, asked.limits)) == ()
+    assert {margin.limit for margin in broken(verify(BODY, free, plan.with_limits([Quiet(most=0.1)]).limits))} == {"quiet"}
 
 
 def test_a_protocol_gives_the_limits_their_numbers(tmp_path: Path) -> None:

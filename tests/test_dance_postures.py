@@ -12,14 +12,14 @@ from biodance.dance.postures import search
 from biodance.dance.postures.exchange import exchange, extremes
 from biodance.dance.postures.posture import KEPT, Posture, anyhow, initial_guess, posture_at, solve
 from biodance.dance.problem.chain import Chain
-from biodance.dance.problem.excitation import blocks, condition, smooth_condition
+from biodance.dance.problem.excitation import condition, excitation_blocks, smooth_condition
 from biodance.dance.problem.stance import seat, stance
 from biodance.errors import BiodanceError
 from biodance.records import Subject
 
 BODY = human(Subject(65.0, 1.75, "F", 33.0))
 CHAIN = Chain(BODY)
-BLOCKS = blocks(BODY)
+BLOCKS = excitation_blocks(BODY)
 FEET = stance(BODY, "parallel")
 
 

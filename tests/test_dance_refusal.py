@@ -11,7 +11,7 @@ from biodance.body.limits import joint_limits
 from biodance.dance.limits import family
 from biodance.dance.postures.posture import KEPT, anyhow, initial_guess, refuse, solve
 from biodance.dance.problem.chain import Chain
-from biodance.dance.problem.person import HEALTHY, PersonLimits, limited
+from biodance.dance.problem.person import HEALTHY, PersonLimits, limit_body
 from biodance.dance.problem.stance import Stance, stance
 from biodance.errors import BiodanceError
 from biodance.records import Subject
@@ -22,7 +22,7 @@ FEET = stance(BODY, "parallel")
 
 
 def limits_of(person: PersonLimits) -> Body:
-    return replace(BODY, limits=limited(BODY, person))
+    return replace(BODY, limits=limit_body(BODY, person))
 
 
 def words(person: PersonLimits, feet: Stance) -> str:

@@ -18,12 +18,12 @@ from biodance.dance.dance import Dance
 from biodance.dance.limits import family
 from biodance.dance.postures.posture import anyhow
 from biodance.dance.problem.chain import Chain
-from biodance.dance.problem.closure import Closure, close_legs
-from biodance.dance.problem.excitation import blocks, dynamic_grams
-from biodance.dance.problem.person import HEALTHY, fitted
+from biodance.dance.problem.excitation import dynamic_grams, excitation_blocks
+from biodance.dance.problem.person import HEALTHY, fit_to_person
 from biodance.dance.problem.plan import read_plan
 from biodance.dance.problem.shapes import capsule_pairs, pairs_of, unchecked_pairs
 from biodance.dance.problem.stance import WIDTH, apart, hip_width, stance, stature_of
+from biodance.dance.problem.state import Closure, close_legs
 from biodance.dance.robot import ERROR, RATE, leg_length, person_sized, robot_plan, robot_rows
 from biodance.dance.transitions.move import Task, evaluate_move
 from biodance.dance.verify import broken, verify
@@ -101,7 +101,7 @@ def test_a_slow_move_is_judged_at_fewer_instants_and_tells_as_much() -> None:
     chain, rng = Chain(HOAP), np.random.default_rng(1)
     ends = np.tile([0.05, 0.0, 0.25, *np.zeros(24)], (2, 1))
     ends[:, 18:] = rng.uniform(0.3, 0.7, (2, 9)) * (HOAP.limits.upper - HOAP.limits.lower)[12:] + HOAP.limits.lower[12:]
-    slow = Task(chain, blocks(HOAP), stance(HOAP, "parallel"), ends, 9.5, family())
+    slow = Task(chain, excitation_blocks(HOAP), stance(HOAP, "parallel"), ends, 9.5, family())
     assert len(slow.grid(10.0)) == len(replace(slow, duration=4.0).grid(10.0)) == 39
     assert len(replace(slow, duration=2.8).grid(10.0)) == 27
     move, _ = evaluate_move(slow, slow.straight())
@@ -166,11 +166,11 @@ def test_a_robot_dances_from_its_file(made: tuple[Path, int]) -> None:
 def test_the_dance_keeps_the_limits_of_the_file(made: tuple[Path, int]) -> None:
     place, _ = made
     dance, body = Dance.load(place / "out" / "dance.npz"), robot_dancer(place / "hoap3.urdf", "right_foot,left_foot")
-    _, plan, _ = fitted(body, robot_plan(body, read_plan(place / "tiny.toml")), HEALTHY)
-    assert not broken(verify(body, dance, plan))
+    _, plan, _ = fit_to_person(body, robot_plan(body, read_plan(place / "tiny.toml")), HEALTHY)
+    assert not broken(verify(body, dance, plan.limits))
     assert np.all(dance.move >= 5.0)
     weak = replace(body, limits=replace(body.limits, torque_upper=0.01 * body.limits.torque_upper))
-    assert {margin.limit for margin in broken(verify(weak, dance, plan))} == {"joint_torque"}
+    assert {margin.limit for margin in broken(verify(weak, dance, plan.limits))} == {"joint_torque"}
 
 
 def test_the_table_of_angles_is_the_dance(made: tuple[Path, int]) -> None:

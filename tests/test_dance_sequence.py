@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from biodance.body.human import human
-from biodance.dance.postures.ordering import support_sequence, under, walk
+from biodance.dance.postures.ordering import order_postures, support_sequence
 from biodance.dance.problem.plan import Plan
-from biodance.dance.problem.stance import stance
+from biodance.dance.problem.stance import stance, under
 from biodance.errors import BiodanceError
 from biodance.records import Subject
 
@@ -52,13 +52,13 @@ def test_weight_over_one_foot_is_inside_both_bases():
 
 def test_a_walk_is_shorter_than_any_single_exchange():
     x = np.random.default_rng(0).normal(size=(9, 29))
-    order = walk(x, [[0, 1, 2, 3], [4, 5, 6, 7, 8]])
+    order = order_postures(x, [[0, 1, 2, 3], [4, 5, 6, 7, 8]])
     assert sorted(order[:4]) == [0, 1, 2, 3]
     assert sorted(order) == list(range(9))
     line = np.zeros((6, 29))
     line[:, 10] = [0.3, 0.1, 0.5, 0.0, 0.4, 0.2]
-    assert list(np.diff(line[walk(line, [list(range(6))]), 10])) == pytest.approx([0.1] * 5) or list(
-        np.diff(line[walk(line, [list(range(6))]), 10])
+    assert list(np.diff(line[order_postures(line, [list(range(6))]), 10])) == pytest.approx([0.1] * 5) or list(
+        np.diff(line[order_postures(line, [list(range(6))]), 10])
     ) == pytest.approx([-0.1] * 5)
 
 

@@ -7,10 +7,9 @@ import numpy as np
 from biodance.body.human import human
 from biodance.dance.limits import family
 from biodance.dance.postures.exchange import exchange
-from biodance.dance.postures.posture import KEPT, Posture, initial_guess, posture_at, solve
-from biodance.dance.postures.search import Exciting
+from biodance.dance.postures.posture import KEPT, Exciting, Posture, initial_guess, posture_at, solve
 from biodance.dance.problem.chain import ROOT, Chain
-from biodance.dance.problem.excitation import blocks, effort, static_grams
+from biodance.dance.problem.excitation import effort, excitation_blocks, static_grams
 from biodance.dance.problem.stance import stance
 from biodance.dance.problem.state import State
 from biodance.records import Array, Subject
@@ -62,7 +61,7 @@ def test_planted_legs_are_not_counted_and_the_free_one_is() -> None:
 
 
 def test_who_asks_for_simple_postures_gets_simpler_ones() -> None:
-    plain = blocks(BODY)
+    plain = excitation_blocks(BODY)
     others = static_grams(np.array([posture_at(CHAIN, FEET, begun(seed)).up for seed in range(3)]))
     found = {}
     for simplicity in (0.0, 2.0):
@@ -78,7 +77,7 @@ def test_of_two_postures_that_tell_the_same_the_simpler_is_taken() -> None:
     up = np.tile([0.0, 1.0, 0.0], (12, 1))
     hard, easy = (Posture(np.full(1, k), up, hard=k) for k in (0.9, 0.1))
     for simplicity, kept in ((0.0, 0.9), (1.0, 0.1)):
-        chosen = exchange(replace(blocks(BODY), simplicity=simplicity), (FEET,), [[hard, easy]])
+        chosen = exchange(replace(excitation_blocks(BODY), simplicity=simplicity), (FEET,), [[hard, easy]])
         assert chosen[0].hard == kept
 
 

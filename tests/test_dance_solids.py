@@ -5,11 +5,11 @@ import pytest
 
 from biodance.body.human import human
 from biodance.dance.limits import self_collision
-from biodance.dance.limits.self_collision import ENOUGH, deepest, distances, outside
+from biodance.dance.limits.self_collision import ENOUGH, deepest, outside, solid_distances
 from biodance.dance.postures.posture import initial_guess
 from biodance.dance.problem.chain import Chain
-from biodance.dance.problem.closure import close_legs
 from biodance.dance.problem.stance import stance
+from biodance.dance.problem.state import close_legs
 from biodance.motion.kinematics import poses
 from biodance.records import Subject
 
@@ -23,7 +23,7 @@ def test_two_codes_find_the_same_distances():
     state = close_legs(CHAIN, feet, x, *np.zeros((2, *x.shape)))
     expected = self_collision.SelfCollision().margins(state).value
     motion = CHAIN.motion(np.arange(60.0), state.x, state.v, state.a)
-    found, names = distances(BODY, poses(BODY, motion.q))
+    found, names = solid_distances(BODY, poses(BODY, motion.q))
     assert len(set(names)) == found.shape[1] == expected.shape[1]
     apart = (found < ENOUGH) & (expected > 0)
     assert apart.sum() > 50

@@ -12,11 +12,11 @@ from biodance.body.human import human
 from biodance.body.limits import joint_limits
 from biodance.dance.dance import Dance
 from biodance.dance.limits import family
-from biodance.dance.postures.ordering import support_sequence, under
+from biodance.dance.postures.ordering import support_sequence
 from biodance.dance.postures.posture import KEPT, Near, initial_guess, solve
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.plan import Plan
-from biodance.dance.problem.stance import seat
+from biodance.dance.problem.stance import seat, under
 from biodance.errors import BiodanceError
 from biodance.lab.session import read_session
 from biodance.motion.kinematics import poses

@@ -1,7 +1,7 @@
 """The Dance: postures held for a while, moves between them, and where the feet stand meanwhile.
 
-A dance is written in the coordinates of its `Chain`; planted legs are not written but solved in closed form, so that planted feet stay
-where they are at every instant, not only at samples.
+A dance is written in the coordinates of its `Chain`; planted legs are not written but solved in closed form, so that
+planted feet stay where they are at every instant, not only at samples.
 """
 
 import json
@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.body.body_file import body_text, parse_body
 from biodance.dance.problem.chain import Chain
-from biodance.dance.problem.closure import close_legs
 from biodance.dance.problem.splines import basis_at
 from biodance.dance.problem.stance import Stance
-from biodance.dance.problem.state import State
+from biodance.dance.problem.state import State, close_legs
 from biodance.errors import BiodanceError, FileRefused
 from biodance.records import Array, Motion, frozen_array
 
@@ -28,7 +27,9 @@ VERSION = 1
 
 @dataclass(frozen=True)
 class Phase:
-    """A stretch of a dance from ``start`` to ``end`` s in which the feet do not change; ``posture`` is held, or moved to."""
+    """A stretch of a dance from ``start`` to ``end`` s in which the feet do not change; ``posture`` is held, or moved
+    to.
+    """
 
     start: float
     end: float
@@ -41,10 +42,11 @@ class Phase:
 class Dance:
     """One continuous movement.
 
-    ``protocol`` its name; ``body`` whose it is; ``postures`` (P, n) coordinates of the chain (m, rad); ``stances`` (P,) the feet during
-    each hold, with ``over`` set for postures in between that only carry the weight from one foot configuration to the next;
-    ``hold`` (P,) s; ``via`` (P - 1, 2, n) via points of the moves, ``move`` (P - 1,) s how long each takes, ``under`` (P - 1,) the feet
-    meanwhile; ``seed`` of the random numbers; ``notes`` in plain sentences what differs from the plan, because a move was impossible.
+    ``protocol`` its name; ``body`` whose it is; ``postures`` (P, n) coordinates of the chain (m, rad); ``stances`` (P,)
+    the feet during each hold, with ``over`` set for postures in between that only carry the weight from one foot
+    configuration to the next; ``hold`` (P,) s; ``via`` (P - 1, 2, n) via points of the moves, ``move`` (P - 1,) s how
+    long each takes, ``under`` (P - 1,) the feet meanwhile; ``seed`` of the random numbers; ``notes`` in plain sentences
+    what differs from the plan, because a move was impossible.
     """
 
     protocol: str
@@ -81,7 +83,9 @@ class Dance:
 
     @property
     def counted(self) -> NDArray[np.bool_]:
-        """(P,) False for the postures in between: where the weight is over one foot of two, and stops that are not held as long."""
+        """(P,) False for the postures in between: where the weight is over one foot of two, and stops that are not held
+        as long.
+        """
         return np.array([stance.over is None for stance in self.stances]) & (self.hold == self.hold.max())
 
     @cached_property

@@ -1,8 +1,10 @@
-"""Rehearse a designed dance in MuJoCo, first posture to last: the body stands on its own feet and follows the plan by its joints alone.
+"""Rehearse a designed dance in MuJoCo, first posture to last: the body stands on its own feet and follows the plan by
+its joints alone.
 
-The simulator knows nothing of the plan's balance: the root is free, the soles are contact points on a plane with friction, joints get the
-planned torque plus a spring and a damper to the planned angle, and nobody holds the body. Does it stay up, where does the centre of
-pressure go, how far is it from the plan? MuJoCo is an optional library (extra ``peers``).
+The simulator knows nothing of the plan's balance: the root is free, the soles are contact points on a plane with
+friction, joints get the planned torque plus a spring and a damper to the planned angle, and nobody holds the body. Does
+it stay up, where does the centre of pressure go, how far is it from the plan? MuJoCo is an optional library (extra
+``peers``).
 """
 
 from dataclasses import dataclass, replace
@@ -21,20 +23,26 @@ from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion, Wrench
 
 STEP = 0.00025
-"""s, of the simulation: at 1 and 0.5 ms the stiff legs ring on the floor and topple postures that stand at 0.25 and 0.125 ms."""
+"""s, of the simulation: at 1 and 0.5 ms the stiff legs ring on the floor and topple postures that stand at 0.25 and
+0.125 ms.
+"""
 STIFFNESS = {"hip": 4000.0, "knee": 4000.0, "ankle": 4000.0, "trunk": 3000.0, "shoulder": 400.0, "elbow": 200.0}
-"""N·m/rad of the joint springs: legs and trunk several times the m g h (about 600 N·m/rad) that would topple a standing person."""
+"""N·m/rad of the joint springs: legs and trunk several times the m g h (about 600 N·m/rad) that would topple a standing
+person.
+"""
 DAMPING = 0.05
 """s: damper over spring."""
 ROTOR = 0.005
-"""kg·m² added to every joint in the simulation: where two axes of a shoulder are nearly in line, nothing else resists them."""
+"""kg·m² added to every joint in the simulation: where two axes of a shoulder are nearly in line, nothing else resists
+them.
+"""
 SETTLE = 0.5
 """s in which the first posture is held before the motion begins, so that the floor bears the body."""
 FALLEN = 0.6
 """Share of the planned height of the root below which the body has fallen."""
 HARD = 0.002
-"""s, time constant of the contacts: at 8 ms a foot under the whole body sinks by 0.6 mm, which tilts a person on one leg until he falls;
-4, 2 and 1 ms keep the pelvis within 12, 5 and 2 mm of the plan.
+"""s, time constant of the contacts: at 8 ms a foot under the whole body sinks by 0.6 mm, which tilts a person on one
+leg until he falls; 4, 2 and 1 ms keep the pelvis within 12, 5 and 2 mm of the plan.
 """
 RADIUS = 0.004
 """m, of the contact points under the soles."""
@@ -46,8 +54,8 @@ TOUCHING = 0.01
 class Playback:
     """What became of a plan, at its own instants ``time`` (T,) s up to the fall.
 
-    ``angle_error`` (T, n) rad joints, ``root_error`` (T,) m, ``tilt_error`` (T,) rad of the root; ``wrench`` of the floor on the body about
-    the lab origin, ``planned_wrench`` what the plan needs; ``fell`` s, NaN if it did not.
+    ``angle_error`` (T, n) rad joints, ``root_error`` (T,) m, ``tilt_error`` (T,) rad of the root; ``wrench`` of the
+    floor on the body about the lab origin, ``planned_wrench`` what the plan needs; ``fell`` s, NaN if it did not.
     """
 
     time: Array
@@ -78,7 +86,9 @@ def _mujoco() -> Any:
 
 
 def floor_model(body: Body, *, friction: float = 0.5) -> Any:
-    """Return the MuJoCo model of ``body`` with contact points at the corners of its soles, on a floor with Coulomb ``friction``."""
+    """Return the MuJoCo model of ``body`` with contact points at the corners of its soles, on a floor with Coulomb
+    ``friction``.
+    """
     mujoco = _mujoco()
     spec = mujoco.MjSpec.from_string(mjcf.text(body, "biodance playback"))
     spec.option.timestep, spec.option.integrator = STEP, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -94,8 +104,8 @@ def floor_model(body: Body, *, friction: float = 0.5) -> Any:
 
 
 def planned_torques(body: Body, motion: Motion, wrench: Wrench, down: NDArray[np.bool_] | None = None) -> Array:
-    """Return the joint torques (T, n) N·m of the plan, the ground wrench shared by the feet (right, left) that are ``down`` (T, 2);
-    without it, those whose soles are near the floor.
+    """Return the joint torques (T, n) N·m of the plan, the ground wrench shared by the feet (right, left) that are
+    ``down`` (T, 2); without it, those whose soles are near the floor.
     """
     pose = poses(body, motion.q)
     soles = [pose.rotation[:, f.segment] @ f.outline.mean(axis=0) + pose.position[:, f.segment] for f in _both(body)]
@@ -113,9 +123,11 @@ def _both(body: Body) -> tuple[Any, Any]:
 
 
 def play(body: Body, motion: Motion, *, friction: float = 0.5, down: NDArray[np.bool_] | None = None) -> Playback:
-    """Return what becomes of ``motion`` of ``body`` (from rest, feet on the plane z = 0) when only its joints are driven.
+    """Return what becomes of ``motion`` of ``body`` (from rest, feet on the plane z = 0) when only its joints are
+    driven.
 
-    ``down`` (T, 2) True where the right, the left foot is planned to bear; without it, where its sole is near the floor.
+    ``down`` (T, 2) True where the right, the left foot is planned to bear; without it, where its sole is near the
+    floor.
 
     Raises
     ------
@@ -159,7 +171,9 @@ def _advance(mujoco: Any, driver: "_Driver", data: Any, motion: Motion, torque: 
 
 
 class _Driver:
-    """Where the joints of a body are in MuJoCo's coordinates, and their springs (n,) N·m/rad; gives the model its dampers."""
+    """Where the joints of a body are in MuJoCo's coordinates, and their springs (n,) N·m/rad; gives the model its
+    dampers.
+    """
 
     def __init__(self, body: Body, model: Any) -> None:
         self.body, self.model = body, model
@@ -171,7 +185,9 @@ class _Driver:
         model.dof_armature[self.v_place] = ROTOR
 
     def place(self, data: Any, q: Array, v: Array) -> None:
-        """Put the body into a configuration of Pinocchio's order (quaternion x y z w, root velocity in the root's frame)."""
+        """Put the body into a configuration of Pinocchio's order (quaternion x y z w, root velocity in the root's
+        frame).
+        """
         data.qpos[:3], data.qpos[3:7] = q[:3], q[[6, 3, 4, 5]]
         data.qvel[:3] = quaternion_matrix(q[None, 3:7])[0] @ v[:3]
         data.qvel[3:6] = v[3:6]
@@ -206,8 +222,8 @@ RATE = 100.0
 
 @dataclass(frozen=True, eq=False)
 class Rehearsal:
-    """``playback`` of the ``dance`` (its holds shortened), ``inside`` (T,) m how far the centre of pressure of the simulated floor is
-    inside the whole base of support of the feet that are planned to be down (negative: outside).
+    """``playback`` of the ``dance`` (its holds shortened), ``inside`` (T,) m how far the centre of pressure of the
+    simulated floor is inside the whole base of support of the feet that are planned to be down (negative: outside).
     """
 
     dance: Dance
@@ -232,7 +248,8 @@ class Rehearsal:
 
 
 def rehearse(dance: Dance, *, hold: float = 0.5, friction: float = 0.5) -> Rehearsal:
-    """Return what becomes of a dance whose postures are held for ``hold`` s only, when nothing but its joints is driven.
+    """Return what becomes of a dance whose postures are held for ``hold`` s only, when nothing but its joints is
+    driven.
 
     Raises
     ------

@@ -16,7 +16,7 @@ from biodance.dance.design import design
 from biodance.dance.expectation import Expectation, expect
 from biodance.dance.limits import Limit
 from biodance.dance.metrics import DanceMetrics, dance_metrics
-from biodance.dance.problem.person import PersonLimits, fitted
+from biodance.dance.problem.person import PersonLimits, fit_to_person
 from biodance.dance.problem.plan import Plan
 from biodance.dance.verify import Margin, broken
 from biodance.errors import BiodanceError
@@ -115,7 +115,7 @@ def make_dance(
         The protocol and the person contradict each other (`person.fitted`).
     """
     started = time.perf_counter()
-    own, plan, notes = fitted(body, plan.with_limits(limits), person)
+    own, plan, notes = fit_to_person(body, plan.with_limits(limits), person)
     reason, margins, dance = "", tuple[Margin, ...](), None
     try:
         dance, margins = makers.design(own, plan, seed=seed, tell=tell, resume=resume)

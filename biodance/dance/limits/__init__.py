@@ -1,8 +1,10 @@
-"""FAMILY: one constraint of a dance per file, found automatically; others come as objects or by the entry points ``biodance.limits``.
+"""FAMILY: one constraint of a dance per file, found automatically; others come as objects or by the entry points
+``biodance.limits``.
 
-A member is a frozen dataclass that derives from `Limit`, given as ``LIMIT`` by its file: its numbers are fields (``[limits.friction]
-mu = 0.4`` in a protocol), ``margins`` is for the optimiser, ``check`` judges the finished motion by other code. Design, verification,
-refusal and report go through the family and know no name; `tests/test_dance_limits.py` holds every member to its contract.
+A member is a frozen dataclass that derives from `Limit`, given as ``LIMIT`` by its file: its numbers are fields
+(``[limits.friction] mu = 0.4`` in a protocol), ``margins`` is for the optimiser, ``check`` judges the finished motion
+by other code. Design, verification, refusal and report go through the family and know no name;
+`tests/test_dance_limits.py` holds every member to its contract.
 """
 
 import inspect
@@ -29,7 +31,7 @@ __all__ = [
     "Remaining",
     "bounded",
     "family",
-    "joined",
+    "join_limits",
     "limits_with",
     "repeated",
     "unconcerned",
@@ -39,7 +41,8 @@ FAR = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Margins:
-    """``value`` (T, m) >= 0 where the limit holds; ``slopes`` (k, T, m, n) by x, v, a in this order, k = 1, 2 or 3 as far as needed.
+    """``value`` (T, m) >= 0 where the limit holds; ``slopes`` (k, T, m, n) by x, v, a in this order, k = 1, 2 or 3 as
+    far as needed.
 
     Columns that are further than ``FAR`` scales from their limit in all samples may have slopes of zero.
     """
@@ -49,7 +52,9 @@ class Margins:
 
 
 def bounded(default: float, low: float, high: float, unit: str = "") -> Any:
-    """Return a number of a limit: its ``default`` and the range from ``low`` to ``high`` in ``unit`` that a protocol may give it."""
+    """Return a number of a limit: its ``default`` and the range from ``low`` to ``high`` in ``unit`` that a protocol
+    may give it.
+    """
     return field(default=default, metadata={"low": low, "high": high, "unit": unit})
 
 
@@ -57,11 +62,11 @@ def bounded(default: float, low: float, high: float, unit: str = "") -> Any:
 class Limit(ABC):
     """One constraint of a dance. A member's numbers are its fields (`bounded`), so that a protocol can set them.
 
-    ``name`` that of its file; ``unit`` of its margins; ``scale`` a noticeable amount in that unit.
-    ``at_rest``, ``in_motion`` whether held postures and moves must keep it. ``suspicion``: where no posture is possible, limits are left
-    out one after the other, the smallest number first, until there would be one; that one is named. ``rounding`` what the check forgives.
-    ``move_reserve`` least share of the scale that is kept in reserve while a move is designed; ``tapers`` True where this reserve ends with
-    the move, because it begins and ends at the limit.
+    ``name`` that of its file; ``unit`` of its margins; ``scale`` a noticeable amount in that unit. ``at_rest``,
+    ``in_motion`` whether held postures and moves must keep it. ``suspicion``: where no posture is possible, limits are
+    left out one after the other, the smallest number first, until there would be one; that one is named. ``rounding``
+    what the check forgives. ``move_reserve`` least share of the scale that is kept in reserve while a move is designed;
+    ``tapers`` True where this reserve ends with the move, because it begins and ends at the limit.
     """
 
     name: ClassVar[str]
@@ -109,7 +114,7 @@ def unconcerned(state: State) -> Margins:
     return Margins(np.empty((len(state.x), 0)), np.empty((1, len(state.x), 0, state.chain.size)))
 
 
-def missing(candidate: object) -> tuple[str, ...]:
+def lacking(candidate: object) -> tuple[str, ...]:
     """Return what an object or class lacks to be a limit."""
     kind = candidate if isinstance(candidate, type) else type(candidate)
     if not issubclass(kind, Limit):
@@ -118,7 +123,7 @@ def missing(candidate: object) -> tuple[str, ...]:
     return (*lacks, *(sorted(getattr(kind, "__abstractmethods__", ())) if inspect.isabstract(kind) else ()))
 
 
-FAMILY: Family[Limit | type[Limit]] = Family("limit of a dance", "biodance.limits", __name__, "LIMIT", missing, lambda kind: kind.name)
+FAMILY: Family[Limit | type[Limit]] = Family("limit of a dance", "biodance.limits", __name__, "LIMIT", lacking, lambda kind: kind.name)
 
 
 def family() -> tuple[Limit, ...]:
@@ -129,10 +134,10 @@ def family() -> tuple[Limit, ...]:
     BiodanceError
         A file of the folder or an entry point is no limit; the sentence says which and what to do.
     """
-    return joined(FAMILY.members().values(), ())
+    return join_limits(FAMILY.members().values(), ())
 
 
-def joined(limits: Iterable[Limit | type[Limit]], more: Iterable[Limit | type[Limit]]) -> tuple[Limit, ...]:
+def join_limits(limits: Iterable[Limit | type[Limit]], more: Iterable[Limit | type[Limit]]) -> tuple[Limit, ...]:
     """Return ``limits`` and ``more``, objects or classes, by name; where a name is in both, the one of ``more``.
 
     Raises
@@ -142,7 +147,7 @@ def joined(limits: Iterable[Limit | type[Limit]], more: Iterable[Limit | type[Li
     """
     found: dict[str, Limit] = {}
     for one in (*limits, *more):
-        if lacks := missing(one):
+        if lacks := lacking(one):
             raise BiodanceError(f"{one!r}: lacks {', '.join(lacks)}, so it is no limit of a dance. See biodance.dance.limits.Limit.")
         found[one.name] = one() if isinstance(one, type) else one
     return tuple(found[name] for name in sorted(found))

@@ -39,7 +39,7 @@ class SelfCollision(Limit):
 
     def check(self, motion: CheckedMotion) -> Remaining:
         """Return the distances (T, pairs) m between surfaces by coal, less the gap; a large one is a lower bound."""
-        apart, pairs = distances(motion.body, motion.pose)
+        apart, pairs = solid_distances(motion.body, motion.pose)
         return Remaining(apart - self.gap, tuple(pairs))
 
 
@@ -95,7 +95,9 @@ def _on(ends: Array, share: Array) -> Array:
 
 
 def outside(point: Array, half: Array) -> tuple[Array, Array]:
-    """Return the signed distance (...) of points (..., 3) from a box about the origin with half sides ``half`` (..., 3), and its slope."""
+    """Return the signed distance (...) of points (..., 3) from a box about the origin with half sides ``half`` (...,
+    3), and its slope.
+    """
     over = np.abs(point) - half
     depth = _depth(over)
     nearest_side = np.eye(3)[np.argmax(over, axis=-1)]
@@ -111,9 +113,11 @@ def _depth(over: Array) -> Array:
 
 
 def deepest(ends: Array, half: Array) -> Array:
-    """Return where (T, K), 0..1, the lines between ``ends`` (T, K, 2, 3) come nearest to their boxes with half sides (K, 3).
+    """Return where (T, K), 0..1, the lines between ``ends`` (T, K, 2, 3) come nearest to their boxes with half sides
+    (K, 3).
 
-    The signed distance from a convex body is convex along a line, so that the smallest sample and its neighbours enclose the minimum.
+    The signed distance from a convex body is convex along a line, so that the smallest sample and its neighbours
+    enclose the minimum.
     """
     start, width = np.zeros(ends.shape[:2]), np.ones(ends.shape[:2])
     for _ in range(ROUNDS):
@@ -124,7 +128,7 @@ def deepest(ends: Array, half: Array) -> Array:
     return start + width / 2
 
 
-def distances(body: Body, pose: Poses) -> tuple[Array, list[str]]:
+def solid_distances(body: Body, pose: Poses) -> tuple[Array, list[str]]:
     """Return the distances (T, pairs) m between surfaces, negative where they overlap, and the names of the pairs.
 
     A distance above ``ENOUGH`` is a lower bound of the true one.

@@ -1,6 +1,8 @@
-"""The best set of postures among all that were found and their mirror images: exchanged one for one until nothing helps, no two alike.
+"""The best set of postures among all that were found and their mirror images: exchanged one for one until nothing
+helps, no two alike.
 
-Only postures whose image stands on feet of the protocol have one: side by side, on the other leg, seated. The right foot in front has none.
+Only postures whose image stands on feet of the protocol have one: side by side, on the other leg, seated. The right
+foot in front has none.
 """
 
 from collections.abc import Iterator
@@ -11,17 +13,18 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.dance.postures.posture import Posture
 from biodance.dance.problem.chain import ROOT, Chain
-from biodance.dance.problem.excitation import Blocks
+from biodance.dance.problem.excitation import Blocks, static_grams, total
 from biodance.dance.problem.stance import Stance
 from biodance.records import Array
 
 APART = np.radians(10.0)
-"""rad: two postures on the same feet differ by this much in one joint at least; a smaller difference nobody would see."""
+"""rad: two postures on the same feet differ by this much in one joint at least; a smaller difference nobody would see.
+"""
 
 
 def exchange(blocks: Blocks, stances: tuple[Stance, ...], pool: list[list[Posture]]) -> list[Posture]:
-    """Return one posture for each place, no two of a stance alike (`APART`) where the pool allows: those that come first, exchanged for
-    better ones of the same stance as long as any helps.
+    """Return one posture for each place, no two of a stance alike (`APART`) where the pool allows: those that come
+    first, exchanged for better ones of the same stance as long as any helps.
     """
     kinds = [stance.name for stance in stances]
     every: dict[str, list[Posture]] = {kind: [] for kind in kinds}
@@ -52,7 +55,9 @@ def exchange(blocks: Blocks, stances: tuple[Stance, ...], pool: list[list[Postur
 
 
 def alike(x: Array) -> NDArray[np.bool_]:
-    """Return (P, P) True where two postures x (P, n) differ by less than `APART` in every coordinate; a posture is like itself."""
+    """Return (P, P) True where two postures x (P, n) differ by less than `APART` in every coordinate; a posture is like
+    itself.
+    """
     return np.asarray(np.abs(x[:, None] - x[None]).max(axis=2) < APART)
 
 
@@ -81,8 +86,8 @@ def _values(blocks: Blocks, grams: Array) -> Array:
 
 
 def extremes(A: Array) -> tuple[Array, Array]:
-    """Return the smallest and the largest eigenvalue of symmetric matrices (..., 3, 3) in closed form (doi:10.1145/355578.366316): an
-    exchange asks for a million of them.
+    """Return the smallest and the largest eigenvalue of symmetric matrices (..., 3, 3) in closed form
+    (doi:10.1145/355578.366316): an exchange asks for a million of them.
     """
     mean = (A[..., 0, 0] + A[..., 1, 1] + A[..., 2, 2]) / 3
     a, b, c = (A[..., i, i] - mean for i in range(3))
@@ -98,7 +103,8 @@ ACROSS = {"parallel": "parallel", "single_right": "single_left", "single_left": 
 FLIP = np.array([1.0, 1.0, -1.0])
 """Sense of the axes of a segment in the image (z to the right)."""
 SIDEWAYS = ("_bending", "_rotation")
-"""Ends of the names of middle joints that change their sense; those in pairs have the anatomical sense on both sides."""
+"""Ends of the names of middle joints that change their sense; those in pairs have the anatomical sense on both sides.
+"""
 SAME = 1e-9
 """m, kg, rad, N·m: differences between the sides that are rounding."""
 
@@ -143,14 +149,18 @@ def _joints(names: list[str]) -> tuple[list[int], Array]:
 
 
 def image_feet(here: Stance, stances: tuple[Stance, ...]) -> int | None:
-    """Return the place of the first of ``stances`` on which images of postures on the feet ``here`` stand, None if there is none."""
+    """Return the place of the first of ``stances`` on which images of postures on the feet ``here`` stand, None if
+    there is none.
+    """
     free = np.isnan(here.hands[::-1])
     alike = (k for k, there in enumerate(stances) if there.name == ACROSS.get(here.name) and np.array_equal(np.isnan(there.hands), free))
     return next(alike, None)
 
 
-def mirrored(chain: Chain, x: Array, here: Stance, there: Stance) -> Array:
-    """Return the coordinates (n,) of the image, on the feet ``there``, of a posture with coordinates ``x`` (n,) on the feet ``here``."""
+def mirror_posture(chain: Chain, x: Array, here: Stance, there: Stance) -> Array:
+    """Return the coordinates (n,) of the image, on the feet ``there``, of a posture with coordinates ``x`` (n,) on the
+    feet ``here``.
+    """
     across, sense = _joints([joint.name for joint in chain.body.joints])
     out = np.concatenate([x[:ROOT] * [1, -1, 1, -1, -1, 1], sense * x[ROOT:][across]])
     gap = there.ankle - here.ankle[::-1] * [1, -1, 1]
@@ -158,7 +168,12 @@ def mirrored(chain: Chain, x: Array, here: Stance, there: Stance) -> Array:
     return np.asarray(out)
 
 
-def mirrored_vectors(body: Body, vectors: Array) -> Array:
+def mirror_vectors(body: Body, vectors: Array) -> Array:
     """Return the image (N, 3) of one vector for each segment, ``vectors`` (N, 3) in the segments' frames."""
     other = [body.segments.index(counterpart(name)) for name in body.segments]
     return np.asarray(FLIP * vectors[other])
+
+
+def criterion(blocks: Blocks, chosen: list[Posture]) -> float:
+    """Return the sum of M_i cond(W_bi^S), kg, of postures."""
+    return total(blocks.weight, static_grams(np.array([p.up for p in chosen])), blocks.first)[0]

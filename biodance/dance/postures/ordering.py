@@ -1,8 +1,8 @@
 """In which order postures are danced, and where the weight must be carried in between (paper III.E).
 
-Each posture goes to one that is near, so that moves are short, smooth and balanced. Feet change in small steps only: weight is shifted with
-both feet down, then one foot is lifted, moved or set down while the other bears everything. So between two foot configurations there are
-postures in between, both feet down, the weight over one of them.
+Each posture goes to one that is near, so that moves are short, smooth and balanced. Feet change in small steps only:
+weight is shifted with both feet down, then one foot is lifted, moved or set down while the other bears everything. So
+between two foot configurations there are postures in between, both feet down, the weight over one of them.
 """
 
 from dataclasses import replace
@@ -21,8 +21,10 @@ METRE = 3.0
 """rad that a metre of the root counts."""
 
 
-def walk(x: Array, groups: list[list[int]]) -> list[int]:
-    """Return the rows of ``x`` (P, n) coordinates in an order in which neighbours are near; groups stay together, one after the other."""
+def order_postures(x: Array, groups: list[list[int]]) -> list[int]:
+    """Return the rows of ``x`` (P, n) coordinates in an order in which neighbours are near; groups stay together, one
+    after the other.
+    """
     scaled = x.copy()
     scaled[:, :3] *= METRE
     apart = np.linalg.norm(scaled[:, None] - scaled[None], axis=2)
@@ -71,9 +73,11 @@ RIGHT, LEFT = 0, 1
 
 
 def support_sequence(body: Body, plan: Plan) -> tuple[Stance, ...]:
-    """Return the stance of every posture of a plan in order, those in between (``over`` one foot) included; it ends on both feet.
+    """Return the stance of every posture of a plan in order, those in between (``over`` one foot) included; it ends on
+    both feet.
 
-    Where the person may not stand alone on the left leg nobody steps: all double support is danced on the first pair of feet.
+    Where the person may not stand alone on the left leg nobody steps: all double support is danced on the first pair of
+    feet.
 
     Raises
     ------
@@ -109,7 +113,9 @@ def _over(feet: Stance, side: int) -> Stance:
 
 
 def weight_shifts(last: Stance, goal: Stance) -> list[Stance]:
-    """Return the postures in between that lead from one stance to another: set down, shift, step with the right foot, shift."""
+    """Return the postures in between that lead from one stance to another: set down, shift, step with the right foot,
+    shift.
+    """
     over = last.planted[0] if len(last.planted) == 1 else None
     out = [_over(last, over)] if over is not None and goal.planted != last.planted else []
     if not np.array_equal(last.ankle, goal.ankle):
@@ -118,11 +124,3 @@ def weight_shifts(last: Stance, goal: Stance) -> list[Stance]:
     if len(goal.planted) == 1 and goal.planted != last.planted and over != goal.planted[0]:
         out.append(_over(goal, goal.planted[0]))
     return out
-
-
-def under(first: Stance, second: Stance) -> Stance:
-    """Return the feet on the ground during the move from one stance to the next."""
-    for one in (first, second):
-        if len(one.planted) < 2:
-            return one
-    return replace(second, over=None) if np.array_equal(first.ankle, second.ankle) else second.on(LEFT)

@@ -1,7 +1,10 @@
-"""One static posture on given feet: found within all limits, near its neighbours, or refused by the name of the limit that forbids it."""
+"""One static posture on given feet: found within all limits, near its neighbours, or refused by the name of the limit
+that forbids it.
+"""
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import NoReturn
 
 import numpy as np
@@ -9,19 +12,18 @@ import numpy as np
 from biodance.body.body import UPRIGHT
 from biodance.dance.limits import CheckedMotion, Limit
 from biodance.dance.problem.chain import ROOT, Chain
-from biodance.dance.problem.closure import close_legs
-from biodance.dance.problem.excitation import effort, uprights
-from biodance.dance.problem.nlp import Evaluation, NonlinearProgramme, Objective, minimise
+from biodance.dance.problem.excitation import Blocks, effort, smooth_condition, static_grams, total, upright_slopes, uprights
+from biodance.dance.problem.nlp import Evaluation, NonlinearProgramme, Objective, free_coordinates, minimise
 from biodance.dance.problem.stance import Stance, stance_words
-from biodance.dance.problem.state import State
+from biodance.dance.problem.state import State, close_legs
 from biodance.errors import BiodanceError
 from biodance.records import Array
 
 
 @dataclass(frozen=True, eq=False)
 class Posture:
-    """``x`` (n,) coordinates, ``up`` (N, 3) the vertical in the segments; ``violation`` of the reserved limits in their scales and the
-    worst ``limit``; ``hard`` how hard it is to take.
+    """``x`` (n,) coordinates, ``up`` (N, 3) the vertical in the segments; ``violation`` of the reserved limits in their
+    scales and the worst ``limit``; ``hard`` how hard it is to take.
     """
 
     x: Array
@@ -33,18 +35,16 @@ class Posture:
 
 KEPT = 0.01
 """Violation, in scales of the limits, of the reserved margins that is accepted."""
+EASE = 5e-4
+"""Worth of a joint at its stop against the criterion: postures near mid range are easier to take."""
 ATTEMPTS = 8
 """Starts of a posture that is not feasible."""
 
 
-def free_coordinates(chain: Chain, stance: Stance) -> list[int]:
-    """Return the coordinates that are free when the planted legs follow the pelvis, and a seated pelvis rests."""
-    held = {c for side in stance.planted for c in chain.leg_columns[side]} | set(range(ROOT if stance.seat else 0))
-    return [c for c in range(chain.size) if c not in held]
-
-
 def initial_guess(chain: Chain, stance: Stance, rng: np.random.Generator) -> Array:
-    """Return the coordinates (n,) of a squat of any depth over the support, arms and trunk anywhere; seated: all joints anywhere."""
+    """Return the coordinates (n,) of a squat of any depth over the support, arms and trunk anywhere; seated: all joints
+    anywhere.
+    """
     low, high, x = chain.body.limits.lower, chain.body.limits.upper, np.zeros(chain.size)
     x[ROOT:] = low + (high - low) * rng.uniform(0.15, 0.85, len(low))
     if stance.seat:
@@ -83,7 +83,8 @@ class Near:
 def intermediate_posture(
     chain: Chain, stance: Stance, neighbours: Array, limits: tuple[Limit, ...], *, seed: list[int], mild: float = MILD
 ) -> Posture:
-    """Return a posture on the feet ``stance`` between ``neighbours`` (K, n) coordinates; ``mild`` share of whose angles is the aim.
+    """Return a posture on the feet ``stance`` between ``neighbours`` (K, n) coordinates; ``mild`` share of whose angles
+    is the aim.
 
     Raises
     ------
@@ -103,7 +104,9 @@ def intermediate_posture(
 
 
 def refuse(chain: Chain, stance: Stance, begin: list[Array], limits: tuple[Limit, ...]) -> NoReturn:
-    """Raise the BiodanceError that says which limit forbids every posture on these feet: the first without which there would be one."""
+    """Raise the BiodanceError that says which limit forbids every posture on these feet: the first without which there
+    would be one.
+    """
     kept = [limit for limit in limits if limit.at_rest]
     for limit in sorted(kept, key=lambda limit: limit.suspicion):
         others = tuple(other for other in kept if other is not limit)
@@ -120,9 +123,38 @@ def refuse(chain: Chain, stance: Stance, begin: list[Array], limits: tuple[Limit
     )
 
 
+@dataclass(frozen=True, eq=False)
+class Exciting:
+    """Objective of one posture beside the Gram matrices of the ``others`` (N, 3, 3), per ``unit`` kg, and the
+    performer's ease.
+    """
+
+    blocks: Blocks
+    others: Array
+    unit: float
+    sharpness: int
+
+    def __call__(self, state: State) -> tuple[float, Array]:
+        """Return the criterion and its slopes by x."""
+        up = uprights(state)
+        measure = partial(smooth_condition, sharpness=self.sharpness)
+        value, slope = total(self.blocks.weight, self.others + static_grams(up), self.blocks.first, measure=measure)
+        by = np.zeros((3, *state.x.shape))
+        by[0] = upright_slopes(state, -2 * np.einsum("nij,tnj->tni", slope, up)) / self.unit
+        ends = state.chain.body.limits
+        half = np.maximum((ends.upper - ends.lower) / 2, 1e-3)
+        off = (state.x[:, ROOT:] - (ends.upper + ends.lower) / 2) / half
+        by[0][:, ROOT:] += 2 * EASE * off / half
+        value = value / self.unit + EASE * float(np.sum(off**2))
+        if not self.blocks.simplicity:
+            return value, by
+        hard, slopes = effort(state)
+        return value + 10 * self.blocks.simplicity * hard, by + 10 * self.blocks.simplicity * slopes
+
+
 def solve(chain: Chain, stance: Stance, begin: Array, objective: Objective, limits: tuple[Limit, ...], *, iterations: int) -> Posture:
-    """Return the posture on the feet ``stance`` that is best for ``objective`` near ``begin`` (n,) and keeps those of the ``limits`` that
-    count at rest.
+    """Return the posture on the feet ``stance`` that is best for ``objective`` near ``begin`` (n,) and keeps those of
+    the ``limits`` that count at rest.
     """
     free = free_coordinates(chain, stance)
     base, basis = np.zeros((3, 1, chain.size)), np.zeros((3, 1, 1))
@@ -144,7 +176,9 @@ def posture_at(chain: Chain, stance: Stance, x: Array) -> Posture:
 
 
 def describe(state: State, limit: Limit) -> str:
-    """Return in words how much a ``state`` (one sample) breaks a ``limit``, and where: in which joint, on which side, between what."""
+    """Return in words how much a ``state`` (one sample) breaks a ``limit``, and where: in which joint, on which side,
+    between what.
+    """
     motion = state.chain.motion(np.zeros(len(state.x)), state.x, state.v, state.a)
     left = limit.check(CheckedMotion(state.chain.body, motion, state.stance))
     column = int(np.argmin(left.value[0]))
@@ -159,7 +193,9 @@ def describe(state: State, limit: Limit) -> str:
 
 @dataclass(frozen=True)
 class Excess:
-    """Objective of a posture that breaks one ``limit`` as little as it can: sum of squares of what is missing, in its scale."""
+    """Objective of a posture that breaks one ``limit`` as little as it can: sum of squares of what is missing, in its
+    scale.
+    """
 
     limit: Limit
 

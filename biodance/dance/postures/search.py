@@ -1,22 +1,22 @@
-"""Static postures that turn gravity through every segment (paper eq. 14-17): small problems in turn, then the best of all that were found.
+"""Static postures that turn gravity through every segment (paper eq. 14-17): small problems in turn, then the best of
+all that were found.
 
-cond has a kink where a segment is isotropic, at which one posture after the other stands still; sweeps therefore use a smooth condition
-number of growing sharpness, and after two independent runs postures are exchanged for better ones among all that came by.
+cond has a kink where a segment is isotropic, at which one posture after the other stands still; sweeps therefore use a
+smooth condition number of growing sharpness, and after two independent runs postures are exchanged for better ones
+among all that came by.
 """
 
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
 from biodance.dance.limits import Limit
-from biodance.dance.postures.exchange import exchange, image_feet, mirrored, mirrored_vectors, symmetric
-from biodance.dance.postures.posture import ATTEMPTS, KEPT, Posture, anyhow, initial_guess, posture_at, refuse, solve
-from biodance.dance.problem.chain import ROOT, Chain
-from biodance.dance.problem.excitation import Blocks, effort, smooth_condition, static_grams, total, upright_slopes, uprights
+from biodance.dance.postures.exchange import criterion, exchange, image_feet, mirror_posture, mirror_vectors, symmetric
+from biodance.dance.postures.posture import ATTEMPTS, KEPT, Exciting, Posture, anyhow, initial_guess, posture_at, refuse, solve
+from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.excitation import Blocks, static_grams
 from biodance.dance.problem.stance import Stance
-from biodance.dance.problem.state import State
 from biodance.records import Array
 
 RUNS = 2
@@ -25,8 +25,6 @@ SWEEPS = ((4, 20), (4, 10))
 """Sharpness of the smooth condition number and iterations for every posture, of the sweeps of a run."""
 FRESH, POLISH = ((8, 20),), ((8, 10), (8, 10), (16, 10), (16, 10), (32, 8))
 """The same for the sweeps after the exchange, first one from fresh starts, then from where the postures are."""
-EASE = 5e-4
-"""Worth of a joint at its stop against the criterion: postures near mid range are easier to take."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,37 +37,11 @@ class Postures:
     bound: float
 
 
-@dataclass(frozen=True, eq=False)
-class Exciting:
-    """Objective of one posture beside the Gram matrices of the ``others`` (N, 3, 3), per ``unit`` kg, and the performer's ease."""
-
-    blocks: Blocks
-    others: Array
-    unit: float
-    sharpness: int
-
-    def __call__(self, state: State) -> tuple[float, Array]:
-        """Return the criterion and its slopes by x."""
-        up = uprights(state)
-        measure = partial(smooth_condition, sharpness=self.sharpness)
-        value, slope = total(self.blocks.weight, self.others + static_grams(up), self.blocks.first, measure=measure)
-        by = np.zeros((3, *state.x.shape))
-        by[0] = upright_slopes(state, -2 * np.einsum("nij,tnj->tni", slope, up)) / self.unit
-        ends = state.chain.body.limits
-        half = np.maximum((ends.upper - ends.lower) / 2, 1e-3)
-        off = (state.x[:, ROOT:] - (ends.upper + ends.lower) / 2) / half
-        by[0][:, ROOT:] += 2 * EASE * off / half
-        value = value / self.unit + EASE * float(np.sum(off**2))
-        if not self.blocks.simplicity:
-            return value, by
-        hard, slopes = effort(state)
-        return value + 10 * self.blocks.simplicity * hard, by + 10 * self.blocks.simplicity * slopes
-
-
 def find_postures(
     chain: Chain, blocks: Blocks, stances: tuple[Stance, ...], limits: tuple[Limit, ...], *, seed: int, workers: Executor
 ) -> Postures:
-    """Return one posture per entry of ``stances`` that keeps the ``limits``, together the most exciting for all first moments.
+    """Return one posture per entry of ``stances`` that keeps the ``limits``, together the most exciting for all first
+    moments.
 
     Raises
     ------
@@ -97,11 +69,6 @@ def find_postures(
     return Postures(np.array([p.x for p in chosen]), stances, criterion(blocks, chosen), float(blocks.weight.sum()))
 
 
-def criterion(blocks: Blocks, chosen: list[Posture]) -> float:
-    """Return the sum of M_i cond(W_bi^S), kg, of postures."""
-    return total(blocks.weight, static_grams(np.array([p.up for p in chosen])), blocks.first)[0]
-
-
 def _price(blocks: Blocks, chosen: list[Posture]) -> float:
     """Return the criterion and, where simplicity counts, how hard the postures are to take, kg."""
     return criterion(blocks, chosen) + blocks.simplicity * float(blocks.weight.sum() * np.mean([p.hard for p in chosen]))
@@ -122,20 +89,24 @@ class _Search:
         return initial_guess(self.chain, self.stances[place], np.random.default_rng([self.seed, run, place]))
 
     def possible(self, place: int) -> Posture:
-        """Return a posture that keeps all limits at this place, or raise the BiodanceError that names the limit that forbids it."""
+        """Return a posture that keeps all limits at this place, or raise the BiodanceError that names the limit that
+        forbids it.
+        """
         begin, stance = [self.anywhere(place, run) for run in range(ATTEMPTS)], self.stances[place]
         found = (solve(self.chain, stance, x, anyhow, self.limits, iterations=30) for x in begin)
         posture = next((p for p in found if p.violation <= KEPT), None)
         return posture or refuse(self.chain, stance, begin, self.limits)
 
     def with_images(self, kept: list[list[Posture]], found: list[list[Posture]]) -> list[list[Posture]]:
-        """Return the postures ``kept`` of every place and the mirror images of ``found`` (`mirror`), of a body whose sides are alike."""
+        """Return the postures ``kept`` of every place and the mirror images of ``found`` (`mirror`), of a body whose
+        sides are alike.
+        """
         out, body = [[*some] for some in kept], self.chain.body
         for here, some in zip(self.stances, found if symmetric(body) else [], strict=False):
             goal = image_feet(here, self.stances)
             if goal is not None:
                 there = self.stances[goal]
-                images = (replace(p, x=mirrored(self.chain, p.x, here, there), up=mirrored_vectors(body, p.up)) for p in some)
+                images = (replace(p, x=mirror_posture(self.chain, p.x, here, there), up=mirror_vectors(body, p.up)) for p in some)
                 out[goal] += [image for image in images if image.violation <= KEPT]
         return out
 
@@ -151,7 +122,9 @@ class _Search:
         return out
 
     def sweep(self, now: list[Posture], begin: list[Array], order: list[int], sharpness: int, iterations: int) -> list[Posture]:
-        """Return the postures of the places ``order``, found one after the other from ``begin`` while all others are held, by place."""
+        """Return the postures of the places ``order``, found one after the other from ``begin`` while all others are
+        held, by place.
+        """
         now, unit = list(now), 0.1 * float(self.blocks.weight.sum()) / len(now)
         for p in order:
             others = np.array([one.up for k, one in enumerate(now) if k != p]).reshape(-1, *now[p].up.shape)

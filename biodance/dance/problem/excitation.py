@@ -1,7 +1,8 @@
-"""What a movement is worth: the paper's criterion on segments (eq. 12) and the effort of the performer, with slopes by the motion.
+"""What a movement is worth: the paper's criterion on segments (eq. 12) and the effort of the performer, with slopes by
+the motion.
 
-First moments count at rest, inertias in motion. Effort is how hard a posture is to take and to remember; three terms over the joints,
-angles in units of half the joint's range:
+First moments count at rest, inertias in motion. Effort is how hard a posture is to take and to remember; three terms
+over the joints, angles in units of half the joint's range:
 - few joints at once: mean of sqrt(r² + e²) - e, r the angle from standing (a smooth absolute value: what need not move stays);
 - symmetric pairs: mean of (right - left)² over the pairs of joints, the same movement on both sides being one thing to do;
 - no discomfort: mean of c⁸, c the angle from standing over the way to the stop on that side.
@@ -22,7 +23,9 @@ from biodance.records import Array
 
 
 def condition(gram: Array) -> tuple[Array, Array]:
-    """Return cond = sqrt(largest / smallest eigenvalue) of Gram matrices (..., k, k), (...), and its gradient (..., k, k)."""
+    """Return cond = sqrt(largest / smallest eigenvalue) of Gram matrices (..., k, k), (...), and its gradient (..., k,
+    k).
+    """
     value, vector = _spectrum(gram)
     cond = np.sqrt(value[..., -1] / value[..., 0])
     by = np.zeros_like(value)
@@ -32,9 +35,11 @@ def condition(gram: Array) -> tuple[Array, Array]:
 
 
 def smooth_condition(gram: Array, *, sharpness: int) -> tuple[Array, Array]:
-    """Return a condition number without kinks and its gradient: power means of the eigenvalues instead of largest and smallest.
+    """Return a condition number without kinks and its gradient: power means of the eigenvalues instead of largest and
+    smallest.
 
-    sqrt(mean(value^p)^(1/p) * mean(value^-p)^(1/p)), p = ``sharpness``: at most cond, 1 exactly where cond is, cond for p -> infinity.
+    sqrt(mean(value^p)^(1/p) * mean(value^-p)^(1/p)), p = ``sharpness``: at most cond, 1 exactly where cond is, cond for
+    p -> infinity.
     """
     value, vector = _spectrum(gram)
     high, low = (value / value[..., -1:]) ** sharpness, (value[..., :1] / value) ** sharpness
@@ -50,8 +55,9 @@ def _spectrum(gram: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """What counts of each segment: ``first`` (of MX, MY, MZ) and ``second`` (of the six inertias) base columns, ``weight`` (N,) kg; and of
-    the performer: ``simplicity``, what a hardness of 1 (`simplicity.hardness`) is worth in mean condition numbers.
+    """What counts of each segment: ``first`` (of MX, MY, MZ) and ``second`` (of the six inertias) base columns,
+    ``weight`` (N,) kg; and of the performer: ``simplicity``, what a hardness of 1 (`simplicity.hardness`) is worth
+    in mean condition numbers.
     """
 
     first: tuple[list[int], ...]
@@ -60,8 +66,10 @@ class Blocks:
     simplicity: float = 0.0
 
 
-def blocks(body: Body) -> Blocks:
-    """Return the base columns of every segment, weighted by its mass in the table (structural base: docs/derivations.md)."""
+def excitation_blocks(body: Body) -> Blocks:
+    """Return the base columns of every segment, weighted by its mass in the table (structural base:
+    docs/derivations.md).
+    """
     columns = structural_base(body).columns
     first, second = (
         tuple([c % 10 - low for c in columns if c // 10 == i and low <= c % 10 < high] for i in range(len(body.segments)))
@@ -75,7 +83,9 @@ Measure = Callable[[Array], tuple[Array, Array]]
 
 
 def total(weight: Array, grams: Array, pick: tuple[list[int], ...], *, measure: Measure = condition) -> tuple[float, Array]:
-    """Return sum_i M_i cond(W_bi) and its gradient by the Gram matrices (N, k, k); segments without weight or columns do not count."""
+    """Return sum_i M_i cond(W_bi) and its gradient by the Gram matrices (N, k, k); segments without weight or columns
+    do not count.
+    """
     value, slope = 0.0, np.zeros_like(grams)
     alike: dict[tuple[int, ...], list[int]] = {}
     for i, columns in enumerate(pick):
@@ -204,8 +214,8 @@ def effort(state: State) -> tuple[float, Array]:
 
 @dataclass(frozen=True, eq=False)
 class _Scale:
-    """Angles (n,) rad of every joint: ``rest`` standing, ``half`` of the range, ``upward``, ``downward`` from standing to the stops (at
-    least 0.2); ``pairs`` of right and left joints.
+    """Angles (n,) rad of every joint: ``rest`` standing, ``half`` of the range, ``upward``, ``downward`` from standing
+    to the stops (at least 0.2); ``pairs`` of right and left joints.
     """
 
     rest: Array

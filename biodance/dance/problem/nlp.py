@@ -1,9 +1,10 @@
-"""Nonlinear programmes: one small design problem with exact slopes, and its solution by sequential quadratic programming.
+"""Nonlinear programmes: one small design problem with exact slopes, and its solution by sequential quadratic
+programming.
 
-The problem: the points of some coordinates, through a spline, give objective and margins: min f(y) subject to c(y) >= 0. Every step
-solves a strictly convex quadratic programme with one common slack (so it always has a solution), as a least-distance problem by
-non-negative least squares (Lawson & Hanson 1974, ch. 23); the Hessian is a damped BFGS estimate, the merit function f + weight * largest
-violation, steps are bounded by a trust region.
+The problem: the points of some coordinates, through a spline, give objective and margins: min f(y) subject to c(y) >=
+0. Every step solves a strictly convex quadratic programme with one common slack (so it always has a solution), as a
+least-distance problem by non-negative least squares (Lawson & Hanson 1974, ch. 23); the Hessian is a damped BFGS
+estimate, the merit function f + weight * largest violation, steps are bounded by a trust region.
 """
 
 from collections.abc import Callable
@@ -13,21 +14,54 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.dance.limits import Limit
-from biodance.dance.problem.chain import Chain
-from biodance.dance.problem.closure import Closure, close_legs
+from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.stance import Stance
-from biodance.dance.problem.state import State
+from biodance.dance.problem.state import Closure, State, close_legs
 from biodance.records import Array
 
 Objective = Callable[[State], tuple[float, Array]]
-"""Returns f and its slopes (3, T, n) by x, v, a; f may be judged without the slopes only at the price of computing them."""
+"""Returns f and its slopes (3, T, n) by x, v, a; f may be judged without the slopes only at the price of computing
+them.
+"""
+
+
+class ConstraintMargins(Protocol):
+    """What is left of a constraint: ``value`` (T, m) >= 0 where it holds, ``slopes`` (k, T, m, n) by x, v, a."""
+
+    @property
+    def value(self) -> Array:
+        """(T, m)."""
+
+    @property
+    def slopes(self) -> Array:
+        """(k, T, m, n)."""
+
+
+class Constraint(Protocol):
+    """What the problem needs of a limit."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def scale(self) -> float:
+        """A noticeable amount of it."""
+
+    def margins(self, state: State) -> ConstraintMargins:
+        """Return what is left of it in every sample."""
+
+
+def free_coordinates(chain: Chain, stance: Stance) -> list[int]:
+    """Return the coordinates that are free when the planted legs follow the pelvis, and a seated pelvis rests."""
+    held = {c for side in stance.planted for c in chain.leg_columns[side]} | set(range(ROOT if stance.seat else 0))
+    return [c for c in range(chain.size) if c not in held]
 
 
 @dataclass(frozen=True, eq=False)
 class NonlinearProgramme:
-    """``base`` (3, T, n) coordinates, rates and accelerations to which the points of the ``free`` coordinates add through ``basis``
-    (3, T, K); ``limits`` to keep, each by its column of ``reserve`` (T, limits) in its scale.
+    """``base`` (3, T, n) coordinates, rates and accelerations to which the points of the ``free`` coordinates add
+    through ``basis`` (3, T, K); ``limits`` to keep, each by its column of ``reserve`` (T, limits) in its scale.
     """
 
     chain: Chain
@@ -35,7 +69,7 @@ class NonlinearProgramme:
     base: Array
     basis: Array
     free: list[int]
-    limits: tuple[Limit, ...]
+    limits: tuple[Constraint, ...]
     objective: Objective
     reserve: Array
 
@@ -87,7 +121,9 @@ class Evaluation:
         return gradient, np.concatenate([np.empty((0, gradient.size)), *parts])
 
     def _chain(self, slopes: list[Array], time: NDArray[np.intp], closure: Closure) -> Array:
-        """Return slopes (R, K * free) by the points of slopes (R, n) by coordinates, rates and accelerations at instants ``time`` (R,)."""
+        """Return slopes (R, K * free) by the points of slopes (R, n) by coordinates, rates and accelerations at
+        instants ``time`` (R,).
+        """
         free, basis = self.problem.free, self.problem.basis
         by = [closure.followed(slopes[0], time)]
         if len(slopes) > 1 and basis[1].any():
@@ -163,7 +199,9 @@ def worst(margins: Array) -> float:
 
 
 def quadratic_step(hessian: Array, gradient: Array, jacobian: Array, margins: Array, radius: float) -> tuple[Array, Array]:
-    """Return the step d (n,) and the prices (m,) of the margins: min d'Hd/2 + g'd + t + t²/2, Jd + t/weight >= -c, |d| <= radius."""
+    """Return the step d (n,) and the prices (m,) of the margins: min d'Hd/2 + g'd + t + t²/2, Jd + t/weight >= -c, |d|
+    <= radius.
+    """
     from scipy.optimize import nnls
 
     n, box, price = gradient.size, np.eye(gradient.size), np.zeros(len(jacobian))

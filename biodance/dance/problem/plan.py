@@ -1,7 +1,9 @@
-"""What a dance is asked to be: postures, feet, times, limits, weights; read from a protocol file. The person's limits are in the Body.
+"""What a dance is asked to be: postures, feet, times, limits, weights; read from a protocol file. The person's limits
+are in the Body.
 
-A person's reduced range, strength or speed go into ``body.limits`` and a person who may not stand on one leg takes blocks out of the plan
-(`person.fitted`), so that whoever designs needs the two records only. The file is TOML; the shipped ones are in ``protocols/dances``:
+A person's reduced range, strength or speed go into ``body.limits`` and a person who may not stand on one leg takes
+blocks out of the plan (`person.fitted`), so that whoever designs needs the two records only. The file is TOML; the
+shipped ones are in ``protocols/dances``:
 
     name = "short"
     description = "what it is for, one sentence"
@@ -39,27 +41,29 @@ from typing import Any, get_args
 import numpy as np
 
 from biodance.body.limits import Range
-from biodance.dance.limits import Limit, family, joined, limits_with
+from biodance.dance.limits import Limit, family, join_limits, limits_with
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import locate, read_toml
 from biodance.records import Array
 
 STANCES = ("parallel", "right_forward", "single_right", "single_left", "seated")
-"""Foot configurations: both feet side by side, right foot in front, on the right leg, on the left leg (paper Table I), on a stool."""
+"""Foot configurations: both feet side by side, right foot in front, on the right leg, on the left leg (paper Table I),
+on a stool.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
     """A protocol of a dance.
 
-    ``blocks``: (stance, number of postures) in the order in which they are danced, each stance of ``STANCES`` at most once;
-    ``move``, ``hold`` s of a transition and of a posture (the paper: 2 and 5); ``forward`` m by which the right foot stands
-    in front; ``limits`` that all of it keeps, with their numbers; ``budget`` s: from the postures found, those that inform
-    most per second are danced until the time is used up (inf: all); ``weights`` (segment, factor) in eq. 12 on top of the
-    masses, ``other_weight`` the factor of all segments not named; ``simplicity`` >= 0 of the performer's term beside the
-    excitation; ``alone`` the legs on which the person may stand alone, be it for a step; ``holds`` the hands that stay on
-    the grips of a frame; ``ranges`` what joints may use: what is reached without effort, or all that a healthy joint allows
-    (the paper).
+    ``blocks``: (stance, number of postures) in the order in which they are danced, each stance of ``STANCES`` at most
+    once; ``move``, ``hold`` s of a transition and of a posture (the paper: 2 and 5); ``forward`` m by which the right
+    foot stands in front; ``limits`` that all of it keeps, with their numbers; ``budget`` s: from the postures found,
+    those that inform most per second are danced until the time is used up (inf: all); ``weights`` (segment, factor) in
+    eq. 12 on top of the masses, ``other_weight`` the factor of all segments not named; ``simplicity`` >= 0 of the
+    performer's term beside the excitation; ``alone`` the legs on which the person may stand alone, be it for a step;
+    ``holds`` the hands that stay on the grips of a frame; ``ranges`` what joints may use: what is reached without
+    effort, or all that a healthy joint allows (the paper).
     """
 
     name: str
@@ -120,8 +124,10 @@ class Plan:
         return min((limit.support_share for limit in self.limits), default=1.0)
 
     def with_limits(self, more: Iterable[Limit | type[Limit]]) -> "Plan":
-        """Return the plan with ``more`` limits, objects or classes; one of a name that is there already takes its place."""
-        return replace(self, limits=joined(self.limits, more))
+        """Return the plan with ``more`` limits, objects or classes; one of a name that is there already takes its
+        place.
+        """
+        return replace(self, limits=join_limits(self.limits, more))
 
     def emphasis(self, segments: tuple[str, ...]) -> Array:
         """Return the factor (N,) of each of the ``segments`` in eq. 12; UnknownName if a weight names none of them."""
@@ -147,7 +153,8 @@ KEYS = ("name", "description", "postures", "limits", "weights", "ranges", *NUMBE
 
 
 def read_plan(name_or_path: str | Path) -> Plan:
-    """Return a shipped protocol by name ("full", "short", "chair", "one_segment"), or one of the user's by the path of its TOML file.
+    """Return a shipped protocol by name ("full", "short", "chair", "one_segment"), or one of the user's by the path of
+    its TOML file.
 
     Raises
     ------
@@ -164,12 +171,12 @@ def read_plan(name_or_path: str | Path) -> Plan:
         if key not in KEYS:
             raise UnknownName.of(f"key of {path}", key, KEYS)
     words = {"ranges": str(raw["ranges"])} if "ranges" in raw else {}
-    fields: dict[str, Any] = words | {field: number(path, key, raw[key]) for key, field in NUMBERS.items() if key in raw}
+    fields: dict[str, Any] = words | {field: finite_number(path, key, raw[key]) for key, field in NUMBERS.items() if key in raw}
     counts = table(path, raw, "postures")
     for stance, count in counts.items():
         if not isinstance(count, int) or isinstance(count, bool):
             raise BiodanceError(f"{path}: postures.{stance} = {count!r}; expected a whole number of postures.")
-    weights = {name: number(path, f"weights.{name}", value) for name, value in table(path, raw, "weights").items()}
+    weights = {name: finite_number(path, f"weights.{name}", value) for name, value in table(path, raw, "weights").items()}
     plan = Plan(str(raw.get("name", path.stem)), str(raw.get("description", "")), tuple(counts.items()), weights=tuple(weights.items()))
     return replace(plan, limits=_limits(path, raw), **fields)
 
@@ -178,18 +185,18 @@ def _limits(path: Path, raw: dict[str, Any]) -> tuple[Limit, ...]:
     """Return all limits with the numbers that the file gives them."""
     given = table(path, raw, "limits")
     found = {
-        name: {key: number(path, f"limits.{name}.{key}", value) for key, value in table(path, given, name, of="limits.").items()}
+        name: {key: finite_number(path, f"limits.{name}.{key}", value) for key, value in table(path, given, name, of="limits.").items()}
         for name in given
     }
     for short, (name, key) in SHORT.items():
         if short in raw and key in found.get(name, {}):
             raise BiodanceError(f"{path}: {short} and limits.{name}.{key} say the same; keep one of them.")
         if short in raw:
-            found.setdefault(name, {})[key] = number(path, short, raw[short])
+            found.setdefault(name, {})[key] = finite_number(path, short, raw[short])
     return limits_with(found, where=str(path))
 
 
-def number(path: Path, where: str, value: object) -> float:
+def finite_number(path: Path, where: str, value: object) -> float:
     """Return ``value`` as a float; BiodanceError names ``where`` it is if it is no finite number."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise BiodanceError(f"{path}: {where} = {value!r}; expected a finite number.")

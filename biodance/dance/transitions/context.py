@@ -1,4 +1,6 @@
-"""What all stages of one design share, and what of it is kept on disk, so that a design that was interrupted goes on where it stopped."""
+"""What all stages of one design share, and what of it is kept on disk, so that a design that was interrupted goes on
+where it stopped.
+"""
 
 import hashlib
 from collections.abc import Callable
@@ -25,7 +27,9 @@ ROOMS = ("body", "dance", "identify", "motion")
 
 
 class Checkpoint:
-    """Named sets of arrays in a folder that belongs to one body, plan, seed and state of the code; without a folder nothing is kept."""
+    """Named sets of arrays in a folder that belongs to one body, plan, seed and state of the code; without a folder
+    nothing is kept.
+    """
 
     def __init__(self, folder: Path | None, body: Body, plan: Plan, seed: int) -> None:
         key = hashlib.sha256(f"{code()}{body_text(body, '')}{plan!r}{seed}".encode()).hexdigest()[:16]
@@ -66,8 +70,8 @@ Tell = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, eq=False)
 class DesignContext:
-    """One design: ``chain`` of the body, ``blocks`` that count, ``plan``, ``seed`` of all random numbers; ``ledger`` keeps what is
-    finished, ``workers`` search side by side, ``tell`` is told the progress.
+    """One design: ``chain`` of the body, ``blocks`` that count, ``plan``, ``seed`` of all random numbers; ``ledger``
+    keeps what is finished, ``workers`` search side by side, ``tell`` is told the progress.
     """
 
     chain: Chain
