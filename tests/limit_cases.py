@@ -1,4 +1,6 @@
-"""Movements on which every limit of a dance is judged twice: by its margins (the optimiser's) and by its check (the judge's)."""
+"""Movements on which every limit of a dance is judged twice: by its margins (the optimiser's) and by its check (the
+judge's).
+"""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -7,13 +9,12 @@ from functools import cache
 import numpy as np
 
 from biodance.body.human import human
-from biodance.dance.chain import Chain
 from biodance.dance.limits import CheckedMotion
-from biodance.dance.postures import start
-from biodance.dance.programme import closed
-from biodance.dance.shapes import palm
-from biodance.dance.stance import Stance, holding, seat, stance
-from biodance.dance.state import State
+from biodance.dance.postures.posture import initial_guess
+from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.shapes import palm
+from biodance.dance.problem.stance import Stance, holding, seat, stance
+from biodance.dance.problem.state import State, close_legs
 from biodance.records import Array, Subject
 
 BODY = human(Subject(65.0, 1.75, "F", 33.0))
@@ -30,10 +31,11 @@ def feet() -> tuple[Stance, ...]:
 
 @cache
 def movements(count: int, *, seed: int = 0) -> tuple[tuple[State, CheckedMotion], ...]:
-    """Return ``count`` random movements of 3 samples each, gentle and violent ones, on all kinds of feet in turn, for both sides.
+    """Return ``count`` random movements of 3 samples each, gentle and violent ones, on all kinds of feet in turn, for
+    both sides.
 
-    Planted knees are bent by 8.2 degrees (less bends the reach of the closed legs) to 70, palms are up to about 6 cm from
-    grips; nobody jumps (100 N on the ground at least).
+    Planted knees are bent by 8.2 degrees (less bends the reach of the closed legs) to 70, palms are up to about 6 cm
+    from grips; nobody jumps (100 N on the ground at least).
     """
     return tuple((state, checked(state)) for state in _movements(count, seed))
 
@@ -42,7 +44,7 @@ def _movements(count: int, seed: int) -> Iterator[State]:
     rng, found = np.random.default_rng(seed), 0
     while found < count:
         where, violence = feet()[found % len(feet())], 10.0 ** rng.uniform(-1.5, 0.5)
-        x = start(CHAIN, where, rng) + rng.normal(0.0, 0.02, (3, CHAIN.size))
+        x = initial_guess(CHAIN, where, rng) + rng.normal(0.0, 0.02, (3, CHAIN.size))
         v, a = violence * rng.normal(size=(2, 3, CHAIN.size))
         if where.seat:
             x[:, :6], v[:, :6], a[:, :6] = [0.0, 0.0, where.seat, 0.0, 0.0, 0.0], 0.0, 0.0
@@ -51,15 +53,17 @@ def _movements(count: int, seed: int) -> Iterator[State]:
             x[:, 3:6] *= 0.5
             x = _standing(x, where, np.radians(rng.choice([rng.uniform(8.2, 10.0, 3), rng.uniform(10.0, 70.0, 3)])))
         if np.isfinite(where.hands).all():
-            where = replace(where, hands=_palms(closed(CHAIN, where, x, v, a))[0] + rng.normal(0.0, 0.02, (2, 3)))
-        state = closed(CHAIN, where, x, v, a)
+            where = replace(where, hands=_palms(close_legs(CHAIN, where, x, v, a))[0] + rng.normal(0.0, 0.02, (2, 3)))
+        state = close_legs(CHAIN, where, x, v, a)
         if state.wrench[:, 2].min() > 100.0 and np.abs(state.a).max() < 1e3:
             found += 1
             yield state
 
 
 def _standing(x: Array, where: Stance, knee: Array) -> Array:
-    """Return coordinates (T, n) whose pelvis is at the height where the longest planted leg has its ``knee`` (T,) rad bent."""
+    """Return coordinates (T, n) whose pelvis is at the height where the longest planted leg has its ``knee`` (T,) rad
+    bent.
+    """
     x = x.copy()
     for _ in range(20):
         turn = CHAIN.root_rotation(x)

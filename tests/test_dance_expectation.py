@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from biodance.body.human import human
-from biodance.dance.chain import ROOT, Chain
-from biodance.dance.expectation import RATE, SIZES, expected, typical_noise
-from biodance.dance.splines import rest_to_rest
+from biodance.dance.expectation import RATE, SIZES, expected_spread, typical_noise
+from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.splines import rest_to_rest
 from biodance.identify.caution import widened
 from biodance.identify.knowledge import segment_quantities
 from biodance.identify.mismatch import mismatch, temper
@@ -32,7 +32,7 @@ def motion() -> Motion:
 
 
 def test_before_the_dance_stands_the_table_and_more_dance_is_never_worse(motion: Motion) -> None:
-    found = expected(BODY, motion, np.array([2.0, 4.0, 6.0]))
+    found = expected_spread(BODY, motion, np.array([2.0, 4.0, 6.0]))
     prior = widened(BODY.sip)
     np.testing.assert_allclose(found.mass[0], np.sqrt(np.diag(prior.covariance)[::10]), rtol=1e-9)
     assert found.share[0].max() < 1e-12
@@ -50,7 +50,7 @@ def test_the_end_is_what_identification_would_say_of_data_that_agree_with_the_ta
     fit = Fit("all", motion, wrench, motion.time < 6.0 - 1e-9)
     data = statistics(BODY, fit, noise).information(noise)
     belief = posterior(temper(data, mismatch(BODY, (fit,), noise), SIZES), widened(BODY.sip))
-    found = expected(BODY, motion, np.array([6.0]))
+    found = expected_spread(BODY, motion, np.array([6.0]))
     for i in range(12):
         cut = slice(10 * i, 10 * i + 10)
         _, slope = segment_quantities(belief.prior.phi[cut])

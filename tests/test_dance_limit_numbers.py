@@ -1,4 +1,6 @@
-"""One number for every limit of a dance that a person works out by hand, for a woman of 65 kg and 1.75 m: by margins and by check."""
+"""One number for every limit of a dance that a person works out by hand, for a woman of 65 kg and 1.75 m: by margins
+and by check.
+"""
 
 from dataclasses import replace
 
@@ -8,16 +10,17 @@ from limit_cases import BODY, CHAIN, checked, feet
 
 from biodance.body.body import Body
 from biodance.dance.limits import CheckedMotion, Limit, family
-from biodance.dance.programme import closed
-from biodance.dance.stance import Stance, holding, seat, stance
-from biodance.dance.state import State
+from biodance.dance.problem.stance import Stance, holding, seat, stance
+from biodance.dance.problem.state import State, close_legs
 from biodance.motion.kinematics import poses
 
 FAMILY = {limit.name: limit for limit in family()}
 
 
 def upright(**angles: float) -> np.ndarray:
-    """Return coordinates (1, n) of a person who stands upright, ankles over the lab origin, soles on the ground, but for ``angles`` rad."""
+    """Return coordinates (1, n) of a person who stands upright, ankles over the lab origin, soles on the ground, but
+    for ``angles`` rad.
+    """
     x = np.zeros((1, CHAIN.size))
     x[0, 2] = 0.371686 + 0.442392 + 0.067375  # thigh, shank, ankle
     for name, value in angles.items():
@@ -43,7 +46,7 @@ def test_friction_a_box_on_an_incline_slips_where_the_tangent_is_the_coefficient
 def test_balance_a_rod_balances_up_to_the_share_of_half_the_base(pelvis: float) -> None:
     x = upright()
     x[0, 0], x[0, 2] = pelvis, x[0, 2] - 0.1
-    state = closed(CHAIN, feet()[0], x, *np.zeros((2, *x.shape)))
+    state = close_legs(CHAIN, feet()[0], x, *np.zeros((2, *x.shape)))
     place = poses(BODY, CHAIN.motion(np.zeros(1), state.x, state.v, state.a).q)
     parts = BODY.sip.phi.reshape(-1, 10)
     middle = sum(part[0] * place.position[0, i] + place.rotation[0, i] @ part[1:4] for i, part in enumerate(parts)) / 65.0
@@ -54,7 +57,7 @@ def test_balance_a_rod_balances_up_to_the_share_of_half_the_base(pelvis: float) 
 
 def test_balance_of_the_weight_over_one_foot_is_that_of_this_foot() -> None:
     over = feet()[5]  # the left one
-    x = closed(CHAIN, over, upright() - 0.1 * np.eye(CHAIN.size)[2], *np.zeros((2, 1, CHAIN.size))).x
+    x = close_legs(CHAIN, over, upright() - 0.1 * np.eye(CHAIN.size)[2], *np.zeros((2, 1, CHAIN.size))).x
     inside, outside = both(FAMILY["balance"], x, feet()[0])[0], both(FAMILY["balance"], x, over)
     assert inside > 0.02
     sole = over.ankle[1, 1] - 0.6 * 0.050008  # its inner edge, drawn together, of sides that slant by 4 degrees
@@ -107,13 +110,13 @@ def test_foot_placement_is_what_the_cosine_rule_leaves(knee: float) -> None:
     x[0, 2] = 0.067375 + length(knee)
     one = stance(BODY, "parallel").on(1)
     x[0, 1] = one.ankle[1, 1] - 0.081375  # the left hip over the left ankle
-    state = closed(CHAIN, one, x, *np.zeros((2, *x.shape)))
+    state = close_legs(CHAIN, one, x, *np.zeros((2, *x.shape)))
     expected = length(9.0) - length(knee)
     assert both(FAMILY["foot_placement"], state.x, one) == pytest.approx((expected, expected), abs=1e-6)
 
 
 def test_foot_placement_a_foot_that_is_not_where_it_stands_is_seen_by_the_check() -> None:
-    x = closed(CHAIN, feet()[0], upright() - 0.1 * np.eye(CHAIN.size)[2], *np.zeros((2, 1, CHAIN.size))).x
+    x = close_legs(CHAIN, feet()[0], upright() - 0.1 * np.eye(CHAIN.size)[2], *np.zeros((2, 1, CHAIN.size))).x
     assert both(FAMILY["foot_placement"], x, feet()[0])[1] > 0
     x[0, 0] += 0.01
     assert both(FAMILY["foot_placement"], x, feet()[0])[1] == pytest.approx(-0.01, abs=2e-6)

@@ -1,5 +1,5 @@
-"""One contract for every limit of a dance: its margins are what its check finds, its slopes are differences, and what a protocol says of it
-reaches both sides. Numbers that a person works out by hand are in test_dance_limit_numbers.py.
+"""One contract for every limit of a dance: its margins are what its check finds, its slopes are differences, and what a
+protocol says of it reaches both sides. Numbers that a person works out by hand are in test_dance_limit_numbers.py.
 """
 
 from dataclasses import fields, replace
@@ -8,19 +8,21 @@ import numpy as np
 import pytest
 from limit_cases import BODY, CHAIN, feet, movements
 
-from biodance.dance.excitation import blocks, dynamic_grams, dynamic_slopes, static_grams
 from biodance.dance.limits import FAR, CheckedMotion, Limit, family
-from biodance.dance.postures import Exciting, free_coordinates, start
-from biodance.dance.programme import Programme
-from biodance.dance.stance import Stance, stance
-from biodance.dance.state import State
+from biodance.dance.postures.posture import Exciting, initial_guess
+from biodance.dance.problem.excitation import dynamic_grams, dynamic_slopes, excitation_blocks, static_grams
+from biodance.dance.problem.nlp import NonlinearProgramme, free_coordinates
+from biodance.dance.problem.stance import Stance, stance
+from biodance.dance.problem.state import State
 from biodance.motion.regressor import predict_wrench
 
-BLOCKS = blocks(BODY)
+BLOCKS = excitation_blocks(BODY)
 STEP = 1e-6
 MOVEMENTS = 198
 NEVER, DEEP = 0.05, -0.02
-"""m: coal gives bounds of distances above the first, and another measure of overlap (the way out, not the depth) below the second."""
+"""m: coal gives bounds of distances above the first, and another measure of overlap (the way out, not the depth) below
+the second.
+"""
 FAMILY = {limit.name: limit for limit in family()}
 each_limit = pytest.mark.parametrize("limit", FAMILY.values(), ids=FAMILY.keys())
 
@@ -68,12 +70,12 @@ def test_another_number_reaches_the_margins_and_the_check(limit: Limit, name: st
 @pytest.mark.parametrize("where", feet(), ids=lambda one: f"{one.name}-{one.over}-{np.isfinite(one.hands).sum()}")
 @each_limit
 def test_slopes_equal_differences(limit: Limit, where: Stance) -> None:
-    built, y, _ = programme(where, (limit,), nothing)
-    point = built.judge(y)
+    built, y, _ = problem(where, (limit,), nothing)
+    point = built.evaluate(y)
     near = np.flatnonzero(point.margins < FAR)
     _, slopes = point.slopes(near)
     assert slopes.shape == (len(near), len(y))
-    expected = differences(built.judge, y, lambda p: p.margins)[near]
+    expected = differences(built.evaluate, y, lambda p: p.margins)[near]
     np.testing.assert_allclose(slopes, expected.reshape(slopes.shape), atol=3e-6 * (1 + np.abs(slopes).max(initial=0)))
 
 
@@ -90,21 +92,23 @@ def test_every_limit_says_what_it_is(limit: Limit) -> None:
 # ---- slopes of criteria and of the closure, with the same small problems
 
 
-def programme(where, limits, objective, *, frames=5, still=False):
+def problem(where, limits, objective, *, frames=5, still=False):
     rng = np.random.default_rng(len(where.planted) + sum(where.planted[:1]))
     base = np.zeros((3, frames, CHAIN.size))
-    base[0] = start(CHAIN, where, rng)
+    base[0] = initial_guess(CHAIN, where, rng)
     base[0, :, 2] -= 0.15
     base[0, :, 3:6] *= 0.3
     basis = rng.normal(0, 1, (3, frames, 1 if still else 2))
     if still:
         basis[:] = np.array([1.0, 0.0, 0.0])[:, None, None]
-    built = Programme(CHAIN, where, base, basis, free_coordinates(CHAIN, where), limits, objective, np.zeros((frames, len(limits))))
+    built = NonlinearProgramme(
+        CHAIN, where, base, basis, free_coordinates(CHAIN, where), limits, objective, np.zeros((frames, len(limits)))
+    )
     return built, rng.normal(0, 0.04, basis.shape[2] * len(built.free)), rng
 
 
-def differences(judge, y, what):
-    return np.array([(what(judge(y + STEP * e)) - what(judge(y - STEP * e))) / (2 * STEP) for e in np.eye(len(y))]).T
+def differences(evaluate, y, what):
+    return np.array([(what(evaluate(y + STEP * e)) - what(evaluate(y - STEP * e))) / (2 * STEP) for e in np.eye(len(y))]).T
 
 
 def nothing(state):
@@ -124,24 +128,24 @@ def test_slopes_of_the_dynamic_criterion(planted):
     def objective(state):
         return float(np.sum(weight * dynamic_grams(state, segments))), dynamic_slopes(state, segments, weight)
 
-    built, y, _ = programme(standing_on(planted), (), objective)
-    expected = differences(built.judge, y, lambda p: p.value)
-    got, _ = built.judge(y).slopes(np.arange(0))
+    built, y, _ = problem(standing_on(planted), (), objective)
+    expected = differences(built.evaluate, y, lambda p: p.value)
+    got, _ = built.evaluate(y).slopes(np.arange(0))
     np.testing.assert_allclose(got, expected, rtol=1e-5, atol=1e-5 * np.abs(expected).max())
 
 
 def test_slopes_of_the_static_criterion():
     up = np.random.default_rng(1).normal(size=(9, 12, 3))
     others = static_grams(up / np.linalg.norm(up, axis=2, keepdims=True))
-    built, y, _ = programme(standing_on((0, 1)), (), Exciting(BLOCKS, others, 1.0, 8), frames=1, still=True)
-    expected = differences(built.judge, y, lambda p: p.value)
-    got, _ = built.judge(y).slopes(np.arange(0))
+    built, y, _ = problem(standing_on((0, 1)), (), Exciting(BLOCKS, others, 1.0, 8), frames=1, still=True)
+    expected = differences(built.evaluate, y, lambda p: p.value)
+    got, _ = built.evaluate(y).slopes(np.arange(0))
     np.testing.assert_allclose(got, expected, atol=1e-5 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("planted", [(0, 1), (0,), (1,)])
 def test_planted_feet_stand_still_and_forces_agree_with_the_regressor(planted):
-    built, y, _ = programme(standing_on(planted), (), nothing)
+    built, y, _ = problem(standing_on(planted), (), nothing)
     state = built.state(y)
     for side in planted:
         ankle = CHAIN.leg_columns[side][-1]

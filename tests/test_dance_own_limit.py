@@ -1,4 +1,6 @@
-"""A limit that nobody planned for: one file in the folder, and it is kept, verified, listed and named where it forbids a dance."""
+"""A limit that nobody planned for: one file in the folder, and it is kept, verified, listed and named where it forbids
+a dance.
+"""
 
 import json
 import sys
@@ -12,12 +14,12 @@ import pytest
 
 from biodance.body.human import human
 from biodance.cli import run
-from biodance.dance import limits, postures
+from biodance.dance import limits
 from biodance.dance.design import design
 from biodance.dance.limits import NOTHING, Limit, family, limits_with, unconcerned
 from biodance.dance.limits.friction import Friction
-from biodance.dance.plan import Plan
-from biodance.dance.protocol import read_plan
+from biodance.dance.postures import search
+from biodance.dance.problem.plan import Plan, read_plan
 from biodance.dance.verify import broken, verify
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import Subject
@@ -30,8 +32,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.dance.limits import CheckedMotion, Limit, Margins, Remaining, bounded
-from biodance.dance.shapes import palm
-from biodance.dance.state import State
+from biodance.dance.problem.shapes import palm
+from biodance.dance.problem.state import State
 
 SIDES = ("right", "left")
 
@@ -77,7 +79,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, sweeps in (("SWEEPS", ((4, 8),)), ("FRESH", ((8, 8),)), ("POLISH", ((8, 4),)), ("ATTEMPTS", 3)):
-        monkeypatch.setattr(postures, name, sweeps)
+        monkeypatch.setattr(search, name, sweeps)
 
 
 def danced(tmp_path: Path, height: float) -> tuple[int, dict[str, object], Path]:
@@ -141,8 +143,8 @@ def test_an_object_is_kept_like_a_member_of_the_family() -> None:
     assert told["quiet"].worst >= 0
     assert told["quiet"].what in {joint.name for joint in BODY.joints}
     asked = plan.with_limits([Quiet, Friction(mu=0.3)])
-    assert broken(verify(BODY, dance, asked)) == ()
-    assert {margin.limit for margin in broken(verify(BODY, free, plan.with_limits([Quiet(most=0.1)])))} == {"quiet"}
+    assert broken(verify(BODY, dance, asked.limits)) == ()
+    assert {margin.limit for margin in broken(verify(BODY, free, plan.with_limits([Quiet(most=0.1)]).limits))} == {"quiet"}
 
 
 def test_a_protocol_gives_the_limits_their_numbers(tmp_path: Path) -> None:

@@ -6,8 +6,8 @@ from random_bodies import random_body
 
 from biodance.body.body import Body
 from biodance.body.human import human
-from biodance.dance.playback import Playback, floor_model, play
-from biodance.dance.splines import rest_to_rest
+from biodance.dance.problem.splines import rest_to_rest
+from biodance.dance.rehearsal import Playback, floor_model, play
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
 from biodance.records import Motion, Subject

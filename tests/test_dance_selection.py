@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from biodance.body.human import human
-from biodance.dance.chain import ROOT, Chain
-from biodance.dance.plan import Plan
-from biodance.dance.selection import FORCE, MOMENT, RATE, choose, learned
-from biodance.dance.splines import rest_to_rest
+from biodance.dance.postures.selection import FORCE, MOMENT, RATE, choose, learned
+from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.plan import Plan
+from biodance.dance.problem.splines import rest_to_rest
 from biodance.identify.posterior import prior_factor
 from biodance.motion.regressor import regressor
 from biodance.records import Array, Subject

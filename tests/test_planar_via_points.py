@@ -7,7 +7,7 @@ from random_bodies import random_body
 from target import target
 from via_points import Excitation, design
 
-from biodance.dance.splines import rest_to_rest
+from biodance.dance.problem.splines import rest_to_rest
 from biodance.identify.base_parameters import structural_base
 from biodance.motion.regressor import GRAVITY
 

@@ -38,8 +38,8 @@ def dance(
     results.json. Ctrl-C keeps what is finished, and the same command goes on from there. A dance that cannot exist is refused with the
     constraint that forbids it (exit code 1).
     """
-    from biodance.dance.person import HEALTHY, read_person
-    from biodance.dance.protocol import read_plan
+    from biodance.dance.problem.person import HEALTHY, read_person
+    from biodance.dance.problem.plan import read_plan
     from biodance.pipeline.dance import UNFINISHED, dance_folder, dancer, make_dance
     from biodance.pipeline.robot_dance import make_robot_dance, robot_dancer
     from biodance.report.dance_write import print_dance, write_dance

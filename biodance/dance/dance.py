@@ -1,7 +1,7 @@
 """The Dance: postures held for a while, moves between them, and where the feet stand meanwhile.
 
-A dance is written in the coordinates of its `Chain`; planted legs are not written but solved in closed form, so that planted feet stay
-where they are at every instant, not only at samples.
+A dance is written in the coordinates of its `Chain`; planted legs are not written but solved in closed form, so that
+planted feet stay where they are at every instant, not only at samples.
 """
 
 import json
@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 from biodance import display
 from biodance.body.body import Body
 from biodance.body.body_file import body_text, parse_body
-from biodance.dance.chain import Chain
-from biodance.dance.programme import closed
-from biodance.dance.splines import basis_at
-from biodance.dance.stance import Stance
-from biodance.dance.state import State
+from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.splines import basis_at
+from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.state import State, close_legs
 from biodance.errors import BiodanceError, FileRefused
 from biodance.records import Array, Motion, frozen_array
 
@@ -32,7 +31,9 @@ VERSION = 1
 
 @dataclass(frozen=True)
 class Phase:
-    """A stretch of a dance from ``start`` to ``end`` s in which the feet do not change; ``posture`` is held, or moved to."""
+    """A stretch of a dance from ``start`` to ``end`` s in which the feet do not change; ``posture`` is held, or moved
+    to.
+    """
 
     start: float
     end: float
@@ -169,11 +170,11 @@ class Dance:
         """
         if phase.kind == "hold":
             x = np.repeat(self.postures[None, phase.posture], len(time), axis=0)
-            return closed(self.chain, phase.stance, x, *np.zeros((2, *x.shape)))
+            return close_legs(self.chain, phase.stance, x, *np.zeros((2, *x.shape)))
         move = phase.posture - 1
         points = np.stack([self.postures[move], *self.via[move], self.postures[move + 1]])
         basis = basis_at(np.clip(time - phase.start, 0.0, phase.end - phase.start), phase.end - phase.start)
-        return closed(self.chain, phase.stance, basis.position @ points, basis.velocity @ points, basis.acceleration @ points)
+        return close_legs(self.chain, phase.stance, basis.position @ points, basis.velocity @ points, basis.acceleration @ points)
 
     def motion(self, rate: float) -> Motion:
         """Return the whole dance, holds included, from 0 to its end.

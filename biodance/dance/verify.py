@@ -1,8 +1,8 @@
 """Is the finished dance allowed? Judged instant by instant by code that its design did not use.
 
-The design works in the coordinates of a chain, with its own closed-form forces, slopes and distances; here the dance is an ordinary Motion
-of the body, forces come from the regressor, torques from pinocchio's inverse dynamics, distances between solids from coal, and the base of
-support is drawn anew from where the soles really are.
+The design works in the coordinates of a chain, with its own closed-form forces, slopes and distances; here the dance is
+an ordinary Motion of the body, forces come from the regressor, torques from pinocchio's inverse dynamics, distances
+between solids from coal, and the base of support is drawn anew from where the soles really are.
 """
 
 from collections.abc import Iterable, Iterator
@@ -13,18 +13,21 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
-from biodance.dance.limits import NOTHING, CheckedMotion
-from biodance.dance.plan import Plan
+from biodance.dance.limits import NOTHING, CheckedMotion, Limit
 
 EDGES = np.array([0.0025, 0.005])
-"""s after the start and before the end of every move that are judged, too: there a foot has just left the ground or is about to return."""
+"""s after the start and before the end of every move that are judged, too: there a foot has just left the ground or is
+about to return.
+"""
 JUMP = 1e-6
 """rad, rad/s, rad/s²: jumps of coordinates between phases: rounding."""
 
 
 @dataclass(frozen=True)
 class Margin:
-    """What is left of one limit at its worst: ``worst`` in ``unit`` (negative: broken), at ``where_s`` s, of ``what`` (a joint, a pair)."""
+    """What is left of one limit at its worst: ``worst`` in ``unit`` (negative: broken), at ``where_s`` s, of ``what``
+    (a joint, a pair).
+    """
 
     limit: str
     worst: float
@@ -33,33 +36,39 @@ class Margin:
     what: str = ""
 
 
-def verify(body: Body, dance: Dance, plan: Plan, *, rate: float = 100.0, part: slice = slice(None)) -> tuple[Margin, ...]:
-    """Return the margin of every limit over the whole dance, sampled at ``rate`` Hz, at the ends of all phases and close to them.
+def verify(body: Body, dance: Dance, limits: tuple[Limit, ...], *, rate: float = 100.0, part: slice = slice(None)) -> tuple[Margin, ...]:
+    """Return the margin of every limit over the whole dance, sampled at ``rate`` Hz, at the ends of all phases and
+    close to them.
 
-    ``body`` whose limits count (usually ``dance.body``); ``plan`` whose limits count; ``part`` only these phases.
+    ``body`` whose limits count (usually ``dance.body``); ``limits`` with their numbers (`Plan.limits`); ``part`` only
+    these phases.
     """
     chosen = range(len(dance.phases))[part]
-    return _least([_continuity(dance), *(margin for k in chosen for margin in _margins(body, dance, plan, k, rate))])
+    return _least([_continuity(dance), *(margin for k in chosen for margin in _margins(body, dance, limits, k, rate))])
 
 
-def verify_with(workers: Executor, body: Body, dance: Dance, plan: Plan) -> tuple[Margin, ...]:
-    """Return what `verify` does, found by two ``workers`` side by side: one looks at every second phase, one at the others."""
-    tasks = [workers.submit(verify, body, dance, plan, part=slice(first, None, 2)) for first in range(2)]
+def verify_with(workers: Executor, body: Body, dance: Dance, limits: tuple[Limit, ...]) -> tuple[Margin, ...]:
+    """Return what `verify` does, found by two ``workers`` side by side: one looks at every second phase, one at the
+    others.
+    """
+    tasks = [workers.submit(verify, body, dance, limits, part=slice(first, None, 2)) for first in range(2)]
     return _least(margin for task in tasks for margin in task.result())
 
 
 def _least(margins: Iterable[Margin]) -> tuple[Margin, ...]:
-    """Return the worst margin of every limit, by name; of equal ones the first in time; one that is no number is the worst."""
+    """Return the worst margin of every limit, by name; of equal ones the first in time; one that is no number is the
+    worst.
+    """
     worst: dict[str, Margin] = {}
     for margin in sorted(margins, key=lambda one: (np.nan_to_num(one.worst, nan=-np.inf), one.where_s)):
         worst.setdefault(margin.limit, margin)
     return tuple(worst[name] for name in sorted(worst))
 
 
-def _margins(body: Body, dance: Dance, plan: Plan, number: int, rate: float) -> Iterator[Margin]:
+def _margins(body: Body, dance: Dance, limits: tuple[Limit, ...], number: int, rate: float) -> Iterator[Margin]:
     """Yield the worst margin of every limit in one phase."""
     motion, held = _motion(body, dance, number, rate), dance.phases[number].kind == "hold"
-    for limit in plan.limits:
+    for limit in limits:
         left = limit.check(motion) if (limit.at_rest if held else limit.in_motion) else NOTHING
         if left.value.size:
             t, k = np.unravel_index(int(np.argmin(left.value)), left.value.shape)

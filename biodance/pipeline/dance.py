@@ -12,13 +12,13 @@ from biodance import display
 from biodance.body.body import Body
 from biodance.body.human import human
 from biodance.body.limits import joint_limits
-from biodance.dance.account import Account, account
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.expectation import Expectation, expect
 from biodance.dance.limits import Limit
-from biodance.dance.person import PersonLimits, fitted
-from biodance.dance.plan import Plan
+from biodance.dance.metrics import DanceMetrics, dance_metrics
+from biodance.dance.problem.person import PersonLimits, fit_to_person
+from biodance.dance.problem.plan import Plan
 from biodance.dance.verify import Margin, broken
 from biodance.errors import BiodanceError
 from biodance.records import Subject
@@ -79,7 +79,7 @@ class DanceResult:
     plan: Plan
     dance: Dance | None
     margins: tuple[Margin, ...]
-    account: Account | None
+    account: DanceMetrics | None
     expectation: Expectation | None
     reason: str
     notes: tuple[str, ...]
@@ -139,10 +139,10 @@ def make_dance(
     Raises
     ------
     BiodanceError
-        The protocol and the person contradict each other (`person.fitted`).
+        The protocol and the person contradict each other (`fit_to_person`).
     """
     started = time.perf_counter()
-    own, plan, notes = fitted(body, plan.with_limits(limits), person)
+    own, plan, notes = fit_to_person(body, plan.with_limits(limits), person)
     reason, margins, dance = "", tuple[Margin, ...](), None
     try:
         dance, margins = makers.design(own, plan, seed=seed, tell=tell, resume=resume)
@@ -152,7 +152,7 @@ def make_dance(
     if dance is not None:
         tell("counting what the dance tells", 0, 0)
         with ProcessPoolExecutor(1) as aside:
-            numbers = aside.submit(account, dance, plan)
+            numbers = aside.submit(dance_metrics, dance, plan)
             expected, counted = makers.expect(dance), numbers.result()
         reason = " ".join(_told(margin) for margin in broken(margins))
     if reason:

@@ -267,8 +267,8 @@ def design_dance(
     >>> made = biodance.design_dance(biodance.Subject(65.0, 1.75, "F", 33.0), "short")  # doctest: +SKIP
     >>> made.dance.save("dance.npz")  # doctest: +SKIP
     """
-    from biodance.dance.person import HEALTHY, read_person
-    from biodance.dance.protocol import read_plan
+    from biodance.dance.problem.person import HEALTHY, read_person
+    from biodance.dance.problem.plan import read_plan
     from biodance.pipeline.dance import dancer, make_dance
 
     plan = read_plan(protocol)
@@ -310,13 +310,13 @@ def verify_dance(
     True
     """
     from biodance.dance.dance import Dance
-    from biodance.dance.person import HEALTHY, fitted, read_person
-    from biodance.dance.protocol import read_plan
+    from biodance.dance.problem.person import HEALTHY, fit_to_person, read_person
+    from biodance.dance.problem.plan import read_plan
     from biodance.dance.verify import verify
 
     one = dance if isinstance(dance, Dance) else Dance.load(dance)
-    own, plan, _ = fitted(body or one.body, read_plan(protocol or one.protocol), read_person(Path(limits)) if limits else HEALTHY)
-    return verify(own, one, plan)
+    own, plan, _ = fit_to_person(body or one.body, read_plan(protocol or one.protocol), read_person(Path(limits)) if limits else HEALTHY)
+    return verify(own, one, plan.limits)
 
 
 def simulate(subject: Subject, protocol: str, out: str | Path, *, seed: int = 0, effects: Iterable[str] = ()) -> Path:

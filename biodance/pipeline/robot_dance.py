@@ -8,11 +8,10 @@ from biodance.body.body import Body
 from biodance.body.standing_frames import standing_frames
 from biodance.body.urdf import read_urdf
 from biodance.dance.limits import Limit
-from biodance.dance.person import PersonLimits
-from biodance.dance.plan import Plan
-from biodance.dance.robot import design_robot, robot_plan
-from biodance.dance.robot_expectation import expect_robot
-from biodance.dance.shapes import unchecked_pairs
+from biodance.dance.problem.person import PersonLimits
+from biodance.dance.problem.plan import Plan
+from biodance.dance.problem.shapes import unchecked_pairs
+from biodance.dance.robot import design_robot, expect_robot, robot_plan
 from biodance.errors import BiodanceError
 from biodance.pipeline.dance import DanceResult, Makers, Tell, make_dance
 

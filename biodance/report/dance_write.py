@@ -8,8 +8,7 @@ import numpy as np
 
 from biodance.dance.cues import cue_sheet
 from biodance.dance.dance import Dance
-from biodance.dance.refusal import told
-from biodance.dance.stance import Stance
+from biodance.dance.problem.stance import Stance, stance_words
 from biodance.dance.verify import Margin
 from biodance.lab.write_c3d import write_c3d
 from biodance.motion.kinematics import poses
@@ -116,7 +115,7 @@ def cues(dance: Dance) -> str:
     """Return the cue sheet of all postures, those in between included: in words for a person, joint angles for a robot without markers."""
     if not dance.body.markers.names:
         return angle_sheet(dance, _held(dance, range(len(dance.stances)))[0][:, 6:])
-    words = tuple(told(s) if s.over is None else f"{told(s.on(0, 1))}, the weight on the {SIDES[s.over]} one" for s in dance.stances)
+    words = tuple(stance_words(s) for s in dance.stances)
     angles = _held(dance, range(len(dance.stances)))[0][:, 6:]
     planted = tuple(tuple(SIDES[side] for side in s.planted) for s in dance.stances)
     return cue_sheet(dance.body, angles, words, planted, move=float(np.median(dance.move)), hold=float(np.max(dance.hold)))

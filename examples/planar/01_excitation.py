@@ -1,7 +1,7 @@
 """The paper's Fig. 4: six motions of a planar chain, designed by different criteria, all judged by cond(W_b).
 
-Left from the paper's start (all joints move in proportion, W_b is singular), right from seeded via points. Joint ranges, masses and
-ends of the motions are assumed (see series.py); the dots are the values that the paper prints.
+Left from the paper's start (all joints move in proportion, W_b is singular), right from seeded via points. Joint
+ranges, masses and ends of the motions are assumed (see series.py); the dots are the values that the paper prints.
 
 python examples/planar/01_excitation.py [FIGURE.png]
 """

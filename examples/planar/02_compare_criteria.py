@@ -1,4 +1,5 @@
-"""All excitation criteria on one body: each designs a motion, each judges all of them, and what would be known afterwards.
+"""All excitation criteria on one body: each designs a motion, each judges all of them, and what would be known
+afterwards.
 
 python examples/planar/02_compare_criteria.py [FIGURE.png]
 """

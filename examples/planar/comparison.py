@@ -1,7 +1,8 @@
-"""All criteria on one body: each designs one trajectory, each scores all of them, and what would be known afterwards is beside it.
+"""All criteria on one body: each designs one trajectory, each scores all of them, and what would be known afterwards is
+beside it.
 
-Every criterion gets the same seeded starts and the winners of the others as further starts, so that a difference between rows comes from
-what the criteria want and not from where they began.
+Every criterion gets the same seeded starts and the winners of the others as further starts, so that a difference
+between rows comes from what the criteria want and not from where they began.
 """
 
 from collections.abc import Callable
@@ -16,10 +17,12 @@ from biodance.records import Array, frozen_array
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """``score[i, j]`` (C, C) is what criterion ``names[j]`` says of the design of ``names[i]``: smaller is better, columns have own units.
+    """``score[i, j]`` (C, C) is what criterion ``names[j]`` says of the design of ``names[i]``: smaller is better,
+    columns have own units.
 
-    ``points`` (C, k, joints) rad of the designs; ``sd_before`` (10N,) standard deviations of the SIP in the table and ``sd_after``
-    (C, 10N) those expected after each design, for independent wrench samples with 1 N and 1 N·m of noise; kg, kg·m, kg·m².
+    ``points`` (C, k, joints) rad of the designs; ``sd_before`` (10N,) standard deviations of the SIP in the table and
+    ``sd_after`` (C, 10N) those expected after each design, for independent wrench samples with 1 N and 1 N·m of noise;
+    kg, kg·m, kg·m².
     """
 
     names: tuple[str, ...]
@@ -35,7 +38,9 @@ class Comparison:
 
     @property
     def lost(self) -> Array:
-        """(C, C) how much worse each design is than the best of its column: ratio for condition numbers, difference for logarithms."""
+        """(C, C) how much worse each design is than the best of its column: ratio for condition numbers, difference for
+        logarithms.
+        """
         best = self.score.min(axis=0)
         plain = np.array([name in ("condition", "mass_weighted") for name in self.names])
         return np.where(plain, self.score / np.where(plain, best, 1.0), self.score - best)
@@ -54,7 +59,8 @@ class Comparison:
 def compare_criteria(
     problem_of: Callable[[str], Excitation], starts: tuple[Array, ...], *, movable: slice, names: tuple[str, ...] = ()
 ) -> Comparison:
-    """Return the comparison of the criteria ``names`` (default: all) on the problems ``problem_of(name)``, which differ in nothing else.
+    """Return the comparison of the criteria ``names`` (default: all) on the problems ``problem_of(name)``, which differ
+    in nothing else.
 
     ``starts`` are points (k, joints) rad; only ``movable`` points are designed.
     """

@@ -1,8 +1,9 @@
 """Seven excitation criteria: each judges what a movement tells about the parameters of the chain; smaller is better.
 
-A criterion judges the information G = R'R = W'W (p, p) of the whitened regressor over the SIP, accumulated over a whole movement and
-given as its triangle R (or any rows with the same G). It returns (value, gradient) with ``gradient`` (p, p) symmetric, dJ = <gradient, dG>.
-So every criterion works for every body and movement, and its derivative by a motion is the chain rule through W.
+A criterion judges the information G = R'R = W'W (p, p) of the whitened regressor over the SIP, accumulated over a whole
+movement and given as its triangle R (or any rows with the same G). It returns (value, gradient) with ``gradient`` (p,
+p) symmetric, dJ = <gradient, dG>. So every criterion works for every body and movement, and its derivative by a motion
+is the chain rule through W.
 """
 
 from collections.abc import Callable
@@ -33,7 +34,9 @@ def condition(triangle: Array, target: Target) -> tuple[float, Array]:
 
 
 def mass_weighted(triangle: Array, target: Target) -> tuple[float, Array]:
-    """Return the paper's sum_i M_i cond(W_bi), kg (eq. 12), and its gradient; a segment whose block is empty does not count."""
+    """Return the paper's sum_i M_i cond(W_bi), kg (eq. 12), and its gradient; a segment whose block is empty does not
+    count.
+    """
     total, slope = 0.0, np.zeros((triangle.shape[1],) * 2)
     for weight, block in zip(target.weights, target.blocks, strict=True):
         if block and weight > 0:
@@ -44,7 +47,9 @@ def mass_weighted(triangle: Array, target: Target) -> tuple[float, Array]:
 
 
 def d_optimal(triangle: Array, target: Target) -> tuple[float, Array]:
-    """Return -log det(W_b'W_b), the volume of the confidence ellipsoid, and its gradient; floored at 1e-30 of the largest eigenvalue."""
+    """Return -log det(W_b'W_b), the volume of the confidence ellipsoid, and its gradient; floored at 1e-30 of the
+    largest eigenvalue.
+    """
     value, vector = spectrum(triangle, target.columns)
     gradient = np.zeros((triangle.shape[1],) * 2)
     gradient[np.ix_(target.columns, target.columns)] = -(vector / value) @ vector.T
@@ -52,7 +57,9 @@ def d_optimal(triangle: Array, target: Target) -> tuple[float, Array]:
 
 
 def a_optimal(triangle: Array, target: Target) -> tuple[float, Array]:
-    """Return log tr(D^-1 (W_b'W_b)^-1 D^-1), D the table's standard deviations (1 where the table fixes a parameter), and its gradient."""
+    """Return log tr(D^-1 (W_b'W_b)^-1 D^-1), D the table's standard deviations (1 where the table fixes a parameter),
+    and its gradient.
+    """
     pick = np.ix_(target.columns, target.columns)
     sd = np.linalg.norm(target.prior_factor, axis=1)[list(target.columns)]
     scale = np.where(sd > 0, sd, 1.0)
@@ -66,7 +73,8 @@ def a_optimal(triangle: Array, target: Target) -> tuple[float, Array]:
 def posterior_variance(triangle: Array, target: Target) -> tuple[float, Array]:
     """Return log sum_k weight_k C_kk / P_kk over the parameters of the weighted blocks, and its gradient.
 
-    Posterior covariance C = S (1 + S'GS)^-1 S' for a table covariance P = S S' and a G whitened by the noise of the lab.
+    Posterior covariance C = S (1 + S'GS)^-1 S' for a table covariance P = S S' and a G whitened by the noise of the
+    lab.
     """
     S = target.prior_factor
     before = np.sum(S**2, axis=1)
@@ -81,7 +89,9 @@ def posterior_variance(triangle: Array, target: Target) -> tuple[float, Array]:
 
 
 def log_of(criterion: Criterion) -> Criterion:
-    """Return the logarithm of a criterion: the same optimum, but a slope that does not explode where the start is nearly singular."""
+    """Return the logarithm of a criterion: the same optimum, but a slope that does not explode where the start is
+    nearly singular.
+    """
 
     def logarithm(triangle: Array, target: Target) -> tuple[float, Array]:
         value, gradient = criterion(triangle, target)

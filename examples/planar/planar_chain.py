@@ -1,8 +1,10 @@
-"""The planar chain of the paper's numerical example (III.C, Fig. 4): head and trunk, arm, hand in a vertical plane, base fixed.
+"""The planar chain of the paper's numerical example (III.C, Fig. 4): head and trunk, arm, hand in a vertical plane,
+base fixed.
 
-Printed in the paper: three hinges, the link lengths 0.8 m and 0.2 m (they appear in eq. 13), base wrench Fx, Fy, Mz. NOT printed, hence
-assumed here and said in the body's notes: masses (Winter 2009, for 65 kg), centres of mass, inertias (uniform rods), joint ranges.
-The chain lies in the plane x (along a link) and y (up at rest: gravity is -y), the axes are z, as in the paper.
+Printed in the paper: three hinges, the link lengths 0.8 m and 0.2 m (they appear in eq. 13), base wrench Fx, Fy, Mz.
+NOT printed, hence assumed here and said in the body's notes: masses (Winter 2009, for 65 kg), centres of mass, inertias
+(uniform rods), joint ranges. The chain lies in the plane x (along a link) and y (up at rest: gravity is -y), the axes
+are z, as in the paper.
 """
 
 from types import MappingProxyType
@@ -29,7 +31,9 @@ RANGES = MappingProxyType(
         "wide": ((-90.0, 90.0), (-90.0, 90.0), (-90.0, 90.0)),
     }
 )
-"""Assumed joint ranges, deg: the frontal plane of a person (trunk bending, shoulder abduction, wrist deviation), and two plain ones."""
+"""Assumed joint ranges, deg: the frontal plane of a person (trunk bending, shoulder abduction, wrist deviation), and
+two plain ones.
+"""
 
 
 def planar_chain(*, ranges: str = "frontal") -> Body:
@@ -68,14 +72,18 @@ def planar_chain(*, ranges: str = "frontal") -> Body:
 
 
 def _rod(mass: float, length: float) -> Array:
-    """Return the ten parameters of a rod along x about its proximal end, the centre of mass 1 % of the length off its axis."""
+    """Return the ten parameters of a rod along x about its proximal end, the centre of mass 1 % of the length off its
+    axis.
+    """
     x, y = 0.5 * length, 0.01 * length
     inertia = mass * length**2 / 3
     return np.array([mass, mass * x, mass * y, 0.0, 0.0, 0.0, inertia, 0.0, 0.0, inertia])
 
 
 def _spread() -> Array:
-    """Return the covariance (30, 30): standard deviations of 10 % of each value, and of 1 cm for the centre of mass across the rod."""
+    """Return the covariance (30, 30): standard deviations of 10 % of each value, and of 1 cm for the centre of mass
+    across the rod.
+    """
     sd = np.concatenate([0.1 * np.abs(_rod(m, length)) for m, length in zip(MASSES, LENGTHS, strict=True)])
     sd[2::10] = 0.01 * np.array(MASSES)
     return np.diag(sd**2)

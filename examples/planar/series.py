@@ -1,9 +1,10 @@
 """The paper's numerical example (III.C, Fig. 4), which criterion excites a planar chain of three links best.
 
-Six motions of 2 s follow each other; each is designed on top of all before it; cond(W_b) at 50 Hz judges every criterion alike. Four via
-points per joint at equal distances, so 12 variables, as printed. NOT printed, hence chosen here: joint ranges and masses (see
-``planar_chain``), rest at both ends of each motion (sixth-order splines as in III.A: a cubic through four points has accelerations linear
-in time and leaves ZZ1, ZZ2, ZZ3 dependent whatever the points), and where the motions begin and end (see the two functions).
+Six motions of 2 s follow each other; each is designed on top of all before it; cond(W_b) at 50 Hz judges every
+criterion alike. Four via points per joint at equal distances, so 12 variables, as printed. NOT printed, hence chosen
+here: joint ranges and masses (see ``planar_chain``), rest at both ends of each motion (sixth-order splines as in III.A:
+a cubic through four points has accelerations linear in time and leaves ZZ1, ZZ2, ZZ3 dependent whatever the points),
+and where the motions begin and end (see the two functions).
 """
 
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ from target import target
 from via_points import Excitation, design, within_ranges
 
 from biodance.body.body import Body
-from biodance.dance.splines import rest_to_rest
+from biodance.dance.problem.splines import rest_to_rest
 from biodance.identify.base_parameters import BaseParameters, base_parameters, parameter_names
 from biodance.motion.kinematics import segment_motion
 from biodance.motion.regressor import regressor_of
@@ -27,14 +28,18 @@ DURATION = 2.0
 """s, of one motion."""
 VIA = 4
 DESIGN_RATE, JUDGE_RATE, RANGE_RATE = 25.0, 50.0, 1000.0
-"""Hz: samples that the optimiser sees, on which the result is judged (the paper's), and on which the joint ranges must hold."""
+"""Hz: samples that the optimiser sees, on which the result is judged (the paper's), and on which the joint ranges must
+hold.
+"""
 ITERATIONS = 60
 MOVABLE = slice(1, -1)
 
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Motions of one criterion: ``points`` (motions, VIA + 2, joints) rad; ``condition`` (motions,) cond(W_b) after each, at 50 Hz."""
+    """Motions of one criterion: ``points`` (motions, VIA + 2, joints) rad; ``condition`` (motions,) cond(W_b) after
+    each, at 50 Hz.
+    """
 
     criterion: str
     points: Array
@@ -57,7 +62,8 @@ def planar_problem(body: Body, name: str, *, rate: float = DESIGN_RATE) -> Excit
 
 
 def paper_series(body: Body, name: str, *, motions: int = MOTIONS) -> Series:
-    """Return motions designed from the paper's start: a line from the lower to the upper limits of all joints, then back, and so on.
+    """Return motions designed from the paper's start: a line from the lower to the upper limits of all joints, then
+    back, and so on.
 
     On the line all joints move in proportion, so the first W_b is singular (the paper: condition number 5e16).
     """
@@ -67,7 +73,9 @@ def paper_series(body: Body, name: str, *, motions: int = MOTIONS) -> Series:
 
 
 def seeded_series(body: Body, name: str, *, motions: int = MOTIONS, starts: int = 3, seed: int = 0) -> Series:
-    """Return motions from mid-range to mid-range, each the best of ``starts`` designs from via points drawn within the ranges."""
+    """Return motions from mid-range to mid-range, each the best of ``starts`` designs from via points drawn within the
+    ranges.
+    """
     rng, middle = np.random.default_rng(seed), (body.limits.lower + body.limits.upper) / 2
 
     def draw() -> Array:

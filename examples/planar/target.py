@@ -15,8 +15,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """``columns`` (nb) the base columns among the SIP; ``blocks`` those of each segment that count (empty: the segment does not);
-    ``weights`` (N,) of the segments, kg in eq. 12; ``prior_factor`` (p, k) with covariance S S' of the table.
+    """``columns`` (nb) the base columns among the SIP; ``blocks`` those of each segment that count (empty: the segment
+    does not); ``weights`` (N,) of the segments, kg in eq. 12; ``prior_factor`` (p, k) with covariance S S' of the
+    table.
     """
 
     columns: tuple[int, ...]
@@ -32,7 +33,9 @@ class Target:
 
     @property
     def bound(self) -> float:
-        """Smallest value that the mass-weighted sum of condition numbers can have: every condition number is at least 1."""
+        """Smallest value that the mass-weighted sum of condition numbers can have: every condition number is at least
+        1.
+        """
         return float(sum(w for w, block in zip(self.weights, self.blocks, strict=True) if block))
 
 
@@ -44,7 +47,8 @@ def target(
     segments: tuple[str, ...] | None = None,
     weights: Array | None = None,
 ) -> Target:
-    """Return the target for the masses and first moments ("static"), the inertias ("dynamic") or all base parameters of ``segments``.
+    """Return the target for the masses and first moments ("static"), the inertias ("dynamic") or all base parameters of
+    ``segments``.
 
     ``weights`` (N,) default to the segments' masses in the table (paper eq. 12).
     """
@@ -58,7 +62,8 @@ def target(
 
 
 def spectrum(triangle: Array, columns: tuple[int, ...]) -> tuple[Array, Array]:
-    """Return eigenvalues (descending, floored at 1e-30 of the largest) and eigenvectors of the Gram matrix of the chosen ``columns``.
+    """Return eigenvalues (descending, floored at 1e-30 of the largest) and eigenvectors of the Gram matrix of the
+    chosen ``columns``.
 
     Taken from the singular values of the triangle, so that condition numbers up to 1e15 are seen, not only up to 1e8.
     """

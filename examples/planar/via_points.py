@@ -1,8 +1,9 @@
 """Optimise the via points of one trajectory so that the regressor it adds to the history reveals the most.
 
-For bodies with few joints and any criterion: the regressor of the trajectory and its derivative with respect to every via point come
-from one batched call on centrally perturbed trajectories, the criterion's own gradient is analytic, joint ranges are linear constraints on
-the samples, and SLSQP does the rest. The paper's planar example (III.C) is solved with it.
+For bodies with few joints and any criterion: the regressor of the trajectory and its derivative with respect to every
+via point come from one batched call on centrally perturbed trajectories, the criterion's own gradient is analytic,
+joint ranges are linear constraints on the samples, and SLSQP does the rest. The paper's planar example (III.C) is
+solved with it.
 """
 
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ from scipy.optimize import minimize
 from target import Target
 
 from biodance.body.body import Body
-from biodance.dance.splines import Basis
+from biodance.dance.problem.splines import Basis
 from biodance.identify.information import fold
 from biodance.motion.kinematics import segment_motion
 from biodance.motion.regressor import regressor_of
@@ -28,8 +29,8 @@ EVERY = 4
 
 @dataclass(frozen=True, eq=False)
 class Excitation:
-    """One design problem on a body with fixed root: ``basis`` (n samples, k via points), ``channels`` of the wrench that are measured,
-    ``gravity`` (3,) m/s² in the lab frame, ``target`` and ``criterion``.
+    """One design problem on a body with fixed root: ``basis`` (n samples, k via points), ``channels`` of the wrench
+    that are measured, ``gravity`` (3,) m/s² in the lab frame, ``target`` and ``criterion``.
     """
 
     body: Body
@@ -40,7 +41,9 @@ class Excitation:
     gravity: Array
 
     def samples(self, points: Array) -> tuple[Array, Array, Array]:
-        """Return position rad, velocity rad/s and acceleration rad/s² (n, joints) of the trajectory through ``points`` (k, joints) rad."""
+        """Return position rad, velocity rad/s and acceleration rad/s² (n, joints) of the trajectory through ``points``
+        (k, joints) rad.
+        """
         basis = self.basis
         return basis.position @ points, basis.velocity @ points, basis.acceleration @ points
 
@@ -61,7 +64,9 @@ class Excitation:
         return fold(self.regressor(points), history)
 
     def value_and_gradient(self, points: Array, history: Array) -> tuple[float, Array]:
-        """Return the criterion of ``history`` plus this trajectory, and its gradient (k, joints) with respect to the points."""
+        """Return the criterion of ``history`` plus this trajectory, and its gradient (k, joints) with respect to the
+        points.
+        """
         states = np.stack(self.samples(points))
         value, slope = self.criterion(fold(self.regressor(points), history), self.target)
         kinds, frames, joints = states.shape
@@ -76,8 +81,8 @@ class Excitation:
 def design(problem: Excitation, start: Array, history: Array, *, movable: slice = ALL_POINTS, iterations: int = 200) -> Array:
     """Return points (k, joints) rad that minimise the criterion within the joint ranges, from ``start`` (k, joints).
 
-    Only the ``movable`` points move, the others (ends that are given) stay. The optimiser sees the ranges at every fourth sample; what it
-    finds is then shrunk towards mid-range until every sample respects them.
+    Only the ``movable`` points move, the others (ends that are given) stay. The optimiser sees the ranges at every
+    fourth sample; what it finds is then shrunk towards mid-range until every sample respects them.
     """
     limits = problem.body.limits
     samples = problem.basis.position[::EVERY, movable]
@@ -104,7 +109,8 @@ def design(problem: Excitation, start: Array, history: Array, *, movable: slice 
 def within_ranges(problem: Excitation, points: Array) -> Array:
     """Return ``points`` (k, joints) rad shrunk towards mid-range, joint by joint, so that no sample leaves its range.
 
-    Exact because a spline is affine in its points; a given end at the limit of its joint moves only where a sample beyond it forces it.
+    Exact because a spline is affine in its points; a given end at the limit of its joint moves only where a sample
+    beyond it forces it.
     """
     limits = problem.body.limits
     middle, half = (limits.upper + limits.lower) / 2, (limits.upper - limits.lower) / 2

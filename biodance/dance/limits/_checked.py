@@ -1,4 +1,6 @@
-"""A stretch of any motion, as the check of every limit sees it: an ordinary Motion of the body, nothing of the design's coordinates."""
+"""A stretch of any motion, as the check of every limit sees it: an ordinary Motion of the body, nothing of the design's
+coordinates.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -6,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.dance.stance import Stance
+from biodance.dance.problem.stance import Stance
 from biodance.motion.dynamics import distribute, joint_torques
 from biodance.motion.kinematics import Poses, poses
 from biodance.motion.regressor import predict_wrench
@@ -17,7 +19,9 @@ SIDES = ("right", "left")
 
 @dataclass(frozen=True, eq=False)
 class Remaining:
-    """What is left of a limit: ``value`` (T, m) in its unit, negative where it is broken; ``of`` (m) which joint, side or pair."""
+    """What is left of a limit: ``value`` (T, m) in its unit, negative where it is broken; ``of`` (m) which joint, side
+    or pair.
+    """
 
     value: Array
     of: tuple[str, ...]
@@ -63,7 +67,9 @@ class CheckedMotion:
         return (self.stance.planted,) if self.stance.over is None else (self.stance.planted, (self.stance.over,))
 
     def torques(self, bearing: tuple[int, ...]) -> Array:
-        """Return the torques (T, n) N·m of the joints, by pinocchio's inverse dynamics, when the feet ``bearing`` carry everything."""
+        """Return the torques (T, n) N·m of the joints, by pinocchio's inverse dynamics, when the feet ``bearing`` carry
+        everything.
+        """
         touching = np.tile([side in bearing for side in (0, 1)], (self.motion.time.size, 1))
         loads = {}
         if bearing:

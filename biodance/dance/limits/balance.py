@@ -1,13 +1,14 @@
-"""The zero-moment point (at rest: the projected centre of mass) stays inside the reduced base of support (paper eq. 16)."""
+"""The zero-moment point (at rest: the projected centre of mass) stays inside the reduced base of support (paper eq.
+16).
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.dance.limits._checked import CheckedMotion, Remaining
-from biodance.dance.limits._limit import Limit, Margins, bounded
-from biodance.dance.stance import Stance
-from biodance.dance.state import State
+from biodance.dance.limits import CheckedMotion, Limit, Margins, Remaining, bounded
+from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.state import State
 from biodance.motion.dynamics import zmp
 from biodance.records import Array
 
@@ -42,7 +43,9 @@ class Balance(Limit):
         return Margins(point @ normals.T + offsets, normals @ moved)
 
     def check(self, motion: CheckedMotion) -> Remaining:
-        """Return the distance (T, 1) m inside the reduced base, drawn from where the soles really are, of all feet that may bear all."""
+        """Return the distance (T, 1) m inside the reduced base, drawn from where the soles really are, of all feet that
+        may bear all.
+        """
         point, soles = zmp(motion.wrench)[:, :2], [sole[0, :, :2] for sole in motion.soles]
         corners = [np.concatenate([*(soles[side] for side in base), motion.stance.props]) for base in motion.bases]
         least = np.min([_inside(point, some, self.share) for some in corners], axis=0)
@@ -53,7 +56,9 @@ LIMIT = Balance
 
 
 def _inside(point: Array, corners: Array, share: float) -> Array:
-    """Return the distance (T,) m of points (T, 2) inside the hull of ``corners`` (K, 2), drawn together to ``share`` about its middle."""
+    """Return the distance (T,) m of points (T, 2) inside the hull of ``corners`` (K, 2), drawn together to ``share``
+    about its middle.
+    """
     from scipy.spatial import ConvexHull
 
     hull = ConvexHull(corners)

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import UPRIGHT, Body
-from biodance.dance.limits._checked import SIDES, CheckedMotion, Remaining
-from biodance.dance.limits._limit import Limit, Margins, bounded, unconcerned
-from biodance.dance.stance import Stance
-from biodance.dance.state import State
+from biodance.dance.limits import CheckedMotion, Limit, Margins, Remaining, bounded, unconcerned
+from biodance.dance.limits._checked import SIDES
+from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.state import State
 from biodance.motion.kinematics import poses
 
 STILL = 1e-6
@@ -17,8 +17,8 @@ STILL = 1e-6
 
 @dataclass(frozen=True)
 class FootPlacement(Limit):
-    """``least_knee`` degrees of flexion: the closed-form legs bend reach smoothly over the last 2 mm, and nobody is asked to lock the
-    knees.
+    """``least_knee`` degrees of flexion: the closed-form legs bend reach smoothly over the last 2 mm, and nobody is
+    asked to lock the knees.
     """
 
     least_knee: float = bounded(9.0, 3.0, 60.0, "degrees")
@@ -41,7 +41,8 @@ class FootPlacement(Limit):
         return Margins(longest - distance, -np.einsum("tkc,tkcn->tkn", away / distance[..., None], slope)[None])
 
     def check(self, motion: CheckedMotion) -> Remaining:
-        """Return how much longer each planted leg could be, or how far its foot is from where it stands, negative, (T, planted feet) m.
+        """Return how much longer each planted leg could be, or how far its foot is from where it stands, negative, (T,
+        planted feet) m.
 
         The reach of legs whose hip is no single point (some robots') is not judged, only their feet.
         """
@@ -63,8 +64,8 @@ LIMIT = FootPlacement
 
 
 def _measured(body: Body, side: str, knee: float) -> tuple[int, float] | None:
-    """Return the segment that begins at the hip and the way m from there to the ankle with the knee bent by ``knee`` rad, measured on
-    the body; None where hip or ankle is no single point.
+    """Return the segment that begins at the hip and the way m from there to the ankle with the knee bent by ``knee``
+    rad, measured on the body; None where hip or ankle is no single point.
     """
     foot = body.feet[side].segment
     path = [body.segment_joint[foot]]

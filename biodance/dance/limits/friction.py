@@ -1,15 +1,15 @@
 """No foot slips: the force stays inside the friction pyramid, mu F_z >= |F_x|, |F_y| (paper eq. 19, printed inverted).
 
-Both feet's forces point the same way (``feet.foot_forces``), so that the total decides for each of them. Standing still needs no friction.
+Both feet's forces point the same way (``feet.foot_forces``), so that the total decides for each of them. Standing still
+needs no friction.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.dance.limits._checked import CheckedMotion, Remaining
-from biodance.dance.limits._limit import Limit, Margins, bounded
-from biodance.dance.state import State
+from biodance.dance.limits import CheckedMotion, Limit, Margins, Remaining, bounded
+from biodance.dance.problem.state import State
 
 
 @dataclass(frozen=True)

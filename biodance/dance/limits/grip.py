@@ -1,13 +1,15 @@
-"""A hand that holds on to a frame stays on its grip. The frame is for safety: the base of support remains that of the feet."""
+"""A hand that holds on to a frame stays on its grip. The frame is for safety: the base of support remains that of the
+feet.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.dance.limits._checked import NOTHING, SIDES, CheckedMotion, Remaining
-from biodance.dance.limits._limit import Limit, Margins, bounded, unconcerned
-from biodance.dance.shapes import palm
-from biodance.dance.state import State
+from biodance.dance.limits import NOTHING, CheckedMotion, Limit, Margins, Remaining, bounded, unconcerned
+from biodance.dance.limits._checked import SIDES
+from biodance.dance.problem.shapes import palm
+from biodance.dance.problem.state import State
 
 
 @dataclass(frozen=True)
@@ -18,7 +20,9 @@ class Grip(Limit):
     name, unit, scale, suspicion = "grip", "m", 0.05, 40
 
     def margins(self, state: State) -> Margins:
-        """Return how much further each holding palm may be from its grip, (T, holding hands) m; none where nothing is held."""
+        """Return how much further each holding palm may be from its grip, (T, holding hands) m; none where nothing is
+        held.
+        """
         holding = [side for side in (0, 1) if np.isfinite(state.stance.hands[side, 0])]
         if not holding:
             return unconcerned(state)

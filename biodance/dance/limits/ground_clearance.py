@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.dance.limits._checked import NOTHING, SIDES, CheckedMotion, Remaining
-from biodance.dance.limits._limit import Limit, Margins, bounded, unconcerned
-from biodance.dance.state import State
+from biodance.dance.limits import NOTHING, CheckedMotion, Limit, Margins, Remaining, bounded, unconcerned
+from biodance.dance.limits._checked import SIDES
+from biodance.dance.problem.state import State
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.dance.chain import ROOT
-from biodance.dance.limits._checked import CheckedMotion, Remaining
-from biodance.dance.limits._limit import Limit, Margins, bounded, repeated
-from biodance.dance.state import State
+from biodance.dance.limits import CheckedMotion, Limit, Margins, Remaining, bounded, repeated
+from biodance.dance.problem.chain import ROOT
+from biodance.dance.problem.state import State
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.dance.limits._checked import CheckedMotion, Remaining
-from biodance.dance.limits._limit import Limit, Margins, bounded
-from biodance.dance.state import State
+from biodance.dance.limits import CheckedMotion, Limit, Margins, Remaining, bounded
+from biodance.dance.problem.state import State
 
 
 @dataclass(frozen=True)
@@ -17,8 +16,8 @@ class JointTorque(Limit):
     name, unit, scale, suspicion = "joint_torque", "N m", 15.0, 10
 
     def margins(self, state: State) -> Margins:
-        """Return distance to the lower and to the upper torque limit, (T, 2 joints) N m; with the weight over one foot of two, (T, 4
-        joints): as the feet share the load, and as that one bears all of it.
+        """Return distance to the lower and to the upper torque limit, (T, 2 joints) N m; with the weight over one foot
+        of two, (T, 4 joints): as the feet share the load, and as that one bears all of it.
         """
         parts = [self._of(state)] + ([self._of(state.alone)] if state.stance.over is not None else [])
         return Margins(np.concatenate([part.value for part in parts], axis=1), np.concatenate([part.slopes for part in parts], axis=2))

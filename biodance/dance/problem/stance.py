@@ -11,29 +11,35 @@ from biodance.records import Array, frozen_array
 WIDTH = 0.12
 """Distance between the ankles, fraction of stature (about 1.3 times the width of the hips)."""
 STRIP, CLEAR = 0.1, 1.25
-"""Of the width of a sole: how much the reduced supports of both feet and of one overlap at least; of its inner half: room between feet."""
+"""Of the width of a sole: how much the reduced supports of both feet and of one overlap at least; of its inner half:
+room between feet.
+"""
 FORWARD = 0.2
 """m: how far the right foot stands in front (paper III.D, human subject)."""
 SINGLE = {"single_right": (0,), "single_left": (1,)}
 STOOL = np.array([[-0.15, -0.2], [0.25, -0.2], [0.25, 0.2], [-0.15, 0.2]])
-"""(4, 2) m where the legs of a stool stand, from below the hips: a seat of 0.4 m by 0.4 m that bears the thighs to their middle."""
+"""(4, 2) m where the legs of a stool stand, from below the hips: a seat of 0.4 m by 0.4 m that bears the thighs to
+their middle.
+"""
 HANGING = 0.08
 """m between the ground and the soles of hanging legs on a stool."""
-
 GRIP = (0.18, 0.28, 0.50)
-"""Grips of a walking frame: m ahead of the heels' line, m to the side, and height over stature (crease of the wrist, as they are set)."""
+"""Grips of a walking frame: m ahead of the heels' line, m to the side, and height over stature (crease of the wrist, as
+they are set).
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Stance:
     """One foot configuration.
 
-    ``name``; ``ankle`` (2, 3) m lab frame, right and left, where each foot stands or would stand, flat and facing lab x; ``planted`` the
-    feet on the ground (0 right, 1 left); ``soles`` (2, P, 3) m their outlines; ``share`` of every half width of the support for which the
-    stance is laid out (`Limit.support_share`); ``props`` (K, 2) m corners on the ground of what else bears weight: the legs of a stool;
-    ``hands`` (2, 3) m grips that the right and the left hand hold, NaN = free;
-    ``seat`` m height of the hip centres of a person on a stool, pelvis upright and still over the lab origin; 0 standing;
-    ``over`` the one of two planted feet (0, 1) over which the weight is, so that the other could be lifted; None anywhere.
+    ``name``; ``ankle`` (2, 3) m lab frame, right and left, where each foot stands or would stand, flat and facing lab
+    x; ``planted`` the feet on the ground (0 right, 1 left); ``soles`` (2, P, 3) m their outlines; ``share`` of every
+    half width of the support for which the stance is laid out (`Limit.support_share`); ``props`` (K, 2) m corners on
+    the ground of what else bears weight: the legs of a stool; ``hands`` (2, 3) m grips that the right and the left hand
+    hold, NaN = free; ``seat`` m height of the hip centres of a person on a stool, pelvis upright and still over the lab
+    origin; 0 standing; ``over`` the one of two planted feet (0, 1) over which the weight is, so that the other could be
+    lifted; None anywhere.
     """
 
     name: str
@@ -64,7 +70,9 @@ class Stance:
 
     @cached_property
     def centre(self) -> Array:
-        """(2,) m middle of the base of support: of its bounding box; with the weight over one foot: deepest inside both bases."""
+        """(2,) m middle of the base of support: of its bounding box; with the weight over one foot: deepest inside both
+        bases.
+        """
         if self.over is not None:
             from scipy.optimize import linprog
 
@@ -74,8 +82,9 @@ class Stance:
         return (self.support.min(axis=0) + self.support.max(axis=0)) / 2
 
     def reduced(self, share: float) -> tuple[Array, Array]:
-        """Return unit inward normals (P, 2) and offsets (P,) m of the base of support, drawn together to ``share`` about its middle:
-        ``normals @ p + offsets`` is the distance inside. With the weight over one foot: of both feet's base and of that one's.
+        """Return unit inward normals (P, 2) and offsets (P,) m of the base of support, drawn together to ``share``
+        about its middle: ``normals @ p + offsets`` is the distance inside. With the weight over one foot: of both
+        feet's base and of that one's.
         """
         if share not in self._reduced:
             self._reduced[share] = self._edges(share)
@@ -108,7 +117,9 @@ class Stance:
 def stance(
     body: Body, name: str, *, left: float = 0.0, right: float = 0.0, planted: tuple[int, ...] = (0, 1), share: float = 1.0
 ) -> Stance:
-    """Return a stance with the ankles ``left`` and ``right`` m ahead of the lab origin, side by side at the person's width."""
+    """Return a stance with the ankles ``left`` and ``right`` m ahead of the lab origin, side by side at the person's
+    width.
+    """
     height = -float(body.feet["right"].outline[:, 1].min())
     half = apart(body, share) / 2
     ankle = np.array([[right, -half, height], [left, half, -float(body.feet["left"].outline[:, 1].min())]])
@@ -136,10 +147,11 @@ def seat(body: Body, *, share: float = 1.0) -> Stance:
 
 
 def apart(body: Body, share: float) -> float:
-    """Return the distance (m) between the ankles: of a person about 1.3 times the width of the hips; of a robot at least that of its hips.
+    """Return the distance (m) between the ankles: of a person about 1.3 times the width of the hips; of a robot at
+    least that of its hips.
 
-    Never so wide that the reduced support of both feet ends before that of one begins: then the weight could not be shifted. Never so
-    narrow that the feet touch.
+    Never so wide that the reduced support of both feet ends before that of one begins: then the weight could not be
+    shifted. Never so narrow that the feet touch.
     """
     sideways = body.feet["right"].outline[:, 2]
     outer, inner = float(sideways.max()), -float(sideways.min())
@@ -152,7 +164,9 @@ def apart(body: Body, share: float) -> float:
 
 
 def hip_width(body: Body) -> float:
-    """Return the distance (m) sideways between the ankles of the upright body at zero angles: that of its hips where legs are straight."""
+    """Return the distance (m) sideways between the ankles of the upright body at zero angles: that of its hips where
+    legs are straight.
+    """
     from biodance.motion.kinematics import poses
 
     place = poses(body, body.neutral[None]).position[0]
@@ -167,3 +181,26 @@ def stature_of(body: Body) -> float:
     tops = [float((pose.position[0, i] + pose.rotation[0, i] @ box[1])[2]) for i, box in enumerate(body.boxes)]
     foot = body.feet["right"]
     return max(tops) - float(pose.points([foot.segment], foot.outline[:1])[0, 0, 2])
+
+
+def under(first: Stance, second: Stance) -> Stance:
+    """Return the feet on the ground during the move from one stance to the next."""
+    for one in (first, second):
+        if len(one.planted) < 2:
+            return one
+    return replace(second, over=None) if np.array_equal(first.ankle, second.ankle) else second.on(1)
+
+
+FEET = {
+    "parallel": "with both feet side by side",
+    "right_forward": "with the right foot in front",
+    "single_right": "on the right leg alone",
+    "single_left": "on the left leg alone",
+    "seated": "on the stool",
+}
+
+
+def stance_words(stance: Stance) -> str:
+    """Return where the feet are, in words, and on which of them the weight is where it must be over one."""
+    weight = "" if stance.over is None else f", the weight on the {('right', 'left')[stance.over]} one"
+    return FEET[stance.name] + weight

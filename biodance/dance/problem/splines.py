@@ -1,7 +1,8 @@
 """Sixth-order B-splines through via points, rest to rest (paper III.A, eq. 18).
 
-A transition of duration D starts and ends with zero velocity and acceleration and passes through K via points at equal distances in
-time. The spline is linear in its points, so a whole trajectory, its velocity and its acceleration are constant matrices times the points.
+A transition of duration D starts and ends with zero velocity and acceleration and passes through K via points at equal
+distances in time. The spline is linear in its points, so a whole trajectory, its velocity and its acceleration are
+constant matrices times the points.
 """
 
 from dataclasses import dataclass
@@ -18,8 +19,8 @@ DEGREE = 5
 
 @dataclass(frozen=True, eq=False)
 class Basis:
-    """Sampled spline: ``time`` (n,) s; ``position``, ``velocity`` 1/s, ``acceleration`` 1/s² (n, K + 2) matrices that map the points
-    [start, via 1 ... via K, end] of a joint to its samples.
+    """Sampled spline: ``time`` (n,) s; ``position``, ``velocity`` 1/s, ``acceleration`` 1/s² (n, K + 2) matrices that
+    map the points [start, via 1 ... via K, end] of a joint to its samples.
     """
 
     time: Array
@@ -34,7 +35,8 @@ class Basis:
 
 
 def rest_to_rest(duration: float, *, via: int = 2, rate: float = 50.0) -> Basis:
-    """Return the sampled basis of a rest-to-rest transition with ``via`` points; samples at ``rate`` Hz include both ends.
+    """Return the sampled basis of a rest-to-rest transition with ``via`` points; samples at ``rate`` Hz include both
+    ends.
 
     Raises
     ------

@@ -1,6 +1,11 @@
-"""What is already found of a dance, on disk, so that a design that was interrupted goes on where it stopped."""
+"""What all stages of one design share, and what of it is kept on disk, so that a design that was interrupted goes on
+where it stopped.
+"""
 
 import hashlib
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -11,15 +16,20 @@ from numpy.typing import NDArray
 import biodance
 from biodance.body.body import Body
 from biodance.body.body_file import body_text
-from biodance.dance.plan import Plan
+from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.excitation import Blocks
+from biodance.dance.problem.plan import Plan
+from biodance.dance.problem.stance import Stance
 from biodance.records import Array
 
 ROOMS = ("body", "dance", "identify", "motion")
 """Rooms whose code decides what a dance becomes."""
 
 
-class Ledger:
-    """Named sets of arrays in a folder that belongs to one body, plan, seed and state of the code; without a folder nothing is kept."""
+class Checkpoint:
+    """Named sets of arrays in a folder that belongs to one body, plan, seed and state of the code; without a folder
+    nothing is kept.
+    """
 
     def __init__(self, folder: Path | None, body: Body, plan: Plan, seed: int) -> None:
         key = hashlib.sha256(f"{code()}{body_text(body, '')}{plan!r}{seed}".encode()).hexdigest()[:16]
@@ -52,3 +62,30 @@ def code() -> str:
     rooms = Path(biodance.__file__).parent
     files = sorted(file for room in ROOMS for file in (rooms / room).rglob("*.py"))
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+
+
+Tell = Callable[[str, int, int], None]
+"""Told what is being done, how many parts are finished and of how many."""
+
+
+@dataclass(frozen=True, eq=False)
+class DesignContext:
+    """One design: ``chain`` of the body, ``blocks`` that count, ``plan``, ``seed`` of all random numbers; ``ledger``
+    keeps what is finished, ``workers`` search side by side, ``tell`` is told the progress.
+    """
+
+    chain: Chain
+    blocks: Blocks
+    plan: Plan
+    seed: int
+    ledger: Checkpoint
+    workers: Executor
+    tell: Tell
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """Postures ``x`` (P, n), those in between included, in the order of the dance, on the feet ``stances`` (P,)."""
+
+    x: Array
+    stances: tuple[Stance, ...]

@@ -1,8 +1,8 @@
 """The body as a chain of one-degree-of-freedom joints, root included: the coordinates in which a dance is designed.
 
-Coordinates x (29): root position forward, left, up (m, lab frame), root turn about its own up axis, drop about forward, tilt about right
-(rad; all zero in the upright posture that faces lab x), then the joints of the body. Linear spaces of splines suit them, and
-pinocchio's analytic derivatives hold for every coordinate alike.
+Coordinates x (29): root position forward, left, up (m, lab frame), root turn about its own up axis, drop about forward,
+tilt about right (rad; all zero in the upright posture that faces lab x), then the joints of the body. Linear spaces of
+splines suit them, and pinocchio's analytic derivatives hold for every coordinate alike.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,6 @@ import numpy as np
 
 from biodance.body.body import UPRIGHT, Body
 from biodance.body.pinocchio_model import load_pinocchio
-from biodance.dance.shapes import Solids
 from biodance.errors import BiodanceError
 from biodance.motion.general_legs import GeneralLeg
 from biodance.motion.kinematics import axis_rotation
@@ -39,7 +38,9 @@ class Chain:
             raise BiodanceError(f"{self.body.name}: a dance needs a body with a free root and two feet; this one has none.")
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what goes to other processes: all but what pinocchio computes in, which takes longer to send than to make."""
+        """Return what goes to other processes: all but what pinocchio computes in, which takes longer to send than to
+        make.
+        """
         return {name: value for name, value in self.__dict__.items() if name != "_own"}
 
     @property
@@ -79,11 +80,6 @@ class Chain:
             above = self.body.joints[k - ROOT].parent if k >= ROOT else k - 1 - ROOT
             table[k] += table[max(above, -1) + ROOT if k >= ROOT else k - 1]
         return table
-
-    @cached_property
-    def solids(self) -> Solids:
-        """The segments that must not touch each other."""
-        return Solids.of(self.body)
 
     @cached_property
     def axes(self) -> Array:
@@ -127,8 +123,8 @@ class Chain:
         return UPRIGHT @ turn @ drop @ tilt
 
     def plant(self, x: Array, planted: tuple[int, ...], ankle: Array) -> Array:
-        """Return x (T, n) with the angles of the planted legs (0 right, 1 left) that hold each foot flat, facing lab x, at ``ankle``
-        (2, 3) m.
+        """Return x (T, n) with the angles of the planted legs (0 right, 1 left) that hold each foot flat, facing lab x,
+        at ``ankle`` (2, 3) m.
         """
         out, turn = x.copy(), self.root_rotation(x)
         flat = np.broadcast_to(UPRIGHT, turn.shape)

@@ -1,25 +1,22 @@
-"""Moves between postures: what excites the inertias within all limits (paper eq. 18-20), rest to rest through two via points.
+"""Moves between postures: what excites the inertias within all limits (paper eq. 18-20), rest to rest through two via
+points.
 
-One programme instead of the paper's two stages: all free coordinates look for excitation, the zero-moment point is a limit and, weakly,
-part of the objective. The start is the smoothest straight move, which is nearly feasible; limits are kept on a coarse grid with a
-reserve and judged on a fine one.
+One problem instead of the paper's two stages: all free coordinates look for excitation, the zero-moment point is a
+limit and, weakly, part of the objective. The start is the smoothest straight move, which is nearly feasible; limits are
+kept on a coarse grid with a reserve and judged on a fine one.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.dance.chain import Chain
-from biodance.dance.excitation import Blocks, condition, dynamic_grams, dynamic_slopes, total
 from biodance.dance.limits import Limit
-from biodance.dance.postures import free_coordinates
-from biodance.dance.programme import Judged, Programme
-from biodance.dance.programme import Objective as Judge
-from biodance.dance.simplicity import hardness
-from biodance.dance.splines import basis_at
-from biodance.dance.sqp import minimise
-from biodance.dance.stance import Stance
-from biodance.dance.state import State
+from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.excitation import Blocks, condition, dynamic_grams, dynamic_slopes, effort, total
+from biodance.dance.problem.nlp import Evaluation, NonlinearProgramme, Objective, free_coordinates, minimise
+from biodance.dance.problem.splines import basis_at
+from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.state import State
 from biodance.records import Array
 
 GRID = 10.0
@@ -27,7 +24,9 @@ GRID = 10.0
 CHECK = 50.0
 """Hz at which a move is judged before it is taken."""
 SLOW = 4.0
-"""s: longer moves, of slow robots, are judged at as many instants as a move of this time: it is the same spline through as many points."""
+"""s: longer moves, of slow robots, are judged at as many instants as a move of this time: it is the same spline through
+as many points.
+"""
 RESERVE = 0.04
 """Share of every limit's scale that is kept in reserve for the instants in between."""
 BETWEEN = 0.004
@@ -35,20 +34,24 @@ BETWEEN = 0.004
 THIRDS = np.array([0.20987654, 0.79012346])
 """Of the way at one and two thirds of the time, for least jerk (10 s³ - 15 s⁴ + 6 s⁵)."""
 ATTEMPTS = ((0.2, 1.0, (14, 8, 8)), (0.0, 0.2, (40, 12, 12)))
-"""Spread (rad) of the via points' start about the straight move, share of excitation in the objective, and iterations of the rounds: after
-each the worst instants are added and the reserve grows by a quarter."""
+"""Spread (rad) of the via points' start about the straight move, share of excitation in the objective, and iterations
+of the rounds: after each the worst instants are added and the reserve grows by a quarter.
+"""
 CENTRE = 0.1
 """Worth of 1 dm² of mean squared distance of the zero-moment point from the middle, beside log cond."""
 LITTLE = 0.01
 """s·(rad/s²)², information on every inertia that is supposed before the first move."""
 HOPELESS = 0.5
-"""Violation after a round, in scales, with which a start is given up; so is one whose limits cannot even be kept without the reserve on the
-coarse grid."""
+"""Violation after a round, in scales, with which a start is given up; so is one whose limits cannot even be kept
+without the reserve on the coarse grid.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A move to find: from ``ends[0]`` to ``ends[1]`` (2, n) in ``duration`` s on the feet of ``stance``, within the ``limits``."""
+    """A move to find: from ``ends[0]`` to ``ends[1]`` (2, n) in ``duration`` s on the feet of ``stance``, within the
+    ``limits``.
+    """
 
     chain: Chain
     blocks: Blocks
@@ -59,7 +62,9 @@ class Task:
 
     @property
     def excited(self) -> list[int]:
-        """Coordinates that excite: trunk and arms with both feet down, the free leg with one (paper Table I), all joints when seated."""
+        """Coordinates that excite: trunk and arms with both feet down, the free leg with one (paper Table I), all
+        joints when seated.
+        """
         legs = [self.chain.leg_columns[side] for side in (0, 1) if side not in self.stance.planted]
         return sorted([*([] if len(legs) == 1 else self.chain.upper), *(c for leg in legs for c in leg)])
 
@@ -72,8 +77,10 @@ class Task:
         """Return the via points (2, n) of the smoothest move."""
         return np.asarray(self.ends[0] + THIRDS[:, None] * (self.ends[1] - self.ends[0]))
 
-    def programme(self, via: Array, free: list[int], time: Array, *, reserve: float, objective: Judge) -> Programme:
-        """Return the programme of the via points of the ``free`` coordinates at instants ``time`` s, the others as in ``via`` (2, n)."""
+    def problem(self, via: Array, free: list[int], time: Array, *, reserve: float, objective: Objective) -> NonlinearProgramme:
+        """Return the problem of the via points of the ``free`` coordinates at instants ``time`` s, the others as in
+        ``via`` (2, n).
+        """
         basis, kept = basis_at(time, self.duration), tuple(limit for limit in self.limits if limit.in_motion)
         points = np.stack([self.ends[0], *via, self.ends[1]])
         points[1:3, free] = 0.0
@@ -83,7 +90,7 @@ class Task:
         least = [max(reserve, limit.move_reserve) if reserve > BETWEEN else reserve for limit in kept]
         bell = np.where([limit.tapers for limit in kept], (4 * way * (1 - way))[:, None], 1.0)
         share = np.array(least) * bell
-        return Programme(self.chain, self.stance, parts @ points, parts[:, :, 1:3], free, kept, objective, share)
+        return NonlinearProgramme(self.chain, self.stance, parts @ points, parts[:, :, 1:3], free, kept, objective, share)
 
     def grid(self, rate: float) -> Array:
         """Return the instants (T,) s between the ends at about ``rate`` Hz, of a long move fewer."""
@@ -96,14 +103,15 @@ class Task:
 
     def state(self, via: Array) -> State:
         """Return the move through ``via`` on the coarse grid."""
-        return self.programme(via, [], self.grid(GRID), reserve=0.0, objective=_nothing).state(np.empty(0))
+        return self.problem(via, [], self.grid(GRID), reserve=0.0, objective=_nothing).state(np.empty(0))
 
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """``via`` (2, n) of a move of ``duration`` s; ``gram`` (N, 6, 6) its own information on the inertias, integrated over time;
-    ``zmp_before``, ``zmp_after`` m, root mean square distance of the zero-moment point to the middle of the support when only the excited
-    coordinates leave the straight move, and in the move found; ``violation`` of the limits in their scales (feasible: 0) and of which.
+    """``via`` (2, n) of a move of ``duration`` s; ``gram`` (N, 6, 6) its own information on the inertias, integrated
+    over time; ``zmp_before``, ``zmp_after`` m, root mean square distance of the zero-moment point to the middle of
+    the support when only the excited coordinates leave the straight move, and in the move found; ``violation`` of
+    the limits in their scales (feasible: 0) and of which.
     """
 
     via: Array
@@ -116,8 +124,10 @@ class Move:
 
 
 @dataclass(frozen=True, eq=False)
-class Objective:
-    """Mass-weighted mean log cond of the inertias after ``history`` (N, 6, 6), times ``share``, and the distance of the ZMP."""
+class MoveObjective:
+    """Mass-weighted mean log cond of the inertias after ``history`` (N, 6, 6), times ``share``, and the distance of the
+    ZMP.
+    """
 
     task: Task
     history: Array
@@ -128,7 +138,7 @@ class Objective:
         value, slope = off_centre(state)
         value, slope = CENTRE * value, CENTRE * slope
         if self.task.blocks.simplicity:
-            hard, by = hardness(state)
+            hard, by = effort(state)
             value, slope = value + self.task.blocks.simplicity * hard, slope + self.task.blocks.simplicity * by
         weight, picks = self.task.blocks.weight, self.task.blocks.second
         segments = [i for i in self.task.segments if picks[i] and weight[i] > 0]
@@ -162,15 +172,17 @@ def off_centre(state: State) -> tuple[float, Array]:
 
 
 def find_move(task: Task, history: Array, *, rng: np.random.Generator) -> Move:
-    """Return the best feasible move found after the information ``history`` (N, 6, 6); if there is none, the one that violates least."""
+    """Return the best feasible move found after the information ``history`` (N, 6, 6); if there is none, the one that
+    violates least.
+    """
     best = None
     for spread, share, rounds in ATTEMPTS:
-        via, time, objective = task.straight(), task.grid(GRID), Objective(task, history, share)
+        via, time, objective = task.straight(), task.grid(GRID), MoveObjective(task, history, share)
         via[:, task.excited] += rng.normal(0, spread, (2, len(task.excited)))
         for k, iterations in enumerate(rounds):
             reserve = RESERVE * (1 + k / 4)
             via, violation = _improved(task, via, time, objective, iterations, reserve)
-            found, instants = judged(task, via)
+            found, instants = evaluate_move(task, via)
             if best is None or found.violation < best.violation:
                 best = found
             if best.violation == 0:
@@ -182,20 +194,24 @@ def find_move(task: Task, history: Array, *, rng: np.random.Generator) -> Move:
     return best
 
 
-def _improved(task: Task, via: Array, time: Array, objective: Objective, iterations: int, reserve: float) -> tuple[Array, float]:
-    """Return the via points found from ``via`` (2, n), and by how much they violate the limits with their ``reserve`` at ``time`` s."""
+def _improved(task: Task, via: Array, time: Array, objective: MoveObjective, iterations: int, reserve: float) -> tuple[Array, float]:
+    """Return the via points found from ``via`` (2, n), and by how much they violate the limits with their ``reserve``
+    at ``time`` s.
+    """
     free = free_coordinates(task.chain, task.stance)
-    programme = task.programme(via, free, time, reserve=reserve, objective=objective)
-    found, out = minimise(programme.judge, via[:, free].ravel(), iterations=iterations), via.copy()
+    problem = task.problem(via, free, time, reserve=reserve, objective=objective)
+    found, out = minimise(problem.evaluate, via[:, free].ravel(), iterations=iterations), via.copy()
     out[:, free] = found.y.reshape(2, -1)
     return out, found.violation
 
 
-def judged(task: Task, via: Array) -> tuple[Move, Array]:
-    """Return the move through ``via`` as it is, judged by all limits on the fine grid, and the worst instants s where one is broken."""
+def evaluate_move(task: Task, via: Array) -> tuple[Move, Array]:
+    """Return the move through ``via`` as it is, judged by all limits on the fine grid, and the worst instants s where
+    one is broken.
+    """
     time = task.grid(CHECK)
-    programme = task.programme(via, [], time, reserve=BETWEEN, objective=_nothing)
-    found = Judged(programme, programme.state(np.empty(0)))
+    problem = task.problem(via, [], time, reserve=BETWEEN, objective=_nothing)
+    found = Evaluation(problem, problem.state(np.empty(0)))
     worst, limit = found.worst
     left = np.pad(found.least, 1, constant_values=np.inf)
     dips = (left[1:-1] < 0) & (left[1:-1] <= left[:-2]) & (left[1:-1] <= left[2:])

@@ -1,20 +1,21 @@
 """Which postures, and in which order: greedily by what each tells per second.
 
-A posture tells through the wrench of standing still in it and through the way to it (straight from the last posture on the same feet; the
-designed way, which is not known yet, tells more). What counts is the expected posterior variance of the parameters given the table,
-log sum_k w_k C_kk / P_kk (criterion "posterior_variance"), with one independent error per posture and per quarter of a second of moving:
-errors of people are slow, so that holding longer tells little more. Adding what tells most per second is within 1 - 1/e of the best
-choice for information measures with diminishing returns (Nemhauser, Wolsey & Fisher 1978). All postures of a plan take equally long, so
-that most per second is most per posture; time spent on changing feet counts in the budget, not in the choice.
+A posture tells through the wrench of standing still in it and through the way to it (straight from the last posture on
+the same feet; the designed way, which is not known yet, tells more). What counts is the expected posterior variance of
+the parameters given the table, log sum_k w_k C_kk / P_kk (criterion "posterior_variance"), with one independent error
+per posture and per quarter of a second of moving: errors of people are slow, so that holding longer tells little more.
+Adding what tells most per second is within 1 - 1/e of the best choice for information measures with diminishing returns
+(Nemhauser, Wolsey & Fisher 1978). All postures of a plan take equally long, so that most per second is most per
+posture; time spent on changing feet counts in the budget, not in the choice.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.dance.chain import Chain
-from biodance.dance.plan import Plan
-from biodance.dance.splines import rest_to_rest
+from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.plan import Plan
+from biodance.dance.problem.splines import rest_to_rest
 from biodance.identify.posterior import prior_factor
 from biodance.motion.regressor import regressor
 from biodance.records import Array
@@ -27,8 +28,9 @@ RATE = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """``order`` (K,) indices of the chosen postures in the order of the dance; ``spread`` (K + 1,) what is not known yet after each pick,
-    in the order in which they were ``picked`` (K,): root mean square of posterior over table standard deviation, weighted; ``duration`` s.
+    """``order`` (K,) indices of the chosen postures in the order of the dance; ``spread`` (K + 1,) what is not known
+    yet after each pick, in the order in which they were ``picked`` (K,): root mean square of posterior over table
+    standard deviation, weighted; ``duration`` s.
     """
 
     order: tuple[int, ...]
@@ -38,9 +40,11 @@ class Choice:
 
 
 def choose(chain: Chain, x: Array, stances: tuple[str, ...], plan: Plan) -> Choice:
-    """Return which of the postures ``x`` (P, n), on the feet ``stances`` (P), are danced within the plan's budget, and in which order.
+    """Return which of the postures ``x`` (P, n), on the feet ``stances`` (P), are danced within the plan's budget, and
+    in which order.
 
-    Blocks of one stance stay together in the order of the plan; within a block the postures come in the order in which they were picked.
+    Blocks of one stance stay together in the order of the plan; within a block the postures come in the order in which
+    they were picked.
     """
     S = prior_factor(chain.body.sip)
     before = np.sum(S**2, axis=1)
@@ -89,7 +93,9 @@ class _Told:
         self.ways: dict[int, dict[int, Array]] = {}
 
     def rows(self, origin: int | None, goal: int) -> Array:
-        """Return the rows (m, k) of the posture ``goal`` and of the way to it from ``origin``; None: from any posture on the same feet."""
+        """Return the rows (m, k) of the posture ``goal`` and of the way to it from ``origin``; None: from any posture
+        on the same feet.
+        """
         if origin is None:
             origin = next((p for p, stance in enumerate(self.stances) if stance == self.stances[goal] and p != goal), goal)
         if origin not in self.ways:

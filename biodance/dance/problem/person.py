@@ -14,8 +14,8 @@
     left_knee = 0.5
     all = 0.8
 
-A key names joints from the coarse to the fine: "all"; "left"; "knee" (both sides); "left_knee"; "left_knee_flexion". Several that name the
-same joint act one after the other. Angles are positive in the anatomical direction of the name.
+A key names joints from the coarse to the fine: "all"; "left"; "knee" (both sides); "left_knee"; "left_knee_flexion".
+Several that name the same joint act one after the other. Angles are positive in the anatomical direction of the name.
 """
 
 import math
@@ -26,8 +26,7 @@ from pathlib import Path
 import numpy as np
 
 from biodance.body.body import Body, JointLimits
-from biodance.dance.plan import Plan
-from biodance.dance.protocol import number, table
+from biodance.dance.problem.plan import Plan, finite_number, table
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import read_toml
 
@@ -40,9 +39,9 @@ Shares = tuple[tuple[str, float], ...]
 class PersonLimits:
     """Limits of one person beyond those of sex, age, mass and stature.
 
-    ``ranges`` (key, lower, upper) rad; ``range_shares``, ``strengths`` (key, share 0..1); ``max_speed`` rad/s; ``stand_alone_on`` the legs
-    on which the person may stand alone; ``seated`` True where standing is not possible; ``holds`` the hands that stay on a frame;
-    ``reason`` in words. Keys: see the module.
+    ``ranges`` (key, lower, upper) rad; ``range_shares``, ``strengths`` (key, share 0..1); ``max_speed`` rad/s;
+    ``stand_alone_on`` the legs on which the person may stand alone; ``seated`` True where standing is not possible;
+    ``holds`` the hands that stay on a frame; ``reason`` in words. Keys: see the module.
     """
 
     ranges: tuple[tuple[str, float, float], ...] = ()
@@ -78,7 +77,7 @@ def read_person(path: str | Path) -> PersonLimits:
     for key, value in table(path, raw, "range_deg").items():
         if not isinstance(value, list) or len(value) != 2:
             raise BiodanceError(f"{path}: range_deg.{key} = {value!r}; expected [lower, upper] in degrees.")
-        low, high = (math.radians(number(path, f"range_deg.{key}", one)) for one in value)
+        low, high = (math.radians(finite_number(path, f"range_deg.{key}", one)) for one in value)
         ranges.append((key, low, high))
     legs, seated = raw.get("stand_alone_on", list(SIDES)), raw.get("seated", False)
     if not isinstance(legs, list) or not isinstance(seated, bool):
@@ -89,7 +88,7 @@ def read_person(path: str | Path) -> PersonLimits:
     hands = raw.get("hold_frame", [])
     if not isinstance(hands, list) or any(hand not in SIDES for hand in hands):
         raise BiodanceError(f'{path}: hold_frame = {hands!r}; expected a list of hands, "right" and "left".')
-    speed = math.radians(number(path, "max_speed_deg_s", raw["max_speed_deg_s"])) if "max_speed_deg_s" in raw else math.inf
+    speed = math.radians(finite_number(path, "max_speed_deg_s", raw["max_speed_deg_s"])) if "max_speed_deg_s" in raw else math.inf
     if not speed > 0:
         raise BiodanceError(f"{path}: max_speed_deg_s = {raw['max_speed_deg_s']!r}; it must be positive.")
     shares, strengths = (_shares(path, table(path, raw, name), name) for name in ("range_share", "strength"))
@@ -97,15 +96,16 @@ def read_person(path: str | Path) -> PersonLimits:
 
 
 def _shares(path: Path, raw: dict[str, object], name: str) -> Shares:
-    found = tuple((key, number(path, f"{name}.{key}", value)) for key, value in raw.items())
+    found = tuple((key, finite_number(path, f"{name}.{key}", value)) for key, value in raw.items())
     for key, value in found:
         if not 0 <= value <= 1:
             raise BiodanceError(f"{path}: {name}.{key} = {value:g}; a share lies between 0 and 1.")
     return found
 
 
-def fitted(body: Body, plan: Plan, person: PersonLimits) -> tuple[Body, Plan, tuple[str, ...]]:
-    """Return the body with the person's limits, the plan without what the person may not do, and what was left out, in plain sentences.
+def fit_to_person(body: Body, plan: Plan, person: PersonLimits) -> tuple[Body, Plan, tuple[str, ...]]:
+    """Return the body with the person's limits, the plan without what the person may not do, and what was left out, in
+    plain sentences.
 
     Raises
     ------
@@ -127,10 +127,14 @@ def fitted(body: Body, plan: Plan, person: PersonLimits) -> tuple[Body, Plan, tu
         for stance, count in plan.blocks
         if not _allowed(stance, person)
     )
-    return replace(body, limits=limited(body, person)), replace(plan, blocks=kept, alone=person.stand_alone_on, holds=person.holds), notes
+    return (
+        replace(body, limits=limit_body(body, person)),
+        replace(plan, blocks=kept, alone=person.stand_alone_on, holds=person.holds),
+        notes,
+    )
 
 
-def limited(body: Body, person: PersonLimits) -> JointLimits:
+def limit_body(body: Body, person: PersonLimits) -> JointLimits:
     """Return the limits of the body's joints with those of the person on top; raises as `fitted` does."""
     limits = body.limits
     lower, upper, strength = limits.lower.copy(), limits.upper.copy(), np.ones(len(body.joints))

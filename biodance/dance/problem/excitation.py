@@ -1,4 +1,12 @@
-"""The paper's criterion on segments, and its slopes by the motion: first moments at rest, inertias in motion (eq. 12)."""
+"""What a movement is worth: the paper's criterion on segments (eq. 12) and the effort of the performer, with slopes by
+the motion.
+
+First moments count at rest, inertias in motion. Effort is how hard a posture is to take and to remember; three terms
+over the joints, angles in units of half the joint's range:
+- few joints at once: mean of sqrt(r² + e²) - e, r the angle from standing (a smooth absolute value: what need not move stays);
+- symmetric pairs: mean of (right - left)² over the pairs of joints, the same movement on both sides being one thing to do;
+- no discomfort: mean of c⁸, c the angle from standing over the way to the stop on that side.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,13 +16,16 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.inertia import TENSOR
-from biodance.dance.state import State
+from biodance.dance.problem.chain import ROOT
+from biodance.dance.problem.state import State
 from biodance.identify.base_parameters import structural_base
 from biodance.records import Array
 
 
 def condition(gram: Array) -> tuple[Array, Array]:
-    """Return cond = sqrt(largest / smallest eigenvalue) of Gram matrices (..., k, k), (...), and its gradient (..., k, k)."""
+    """Return cond = sqrt(largest / smallest eigenvalue) of Gram matrices (..., k, k), (...), and its gradient (..., k,
+    k).
+    """
     value, vector = _spectrum(gram)
     cond = np.sqrt(value[..., -1] / value[..., 0])
     by = np.zeros_like(value)
@@ -24,9 +35,11 @@ def condition(gram: Array) -> tuple[Array, Array]:
 
 
 def smooth_condition(gram: Array, *, sharpness: int) -> tuple[Array, Array]:
-    """Return a condition number without kinks and its gradient: power means of the eigenvalues instead of largest and smallest.
+    """Return a condition number without kinks and its gradient: power means of the eigenvalues instead of largest and
+    smallest.
 
-    sqrt(mean(value^p)^(1/p) * mean(value^-p)^(1/p)), p = ``sharpness``: at most cond, 1 exactly where cond is, cond for p -> infinity.
+    sqrt(mean(value^p)^(1/p) * mean(value^-p)^(1/p)), p = ``sharpness``: at most cond, 1 exactly where cond is, cond for
+    p -> infinity.
     """
     value, vector = _spectrum(gram)
     high, low = (value / value[..., -1:]) ** sharpness, (value[..., :1] / value) ** sharpness
@@ -42,8 +55,9 @@ def _spectrum(gram: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """What counts of each segment: ``first`` (of MX, MY, MZ) and ``second`` (of the six inertias) base columns, ``weight`` (N,) kg; and of
-    the performer: ``simplicity``, what a hardness of 1 (`simplicity.hardness`) is worth in mean condition numbers.
+    """What counts of each segment: ``first`` (of MX, MY, MZ) and ``second`` (of the six inertias) base columns,
+    ``weight`` (N,) kg; and of the performer: ``simplicity``, what a hardness of 1 (`simplicity.hardness`) is worth
+    in mean condition numbers.
     """
 
     first: tuple[list[int], ...]
@@ -52,8 +66,10 @@ class Blocks:
     simplicity: float = 0.0
 
 
-def blocks(body: Body) -> Blocks:
-    """Return the base columns of every segment, weighted by its mass in the table (structural base: docs/derivations.md)."""
+def excitation_blocks(body: Body) -> Blocks:
+    """Return the base columns of every segment, weighted by its mass in the table (structural base:
+    docs/derivations.md).
+    """
     columns = structural_base(body).columns
     first, second = (
         tuple([c % 10 - low for c in columns if c // 10 == i and low <= c % 10 < high] for i in range(len(body.segments)))
@@ -67,7 +83,9 @@ Measure = Callable[[Array], tuple[Array, Array]]
 
 
 def total(weight: Array, grams: Array, pick: tuple[list[int], ...], *, measure: Measure = condition) -> tuple[float, Array]:
-    """Return sum_i M_i cond(W_bi) and its gradient by the Gram matrices (N, k, k); segments without weight or columns do not count."""
+    """Return sum_i M_i cond(W_bi) and its gradient by the Gram matrices (N, k, k); segments without weight or columns
+    do not count.
+    """
     value, slope = 0.0, np.zeros_like(grams)
     alike: dict[tuple[int, ...], list[int]] = {}
     for i, columns in enumerate(pick):
@@ -159,3 +177,58 @@ def dynamic_slopes(state: State, segments: list[int], slope: Array) -> Array:
     dv = np.einsum("tsc,tkc,sk->tk", by_w, axis, moved) + np.einsum("tsc,tskc,sk->tk", by_dw, ahead, moved)
     da = np.einsum("tsc,tkc,sk->tk", by_dw, axis, moved)
     return np.stack([dx, dv, da])
+
+
+SOFT = 0.05
+"""e: angles below a twentieth of half the range are not worth saving."""
+SIDE, STOP = 0.25, 1.0
+"""Worth of the second and the third term beside the first."""
+
+
+def effort(state: State) -> tuple[float, Array]:
+    """Return the mean over the samples, about 0 standing and 1 for a contortion, and its slopes (3, T, n) by x, v, a.
+
+    Planted legs are not counted: they follow from the pelvis.
+    """
+    scale, slopes = _Scale.of(state.chain.body), np.zeros((3, *state.x.shape))
+    planted = [c - ROOT for side in state.stance.planted for c in state.chain.leg_columns[side]]
+    counts = np.ones(len(scale.half))
+    counts[planted] = 0.0
+    angle = state.x[:, ROOT:]
+    away = (angle - scale.rest) / scale.half
+    way = np.where(angle > scale.rest, scale.upward, scale.downward)
+    near = (angle - scale.rest) / way
+    root = np.sqrt(away**2 + SOFT**2)
+    value = (root - SOFT + STOP * near**8) @ counts
+    by = counts * (away / root / scale.half + 8 * STOP * near**7 / way)
+    for right, left in scale.pairs:
+        if counts[right] and counts[left]:
+            gap = (angle[:, right] - angle[:, left]) / scale.half[right]
+            value = value + 2 * SIDE * gap**2
+            by[:, right] += 4 * SIDE * gap / scale.half[right]
+            by[:, left] -= 4 * SIDE * gap / scale.half[right]
+    share = 1.0 / (max(1.0, counts.sum()) * len(angle))
+    slopes[0][:, ROOT:] = share * by
+    return float(share * value.sum()), slopes
+
+
+@dataclass(frozen=True, eq=False)
+class _Scale:
+    """Angles (n,) rad of every joint: ``rest`` standing, ``half`` of the range, ``upward``, ``downward`` from standing
+    to the stops (at least 0.2); ``pairs`` of right and left joints.
+    """
+
+    rest: Array
+    half: Array
+    upward: Array
+    downward: Array
+    pairs: tuple[tuple[int, int], ...]
+
+    @classmethod
+    def of(cls, body: Body) -> "_Scale":
+        low, high = body.limits.lower, body.limits.upper
+        names, rest = [joint.name for joint in body.joints], np.clip(0.0, low, high)
+        others = [name.replace("right_", "left_", 1) for name in names]
+        pairs = [(j, names.index(other)) for j, other in enumerate(others) if other != names[j] and other in names]
+        upward, downward = np.maximum(high - rest, 0.2), np.maximum(rest - low, 0.2)
+        return cls(rest, np.maximum((high - low) / 2, 1e-3), upward, downward, tuple(pairs))
