@@ -22,8 +22,8 @@ from hidden_sessions import CACHE, Scenario, examined
 from scipy.stats import t as student
 
 from biodance.diagnose.diagnosis import SIGMAS
-from biodance.diagnose.tolerances import read_tolerances, shipped, to_toml
 from biodance.pipeline.diagnosis import diagnose_session
+from biodance.uncertainty.tolerances import read_tolerances, shipped, to_toml
 
 PERSONS = (10, 11)
 FILTER = "filter_mismatch:cutoff=4"

@@ -16,9 +16,9 @@ from hidden_sessions import Scenario, examined
 from biodance.diagnose.candidates import candidates
 from biodance.diagnose.learning import Null, learn, null_of
 from biodance.diagnose.problem import problem
-from biodance.diagnose.tolerances import shipped, to_toml
 from biodance.pipeline.diagnosis import looks
 from biodance.pipeline.identification import FITTED
+from biodance.uncertainty.tolerances import shipped, to_toml
 
 SCENARIOS = [Scenario("learn", i, 500 + i, 0) for i in range(20)] + [Scenario("learn", i, 500 + i, 1) for i in range(10)]
 

@@ -10,10 +10,10 @@ from scipy.interpolate import CubicSpline
 from biodance.body.human import human
 from biodance.diagnose.problem import Look
 from biodance.diagnose.spectrum import EDGES
-from biodance.diagnose.tolerances import Tolerances
 from biodance.effects.case import at_origin
 from biodance.motion.regressor import predict_wrench
 from biodance.records import CHANNELS, Motion, Plate, Source, Subject, Trial, Wrench
+from biodance.uncertainty.tolerances import Tolerances
 
 SUBJECT = Subject(70.0, 1.75, "M", 30.0)
 RATE, SECONDS = 50.0, 12.0
@@ -64,8 +64,8 @@ def noise(rng: np.random.Generator, frames: int) -> np.ndarray:
 
 def looks(seed: int, *, trials: int = 4, hidden=lambda wrench, time, motion: wrench) -> tuple[Look, ...]:
     """Return trials of a person whose parameters differ from the table by its own standard deviations; ``hidden`` changes the wrench."""
-    from biodance.identify.caution import widened
     from biodance.identify.posterior import prior_factor
+    from biodance.uncertainty.caution import widened
 
     rng = np.random.default_rng(1000 + seed)
     prior = widened(body().sip)

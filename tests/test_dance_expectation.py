@@ -7,13 +7,13 @@ from biodance.body.human import human
 from biodance.dance.chain import ROOT, Chain
 from biodance.dance.expectation import RATE, SIZES, expected, typical_noise
 from biodance.dance.splines import rest_to_rest
-from biodance.identify.caution import widened
 from biodance.identify.knowledge import segment_quantities
 from biodance.identify.mismatch import mismatch, temper
 from biodance.identify.posterior import posterior
 from biodance.identify.statistics import Fit, statistics
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Motion, Subject
+from biodance.uncertainty.caution import widened
 
 BODY = human(Subject(65.0, 1.75, "F", 33.0))
 CHAIN = Chain(BODY)

@@ -4,24 +4,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from biodance.diagnose.kinematic_errors import kinematic_errors
+from biodance.identify.twins import Twins, central_inertia, disturbance
 from diagnosed_sessions import body, known, looks, motion
 from scipy.stats import multivariate_normal
 
 from biodance.body.body import JointError
 from biodance.diagnose.candidates import Candidate, candidates, changes, removed, slopes
 from biodance.diagnose.evidence import believe, evidence, smallest
-from biodance.diagnose.kinematic_errors import kinematic_errors
 from biodance.diagnose.learning import Null, learn
 from biodance.diagnose.model import model
 from biodance.diagnose.naming import screen
 from biodance.diagnose.observability import Visibility, limits, placed, placing_leaves, visibility
 from biodance.diagnose.problem import problem
-from biodance.diagnose.tolerances import Tolerances, key_of, read_tolerances, shipped, to_toml
 from biodance.effects import effect
-from biodance.identify.twins import Twins, central_inertia, disturbance
 from biodance.motion.kinematics import poses, segment_motion
 from biodance.motion.marker_jacobian import jacobian, skew
 from biodance.motion.regressor import GRAVITY
+from biodance.uncertainty.tolerances import Tolerances, key_of, read_tolerances, shipped, to_toml
 
 
 def test_evidence_is_the_ratio_of_two_gaussian_densities() -> None:

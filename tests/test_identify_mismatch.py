@@ -3,18 +3,18 @@
 from dataclasses import replace
 
 import numpy as np
+from biodance.identify.kinematic_scores import kinematic_scores
+from biodance.identify.twins import Twins, central_inertia, chains, disturbance, draw_twins, jacobian, neighbours, skew
 from identify_trials import noisy_fit, person, smooth_motion
 
 from biodance.body.body import Body
 from biodance.identify.information import Information
-from biodance.identify.kinematic_scores import kinematic_scores
 from biodance.identify.mismatch import Mismatch, Sizes, evidence_of_scale, evident_sizes, mismatch, nothing, plate_sources, temper
-from biodance.identify.noise import Noise
 from biodance.identify.posterior import posterior
-from biodance.identify.twins import Twins, central_inertia, chains, disturbance, draw_twins, jacobian, neighbours, skew
 from biodance.motion.kinematics import poses, segment_motion
 from biodance.motion.regressor import GRAVITY, predict_wrench
 from biodance.records import Array, Motion
+from biodance.uncertainty.noise import Noise
 
 
 def wrench_change(body: Body, motion: Motion, places: Array, turns: Array) -> Array:

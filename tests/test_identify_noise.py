@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from biodance.errors import BiodanceError
-from biodance.identify.noise import BLOCK, Noise, blocks
+from biodance.uncertainty.noise import BLOCK, Noise, blocks
 
 ABOUT = np.array([0.2, -0.1, 0.0])
 

@@ -8,7 +8,6 @@ from identify_trials import noisy_fit, person, smooth_motion
 
 from biodance.body.inertia import pseudo_inertia, smallest_eigenvalues
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.identify.caution import about_true_centres, widened
 from biodance.identify.identification import NOISE_ALONE, conclude, identify, standing_point
 from biodance.identify.knowledge import knowledge, segment_quantities
 from biodance.identify.learning import learn
@@ -18,6 +17,7 @@ from biodance.identify.statistics import layout_for, statistics
 from biodance.identify.validation import gain, validate
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Motion, Sip, Wrench
+from biodance.uncertainty.caution import about_true_centres, widened
 
 
 def session(seed: int, *, frames: int = 1500):
@@ -120,7 +120,7 @@ def test_caution_widens_without_moving_or_breaking_the_scale() -> None:
 def test_a_turned_frame_and_a_shifted_centre_to_first_order() -> None:
     from scipy.spatial.transform import Rotation
 
-    from biodance.identify.caution import _shift_slope, _turn_slope
+    from biodance.uncertainty.caution import _shift_slope, _turn_slope
     from biodance.virtual_lab.flesh import of_parameters, parameters, placed
 
     phi = np.array(person(6)[0].sip.phi[:10])

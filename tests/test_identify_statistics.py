@@ -9,10 +9,10 @@ from scipy.signal import lfilter
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identify.information import information
 from biodance.identify.learning import learn
-from biodance.identify.noise import Noise
 from biodance.identify.statistics import Fit, layout_for, statistics
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Motion, Sip, Wrench
+from biodance.uncertainty.noise import Noise
 
 ABOUT = np.array([0.1, 0.2, 0.0])
 LAYOUT = layout_for(ABOUT)

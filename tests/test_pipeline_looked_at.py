@@ -8,11 +8,11 @@ from diagnosed_sessions import RATE, body, looks, motion
 
 from biodance.diagnose.problem import Look
 from biodance.diagnose.spectrum import EDGES
-from biodance.diagnose.tolerances import shipped
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.looked_at import MARKERS, UNREST, left_out, looked_at, own_tolerances, soft_tissue, unrest
 from biodance.pipeline.results import Step, TrialResult, WrenchComparison
 from biodance.records import Array, Motion, Role, Wrench
+from biodance.uncertainty.tolerances import shipped
 
 
 def still(seconds: float) -> Motion:

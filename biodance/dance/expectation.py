@@ -11,15 +11,16 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
-from biodance.identify.caution import widened
 from biodance.identify.information import Information
 from biodance.identify.knowledge import segment_quantities
 from biodance.identify.mismatch import Mismatch, Sizes, mismatch, temper
-from biodance.identify.noise import BANDS, Noise
 from biodance.identify.posterior import Posterior, posterior
 from biodance.identify.statistics import Fit, statistics
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion
+from biodance.uncertainty.bands import BANDS, Bands
+from biodance.uncertainty.caution import widened
+from biodance.uncertainty.noise import Noise
 
 TYPICAL = np.array(
     [
@@ -92,7 +93,7 @@ def expected(body: Body, motion: Motion, ends: Array) -> Expectation:
 def typical_noise(about: Array) -> Noise:
     """Return the noise of a typical session about the standing point ``about`` (3,) m; a coefficient's variance grows with the rate."""
     covariance = RATE / 25.0 * np.array([np.diag(row**2) for row in TYPICAL])
-    return Noise(covariance, about, BANDS[: len(TYPICAL) + 1], RATE)
+    return Noise(covariance, about, Bands(BANDS.edges, RATE))
 
 
 def _gram(information: Information) -> Array:

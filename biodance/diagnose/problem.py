@@ -13,16 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.diagnose.kinematic_errors import Errors, kinematic_errors
 from biodance.diagnose.spectrum import Spectrum, spectrum, thinned
 from biodance.effects import effects
 from biodance.effects.case import Case
 from biodance.effects.effect import Effect
-from biodance.identify.caution import widened
 from biodance.identify.identification import usable
 from biodance.identify.posterior import prior_factor
 from biodance.identify.statistics import Fit
 from biodance.records import Array, Motion, Sip, Trial
+from biodance.uncertainty.caution import widened
+from biodance.uncertainty.sources import Errors, forward, of_clusters
+from biodance.uncertainty.tolerances import in_state
 
 LIGHTEST = 0.2
 """Share of the table's mass below which an identified segment is not believed."""
@@ -139,7 +140,8 @@ def problem(body: Body, looks: tuple[Look, ...], *, prior: Sip | None = None) ->
     rows, markers = _kinematic_rows(where, errors)
     shown = sizes_shown(cases)
     sip = np.concatenate([W.reshape(-1, W.shape[2]), np.zeros((len(markers) + len(shown), W.shape[2]))])
-    groups = next(one.groups for some in errors for one in some)
+    unit, placed = next(one for some in errors for one in some), {error.joint for error in body.joint_errors}
+    groups = tuple(in_state(group, joint, placed) for group, joint in zip(unit.groups, unit.joints, strict=True))
     measured = where.rows(tuple(case.residual[:, :, None] for case in cases))
     target = np.concatenate([measured.ravel(), _mean_markers(cases, where).ravel(), list(shown.values())])
     rows = np.concatenate([rows, markers, np.zeros((len(shown), rows.shape[1]))])
@@ -158,7 +160,9 @@ def sizes_shown(cases: tuple[Case, ...]) -> dict[tuple[str, str], float]:
 
 def _errors(body: Body, cases: tuple[Case, ...], where: Spectrum) -> list[list[Errors]]:
     """Return the elementary errors of every run of every trial."""
-    return [[kinematic_errors(body, _part(case.motion, pick)) for pick in picks] for case, picks in zip(cases, where.picks, strict=True)]
+    return [
+        [forward(of_clusters(body), _part(case.motion, pick)) for pick in picks] for case, picks in zip(cases, where.picks, strict=True)
+    ]
 
 
 def _part(motion: Motion, pick: NDArray[np.intp]) -> Motion:
@@ -170,10 +174,10 @@ def _kinematic_rows(where: Spectrum, errors: list[list[Errors]]) -> tuple[Array,
     wrench, frames = [], 0
     markers = np.zeros_like(next(one for some in errors for one in some).markers)
     for index, some in enumerate(errors):
-        layout = where.layout.at(where.rates[index])
+        bands = where.layout.bands.at(where.rates[index])
         for pick, one in zip(where.picks[index], some, strict=True):
-            kept = layout.bands_of(pick.size) >= 0
-            wrench.append(layout.coefficients(layout.shift @ one.wrench)[kept])
+            kept = bands.of(pick.size) >= 0
+            wrench.append(bands.coefficients(where.layout.shift @ one.wrench)[kept])
             markers -= pick.size * one.markers
             frames += pick.size
     rows = np.concatenate(wrench)

@@ -12,7 +12,6 @@ from biodance.diagnose.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnose.engine import Examined, diagnose
 from biodance.diagnose.foresight import Foresight, foresee, session_of
 from biodance.diagnose.problem import Look
-from biodance.diagnose.tolerances import Tolerances
 from biodance.effects.case import Case
 from biodance.effects.gate import Gate, gates
 from biodance.errors import BiodanceError, SessionRefused, TrialRefused
@@ -22,6 +21,7 @@ from biodance.pipeline.identification import FITTED, KEPT, SessionIdentification
 from biodance.pipeline.looked_at import Own, left_out, looked_at, looks, own_tolerances
 from biodance.pipeline.results import SessionResult
 from biodance.records import Role, Sip
+from biodance.uncertainty.tolerances import Tolerances
 
 TRIAL_SECONDS = 20.0
 """s: a designed dance is looked at as trials of about this length."""
