@@ -1,6 +1,7 @@
 """Learn from sessions without fault how large everything is that is no fault, all of them at once (`uncertainty/learning`).
 
-A coefficient of a nuisance is normal with the mean and the size of its key; a mean counts only where the sessions agree on it.
+A coefficient of a nuisance is normal with the mean and the size of its key; a mean counts only where the sessions agree on it. What a joint
+may err before functional calibration is the literature's, and stays.
 """
 
 from collections.abc import Iterable
@@ -15,7 +16,7 @@ from biodance.diagnose.model import marker_keys, nuisances, shown_left_out
 from biodance.diagnose.problem import Problem
 from biodance.records import Array
 from biodance.uncertainty.learning import Moments, maximise, moments_of, noise_of, sizes_of
-from biodance.uncertainty.tolerances import REFERENCE, Tolerances, whitened
+from biodance.uncertainty.tolerances import BEFORE, REFERENCE, Tolerances, whitened
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +99,8 @@ def _improved(sessions: tuple[Null, ...], found: Tolerances) -> Tolerances:
         here = moments_of(parts, null.band, bands)
         total = total + replace(here, residual=here.residual * (REFERENCE / null.mass) ** 2)
     means, sizes = sizes_of(rows)
-    return replace(found, sizes={**found.sizes, **sizes}, noise=noise_of(total), means=means)
+    learned = {key: size for key, size in sizes.items() if not key.endswith(BEFORE)}
+    return replace(found, sizes={**found.sizes, **learned}, noise=noise_of(total), means=means)
 
 
 def _energy(null: Null, found: Tolerances) -> Array:

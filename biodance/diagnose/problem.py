@@ -170,7 +170,7 @@ def _part(motion: Motion, pick: NDArray[np.intp]) -> Motion:
 
 
 def _kinematic_rows(where: Spectrum, errors: list[list[Errors]]) -> tuple[Array, Array]:
-    """Return the rows (6 m, K) of the errors' wrenches and (3M, K) of the mean marker residuals, measured minus model."""
+    """Return the rows (6 m, K) of the errors' wrenches and (3M, K) of the mean marker residuals; signs as `forward` has them."""
     wrench, frames = [], 0
     markers = np.zeros_like(next(one for some in errors for one in some).markers)
     for index, some in enumerate(errors):
@@ -178,7 +178,7 @@ def _kinematic_rows(where: Spectrum, errors: list[list[Errors]]) -> tuple[Array,
         for pick, one in zip(where.picks[index], some, strict=True):
             kept = bands.of(pick.size) >= 0
             wrench.append(bands.coefficients(where.layout.shift @ one.wrench)[kept])
-            markers -= pick.size * one.markers
+            markers += pick.size * one.markers
             frames += pick.size
     rows = np.concatenate(wrench)
     return rows.reshape(-1, rows.shape[2]), (markers / frames).reshape(-1, rows.shape[2])

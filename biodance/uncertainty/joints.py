@@ -14,7 +14,11 @@ from biodance.uncertainty.source import Effects, Source, kind_of, mean_local, me
 
 @dataclass(frozen=True, eq=False)
 class Centre(Source):
-    """A joint centre that lies elsewhere, along the axes of its parent (m); in the neutral posture it is calibrated away."""
+    """A joint centre that lies elsewhere, along the axes of its parent (m).
+
+    All that hangs on the joint is carried by R_parent - R_child C, with C = child_R_parent of the neutral posture, where the static trial
+    has calibrated it away.
+    """
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -29,10 +33,17 @@ class Centre(Source):
     def forward(self, trial: Response) -> Effects:
         """Return what displaced centres do to what hangs on them."""
         value, left = self._followed(trial)
-        drift = np.concatenate([own for _, own in self._drifts(trial)], axis=3)
-        for s in range(len(self.body.segments)):
-            value += trial.place[:, s] @ drift[:, s]
+        for k, (on, drift) in enumerate(self._drifts(trial)):
+            value[:, :, 3 * k : 3 * k + 3] += trial.place[:, on].sum(axis=1) @ drift
         return value, mean_local(trial, left, np.ones((len(left), 1)))
+
+    def transpose(self, trial: Response, pull: Pull) -> Array:
+        """Return the weights on a drift of whole segments with their markers."""
+        worn, found = np.array(self.body.markers.segment), [np.empty((0, pull.place.shape[3]))]
+        for on, drift in self._drifts(trial):
+            total = pull.place[:, on].sum(axis=1) + pull.marker[:, np.isin(worn, on)].sum(axis=1)
+            found.append(np.einsum("fij,fip->jp", drift, total, optimize=True))
+        return np.concatenate(found)
 
     def squares(self, trial: Response) -> Array:
         """Return the squared residuals of the markers that are carried along."""
@@ -40,26 +51,20 @@ class Centre(Source):
 
     def _followed(self, trial: Response) -> tuple[Array, Array]:
         """Return functionals (F, 18, K) and residuals (F, 3M, K) of the markers that are carried along."""
-        worn = list(self.body.markers.segment)
-        drift = np.concatenate([own[:, worn] for _, own in self._drifts(trial)], axis=3)
-        return trial.of_markers(drift.reshape(len(drift), 3 * len(worn), -1))
-
-    def transpose(self, trial: Response, pull: Pull) -> Array:
-        """Return the weights on a drift of whole segments with their markers."""
-        weight = pull.place.copy()
-        np.add.at(np.swapaxes(weight, 0, 1), list(self.body.markers.segment), np.swapaxes(pull.marker, 0, 1))
-        parts = [np.einsum("fsij,fsip->jp", own[:, on], weight[:, on], optimize=True) for on, own in self._drifts(trial)]
-        return np.concatenate(parts)
+        worn = np.array(self.body.markers.segment)
+        moved = np.zeros((len(trial.J), worn.size, 3, len(self.groups)))
+        for k, (on, drift) in enumerate(self._drifts(trial)):
+            moved[:, np.isin(worn, on), :, 3 * k : 3 * k + 3] = drift[:, None]
+        return trial.of_markers(moved.reshape(len(moved), 3 * worn.size, -1))
 
     def _drifts(self, trial: Response) -> list[tuple[Array, Array]]:
-        """Return for every anatomical joint the segments on it and (F, N, 3, 3) m of every segment per metre along the parent's axes."""
+        """Return for every anatomical joint the segments on it and (F, 3, 3) m of their drift, lab, per metre along the parent's axes."""
         rest, hangs, found = poses(self.body, self.body.neutral), below(self.body), []
-        for joint in (chain[0] for chain in chains(self.body)):
-            turn, still = (_above(self.body, at, joint) for at in (trial.pose, rest))
-            on = np.flatnonzero(hangs[joint])
-            own = np.zeros((len(turn), len(self.body.segments), 3, 3))
-            own[:, on] = turn[:, None] - trial.pose.rotation[:, on] @ (np.swapaxes(rest.rotation[:, on], -1, -2) @ still[:, None])
-            found.append((on, own))
+        for chain in chains(self.body):
+            turn, still = (_above(self.body, at, chain[0]) for at in (trial.pose, rest))
+            child = self.body.joints[chain[-1]].segment
+            drift = turn - trial.pose.rotation[:, child] @ (rest.rotation[0, child].T @ still[0])
+            found.append((np.flatnonzero(hangs[chain[0]]), drift))
         return found
 
 
