@@ -17,7 +17,7 @@ from biodance.errors import BiodanceError, UnknownName
 from biodance.library import folder, names, read_toml
 from biodance.records import Subject
 
-FAMILIES = ("segments", "human", "robots")
+FAMILIES = ("segments", "human", "robots", "uncertainty")
 TABLES = [(family, name) for family in FAMILIES for name in names(f"anthropometry/{family}", ".csv")]
 PEOPLE = [("F", 1.50, 45.0), ("F", 1.75, 65.0), ("F", 1.62, 90.0), ("M", 1.60, 55.0), ("M", 1.77, 75.0), ("M", 1.95, 110.0)]
 

@@ -5,7 +5,7 @@ import pytest
 
 from biodance.body.human import human
 from biodance.dance.chain import ROOT, Chain
-from biodance.dance.expectation import RATE, SIZES, expected, typical_noise
+from biodance.dance.expectation import RATE, expected, typical_noise, typical_sizes
 from biodance.dance.splines import rest_to_rest
 from biodance.identify.knowledge import segment_quantities
 from biodance.identify.mismatch import mismatch, temper
@@ -49,7 +49,7 @@ def test_the_end_is_what_identification_would_say_of_data_that_agree_with_the_ta
     noise = typical_noise(wrench.cop().mean(axis=0))
     fit = Fit("all", motion, wrench, motion.time < 6.0 - 1e-9)
     data = statistics(BODY, fit, noise).information(noise)
-    belief = posterior(temper(data, mismatch(BODY, (fit,), noise), SIZES), widened(BODY.sip))
+    belief = posterior(temper(data, mismatch(BODY, (fit,), noise), typical_sizes()), widened(BODY.sip))
     found = expected(BODY, motion, np.array([6.0]))
     for i in range(12):
         cut = slice(10 * i, 10 * i + 10)
