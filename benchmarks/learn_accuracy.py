@@ -1,4 +1,4 @@
-"""Learn how far the sizes of named causes are from the truth: writes the section [accuracy] of anthropometry/uncertainty/null_sessions.toml anew.
+"""Learn how far the sizes of named causes are from the truth: writes [accuracy] of anthropometry/uncertainty/null_sessions.toml anew.
 
     python benchmarks/learn_accuracy.py [--minutes 30] [--out anthropometry/uncertainty/null_sessions.toml] [--prepare]
 

@@ -83,14 +83,14 @@ def nuisances(problem: Problem, causes: tuple[Candidate, ...]) -> tuple[Array, t
     """Return columns (r, K) per unit of all that may be no fault, the keys of their sizes and of their means ("" for those that have none:
     the signs of slides and tilts are mirrored between sides and persons).
     """
-    body, placed = problem.cases[0].body, {error.joint for error in problem.cases[0].body.joint_errors}
+    body = problem.cases[0].body
     joints = {joint_of(body, chain) for chain in chains(body)}
     parts, keys = [problem.kinematics], list(problem.groups)
     means = [group if group.startswith("sag ") else "" for group in problem.groups]
     for one in causes:
         parts.append(one.basis / (SCALE * one.effect.typical[0]))
         key, width = key_of(*one.names), one.basis.shape[1]
-        own = in_state(key, one.effect.target if one.effect.target in joints else "", placed)
+        own = in_state(key, one.effect.target if one.effect.target in joints else "", body)
         loud = [p.name for p, silent in zip(one.effect.parameters, one.silent, strict=True) if not silent]
         keys += [own] * width
         means += [mean_key(*one.names, name) if own == key else "" for name in loud] + [""] * (width - len(loud))

@@ -140,8 +140,8 @@ def problem(body: Body, looks: tuple[Look, ...], *, prior: Sip | None = None) ->
     rows, markers = _kinematic_rows(where, errors)
     shown = sizes_shown(cases)
     sip = np.concatenate([W.reshape(-1, W.shape[2]), np.zeros((len(markers) + len(shown), W.shape[2]))])
-    unit, placed = next(one for some in errors for one in some), {error.joint for error in body.joint_errors}
-    groups = tuple(in_state(group, joint, placed) for group, joint in zip(unit.groups, unit.joints, strict=True))
+    unit = next(one for some in errors for one in some)
+    groups = tuple(in_state(group, joint, body) for group, joint in zip(unit.groups, unit.joints, strict=True))
     measured = where.rows(tuple(case.residual[:, :, None] for case in cases))
     target = np.concatenate([measured.ravel(), _mean_markers(cases, where).ravel(), list(shown.values())])
     rows = np.concatenate([rows, markers, np.zeros((len(shown), rows.shape[1]))])

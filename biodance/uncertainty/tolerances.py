@@ -8,7 +8,7 @@ laboratory's own.
 
 import re
 import tomllib
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from types import MappingProxyType
@@ -16,6 +16,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from biodance.body.body import Body
 from biodance.body.error_sizes import error_rows, error_size
 from biodance.library import locate
 from biodance.records import Array, frozen_array
@@ -23,7 +24,7 @@ from biodance.records import Array, frozen_array
 REFERENCE = 70.0
 """kg: the noise is stated for a person of this mass and grows in proportion to it."""
 BEFORE = " before"
-"""End of the key of what belongs to a joint that no functional calibration placed."""
+"""End of the key of what belongs to a joint where no functional calibration was made."""
 JOINTS = ("joint_centre", "tilt")
 """Quantities that a functional calibration changes."""
 
@@ -57,8 +58,8 @@ class Tolerances:
             object.__setattr__(self, name, frozen_array(getattr(self, name), (bands, 6), f"Tolerances.{name}"))
 
     def size(self, key: str) -> float:
-        """Return the standard deviation of ``key``; 0 for one that was never learned: it is then no nuisance. A joint that was not
-        placed has the size of one that was where nothing is known of the difference.
+        """Return the standard deviation of ``key``; 0 for one that was never learned: it is then no nuisance. A joint
+        before functional calibration has the size of one after it where nothing is known of the difference.
         """
         return self.sizes.get(key, self.sizes.get(key.removesuffix(BEFORE), 0.0))
 
@@ -129,9 +130,13 @@ def key_of(name: str, target: str) -> str:
     return f"{name} {kind}".strip()
 
 
-def in_state(key: str, joint: str, placed: Collection[str]) -> str:
-    """Return ``key`` as it holds for a ``joint`` of the body ("" for what belongs to none), if those ``placed`` were placed by movement."""
-    return key if not joint or joint in placed else key + BEFORE
+def in_state(key: str, joint: str, body: Body) -> str:
+    """Return ``key`` as it holds for a ``joint`` of ``body`` ("" for what belongs to none): before or after a functional calibration.
+
+    After it, a joint that the movement did not show stays where it was; its errors hardly show in that movement either, and such joints
+    are among those that the sizes were learned on.
+    """
+    return key if not joint or body.joint_errors else key + BEFORE
 
 
 def mean_key(name: str, target: str, parameter: str) -> str:
