@@ -14,7 +14,7 @@ from biodance.identify.learning import learn
 from biodance.identify.loads import may_carry, point_mass
 from biodance.identify.sessions import differences
 from biodance.identify.statistics import layout_for, statistics
-from biodance.identify.validation import gain, validate
+from biodance.identify.validation import residual_ratio, validate
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Motion, Sip, Wrench
 from biodance.uncertainty.caution import about_true_centres, widened
@@ -160,13 +160,13 @@ def test_gain_has_the_known_ratio_in_its_interval() -> None:
     half = replace(fit, wrench=halved)
     assert half.wrench.value.shape == fit.wrench.value.shape
     true_body = replace(body, sip=Sip(body.segments, truth, body.sip.covariance))
-    result = gain((validate(body, true_body, half, about=np.zeros(3)),))
+    result = residual_ratio((validate(body, true_body, half, about=np.zeros(3)),))
     assert result.force == pytest.approx(2.0)
     assert result.moment == pytest.approx(2.0)
     assert result.force_interval[0] <= 2.0 + 1e-9
     assert result.force_interval[1] >= 2.0 - 1e-9
     with pytest.raises(BiodanceError, match="blocks"):
-        gain((validate(body, true_body, noisy_fit(body, smooth_motion(body, rng, frames=120), truth, rng), about=np.zeros(3)),))
+        residual_ratio((validate(body, true_body, noisy_fit(body, smooth_motion(body, rng, frames=120), truth, rng), about=np.zeros(3)),))
 
 
 def test_learned_noise_is_used_when_given() -> None:

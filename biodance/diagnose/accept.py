@@ -59,7 +59,7 @@ def judged(body: Body, fits: tuple[Fit, ...], about: Array) -> Judged:
     return Judged(tuple(f.name for f in fits), left, tuple(f.use for f in fits), tuple(f.motion.rate for f in fits))
 
 
-def gain(before: Judged, after: Judged, *, fitted: tuple[Judged, Judged], seed: int = 0) -> Gain:
+def gain_by_naming(before: Judged, after: Judged, *, fitted: tuple[Judged, Judged], seed: int = 0) -> Gain:
     """Return what naming the causes gains on trials that were not used: ``before`` and ``after`` hold the same trials.
 
     ``fitted`` the same two bodies on the trials that were used: what the better one leaves there is the unit in which the channels are

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.diagnose.accept import Judged, accept, fit_of, gain, judged
+from biodance.diagnose.accept import Judged, accept, fit_of, gain_by_naming, judged
 from biodance.diagnose.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnose.engine import Examined, diagnose
 from biodance.diagnose.foresight import Foresight, foresee, session_of
@@ -227,7 +227,7 @@ def _accepted(result: SessionResult, examined: Examined, before: Identification)
         judged(after.identified, tuple(fit_of(*pair) for pair in mended), about),
     )
     try:
-        measured = gain(*left, fitted=used)
+        measured = gain_by_naming(*left, fitted=used)
     except BiodanceError:
         measured = None
     findings = tuple(replace(one, gain=measured) for one in findings)

@@ -7,7 +7,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.motion.kinematics import Poses, poses
 from biodance.motion.marker_jacobian import below, chains, skew
-from biodance.records import Array
+from biodance.records import Array, Index
 from biodance.uncertainty.response import Pull, Response, centres
 from biodance.uncertainty.source import Effects, Source, kind_of, mean_local, mean_squares
 
@@ -57,7 +57,7 @@ class Centre(Source):
             moved[:, np.isin(worn, on), :, 3 * k : 3 * k + 3] = drift[:, None]
         return trial.of_markers(moved.reshape(len(moved), 3 * worn.size, -1))
 
-    def _drifts(self, trial: Response) -> list[tuple[Array, Array]]:
+    def _drifts(self, trial: Response) -> list[tuple[Index, Array]]:
         """Return for every anatomical joint the segments on it and (F, 3, 3) m of their drift, lab, per metre along the parent's axes."""
         rest, hangs, found = poses(self.body, self.body.neutral), below(self.body), []
         for chain in chains(self.body):
@@ -119,7 +119,7 @@ class Tilt(Source):
             found.append(np.einsum("fit,fip->tp", rho, total))
         return np.concatenate(found)
 
-    def _turns(self, trial: Response) -> list[tuple[int, Array, Array]]:
+    def _turns(self, trial: Response) -> list[tuple[int, Index, Array]]:
         """Return for every hinge its joint, the segments on it, and (F, 3, 2) rad of their turn, lab, per radian of tilt."""
         hangs, found = below(self.body), []
         for (joint,) in (chain for chain in chains(self.body) if len(chain) == 1):

@@ -20,7 +20,7 @@ from biodance.body.inertia import TENSOR
 from biodance.motion.kinematics import Poses, poses, segment_motion
 from biodance.motion.marker_jacobian import jacobian, skew
 from biodance.motion.regressor import GRAVITY
-from biodance.records import Array, Motion
+from biodance.records import Array, Index, Motion
 
 RIDGE = 1e-6
 """Share of the mean curvature of the tracking that is added to it, so that coordinates without markers stay where they are."""
@@ -72,7 +72,7 @@ class Response:
         """(F, n) rad, of the joints."""
         return self.motion.q[:, self.body.nq - len(self.body.joints) :]
 
-    def of_markers(self, moved: Array, rows: Array | slice = slice(None)) -> tuple[Array, Array]:
+    def of_markers(self, moved: Array, rows: Index | slice = slice(None)) -> tuple[Array, Array]:
         """Return the functionals (F, 18, K) of model markers ``rows`` that ``moved`` (F, R, K) m, and what is left of all (F, 3M, K) m."""
         change = self.follow[:, :, rows] @ moved
         left = self.J @ change

@@ -8,7 +8,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.motion.kinematics import cross, segment_motion
 from biodance.motion.regressor import GRAVITY
-from biodance.records import Array
+from biodance.records import Array, Index
 from biodance.uncertainty.response import Pull, Response
 from biodance.uncertainty.source import Effects, Source, kind_of, mean_local, mean_squares, neighbours
 
@@ -54,14 +54,14 @@ class Slide(Source):
             found.append(3 * np.mean(residual**2, axis=1).T @ trial.angles[:, near] ** 2 / len(residual))
         return np.concatenate([part.ravel() for part in found])
 
-    def _moved(self, trial: Response, s: int, on: Array) -> Array:
+    def _moved(self, trial: Response, s: int, on: Index) -> Array:
         """Return the displacements (F, 3m, P) of the model's markers against those measured, lab."""
         local = np.swapaxes(self.patterns[s], 1, 2)[None]
         moved = -np.swapaxes(local @ np.swapaxes(trial.pose.rotation[:, s, None], -1, -2), -1, -2)
         return np.asarray(moved).reshape(len(moved), 3 * on.size, -1)
 
     @cached_property
-    def _parts(self) -> tuple[tuple[int, Array, Array, Array], ...]:
+    def _parts(self) -> tuple[tuple[int, Index, Index, Index], ...]:
         """Segments that wear markers: index, markers, their rows among 3M, angles beside it."""
         worn, found = np.array(self.body.markers.segment), []
         for s, near in enumerate(_near(self.body)):
@@ -107,7 +107,7 @@ class Sag(Source):
     def _worn(self) -> tuple[int, ...]:
         return tuple(sorted(set(self.body.markers.segment)))
 
-    def _moved(self, trial: Response, s: int) -> tuple[Array, Array]:
+    def _moved(self, trial: Response, s: int) -> tuple[Index, Array]:
         """Return the markers of a segment and the acceleration (F, 3) of their middle less gravity, lab."""
         on = np.flatnonzero(np.array(self.body.markers.segment) == s)
         move = segment_motion(self.body, trial.motion)
@@ -143,7 +143,7 @@ class Flesh(Source):
         return np.zeros(len(self.groups))
 
 
-def _near(body: Body) -> tuple[Array, ...]:
+def _near(body: Body) -> tuple[Index, ...]:
     """Return for every segment the angles beside it."""
     return tuple(np.flatnonzero(column) for column in neighbours(body).T)
 

@@ -38,8 +38,8 @@ class Errors:
     """What K elementary errors do in one trial.
 
     ``groups`` (K) such as ``slide thigh`` (m/rad), ``sag thigh`` (s²), ``flesh thigh`` (m/rad), ``joint_centre hip`` (m), ``tilt knee``
-    (rad); ``joints`` (K) of the body that they belong to, or ""; ``wrench`` (T, 6, K) added to the wrench that the motion needs beyond
-    the predicted one, about the lab origin; ``markers`` (M, 3, K) m, mean residual of every marker, model less measured, segment axes.
+    (rad); ``joints`` (K) of the body that they belong to, or ""; ``wrench`` (T, 6, K) added to the predicted wrench, predicted less
+    measured, about the lab origin; ``markers`` (M, 3, K) m, mean residual of every marker, model less measured, segment axes.
     """
 
     groups: tuple[str, ...]
