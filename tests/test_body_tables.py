@@ -20,7 +20,7 @@ from biodance.errors import BiodanceError, UnknownName
 from biodance.library import folder, names, read_toml
 from biodance.records import Subject
 
-FAMILIES = ("segments", "human", "robots")
+FAMILIES = ("segments", "human", "robots", "uncertainty")
 TABLES = [(family, name) for family in FAMILIES for name in names(f"anthropometry/{family}", ".csv")]
 PEOPLE = [("F", 1.50, 45.0), ("F", 1.75, 65.0), ("F", 1.62, 90.0), ("M", 1.60, 55.0), ("M", 1.77, 75.0), ("M", 1.95, 110.0)]
 
@@ -293,3 +293,22 @@ def test_the_disagreement_of_tables_does_not_widen_a_limb(table: str) -> None:
     grown = np.diag(together)[place] - np.diag(alone)[place]
     assert np.all(grown <= np.maximum(0.0, ways - 0.75 * np.diag(alone))[place] + 1e-15)
     assert np.all(np.diag(together)[place] >= 0.25 * np.diag(alone)[place] - 1e-15)
+
+
+def test_left_and_right_vary_as_mirror_images() -> None:
+    """A point cloud and its reflection at z = 0: what makes the right number larger makes the reflected left one larger, all ten."""
+    rng = np.random.default_rng(3)
+    cloud, weight = rng.normal(size=(20, 3)), rng.uniform(0.1, 1.0, 20)
+    other = cloud * [1.0, 1.0, -1.0]
+
+    def ten(points: np.ndarray) -> np.ndarray:
+        inertia = sum(m * (p @ p * np.eye(3) - np.outer(p, p)) for m, p in zip(weight, points, strict=True))
+        return np.array([weight.sum(), *(weight @ points), *(inertia[i, j] for i, j in TENSOR)])
+
+    signs = np.sign(ten(other) / ten(cloud))
+    sip = human(Subject(70.0, 1.72, "M", 40.0)).sip
+    correlation = sip.covariance / np.sqrt(np.outer(np.diag(sip.covariance), np.diag(sip.covariance)))
+    for kind in ("thigh", "shank", "upper_arm"):
+        right, left = (10 * SEGMENTS.index(f"{side}_{kind}") for side in ("right", "left"))
+        own = np.diag(correlation[right : right + 10, left : left + 10])
+        assert (signs * own > 0.3).all(), (kind, signs * own)

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from biodance.body.human import human
-from biodance.dance.expectation import RATE, SIZES, expected_spread, typical_noise
+from biodance.dance.expectation import RATE, expected_spread, typical_noise, typical_sizes
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.splines import rest_to_rest
-from biodance.identify.caution import widened
 from biodance.identify.knowledge import segment_quantities
 from biodance.identify.mismatch import mismatch, temper
 from biodance.identify.posterior import posterior
 from biodance.identify.statistics import Fit, statistics
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Motion, Subject
+from biodance.uncertainty.caution import widened
 
 BODY = human(Subject(65.0, 1.75, "F", 33.0))
 CHAIN = Chain(BODY)
@@ -49,7 +49,7 @@ def test_the_end_is_what_identification_would_say_of_data_that_agree_with_the_ta
     noise = typical_noise(wrench.cop().mean(axis=0))
     fit = Fit("all", motion, wrench, motion.time < 6.0 - 1e-9)
     data = statistics(BODY, fit, noise).information(noise)
-    belief = posterior(temper(data, mismatch(BODY, (fit,), noise), SIZES), widened(BODY.sip))
+    belief = posterior(temper(data, mismatch(BODY, (fit,), noise), typical_sizes()), widened(BODY.sip))
     found = expected_spread(BODY, motion, np.array([6.0]))
     for i in range(12):
         cut = slice(10 * i, 10 * i + 10)

@@ -7,7 +7,7 @@ import pytest
 from diagnosed_sessions import about_plate, body, known, looks
 from scipy.interpolate import make_interp_spline
 
-from biodance.diagnose.accept import accept, fit_of, gain, judged
+from biodance.diagnose.accept import accept, fit_of, gain_by_naming, judged
 from biodance.diagnose.engine import diagnose
 from biodance.effects import Case, Effect, Parameter
 from biodance.errors import BiodanceError, TrialRefused, UnknownName
@@ -166,7 +166,7 @@ def test_accepting_a_fault_gains_on_trials_that_were_not_used() -> None:
     about = standing_point(as_is)
     before = judged(identified(examined.naming.first.phi), as_is, about)
     after = judged(identified(examined.naming.found.phi), mended, about)
-    measured = gain(before, after, fitted=(before, after))
+    measured = gain_by_naming(before, after, fitted=(before, after))
     assert measured.proven
     assert measured.rms_after[2] < 0.6 * measured.rms_before[2]
     assert measured.score > 2 * measured.score_se > 0
@@ -186,7 +186,7 @@ def test_a_gain_needs_three_blocks() -> None:
     fit = fit_of(Case(body(), look.trial, look.motion, body().sip.phi, np.linspace(0, 1, look.motion.time.size)), use)
     one = judged(body(), (fit,), np.zeros(3))
     with pytest.raises(BiodanceError, match="needs 3"):
-        gain(one, one, fitted=(one, one))
+        gain_by_naming(one, one, fitted=(one, one))
 
 
 def test_too_short_trials_are_refused() -> None:

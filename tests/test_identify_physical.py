@@ -11,11 +11,11 @@ from biodance.body.inertia import smallest_eigenvalues
 from biodance.errors import NotSolved
 from biodance.identify import physical
 from biodance.identify.information import Information, fold, information
-from biodance.identify.noise import Noise
 from biodance.identify.physical import FailedFit, PhysicalFit, physical_fit
 from biodance.identify.posterior import Posterior, posterior
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Sip, Wrench
+from biodance.uncertainty.noise import Noise
 
 NOISE = Noise.of_sd(2.0, 0.5, np.zeros(3))
 SEEDS = range(100)

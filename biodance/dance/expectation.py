@@ -3,41 +3,29 @@ danced.
 
 The same machinery as identification, on the planned motion: information of the whitened regressor, discounted by what
 twins of the person (soft tissue, joint centres, hinge axes) and plates within their tolerances would disturb, on top of
-the table. Only the noise is not the session's own but a typical one.
+the table. Only the noise is not the session's own but that of virtual dances.
 """
 
 from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
 
 import numpy as np
 
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
-from biodance.identify.caution import widened
 from biodance.identify.information import Information
 from biodance.identify.knowledge import segment_quantities
 from biodance.identify.mismatch import Mismatch, Sizes, mismatch, temper
-from biodance.identify.noise import BANDS, Noise
 from biodance.identify.posterior import Posterior, posterior
 from biodance.identify.statistics import Fit, statistics
+from biodance.library import locate, read_toml
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion
+from biodance.uncertainty.bands import BANDS, Bands
+from biodance.uncertainty.caution import widened
+from biodance.uncertainty.noise import Noise
 
-TYPICAL = np.array(
-    [
-        [35.0, 11.0, 80.0, 19.0, 11.0, 2.9],
-        [3.6, 3.6, 5.0, 4.0, 3.6, 1.9],
-        [2.6, 2.6, 3.2, 3.1, 3.5, 1.3],
-        [2.3, 2.1, 2.1, 1.9, 2.6, 0.9],
-        [2.7, 2.4, 2.6, 2.2, 2.9, 0.8],
-        [2.1, 1.5, 2.3, 1.3, 1.9, 0.6],
-        [1.7, 1.3, 1.6, 1.1, 1.5, 0.5],
-    ]
-)
-"""(7, 6) N, N·m: noise of one coefficient in each of `identify.noise.BANDS` up to 6 Hz at 25 Hz, as learned from three
-virtual subjects who danced with realistic tolerances (root mean square).
-"""
-SIZES = Sizes(kinematics=1.0, noise=7.0)
-"""Sizes of the disturbances that the evidence chose in those sessions (noise: 4.5, 7, 7)."""
 RATE = 12.5
 """Hz at which a plan is judged: moves of 2 s from rest to rest have nothing to say above 6 Hz."""
 STILL = 1.5
@@ -96,11 +84,20 @@ def expected_spread(body: Body, motion: Motion, ends: Array) -> Expectation:
 
 
 def typical_noise(about: Array) -> Noise:
-    """Return the noise of a typical session about the standing point ``about`` (3,) m; a coefficient's variance grows
-    with the rate.
-    """
-    covariance = RATE / 25.0 * np.array([np.diag(row**2) for row in TYPICAL])
-    return Noise(covariance, about, BANDS[: len(TYPICAL) + 1], RATE)
+    """Return the noise of a typical session about the standing point ``about`` (3,) m; a coefficient's variance grows with the rate."""
+    covariance = RATE / BANDS.rate * np.array([np.diag(np.square(row)) for row in _danced()["noise"]])
+    return Noise(covariance, about, Bands(BANDS.edges, RATE))
+
+
+def typical_sizes() -> Sizes:
+    """Return the sizes of the disturbances that the evidence chose in typical sessions."""
+    return Sizes(**_danced()["sizes"])
+
+
+@cache
+def _danced() -> dict[str, Any]:
+    """Return what virtual dances left: ``anthropometry/uncertainty/dances.toml``."""
+    return read_toml(locate("anthropometry/uncertainty", "dances"))
 
 
 def _gram(information: Information) -> Array:
@@ -117,7 +114,7 @@ def _belief(body: Body, H: Array, found: Mismatch) -> Posterior:
     R = np.zeros((len(H) + 1, len(H) + 1))
     R[: len(triangle)] = triangle
     data = Information(R, 1)
-    return posterior(temper(data, found, SIZES) if H.any() else data, prior)
+    return posterior(temper(data, found, typical_sizes()) if H.any() else data, prior)
 
 
 def _deviations(belief: Posterior, first: int) -> Array:

@@ -12,11 +12,11 @@ from biodance.diagnose.naming import Naming, Round, name_causes, suspicious
 from biodance.diagnose.observability import hidden, limits, visibility
 from biodance.diagnose.passing import with_passing
 from biodance.diagnose.problem import Look, problem
-from biodance.diagnose.tolerances import Tolerances, key_of, shipped
 from biodance.discovery import Chosen
 from biodance.effects import DiscreteEffect, Effect, Gate
 from biodance.effects import effects as family
 from biodance.records import Sip
+from biodance.uncertainty.tolerances import Tolerances, key_of, shipped
 
 STRANGE = (
     "What the plates measured fits only a body that is more unlike the table than people are. Something that looks like a body is wrong: "

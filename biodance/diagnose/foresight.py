@@ -14,12 +14,12 @@ from biodance.diagnose.diagnosis import Unobservable
 from biodance.diagnose.naming import built
 from biodance.diagnose.observability import Visibility, hidden, limits, visibility
 from biodance.diagnose.problem import Look, problem
-from biodance.diagnose.tolerances import Tolerances, shipped
 from biodance.discovery import Chosen
 from biodance.effects import Effect
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Markers, Motion, Plate, Source, Trial
+from biodance.uncertainty.tolerances import Tolerances, shipped
 
 HALF = 0.3
 """m: half the side of the plate that is put under the movement."""

@@ -10,10 +10,10 @@ from biodance.diagnose.diagnosis import Alias
 from biodance.diagnose.evidence import evidence
 from biodance.diagnose.model import Model, Named, model
 from biodance.diagnose.problem import Problem
-from biodance.diagnose.tolerances import Tolerances
 from biodance.discovery import Chosen
 from biodance.effects import Effect, effects
 from biodance.records import Array
+from biodance.uncertainty.tolerances import Tolerances
 
 ROUNDS = 3
 """Causes named at most."""

@@ -14,18 +14,18 @@ from biodance import display
 from biodance.body.body import Body
 from biodance.errors import NotSolved, TrialRefused, UnknownName
 from biodance.identify.base_parameters import BaseEstimate, estimate_base, structural_base
-from biodance.identify.caution import about_true_centres, widened
 from biodance.identify.gate import believable
 from biodance.identify.information import Information
 from biodance.identify.knowledge import QUANTITIES, Known, knowledge, mass_interval
 from biodance.identify.learning import learn
 from biodance.identify.loads import may_carry
 from biodance.identify.mismatch import Mismatch, Sizes, evident_sizes, mismatch, temper
-from biodance.identify.noise import Noise
 from biodance.identify.physical import FailedFit, PhysicalFit, physical_fit
 from biodance.identify.posterior import Posterior, posterior
 from biodance.identify.statistics import Fit, Statistics, empty, layout_for, statistics
 from biodance.records import Array, Sip
+from biodance.uncertainty.caution import about_true_centres, widened
+from biodance.uncertainty.noise import Noise
 
 if TYPE_CHECKING:
     import pandas as pd

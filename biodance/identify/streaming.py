@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.identify.caution import widened
 from biodance.identify.identification import Identification, conclude
 from biodance.identify.knowledge import Known
 from biodance.identify.learning import learn
 from biodance.identify.loads import may_carry
 from biodance.identify.mismatch import SHORTEST, Mismatch, mismatch, nothing
-from biodance.identify.noise import BLOCK, blocks
 from biodance.identify.statistics import Fit, Statistics, empty, layout_for, statistics
 from biodance.records import Array, Motion, Wrench
+from biodance.uncertainty.bands import BLOCK
+from biodance.uncertainty.caution import widened
 
 ENOUGH = ("mass", "com x", "com y", "com z")
 """Quantities that must all be known before a segment is known well enough."""
@@ -144,7 +144,7 @@ def begin(body: Body, *, rate: float) -> Stream:
 
 def about(found: Statistics, point: Array) -> Statistics:
     """Return the statistics with wrenches about another ``point`` (3,) m of the lab: an exact linear map of the channels."""
-    layout = layout_for(point, edges=found.layout.edges, rate=found.layout.rate)
+    layout = layout_for(point, found.layout.bands)
     move = layout.shift @ np.linalg.inv(found.layout.shift)
     return Statistics(np.einsum("ab,nbicj,dc->naidj", move, found.gram, move, optimize=True), found.count, layout)
 
@@ -158,8 +158,7 @@ def _pressure(fit: Fit) -> Array:
 
 def _stride(stream: Stream) -> int:
     """Return how many frames the batch takes one of."""
-    every = next(blocks(np.ones(BLOCK * 100, dtype=bool), stream.rate, stream.total.layout))
-    return int(every[1] - every[0])
+    return stream.total.layout.bands.stride(stream.rate)
 
 
 def _extended(stream: Stream, rows: Array) -> Stream:

@@ -9,12 +9,11 @@ import numpy as np
 
 from biodance import display
 from biodance.body.body import Body
-from biodance.diagnose.accept import Judged, accept, fit_of, gain, judged
+from biodance.diagnose.accept import Judged, accept, fit_of, gain_by_naming, judged
 from biodance.diagnose.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
 from biodance.diagnose.engine import Examined, diagnose
 from biodance.diagnose.foresight import Foresight, foresee, session_of
 from biodance.diagnose.problem import Look
-from biodance.diagnose.tolerances import Tolerances
 from biodance.discovery import Chosen
 from biodance.effects import Case, DiscreteEffect, Effect, Gate, causes, gates
 from biodance.errors import BiodanceError, NotSolved, SessionRefused, TrialRefused
@@ -24,6 +23,7 @@ from biodance.pipeline.identification import FITTED, KEPT, SessionIdentification
 from biodance.pipeline.looked_at import Own, left_out, looked_at, looks, own_tolerances
 from biodance.pipeline.results import SessionResult
 from biodance.records import Role, Sip
+from biodance.uncertainty.tolerances import Tolerances
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -274,7 +274,7 @@ def _accepted(result: SessionResult, examined: Examined, before: Identification)
         judged(after.identified, tuple(fit_of(*pair) for pair in mended), about),
     )
     try:
-        measured = gain(*left, fitted=used)
+        measured = gain_by_naming(*left, fitted=used)
     except BiodanceError:
         measured = None
     findings = tuple(replace(one, gain=measured) for one in findings)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from biodance import display
 from biodance.body.body import Body
-from biodance.diagnose.tolerances import Tolerances
 from biodance.discovery import Chosen
 from biodance.effects import DiscreteEffect, Effect, causes
 from biodance.lab.session import read_session
@@ -17,6 +16,7 @@ from biodance.pipeline.identification import SessionIdentification, identify_tri
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine, identified
 from biodance.records import Session, Subject
+from biodance.uncertainty.tolerances import Tolerances
 
 if TYPE_CHECKING:
     import pandas as pd

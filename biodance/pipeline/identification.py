@@ -14,7 +14,7 @@ from biodance.identify.identification import Identification, identify, standing_
 from biodance.identify.sessions import Difference, differences
 from biodance.identify.statistics import Fit
 from biodance.identify.torques import TorqueBands, torque_bands
-from biodance.identify.validation import Gain, TrialValidation, gain, validate
+from biodance.identify.validation import ResidualRatio, TrialValidation, residual_ratio, validate
 from biodance.motion.comparison import Agreement, compare
 from biodance.motion.contact import foot_wrenches, ground_contact
 from biodance.motion.regressor import predict_wrench
@@ -70,7 +70,7 @@ class SessionIdentification:
     fitted: tuple[TrialValidation, ...]
     validations: tuple[TrialValidation, ...]
     agreements: Mapping[str, Agreement]
-    gain: Gain | None
+    gain: ResidualRatio | None
     search: AddedMass
     changes: tuple[Difference, ...] = ()
     torques: TorqueBands | None = None
@@ -232,11 +232,11 @@ def _fits(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[Fi
     return tuple(fit for fit in found if fit is not None)
 
 
-def _gain(kept: tuple[TrialValidation, ...], notes: list[str]) -> Gain | None:
+def _gain(kept: tuple[TrialValidation, ...], notes: list[str]) -> ResidualRatio | None:
     if not kept:
         return None
     try:
-        return gain(kept)
+        return residual_ratio(kept)
     except BiodanceError as error:
         notes.append(str(error))
         return None

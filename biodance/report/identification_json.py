@@ -10,7 +10,7 @@ from biodance.identify.identification import Identification
 from biodance.identify.knowledge import Known
 from biodance.identify.sessions import Difference
 from biodance.identify.torques import TorqueBands
-from biodance.identify.validation import Gain, TrialValidation
+from biodance.identify.validation import ResidualRatio, TrialValidation
 from biodance.motion.comparison import Agreement
 from biodance.pipeline.identification import SessionIdentification
 
@@ -64,7 +64,7 @@ def _validation(trial: TrialValidation) -> dict[str, Any]:
     }
 
 
-def _gain(found: Gain | None) -> dict[str, Any] | None:
+def _gain(found: ResidualRatio | None) -> dict[str, Any] | None:
     if found is None:
         return None
     return {"force": found.force, "force_ci95": found.force_interval, "moment": found.moment, "moment_ci95": found.moment_interval}

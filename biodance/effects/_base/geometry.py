@@ -13,10 +13,9 @@ from biodance.body.body import Body
 from biodance.body.moved import carried_by, neutral_turn
 from biodance.effects._base.moved_matter import MovedMatter, centres, moved_matter, wrench_of
 from biodance.effects._base.posture_answer import PostureAnswer
-from biodance.identify.twins import skew
 from biodance.lab.filters import LowPass, motion_filter
 from biodance.motion.kinematics import Poses, SegmentMotion
-from biodance.motion.marker_jacobian import below, chains, jacobian
+from biodance.motion.marker_jacobian import below, chains, jacobian, skew
 from biodance.records import Array, Index
 
 if TYPE_CHECKING:

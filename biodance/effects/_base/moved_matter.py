@@ -15,9 +15,9 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from biodance.body.inertia import TENSOR
-from biodance.identify.twins import skew
 from biodance.lab.filters import LowPass, low_pass
 from biodance.motion.kinematics import SegmentMotion
+from biodance.motion.marker_jacobian import skew
 from biodance.records import Array
 
 DEGREE = 5

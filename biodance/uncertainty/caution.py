@@ -7,27 +7,13 @@ a CoM that is off by d adds m d² to the inertia about the joint, which a first-
 import numpy as np
 
 from biodance.body.body import JointError
+from biodance.body.error_sizes import error_size, joint_size
 from biodance.body.inertia import TENSOR
-from biodance.identify.twins import skew
+from biodance.motion.marker_jacobian import skew
 from biodance.records import Array, Sip
 
-TURN = np.array([0.05, 0.05, 0.05])
-"""(3,) rad: standard deviation of a segment frame's turn about its axes; 3 degrees."""
-ARM_TURN = np.array([0.05, 0.4, 0.05])
-"""(3,) rad for upper arm and forearm: their long axis turns with a plane that a nearly straight arm hardly defines."""
-
-
-MASS_FLOOR = 0.14
-"""Relative standard deviation of a segment's mass: no table is known to fit a person better (spread between de Leva 1996, Dumas 2018 and
-Zatsiorsky, and the tables' own residuals)."""
-SIDES, SCALE_SD = 0.8, 0.2
-"""Correlation of the right and the left side; kg, how well the scale pins the total mass."""
-CENTRE = {"thigh": 0.012, "shank": 0.008, "foot": 0.008, "trunk_head": 0.030, "upper_arm": 0.012, "forearm_hand": 0.020}
-"""m per axis: how far the origin of a segment's frame may be from its true joint centre (see `twins.JOINT_CENTRE`)."""
 JOINT = {"thigh": "hip", "shank": "knee", "foot": "ankle", "trunk_head": "trunk", "upper_arm": "shoulder", "forearm_hand": "elbow"}
 """The joint at the origin of each segment's frame."""
-ROOT_CENTRE = 0.008
-"""m per axis: the same for the pelvis, and for segments of other bodies."""
 
 
 def widened(prior: Sip) -> Sip:
@@ -38,10 +24,17 @@ def widened(prior: Sip) -> Sip:
         phi, own = prior.phi[cut], covariance[cut, cut].copy()
         if phi[0] <= 0:
             continue
-        turn = ARM_TURN if segment.endswith(("upper_arm", "forearm_hand")) else TURN
-        slope = _turn_slope(phi) * turn
+        slope = _turn_slope(phi) * frame_turn(segment)
         covariance[cut, cut] = own + slope @ slope.T + _displacement(phi, own)
     return Sip(prior.segments, prior.phi, covariance)
+
+
+def frame_turn(segment: str) -> Array:
+    """Return (3,) rad: standard deviation of the turn of a segment's frame about its axes."""
+    turn = np.full(3, error_size("frame_turn", "any"))
+    if segment.endswith(("upper_arm", "forearm_hand")):
+        turn[1] = error_size("frame_turn", "arm axis")
+    return turn
 
 
 def about_true_centres(sip: Sip, placed: tuple[JointError, ...] = ()) -> Sip:
@@ -53,8 +46,8 @@ def about_true_centres(sip: Sip, placed: tuple[JointError, ...] = ()) -> Sip:
     covariance = np.array(sip.covariance)
     known = {error.joint: error.centre for error in placed}
     for i, segment in enumerate(sip.segments):
-        by_formula = next((value for kind, value in CENTRE.items() if segment.endswith(kind)), ROOT_CENTRE)
-        sd = known.get(_joint_of(segment), by_formula)
+        joint = _joint_of(segment)
+        sd = known.get(joint, joint_size("joint_centre", joint or segment))
         slope = sd * _shift_slope(sip.phi[10 * i : 10 * i + 10])
         covariance[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] += slope @ slope.T
     return Sip(sip.segments, sip.phi, covariance)
@@ -80,12 +73,13 @@ def _mass_spread(prior: Sip) -> Array:
     """Return the covariance (p, p) that raises every relative mass sd to the floor, sides alike, the total mass unchanged."""
     table, variance = prior.phi.reshape(-1, 10), np.diag(prior.covariance)[::10]
     mass = np.maximum(table[:, 0], 1e-12)
-    missing = np.sqrt(np.maximum(MASS_FLOOR**2 - variance / mass**2, 0.0)) * (table[:, 0] > 0) * (variance > 0)
+    missing = np.sqrt(np.maximum(error_size("segment_mass", "floor") ** 2 - variance / mass**2, 0.0)) * (table[:, 0] > 0) * (variance > 0)
     names = [name.removeprefix("right_").removeprefix("left_") for name in prior.segments]
-    alike = np.array([[1.0 if a == b else SIDES if x == y else 0.0 for b, y in enumerate(names)] for a, x in enumerate(names)])
+    sides = error_size("left_right_correlation", "mass")
+    alike = np.array([[1.0 if a == b else sides if x == y else 0.0 for b, y in enumerate(names)] for a, x in enumerate(names)])
     masses = alike * np.outer(missing * mass, missing * mass)
     total = masses.sum(axis=1)
-    masses = masses - np.outer(total, total) / (total.sum() + SCALE_SD**2)
+    masses = masses - np.outer(total, total) / (total.sum() + error_size("scale", "mass") ** 2)
     return np.asarray(np.kron(masses, np.ones((10, 10))) * np.outer(prior.phi / np.repeat(mass, 10), prior.phi / np.repeat(mass, 10)))
 
 

@@ -2,28 +2,31 @@
 
 Errors of a person repeat with the movement, so that counting residuals as independent noise would name a cause in every session. The sizes
 of all nuisances, what is expected of them, and the covariance of the rest per band are learned together on null sessions (`learning`):
-virtual subjects whose file is in `tolerances.toml`, or a laboratory's own sessions.
+of virtual subjects, whose sizes stand in the one table and the rest in ``anthropometry/uncertainty/null_sessions.toml``, or a
+laboratory's own.
 """
 
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
-from importlib.resources import files
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
+from biodance.body.body import Body
+from biodance.body.error_sizes import error_rows, error_size
+from biodance.library import locate
 from biodance.records import Array, frozen_array
 
 REFERENCE = 70.0
 """kg: the noise is stated for a person of this mass and grows in proportion to it."""
-FLOOR = np.diag([0.15**2] * 3 + [0.05**2] * 3)
-"""(6, 6) N², N²·m²: no band claims less."""
-MARKER_FLOOR = 0.0003
-"""m: calibrated cameras."""
+BEFORE = " before"
+"""End of the key of what belongs to a joint where no functional calibration was made."""
+JOINTS = ("joint_centre", "tilt")
+"""Quantities that a functional calibration changes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +58,10 @@ class Tolerances:
             object.__setattr__(self, name, frozen_array(getattr(self, name), (bands, 6), f"Tolerances.{name}"))
 
     def size(self, key: str) -> float:
-        """Return the standard deviation of ``key``; 0 for one that was never learned: it is then no nuisance."""
-        return self.sizes.get(key, 0.0)
+        """Return the standard deviation of ``key``; 0 for one that was never learned: it is then no nuisance. A joint
+        before functional calibration has the size of one after it where nothing is known of the difference.
+        """
+        return self.sizes.get(key, self.sizes.get(key.removesuffix(BEFORE), 0.0))
 
     def mean(self, key: str) -> float:
         """Return what is expected of ``key`` in a session without fault; 0 where nothing was learned."""
@@ -77,8 +82,21 @@ class Tolerances:
 
 @cache
 def shipped() -> Tolerances:
-    """Return the tolerances that come with biodance, learned from virtual subjects (`tolerances.toml` says which)."""
-    return read_tolerances((files("biodance.diagnose") / "tolerances.toml").read_text(encoding="utf-8"))
+    """Return the tolerances that come with biodance, learned from virtual subjects (``null_sessions.toml`` says which)."""
+    rest = read_tolerances(locate("anthropometry/uncertainty", "null_sessions").read_text(encoding="utf-8"))
+    return replace(rest, sizes=table_sizes())
+
+
+def table_sizes() -> dict[str, float]:
+    """Return the sizes of the one table that sessions without fault are judged by, by key: the learned ones, and those of joints before
+    any functional calibration.
+    """
+    sizes = {}
+    for row in error_rows():
+        if row["learned_on"] == "null_sessions" or row["quantity"] in JOINTS:
+            key = " ".join((row["quantity"], row["target"])).removesuffix(" session")
+            sizes[key + (BEFORE if row["state"] == "before" else "")] = float(row["sd"])
+    return sizes
 
 
 def read_tolerances(text: str) -> Tolerances:
@@ -86,7 +104,7 @@ def read_tolerances(text: str) -> Tolerances:
     raw = tomllib.loads(text)
     noise, energy, energy_sd = (np.array(raw[name]) for name in ("noise", "energy", "energy_sd"))
     return Tolerances(
-        raw["sizes"], noise, energy, energy_sd, raw["threshold"], raw["origin"], raw.get("means", {}), raw.get("accuracy", {})
+        raw.get("sizes", {}), noise, energy, energy_sd, raw["threshold"], raw["origin"], raw.get("means", {}), raw.get("accuracy", {})
     )
 
 
@@ -112,6 +130,15 @@ def key_of(name: str, target: str) -> str:
     return f"{name} {kind}".strip()
 
 
+def in_state(key: str, joint: str, body: Body) -> str:
+    """Return ``key`` as it holds for a ``joint`` of ``body`` ("" for what belongs to none): before or after a functional calibration.
+
+    After it, a joint that the movement did not show stays where it was; its errors hardly show in that movement either, and such joints
+    are among those that the sizes were learned on.
+    """
+    return key if not joint or body.joint_errors else key + BEFORE
+
+
 def mean_key(name: str, target: str, parameter: str) -> str:
     """Return the key of what is expected of one parameter of an effect: sides of the body each have their own, as signs may be mirrored."""
     plate, colon, rest = target.partition(":")
@@ -126,6 +153,6 @@ def whitened(rows: Array, band: NDArray[np.intp], marker_keys: tuple[str, ...], 
     for b, matrix in enumerate(tolerances.whiteners(mass).astype(rows.dtype)):
         chosen = band == b
         white[chosen] = matrix @ wrench[chosen]
-    known = [tolerances.size(key) for key in marker_keys]
-    sd = np.array([max(size, MARKER_FLOOR) if size > 0 else np.inf for size in known], dtype=rows.dtype)
+    known, cameras = [tolerances.size(key) for key in marker_keys], error_size("camera", "marker")
+    sd = np.array([max(size, cameras) if size > 0 else np.inf for size in known], dtype=rows.dtype)
     return np.concatenate([white.reshape(count, -1), rows[count:] / sd[:, None]])
