@@ -153,7 +153,8 @@ class DataFamily:
     def shipped(self) -> Mapping[str, Path]:
         """Return the files in the folder of biodance by name."""
         first, _, rest = self.folder.partition("/")
-        return MappingProxyType({path.stem: path for path in sorted((folder(first) / rest).glob(f"*{self.suffix}"))})
+        place = folder(first) / rest
+        return _files_in(place, self.suffix, place.stat().st_mtime_ns)
 
     def files(self) -> Mapping[str, Path]:
         """Return the files of all members by name: the shipped ones, then those of the entry points.
@@ -192,6 +193,12 @@ class DataFamily:
             unknown = UnknownName.of(self.kind, str(name_or_path), tuple(files))
             raise UnknownName(f"{unknown} A file of your own is given by its path (*{self.suffix}).")
         return files[str(name_or_path)]
+
+
+@cache
+def _files_in(place: Path, suffix: str, _stamp: int) -> Mapping[str, Path]:
+    """Return the files of a folder by name; the stamp of the folder makes an old answer stale."""
+    return MappingProxyType({path.stem: path for path in sorted(place.glob(f"*{suffix}"))})
 
 
 @cache

@@ -6,7 +6,7 @@ from pathlib import Path
 from biodance.lab.marker_sets import FAMILY as MARKER_SETS
 from biodance.lab.marker_sets import read_marker_set
 
-RENAMED = {label: f"T{i:02d}" for i, label in enumerate(read_marker_set("plug_in_gait").labels)}
+RENAMED = {label: f"X{i:02d}" for i, label in enumerate(read_marker_set("plug_in_gait").labels)}
 ENTRY_POINTS = """[biodance.effects]
 cable = tiny_lab.cable:Cable
 [biodance.readers]

@@ -1,6 +1,8 @@
 """The shipped tables: unchanged, consistent, with provenance, and the prior made from them."""
 
+import re
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -122,6 +124,13 @@ def test_a_users_table_that_is_no_body_is_refused(tmp_path, rows: str, words: st
         reference(str(tmp_path / "scan.csv"), Subject(65.0, 1.7, "F"))
     with pytest.raises(BiodanceError, match="there is no such table"):
         reference(str(tmp_path / "absent.csv"), Subject(65.0, 1.7, "F"))
+
+
+def test_the_example_of_contributing_is_a_table(tmp_path) -> None:
+    page = (Path(__file__).parent.parent / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"```\n(segment,sex,.*?)```", page, flags=re.DOTALL)
+    (tmp_path / "scan.csv").write_text(example)
+    assert human(Subject(64.0, 1.70, "F", 30.0), table=str(tmp_path / "scan.csv")).sip.of("left_thigh")[0] == pytest.approx(8.1, rel=0.01)
 
 
 def test_a_users_own_scan_becomes_the_body(tmp_path) -> None:

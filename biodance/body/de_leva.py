@@ -5,6 +5,7 @@ hand = forearm_hand.
 """
 
 from collections.abc import Mapping
+from functools import cache
 
 import numpy as np
 
@@ -36,6 +37,7 @@ def stature(sex: Sex) -> float:
     return float(_table().provenance["reference_stature_m"][sex])
 
 
+@cache
 def _table() -> SegmentTable:
     return read_segment_table("de_leva_1996")
 

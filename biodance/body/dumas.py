@@ -1,5 +1,7 @@
 """The reference persons of Dumas and Wojtusch 2018: 3-D CoM and full inertia tensors; the trunk joint is L5/S1."""
 
+from functools import cache
+
 import numpy as np
 
 from biodance.body import de_leva
@@ -27,6 +29,7 @@ def stature(sex: Sex) -> float:
     return float(_table().provenance["reference_stature_m"][sex])
 
 
+@cache
 def _table() -> SegmentTable:
     return read_segment_table("dumas_2018")
 

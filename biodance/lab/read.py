@@ -21,7 +21,7 @@ def format_of(path: str | Path, *, chosen: Chosen[Reader] = None) -> str:
 
 
 def reader_of(path: str | Path, *, chosen: Chosen[Reader] = None) -> Reader:
-    """Return the reader of a file: the first one that knows its head; where none does, the one that has its extension.
+    """Return the reader of a file: the one that knows its head (`sniffed`); where none does, the one that has its extension.
 
     Raises
     ------
@@ -31,7 +31,7 @@ def reader_of(path: str | Path, *, chosen: Chosen[Reader] = None) -> Reader:
     """
     path = Path(path)
     head = read_head(path)
-    found = sniffed(head, chosen)
+    found = sniffed(path, head, chosen)
     if found:
         return found
     extension, legal = path.suffix.lower(), extensions(chosen)
@@ -66,9 +66,10 @@ def read_head(path: Path) -> bytes:
     return head
 
 
-def sniffed(head: bytes, chosen: Chosen[Reader] = None) -> Reader | None:
-    """Return the first reader that knows the head of a file; None if none does."""
-    return next((reader for reader in readers(chosen) if reader.sniff(head)), None)
+def sniffed(path: Path, head: bytes, chosen: Chosen[Reader] = None) -> Reader | None:
+    """Return the reader that knows the head of a file, of several the one that has its extension; None if none does."""
+    known = [reader for reader in readers(chosen) if reader.sniff(head)]
+    return next((reader for reader in known if path.suffix.lower() in reader.EXTENSIONS), known[0] if known else None)
 
 
 def read_trial(

@@ -76,7 +76,7 @@ def _is_data(file: Path, readers: Chosen[Reader]) -> bool:
     if file.suffix.lower() not in TEXT:
         return True
     try:
-        return sniffed(read_head(file), readers) is not None
+        return sniffed(file, read_head(file), readers) is not None
     except BiodanceError:
         return False
 

@@ -1,6 +1,7 @@
 """FAMILY: one recording format per file, found automatically; other packages join by the entry points ``biodance.readers``.
 
-A file is given to the first reader whose ``sniff`` knows its head; where none does, to the one that has its extension.
+A file is given to the reader whose ``sniff`` knows its head (of several to the one that also has its extension, else to the preferred one);
+where none does, to the one that has its extension.
 """
 
 from collections.abc import Mapping
@@ -24,7 +25,7 @@ class Reader(Protocol):
     EXTENSIONS: tuple[str, ...]
     """Lower case with the dot, the usual one first."""
     PREFERENCE: int
-    """Of one trial in several formats the file of the lowest number is read, and its reader is asked first (C3D 0, text tables 40)."""
+    """Of one trial in several formats the file of the lowest number is read, and its reader is preferred (C3D 0, bare tables 90)."""
 
     def sniff(self, head: bytes) -> bool:
         """Return whether a file that begins with these bytes (8192 at most) is of this format, beyond doubt."""
