@@ -6,6 +6,7 @@ import os
 
 import pytest
 from docstrings import faults, public
+from small_dances import small_dance
 
 import biodance
 
@@ -23,7 +24,8 @@ def names(tmp_path_factory):
     session = biodance.read_session("visit")
     result = biodance.examine(session)
     shared = {"session": session, "result": result, "identified": biodance.identify(result), "found": biodance.diagnose(result)}
-    yield {"biodance": biodance, **shared}
+    small_dance().save("dance.npz")
+    yield {"biodance": biodance, "dance": small_dance(), **shared}
     plt.close("all")
     os.chdir(before)
 

@@ -265,7 +265,11 @@ def design_dance(
     Examples
     --------
     >>> made = biodance.design_dance(biodance.Subject(65.0, 1.75, "F", 33.0), "short")  # doctest: +SKIP
-    >>> made.dance.save("dance.npz")  # doctest: +SKIP
+    >>> made.dance.save("short.npz")  # doctest: +SKIP
+    >>> biodance.design_dance(biodance.Subject(6.5, 1.75, "F", 33.0), "short")
+    Traceback (most recent call last):
+        ...
+    biodance.errors.BiodanceError: The mass is 6.5 kg; a dance is designed for 30 to 200 kg. Correct it.
     """
     from biodance.dance.problem.person import HEALTHY, read_person
     from biodance.dance.problem.plan import read_plan
@@ -305,8 +309,8 @@ def verify_dance(
 
     Examples
     --------
-    >>> margins = biodance.verify_dance("dance.npz")  # doctest: +SKIP
-    >>> all(margin.worst >= 0 for margin in margins)  # doctest: +SKIP
+    >>> margins = biodance.verify_dance("dance.npz")
+    >>> all(margin.worst >= 0 for margin in margins)
     True
     """
     from biodance.dance.dance import Dance

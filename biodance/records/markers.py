@@ -117,7 +117,7 @@ class Markers:
         Examples
         --------
         >>> list(session["squat_1"].markers.table().columns[:3])
-        ['LFHD x (m)', 'LFHD y (m)', 'LFHD z (m)']
+        ['RASI x (m)', 'RASI y (m)', 'RASI z (m)']
         """
         columns = [f"{name} {axis} (m)" for name in self.names for axis in "xyz"]
         return in_time(self.time, self.xyz.reshape(self.time.size, -1), columns)
