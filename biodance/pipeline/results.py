@@ -4,7 +4,7 @@ All records are frozen; arrays are in SI units in the lab frame (z up); a wrench
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -91,7 +91,9 @@ class Still:
 
     ``bones`` (B, 2, 3) m lines with ``sides`` (B) "left", "right" or "middle"; ``markers`` (K, 3) m as measured; ``plates`` (P, 4, 3) m
     corners; ``com`` (3,) m; ``force`` and ``cop`` (3,) N, m of the total wrench (NaN = unloaded); ``forward`` (2,) unit vector the
-    subject faces.
+    subject faces. ``boxes`` (N, 2, 3) m of the segments with ``rotations`` (N, 3, 3) and ``positions`` (N, 3) m in the lab and their
+    ``box_sides``; ``residual`` (3,) N measured minus predicted force, ``load`` (3,) m place of a load that was found (NaN = none);
+    ``about`` what the picture shows, one sentence.
     """
 
     trial: str
@@ -104,6 +106,13 @@ class Still:
     force: Array
     cop: Array
     forward: Array
+    boxes: Array = field(default_factory=lambda: np.empty((0, 2, 3)))
+    rotations: Array = field(default_factory=lambda: np.empty((0, 3, 3)))
+    positions: Array = field(default_factory=lambda: np.empty((0, 3)))
+    box_sides: tuple[str, ...] = ()
+    residual: Array = field(default_factory=lambda: np.full(3, np.nan))
+    load: Array = field(default_factory=lambda: np.full(3, np.nan))
+    about: str = ""
 
 
 @dataclass(frozen=True)
@@ -164,7 +173,7 @@ class SessionResult:
 
     ``body`` that moved (None: no markers or no stature) and ``body_source`` in words; ``standing`` the one whose weight is compared with
     the declared mass; ``settings`` name -> value of every number that shaped the result; ``identification`` None where no trial is to be
-    identified from, or it was refused.
+    identified from, or it was refused; ``more_stills`` the frame with the largest residual force and a load that was found.
     """
 
     session: Session
@@ -178,6 +187,7 @@ class SessionResult:
     still: Still | None
     settings: Mapping[str, str]
     identification: "SessionIdentification | None" = None
+    more_stills: tuple[Still, ...] = ()
 
     @property
     def all_checks(self) -> tuple[Check, ...]:
