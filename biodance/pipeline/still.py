@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.body.solids import shape_parts
 from biodance.errors import TrialRefused
 from biodance.identify.added_mass import AddedMass
 from biodance.motion.kinematics import Poses, poses
@@ -102,7 +103,8 @@ def still_at(body: Body, one: TrialResult, frame: int) -> Still:
 def posture_still(body: Body, q: Array, title: str) -> Still:
     """Return a posture ``q`` (nq,) alone: bones, boxes and centre of mass, without markers, plates or forces."""
     motion = Motion(np.zeros(1), q[None], np.zeros((1, body.nv)), np.zeros((1, body.nv)))
-    pose, nothing = poses(body, q), np.full(3, np.nan)
+    pose, nothing, parts = poses(body, q), np.full(3, np.nan), shape_parts(body)
+    on = [segment for segment, _ in parts]
     lines, sides = bones(body, pose)
     return Still(
         trial=title,
@@ -115,10 +117,10 @@ def posture_still(body: Body, q: Array, title: str) -> Still:
         force=nothing,
         cop=nothing,
         forward=facing(body, motion),
-        boxes=body.boxes,
-        rotations=pose.rotation[0],
-        positions=pose.position[0],
-        box_sides=tuple(_side(segment) for segment in body.segments),
+        boxes=np.reshape([box for _, box in parts], (-1, 2, 3)),
+        rotations=pose.rotation[0, on],
+        positions=pose.position[0, on],
+        box_sides=tuple(_side(body.segments[segment]) for segment in on),
     )
 
 
@@ -138,7 +140,7 @@ def worst_still(body: Body, results: tuple[TrialResult, ...]) -> Still | None:
         return None
     size_n, one, frame, force = worst
     x, y, z = (f"{value:+.0f}" for value in force)
-    about = f"The worst frame: the plates measured {size_n:.0f} N other than the body needs (x {x}, y {y}, z {z} N; red, 1 m for 100 N)."
+    about = f"The worst frame: the plates measured {size_n:.0f} N other than the body needs (x {x}, y {y}, z {z} N; arrow: 1 m for 100 N)."
     return replace(still_at(body, one, frame), residual=force, about=about)
 
 
@@ -147,7 +149,9 @@ def load_still(body: Body, results: tuple[TrialResult, ...], search: AddedMass) 
     if not search.found or not np.isfinite(search.best.place).all():
         return None
     still, best = still_of(body, results), search.best
-    segment = body.segment_index(best.segment)
-    place = still.positions[segment] + still.rotations[segment] @ best.place
+    one = next(result for result in results if result.trial.name == still.trial and result.motion is not None)
+    assert one.motion is not None
+    pose, segment = poses(body, one.motion.q[one.motion.time.size // 2]), body.segment_index(best.segment)
+    place = pose.position[0, segment] + pose.rotation[0, segment] @ best.place
     about = f"The load that was found: {best.mass:.2f} kg ± {best.sd:.2f} kg on the {best.segment.replace('_', ' ')} (yellow)."
     return replace(still, load=place, about=about)

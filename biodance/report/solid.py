@@ -19,7 +19,7 @@ from biodance.body.solids import box_solid
 from biodance.pipeline.results import Still
 from biodance.records import Array
 from biodance.report.still import FORCE_SCALE, RESIDUAL_SCALE, VIEWS, still_figure
-from biodance.report.style import BLACK, GREEN, GREY, RED, SIDES, YELLOW, svg_address
+from biodance.report.style import BLACK, GREEN, GREY, SIDES, YELLOW, svg_address
 
 PATIENCE = 60.0
 """Seconds after which the child is given up."""
@@ -28,7 +28,7 @@ PIXELS = (1500, 900)
 TILE, COLUMNS = (300, 420), 6
 """Size of one posture in a sheet of postures, px, and how many stand beside each other."""
 PNG = b"\x89PNG"
-SKIN = 0.35
+SKIN = 0.3
 """Opacity of the segments, through which bones and markers are seen."""
 TEXTS = ("trial", "about")
 
@@ -110,7 +110,7 @@ def _measured(plotter: Any, still: Still) -> None:
     for corners in still.plates:
         plotter.add_mesh(pv.PolyData(corners, faces=[4, 0, 1, 2, 3]), color=GREY, opacity=0.5)
     _arrow(plotter, still.cop, FORCE_SCALE * still.force, GREEN, 0.010)
-    _arrow(plotter, still.com, RESIDUAL_SCALE * still.residual, RED, 0.014)
+    _arrow(plotter, still.com, RESIDUAL_SCALE * still.residual, BLACK, 0.014)
     if np.isfinite(still.load).all():
         plotter.add_mesh(pv.Sphere(0.06, still.load), color=YELLOW)
 
@@ -130,21 +130,21 @@ def _arrow(plotter: Any, start: Array, along: Array, colour: str, radius: float)
 
 
 def _names(plotter: Any, still: Still) -> None:
-    """Write left and right beside the ends of the arms."""
-    middle = still.bones.mean(axis=(0, 1))
-    for side in ("left", "right"):
+    """Write left and right beside the ends of the arms: seen from the front, the right arm is on the left of the picture."""
+    for side, justified in (("left", "left"), ("right", "right")):
         ends = [end for (_, end), own in zip(still.bones, still.sides, strict=True) if own == side]
         if ends:
-            outwards = (ends[-1] - middle) * np.array([1.0, 1.0, 0.0])
-            place = ends[-1] + 0.12 * outwards / max(float(np.linalg.norm(outwards)), 1e-9)
-            plotter.add_point_labels(
-                [place], [side], font_size=22, shape=None, show_points=False, always_visible=True, text_color=SIDES[side][0]
-            )
+            word = f"   {side}   "
+            look = {"font_size": 22, "shape": None, "show_points": False, "always_visible": True, "text_color": SIDES[side][0]}
+            plotter.add_point_labels([ends[-1]], [word], justification_horizontal=justified, justification_vertical="center", **look)
 
 
-def _camera(plotter: Any, still: Still, view: tuple[float, float], *, distance: float, lift: float = 0.0) -> None:
-    points = np.concatenate([still.bones.reshape(-1, 3), still.load[None], still.positions])
-    middle = (np.nanmin(points, axis=0) + np.nanmax(points, axis=0)) / 2 + np.array([0.0, 0.0, lift])
+def _camera(plotter: Any, still: Still, view: tuple[float, float], *, distance: float, height: float | None = None) -> None:
+    """Look at the middle of the body; ``height`` m: as if it were so high, so that feet stand on one line."""
+    points = still.bones.reshape(-1, 3)
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = (low + high) / 2
+    middle[2] = low[2] + (high[2] - low[2] if height is None else height) / 2
     heading = np.arctan2(still.forward[1], still.forward[0])
     up, around = np.radians(view[0]), np.radians(view[1]) + heading
     away = np.array([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)])
@@ -170,7 +170,6 @@ def _draw(still: Still) -> bytes:
     plotter = pv.Plotter(off_screen=True, shape=(1, len(VIEWS)), window_size=list(PIXELS), border=False)
     for column, (elevation, azimuth, _) in enumerate(VIEWS):
         plotter.subplot(0, column)
-        plotter.enable_depth_peeling()
         _body(plotter, still)
         _measured(plotter, still)
         if column == 0:
@@ -186,12 +185,12 @@ def _draw_sheet(stills: Sequence[Still]) -> bytes:
     columns = min(COLUMNS, len(stills))
     rows = -(-len(stills) // columns)
     plotter = pv.Plotter(off_screen=True, shape=(rows, columns), window_size=[TILE[0] * columns, TILE[1] * rows], border=False)
+    height = max(float(np.ptp(still.bones[..., 2])) for still in stills)
     for i, still in enumerate(stills):
         plotter.subplot(i // columns, i % columns)
-        plotter.enable_depth_peeling()
         _body(plotter, still)
         plotter.add_text(still.trial, position="upper_left", font_size=8, color=BLACK)
-        _camera(plotter, still, (12.0, -50.0), distance=5.4)
+        _camera(plotter, still, (12.0, -50.0), distance=5.8, height=height)
     return _png(plotter)
 
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from biodance.pipeline.results import Still
-from biodance.report.style import BLACK, GREEN, GREY, RED, SIDES, YELLOW, figure, look
+from biodance.report.style import BLACK, GREEN, GREY, SIDES, YELLOW, figure, look
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -44,7 +44,7 @@ def _body(axes: "Axes3D", still: Still) -> None:
     axes.plot(*still.markers.T, linestyle="", marker="o", markersize=2.2, color=BLACK)
     axes.plot(*still.com, linestyle="", marker="D", markersize=5, color=GREEN)
     if np.isfinite(still.residual).all():
-        axes.plot(*np.stack([still.com, still.com + RESIDUAL_SCALE * still.residual]).T, color=RED, linewidth=1.8)
+        axes.plot(*np.stack([still.com, still.com + RESIDUAL_SCALE * still.residual]).T, color=BLACK, linewidth=2.2)
     if np.isfinite(still.load).all():
         axes.plot(*still.load, linestyle="", marker="o", markersize=9, color=YELLOW, markeredgecolor=BLACK)
 
