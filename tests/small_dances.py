@@ -3,13 +3,13 @@
 from functools import cache
 
 import numpy as np
+from biodance.dance.chain import Chain
+from biodance.dance.plan import Plan
+from biodance.dance.sequence import sequence, under
 
 from biodance.body.human import human
-from biodance.dance.chain import Chain
 from biodance.dance.dance import Dance
-from biodance.dance.plan import Plan
 from biodance.dance.postures import start
-from biodance.dance.sequence import sequence, under
 from biodance.records import Subject
 
 BODY = human(Subject(65.0, 1.75, "F", 33.0, "S01"))

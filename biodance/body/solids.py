@@ -23,6 +23,10 @@ MESHES = (".stl", ".obj", ".ply", ".off", ".glb", ".dae")
 """Mesh files that are read, by the ending of their name."""
 ROUNDNESS = 4.0
 """Exponent of the solid in a box, |x/a|^p + |y/b|^p + |z/c|^p = 1: 2 is an ellipsoid, infinity the box."""
+HEAD, SHOULDER = 0.7, 0.3
+"""Of the height over the shoulders: the head from the vertex down, and how far the trunk reaches up (they meet)."""
+HEAD_BREADTH, HEAD_DEPTH = 0.68, 0.85
+"""Of the height of the head."""
 
 
 def box_solid(box: Array) -> "Trimesh":
@@ -34,6 +38,29 @@ def box_solid(box: Array) -> "Trimesh":
     low, high = np.asarray(box)
     sphere.vertices = (low + high) / 2 + (high - low) / 2 * sphere.vertices / size
     return sphere
+
+
+def shape_parts(body: Body) -> list[tuple[int, Array]]:
+    """Return the boxes (2, 3) m that segments are drawn as, each with the index of its segment: one each, but trunk and head apart.
+
+    The head takes `HEAD` of what is above the shoulders, in the proportions of a person (Winter 2009); segments without a box have none.
+    """
+    parts = []
+    for index, box in enumerate(body.boxes):
+        if not np.all(box[1] > box[0]):
+            continue
+        arms = [joint.translation[1] for joint in body.joints if joint.parent == body.segment_joint[index]]
+        if body.segments[index] == "trunk_head" and arms and box[0, 1] < np.mean(arms) < box[1, 1]:
+            low, high = np.array(box), np.array(box)
+            low[1, 1] = np.mean(arms) + SHOULDER * (box[1, 1] - np.mean(arms))
+            height = HEAD * (box[1, 1] - np.mean(arms))
+            middle, half = (box[0] + box[1]) / 2, height * np.array([HEAD_DEPTH, 1.0, HEAD_BREADTH]) / 2
+            high = np.stack([middle - half, middle + half])
+            high[:, 1] = box[1, 1] - height, box[1, 1]
+            parts += [(index, low), (index, high)]
+        else:
+            parts.append((index, box))
+    return parts
 
 
 def marker_hull(body: Body, segment: str) -> "Trimesh":
@@ -87,7 +114,7 @@ def read_mesh(path: str | Path, *, scale: float | Array = 1.0) -> "Trimesh":
 
 
 def segment_solids(body: Body, folder: str | Path | None = None) -> dict[str, "Trimesh"]:
-    """Return a mesh of every segment: the file of its name in ``folder`` (``right_thigh.stl``), else the solid in its box.
+    """Return a mesh of every segment: the file of its name in ``folder`` (``right_thigh.stl``), else the solids in its `shape_parts`.
 
     Segments whose box is empty have none.
 
@@ -96,14 +123,15 @@ def segment_solids(body: Body, folder: str | Path | None = None) -> dict[str, "T
     FileRefused
         The folder is missing, holds a mesh that is named like no segment or two for one, or a mesh cannot be read.
     """
+    from trimesh import Trimesh
+    from trimesh.util import concatenate
+
     given = {} if folder is None else _mesh_files(body, Path(folder))
-    solids = {}
-    for name, box in zip(body.segments, body.boxes, strict=True):
-        if name in given:
-            solids[name] = read_mesh(given[name])
-        elif np.all(box[1] > box[0]):
-            solids[name] = box_solid(box)
-    return solids
+    parts: dict[str, list[Trimesh]] = {}
+    for index, box in shape_parts(body):
+        parts.setdefault(body.segments[index], []).append(box_solid(box))
+    made = {name: several[0] if len(several) == 1 else concatenate(several) for name, several in parts.items()}
+    return {name: read_mesh(given[name]) if name in given else made[name] for name in body.segments if name in given or name in made}
 
 
 def _mesh_files(body: Body, folder: Path) -> dict[str, Path]:

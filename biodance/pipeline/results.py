@@ -4,7 +4,7 @@ All records are frozen; arrays are in SI units in the lab frame (z up); a wrench
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -129,7 +129,9 @@ class Still:
 
     ``bones`` (B, 2, 3) m lines with ``sides`` (B) "left", "right" or "middle"; ``markers`` (K, 3) m as measured; ``plates`` (P, 4, 3) m
     corners; ``com`` (3,) m; ``force`` and ``cop`` (3,) N, m of the total wrench (NaN = unloaded); ``forward`` (2,) unit vector the
-    subject faces.
+    subject faces. ``boxes`` (N, 2, 3) m of the segments with ``rotations`` (N, 3, 3) and ``positions`` (N, 3) m in the lab and their
+    ``box_sides``; ``residual`` (3,) N measured minus predicted force, ``load`` (3,) m place of a load that was found (NaN = none);
+    ``about`` what the picture shows, one sentence.
     """
 
     trial: str
@@ -142,6 +144,13 @@ class Still:
     force: Array
     cop: Array
     forward: Array
+    boxes: Array = field(default_factory=lambda: np.empty((0, 2, 3)))
+    rotations: Array = field(default_factory=lambda: np.empty((0, 3, 3)))
+    positions: Array = field(default_factory=lambda: np.empty((0, 3)))
+    box_sides: tuple[str, ...] = ()
+    residual: Array = field(default_factory=lambda: np.full(3, np.nan))
+    load: Array = field(default_factory=lambda: np.full(3, np.nan))
+    about: str = ""
 
 
 @dataclass(frozen=True)
@@ -232,6 +241,8 @@ class SessionResult:
         The quiet standing whose weight is compared with the declared mass, or None.
     still : Still or None
         One instant to draw, or None.
+    more_stills : tuple of Still
+        The frame with the largest residual force, and a load that was found.
     identification : SessionIdentification or None
         None where no trial is to be identified from, or it was refused.
 
@@ -253,6 +264,7 @@ class SessionResult:
     standing: Standing | None
     still: Still | None
     identification: "SessionIdentification | None" = None
+    more_stills: tuple[Still, ...] = ()
 
     def __repr__(self) -> str:
         return f"SessionResult({self.session.folder.name!r}: {', '.join(f'{one.name} {one.status}' for one in self.trials)})"

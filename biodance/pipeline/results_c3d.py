@@ -3,13 +3,13 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from biodance import __version__
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, TrialRefused
+from biodance.lab.c3d_records import FileValue
 from biodance.lab.results_c3d import Event, Output, write_results_c3d
 from biodance.motion.contact import Contact, foot_wrenches, ground_contact
 from biodance.motion.dynamics import joint_torques
@@ -52,7 +52,12 @@ def results_into_c3d(one: TrialResult, body: Body, path: Path, *, source: str, s
         outputs += [*_wrenches(body, one), *_moments(body, one, contact)]
         feet = foot_wrenches(one.trial, contact, soles_from_body(body, one.motion))
         events = tuple(Event(event.time, event.side.title(), NAMES[event.down]) for event in foot_events(feet, contact))
-    said: dict[str, Any] = {"VERSION": [__version__], "SOURCE": [source[:255]], "SEGMENTS": list(body.segments), "MASS": body.sip.mass}
+    said: dict[str, FileValue] = {
+        "VERSION": [__version__],
+        "SOURCE": [source[:255]],
+        "SEGMENTS": list(body.segments),
+        "MASS": body.sip.mass,
+    }
     write_results_c3d(path, one.trial.source.path, outputs=outputs, events=events, parameters=said, subject=subject)
     return path, f"The recording of trial {trial} with {len(outputs)} results and {len(events)} events. {source}"
 

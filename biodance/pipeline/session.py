@@ -4,14 +4,15 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
+from biodance.body.body import Body
 from biodance.body.segment_tables import reference as reference_person
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.pipeline.body import body_of
 from biodance.pipeline.checks import mass_check, standing_check, trial_checks
 from biodance.pipeline.identification import SessionIdentification, can_identify, identify_trials
-from biodance.pipeline.results import SessionResult, Standing, Step, TrialResult
+from biodance.pipeline.results import SessionResult, Standing, Step, Still, TrialResult
 from biodance.pipeline.steps import attempt
-from biodance.pipeline.still import still_of
+from biodance.pipeline.still import load_still, still_of, worst_still
 from biodance.pipeline.trial import examine_trial, prepared
 from biodance.records import Session
 from biodance.settings import StandingRules
@@ -91,7 +92,15 @@ def examine(
         standing=standing,
         still=attempt(steps, "still", lambda: still_of(body, done)) if body else None,
         identification=identification,
+        more_stills=_stills(body, done, identification) if body else (),
     )
+
+
+def _stills(body: Body, done: tuple[TrialResult, ...], found: SessionIdentification | None) -> tuple[Still, ...]:
+    """Return the worst frame of the body that is believed, and the load that was found."""
+    worst = worst_still(found.identification.identified if found else body, done)
+    load = load_still(body, done, found.search) if found and worst else None
+    return tuple(still for still in (worst, load) if still is not None)
 
 
 def best_standing(results: tuple[TrialResult, ...]) -> Standing:

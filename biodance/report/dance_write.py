@@ -13,10 +13,12 @@ from biodance.dance.verify import Margin
 from biodance.lab.write_c3d import write_c3d
 from biodance.motion.kinematics import poses
 from biodance.pipeline.dance import DanceResult
+from biodance.pipeline.still import posture_still
 from biodance.records import Markers
 from biodance.report.dance_figures import criterion_figure, expectation_figure, postures_figure, zmp_figure
 from biodance.report.results_json import plain, to_text
 from biodance.report.robot_dance import angle_sheet, write_angles
+from biodance.report.solid import solid_pngs
 
 RATE = 100.0
 """Hz of the preview's markers."""
@@ -51,6 +53,9 @@ def write_dance(result: DanceResult, folder: Path) -> dict[str, Any]:
         }
         for name, figure in drawn.items():
             figure.savefig(folder / f"{name}.png", dpi=DOTS, metadata={"Software": None})
+        stills = [posture_still(dance.body, q, title) for q, title in zip(still.q, titles, strict=True)]
+        for picture in solid_pngs(stills, sheet=True) or ():
+            (folder / "postures_3d.png").write_bytes(picture)
     (folder / "results.json").write_text(to_text(found), encoding="utf-8", newline="\n")
     return found
 

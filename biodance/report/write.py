@@ -14,7 +14,7 @@ from biodance.report.diagnosis_page import diagnosis_page, diagnosis_section
 from biodance.report.identification_json import identification_document
 from biodance.report.page import page
 from biodance.report.results_json import document, plain, to_text
-from biodance.report.solid import still_address
+from biodance.report.solid import still_addresses
 
 PAGE, NUMBERS = "report.html", "results.json"
 
@@ -59,7 +59,8 @@ def write_diagnosis(result: SessionResult, found: SessionDiagnosis, folder: Path
 
 def _page(result: SessionResult, made: Provenance, diagnosis: SessionDiagnosis | None = None) -> str:
     told = diagnosis_section(diagnosis) if diagnosis else ""
-    return page(result, made, still=still_address(result.still) if result.still else "", diagnosis=told)
+    stills = still_addresses((result.still, *result.more_stills)) if result.still else []
+    return page(result, made, stills=stills, diagnosis=told)
 
 
 def _write(folder: Path, files: dict[str, str]) -> None:
