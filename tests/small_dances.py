@@ -3,13 +3,14 @@
 from functools import cache
 
 import numpy as np
-from biodance.dance.chain import Chain
-from biodance.dance.plan import Plan
-from biodance.dance.sequence import sequence, under
 
 from biodance.body.human import human
 from biodance.dance.dance import Dance
-from biodance.dance.postures import start
+from biodance.dance.postures.ordering import support_sequence
+from biodance.dance.postures.posture import initial_guess
+from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.plan import Plan
+from biodance.dance.problem.stance import under
 from biodance.records import Subject
 
 BODY = human(Subject(65.0, 1.75, "F", 33.0, "S01"))
@@ -19,8 +20,8 @@ BODY = human(Subject(65.0, 1.75, "F", 33.0, "S01"))
 def small_dance() -> Dance:
     """Return 1 s of standing, 2 s of raising the left arm to the side, 1 s with it raised."""
     chain = Chain(BODY)
-    stances = sequence(BODY, Plan("one_segment", "", (("parallel", 2),), hold=1.0))
-    stand = start(chain, stances[0], np.random.default_rng(0))
+    stances = support_sequence(BODY, Plan("one_segment", "", (("parallel", 2),), hold=1.0))
+    stand = initial_guess(chain, stances[0], np.random.default_rng(0))
     stand[2], stand[3:] = 0.86, 0.0
     for side in ("left", "right"):
         stand[6 + BODY.joint_index(f"{side}_shoulder_adduction")] = -0.4
