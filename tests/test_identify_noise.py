@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from biodance.errors import BiodanceError
-from biodance.uncertainty.bands import BLOCK, WHITE, Bands
+from biodance.uncertainty.bands import BLOCK_SAMPLES, WHITE, Bands
 from biodance.uncertainty.noise import Noise
 
 ABOUT = np.array([0.2, -0.1, 0.0])
@@ -50,7 +50,7 @@ def test_blocks_follow_the_runs_and_thin_to_the_rate() -> None:
     assert not any((p >= 1000).any() and (p < 1100).any() for p in pieces)
     white = list(WHITE.runs(use, 100.0))
     assert sum(p.size for p in white) == 4900
-    assert max(p.size for p in white) <= BLOCK
+    assert max(p.size for p in white) <= BLOCK_SAMPLES
 
 
 def test_coefficients_above_the_last_edge_do_not_count() -> None:

@@ -1,4 +1,5 @@
-"""Expectation maximisation against hand-made posteriors: the parameters' spread counts, few coefficients keep the start."""
+"""Expectation maximisation against hand-made posteriors: the parameters' spread counts, few coefficients keep the
+start."""
 
 import numpy as np
 import pytest
@@ -30,7 +31,9 @@ def test_the_expectation_counts_the_spread_of_the_parameters() -> None:
 
 
 def test_one_parameter_with_a_posterior_by_hand() -> None:
-    """One column w, prior 1, noise 1: posterior mean w y / (1 + w²), variance 1 / (1 + w²); the mean square left is r² + w² variance."""
+    """One column w, prior 1, noise 1: posterior mean w y / (1 + w²), variance 1 / (1 + w²); the mean square left is
+    r² + w² variance.
+    """
     w, y = 3.0, 5.0
     mean, variance = w * y / (1 + w**2), 1 / (1 + w**2)
     parts = np.zeros((1, 6, 2))

@@ -1,4 +1,5 @@
-"""Elementary errors: forward equal to the transpose, and to what tracking and the rates of momentum make of a small error by other code."""
+"""Elementary errors: forward equal to the transpose, and to what tracking and the rates of momentum make of a small
+error by other code."""
 
 from dataclasses import replace
 from functools import cache
@@ -20,7 +21,7 @@ from biodance.records import Array, Motion
 from biodance.uncertainty.joints import Centre, Tilt, joint_of
 from biodance.uncertainty.response import Response, derivatives
 from biodance.uncertainty.soft_tissue import Flesh, Sag, Slide
-from biodance.uncertainty.source import Source, neighbours
+from biodance.uncertainty.source import ErrorSource, neighbours
 from biodance.uncertainty.sources import forward, of_clusters, of_markers, transpose
 
 SMALL = 1e-4
@@ -48,7 +49,9 @@ def moving() -> Motion:
 
 
 def needed(com: Array, turn: Array) -> Array:
-    """Return the wrench (T, 6) of matter whose segments' centres of mass are at ``com`` (T, N, 3), turned by ``turn`` (T, N, 3, 3)."""
+    """Return the wrench (T, 6) of matter whose segments' centres of mass are at ``com`` (T, N, 3), turned by ``turn``
+    (T, N, 3, 3).
+    """
     lumps, time = [lump_of(phi) for phi in body().sip.phi.reshape(-1, 10)], moving().time
     mass, own = np.array([lump.mass for lump in lumps]), np.array([lump.inertia for lump in lumps])
 
@@ -75,7 +78,9 @@ def stepped(q: Array, k: int, size: float | Array) -> Array:
 
 
 def tracked(target: Array, moved: Array) -> Array:
-    """Return the positions at which model markers, displaced by ``moved``, are nearest to ``target`` (T, M, 3): Gauss-Newton."""
+    """Return the positions at which model markers, displaced by ``moved``, are nearest to ``target`` (T, M, 3):
+    Gauss-Newton.
+    """
     one, q = body(), np.array(moving().q)
     worn, weight = list(one.markers.segment), np.sqrt(np.repeat(one.markers.weight, 3))
 
@@ -92,7 +97,9 @@ def tracked(target: Array, moved: Array) -> Array:
 
 
 def brute(moved: Array, places: Array, turns: Array) -> tuple[Array, Array]:
-    """Return wrench (T, 6) and mean residual (M, 3) of a model that errs by ``moved`` (T, M, 3), ``places``, ``turns`` (T, N, 3)."""
+    """Return wrench (T, 6) and mean residual (M, 3) of a model that errs by ``moved`` (T, M, 3), ``places``,
+    ``turns`` (T, N, 3).
+    """
     one, worn = body(), list(body().markers.segment)
     true = poses(one, moving().q)
     target = true.points(worn, one.markers.position)
@@ -106,8 +113,10 @@ def brute(moved: Array, places: Array, turns: Array) -> tuple[Array, Array]:
     return (after - before) / SMALL, local[..., 0].mean(axis=0) / SMALL
 
 
-def disturbed(kind: str) -> tuple[Source, int, Array, Array, Array]:
-    """Return a source, the index of one of its errors, and what that error displaces at unchanged coordinates, by construction."""
+def disturbed(kind: str) -> tuple[ErrorSource, int, Array, Array, Array]:
+    """Return a source, the index of one of its errors, and what that error displaces at unchanged coordinates, by
+    construction.
+    """
     one = body()
     true, worn = poses(one, moving().q), np.array(one.markers.segment)
     marker, com = true.points(list(worn), one.markers.position), true.points(list(range(len(one.segments))), one.sip.com)
@@ -152,7 +161,9 @@ def disturbed(kind: str) -> tuple[Source, int, Array, Array, Array]:
 
 
 def slow(wrench: Array) -> Array:
-    """Return the coefficients below 1.5 Hz: accelerations of the movement have kinks, whose second derivatives no two formulas share."""
+    """Return the coefficients below 1.5 Hz: accelerations of the movement have kinks, whose second derivatives no two
+    formulas share.
+    """
     return dct(wrench, norm="ortho", axis=0)[: int(1.5 * 2 * len(wrench) / moving().rate)]
 
 

@@ -1,4 +1,6 @@
-"""The one table of how wrong things are: ``anthropometry/uncertainty/sizes.csv``, with source, unit and where every size was learned."""
+"""The one table of how wrong things are: ``anthropometry/uncertainty/sizes.csv``, with source, unit and where every
+size was learned.
+"""
 
 import functools
 
@@ -26,8 +28,8 @@ def error_size(quantity: str, target: str, *, state: str = "any", whose: str = "
 
 
 def joint_size(quantity: str, joint: str) -> float:
-    """Return the size of ``joint_centre`` (m per axis) or ``tilt`` (rad) of a joint, sides alike, before any functional calibration; of
-    a joint that the table does not name that of "other" ones.
+    """Return the size of ``joint_centre`` (m per axis) or ``tilt`` (rad) of a joint, sides alike, before any
+    functional calibration; of a joint that the table does not name that of "other" ones.
     """
     try:
         return error_size(quantity, joint.removeprefix("right_").removeprefix("left_"), state="before")

@@ -16,7 +16,7 @@ from biodance.diagnose.model import marker_keys, nuisances, shown_left_out
 from biodance.diagnose.problem import Problem
 from biodance.records import Array
 from biodance.uncertainty.learning import Moments, maximise, moments_of, noise_of, sizes_of
-from biodance.uncertainty.tolerances import BEFORE, REFERENCE, Tolerances, whitened
+from biodance.uncertainty.tolerances import BEFORE, REFERENCE_PERSON, Tolerances, whitened
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +97,7 @@ def _improved(sessions: tuple[Null, ...], found: Tolerances) -> Tolerances:
         rows += [(key, "", float(np.sqrt(square)), 0.0) for key, square in zip(null.marker_keys, seen, strict=True)]
         parts = np.concatenate([some.left[:wrench, None], some.spread[:wrench]], axis=1).reshape(null.band.size, 6, -1)
         here = moments_of(parts, null.band, bands)
-        total = total + replace(here, residual=here.residual * (REFERENCE / null.mass) ** 2)
+        total = total + replace(here, residual=here.residual * (REFERENCE_PERSON / null.mass) ** 2)
     means, sizes = sizes_of(rows)
     learned = {key: size for key, size in sizes.items() if not key.endswith(BEFORE)}
     return replace(found, sizes={**found.sizes, **learned}, noise=noise_of(total), means=means)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from biodance.body.skeleton import kind_of
 from biodance.diagnose.candidates import SCALE, Candidate, removed
 from biodance.diagnose.evidence import Belief, believe
 from biodance.diagnose.problem import Problem
@@ -12,7 +13,6 @@ from biodance.effects import Effect
 from biodance.motion.marker_jacobian import chains
 from biodance.records import Array
 from biodance.uncertainty.joints import joint_of
-from biodance.uncertainty.source import kind_of
 from biodance.uncertainty.tolerances import Tolerances, in_state, key_of, mean_key, whitened
 
 

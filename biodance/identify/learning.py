@@ -17,7 +17,9 @@ WORTH = 6.0
 
 
 def learn(data: Statistics, prior: Sip, *, rounds: int = 12, tolerance: float = 1e-3) -> tuple[Noise, Posterior]:
-    """Return the noise of the session and the posterior under it, after at most ``rounds`` or once nothing changes beyond ``tolerance``."""
+    """Return the noise of the session and the posterior under it, after at most ``rounds`` or once nothing changes
+    beyond ``tolerance``.
+    """
 
     def improved(noise: Noise) -> Noise:
         belief = posterior(data.information(noise), prior)

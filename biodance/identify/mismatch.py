@@ -1,9 +1,11 @@
-"""What disturbs a session beyond the noise: kinematics that are wrong coherently, plates within their tolerances; how large by evidence.
+"""What disturbs a session beyond the noise: kinematics that are wrong coherently, plates within their tolerances; how
+large by evidence.
 
-The errors of independent sources, each of one standard deviation, enter the equations b = W' S^-1 y as scores W' S^-1 e; with the scores as
-columns of F the covariance is F F', exact over all sources (`uncertainty/sources`). The model is
-b ~ N(H phi, noise H + kinematics² F_kinematics F_kinematics' + F_plates F_plates'),  and the two sizes are those under which the session's
-own b is most probable given the table (evidence), never smaller than drawn. What is left for the parameters is H (...)^-1 H in place of H.
+The errors of independent sources, each of one standard deviation, enter the equations b = W' S^-1 y as scores W' S^-1
+e; with the scores as columns of F the covariance is F F', exact over all sources (`uncertainty/sources`). The model
+is b ~ N(H phi, noise H + kinematics² F_kinematics F_kinematics' + F_plates F_plates'),  and the two sizes are those
+under which the session's own b is most probable given the table (evidence), never smaller than drawn. What is left
+for the parameters is H (...)^-1 H in place of H.
 """
 
 from dataclasses import dataclass
@@ -18,9 +20,9 @@ from biodance.motion.regressor import regressor_of
 from biodance.records import Array, Motion, Sip
 from biodance.uncertainty.deviations import deviations
 from biodance.uncertainty.noise import Noise
-from biodance.uncertainty.plates import COUNT, plate_errors, plate_sources
+from biodance.uncertainty.plates import PLATE_SOURCES, plate_errors, plate_sources
 from biodance.uncertainty.response import Response
-from biodance.uncertainty.source import Source
+from biodance.uncertainty.source import ErrorSource
 from biodance.uncertainty.sources import of_markers, transpose
 
 EVERY = 8
@@ -29,14 +31,14 @@ SHORTEST = 8
 """Frames: shorter runs have no accelerations worth the name."""
 KINEMATICS = (1.0, 1.4, 2.0, 2.8)
 NOISE = (1.7, 2.2, 3.0, 4.5, 7.0, 10.0, 15.0, 22.0)
-"""Sizes among which the evidence chooses: of the kinematic errors (never smaller than drawn), and variance factor of the noise (never below
-1.7: the parameters absorb part of what is noise)."""
+"""Sizes among which the evidence chooses: of the kinematic errors (never smaller than drawn), and variance factor of
+the noise (never below 1.7: the parameters absorb part of what is noise)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Mismatch:
-    """``kinematics`` (p, n), ``plates`` (p, m): scores W' S^-1 e over all trials of n and m independent sources of errors e, each of one
-    standard deviation.
+    """``kinematics`` (p, n), ``plates`` (p, m): scores W' S^-1 e over all trials of n and m independent sources of
+    errors e, each of one standard deviation.
     """
 
     kinematics: Array
@@ -81,11 +83,13 @@ def mismatch(body: Body, fits: tuple[Fit, ...], noise: Noise) -> Mismatch:
 def nothing(body: Body) -> Mismatch:
     """Return the scores of no frames."""
     size, sources = 10 * len(body.segments), sum(len(source.groups) for source in of_markers(body))
-    return Mismatch(np.zeros((size, sources)), np.zeros((size, COUNT)))
+    return Mismatch(np.zeros((size, sources)), np.zeros((size, PLATE_SOURCES)))
 
 
-def _marker_squares(body: Body, motion: Motion, sources: tuple[Source, ...]) -> Array:
-    """Return (K,) mean square distance (m²) between markers and model that every error of unit size leaves, over one of `EVERY` frames."""
+def _marker_squares(body: Body, motion: Motion, sources: tuple[ErrorSource, ...]) -> Array:
+    """Return (K,) mean square distance (m²) between markers and model that every error of unit size leaves, over one
+    of `EVERY` frames.
+    """
     few = Response.of(body, Motion(motion.time[::EVERY], motion.q[::EVERY], motion.v[::EVERY], motion.a[::EVERY]))
     return np.concatenate([source.squares(few) for source in sources])
 
@@ -118,7 +122,9 @@ def evident_sizes(data: Information, found: Mismatch, prior: Sip) -> Sizes:
 
 
 def temper(data: Information, found: Mismatch, sizes: Sizes) -> Information:
-    """Return the information that is left for the parameters: H C^+ H, with C the covariance of b at given parameters."""
+    """Return the information that is left for the parameters: H C^+ H, with C the covariance of b at given
+    parameters.
+    """
     R = data.triangle
     H = R.T @ R
     C = covariance(H, found, sizes)
@@ -134,7 +140,8 @@ def temper(data: Information, found: Mismatch, sizes: Sizes) -> Information:
 
 
 def evidence_of_scale(data: Information, prior: Sip, scales: Array) -> Array:
-    """Return the log evidence (n,) of whitened ``data`` when the prior's standard deviations are multiplied by each of ``scales`` (n,).
+    """Return the log evidence (n,) of whitened ``data`` when the prior's standard deviations are multiplied by each
+    of ``scales`` (n,).
 
     The rule that chooses the prior's weight is maximum a posteriori: scale 1. This curve shows whether the data agree.
     """

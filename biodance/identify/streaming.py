@@ -19,7 +19,7 @@ from biodance.identify.loads import may_carry
 from biodance.identify.mismatch import SHORTEST, Mismatch, mismatch, nothing
 from biodance.identify.statistics import Fit, Statistics, empty, layout_for, statistics
 from biodance.records import Array, Motion, Wrench
-from biodance.uncertainty.bands import BLOCK
+from biodance.uncertainty.bands import BLOCK_SAMPLES
 from biodance.uncertainty.caution import widened
 
 ENOUGH = ("mass", "com x", "com y", "com z")
@@ -30,11 +30,12 @@ ENOUGH = ("mass", "com x", "com y", "com z")
 class Stream:
     """A session that is being recorded.
 
-    ``body`` with the table as prior; ``rate`` Hz of the frames; ``total`` statistics of all full blocks, about the lab origin;
-    ``disturbed`` what twins and plates make of these blocks, each under the noise known when it was closed (so that verdicts on the way
-    are as careful as the last one); ``pending`` (n < BLOCK, 1 + nq + 2 nv + 6 + 1) thinned frames of the running block: time, q, v, a,
-    wrench, RMS marker distance; ``pressure`` (4,) sum over the loaded frames of the centre of pressure m, and their number; ``run`` frames
-    since the run of used frames began; ``last`` s, time of the last frame.
+    ``body`` with the table as prior; ``rate`` Hz of the frames; ``total`` statistics of all full blocks, about the
+    lab origin; ``disturbed`` what twins and plates make of these blocks, each under the noise known when it was
+    closed (so that verdicts on the way are as careful as the last one); ``pending`` (n < BLOCK_SAMPLES, 1 + nq + 2 nv
+    + 6 + 1) thinned frames of the running block: time, q, v, a, wrench, RMS marker distance; ``pressure`` (4,) sum
+    over the loaded frames of the centre of pressure m, and their number; ``run`` frames since the run of used frames
+    began; ``last`` s, time of the last frame.
     """
 
     body: Body
@@ -167,10 +168,10 @@ def _extended(stream: Stream, rows: Array) -> Stream:
     thin = rows[-stream.run % stride :: stride]
     stream = replace(stream, run=stream.run + len(rows))
     while len(thin):
-        room = BLOCK - len(stream.pending)
+        room = BLOCK_SAMPLES - len(stream.pending)
         stream = replace(stream, pending=np.concatenate([stream.pending, thin[:room]]))
         thin = thin[room:]
-        if len(stream.pending) == BLOCK:
+        if len(stream.pending) == BLOCK_SAMPLES:
             stream = _settle(stream)
     return stream
 

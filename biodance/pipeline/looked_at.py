@@ -17,7 +17,7 @@ from biodance.pipeline.identification import FITTED, KEPT
 from biodance.pipeline.results import TrialResult
 from biodance.records import Array, Role
 from biodance.uncertainty.bands import BANDS
-from biodance.uncertainty.tolerances import REFERENCE, Tolerances, shipped
+from biodance.uncertainty.tolerances import REFERENCE_PERSON, Tolerances, shipped
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,7 @@ def own_tolerances(body: Body, chosen: tuple[Look, ...]) -> Own:
     standing = tuple(look for look in chosen if look.trial.role == "static" and _seconds(look) > 0)
     if standing:
         shaken = unrest(body, standing, standing_point(tuple(map(_fit, chosen))))
-        found = replace(found, noise=found.noise + shaken * (REFERENCE / body.sip.mass.sum()) ** 2)
+        found = replace(found, noise=found.noise + shaken * (REFERENCE_PERSON / body.sip.mass.sum()) ** 2)
         size = np.sqrt(np.einsum("b,bcc->c", 2 * np.diff(BANDS.edges) / BANDS.rate, shaken))
         notes.append(
             f"Standing still, the person moves the forces by {size[:3].max():.1f} N and the moments by {size[3:].max():.1f} N·m above "

@@ -1,7 +1,8 @@
 """The table's standard deviations, widened by what the table cannot know: how the model's frames sit in this person.
 
-The table's numbers hold in ideal anatomical frames. Markers turn the frames by degrees (the long axis of an arm by tens of degrees), and
-a CoM that is off by d adds m d² to the inertia about the joint, which a first-order covariance leaves out.
+The table's numbers hold in ideal anatomical frames. Markers turn the frames by degrees (the long axis of an arm by
+tens of degrees), and a CoM that is off by d adds m d² to the inertia about the joint, which a first-order covariance
+leaves out.
 """
 
 import numpy as np
@@ -17,7 +18,9 @@ JOINT = {"thigh": "hip", "shank": "knee", "foot": "ankle", "trunk_head": "trunk"
 
 
 def widened(prior: Sip) -> Sip:
-    """Return ``prior`` with the same values and a covariance that holds for frames that are turned and centres that are displaced."""
+    """Return ``prior`` with the same values and a covariance that holds for frames that are turned and centres that
+    are displaced.
+    """
     covariance = np.array(prior.covariance) + _mass_spread(prior)
     for i, segment in enumerate(prior.segments):
         cut = slice(10 * i, 10 * i + 10)
@@ -40,8 +43,8 @@ def frame_turn(segment: str) -> Array:
 def about_true_centres(sip: Sip, placed: tuple[JointError, ...] = ()) -> Sip:
     """Return ``sip`` with a covariance that also holds about the true joint centres, which no wrench can find.
 
-    The data tell where matter is relative to the model's frames; where the person's own joint centre is stays as uncertain as the formula
-    that predicted it, or as the movement that ``placed`` it left it.
+    The data tell where matter is relative to the model's frames; where the person's own joint centre is stays as
+    uncertain as the formula that predicted it, or as the movement that ``placed`` it left it.
     """
     covariance = np.array(sip.covariance)
     known = {error.joint: error.centre for error in placed}
@@ -70,7 +73,9 @@ def _shift_slope(phi: Array) -> Array:
 
 
 def _mass_spread(prior: Sip) -> Array:
-    """Return the covariance (p, p) that raises every relative mass sd to the floor, sides alike, the total mass unchanged."""
+    """Return the covariance (p, p) that raises every relative mass sd to the floor, sides alike, the total mass
+    unchanged.
+    """
     table, variance = prior.phi.reshape(-1, 10), np.diag(prior.covariance)[::10]
     mass = np.maximum(table[:, 0], 1e-12)
     missing = np.sqrt(np.maximum(error_size("segment_mass", "floor") ** 2 - variance / mass**2, 0.0)) * (table[:, 0] > 0) * (variance > 0)
@@ -97,7 +102,9 @@ def _turn_slope(phi: Array) -> Array:
 
 
 def _displacement(phi: Array, own: Array) -> Array:
-    """Return the second moment (10, 10) of m (|d|² 1 - d d') for the CoM's error d ~ N(0, its covariance): its mean and its variance."""
+    """Return the second moment (10, 10) of m (|d|² 1 - d d') for the CoM's error d ~ N(0, its covariance): its mean
+    and its variance.
+    """
     mass, com = phi[0], phi[1:4] / phi[0]
     slope = np.zeros((3, 10))
     slope[:, 0], slope[:, 1:4] = -com / mass, np.eye(3) / mass

@@ -1,4 +1,6 @@
-"""How large every elementary error of a body is: from the one table, or from the functional calibration of its own joints."""
+"""How large every elementary error of a body is: from the one table, or from the functional calibration of its own
+joints.
+"""
 
 import numpy as np
 
@@ -6,14 +8,14 @@ from biodance.body.body import Body
 from biodance.body.error_sizes import error_size, joint_size
 from biodance.errors import UnknownName
 from biodance.records import Array
-from biodance.uncertainty.source import Source
+from biodance.uncertainty.source import ErrorSource
 
 
-def deviations(body: Body, sources: tuple[Source, ...]) -> Array:
+def deviations(body: Body, sources: tuple[ErrorSource, ...]) -> Array:
     """Return (K,) standard deviations of all errors of ``sources``, each in its own unit.
 
-    A joint that a functional calibration placed has the standard deviation that came with it (``body.joint_errors``), every other one
-    that of the table before calibration.
+    A joint that a functional calibration placed has the standard deviation that came with it (``body.joint_errors``),
+    every other one that of the table before calibration.
     """
     placed = {error.joint: {"joint_centre": error.centre, "tilt": error.axis} for error in body.joint_errors}
     found: dict[tuple[str, str], float] = {}

@@ -5,19 +5,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.body.skeleton import kind_of
 from biodance.motion.kinematics import Poses, poses
 from biodance.motion.marker_jacobian import below, chains, skew
 from biodance.records import Array, Index
-from biodance.uncertainty.response import Pull, Response, centres
-from biodance.uncertainty.source import Effects, Source, kind_of, mean_local, mean_squares
+from biodance.uncertainty.response import Pull, Response, centres_of_mass
+from biodance.uncertainty.source import Effects, ErrorSource, mean_local, mean_squares
 
 
 @dataclass(frozen=True, eq=False)
-class Centre(Source):
+class Centre(ErrorSource):
     """A joint centre that lies elsewhere, along the axes of its parent (m).
 
-    All that hangs on the joint is carried by R_parent - R_child C, with C = child_R_parent of the neutral posture, where the static trial
-    has calibrated it away.
+    All that hangs on the joint is carried by R_parent - R_child C, with C = child_R_parent of the neutral posture,
+    where the static trial has calibrated it away.
     """
 
     @property
@@ -58,7 +59,9 @@ class Centre(Source):
         return trial.of_markers(moved.reshape(len(moved), 3 * worn.size, -1))
 
     def _drifts(self, trial: Response) -> list[tuple[Index, Array]]:
-        """Return for every anatomical joint the segments on it and (F, 3, 3) m of their drift, lab, per metre along the parent's axes."""
+        """Return for every anatomical joint the segments on it and (F, 3, 3) m of their drift, lab, per metre along
+        the parent's axes.
+        """
         rest, hangs, found = poses(self.body, self.body.neutral), below(self.body), []
         for chain in chains(self.body):
             turn, still = (_above(self.body, at, chain[0]) for at in (trial.pose, rest))
@@ -69,7 +72,7 @@ class Centre(Source):
 
 
 @dataclass(frozen=True, eq=False)
-class Tilt(Source):
+class Tilt(ErrorSource):
     """The axis of a hinge that is tilted against the bone's own, about two directions square to it (rad)."""
 
     @property
@@ -85,7 +88,7 @@ class Tilt(Source):
     def forward(self, trial: Response) -> Effects:
         """Return what hangs on a hinge turned and displaced by the angle times the tilt."""
         value, left = self._followed(trial)
-        com = centres(self.body, trial.pose)
+        com = centres_of_mass(self.body, trial.pose)
         for k, (joint, on, rho) in enumerate(self._turns(trial)):
             origin = trial.pose.joint_position[:, joint]
             for s in on:
@@ -110,7 +113,7 @@ class Tilt(Source):
     def transpose(self, trial: Response, pull: Pull) -> Array:
         """Return the weights on turns and displacements of what hangs on a hinge, along the tilt times the angle."""
         worn = np.array(self.body.markers.segment)
-        com, marker = centres(self.body, trial.pose), trial.pose.points(list(worn), self.body.markers.position)
+        com, marker = centres_of_mass(self.body, trial.pose), trial.pose.points(list(worn), self.body.markers.position)
         found = [np.empty((0, pull.place.shape[3]))]
         for joint, on, rho in self._turns(trial):
             origin, carried = trial.pose.joint_position[:, joint, None], np.flatnonzero(np.isin(worn, on))
@@ -120,7 +123,9 @@ class Tilt(Source):
         return np.concatenate(found)
 
     def _turns(self, trial: Response) -> list[tuple[int, Index, Array]]:
-        """Return for every hinge its joint, the segments on it, and (F, 3, 2) rad of their turn, lab, per radian of tilt."""
+        """Return for every hinge its joint, the segments on it, and (F, 3, 2) rad of their turn, lab, per radian of
+        tilt.
+        """
         hangs, found = below(self.body), []
         for (joint,) in (chain for chain in chains(self.body) if len(chain) == 1):
             across = np.array(_across(self.body.joints[joint].axis)).T

@@ -1,8 +1,10 @@
-"""Learn the noise per band, and how large what disturbs is, from what sessions leave: expectation maximisation, the one in the house.
+"""Learn the noise per band, and how large what disturbs is, from what sessions leave: expectation maximisation, the
+one in the house.
 
-The residual of a person is mostly not instrument noise, and its covariance cannot be known beforehand. It is estimated at the current
-parameters, with the parameters' own uncertainty added (expectation), until both agree (maximisation). Who holds the data - sums of second
-moments in `identify`, rows in `diagnose` - provides the expectation; everything else is here.
+The residual of a person is mostly not instrument noise, and its covariance cannot be known beforehand. It is
+estimated at the current parameters, with the parameters' own uncertainty added (expectation), until both agree
+(maximisation). Who holds the data - sums of second moments in `identify`, rows in `diagnose` - provides the
+expectation; everything else is here.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,18 +17,19 @@ from numpy.typing import NDArray
 from biodance.body.error_sizes import error_size
 from biodance.records import Array
 
-T = TypeVar("T")
+Learned = TypeVar("Learned")
 """Whatever is learned; its noise is looked at."""
-DOUBT = 1 / 3
-"""Standard deviation of a mean, as a share of itself: one mean is believed to a third, as virtual persons are no better known."""
+MEAN_DOUBT = 1 / 3
+"""Standard deviation of a mean, as a share of itself: one mean is believed to a third, as virtual persons are no
+better known."""
 AGREED = 4.0
 """Standard errors from which on a mean is kept; smaller ones are chance."""
 
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """What sessions leave: ``residual`` (B, 6, 6) sum over the coefficients of a band of r r' at the posterior mean, plus W C W' with the
-    posterior covariance C of the parameters; ``count`` (B,) coefficients.
+    """What sessions leave: ``residual`` (B, 6, 6) sum over the coefficients of a band of r r' at the posterior mean,
+    plus W C W' with the posterior covariance C of the parameters; ``count`` (B,) coefficients.
     """
 
     residual: Array
@@ -38,8 +41,8 @@ class Moments:
 
 
 def moments_of(parts: Array, band: NDArray[np.intp], bands: int) -> Moments:
-    """Return the moments of ``parts`` (m, 6, 1 + k): the residuals of m coefficients, and a square root of what the spread of the
-    parameters adds; ``band`` (m,) of each.
+    """Return the moments of ``parts`` (m, 6, 1 + k): the residuals of m coefficients, and a square root of what the
+    spread of the parameters adds; ``band`` (m,) of each.
     """
     residual = np.zeros((bands, 6, 6))
     for b in range(bands):
@@ -49,8 +52,8 @@ def moments_of(parts: Array, band: NDArray[np.intp], bands: int) -> Moments:
 
 
 def noise_of(found: Moments, *, start: Array | None = None, worth: float = 0.0) -> Array:
-    """Return the covariance (B, 6, 6) of a coefficient: mean moments and the floor; bands of few coefficients keep ``worth`` coefficients
-    of ``start`` (6, 6), as three coefficients cannot have a covariance of their own.
+    """Return the covariance (B, 6, 6) of a coefficient: mean moments and the floor; bands of few coefficients keep
+    ``worth`` coefficients of ``start`` (6, 6), as three coefficients cannot have a covariance of their own.
     """
     mean = found.residual / np.maximum(found.count, 1)[:, None, None]
     if start is not None:
@@ -64,9 +67,11 @@ def floor() -> Array:
     return np.diag([error_size("plate_floor", "force") ** 2] * 3 + [error_size("plate_floor", "moment") ** 2] * 3)
 
 
-def maximise(start: T, improved: Callable[[T], T], covariance: Callable[[T], Array], *, rounds: int, tolerance: float = 0.0) -> T:
-    """Return ``start`` after at most ``rounds`` of expectation and maximisation (``improved``), fewer once the log-determinants of all its
-    noise covariances (B, 6, 6) change by less than ``tolerance``.
+def maximise(
+    start: Learned, improved: Callable[[Learned], Learned], covariance: Callable[[Learned], Array], *, rounds: int, tolerance: float = 0.0
+) -> Learned:
+    """Return ``start`` after at most ``rounds`` of expectation and maximisation (``improved``), fewer once the
+    log-determinants of all its noise covariances (B, 6, 6) change by less than ``tolerance``.
     """
     found = start
     for _ in range(rounds):
@@ -79,8 +84,8 @@ def maximise(start: T, improved: Callable[[T], T], covariance: Callable[[T], Arr
 
 
 def sizes_of(rows: Sequence[tuple[str, str, float, float]]) -> tuple[dict[str, float], dict[str, float]]:
-    """Return means and sizes from rows of key, name of the mean ("" for none), posterior mean and posterior variance of a coefficient:
-    size² = mean of (value - mean)² + variance + (`DOUBT` mean)².
+    """Return means and sizes from rows of key, name of the mean ("" for none), posterior mean and posterior variance
+    of a coefficient: size² = mean of (value - mean)² + variance + (`MEAN_DOUBT` mean)².
     """
     named: dict[str, list[tuple[float, float]]] = {}
     for _, name, value, variance in rows:
@@ -90,7 +95,7 @@ def sizes_of(rows: Sequence[tuple[str, str, float, float]]) -> tuple[dict[str, f
     square: dict[str, list[float]] = {}
     for key, name, value, variance in rows:
         centre = means.get(name, 0.0)
-        square.setdefault(key, []).append((value - centre) ** 2 + variance + (DOUBT * centre) ** 2)
+        square.setdefault(key, []).append((value - centre) ** 2 + variance + (MEAN_DOUBT * centre) ** 2)
     return means, {key: float(np.sqrt(np.mean(some))) for key, some in square.items()}
 
 

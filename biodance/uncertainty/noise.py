@@ -1,7 +1,7 @@
 """The noise of the wrench residual, by frequency band: counting frames as independent makes intervals lie.
 
-Slow bands carry soft tissue, marker placement and plate zeros; fast bands carry the instruments. Whitening every band by its own
-covariance makes least squares the generalised least squares of the coloured noise.
+Slow bands carry soft tissue, marker placement and plate zeros; fast bands carry the instruments. Whitening every band
+by its own covariance makes least squares the generalised least squares of the coloured noise.
 """
 
 from dataclasses import dataclass, replace
@@ -14,8 +14,8 @@ from biodance.uncertainty.bands import WHITE, Bands
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """Covariance (B, 6, 6) N², N²·m, N²·m² of one transform coefficient in each of B ``bands``, for wrenches about ``about`` (3,) m in
-    the lab frame.
+    """Covariance (B, 6, 6) N², N²·m, N²·m² of one transform coefficient in each of B ``bands``, for wrenches about
+    ``about`` (3,) m in the lab frame.
     """
 
     covariance: Array
@@ -49,7 +49,9 @@ class Noise:
         return replace(self, bands=self.bands.at(rate))
 
     def whiten(self, rows: Array) -> Array:
-        """Return whitened rows (m, 6, n), m <= T, of consecutive samples ``rows`` (T, 6, n) of wrenches about the lab origin."""
+        """Return whitened rows (m, 6, n), m <= T, of consecutive samples ``rows`` (T, 6, n) of wrenches about the lab
+        origin.
+        """
         shifted = self.shift @ rows
         if self.bands.white:
             return np.asarray(np.linalg.solve(np.linalg.cholesky(self.covariance[0]), shifted))
@@ -59,7 +61,9 @@ class Noise:
         return inverse[band[keep]] @ self.bands.coefficients(shifted)[keep]
 
     def weighted(self, rows: Array) -> Array:
-        """Return S^-1 rows (T, 6, n) for consecutive samples ``rows`` (T, 6, n) about the lab origin: ``whiten`` and its transpose."""
+        """Return S^-1 rows (T, 6, n) for consecutive samples ``rows`` (T, 6, n) about the lab origin: ``whiten`` and
+        its transpose.
+        """
         white = self.whiten(rows)
         if self.bands.white:
             return np.asarray(self.shift.T @ np.linalg.solve(np.linalg.cholesky(self.covariance[0]).T, white))

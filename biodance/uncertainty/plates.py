@@ -1,4 +1,6 @@
-"""What an installed plate can add to a wrench: 49 elementary errors of one standard deviation each, about where the person stands."""
+"""What an installed plate can add to a wrench: 49 elementary errors of one standard deviation each, about where the
+person stands.
+"""
 
 from dataclasses import dataclass
 
@@ -9,12 +11,14 @@ from biodance.records import CHANNELS, Array
 from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.tolerances import shipped
 
-COUNT = 49
+PLATE_SOURCES = 49
 
 
 @dataclass(frozen=True, eq=False)
 class Plates:
-    """What m plates do to a wrench about their middle: ``mixing`` (m, 6, 6), ``offset`` (m, 6) N, N·m, ``delay`` (m,) s."""
+    """What m plates do to a wrench about their middle: ``mixing`` (m, 6, 6), ``offset`` (m, 6) N, N·m, ``delay`` (m,)
+    s.
+    """
 
     mixing: Array
     offset: Array
@@ -22,8 +26,10 @@ class Plates:
 
 
 def plate_sources() -> Plates:
-    """Return plates with one fault of one standard deviation each: 36 gains and cross-talks, 3 turns, 3 shifts, 6 offsets, a delay."""
-    mixing, offset, delay = np.zeros((COUNT, 6, 6)), np.zeros((COUNT, 6)), np.zeros(COUNT)
+    """Return plates with one fault of one standard deviation each: 36 gains and cross-talks, 3 turns, 3 shifts, 6
+    offsets, a delay.
+    """
+    mixing, offset, delay = np.zeros((PLATE_SOURCES, 6, 6)), np.zeros((PLATE_SOURCES, 6)), np.zeros(PLATE_SOURCES)
     rows, columns = np.divmod(np.arange(36), 6)
     mixing[np.arange(36), rows, columns] = [_share(CHANNELS[c], CHANNELS[r]) for r, c in zip(rows, columns, strict=True)]
     turn, shift = (skew(np.diag([around_zero(f"{name} {axis}") for axis in "xyz"])) for name in ("plate_rotation", "plate_position"))
@@ -35,14 +41,16 @@ def plate_sources() -> Plates:
 
 
 def around_zero(key: str, parameter: str = "") -> float:
-    """Return the root mean square of what ``key`` of the shipped tolerances can be, its mean in sessions without fault included."""
+    """Return the root mean square of what ``key`` of the shipped tolerances can be, its mean in sessions without
+    fault included.
+    """
     known = shipped()
     return float(np.hypot(known.size(key), known.mean(f"{key} {parameter}")))
 
 
 def plate_errors(wrench: Array, rate: float, noise: Noise, plates: Plates) -> Array:
-    """Return the errors (T, 6, m) about the lab origin of plates that measure ``wrench`` (T, 6), at ``rate`` Hz, described about the
-    point of ``noise``.
+    """Return the errors (T, 6, m) about the lab origin of plates that measure ``wrench`` (T, 6), at ``rate`` Hz,
+    described about the point of ``noise``.
     """
     near = wrench @ noise.shift.T
     late = np.gradient(near, 1.0 / rate, axis=0)[..., None] * plates.delay

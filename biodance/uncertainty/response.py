@@ -1,12 +1,14 @@
-"""How a trial answers small displacements: of its markers, of its centres of mass, of its segments - and the same backwards.
+"""How a trial answers small displacements: of its markers, of its centres of mass, of its segments - and the same
+backwards.
 
-Markers moved by x (m) are followed by the coordinates, dq = -(J'DJ)^-1 J'D x with D the marker weights (first order of the inverse
-kinematics). A displacement u (m, lab) of a segment's CoM and a turn r (rad, lab) of the segment change the wrench that the motion needs by
+Markers moved by x (m) are followed by the coordinates, dq = -(J'DJ)^-1 J'D x with D the marker weights (first order
+of the inverse kinematics). A displacement u (m, lab) of a segment's CoM and a turn r (rad, lab) of the segment change
+the wrench that the motion needs by
 
     d2/dt2 (F2 y) + d/dt (F1 y) + F0 y,    y = (u, r),
 
-from the rate of momentum and angular momentum (docs/derivations.md, section 16). All of it is linear: `Response.wrench` goes forward,
-`Response.pull` is its exact transpose.
+from the rate of momentum and angular momentum (docs/derivations.md, section 16). All of it is linear:
+`Response.wrench` goes forward, `Response.pull` is its exact transpose.
 """
 
 from dataclasses import dataclass
@@ -21,14 +23,15 @@ from biodance.motion.kinematics import Poses, poses, segment_motion
 from biodance.motion.marker_jacobian import jacobian, skew
 from biodance.records import Array, Index, Motion
 
-RIDGE = 1e-6
-"""Share of the mean curvature of the tracking that is added to it, so that coordinates without markers stay where they are."""
+TRACKING_RIDGE = 1e-6
+"""Share of the mean curvature of the tracking that is added to it, so that coordinates without markers stay where
+they are."""
 
 
 @dataclass(frozen=True, eq=False)
 class Pull:
-    """Weights of p equations on displacements: ``place``, ``turn`` (F, N, 3, p) of the segments' centres of mass and of the segments,
-    ``marker`` (F, M, 3, p) of the model's markers at unchanged coordinates.
+    """Weights of p equations on displacements: ``place``, ``turn`` (F, N, 3, p) of the segments' centres of mass and
+    of the segments, ``marker`` (F, M, 3, p) of the model's markers at unchanged coordinates.
     """
 
     place: Array
@@ -40,8 +43,9 @@ class Pull:
 class Response:
     """How ``body`` in ``motion`` (F frames at an even rate) with its ``pose`` answers.
 
-    ``place``, ``turn`` (F, N, 18, 3) the functionals F2, F1, F0 of a segment's CoM moved and of the segment turned; ``tangent`` (F, 18, nv)
-    the same of the coordinates; ``follow`` (F, nv, 3M) coordinates per marker displacement; ``J`` (F, 3M, nv) markers per coordinate.
+    ``place``, ``turn`` (F, N, 18, 3) the functionals F2, F1, F0 of a segment's CoM moved and of the segment turned;
+    ``tangent`` (F, 18, nv) the same of the coordinates; ``follow`` (F, nv, 3M) coordinates per marker displacement;
+    ``J`` (F, 3M, nv) markers per coordinate.
     """
 
     body: Body
@@ -59,7 +63,7 @@ class Response:
         pose, frames = poses(body, motion.q), motion.time.size
         every, segment = list(range(len(body.segments))), list(body.markers.segment)
         J, _ = jacobian(body, pose, segment, pose.points(segment, body.markers.position))
-        moved, turned = (part.reshape(frames, len(every), 3, body.nv) for part in jacobian(body, pose, every, centres(body, pose)))
+        moved, turned = (part.reshape(frames, len(every), 3, body.nv) for part in jacobian(body, pose, every, centres_of_mass(body, pose)))
         place, turn = (part.reshape(frames, len(every), 18, 3) for part in functionals(body, motion))
         tangent = np.zeros((frames, 18, body.nv))
         for s in every:
@@ -72,7 +76,9 @@ class Response:
         return self.motion.q[:, self.body.nq - len(self.body.joints) :]
 
     def of_markers(self, moved: Array, rows: Index | slice = slice(None)) -> tuple[Array, Array]:
-        """Return the functionals (F, 18, K) of model markers ``rows`` that ``moved`` (F, R, K) m, and what is left of all (F, 3M, K) m."""
+        """Return the functionals (F, 18, K) of model markers ``rows`` that ``moved`` (F, R, K) m, and what is left of
+        all (F, 3M, K) m.
+        """
         change = self.follow[:, :, rows] @ moved
         left = self.J @ change
         left[:, rows] += moved
@@ -99,27 +105,33 @@ class Response:
 
 @lru_cache(maxsize=8)
 def derivatives(count: int) -> tuple[Array, Array]:
-    """Return (n, n) twice: second and first derivative, at ``count`` samples one unit apart, of the quintic spline through them."""
+    """Return (n, n) twice: second and first derivative, at ``count`` samples one unit apart, of the quintic spline
+    through them.
+    """
     time = np.arange(count, dtype=float)
     spline = make_interp_spline(time, np.eye(count), k=min(5, count - 1))
     return spline.derivative(2)(time), spline.derivative(1)(time)
 
 
-def centres(body: Body, pose: Poses) -> Array:
+def centres_of_mass(body: Body, pose: Poses) -> Array:
     """Return the centres of mass (F, N, 3) m of the segments, lab."""
     return pose.points(list(range(len(body.segments))), body.sip.com)
 
 
 def tracking(body: Body, J: Array) -> Array:
-    """Return (F, nv, 3M): how the coordinates follow measured markers that move, least squares weighted by the body's marker weights."""
+    """Return (F, nv, 3M): how the coordinates follow measured markers that move, least squares weighted by the body's
+    marker weights.
+    """
     weighted = np.swapaxes(np.repeat(body.markers.weight, 3)[:, None] * J, 1, 2)
     normal = weighted @ J
-    ridge = RIDGE * np.trace(normal, axis1=1, axis2=2)[:, None, None] / body.nv * np.eye(body.nv)
+    ridge = TRACKING_RIDGE * np.trace(normal, axis1=1, axis2=2)[:, None, None] / body.nv * np.eye(body.nv)
     return np.asarray(np.linalg.solve(normal + ridge, weighted))
 
 
 def functionals(body: Body, motion: Motion) -> tuple[Array, Array]:
-    """Return (F, N, 3, 6, 3) twice: F2, F1, F0 of a displacement of a segment's CoM (m, lab) and of a turn of the segment (rad, lab)."""
+    """Return (F, N, 3, 6, 3) twice: F2, F1, F0 of a displacement of a segment's CoM (m, lab) and of a turn of the
+    segment (rad, lab).
+    """
     move = segment_motion(body, motion)
     frames, count = motion.time.size, len(body.segments)
     mass = body.sip.mass[:, None, None]

@@ -6,17 +6,19 @@ from functools import cached_property
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.body.skeleton import kind_of
 from biodance.motion.kinematics import cross, segment_motion
 from biodance.records import Array, Index
 from biodance.uncertainty.response import Pull, Response
-from biodance.uncertainty.source import Effects, Source, kind_of, mean_local, mean_squares, neighbours
+from biodance.uncertainty.source import Effects, ErrorSource, mean_local, mean_squares, neighbours
 
 
 @dataclass(frozen=True, eq=False)
-class Slide(Source):
+class Slide(ErrorSource):
     """Skin over bone: a pattern of a segment's markers in proportion to the angle of a joint beside it (m/rad).
 
-    ``patterns`` per segment (m, 3, P) displacements of its m markers, segment axes: the markers of a segment as a whole, or each alone.
+    ``patterns`` per segment (m, 3, P) displacements of its m markers, segment axes: the markers of a segment as a
+    whole, or each alone.
     """
 
     patterns: tuple[Array, ...]
@@ -71,7 +73,7 @@ class Slide(Source):
 
 
 @dataclass(frozen=True, eq=False)
-class Sag(Source):
+class Sag(ErrorSource):
     """Markers on flesh that yields to its own weight and acceleration, segment by segment (s²: m per m/s²)."""
 
     @property
@@ -117,8 +119,10 @@ class Sag(Source):
 
 
 @dataclass(frozen=True, eq=False)
-class Flesh(Source):
-    """Matter that moves against its segment in proportion to an angle beside it, along the three axes of the segment (m/rad)."""
+class Flesh(ErrorSource):
+    """Matter that moves against its segment in proportion to an angle beside it, along the three axes of the segment
+    (m/rad).
+    """
 
     @property
     def groups(self) -> tuple[str, ...]:

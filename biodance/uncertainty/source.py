@@ -1,4 +1,6 @@
-"""What one kind of elementary error must be able to say of itself: what it adds to the wrench, forward and as the transpose."""
+"""What one kind of elementary error must be able to say of itself: what it adds to the wrench, forward and as the
+transpose.
+"""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -11,11 +13,12 @@ from biodance.records import Array
 from biodance.uncertainty.response import Pull, Response
 
 Effects = tuple[Array, Array]
-"""Functionals (F, 18, K) of the wrench, and the mean residual (M, 3, K) m of every marker, model less measured, in segment axes."""
+"""Functionals (F, 18, K) of the wrench, and the mean residual (M, 3, K) m of every marker, model less measured, in
+segment axes."""
 
 
 @dataclass(frozen=True, eq=False)
-class Source(ABC):
+class ErrorSource(ABC):
     """One kind of error of ``body``: K elementary errors of unit size."""
 
     body: Body
@@ -50,11 +53,6 @@ def neighbours(body: Body) -> Array:
         child, above = body.joints[chain[-1]].segment, body.joints[chain[0]].parent
         table[np.ix_(chain, (child, 0 if above < 0 else body.joints[above].segment))] = 1.0
     return table
-
-
-def kind_of(name: str) -> str:
-    """Return the name of a segment or joint without its side."""
-    return name.removeprefix("right_").removeprefix("left_")
 
 
 def mean_local(trial: Response, residual: Array, weight: Array) -> Array:

@@ -1,9 +1,10 @@
-"""How large everything is that is no fault: soft tissue, joint centres, installed plates, and what is left; learned from null sessions.
+"""How large everything is that is no fault: soft tissue, joint centres, installed plates, and what is left; learned
+from null sessions.
 
-Errors of a person repeat with the movement, so that counting residuals as independent noise would name a cause in every session. The sizes
-of all nuisances, what is expected of them, and the covariance of the rest per band are learned together on null sessions (`learning`):
-of virtual subjects, whose sizes stand in the one table and the rest in ``anthropometry/uncertainty/null_sessions.toml``, or a
-laboratory's own.
+Errors of a person repeat with the movement, so that counting residuals as independent noise would name a cause in
+every session. The sizes of all nuisances, what is expected of them, and the covariance of the rest per band are
+learned together on null sessions (`learning`): of virtual subjects, whose sizes stand in the one table and the rest
+in ``anthropometry/uncertainty/null_sessions.toml``, or a laboratory's own.
 """
 
 import re
@@ -21,22 +22,24 @@ from biodance.body.error_sizes import error_rows, error_size
 from biodance.library import locate
 from biodance.records import Array, frozen_array
 
-REFERENCE = 70.0
+REFERENCE_PERSON = 70.0
 """kg: the noise is stated for a person of this mass and grows in proportion to it."""
 BEFORE = " before"
 """End of the key of what belongs to a joint where no functional calibration was made."""
-JOINTS = ("joint_centre", "tilt")
+CALIBRATED = ("joint_centre", "tilt")
 """Quantities that a functional calibration changes."""
 
 
 @dataclass(frozen=True, eq=False)
 class Tolerances:
-    """``sizes`` standard deviation by key: an effect and its target (``plate_gain Fz``), a group of elementary errors (``slide thigh``) or
-    a marker's segment (``marker thigh``), in the unit of its column; ``noise`` (B, 6, 6) covariance of one coefficient at `REFERENCE`;
-    ``energy``, ``energy_sd`` (B, 6) mean square of the whitened residual in null sessions and its standard deviation; ``threshold`` of
-    the evidence (natural logarithm) that no more than a few null sessions reach; ``origin`` in words; ``means`` what every null session
-    shows of a nuisance, by `mean_key` or group, in the unit of its column (flesh sags downwards in everybody); ``accuracy`` by effect:
-    share of its size by which a named cause errs beyond its own standard deviation, because no fault is quite like its model.
+    """``sizes`` standard deviation by key: an effect and its target (``plate_gain Fz``), a group of elementary errors
+    (``slide thigh``) or a marker's segment (``marker thigh``), in the unit of its column; ``noise`` (B, 6, 6)
+    covariance of one coefficient at `REFERENCE_PERSON`; ``energy``, ``energy_sd`` (B, 6) mean square of the whitened
+    residual in null sessions and its standard deviation; ``threshold`` of the evidence (natural logarithm) that no
+    more than a few null sessions reach; ``origin`` in words; ``means`` what every null session shows of a nuisance,
+    by `mean_key` or group, in the unit of its column (flesh sags downwards in everybody); ``accuracy`` by effect:
+    share of its size by which a named cause errs beyond its own standard deviation, because no fault is quite like
+    its model.
     """
 
     sizes: Mapping[str, float]
@@ -68,7 +71,9 @@ class Tolerances:
         return self.means.get(key, 0.0)
 
     def unlike(self, effect: str) -> float:
-        """Return the share of its size by which ``effect`` errs beyond noise; of one never measured that of "other" ones."""
+        """Return the share of its size by which ``effect`` errs beyond noise; of one never measured that of "other"
+        ones.
+        """
         return self.accuracy.get(effect, self.accuracy.get("other", 0.0))
 
     def knows(self, effect: str) -> bool:
@@ -77,23 +82,25 @@ class Tolerances:
 
     def whiteners(self, mass: float) -> Array:
         """Return (B, 6, 6) matrices that whiten a coefficient of a person of ``mass`` kg."""
-        return np.linalg.inv(np.linalg.cholesky(self.noise)) * (REFERENCE / mass)
+        return np.linalg.inv(np.linalg.cholesky(self.noise)) * (REFERENCE_PERSON / mass)
 
 
 @cache
 def shipped() -> Tolerances:
-    """Return the tolerances that come with biodance, learned from virtual subjects (``null_sessions.toml`` says which)."""
+    """Return the tolerances that come with biodance, learned from virtual subjects (``null_sessions.toml`` says
+    which).
+    """
     rest = read_tolerances(locate("anthropometry/uncertainty", "null_sessions").read_text(encoding="utf-8"))
     return replace(rest, sizes=table_sizes())
 
 
 def table_sizes() -> dict[str, float]:
-    """Return the sizes of the one table that sessions without fault are judged by, by key: the learned ones, and those of joints before
-    any functional calibration.
+    """Return the sizes of the one table that sessions without fault are judged by, by key: the learned ones, and
+    those of joints before any functional calibration.
     """
     sizes = {}
     for row in error_rows():
-        if row["learned_on"] == "null_sessions" or row["quantity"] in JOINTS:
+        if row["learned_on"] == "null_sessions" or row["quantity"] in CALIBRATED:
             key = " ".join((row["quantity"], row["target"])).removesuffix(" session")
             sizes[key + (BEFORE if row["state"] == "before" else "")] = float(row["sd"])
     return sizes
@@ -131,16 +138,19 @@ def key_of(name: str, target: str) -> str:
 
 
 def in_state(key: str, joint: str, body: Body) -> str:
-    """Return ``key`` as it holds for a ``joint`` of ``body`` ("" for what belongs to none): before or after a functional calibration.
+    """Return ``key`` as it holds for a ``joint`` of ``body`` ("" for what belongs to none): before or after a
+    functional calibration.
 
-    After it, a joint that the movement did not show stays where it was; its errors hardly show in that movement either, and such joints
-    are among those that the sizes were learned on.
+    After it, a joint that the movement did not show stays where it was; its errors hardly show in that movement
+    either, and such joints are among those that the sizes were learned on.
     """
     return key if not joint or body.joint_errors else key + BEFORE
 
 
 def mean_key(name: str, target: str, parameter: str) -> str:
-    """Return the key of what is expected of one parameter of an effect: sides of the body each have their own, as signs may be mirrored."""
+    """Return the key of what is expected of one parameter of an effect: sides of the body each have their own, as
+    signs may be mirrored.
+    """
     plate, colon, rest = target.partition(":")
     return " ".join(filter(None, (name, rest if colon and plate.startswith("plate") else target, parameter)))
 
