@@ -137,4 +137,4 @@ def test_the_criterion_of_a_motion_is_that_of_the_dance(made: tuple[Path, Path, 
     folder, protocol, _ = made
     dance = Dance.load(folder / "dance.npz")
     _, dynamic = criterion_of(dance.body, dance.motion(50.0))
-    assert dynamic == pytest.approx(dance_metrics(dance, read_plan(protocol).limits).dynamic[-1], rel=2e-3)
+    assert dynamic == pytest.approx(dance_metrics(dance, read_plan(protocol)).dynamic[-1], rel=2e-3)

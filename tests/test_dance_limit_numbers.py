@@ -55,6 +55,10 @@ def test_balance_a_rod_balances_up_to_the_share_of_half_the_base(pelvis: float) 
     assert both(FAMILY["balance"], state.x, feet()[0]) == pytest.approx((expected, expected), abs=1e-6)
 
 
+def test_the_check_forgives_rounding_only() -> None:
+    assert all(0 <= limit.rounding <= 1e-8 for limit in FAMILY.values())
+
+
 def test_balance_of_the_weight_over_one_foot_is_that_of_this_foot() -> None:
     over = feet()[5]  # the left one
     x = close_legs(CHAIN, over, upright() - 0.1 * np.eye(CHAIN.size)[2], *np.zeros((2, 1, CHAIN.size))).x

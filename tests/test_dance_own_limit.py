@@ -18,6 +18,7 @@ from biodance.dance import limits
 from biodance.dance.design import design
 from biodance.dance.limits import NOTHING, Limit, family, limits_with, unconcerned
 from biodance.dance.limits.friction import Friction
+from biodance.dance.limits.ground_clearance import GroundClearance
 from biodance.dance.postures import search
 from biodance.dance.problem.plan import Plan, read_plan
 from biodance.dance.verify import broken, verify
@@ -179,6 +180,22 @@ def test_what_a_protocol_may_not_say_of_limits_is_one_sentence(text: str, error:
     path.write_text(("share_of_support = 0.6\n" if "balance" in text else "") + f"[postures]\nparallel = 2\n{text}")
     with pytest.raises(error, match=said):
         read_plan(path)
+
+
+def test_a_limit_of_a_robots_likeness_grows_with_it() -> None:
+    assert GroundClearance(height=0.05).resized(3.0).height == pytest.approx(0.15)
+    assert Friction(mu=0.4).resized(3.0) == Friction(mu=0.4)
+
+
+def test_nobody_but_the_limits_themselves_knows_a_limit_by_name() -> None:
+    room = Path(limits.__file__).parents[2]
+    files = [*(room / "dance").rglob("*.py"), room / "pipeline" / "dance.py", room / "report" / "dance_write.py"]
+    known = {(path.name, limit.name) for path in files for limit in family() if f'"{limit.name}"' in path.read_text()}
+    assert {one for one in known if f"{one[1]}.py" != one[0]} == {
+        ("robot.py", "seat"),  # a size of a stance
+        ("rehearsal.py", "friction"),  # of MuJoCo's floor
+        ("plan.py", "balance"),  # share_of_support, the short form in protocols
+    }
 
 
 def test_what_is_no_limit_is_not_taken_as_one() -> None:

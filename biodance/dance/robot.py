@@ -98,6 +98,7 @@ def design_robot(
         hold=time * plan.hold,
         budget=time * plan.budget,
         forward=float(np.clip(length * plan.forward, 0.05, 0.4)),
+        limits=tuple(limit.resized(length) for limit in plan.limits),
     )
     large, _ = design(likeness(body, to), long, seed=seed, tell=tell, resume=resume)
     dance = shrunk(large, body, to)

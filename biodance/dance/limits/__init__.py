@@ -10,6 +10,7 @@ by other code. Design, verification, refusal and report go through the family an
 import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
+from copy import copy
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, ClassVar
 
@@ -97,6 +98,14 @@ class Limit(ABC):
     def hold_reserve(self, stance: Stance) -> float:
         """Return the share of the scale that a held posture keeps in reserve, for the moves that begin and end there."""
         return 0.06
+
+    def resized(self, length: float) -> "Limit":
+        """Return the limit of a body that is ``length`` times as large: its numbers in m grow with it."""
+        other = copy(self)
+        for one in fields(self):
+            if one.metadata.get("unit") == "m":
+                object.__setattr__(other, one.name, length * getattr(self, one.name))
+        return other
 
     @property
     def support_share(self) -> float:
