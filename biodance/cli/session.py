@@ -172,6 +172,7 @@ def export(
     out: Annotated[Path, Parameter(help="The file to write.")],
     trial: Annotated[str | None, Parameter(help="Name of the trial for trc and mot.")] = None,
     subject: Annotated[str | None, Parameter(help="The person to export where C3D files hold several.")] = None,
+    markers: MarkersFile = None,
     force: Annotated[bool, Parameter(name="--force", negative="", help="Replace the file if it exists.")] = False,
 ) -> int:
     """Write a session, or the results of `biodance identify`, for another program.
@@ -185,7 +186,7 @@ def export(
     from biodance.pipeline.export import replaceable
 
     with progress() as tell, replaceable(out, force=force) as place:
-        _, sentence = write(source, place, format=format, trial=trial, subject=subject, tell=tell)
+        _, sentence = write(source, place, format=format, trial=trial, subject=subject, markers=markers, tell=tell)
     say(sentence)
     sys.stdout.write(f"{out}\n")
     return DONE

@@ -34,13 +34,15 @@ def export(
     format: str,
     trial: str | None = None,
     subject: str | None = None,
+    markers: str | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> tuple[Path, str]:
     """Write ``source`` to the file ``out`` and return its path and one sentence on what it holds.
 
     ``source`` a session folder, or the results folder (or its body.json) of `biodance identify`. Model formats write the body with the
     identified parameters, where there are trials to identify from, else with the table's; ``trc`` writes the prepared markers and ``mot``
-    the joint coordinates (of the model that ``osim`` writes) of one trial. ``subject`` names the person where files hold several.
+    the joint coordinates (of the model that ``osim`` writes) of one trial. ``subject`` names the person where files hold several;
+    ``markers`` the marker set that was worn (a file or a name).
 
     Raises
     ------
@@ -57,7 +59,7 @@ def export(
             raise SessionRefused(f"{source}: holds a body and no trial. Give the session folder to export {format}.")
         body, words = read_body(kept)
         return write_model(body, out, format=format, source=words), words
-    session = read_session(source, subject_name=subject, tell=tell)
+    session = read_session(source, subject_name=subject, markers=markers, tell=tell)
     if format == "trc":
         return _markers(_chosen(session, trial), out)
     if format == "mot":
