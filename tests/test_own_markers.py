@@ -88,6 +88,8 @@ def test_the_option_reaches_every_command(
     found = json.loads(capsys.readouterr().out)
     assert {trial["marker_set"] for trial in found["trials"]} == {mine}
     assert all(trial["marker_rms_m"] < 0.002 for trial in found["trials"])
+    run(["export", str(folder), "--format", "csv", "--out", str(tmp_path / "body.csv"), "--markers", mine])
+    assert "right_thigh" in (tmp_path / "body.csv").read_text()
     asked = []
 
     def stopping(*_: object, markers: str | None = None, **__: object) -> None:

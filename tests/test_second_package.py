@@ -130,6 +130,22 @@ def test_a_package_that_is_broken_is_named(tmp_path: Path, monkeypatch: pytest.M
     forget()
 
 
+@pytest.mark.parametrize(("room", "family"), [("effects", "effect"), ("lab.readers", "reader"), ("body.export", "model format")])
+def test_a_stray_file_in_a_folder_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, room: str, family: str) -> None:
+    package = importlib.import_module(f"biodance.{room}")
+    (tmp_path / "notes.py").write_text("PAGES = 3\n")
+    monkeypatch.setattr(package, "__path__", [*package.__path__, str(tmp_path)])
+    with pytest.raises(BiodanceError, match=rf"notes\.py: .*so it is no {family}"):
+        package.FAMILY.members()
+    sys.modules.pop(f"biodance.{room}.notes", None)
+
+
+def test_a_table_of_a_package_says_where_its_numbers_come_from(installed: Path) -> None:
+    (installed / "tiny_lab" / "tiny_study.toml").unlink()
+    with pytest.raises(BiodanceError, match=r"tiny_study\.csv: has no tiny_study\.toml beside it, which says where its numbers come from"):
+        table_names("F")
+
+
 def test_nothing_is_imported_before_a_family_is_asked(tmp_path: Path) -> None:
     place = install(tmp_path / "site")
     code = "import sys, biodance, biodance.cli; print([m for m in sys.modules if m.startswith(('tiny_lab', 'biodance.effects', 'numpy'))])"

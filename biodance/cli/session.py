@@ -256,6 +256,7 @@ def export(
     trial: Annotated[str | None, Parameter(help="Name of the trial for trc, mot and c3d.")] = None,
     subject: Annotated[str | None, Parameter(help="The person to export where C3D files hold several.")] = None,
     meshes: Annotated[Path | None, Parameter(help="Folder with a closed mesh a segment (right_thigh.stl, m) for glb and osim.")] = None,
+    markers: MarkersFile = None,
     force: Annotated[bool, Parameter(name="--force", negative="", help="Replace the file if it exists.")] = False,
 ) -> int:
     """Write a session, or the results of `biodance identify`, for another program.
@@ -269,7 +270,7 @@ def export(
     from biodance.pipeline.export import replaceable
 
     with progress() as tell, replaceable(out, force=force) as place:
-        _, sentence = write(source, place, format=format, trial=trial, subject=subject, meshes=meshes, tell=tell)
+        _, sentence = write(source, place, format=format, trial=trial, subject=subject, markers=markers, meshes=meshes, tell=tell)
     say(sentence)
     sys.stdout.write(f"{out}\n")
     return DONE

@@ -38,6 +38,7 @@ def export(
     trial: str | None = None,
     subject: str | None = None,
     meshes: Path | None = None,
+    markers: str | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> tuple[Path, str]:
     """Write a session, or what was identified from it, in the format of another program.
@@ -56,6 +57,8 @@ def export(
         Name of the trial for ``trc`` and ``mot``; by default the only one that moves.
     subject : str, optional
         The person where files hold several.
+    markers : str, optional
+        The marker set that was worn: a file or a name.
     meshes : pathlib.Path, optional
         Folder with a closed mesh a segment (``right_thigh.stl``, m, in the segment's axes), shown by glb and osim.
     tell : callable, optional
@@ -95,7 +98,7 @@ def export(
                 raise SessionRefused(f"{folder}: holds a body and no trial. Give the session folder to export {format}.")
             body, words = read_body(kept)
             return _model(body, out, format, words, meshes), words
-        session = read_session(folder, subject_name=subject, tell=tell)
+        session = read_session(folder, subject_name=subject, markers=markers, tell=tell)
     if format == "trc":
         return _markers(_chosen(session, trial), out)
     if format == "mot":
