@@ -43,11 +43,11 @@ if TYPE_CHECKING:
     from biodance.pipeline.export import export as export
     from biodance.pipeline.front import SessionComparison as SessionComparison
     from biodance.pipeline.front import compare_sessions as compare_sessions
-    from biodance.pipeline.front import design_dance as design_dance
     from biodance.pipeline.front import diagnose as diagnose
     from biodance.pipeline.front import identify as identify
-    from biodance.pipeline.front import simulate as simulate
-    from biodance.pipeline.front import verify_dance as verify_dance
+    from biodance.pipeline.front_dance import design_dance as design_dance
+    from biodance.pipeline.front_dance import simulate as simulate
+    from biodance.pipeline.front_dance import verify_dance as verify_dance
     from biodance.pipeline.identification import SessionIdentification as SessionIdentification
     from biodance.pipeline.results import SessionResult as SessionResult
     from biodance.pipeline.session import examine as examine
@@ -79,7 +79,8 @@ HOMES = {
     "pipeline.dance": ("DanceResult",),
     "pipeline.diagnosis": ("SessionDiagnosis",),
     "pipeline.export": ("export",),
-    "pipeline.front": ("SessionComparison", "compare_sessions", "design_dance", "diagnose", "identify", "simulate", "verify_dance"),
+    "pipeline.front": ("SessionComparison", "compare_sessions", "diagnose", "identify"),
+    "pipeline.front_dance": ("design_dance", "simulate", "verify_dance"),
     "pipeline.identification": ("SessionIdentification",),
     "pipeline.results": ("SessionResult",),
     "pipeline.session": ("examine",),

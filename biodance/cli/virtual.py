@@ -30,14 +30,14 @@ def simulate(
     protocol
         Name of a protocol: dance, short, squat, standing ...; a wrong name lists all.
     """
-    from biodance.pipeline import front
+    from biodance.pipeline import front_dance
     from biodance.records import Subject
 
     if force:
         _forget_simulated(out)
     with progress() as tell:
         tell(f"simulating {protocol}")
-        folder = front.simulate(Subject(mass, height, sex, age), protocol, out, seed=seed, effects=effect)
+        folder = front_dance.simulate(Subject(mass, height, sex, age), protocol, out, seed=seed, effects=effect)
     sys.stdout.write(f"{folder}\n")
     return DONE
 

@@ -1,4 +1,4 @@
-"""What ``import biodance`` conducts: one function for each thing that an analyst asks of a visit; the commands call the same ones."""
+"""What ``import biodance`` conducts: what an analyst asks of a visit; the commands call the same functions."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -10,6 +10,8 @@ from biodance import display
 from biodance.body.body import Body
 from biodance.discovery import Chosen
 from biodance.effects import DiscreteEffect, Effect, causes
+from biodance.diagnose.tolerances import Tolerances
+from biodance.errors import UnknownName
 from biodance.lab.session import read_session
 from biodance.pipeline.diagnosis import SessionDiagnosis, diagnose_session
 from biodance.pipeline.identification import SessionIdentification, identify_trials
@@ -17,13 +19,11 @@ from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine, identified
 from biodance.records import Session, Subject
 from biodance.uncertainty.tolerances import Tolerances
+from biodance.records import Session
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from biodance.dance.dance import Dance
-    from biodance.dance.verify import Margin
-    from biodance.pipeline.dance import DanceResult
 
 Visit: TypeAlias = Session | SessionResult | str | Path
 """A session: as read, as examined, or its folder."""
@@ -219,6 +219,7 @@ def compare_sessions(earlier: Earlier, later: Earlier, *, tell: Tell = _silent) 
     return SessionComparison(first, replace(second, changes=differences(first.identification, second.identification)))
 
 
+<<<<<<< HEAD
 def design_dance(
     subject: Subject,
     protocol: str | Path = "full",
@@ -364,6 +365,16 @@ def simulate(subject: Subject, protocol: str, out: str | Path, *, seed: int = 0,
     plan = read_protocol(protocol)
     visit, loads = hide(tuple(parse(text) for text in effects), subject, plan, seed=seed)
     return write_session(subject, plan, Path(out), seed=seed, loads=loads, visit=visit)
+=======
+def _known_effects(chosen: Iterable[Any]) -> None:
+    """Refuse a name that no effect has."""
+    from biodance.effects import discrete_effects, effects
+
+    legal = (*effects(), *discrete_effects())
+    for name in chosen:
+        if isinstance(name, str) and name not in legal:
+            raise UnknownName.of("effect", name, legal)
+>>>>>>> frontdoor
 
 
 def _examined(session: Visit, tell: Tell) -> SessionResult:
