@@ -65,8 +65,8 @@ def design_dance(
         ...
     biodance.errors.BiodanceError: The mass is 6.5 kg; a dance is designed for 30 to 200 kg. Correct it.
     """
-    from biodance.dance.person import HEALTHY, read_person
-    from biodance.dance.protocol import read_plan
+    from biodance.dance.problem.person import HEALTHY, read_person
+    from biodance.dance.problem.plan import read_plan
     from biodance.pipeline.dance import dancer, make_dance
 
     plan = read_plan(protocol)
@@ -108,13 +108,13 @@ def verify_dance(
     True
     """
     from biodance.dance.dance import Dance
-    from biodance.dance.person import HEALTHY, fitted, read_person
-    from biodance.dance.protocol import read_plan
+    from biodance.dance.problem.person import HEALTHY, fit_to_person, read_person
+    from biodance.dance.problem.plan import read_plan
     from biodance.dance.verify import verify
 
     one = dance if isinstance(dance, Dance) else Dance.load(dance)
-    own, plan, _ = fitted(body or one.body, read_plan(protocol or one.protocol), read_person(Path(limits)) if limits else HEALTHY)
-    return verify(own, one, plan)
+    own, plan, _ = fit_to_person(body or one.body, read_plan(protocol or one.protocol), read_person(Path(limits)) if limits else HEALTHY)
+    return verify(own, one, plan.limits)
 
 
 def simulate(subject: Subject, protocol: str, out: str | Path, *, seed: int = 0, effects: Iterable[str] = ()) -> Path:
