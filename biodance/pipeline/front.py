@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 from biodance import display
-from biodance.diagnose.tolerances import Tolerances
 from biodance.discovery import Chosen
 from biodance.effects import DiscreteEffect, Effect, causes
 from biodance.lab.session import read_session
