@@ -158,9 +158,9 @@ def test_a_robot_dances_from_its_file(made: tuple[Path, int]) -> None:
     assert (found["postures"], found["criterion"]["static_bound"]) == (2, pytest.approx(7.942, abs=0.001))
     assert all(margin["worst"] >= 0 for margin in found["margins"])
     assert all(0 < row["mass_kg"] <= row["mass_table_kg"] for row in found["expected_sd"])
-    assert sorted(path.name for path in (place / "out").iterdir()) == sorted(
-        ["results.json", "dance.npz", "dance.csv", "cues.md", "margins.md", "postures.png", "criterion.png", "zmp.png", "expectation.png"]
-    )
+    drawn = {"postures.png", "criterion.png", "zmp.png", "expectation.png"}
+    names = {path.name for path in (place / "out").iterdir()} - {"postures_3d.png"}  # only where the machine can draw it
+    assert names == {"results.json", "dance.npz", "dance.csv", "cues.md", "margins.md", *drawn}
 
 
 def test_the_dance_keeps_the_limits_of_the_file(made: tuple[Path, int]) -> None:

@@ -29,7 +29,7 @@ UNFINISHED = "unfinished"
 """Folder with what is finished of a dance whose design was stopped."""
 OURS = (
     *("results.json", "dance.npz", "dance.c3d", "dance.csv", "cues.md", "margins.md"),
-    *("postures.png", "criterion.png", "zmp.png", "expectation.png"),
+    *("postures.png", "postures_3d.png", "criterion.png", "zmp.png", "expectation.png"),
 )
 """Files that a dance consists of."""
 
