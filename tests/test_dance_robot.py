@@ -9,10 +9,10 @@ import pytest
 from robots import biped
 
 from biodance.body.export import write_model
-from biodance.body.hoap3 import hoap3
-from biodance.body.human import human
-from biodance.body.standing_frames import standing_frames
-from biodance.body.urdf import read_urdf
+from biodance.body.human.human import human
+from biodance.body.robot.hoap3 import hoap3
+from biodance.body.robot.standing_frames import standing_frames
+from biodance.body.robot.urdf import read_urdf
 from biodance.cli import run
 from biodance.dance.dance import Dance
 from biodance.dance.limits import family
@@ -28,10 +28,10 @@ from biodance.dance.robot import ERROR, RATE, leg_length, person_sized, robot_pl
 from biodance.dance.transitions.move import Task, evaluate_move
 from biodance.dance.verify import broken, verify
 from biodance.errors import BiodanceError
-from biodance.identify.base_parameters import estimate_base, structural_base
-from biodance.identify.information import Information, fold
+from biodance.identification.base_parameters import estimate_base, structural_base
+from biodance.identification.information import Information, fold
 from biodance.motion.regressor import predict_wrench, regressor
-from biodance.pipeline.robot_dance import robot_dancer
+from biodance.pipeline.dance import robot_dancer
 from biodance.records import Subject
 
 HOAP = standing_frames(hoap3())

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, TypeAlias
 from biodance import display
 from biodance.discovery import Chosen
 from biodance.effects import DiscreteEffect, Effect, causes
-from biodance.lab.session import read_session
+from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import SessionDiagnosis, diagnose_session
 from biodance.pipeline.identification import SessionIdentification, identify_trials
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.session import examine, identified
+from biodance.pipeline.session import examine, identification_of
 from biodance.records import Session
 from biodance.uncertainty.tolerances import Tolerances
 
@@ -123,8 +123,8 @@ def identify(session: Visit, *, reference: Earlier | None = None, tell: Tell = _
     """
     result = _examined(session, tell)
     if reference is None:
-        return identified(result)
-    return identified(_against(result, _earlier(reference, tell)))
+        return identification_of(result)
+    return identification_of(_against(result, _earlier(reference, tell)))
 
 
 def diagnose(
@@ -209,7 +209,7 @@ def compare_sessions(earlier: Earlier, later: Earlier, *, tell: Tell = _silent) 
     >>> biodance.compare_sessions(identified, identified).table().shape
     (120, 9)
     """
-    from biodance.identify.sessions import differences
+    from biodance.identification.sessions import differences
 
     first, second = _earlier(earlier, tell), _earlier(later, tell)
     return SessionComparison(first, replace(second, changes=differences(first.identification, second.identification)))
@@ -224,7 +224,7 @@ def _examined(session: Visit, tell: Tell) -> SessionResult:
 
 def _earlier(session: Earlier, tell: Tell) -> SessionIdentification:
     """Return what a visit says about the body."""
-    return session if isinstance(session, SessionIdentification) else identified(_examined(session, tell))
+    return session if isinstance(session, SessionIdentification) else identification_of(_examined(session, tell))
 
 
 def _against(result: SessionResult, before: SessionIdentification) -> SessionResult:

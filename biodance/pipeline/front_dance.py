@@ -151,10 +151,10 @@ def simulate(subject: Subject, protocol: str, out: str | Path, *, seed: int = 0,
     >>> sorted(path.name for path in folder.iterdir())
     ['session.toml', 'standing_1.c3d', 'standing_2.c3d', 'static.c3d', 'truth']
     """
-    from biodance.virtual_lab.hide import hide, parse
-    from biodance.virtual_lab.protocol_file import read_protocol
-    from biodance.virtual_lab.simulate import simulate as write_session
+    from biodance.virtual_lab.causes import hide, parse_cause
+    from biodance.virtual_lab.protocol import read_protocol
+    from biodance.virtual_lab.simulate import simulate_session as write_session
 
     plan = read_protocol(protocol)
-    visit, loads = hide(tuple(parse(text) for text in effects), subject, plan, seed=seed)
+    visit, loads = hide(tuple(parse_cause(text) for text in effects), subject, plan, seed=seed)
     return write_session(subject, plan, Path(out), seed=seed, loads=loads, visit=visit)

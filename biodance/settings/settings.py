@@ -6,15 +6,7 @@ from typing import Any, Literal
 
 from biodance.errors import BiodanceError, UnknownName
 from biodance.settings.group import GENERAL, Group, Setting, Value, number_field, word_field
-from biodance.settings.groups import (
-    STANDARD_GRAVITY,
-    CheckLimits,
-    ContactRules,
-    FilterSettings,
-    GapSettings,
-    Hip,
-    StandingRules,
-)
+from biodance.settings.groups import STANDARD_GRAVITY, CheckLimits, ContactRules, FilterSettings, GapSettings, Hip, StandingRules
 
 
 @dataclass(frozen=True)
