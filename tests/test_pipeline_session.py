@@ -84,9 +84,9 @@ def test_a_heavier_load_on_the_plates_is_seen_in_mass_and_wrench():
     body = human(SUBJECT)
     stand = recorded(body, "standing", arm_swing(body, frames=150, angle=0.0))
     plate = stand.plates[0]
-    loaded = replace(stand, plates=(replace(plate, wrench=Wrench(plate.wrench.time, 1.05 * plate.wrench.value)),))
+    loaded = replace(stand, plates=(replace(plate, wrench=Wrench(plate.wrench.time, 1.04 * plate.wrench.value)),))
     result = examine(Session(SUBJECT, (loaded,), Path("/lab/S01")))
-    assert result.mass_difference == pytest.approx(5.0, abs=0.01)
+    assert result.mass_difference == pytest.approx(4.0, abs=0.01)  # a force difference of 4 % is inside its limit of 5
     assert [check.what for check in result.all_checks if not check.inside] == ["mass on the plates against declared"]
 
 

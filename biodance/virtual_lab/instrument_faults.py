@@ -128,13 +128,13 @@ def plate_bending(target: str, size: float) -> Fault:
 
 
 def loose_connection(target: str, gain: float) -> Fault:
-    """Shake a plug with bad contact: for some tenths of a second a channel reads ``gain`` too much, about once in 3 s."""
+    """Shake a plug with bad contact: for some tenths of a second a channel reads ``gain`` too much, about once in 3 s and at least once."""
     index = fault_channel(target)
 
     def change(wrench: Array, recording: Recording) -> Array:
         rng = stream(0, "loose connection", recording.name)
         out, rate = wrench.copy(), recording.analog_rate
-        for _ in range(rng.poisson(len(wrench) / rate / 3.0)):
+        for _ in range(max(1, rng.poisson(len(wrench) / rate / 3.0))):
             first = int(rng.integers(0, len(wrench)))
             out[first : first + int(rng.uniform(0.2, 0.8) * rate), index] *= 1.0 + gain
         return out
