@@ -1,0 +1,67 @@
+"""The tutorial pages: each is one script of examples/, with what it says, what it printed and what it drew.
+
+`python docs/hooks/tutorials.py` runs the scripts and keeps their output in docs/tutorials/ (`make tutorials`).
+"""
+
+import ast
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+
+ROOT = Path(__file__).parents[2]
+KEPT = ROOT / "docs" / "tutorials"
+
+
+def scripts() -> list[Path]:
+    """Return the examples in their order."""
+    return sorted((ROOT / "examples").glob("[0-9][0-9]_*.py"))
+
+
+def on_files(files: Files, *, config: MkDocsConfig) -> Files:
+    """Add a page for each script, and one that lists them."""
+    files.append(File.generated(config, "tutorials/index.md", content=contents()))
+    for script in scripts():
+        files.append(File.generated(config, f"tutorials/{script.stem}.md", content=page(script)))
+    return files
+
+
+def contents() -> str:
+    """Return the page that lists the tutorials."""
+    lines = [f"- [{title(script)}]({script.stem}.md)" for script in scripts()]
+    said = "Each tutorial is one script of the folder `examples/`. It runs as it stands; the tests run it, too."
+    return "\n".join(["# Tutorials", "", said, "", *lines, ""])
+
+
+def page(script: Path) -> str:
+    """Return the page of one script."""
+    _, *text = (ast.get_docstring(ast.parse(script.read_text())) or "").splitlines()
+    parts = [f"# {title(script)}", "\n".join(text), "```python", script.read_text(), "```"]
+    printed, drawn = KEPT / f"{script.stem}.txt", KEPT / f"{script.stem}.png"
+    if printed.is_file():
+        parts += ["It prints:", "", "```text", printed.read_text(), "```"]
+    if drawn.is_file():
+        parts += ["", f"![What this script draws]({drawn.name})"]
+    return "\n".join(parts) + "\n"
+
+
+def title(script: Path) -> str:
+    """Return the first sentence of a script's docstring, with its number."""
+    first = (ast.get_docstring(ast.parse(script.read_text())) or script.stem).splitlines()[0]
+    return f"{script.stem[:2]} {first.rstrip('.')}"
+
+
+def run(script: Path) -> None:
+    """Run one script; keep what it prints and draws."""
+    with tempfile.TemporaryDirectory() as scratch:
+        picture = KEPT / f"{script.stem}.png"
+        done = subprocess.run([sys.executable, script, picture], cwd=scratch, capture_output=True, text=True, check=True)
+    (KEPT / f"{script.stem}.txt").write_text(done.stdout)
+
+
+if __name__ == "__main__":
+    for one in [path for path in scripts() if not sys.argv[1:] or path.stem in sys.argv[1:]]:
+        run(one)
