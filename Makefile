@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: demo test lint clean
+.PHONY: demo test lint docs tutorials clean
 demo: $(STAMP)
 	$(BIN)/biodance demo --out demo --force || [ $$? -eq 1 ] # 1: done, and something needs a person
 
@@ -17,11 +17,17 @@ lint: $(STAMP)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+docs: $(STAMP)
+	PYTHONPATH=. $(BIN)/mkdocs build --strict --quiet
+
+tutorials: $(STAMP) # runs every example, and keeps what it prints and draws for the documentation
+	$(BIN)/python docs/hooks/tutorials.py
+
 $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e ".[test,lint,peers,viz]"
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e ".[test,lint,peers,viz,docs]"
 	touch $(STAMP)
 
 clean:
-	rm -rf $(VENV) demo
+	rm -rf $(VENV) demo build/site

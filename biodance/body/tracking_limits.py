@@ -2,7 +2,7 @@
 
 Stops that the person passes are worse than none: the joint is held, all others take the error coherently, and identification believes it.
 Of virtual persons who copied postures of the anatomical ranges seven degrees off, 67 to 79 % of all frames lay at a stop, and masses came
-out up to two times as wrong as without (docs/dance.md).
+out up to two times as wrong as without (docs/benchmarks/dance.md).
 """
 
 from dataclasses import replace
