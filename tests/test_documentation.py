@@ -38,7 +38,7 @@ def test_a_decision_is_a_dated_record(path: Path) -> None:
 
 
 def test_every_decision_stands_in_the_list() -> None:
-    page = hook("decisions").page(DOCS / "decisions")
+    page = hook("decisions").contents(DOCS / "decisions")
     assert len(RECORDS) >= 75
     assert all(f"({path.name})" in page for path in RECORDS)
 

@@ -26,6 +26,8 @@ def on_files(files: Files, *, config: MkDocsConfig) -> Files:
     files.append(File.generated(config, "tutorials/index.md", content=contents()))
     for script in scripts():
         files.append(File.generated(config, f"tutorials/{script.stem}.md", content=page(script)))
+    entry = next(item for item in config.nav or () if "Tutorials" in item)
+    entry["Tutorials"] = ["tutorials/index.md", *({short(script): f"tutorials/{script.stem}.md"} for script in scripts())]
     return files
 
 
@@ -52,6 +54,11 @@ def title(script: Path) -> str:
     """Return the first sentence of a script's docstring, with its number."""
     first = (ast.get_docstring(ast.parse(script.read_text())) or script.stem).splitlines()[0]
     return f"{script.stem[:2]} {first.rstrip('.')}"
+
+
+def short(script: Path) -> str:
+    """Return the name of a script as the navigation shows it."""
+    return f"{script.stem[:2]} {script.stem[3:].replace('_', ' ').capitalize()}"
 
 
 def run(script: Path) -> None:
