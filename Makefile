@@ -16,6 +16,7 @@ lint: $(STAMP)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	PYTHONPATH=tests $(BIN)/python tests/docstrings.py
 
 docs: $(STAMP)
 	PYTHONPATH=. $(BIN)/mkdocs build --strict --quiet
@@ -26,7 +27,7 @@ tutorials: $(STAMP) # runs every example, and keeps what it prints and draws for
 $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e ".[test,lint,peers,viz,docs]"
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e ".[test,lint,peers,docs]"
 	touch $(STAMP)
 
 clean:

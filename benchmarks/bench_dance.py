@@ -17,12 +17,11 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.human import human
-from biodance.dance.account import account
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
-from biodance.dance.person import HEALTHY, PersonLimits, fitted
-from biodance.dance.plan import Plan
-from biodance.dance.protocol import read_plan
+from biodance.dance.metrics import dance_metrics
+from biodance.dance.problem.person import HEALTHY, PersonLimits, fit_to_person
+from biodance.dance.problem.plan import Plan, read_plan
 from biodance.dance.rehearsal import rehearse
 from biodance.dance.verify import verify
 from biodance.errors import BiodanceError
@@ -71,14 +70,14 @@ def _spent() -> float:
 def told(name: str, folder: Path) -> str:
     """Return the row of one body, or the sentence in which its dance is refused."""
     subject, person = BODIES[name]
-    body, plan, _ = fitted(human(subject), read_plan("full"), person)
+    body, plan, _ = fit_to_person(human(subject), read_plan("full"), person)
     who = f"| {name}, {subject.sex} {subject.stature:.2f} m {subject.mass:.0f} kg {subject.age:.0f} y"
     try:
         dance, spent = made(body, plan, folder, name)
     except BiodanceError as error:
         return f"{who} | refused: {error} |"
-    margins, numbers = verify(body, dance, plan), account(dance, plan)
-    numbers = account(dance, replace(plan, weights=tuple((name, 0.0) for name in numbers.hardly)))  # feet that never leave the ground
+    margins, numbers = verify(body, dance, plan.limits), dance_metrics(dance, plan)
+    numbers = dance_metrics(dance, replace(plan, weights=tuple((name, 0.0) for name in numbers.hardly)))  # feet that never leave the ground
     worst = min((m for m in margins if m.limit not in ROUNDING), key=lambda m: m.worst)
     slow, stops = int(np.sum(dance.move > plan.move + 1e-9)), int(np.sum(dance.hold == 0))
     holds = sum(m.worst >= 0 for m in margins)

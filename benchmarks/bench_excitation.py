@@ -22,15 +22,14 @@ from pathlib import Path
 import numpy as np
 from virtual_visits import subjects
 
-from biodance.dance.account import criterion_of
-from biodance.dance.between import Near, middle_posture
-from biodance.dance.chain import Chain
 from biodance.dance.dance import Dance
 from biodance.dance.design import SHORT, design
-from biodance.dance.plan import Plan
-from biodance.dance.postures import KEPT, solve, start
-from biodance.dance.protocol import read_plan
-from biodance.dance.sequence import sequence, under
+from biodance.dance.metrics import criterion_of
+from biodance.dance.postures.ordering import support_sequence
+from biodance.dance.postures.posture import KEPT, Near, initial_guess, intermediate_posture, solve
+from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.plan import Plan, read_plan
+from biodance.dance.problem.stance import under
 from biodance.lab.session import read_session
 from biodance.motion.kinematics import poses
 from biodance.pipeline.dance import dancer
@@ -99,16 +98,17 @@ def random_dance(like: Dance, plan: Plan) -> Dance:
     body = dancer(SHOWN_TO, plan)
     chain, rng = Chain(body), np.random.default_rng(7)
     count = {name: sum(s.over is None and s.name == name for s in like.stances) for name, _ in plan.blocks}
-    stances = sequence(body, replace(plan, budget=float("inf"), blocks=tuple((name, n) for name, n in count.items() if n)))
+    stances = support_sequence(body, replace(plan, budget=float("inf"), blocks=tuple((name, n) for name, n in count.items() if n)))
     x = np.full((len(stances), chain.size), np.nan)
     for k, stance in enumerate(stances):
         while stance.over is None and np.isnan(x[k, 0]):
-            begin = start(chain, stance, rng)
-            found = solve(chain, stance, begin, Near(begin), iterations=40)
+            begin = initial_guess(chain, stance, rng)
+            found = solve(chain, stance, begin, Near(begin), plan.limits, iterations=40)
             if found.violation <= KEPT:
                 x[k] = found.x
     for k in np.flatnonzero(np.isnan(x[:, 0])):
-        x[k] = middle_posture(chain, stances[k], x[[max(k - 1, 0)]] if k and not np.isnan(x[k - 1, 0]) else x[:1], seed=[3, int(k)]).x
+        near = x[[max(k - 1, 0)]] if k and not np.isnan(x[k - 1, 0]) else x[:1]
+        x[k] = intermediate_posture(chain, stances[k], near, plan.limits, seed=[3, int(k)]).x
     hold = np.array([plan.hold if s.over is None else min(SHORT, plan.hold) for s in stances])
     move = np.full(len(x) - 1, (like.duration - hold.sum()) / (len(x) - 1))
     feet = tuple(under(a, b) for a, b in pairwise(stances))

@@ -170,7 +170,8 @@ def pairs(subject: Subject, seed: int, reference: Identification, *, full: bool)
 
 def subject_of(index: int, catalogue: tuple[int, int], *, tell) -> tuple[Row, list[AddedMass], Load, list[Load]]:
     """Return all about one subject, from the cache while the code of identify/ is unchanged."""
-    code = b"".join(path.read_bytes() for path in sorted(Path(biodance.identify.__file__).parent.glob("*.py")))
+    house = Path(biodance.identify.__file__).parent.parent
+    code = b"".join(path.read_bytes() for room in ("identify", "uncertainty") for path in sorted((house / room).glob("*.py")))
     path = CACHE / f"subject-{hashlib.sha256(f'{catalogue}-{index}'.encode() + code).hexdigest()[:20]}.pickle"
     if not path.is_file():
         person, seed = subjects(index + 1, catalogue)[index], catalogue[1] + index

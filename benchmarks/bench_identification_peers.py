@@ -25,11 +25,11 @@ from biodance.body.inertia import smallest_eigenvalues
 from biodance.identify.identification import identify
 from biodance.identify.information import information
 from biodance.identify.knowledge import segment_quantities
-from biodance.identify.noise import Noise
 from biodance.identify.paper_programme import paper_programme
 from biodance.identify.statistics import Fit
 from biodance.motion.regressor import regressor
 from biodance.records import Array, Motion, Subject, Wrench
+from biodance.uncertainty.noise import Noise
 from biodance.virtual_lab.flesh import of_parameters, parameters, placed
 
 SUBJECTS = (Subject(52.0, 1.58, "F"), Subject(66.0, 1.71, "F"), Subject(78.0, 1.80, "M"), Subject(97.0, 1.88, "M"))

@@ -16,8 +16,7 @@ from pathlib import Path
 from hidden_sessions import REAL
 
 from biodance.diagnose.diagnosis import Diagnosis, Finding
-from biodance.effects import discrete_effects, effects
-from biodance.effects.gate import unit_of
+from biodance.effects import discrete_effects, effects, unit_of
 from biodance.errors import BiodanceError
 from biodance.lab.plate_parameters import count_plates
 from biodance.lab.raw_c3d import read_raw
@@ -52,7 +51,7 @@ def diagnosed(folder: Path) -> Diagnosis | str:
     """Return the diagnosis of a session, or why there is none."""
     names = tuple(name for name in (*effects(), *discrete_effects()) if name != "labels_swapped")
     try:
-        return diagnose_session(examine(read_session(folder)), chosen=names).diagnosis
+        return diagnose_session(examine(read_session(folder)), effects=names).diagnosis
     except BiodanceError as error:
         return str(error)
 

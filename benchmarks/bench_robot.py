@@ -19,8 +19,7 @@ from biodance.body.inertia import lump_of, smallest_eigenvalues
 from biodance.body.similar import Likeness, likeness
 from biodance.dance.dance import Dance
 from biodance.dance.rehearsal import rehearse
-from biodance.dance.robot import person_sized, shrunk
-from biodance.dance.robot_expectation import ERROR, RATE, robot_rows
+from biodance.dance.robot import ERROR, RATE, person_sized, robot_rows, shrunk
 from biodance.identify.base_parameters import estimate_base, structural_base
 from biodance.identify.information import Information, fold
 from biodance.identify.paper_programme import paper_programme

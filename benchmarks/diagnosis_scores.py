@@ -81,12 +81,12 @@ def judge(scenario: Scenario, *, absent: bool = False) -> Score:
     planned = Clock()
     start = time.process_time()
     with (
-        patch("biodance.effects._family", lambda: left),
+        patch("biodance.effects.causes", lambda chosen=None: left if chosen is None else chosen),
         patch("biodance.diagnose.engine.problem", planned.timed(problem)),
         patch("biodance.diagnose.naming.candidates", planned.timed(candidates)),
         patch("biodance.diagnose.engine.limits", planned.timed(limits)),
     ):
-        found = diagnose_session(result)
+        found = diagnose_session(result, effects=left)
     seconds = time.process_time() - start
     harm = contamination(scenario, result, found) if scenario.judged and not absent else {}
     one = score(scenario, found.diagnosis, seconds, group="absent" if absent else scenario.group, harm=harm)

@@ -8,14 +8,15 @@ from pathlib import Path
 from virtual_visits import CACHE, TrackedVisit, visit
 
 import biodance.identify
-from biodance.identify.caution import widened
 from biodance.identify.identification import Identification, conclude, usable
 from biodance.identify.learning import learn
 from biodance.identify.loads import may_carry
 from biodance.identify.mismatch import Mismatch, mismatch
-from biodance.identify.noise import Noise
 from biodance.identify.statistics import Statistics, empty, layout_for, statistics
+from biodance.library import locate
 from biodance.records import Subject
+from biodance.uncertainty.caution import widened
+from biodance.uncertainty.noise import Noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,14 +38,16 @@ class Gathered:
         return conclude(self.visit.body, self.total, self.names, noise=self.noise, found=self.found)
 
 
-SOURCES = ("statistics", "noise", "learning", "loads", "twins", "mismatch", "kinematic_scores", "caution")
-"""Modules of identify/ on which what is gathered depends."""
+SOURCES = ("statistics", "learning", "loads", "mismatch")
+"""Modules of identify/ on which what is gathered depends, beside all of uncertainty/ and its table."""
 
 
 def gather(subject: Subject, protocol: str, seed: int, *, session: int = 0, load: tuple[str, float] | None = None) -> Gathered:
     """Return the statistics, the noise and the disturbances of a visit, from the cache while their code is unchanged."""
     folder = Path(biodance.identify.__file__).parent
-    code = b"".join((folder / f"{name}.py").read_bytes() for name in SOURCES)
+    room, table = folder.parent / "uncertainty", locate("anthropometry/uncertainty", "sizes", ".csv")
+    parts = [*(folder / f"{name}.py" for name in SOURCES), *sorted(room.glob("*.py")), table]
+    code = b"".join(path.read_bytes() for path in parts)
     key = f"{subject}-{protocol}-{seed}-{session}-{load}".encode() + code
     path = CACHE / f"gathered-{hashlib.sha256(key).hexdigest()[:20]}.pickle"
     if path.is_file():

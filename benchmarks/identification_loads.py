@@ -8,17 +8,16 @@ from identification_tables import ARM, LOADS, Load
 from virtual_visits import TrackedVisit
 
 from biodance.identify.added_mass import added_mass
-from biodance.identify.caution import widened
 from biodance.identify.identification import Identification, conclude
 from biodance.identify.learning import learn
 from biodance.identify.loads import may_carry
 from biodance.identify.mismatch import mismatch
-from biodance.identify.noise import blocks
 from biodance.identify.statistics import Fit, Statistics
 from biodance.lab.filters import LowPass, low_pass
 from biodance.motion.kinematics import segment_motion
 from biodance.motion.regressor import GRAVITY, regressor_of
 from biodance.records import Array, Motion
+from biodance.uncertainty.caution import widened
 from biodance.virtual_lab.merge import MERGED
 
 
@@ -64,11 +63,11 @@ def _with_loads(got: Gathered) -> Statistics:
     gram, count = np.zeros((len(got.total.count), 6, p + 1, 6, p + 1)), np.zeros_like(got.total.count)
     for fit in one.fits:
         unit = np.stack([_unit_wrench(one, fit, s) for s in range(len(one.body.segments))], axis=2)
-        for pick in blocks(fit.use, fit.motion.rate, layout):
+        for pick in layout.bands.runs(fit.use, fit.motion.rate):
             part = Motion(fit.motion.time[pick], fit.motion.q[pick], fit.motion.v[pick], fit.motion.a[pick])
-            W = regressor_of(segment_motion(one.body, part))
-            X = layout.coefficients(layout.shift @ np.concatenate([W, unit[pick], fit.wrench.value[pick][:, :, None]], axis=2))
-            band = layout.bands_of(len(X))
+            W = regressor_of(segment_motion(one.body, part), gravity=one.body.gravity)
+            X = layout.bands.coefficients(layout.shift @ np.concatenate([W, unit[pick], fit.wrench.value[pick][:, :, None]], axis=2))
+            band = layout.bands.of(len(X))
             for b in np.unique(band[band >= 0]):
                 flat = X[band == b].reshape(-1, 6 * (p + 1))
                 gram[b] += (flat.T @ flat).reshape(6, p + 1, 6, p + 1)

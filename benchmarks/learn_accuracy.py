@@ -1,6 +1,6 @@
-"""Learn how far the sizes of named causes are from the truth: writes the section [accuracy] of biodance/diagnose/tolerances.toml anew.
+"""Learn how far the sizes of named causes are from the truth: writes [accuracy] of anthropometry/uncertainty/null_sessions.toml anew.
 
-    python benchmarks/learn_accuracy.py [--minutes 30] [--out biodance/diagnose/tolerances.toml] [--prepare]
+    python benchmarks/learn_accuracy.py [--minutes 30] [--out anthropometry/uncertainty/null_sessions.toml] [--prepare]
 
 Every cause at three times its limit is hidden in sessions of two persons whom no other benchmark uses. No real fault is quite like the
 model that is fitted to it (a joint's course, a rope's angle), so a size errs by a share of itself, beyond what noise explains. The share of
@@ -22,8 +22,8 @@ from hidden_sessions import CACHE, Scenario, examined
 from scipy.stats import t as student
 
 from biodance.diagnose.diagnosis import SIGMAS
-from biodance.diagnose.tolerances import read_tolerances, shipped, to_toml
 from biodance.pipeline.diagnosis import diagnose_session
+from biodance.uncertainty.tolerances import read_tolerances, shipped, to_toml
 
 PERSONS = (10, 11)
 FILTER = "filter_mismatch:cutoff=4"
@@ -71,7 +71,7 @@ def main() -> None:
     """Measure what time allows, learn and write."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=1e9)
-    parser.add_argument("--out", type=Path, default=Path("biodance/diagnose/tolerances.toml"))
+    parser.add_argument("--out", type=Path, default=Path("anthropometry/uncertainty/null_sessions.toml"))
     parser.add_argument("--prepare", action="store_true", help="only simulate and track")
     chosen = parser.parse_args()
     start = time.monotonic()

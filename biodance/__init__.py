@@ -1,3 +1,126 @@
-"""biodance: segment inertial parameters of a person, measured from markers and force plates instead of read from a table."""
+"""biodance: segment inertial parameters of a person, measured from markers and force plates instead of read from a table.
+
+A visit is diagnosed in a few lines::
+
+    import biodance
+
+    visit = biodance.read_session("visit")
+    found = biodance.diagnose(visit)
+    print(found.verdict)
+    print(found.table())
+
+SI units (m, kg, s, N, N·m, rad); lab frame with z up; a wrench is the ground's action on the subject about the lab origin, force first.
+The examples of this package share a simulated visit: ``session = read_session("visit")``, ``result = examine(session)``,
+``identified = identify(result)``, ``found = diagnose(result)``, and a short ``dance``; what they print is checked by the tests.
+"""
+
+import sys
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from biodance.body.body import Body as Body
+    from biodance.body.human import human as human
+    from biodance.body.scaling import scale as scale
+    from biodance.dance.dance import Dance as Dance
+    from biodance.diagnose.diagnosis import Diagnosis as Diagnosis
+    from biodance.diagnose.diagnosis import Finding as Finding
+    from biodance.errors import BiodanceError as BiodanceError
+    from biodance.errors import FileRefused as FileRefused
+    from biodance.errors import MissingLibrary as MissingLibrary
+    from biodance.errors import SessionRefused as SessionRefused
+    from biodance.errors import TrialRefused as TrialRefused
+    from biodance.errors import UnknownName as UnknownName
+    from biodance.identify.identification import Identification as Identification
+    from biodance.lab.c3d import read_c3d as read_c3d
+    from biodance.lab.read import read_trial as read_trial
+    from biodance.lab.session import read_session as read_session
+    from biodance.motion.regressor import predict_wrench as predict_wrench
+    from biodance.motion.track import track as track
+    from biodance.pipeline.dance import DanceResult as DanceResult
+    from biodance.pipeline.diagnosis import SessionDiagnosis as SessionDiagnosis
+    from biodance.pipeline.export import export as export
+    from biodance.pipeline.front import SessionComparison as SessionComparison
+    from biodance.pipeline.front import compare_sessions as compare_sessions
+    from biodance.pipeline.front import design_dance as design_dance
+    from biodance.pipeline.front import diagnose as diagnose
+    from biodance.pipeline.front import identify as identify
+    from biodance.pipeline.front import simulate as simulate
+    from biodance.pipeline.front import verify_dance as verify_dance
+    from biodance.pipeline.identification import SessionIdentification as SessionIdentification
+    from biodance.pipeline.results import SessionResult as SessionResult
+    from biodance.pipeline.session import examine as examine
+    from biodance.records import Markers as Markers
+    from biodance.records import Motion as Motion
+    from biodance.records import Plate as Plate
+    from biodance.records import Session as Session
+    from biodance.records import Sip as Sip
+    from biodance.records import Subject as Subject
+    from biodance.records import Trial as Trial
+    from biodance.records import Wrench as Wrench
+    from biodance.settings import Settings as Settings
 
 __version__ = "0.1.0"
+
+HOMES = {
+    "body.body": ("Body",),
+    "body.human": ("human",),
+    "body.scaling": ("scale",),
+    "dance.dance": ("Dance",),
+    "diagnose.diagnosis": ("Diagnosis", "Finding"),
+    "errors": ("BiodanceError", "FileRefused", "MissingLibrary", "SessionRefused", "TrialRefused", "UnknownName"),
+    "identify.identification": ("Identification",),
+    "lab.c3d": ("read_c3d",),
+    "lab.read": ("read_trial",),
+    "lab.session": ("read_session",),
+    "motion.regressor": ("predict_wrench",),
+    "motion.track": ("track",),
+    "pipeline.dance": ("DanceResult",),
+    "pipeline.diagnosis": ("SessionDiagnosis",),
+    "pipeline.export": ("export",),
+    "pipeline.front": ("SessionComparison", "compare_sessions", "design_dance", "diagnose", "identify", "simulate", "verify_dance"),
+    "pipeline.identification": ("SessionIdentification",),
+    "pipeline.results": ("SessionResult",),
+    "pipeline.session": ("examine",),
+    "records": ("Markers", "Motion", "Plate", "Session", "Sip", "Subject", "Trial", "Wrench"),
+    "settings": ("Settings",),
+}
+"""Module -> the names of the front door that live there; each is loaded when it is first asked for."""
+_HOME = {name: f"{__name__}.{module}" for module, names in HOMES.items() for name in names}
+__all__ = sorted(_HOME)  # noqa: PLE0605 - one list, checked against the imports above by a test
+
+
+def front_door(name: str) -> Any:
+    """Return what a name of the front door stands for, from where it lives."""
+    return getattr(import_module(_HOME[name]), name)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}. It has {', '.join(__all__)}.")
+    found = front_door(name)
+    return globals().setdefault(name, found)
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]
+
+
+class _Room(ModuleType):
+    """A package whose name is also a verb of the front door (``biodance.identify``): called, it does that."""
+
+    def __call__(self, *args: Any, **options: Any) -> Any:
+        return front_door(self.__name__.rpartition(".")[2])(*args, **options)
+
+
+class _Package(ModuleType):
+    """The front door: Python sets every subpackage as an attribute here; one with the name of a verb becomes a `_Room`."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in _HOME and isinstance(value, ModuleType):
+            value.__class__ = _Room
+        super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package

@@ -46,11 +46,13 @@ def _importing(module: str) -> str:
 
 PROBES = (
     Probe("pinocchio", _importing("pinocchio"), "It needs the system library libgomp: apt-get install libgomp1; then pip install pin."),
-    Probe("c3d (second reader)", "import c3d; print('loads')", "pip install c3d"),
+    Probe("ezc3d (judge and writer)", _importing("ezc3d"), "pip install ezc3d"),
     Probe("scipy", _importing("scipy"), "pip install scipy"),
     Probe("cvxpy with Clarabel", "import clarabel, cvxpy; print(cvxpy.__version__)", "pip install cvxpy clarabel"),
+    Probe("pandas with pyarrow", "import pandas, pyarrow; print(pandas.__version__)", "pip install pandas pyarrow"),
+    Probe("trimesh", _importing("trimesh"), "pip install trimesh"),
     Probe("matplotlib", _importing("matplotlib"), "pip install matplotlib"),
-    Probe("GL stills (pyvista)", STILL, "pip install 'biodance[viz]'; apt-get install libgl1 libegl1.", needed=False),
+    Probe("GL stills (pyvista)", STILL, "pip install pyvista; apt-get install libgl1 libegl1.", needed=False),
     Probe("opensim (comparisons)", _importing("opensim"), "pip install opensim; only the tests and benchmarks use it.", needed=False),
     Probe("mujoco (comparisons)", _importing("mujoco"), "pip install mujoco; only the tests use it.", needed=False),
 )  # fmt: skip

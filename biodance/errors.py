@@ -6,33 +6,106 @@ is a status in its result, not an exception.
 
 
 class BiodanceError(ValueError):
-    """Root of all errors that biodance raises on purpose; its text is one plain sentence for the analyst."""
+    """Root of all errors that biodance raises on purpose; its text is one plain sentence for the analyst.
+
+    Examples
+    --------
+    >>> try:
+    ...     biodance.read_session("nowhere")
+    ... except biodance.BiodanceError as error:
+    ...     print(error)
+    nowhere: there is no such folder. Check the path.
+    """
 
 
 class FileRefused(BiodanceError):
-    """A file that cannot be read, or that cannot be trusted: names the file, the fault and the remedy."""
+    """A file that cannot be read, or that cannot be trusted: names the file, the fault and the remedy.
+
+    Examples
+    --------
+    >>> biodance.read_c3d("visit/session.toml")
+    Traceback (most recent call last):
+        ...
+    biodance.errors.FileRefused: visit/session.toml: ...
+    """
 
 
 class TrialRefused(BiodanceError):
-    """A trial that was read but cannot carry the step asked of it (no markers, no plate, no loaded frame ...)."""
+    """A trial that was read but cannot carry the step asked of it (no markers, no plate, no loaded frame ...).
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> replace(session["squat_1"], plates=()).wrench
+    Traceback (most recent call last):
+        ...
+    biodance.errors.TrialRefused: Trial squat_1: no force plate was recorded, so there is no wrench. Record with the plates on.
+    """
 
 
 class SessionRefused(BiodanceError):
-    """A session folder from which no step can be done (empty, no readable trial, contradictory session.toml)."""
+    """A session folder from which no step can be done (empty, no readable trial, contradictory session.toml).
+
+    Examples
+    --------
+    >>> biodance.read_session("nowhere")
+    Traceback (most recent call last):
+        ...
+    biodance.errors.SessionRefused: nowhere: there is no such folder. Check the path.
+    """
+
+
+class NotSolved(BiodanceError):
+    """Parameters were asked of an estimate that failed and has none: its cause and cure. Look at ``status`` before."""
 
 
 class UnknownName(BiodanceError):
-    """A name that is not in the library or record it was looked up in; lists the legal names."""
+    """A name that is not in the library or record it was looked up in; lists the legal names.
+
+    Examples
+    --------
+    >>> session["squat"]
+    Traceback (most recent call last):
+        ...
+    biodance.errors.UnknownName: 'squat' is not a trial of session visit. Did you mean 'squat_1'? Legal: dance_1, squat_1, static.
+    """
 
     @classmethod
     def of(cls, kind: str, name: str, legal: list[str] | tuple[str, ...]) -> "UnknownName":
-        """Build the error for ``name``, which is no ``kind``; ``legal`` are all names that would have been right."""
+        """Build the error for a name that does not exist.
+
+        Parameters
+        ----------
+        kind : str
+            What it was taken for.
+        name : str
+            As it was given.
+        legal : list or tuple of str
+            All names that would have been right.
+
+        Returns
+        -------
+        UnknownName
+            To be raised.
+
+        Examples
+        --------
+        >>> print(biodance.UnknownName.of("segment", "thihg", ("thigh", "shank")))
+        'thihg' is not a segment. Did you mean 'thigh'? Legal: shank, thigh.
+        """
         from difflib import get_close_matches
 
         close = get_close_matches(name, legal, n=1)
         hint = f" Did you mean {close[0]!r}?" if close else ""
-        return cls(f"{name!r} is not a {kind}.{hint} Legal: {', '.join(sorted(legal)) or 'none'}.")
+        article = "an" if kind[0] in "aeio" else "a"
+        return cls(f"{name!r} is not {article} {kind}.{hint} Legal: {', '.join(sorted(legal)) or 'none'}.")
 
 
 class MissingLibrary(BiodanceError):
-    """A third-party library that this step needs does not load on this machine; says how to mend it."""
+    """A third-party library that this step needs does not load on this machine; says how to mend it.
+
+    Examples
+    --------
+    >>> issubclass(biodance.MissingLibrary, biodance.BiodanceError)
+    True
+    """

@@ -9,11 +9,11 @@ from scipy.interpolate import CubicSpline
 
 from biodance.body.human import human
 from biodance.diagnose.problem import Look
-from biodance.diagnose.spectrum import EDGES
-from biodance.diagnose.tolerances import Tolerances
-from biodance.effects.case import at_origin
+from biodance.effects import at_origin
 from biodance.motion.regressor import predict_wrench
 from biodance.records import CHANNELS, Motion, Plate, Source, Subject, Trial, Wrench
+from biodance.uncertainty.bands import BANDS
+from biodance.uncertainty.tolerances import Tolerances
 
 SUBJECT = Subject(70.0, 1.75, "M", 30.0)
 RATE, SECONDS = 50.0, 12.0
@@ -30,7 +30,7 @@ def body():
 
 def known() -> Tolerances:
     """Return tolerances that hold for these sessions: noise only, and installed plates."""
-    bands = len(EDGES) - 1
+    bands = len(BANDS)
     sizes = {f"plate_offset {c}": 0.3 for c in CHANNELS} | {f"plate_gain {c}": 0.002 for c in CHANNELS[:3]}
     noise = np.tile(np.diag(NOISE**2), (bands, 1, 1))
     spread = np.tile(np.array([[0.7], [0.35], [0.25], [0.2], [0.15]]), (1, 6))
@@ -64,8 +64,8 @@ def noise(rng: np.random.Generator, frames: int) -> np.ndarray:
 
 def looks(seed: int, *, trials: int = 4, hidden=lambda wrench, time, motion: wrench) -> tuple[Look, ...]:
     """Return trials of a person whose parameters differ from the table by its own standard deviations; ``hidden`` changes the wrench."""
-    from biodance.identify.caution import widened
     from biodance.identify.posterior import prior_factor
+    from biodance.uncertainty.caution import widened
 
     rng = np.random.default_rng(1000 + seed)
     prior = widened(body().sip)

@@ -98,9 +98,7 @@ def full_session() -> SessionResult:
     )
     mass = Check("mass on the plates against declared", "walk <1>", "0.3 %", "at most 2 %", True)
     session = Session(Subject(65.0, 1.7, "F", 31.0, "S01"), (result.trial,), Path("/sessions/S01"), notes=("Sex guessed.",))
-    return SessionResult(
-        session, session.subject, None, "Scaled on static.", (), (result,), (mass,), result.standing, still(), {"low-pass": "10 Hz"}
-    )
+    return SessionResult(session, session.subject, None, "Scaled on static.", (), (result,), (mass,), result.standing, still())
 
 
 def refused_session() -> SessionResult:
@@ -109,6 +107,4 @@ def refused_session() -> SessionResult:
     bare = Trial("walk", "fit", None, (), Source(Path("/sessions/S02/walk.c3d"), "cd" * 32, "C3D"), warnings=("No plates.",))
     result = TrialResult(bare, (Step("prepare", "refused", why),))
     session = Session(Subject(float("nan"), float("nan"), "M"), (bare,), Path("/sessions/S02"), {"broken.c3d": "broken.c3d: is empty."})
-    return SessionResult(
-        session, session.subject, None, "No body.", (Step("body", "refused", "No stature."),), (result,), (), None, None, {}
-    )
+    return SessionResult(session, session.subject, None, "No body.", (Step("body", "refused", "No stature."),), (result,), (), None, None)

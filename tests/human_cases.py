@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from biodance.body.body import Body
 from biodance.body.human import human
-from biodance.effects.case import Case
+from biodance.effects import Case
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
 from biodance.motion.track import track

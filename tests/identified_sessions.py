@@ -66,5 +66,5 @@ def session_result(*, load: float = 0.0, roles: tuple[str, ...] = ("fit", "valid
     """Return a session with one trial per role, identified where one is to be fitted."""
     trials = tuple(trial_result(f"{role}_{i}", role, seed + i, load=load) for i, role in enumerate(roles))
     session = Session(SUBJECT, tuple(t.trial for t in trials), Path("/lab/S01"))
-    result = SessionResult(session, SUBJECT, body(), "From stature alone.", (), trials, (), None, None, {"gravity": "9.80665 m/s²"})
+    result = SessionResult(session, SUBJECT, body(), "From stature alone.", (), trials, (), None, None)
     return replace(result, identification=identify_trials(body(), trials, name="S01")) if "fit" in roles else result

@@ -230,7 +230,7 @@ def test_nothing_is_overwritten_and_names_are_listed(tmp_path) -> None:
     path = write_model(WOMAN, tmp_path / "m.urdf", format="urdf")
     with pytest.raises(FileRefused, match="exists already"):
         write_model(WOMAN, path, format="urdf")
-    with pytest.raises(UnknownName, match="biomod, csv, mjcf, osim, urdf"):
+    with pytest.raises(UnknownName, match="biomod, csv, glb, mjcf, osim, urdf"):
         write_model(WOMAN, tmp_path / "m.obj", format="obj")
     assert len(STANDARD) == 10
 

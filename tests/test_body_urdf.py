@@ -125,7 +125,7 @@ def test_what_is_guessed_is_said(tmp_path: Path) -> None:
         ('xyz="0 0 0.08"', 'xyz="0 0"', "three finite numbers"),
         ('<parent link="base"/>', '<parent link="l_ulna"/>', "does not hang on the root"),
         ('<child link="r_clavicle"/>', '<child link="l_clavicle"/>', "2 links have no parent"),
-        ("<box size=\"0.22 0.1 0.02\"/>", '<mesh filename="sole.stl"/>', "the right foot r_pad shows no sole, since its shapes are meshes"),
+        ("<box size=\"0.22 0.1 0.02\"/>", '<mesh filename="sole.stl"/>', "since of its meshes the mesh 'sole.stl' is not where"),
         ("<box size=\"0.22 0.1 0.02\"/>", "<capsule/>", "<capsule>"),
     ],
 )  # fmt: skip

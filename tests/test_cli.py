@@ -31,7 +31,7 @@ def reported(session):
 
 @pytest.fixture
 def no_stills(monkeypatch):
-    monkeypatch.setattr("biodance.report.solid.solid_png", lambda _: None)
+    monkeypatch.setattr("biodance.report.solid.solid_pngs", lambda *_, **__: None)
 
 
 def test_help_names_every_command_and_imports_nothing_heavy():

@@ -11,7 +11,7 @@ from biodance.body.export.csv import read_sip
 from biodance.cli import run
 from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE
 from biodance.lab.mot import read_mot
-from biodance.pipeline.export import legal_formats
+from biodance.pipeline.export import MOTION_FORMATS, legal_formats
 
 
 @pytest.fixture
@@ -53,13 +53,13 @@ def test_nothing_to_identify_is_one_sentence(lab, capsys):
     assert "Traceback" not in sentence
 
 
-@pytest.mark.parametrize("format", [f for f in legal_formats() if f not in ("trc", "mot")])
+@pytest.mark.parametrize("format", [f for f in legal_formats() if f not in MOTION_FORMATS])
 def test_the_identified_body_is_exported_from_session_and_from_results(format, lab, no_page, capsys):
     run(["identify", str(lab / "S01"), "--out", str(lab / "out")])
     files = [lab / f"{name}.{format}" for name in ("S01", "out")]
     for file in files:
         assert run(["export", str(lab / file.stem), "--format", format, "--out", str(file)]) == DONE
-    assert files[0].read_text() == files[1].read_text()
+    assert files[0].read_bytes() == files[1].read_bytes()
     assert "identified from fit_0" in capsys.readouterr().err
     if format == "csv":
         assert np.array_equal(read_sip(files[0]).phi, session_result().identification.identification.sip.phi)
@@ -89,8 +89,16 @@ def test_an_existing_file_is_replaced_only_by_force_and_only_by_a_whole_one(lab,
     out.write_text("old")
     assert run(["export", str(lab / "S01"), "--format", "urdf", "--out", str(out)]) == NOT_DONE
     assert run(["export", str(lab / "S01"), "--format", "obj", "--out", str(out), "--force"]) == NOT_DONE
-    assert "Legal: biomod, csv" in capsys.readouterr().err
+    assert "Legal: biomod, c3d, csv, glb" in capsys.readouterr().err
     assert out.read_text() == "old"
     assert run(["export", str(lab / "S01"), "--format", "urdf", "--out", str(out), "--force"]) == DONE
     assert out.read_text().startswith("<?xml")
     assert [path.name for path in lab.glob(".*")] == []
+
+
+def test_tables_lie_beside_the_page(lab, no_page, capsys):
+    words = ["identify", str(lab / "S01"), "--out", str(lab / "out"), "--tables", str(lab / "tables")]
+    assert run(words) in (DONE, NEEDS_A_PERSON)
+    assert {"segments.csv", "segments.parquet", "wrench.csv", "angles.parquet"} <= {path.name for path in (lab / "tables").iterdir()}
+    assert run([*words[:3], str(lab / "more"), *words[4:]]) == NOT_DONE
+    assert "--force" in capsys.readouterr().err

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from biodance.cli import run
-from biodance.dance.account import account, criterion_of
 from biodance.dance.dance import Dance
-from biodance.dance.protocol import read_plan
+from biodance.dance.metrics import criterion_of, dance_metrics
+from biodance.dance.problem.plan import read_plan
 from biodance.dance.verify import broken, verify
 from biodance.errors import BiodanceError
 from biodance.lab.inspect import inspect_file
@@ -54,7 +54,7 @@ def test_results_json_keeps_its_promise(made: tuple[Path, Path, int]) -> None:
 def test_the_dance_on_disk_keeps_every_limit(made: tuple[Path, Path, int]) -> None:
     folder, protocol, _ = made
     dance = Dance.load(folder / "dance.npz")
-    assert not broken(verify(dancer(Subject(65.0, 1.75, "F"), read_plan(protocol)), dance, read_plan(protocol)))
+    assert not broken(verify(dancer(Subject(65.0, 1.75, "F"), read_plan(protocol)), dance, read_plan(protocol).limits))
 
 
 def test_virtual_markers_are_what_cameras_would_see(made: tuple[Path, Path, int]) -> None:
@@ -137,4 +137,4 @@ def test_the_criterion_of_a_motion_is_that_of_the_dance(made: tuple[Path, Path, 
     folder, protocol, _ = made
     dance = Dance.load(folder / "dance.npz")
     _, dynamic = criterion_of(dance.body, dance.motion(50.0))
-    assert dynamic == pytest.approx(account(dance, read_plan(protocol)).dynamic[-1], rel=2e-3)
+    assert dynamic == pytest.approx(dance_metrics(dance, read_plan(protocol)).dynamic[-1], rel=2e-3)

@@ -8,12 +8,12 @@ import pytest
 
 from biodance.body.human import human
 from biodance.dance import design as design_module
-from biodance.dance import postures
-from biodance.dance import verify as verify_module
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
-from biodance.dance.exchange import alike
-from biodance.dance.plan import Plan
+from biodance.dance.limits.balance import Balance
+from biodance.dance.postures import search
+from biodance.dance.postures.exchange import alike
+from biodance.dance.problem.plan import Plan
 from biodance.dance.rehearsal import bearing, rehearse
 from biodance.dance.verify import broken, verify, verify_with
 from biodance.errors import BiodanceError, FileRefused
@@ -28,7 +28,7 @@ PLAN = Plan("small", "", (("parallel", 2), ("single_left", 2)), hold=1.0)
 def quick():
     with pytest.MonkeyPatch.context() as patch:
         for name, sweeps in (("SWEEPS", ((4, 8),)), ("FRESH", ((8, 8),)), ("POLISH", ((8, 4),))):
-            patch.setattr(postures, name, sweeps)
+            patch.setattr(search, name, sweeps)
         yield
 
 
@@ -52,7 +52,7 @@ def test_the_dance_has_its_postures_its_feet_and_its_time(dance):
 
 
 def test_every_limit_holds(dance):
-    margins = verify(BODY, dance, PLAN)
+    margins = verify(BODY, dance, PLAN.limits)
     told = "balance continuity foot_placement friction ground_clearance joint_range joint_speed joint_torque self_collision"
     assert [m.limit for m in margins] == told.split()
     assert broken(margins) == ()
@@ -60,18 +60,18 @@ def test_every_limit_holds(dance):
 
 def test_two_workers_find_the_same_margins(dance):
     with ThreadPoolExecutor(2) as workers:
-        assert verify_with(workers, BODY, dance, PLAN) == verify(BODY, dance, PLAN)
+        assert verify_with(workers, BODY, dance, PLAN.limits) == verify(BODY, dance, PLAN.limits)
 
 
 def test_a_margin_that_is_no_number_is_never_lost(dance, monkeypatch):
-    judge = verify_module._judge
+    judge, start = Balance.check, dance.phases[3].start
 
-    def spoiled(stretch):
-        for limit, unit, value, what in judge(stretch):
-            yield limit, unit, value * np.nan if limit == "balance" and stretch.phase == 3 else value, what
+    def spoiled(self, motion):
+        left = judge(self, motion)
+        return replace(left, value=left.value * np.nan) if motion.motion.time[0] == start else left
 
-    monkeypatch.setattr(verify_module, "_judge", spoiled)
-    assert {margin.limit for margin in broken(verify(BODY, dance, PLAN))} == {"balance"}
+    monkeypatch.setattr(Balance, "check", spoiled)
+    assert {margin.limit for margin in broken(verify(BODY, dance, PLAN.limits))} == {"balance"}
 
 
 def test_no_posture_comes_twice(dance):
@@ -147,7 +147,7 @@ def moved(stance):
     ],
 )
 def test_what_breaks_a_limit_is_seen(dance, limit, change):
-    assert limit in {m.limit for m in broken(verify(BODY, change(dance), PLAN))}
+    assert limit in {m.limit for m in broken(verify(BODY, change(dance), PLAN.limits))}
 
 
 def test_a_dance_that_fails_the_check_is_not_returned(dance, folder, monkeypatch):

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from biodance.body.human import human
-from biodance.dance.chain import ROOT, Chain
-from biodance.dance.expectation import RATE, SIZES, expected, typical_noise
-from biodance.dance.splines import rest_to_rest
-from biodance.identify.caution import widened
+from biodance.dance.expectation import RATE, expected_spread, typical_noise, typical_sizes
+from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.splines import rest_to_rest
 from biodance.identify.knowledge import segment_quantities
 from biodance.identify.mismatch import mismatch, temper
 from biodance.identify.posterior import posterior
 from biodance.identify.statistics import Fit, statistics
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Motion, Subject
+from biodance.uncertainty.caution import widened
 
 BODY = human(Subject(65.0, 1.75, "F", 33.0))
 CHAIN = Chain(BODY)
@@ -32,7 +32,7 @@ def motion() -> Motion:
 
 
 def test_before_the_dance_stands_the_table_and_more_dance_is_never_worse(motion: Motion) -> None:
-    found = expected(BODY, motion, np.array([2.0, 4.0, 6.0]))
+    found = expected_spread(BODY, motion, np.array([2.0, 4.0, 6.0]))
     prior = widened(BODY.sip)
     np.testing.assert_allclose(found.mass[0], np.sqrt(np.diag(prior.covariance)[::10]), rtol=1e-9)
     assert found.share[0].max() < 1e-12
@@ -49,8 +49,8 @@ def test_the_end_is_what_identification_would_say_of_data_that_agree_with_the_ta
     noise = typical_noise(wrench.cop().mean(axis=0))
     fit = Fit("all", motion, wrench, motion.time < 6.0 - 1e-9)
     data = statistics(BODY, fit, noise).information(noise)
-    belief = posterior(temper(data, mismatch(BODY, (fit,), noise), SIZES), widened(BODY.sip))
-    found = expected(BODY, motion, np.array([6.0]))
+    belief = posterior(temper(data, mismatch(BODY, (fit,), noise), typical_sizes()), widened(BODY.sip))
+    found = expected_spread(BODY, motion, np.array([6.0]))
     for i in range(12):
         cut = slice(10 * i, 10 * i + 10)
         _, slope = segment_quantities(belief.prior.phi[cut])

@@ -8,16 +8,17 @@ import numpy as np
 import pytest
 
 from biodance.body.human import human
-from biodance.dance.chain import ROOT, Chain
 from biodance.dance.dance import Dance
-from biodance.dance.limits import grip
-from biodance.dance.person import fitted, read_person
-from biodance.dance.plan import Plan
-from biodance.dance.postures import ATTEMPTS, KEPT, anyhow, at, solve, start
-from biodance.dance.sequence import sequence, under
-from biodance.dance.shapes import palm
-from biodance.dance.stance import holding, stance
-from biodance.dance.state import State
+from biodance.dance.limits import family
+from biodance.dance.limits.grip import Grip
+from biodance.dance.postures.ordering import support_sequence
+from biodance.dance.postures.posture import ATTEMPTS, KEPT, anyhow, initial_guess, posture_at, solve
+from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.person import fit_to_person, read_person
+from biodance.dance.problem.plan import Plan
+from biodance.dance.problem.shapes import palm
+from biodance.dance.problem.stance import holding, stance, under
+from biodance.dance.problem.state import State
 from biodance.dance.verify import verify
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
@@ -32,7 +33,7 @@ FRAME = holding(stance(BODY, "parallel"), BODY, ("right",))
 def held() -> Array:
     rng = np.random.default_rng(0)
     for _ in range(4 * ATTEMPTS):
-        found = solve(CHAIN, FRAME, start(CHAIN, FRAME, rng), anyhow, iterations=60)
+        found = solve(CHAIN, FRAME, initial_guess(CHAIN, FRAME, rng), anyhow, family(), iterations=60)
         if found.violation <= KEPT:
             return found.x
     raise AssertionError("no posture reaches the grip")
@@ -45,30 +46,30 @@ def test_slopes_are_exact_and_a_free_hand_does_not_count() -> None:
     both = holding(FRAME, BODY, ("right", "left"))
 
     def value(x: Array) -> Array:
-        return grip.margins(State(CHAIN, both, x, *np.zeros((2, *x.shape)))).value
+        return Grip().margins(State(CHAIN, both, x, *np.zeros((2, *x.shape)))).value
 
     turn, step = rng.normal(size=x.shape), 1e-6
-    found = grip.margins(State(CHAIN, both, x, *np.zeros((2, *x.shape))))
+    found = Grip().margins(State(CHAIN, both, x, *np.zeros((2, *x.shape))))
     difference = (value(x + step * turn) - value(x - step * turn)) / (2 * step)
     np.testing.assert_allclose(np.einsum("tkn,tn->tk", found.slopes[0], turn), difference, rtol=1e-6)
     assert found.value.shape == (2, 2)
-    assert grip.margins(State(CHAIN, stance(BODY, "parallel"), x, *np.zeros((2, *x.shape)))).value.shape == (2, 0)
+    assert Grip().margins(State(CHAIN, stance(BODY, "parallel"), x, *np.zeros((2, *x.shape)))).value.shape == (2, 0)
 
 
 def test_a_posture_holds_the_frame_judged_by_other_code() -> None:
     x = held()
     pose = poses(BODY, CHAIN.motion(np.zeros(1), x[None], *np.zeros((2, 1, CHAIN.size))).q)
     segment, local = palm(BODY, "right")
-    assert np.linalg.norm(pose.points([segment], local[None])[0, 0] - FRAME.hands[0]) < grip.LOOSE
+    assert np.linalg.norm(pose.points([segment], local[None])[0, 0] - FRAME.hands[0]) < Grip().loose
     assert np.isnan(FRAME.hands[1]).all()
 
 
 def test_verification_sees_a_hand_that_lets_go() -> None:
     x = np.array([held(), held()])
-    away = at(CHAIN, FRAME, np.where(np.arange(CHAIN.size) == ROOT + BODY.joint_index("right_shoulder_flexion"), 1.5, x[1])).x
+    away = posture_at(CHAIN, FRAME, np.where(np.arange(CHAIN.size) == ROOT + BODY.joint_index("right_shoulder_flexion"), 1.5, x[1])).x
     for rows, kept in ((x, True), (np.array([x[0], away]), False)):
         dance = Dance("t", BODY, rows, (FRAME, FRAME), np.ones(2), rows[None, [0, 1]], np.array([2.0]), (under(FRAME, FRAME),), 0)
-        margin = next(m for m in verify(BODY, dance, Plan("t", "", (("parallel", 2),))) if m.limit == "grip")
+        margin = next(m for m in verify(BODY, dance, family()) if m.limit == "grip")
         assert (margin.worst >= 0) == kept
         assert margin.what == "right_hand"
 
@@ -77,10 +78,10 @@ def test_a_persons_file_puts_the_hand_on_the_frame_in_every_stance(tmp_path: Pat
     path = tmp_path / "person.toml"
     path.write_text('hold_frame = ["right"]\nstand_alone_on = ["left"]\n')
     plan = Plan("p", "", (("parallel", 2), ("single_right", 2), ("single_left", 1)))
-    body, plan, _ = fitted(BODY, plan, read_person(path))
-    feet = sequence(body, plan)
+    body, plan, _ = fit_to_person(BODY, plan, read_person(path))
+    feet = support_sequence(body, plan)
     assert all(np.isfinite(one.hands[0]).all() and np.isnan(one.hands[1]).all() for one in feet)
-    assert not any(np.isfinite(one.hands).any() for one in sequence(body, replace(plan, holds=())))
+    assert not any(np.isfinite(one.hands).any() for one in support_sequence(body, replace(plan, holds=())))
     path.write_text('hold_frame = ["both"]\n')
     with pytest.raises(BiodanceError, match="list of hands"):
         read_person(path)

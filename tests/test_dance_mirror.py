@@ -6,30 +6,31 @@ import numpy as np
 import pytest
 
 from biodance.body.human import human
-from biodance.dance.chain import ROOT, Chain
-from biodance.dance.mirror import image_feet, mirrored, mirrored_vectors, symmetric
-from biodance.dance.person import PersonLimits, limited
-from biodance.dance.plan import Plan
-from biodance.dance.postures import anyhow, solve, start
-from biodance.dance.sequence import sequence
-from biodance.dance.stance import holding
+from biodance.dance.limits import family
+from biodance.dance.postures.exchange import image_feet, mirror_posture, mirror_vectors, symmetric
+from biodance.dance.postures.ordering import support_sequence
+from biodance.dance.postures.posture import anyhow, initial_guess, solve
+from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.person import PersonLimits, limit_body
+from biodance.dance.problem.plan import Plan
+from biodance.dance.problem.stance import holding
 from biodance.records import Subject
 
 BODY = human(Subject(65.0, 1.75, "F", 33.0))
 CHAIN = Chain(BODY)
 BLOCKS = ("parallel", "right_forward", "single_right", "single_left")
-FEET = tuple(s for s in sequence(BODY, Plan("all", "", tuple((name, 1) for name in BLOCKS))) if s.over is None)
+FEET = tuple(s for s in support_sequence(BODY, Plan("all", "", tuple((name, 1) for name in BLOCKS))) if s.over is None)
 
 
 @pytest.mark.parametrize("place", [0, 2, 3])
 def test_an_image_keeps_every_limit_as_well_as_its_posture(place):
     here, there = FEET[place], FEET[image_feet(FEET[place], FEET)]
-    posture = solve(CHAIN, here, start(CHAIN, here, np.random.default_rng(place)), anyhow, iterations=8)
-    image = solve(CHAIN, there, mirrored(CHAIN, posture.x, here, there), anyhow, iterations=0)
+    posture = solve(CHAIN, here, initial_guess(CHAIN, here, np.random.default_rng(place)), anyhow, family(), iterations=8)
+    image = solve(CHAIN, there, mirror_posture(CHAIN, posture.x, here, there), anyhow, family(), iterations=0)
     assert image.violation == pytest.approx(posture.violation, abs=1e-9)
-    np.testing.assert_allclose(image.up, mirrored_vectors(BODY, posture.up), atol=1e-12)
+    np.testing.assert_allclose(image.up, mirror_vectors(BODY, posture.up), atol=1e-12)
     assert np.abs(image.x[ROOT:] - posture.x[ROOT:]).max() > 0.1
-    np.testing.assert_allclose(mirrored(CHAIN, image.x, there, here), posture.x, atol=1e-12)
+    np.testing.assert_allclose(mirror_posture(CHAIN, image.x, there, here), posture.x, atol=1e-12)
 
 
 def test_images_stand_on_their_own_feet():
@@ -46,4 +47,4 @@ def test_images_stand_on_their_own_feet():
 )
 def test_whoever_differs_from_side_to_side_has_no_images(person):
     assert symmetric(BODY)
-    assert not symmetric(replace(BODY, limits=limited(BODY, person)))
+    assert not symmetric(replace(BODY, limits=limit_body(BODY, person)))

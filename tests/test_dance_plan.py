@@ -8,9 +8,8 @@ import pytest
 
 from biodance import library
 from biodance.body.human import human
-from biodance.dance.person import HEALTHY, PersonLimits, fitted, joints, limited, read_person
-from biodance.dance.plan import Plan
-from biodance.dance.protocol import read_plan
+from biodance.dance.problem.person import HEALTHY, PersonLimits, fit_to_person, joints, limit_body, read_person
+from biodance.dance.problem.plan import Plan, read_plan
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import Subject
 
@@ -93,7 +92,7 @@ def test_a_person_only_takes_away(tmp_path: Path) -> None:
         "[range_share]\nleft = 0.5\n[strength]\nall = 0.8\nleft_knee = 0.5\n",
     )
     person = read_person(path)
-    own, usual = limited(BODY, person), BODY.limits
+    own, usual = limit_body(BODY, person), BODY.limits
     assert (own.lower >= usual.lower).all()
     assert (own.upper <= usual.upper).all()
     np.testing.assert_allclose(own.velocity, np.radians(90.0))
@@ -107,7 +106,7 @@ def test_a_person_only_takes_away(tmp_path: Path) -> None:
 
 
 def test_a_healthy_person_changes_nothing() -> None:
-    body, plan, notes = fitted(BODY, read_plan("full"), HEALTHY)
+    body, plan, notes = fit_to_person(BODY, read_plan("full"), HEALTHY)
     for name in ("lower", "upper", "velocity", "torque_lower", "torque_upper"):
         np.testing.assert_array_equal(getattr(body.limits, name), getattr(BODY.limits, name))
     assert plan.count == 60
@@ -115,7 +114,7 @@ def test_a_healthy_person_changes_nothing() -> None:
 
 
 def test_legs_that_may_not_carry_alone_leave_the_plan() -> None:
-    _, plan, notes = fitted(BODY, read_plan("full"), PersonLimits(stand_alone_on=("right",)))
+    _, plan, notes = fit_to_person(BODY, read_plan("full"), PersonLimits(stand_alone_on=("right",)))
     assert [name for name, _ in plan.blocks] == ["parallel", "right_forward", "single_right"]
     assert "single left" in notes[0]
 
@@ -123,11 +122,11 @@ def test_legs_that_may_not_carry_alone_leave_the_plan() -> None:
 def test_what_cannot_be_danced_is_refused_with_the_constraint() -> None:
     only = Plan("left", "", (("single_left", 4),))
     with pytest.raises(BiodanceError, match="neither leg"):
-        fitted(BODY, only, PersonLimits(stand_alone_on=()))
+        fit_to_person(BODY, only, PersonLimits(stand_alone_on=()))
     with pytest.raises(BiodanceError, match="must sit"):
-        fitted(BODY, read_plan("full"), PersonLimits(seated=True))
+        fit_to_person(BODY, read_plan("full"), PersonLimits(seated=True))
     with pytest.raises(BiodanceError, match="right_knee_flexion from 150 to 160 degrees"):
-        limited(BODY, PersonLimits(ranges=(("right_knee", np.radians(150.0), np.radians(160.0)),)))
+        limit_body(BODY, PersonLimits(ranges=(("right_knee", np.radians(150.0), np.radians(160.0)),)))
 
 
 @pytest.mark.parametrize(

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from random_bodies import random_body
 
 from biodance.body.body import Body
 from biodance.body.human import human
-from biodance.body.planar import planar_chain
-from biodance.dance.playback import Playback, floor_model, play
-from biodance.dance.splines import rest_to_rest
+from biodance.dance.problem.splines import rest_to_rest
+from biodance.dance.rehearsal import Playback, floor_model, play
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
 from biodance.records import Motion, Subject
@@ -63,6 +63,6 @@ def test_lifting_a_foot_without_shifting_the_weight_falls() -> None:
 
 
 def test_a_body_without_feet_is_refused() -> None:
-    body = planar_chain()
+    body = random_body(np.random.default_rng(0), n_segments=2, root="fixed")
     with pytest.raises(BiodanceError, match="right and a left foot"):
-        play(body, Motion(np.arange(2.0), *np.zeros((3, 2, 3))))
+        play(body, Motion(np.arange(2.0), *np.zeros((3, 2, len(body.joints)))))

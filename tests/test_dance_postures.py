@@ -7,18 +7,19 @@ import numpy as np
 import pytest
 
 from biodance.body.human import human
-from biodance.dance import postures
-from biodance.dance.chain import Chain
-from biodance.dance.exchange import Posture, exchange, extremes
-from biodance.dance.excitation import blocks, condition, smooth_condition
-from biodance.dance.postures import KEPT, anyhow, at, solve, start
-from biodance.dance.stance import seat, stance
+from biodance.dance.limits import family
+from biodance.dance.postures import search
+from biodance.dance.postures.exchange import exchange, extremes
+from biodance.dance.postures.posture import KEPT, Posture, anyhow, initial_guess, posture_at, solve
+from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.excitation import condition, excitation_blocks, smooth_condition
+from biodance.dance.problem.stance import seat, stance
 from biodance.errors import BiodanceError
 from biodance.records import Subject
 
 BODY = human(Subject(65.0, 1.75, "F", 33.0))
 CHAIN = Chain(BODY)
-BLOCKS = blocks(BODY)
+BLOCKS = excitation_blocks(BODY)
 FEET = stance(BODY, "parallel")
 
 
@@ -76,32 +77,32 @@ def criterion(postures):
 
 def test_a_search_lowers_the_criterion_and_the_same_seed_gives_the_same_postures(monkeypatch):
     for name, sweeps in (("SWEEPS", ((4, 8),)), ("FRESH", ((8, 8),)), ("POLISH", ((8, 4),))):
-        monkeypatch.setattr(postures, name, sweeps)
+        monkeypatch.setattr(search, name, sweeps)
     stances = (FEET, FEET.on(0), FEET.on(1))
     with ThreadPoolExecutor(1) as workers:
-        found = postures.find_postures(CHAIN, BLOCKS, stances, seed=3, workers=workers)
-        twice = postures.find_postures(CHAIN, BLOCKS, stances, seed=3, workers=workers)
+        found = search.find_postures(CHAIN, BLOCKS, stances, family(), seed=3, workers=workers)
+        twice = search.find_postures(CHAIN, BLOCKS, stances, family(), seed=3, workers=workers)
     np.testing.assert_array_equal(found.x, twice.x)
     rng = np.random.default_rng(0)
-    anywhere = [at(CHAIN, s, start(CHAIN, s, rng)) for s in stances]
+    anywhere = [posture_at(CHAIN, s, initial_guess(CHAIN, s, rng)) for s in stances]
     assert found.bound == pytest.approx(65.0, abs=1e-6)
     assert found.bound < found.criterion < 0.7 * criterion(anywhere)
-    assert found.criterion == pytest.approx(criterion([at(CHAIN, s, x) for s, x in zip(stances, found.x, strict=True)]), rel=1e-3)
+    assert found.criterion == pytest.approx(criterion([posture_at(CHAIN, s, x) for s, x in zip(stances, found.x, strict=True)]), rel=1e-3)
 
 
 def test_a_seated_person_keeps_the_pelvis_still_and_the_knees_up():
     stool = seat(BODY)
-    found = solve(CHAIN, stool, start(CHAIN, stool, np.random.default_rng(0)), anyhow, iterations=30)
+    found = solve(CHAIN, stool, initial_guess(CHAIN, stool, np.random.default_rng(0)), anyhow, family(), iterations=30)
     assert found.violation <= KEPT
     np.testing.assert_allclose(found.x[:6], [0, 0, stool.seat, 0, 0, 0], atol=1e-12)
 
 
 def test_a_person_too_weak_to_stand_is_refused_by_the_name_of_the_limit(monkeypatch):
-    monkeypatch.setattr(postures, "ATTEMPTS", 2)
+    monkeypatch.setattr(search, "ATTEMPTS", 2)
     limits = BODY.limits
     weak = replace(BODY, limits=replace(limits, torque_lower=0.02 * limits.torque_lower, torque_upper=0.02 * limits.torque_upper))
     with ThreadPoolExecutor(1) as workers, pytest.raises(BiodanceError, match="joint torque"):
-        postures.find_postures(Chain(weak), BLOCKS, (FEET,), seed=0, workers=workers)
+        search.find_postures(Chain(weak), BLOCKS, (FEET,), family(), seed=0, workers=workers)
 
 
 def test_extreme_eigenvalues_in_closed_form():

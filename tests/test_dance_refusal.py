@@ -8,10 +8,11 @@ import pytest
 from biodance.body.body import Body
 from biodance.body.human import human
 from biodance.body.limits import joint_limits
-from biodance.dance.chain import Chain
-from biodance.dance.person import HEALTHY, PersonLimits, limited
-from biodance.dance.postures import KEPT, anyhow, refuse, solve, start
-from biodance.dance.stance import Stance, stance
+from biodance.dance.limits import family
+from biodance.dance.postures.posture import KEPT, anyhow, initial_guess, refuse, solve
+from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.person import HEALTHY, PersonLimits, limit_body
+from biodance.dance.problem.stance import Stance, stance
 from biodance.errors import BiodanceError
 from biodance.records import Subject
 
@@ -21,17 +22,17 @@ FEET = stance(BODY, "parallel")
 
 
 def limits_of(person: PersonLimits) -> Body:
-    return replace(BODY, limits=limited(BODY, person))
+    return replace(BODY, limits=limit_body(BODY, person))
 
 
 def words(person: PersonLimits, feet: Stance) -> str:
     """Return why there is no posture; nothing if there is one."""
     chain, rng = Chain(limits_of(person)), np.random.default_rng(1)
-    begin = [start(chain, feet, rng) for _ in range(4)]
-    if any(solve(chain, feet, x, anyhow, iterations=40).violation <= KEPT for x in begin):
+    begin = [initial_guess(chain, feet, rng) for _ in range(4)]
+    if any(solve(chain, feet, x, anyhow, family(), iterations=40).violation <= KEPT for x in begin):
         return ""
     with pytest.raises(BiodanceError) as said:
-        refuse(chain, feet, begin)
+        refuse(chain, feet, begin, family())
     return str(said.value)
 
 

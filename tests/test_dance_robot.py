@@ -14,18 +14,18 @@ from biodance.body.human import human
 from biodance.body.standing_frames import standing_frames
 from biodance.body.urdf import read_urdf
 from biodance.cli import run
-from biodance.dance.chain import Chain
 from biodance.dance.dance import Dance
-from biodance.dance.excitation import blocks, dynamic_grams
-from biodance.dance.person import HEALTHY, fitted
-from biodance.dance.postures import anyhow
-from biodance.dance.programme import Closure, closed
-from biodance.dance.protocol import read_plan
-from biodance.dance.robot import leg_length, person_sized, robot_plan
-from biodance.dance.robot_expectation import ERROR, RATE, robot_rows
-from biodance.dance.shapes import capsule_pairs, pairs_of, unchecked_pairs
-from biodance.dance.stance import WIDTH, apart, hip_width, stance, stature_of
-from biodance.dance.transitions import Task, judged
+from biodance.dance.limits import family
+from biodance.dance.postures.posture import anyhow
+from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.excitation import dynamic_grams, excitation_blocks
+from biodance.dance.problem.person import HEALTHY, fit_to_person
+from biodance.dance.problem.plan import read_plan
+from biodance.dance.problem.shapes import capsule_pairs, pairs_of, unchecked_pairs
+from biodance.dance.problem.stance import WIDTH, apart, hip_width, stance, stature_of
+from biodance.dance.problem.state import Closure, close_legs
+from biodance.dance.robot import ERROR, RATE, leg_length, person_sized, robot_plan, robot_rows
+from biodance.dance.transitions.move import Task, evaluate_move
 from biodance.dance.verify import broken, verify
 from biodance.errors import BiodanceError
 from biodance.identify.base_parameters import estimate_base, structural_base
@@ -56,7 +56,7 @@ def test_planted_feet_stay_and_slopes_are_exact() -> None:
     x[0, 3:6] = [0.1, -0.05, 0.1]
     x[0, 18:] = rng.uniform(HOAP.limits.lower, HOAP.limits.upper)[12:]
     v, a = rng.normal(size=(2, 1, chain.size))
-    state = closed(chain, feet, x, v, a)
+    state = close_legs(chain, feet, x, v, a)
     legs = [c for side in feet.planted for c in chain.leg_columns[side]]
     free = [c for c in range(chain.size) if c not in legs]
     closure, step, no_time = Closure(state), 1e-6, np.zeros(len(legs), dtype=int)
@@ -67,11 +67,11 @@ def test_planted_feet_stay_and_slopes_are_exact() -> None:
         for sign in (1, -1):
             moved = x.copy()
             moved[0, c] += sign * step
-            shifted.append(closed(chain, feet, moved, v, a))
+            shifted.append(close_legs(chain, feet, moved, v, a))
         for k, name in enumerate(("x", "v", "a")):
             difference = (getattr(shifted[0], name) - getattr(shifted[1], name))[0] / (2 * step)
             np.testing.assert_allclose(slopes[k][:, c], difference[legs], rtol=0, atol=2e-5 * max(1.0, float(np.abs(difference).max())))
-    rest = Closure(closed(chain, feet, x, np.zeros_like(v), np.zeros_like(a)))
+    rest = Closure(close_legs(chain, feet, x, np.zeros_like(v), np.zeros_like(a)))
     np.testing.assert_allclose(rest.followed(picks, no_time), slopes[0], atol=1e-12)
     assert not rest.turned(picks, "ax", no_time).any()
     assert len(free) == 15
@@ -101,12 +101,12 @@ def test_a_slow_move_is_judged_at_fewer_instants_and_tells_as_much() -> None:
     chain, rng = Chain(HOAP), np.random.default_rng(1)
     ends = np.tile([0.05, 0.0, 0.25, *np.zeros(24)], (2, 1))
     ends[:, 18:] = rng.uniform(0.3, 0.7, (2, 9)) * (HOAP.limits.upper - HOAP.limits.lower)[12:] + HOAP.limits.lower[12:]
-    slow = Task(chain, blocks(HOAP), stance(HOAP, "parallel"), ends, 9.5)
+    slow = Task(chain, excitation_blocks(HOAP), stance(HOAP, "parallel"), ends, 9.5, family())
     assert len(slow.grid(10.0)) == len(replace(slow, duration=4.0).grid(10.0)) == 39
     assert len(replace(slow, duration=2.8).grid(10.0)) == 27
-    move, _ = judged(slow, slow.straight())
+    move, _ = evaluate_move(slow, slow.straight())
     time = np.linspace(0.0, 9.5, 2001)[1:-1]
-    fine = slow.programme(slow.straight(), [], time, reserve=0.0, objective=anyhow).state(np.empty(0))
+    fine = slow.problem(slow.straight(), [], time, reserve=0.0, objective=anyhow).state(np.empty(0))
     np.testing.assert_allclose(move.gram, dynamic_grams(fine, list(range(12))) * 9.5 / 2000, rtol=0, atol=1e-4 * np.abs(move.gram).max())
 
 
@@ -166,11 +166,11 @@ def test_a_robot_dances_from_its_file(made: tuple[Path, int]) -> None:
 def test_the_dance_keeps_the_limits_of_the_file(made: tuple[Path, int]) -> None:
     place, _ = made
     dance, body = Dance.load(place / "out" / "dance.npz"), robot_dancer(place / "hoap3.urdf", "right_foot,left_foot")
-    _, plan, _ = fitted(body, robot_plan(body, read_plan(place / "tiny.toml")), HEALTHY)
-    assert not broken(verify(body, dance, plan))
+    _, plan, _ = fit_to_person(body, robot_plan(body, read_plan(place / "tiny.toml")), HEALTHY)
+    assert not broken(verify(body, dance, plan.limits))
     assert np.all(dance.move >= 5.0)
     weak = replace(body, limits=replace(body.limits, torque_upper=0.01 * body.limits.torque_upper))
-    assert {margin.limit for margin in broken(verify(weak, dance, plan))} == {"joint_torque"}
+    assert {margin.limit for margin in broken(verify(weak, dance, plan.limits))} == {"joint_torque"}
 
 
 def test_the_table_of_angles_is_the_dance(made: tuple[Path, int]) -> None:

@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 
 from biodance.body.human import human
-from biodance.dance.chain import ROOT, Chain
-from biodance.dance.excitation import blocks, static_grams
-from biodance.dance.postures import KEPT, Exciting, Posture, at, exchange, solve, start
-from biodance.dance.simplicity import hardness
-from biodance.dance.stance import stance
-from biodance.dance.state import State
+from biodance.dance.limits import family
+from biodance.dance.postures.exchange import exchange
+from biodance.dance.postures.posture import KEPT, Exciting, Posture, initial_guess, posture_at, solve
+from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.excitation import effort, excitation_blocks, static_grams
+from biodance.dance.problem.stance import stance
+from biodance.dance.problem.state import State
 from biodance.records import Array, Subject
 
 BODY = human(Subject(65.0, 1.75, "F"))
@@ -19,7 +20,7 @@ FEET = stance(BODY, "parallel")
 
 
 def hard(x: Array, feet=FEET) -> float:
-    return hardness(State(CHAIN, feet, x, *np.zeros((2, *x.shape))))[0]
+    return effort(State(CHAIN, feet, x, *np.zeros((2, *x.shape))))[0]
 
 
 def posed(**angles: float) -> Array:
@@ -34,7 +35,7 @@ def test_slopes_are_exact() -> None:
     x = np.zeros((3, CHAIN.size))
     x[:, ROOT:] = rng.uniform(BODY.limits.lower, BODY.limits.upper, (3, 23))
     for feet in (FEET, FEET.on(0)):
-        _, slopes = hardness(State(CHAIN, feet, x, *np.zeros((2, *x.shape))))
+        _, slopes = effort(State(CHAIN, feet, x, *np.zeros((2, *x.shape))))
         turn = rng.normal(size=x.shape)
         step = 1e-6
         difference = (hard(x + step * turn, feet) - hard(x - step * turn, feet)) / (2 * step)
@@ -60,12 +61,12 @@ def test_planted_legs_are_not_counted_and_the_free_one_is() -> None:
 
 
 def test_who_asks_for_simple_postures_gets_simpler_ones() -> None:
-    plain = blocks(BODY)
-    others = static_grams(np.array([at(CHAIN, FEET, begun(seed)).up for seed in range(3)]))
+    plain = excitation_blocks(BODY)
+    others = static_grams(np.array([posture_at(CHAIN, FEET, begun(seed)).up for seed in range(3)]))
     found = {}
     for simplicity in (0.0, 2.0):
         objective = Exciting(replace(plain, simplicity=simplicity), others, 0.1 * 65.0 / 4, 8)
-        found[simplicity] = [solve(CHAIN, FEET, begun(seed), objective, iterations=30) for seed in (4, 5)]
+        found[simplicity] = [solve(CHAIN, FEET, begun(seed), objective, family(), iterations=30) for seed in (4, 5)]
     for usual, simple in zip(found[0.0], found[2.0], strict=True):
         assert usual.violation <= KEPT
         assert simple.violation <= KEPT
@@ -76,9 +77,9 @@ def test_of_two_postures_that_tell_the_same_the_simpler_is_taken() -> None:
     up = np.tile([0.0, 1.0, 0.0], (12, 1))
     hard, easy = (Posture(np.full(1, k), up, hard=k) for k in (0.9, 0.1))
     for simplicity, kept in ((0.0, 0.9), (1.0, 0.1)):
-        chosen = exchange(replace(blocks(BODY), simplicity=simplicity), (FEET,), [[hard, easy]])
+        chosen = exchange(replace(excitation_blocks(BODY), simplicity=simplicity), (FEET,), [[hard, easy]])
         assert chosen[0].hard == kept
 
 
 def begun(seed: int) -> Array:
-    return start(CHAIN, FEET, np.random.default_rng(seed))
+    return initial_guess(CHAIN, FEET, np.random.default_rng(seed))

@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 
 from biodance.body.human import human
-from biodance.dance.chain import Chain
 from biodance.dance.limits import self_collision
-from biodance.dance.limits.self_collision import deepest, outside
-from biodance.dance.postures import start
-from biodance.dance.programme import closed
-from biodance.dance.solid_distance import ENOUGH, distances
-from biodance.dance.stance import stance
+from biodance.dance.limits.self_collision import ENOUGH, deepest, outside, solid_distances
+from biodance.dance.postures.posture import initial_guess
+from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.stance import stance
+from biodance.dance.problem.state import close_legs
 from biodance.motion.kinematics import poses
 from biodance.records import Subject
 
@@ -20,11 +19,11 @@ CHAIN = Chain(BODY)
 
 def test_two_codes_find_the_same_distances():
     rng, feet = np.random.default_rng(0), stance(BODY, "parallel").on(0)
-    x = np.array([start(CHAIN, feet, rng) for _ in range(60)])
-    state = closed(CHAIN, feet, x, *np.zeros((2, *x.shape)))
-    expected = self_collision.margins(state).value
+    x = np.array([initial_guess(CHAIN, feet, rng) for _ in range(60)])
+    state = close_legs(CHAIN, feet, x, *np.zeros((2, *x.shape)))
+    expected = self_collision.SelfCollision().margins(state).value
     motion = CHAIN.motion(np.arange(60.0), state.x, state.v, state.a)
-    found, names = distances(BODY, poses(BODY, motion.q))
+    found, names = solid_distances(BODY, poses(BODY, motion.q))
     assert len(set(names)) == found.shape[1] == expected.shape[1]
     apart = (found < ENOUGH) & (expected > 0)
     assert apart.sum() > 50

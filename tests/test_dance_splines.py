@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from biodance.dance.splines import basis_at, rest_to_rest
+from biodance.dance.problem.splines import basis_at, rest_to_rest
 from biodance.errors import BiodanceError
 
 

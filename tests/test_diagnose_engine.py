@@ -1,15 +1,15 @@
 """The engine on sessions whose only fault is known: it names it, sizes it, stays silent without one, and says unexplained when it must."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from diagnosed_sessions import about_plate, body, known, looks
 from scipy.interpolate import make_interp_spline
 
-from biodance.diagnose.accept import accept, fit_of, gain, judged
+from biodance.diagnose.accept import accept, fit_of, gain_by_naming, judged
 from biodance.diagnose.engine import diagnose
-from biodance.effects.case import Case
+from biodance.effects import Case, Effect, Parameter
 from biodance.errors import BiodanceError, TrialRefused, UnknownName
 from biodance.identify.identification import standing_point
 from biodance.motion.kinematics import poses
@@ -19,7 +19,7 @@ FAST = ("plate_gain", "plate_offset", "plate_position", "plate_rotation", "time_
 
 
 def found(hidden, *, seed: int = 1, chosen=FAST):
-    return diagnose(body(), looks(seed, hidden=hidden), tolerances=known(), chosen=chosen)
+    return diagnose(body(), looks(seed, hidden=hidden), tolerances=known(), effects=chosen)
 
 
 def gained(local, session):
@@ -34,6 +34,33 @@ def offset(local, session):
 
 def late(wrench, session, moving):
     return make_interp_spline(moving.time, wrench, k=5)(np.clip(moving.time - 0.02, 0, None))
+
+
+@dataclass(frozen=True)
+class Cable(Effect):
+    """A cable pulls sideways in the beat of ``beat`` Hz, one metre over the lab's origin; an effect as a user writes it."""
+
+    beat: float = 1.0
+    name = "cable"
+    parameters = (Parameter("pull", "N", 5.0, "a spring balance"),)
+
+    def columns(self, case):
+        force = np.sin(2 * np.pi * self.beat * case.motion.time)
+        zero = np.zeros_like(force)
+        return np.stack([zero, force, zero, -force, zero, zero], axis=1)[:, :, None]
+
+
+@pytest.mark.parametrize("effects", [[Cable(beat=1.3), *FAST], [Cable(beat=1.3)]])
+def test_a_users_own_effect_is_found_beside_the_family(effects) -> None:
+    def pulled(wrench, session, moving):
+        pull = np.outer(8.0 * np.sin(2 * np.pi * 1.3 * moving.time), [0.0, 1.0, 0.0])
+        return wrench + np.concatenate([pull, np.cross([0.0, 0.0, 1.0], pull)], axis=1)
+
+    diagnosis = found(pulled, chosen=effects).diagnosis
+    (finding,) = diagnosis.findings
+    assert (finding.effect, finding.target) == ("cable", "")
+    assert finding.parameters[0].value == pytest.approx(8.0, rel=0.1)
+    assert ("plate_gain", "Fz") in {(one.effect, one.target) for one in diagnosis.candidates}
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -129,7 +156,7 @@ def test_a_hand_that_comes_and_goes_is_named_with_its_force() -> None:
 
 def test_accepting_a_fault_gains_on_trials_that_were_not_used() -> None:
     looked_at = looks(1, trials=6, hidden=about_plate(gained))
-    examined = diagnose(body(), looked_at[:4], tolerances=known(), chosen=FAST)
+    examined = diagnose(body(), looked_at[:4], tolerances=known(), effects=FAST)
     kept = looked_at[4:]
     cases = [
         Case(body(), look.trial, look.motion, body().sip.phi, np.linspace(look.start, look.end, look.motion.time.size)) for look in kept
@@ -139,7 +166,7 @@ def test_accepting_a_fault_gains_on_trials_that_were_not_used() -> None:
     about = standing_point(as_is)
     before = judged(identified(examined.naming.first.phi), as_is, about)
     after = judged(identified(examined.naming.found.phi), mended, about)
-    measured = gain(before, after, fitted=(before, after))
+    measured = gain_by_naming(before, after, fitted=(before, after))
     assert measured.proven
     assert measured.rms_after[2] < 0.6 * measured.rms_before[2]
     assert measured.score > 2 * measured.score_se > 0
@@ -159,7 +186,7 @@ def test_a_gain_needs_three_blocks() -> None:
     fit = fit_of(Case(body(), look.trial, look.motion, body().sip.phi, np.linspace(0, 1, look.motion.time.size)), use)
     one = judged(body(), (fit,), np.zeros(3))
     with pytest.raises(BiodanceError, match="needs 3"):
-        gain(one, one, fitted=(one, one))
+        gain_by_naming(one, one, fitted=(one, one))
 
 
 def test_too_short_trials_are_refused() -> None:
@@ -171,7 +198,7 @@ def test_too_short_trials_are_refused() -> None:
 
 def test_a_cause_that_is_not_in_the_family_is_refused() -> None:
     with pytest.raises(UnknownName, match="plate_gain"):
-        diagnose(body(), looks(1, trials=1), tolerances=known(), chosen=("plate_gian",))
+        diagnose(body(), looks(1, trials=1), tolerances=known(), effects=("plate_gian",))
 
 
 def test_limits_come_without_the_forces() -> None:

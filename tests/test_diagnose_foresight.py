@@ -1,15 +1,16 @@
 """What a movement will be able to see, before any force is measured."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from diagnosed_sessions import body, known, motion
 from random_bodies import random_body, random_motion
 
-from biodance.dance.target import target
 from biodance.diagnose.foresight import foresee, planned, session_of
 from biodance.diagnose.separation import evaluate
-from biodance.identify.base_parameters import structural_base
 from biodance.identify.information import fold
+from biodance.identify.posterior import prior_factor
 from biodance.motion.regressor import regressor
 
 CHOSEN = ("plate_gain", "plate_offset", "body_mass", "time_delay", "added_mass")
@@ -17,13 +18,13 @@ CHOSEN = ("plate_gain", "plate_offset", "body_mass", "time_delay", "added_mass")
 
 def test_a_planned_movement_says_what_it_will_see() -> None:
     moves = tuple(motion(s) for s in (1, 2, 3))
-    found = foresee(body(), moves, tolerances=known(), chosen=CHOSEN)
+    found = foresee(body(), moves, tolerances=known(), effects=CHOSEN)
     limit = {(row.effect, row.target): row.limit for row in found.limits}
     assert 0 < limit["plate_gain", "Fz"] < 0.05
     assert limit["added_mass", "left_forearm_hand"] < limit["added_mass", "pelvis"]
     assert found.confusions[0].difference == found.separation
     assert {"body_mass", "added_mass"} >= {found.confusions[0].cause[0]} | {found.confusions[0].other[0]}
-    more = foresee(body(), (*moves, *(motion(s) for s in (4, 5, 6))), tolerances=known(), chosen=CHOSEN)
+    more = foresee(body(), (*moves, *(motion(s) for s in (4, 5, 6))), tolerances=known(), effects=CHOSEN)
     later = {(row.effect, row.target): row.limit for row in more.limits}
     assert later["plate_gain", "Fz"] < limit["plate_gain", "Fz"]
 
@@ -31,7 +32,7 @@ def test_a_planned_movement_says_what_it_will_see() -> None:
 def test_standing_still_sees_no_delay() -> None:
     still = motion(1)
     frozen = type(still)(still.time, np.tile(still.q[0], (still.time.size, 1)), 0 * still.v, 0 * still.a)
-    found = foresee(body(), (frozen,), tolerances=known(), chosen=("plate_gain", "plate_offset"))
+    found = foresee(body(), (frozen,), tolerances=known(), effects=("plate_gain", "plate_offset"))
     assert {row.effect for row in found.hidden} >= {"plate_gain"}
 
 
@@ -49,7 +50,7 @@ def test_a_long_movement_is_cut_into_trials() -> None:
 
 def test_the_gradient_of_the_separation_agrees_with_differences() -> None:
     one = random_body(np.random.default_rng(0), n_segments=3)
-    aim = target(one, structural_base(one))
+    aim = SimpleNamespace(prior_factor=prior_factor(one.sip))
     R = fold(regressor(one, random_motion(one, np.random.default_rng(1), frames=40)).reshape(-1, 30))
     value, gradient = evaluate(R, aim)
     rng = np.random.default_rng(2)

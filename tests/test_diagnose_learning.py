@@ -5,7 +5,7 @@ import pytest
 
 from biodance.diagnose.learning import Null, learn
 from biodance.diagnose.model import shown_left_out
-from biodance.diagnose.tolerances import Tolerances, mean_key, shipped
+from biodance.uncertainty.tolerances import Tolerances, mean_key, shipped
 
 BANDS = len(shipped().noise)
 BAND = np.repeat(np.arange(BANDS), 12)

@@ -4,24 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import body, known, looks, motion
+from diagnosed_sessions import body, known, looks
 from scipy.stats import multivariate_normal
 
 from biodance.body.body import JointError
 from biodance.diagnose.candidates import Candidate, candidates, changes, removed, slopes
 from biodance.diagnose.evidence import believe, evidence, smallest
-from biodance.diagnose.kinematic_errors import kinematic_errors
 from biodance.diagnose.learning import Null, learn
 from biodance.diagnose.model import model
 from biodance.diagnose.naming import screen
 from biodance.diagnose.observability import Visibility, limits, placed, placing_leaves, visibility
 from biodance.diagnose.problem import problem
-from biodance.diagnose.tolerances import Tolerances, key_of, read_tolerances, shipped, to_toml
 from biodance.effects import effect
-from biodance.identify.twins import Twins, central_inertia, disturbance
-from biodance.motion.kinematics import poses, segment_motion
-from biodance.motion.marker_jacobian import jacobian, skew
-from biodance.motion.regressor import GRAVITY
+from biodance.uncertainty.tolerances import Tolerances, key_of, read_tolerances, shipped, to_toml
 
 
 def test_evidence_is_the_ratio_of_two_gaussian_densities() -> None:
@@ -53,62 +48,6 @@ def test_the_smallest_size_meets_the_threshold_in_the_mean() -> None:
     assert smallest(np.zeros((1, 1)), np.ones(1), 10.0) == float("inf")
 
 
-@pytest.mark.parametrize("kind", ["slide", "centre", "tilt", "flesh"])
-def test_elementary_errors_agree_with_the_twins(kind: str) -> None:
-    one, moving = body(), motion(3)
-    found = kinematic_errors(one, moving)
-    index = {"slide": "slide thigh", "centre": "centre shoulder", "tilt": "tilt knee", "flesh": "flesh shank"}[kind]
-    k = found.groups.index(index)
-    n, markers, segments = len(one.joints), len(one.markers.names), len(one.segments)
-    parts = {"slide": (n, markers, 3, 1), "flesh": (n, segments, 3, 1), "centre": (n, 3, 1), "tilt": (n, 3, 1)}
-    twin = {name: np.zeros(shape) for name, shape in parts.items()}
-    joint = one.joint_index({"slide": "right_hip_flexion", "centre": "right_shoulder_flexion"}.get(kind, "right_knee_flexion"))
-    if kind == "slide":
-        on = [i for i, s in enumerate(one.markers.segment) if one.segments[s] == "right_thigh"]
-        twin["slide"][joint, on, 0, 0] = 1.0
-    elif kind == "flesh":
-        twin["flesh"][joint, one.segment_index("right_shank"), 0, 0] = 1.0
-    elif kind == "centre":
-        twin["centre"][joint, 0, 0] = 1.0
-    else:
-        axis = one.joints[joint].axis
-        across = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
-        twin["tilt"][joint, :, 0] = across / np.linalg.norm(across)
-    expected = _through_tracking(one, moving, Twins(**twin))
-    inside = slice(10, -10)
-    scale = np.abs(expected).max(axis=0)
-    np.testing.assert_allclose(found.wrench[inside, :, k] / scale, expected[inside] / scale, atol=0.25)
-    assert np.corrcoef(found.wrench[inside, :, k].ravel(), expected[inside].ravel())[0, 1] > 0.995
-
-
-def _through_tracking(one, moving, twin):
-    pose, segment, every = poses(one, moving.q), list(one.markers.segment), list(range(len(one.segments)))
-    J, _ = jacobian(one, pose, segment, pose.points(segment, one.markers.position))
-    place, turn = jacobian(one, pose, every, pose.points(every, one.sip.com))
-    weighted = np.swapaxes(np.repeat(one.markers.weight, 3)[:, None] * J, 1, 2)
-    normal = weighted @ J
-    ridge = 1e-6 * np.trace(normal, axis1=1, axis2=2)[:, None, None] / one.nv * np.eye(one.nv)
-    wrong = disturbance(one, moving, pose, twin)
-    tangent = -np.linalg.solve(normal + ridge, weighted) @ wrong.markers.reshape(len(J), -1, 1)
-    shape = wrong.places.shape
-    places, turns = (wrong.places + (place @ tangent).reshape(shape))[..., 0], (wrong.turns + (turn @ tangent).reshape(shape))[..., 0]
-    return (_needed(one, moving, places, turns, 1e-3) - _needed(one, moving, places, turns, -1e-3)) / 2e-3
-
-
-def _needed(one, moving, places, turns, size):
-    """Return the wrench from the rates of momentum and angular momentum, CoMs moved and segments turned by ``size`` times the errors."""
-    move, step = segment_motion(one, moving), 1.0 / moving.rate
-    mass, spin = one.sip.mass, move.angular_velocity
-    com = (move.rotation @ one.sip.com[..., None])[..., 0] + move.position + size * places
-    velocity = np.gradient(com, step, axis=0)
-    omega = spin + size * (np.gradient(turns, step, axis=0) + np.cross(turns, spin))
-    turn = np.eye(3) + size * skew(turns)
-    inertia = turn @ move.rotation @ central_inertia(one) @ np.swapaxes(turn @ move.rotation, -1, -2)
-    angular = np.sum(np.cross(com, mass[:, None] * velocity) + (inertia @ omega[..., None])[..., 0], axis=1)
-    force = np.gradient(np.sum(mass[:, None] * velocity, axis=1), step, axis=0)
-    return np.concatenate([force, np.gradient(angular, step, axis=0) - np.sum(np.cross(com, mass[:, None] * GRAVITY), axis=1)], axis=1)
-
-
 @pytest.fixture(scope="module")
 def put():
     return problem(body(), looks(3, trials=2))
@@ -121,7 +60,7 @@ def test_rows_are_white_under_the_noise_they_were_made_with(put) -> None:
 
 
 def test_differences_of_a_cause_agree_with_its_columns(put) -> None:
-    late = effect("time_delay")("")
+    late = effect("time_delay")
     columns = put.columns([late])[0]
     np.testing.assert_allclose(slopes(put, late, np.zeros(1)), columns, atol=0.02 * np.abs(columns).max())
     np.testing.assert_allclose(changes(put, late, np.zeros(1)), 0.0, atol=1e-9)
@@ -129,7 +68,7 @@ def test_differences_of_a_cause_agree_with_its_columns(put) -> None:
 
 
 def test_a_linear_cause_is_its_columns(put) -> None:
-    gain = effect("plate_gain")("Fz")
+    gain = replace(effect("plate_gain"), target="Fz")
     assert gain.linear
     size = np.array([0.03])
     expected = put.spectrum.rows(tuple(gain.added(case, size)[:, :, None] for case in put.cases)).ravel()
@@ -155,6 +94,21 @@ def test_screening_ranks_every_cause_and_limits_them_all(put) -> None:
     assert all(row.told_from >= row.limit > 0 for row in rows)
 
 
+def test_thirty_targets_are_charged_as_thirty_chances(put) -> None:
+    (one,) = candidates(put, ("time_delay",))
+    found = model(put, (one,), known())
+    alone = screen(found, (one,))
+    targets = [replace(one, effect=replace_target(one.effect, f"t{k}")) for k in range(30)]
+    crowd = screen(found, tuple(targets))
+    assert alone[0].score - crowd[0].score == pytest.approx(np.log(30))
+    assert alone[0].score == pytest.approx(alone[0].log_bayes_factor)
+
+
+def replace_target(cause, target: str):
+    """Return the same cause at another target."""
+    return type(cause)(target)
+
+
 def test_what_placing_has_repaired_needs_a_larger_fault_to_be_seen() -> None:
     rng = np.random.default_rng(4)
     kinds = (
@@ -165,7 +119,9 @@ def test_what_placing_has_repaired_needs_a_larger_fault_to_be_seen() -> None:
     )
     Z = [rng.normal(size=(400, width)) for *_, width in kinds]
     Z[2] = 0.9 * Z[0] + 0.1 * Z[2]  # a marker beside the joint looks much like its centre
-    causes = tuple(Candidate(effect(name)(target), z, (False,) * z.shape[1]) for (name, target, _), z in zip(kinds, Z, strict=True))
+    causes = tuple(
+        Candidate(replace(effect(name), target=target), z, (False,) * z.shape[1]) for (name, target, _), z in zip(kinds, Z, strict=True)
+    )
     cuts = (slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 10))
     whole = np.concatenate(Z, axis=1)
     seen = Visibility(causes, whole.T @ whole, cuts)

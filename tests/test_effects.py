@@ -8,10 +8,9 @@ from human_cases import human_case
 from random_bodies import random_body
 from scipy.interpolate import CubicSpline
 
-from biodance.effects import effect, effects
-from biodance.effects.case import Case, at_origin, at_point
-from biodance.effects.effect import Effect
+from biodance.effects import Case, Effect, at_origin, at_point, effect, effects
 from biodance.errors import UnknownName
+from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Motion, Plate, Source, Trial, Wrench
 
@@ -70,7 +69,7 @@ def test_columns_are_the_differences_of_transform(name: str, plates: int | str) 
 def test_every_effect_says_what_it_is(name: str) -> None:
     kind = effect(name)
     assert kind.name == name
-    assert issubclass(kind, Effect)
+    assert isinstance(kind, Effect)
     assert kind.parameters
     for words in (kind.separated_by, kind.advice):
         assert words.endswith(".")
@@ -116,10 +115,23 @@ def test_added_mass_weighs_what_it_says() -> None:
     assert np.abs((loaded.residual - case.residual)[:, 2]).max() > 2.4 * 9.8
 
 
+def test_a_load_pulls_at_its_place_from_the_centre_of_mass() -> None:
+    case, index = CASES[1], CASES[1].body.segment_index("s2")
+    place = np.array([0.03, -0.05, 0.02])
+    phi = case.phi[10 * index : 10 * index + 10]
+    still = Motion(case.motion.time, case.motion.q, 0 * case.motion.v, 0 * case.motion.a)
+    standing = Case(case.body, case.trial, still, case.phi, case.session_time)
+    change = effect("added_mass").at("s2", standing).transform(standing, np.array([2.4, *place])).residual - standing.residual
+    lever = poses(case.body, case.motion.q).points([index], (phi[1:4] / phi[0] + place)[None])[:, 0]
+    assert np.linalg.norm(phi[1:4] / phi[0]) > 0.02, "the centre of mass must not lie at the joint, or this test sees nothing"
+    weight = np.array([0, 0, 2.4 * 9.80665])
+    np.testing.assert_allclose(change[:, 3:], np.cross(lever, weight), atol=1e-9)
+
+
 def test_wrong_target_lists_the_legal_ones() -> None:
     with pytest.raises(UnknownName, match="plate1:z"):
         effect("plate_position").at("plate9:x", CASES[1])
-    with pytest.raises(UnknownName, match="plate_gain"):
+    with pytest.raises(UnknownName, match=r"'plate_gian' is not an effect\. Did you mean 'plate_gain'"):
         effect("plate_gian")
 
 

@@ -10,10 +10,8 @@ import pytest
 from human_cases import CORNERS, human_case
 
 import biodance.effects as family
-from biodance.effects import discrete_effects, effect, effects
-from biodance.effects.case import Case, at_origin, at_point
+from biodance.effects import Case, DiscreteEffect, Gate, Recorded, at_origin, at_point, discrete_effects, effect, effects, gates
 from biodance.effects.frame_rate import clock_beside_body
-from biodance.effects.gate import DiscreteEffect, Gate, Recorded, gates
 from biodance.effects.unit_error import FACTORS
 from biodance.errors import BiodanceError, UnknownName
 from biodance.motion.kinematics import poses
@@ -61,7 +59,7 @@ def session_of(*cases: Case) -> Recorded:
 def test_every_discrete_effect_says_what_it_is(name: str) -> None:
     kind = discrete_effects()[name]
     assert kind.name == name
-    assert issubclass(kind, DiscreteEffect)
+    assert isinstance(kind, DiscreteEffect)
     assert kind.separated_by.endswith(".")
     assert len(kind.advice) > 20
     text = " ".join((importlib.import_module(f"biodance.effects.{name}").__doc__ or "").split())
@@ -216,15 +214,18 @@ def test_a_turned_wrist_is_named_in_the_static_trial(side: str) -> None:
         assert failed(found) == expected
 
 
-@pytest.mark.parametrize(("module", "base", "missing"), [("gate", "DiscreteEffect", "look"), ("missing_joint", "MissingJoint", "loosened")])
+@pytest.mark.parametrize(
+    ("module", "base", "missing"),
+    [("gate", "DiscreteEffect", "look"), ("missing_joint", "MissingJoint", "loosened"), ("effect", "Effect", "columns or transform")],
+)
 def test_a_file_that_leaves_out_what_its_author_must_write_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: str, base: str, missing: str
 ) -> None:
-    text = f"from biodance.effects.{module} import {base}\n\n\nclass Blind({base}):\n    pass\n\n\nEFFECT = Blind\n"
+    text = f"from biodance.effects._base.{module} import {base}\n\n\nclass Blind({base}):\n    name = 'blind'\n\n\nEFFECT = Blind\n"
     (tmp_path / "blind.py").write_text(text, encoding="utf-8")
     monkeypatch.setattr(family, "__path__", [*family.__path__, str(tmp_path)])
     importlib.invalidate_caches()
-    with pytest.raises(BiodanceError, match=rf"blind\.py: Blind lacks {missing}. Write it as {base} describes"):
+    with pytest.raises(BiodanceError, match=rf"blind\.py: lacks {missing}, so it is no effect\. Write what is missing"):
         effects()
     sys.modules.pop("biodance.effects.blind", None)
 

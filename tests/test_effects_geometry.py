@@ -70,7 +70,7 @@ def test_trial_without_the_marker_says_nothing_about_it() -> None:
     assert CASE.trial.markers is not None
     fewer = CASE.trial.markers.select(name for name in CASE.trial.markers.names if name != "LTIB")
     blind = replace(CASE, trial=replace(CASE.trial, markers=fewer))
-    found = effect("marker_misplaced")("LTIB")
+    found = replace(effect("marker_misplaced"), target="LTIB")
     assert not found.columns(blind).any()
     rows = found.marker_columns(blind)
     assert rows is not None

@@ -10,11 +10,13 @@ from human_cases import CORNERS, human_case, moving
 from biodance.body.body import Body
 from biodance.body.human import human
 from biodance.body.inertia import smallest_eigenvalues
-from biodance.effects import effect
-from biodance.effects.case import Case
+from biodance.body.moved import displaced
+from biodance.diagnose.accept import fit_of
+from biodance.effects import Case, effect
 from biodance.effects.head_joint import with_neck
 from biodance.effects.shoulder_girdle import with_clavicles
 from biodance.effects.trunk_joint import with_thorax
+from biodance.identify.identification import identify
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
 from biodance.motion.smoothing import smooth
@@ -63,8 +65,37 @@ def test_body_with_the_joint_is_the_same_body_at_zero(name: str) -> None:
     plain = smooth(case.body, case.motion.time, case.motion.q)
     np.testing.assert_allclose(predict_wrench(extended, motion).value, predict_wrench(case.body, plain).value, atol=1e-8)
     assert extended.sip.mass.sum() == pytest.approx(case.body.sip.mass.sum())
-    heavy = extended.sip.phi.reshape(-1, 10)[extended.sip.mass > 0]
-    assert (smallest_eigenvalues(heavy.ravel()) > 0).all()
+    assert (smallest_eigenvalues(extended.sip.phi) > 0).all()
+    assert (extended.com_boxes[:, 0] < extended.sip.com).all()
+    assert (extended.com_boxes[:, 1] > extended.sip.com).all()
+
+
+@pytest.mark.parametrize("name", ["head_joint", "trunk_joint"])
+def test_the_parts_are_together_as_well_known_as_the_whole(name: str) -> None:
+    case = human_case(120)
+    extended = KINDS[name](case)
+    assert extended is not None
+    old, count = case.body.segment_index("trunk_head"), case.body.sip.phi.size
+    place = extended.joints[[joint.parent for joint in extended.joints].index(extended.segment_joint[old])].translation
+    together = np.eye(count, count + 10)
+    together[10 * old : 10 * old + 10, count:] = displaced(place)
+    np.testing.assert_allclose(together @ extended.sip.phi, case.body.sip.phi, atol=1e-9)
+    np.testing.assert_allclose(together @ extended.sip.covariance @ together.T, case.body.sip.covariance, atol=1e-9)
+    sd = np.sqrt(np.diag(extended.sip.covariance)[::10]) / extended.sip.mass
+    assert 0.05 < sd[-1] < 0.5
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_accepting_the_joint_identifies_the_body_that_has_it(name: str) -> None:
+    case, _ = person(name, 0.12)
+    right = effect(name).at("", case).corrected(case, np.array([0.12, 0.0]))
+    use = np.zeros(400, dtype=bool)
+    use[INSIDE] = True
+    found = identify(right.body, (fit_of(right, use),))
+    assert found.status == "solved", found.cause
+    assert all(np.isfinite([known.value, known.sd]).all() for known in found.known)
+    assert max(known.from_data for known in found.known if known.quantity == "mass") > 0.3
+    assert np.abs(found.sip.mass - right.body.sip.mass).max() < 1.0, "the table's masses are the true ones"
 
 
 @pytest.mark.parametrize("name", KINDS)
@@ -88,7 +119,7 @@ def test_without_its_markers_there_is_no_target(name: str) -> None:
     few = case.trial.markers.select(n for n in case.trial.markers.names if not n.endswith(("HD", "SHO")) and n not in ("C7", "CLAV"))
     blind = replace(case, trial=replace(case.trial, markers=few))
     assert effect(name).targets(blind) == ()
-    assert not effect(name)("").columns(blind).any(), "a trial of a session in which others have the markers"
+    assert not effect(name).columns(blind).any(), "a trial of a session in which others have the markers"
 
 
 def test_still_joint_adds_nothing() -> None:

@@ -7,8 +7,7 @@ import pytest
 from human_cases import human_case
 
 from biodance.diagnose.passing import one_sided
-from biodance.effects import effect
-from biodance.effects.case import Case
+from biodance.effects import Case, effect
 from biodance.effects.filter_mismatch import STRENGTH
 from biodance.effects.sloshing_load import FREQUENCY
 from biodance.effects.time_delay import moved_in_time
@@ -35,7 +34,7 @@ def test_a_delay_is_undone_with_what_the_prediction_lacks(name: str, size: float
     share = 1.0 if name == "time_delay" else case.session_time - 0.5
     late = moved_in_time(case.motion.time, right, size * share * np.ones(len(right)))
     wrong = with_measured(case, late)
-    found = effect(name)("")
+    found = effect(name)
     mended = found.corrected(wrong, np.array([size])).trial.wrench.value
     np.testing.assert_allclose(mended[INSIDE], right[INSIDE], atol=0.02 * np.abs(late - right)[INSIDE].max())
     predicted_only = late - found.added(wrong, np.array([size]))
@@ -49,7 +48,7 @@ def test_a_lower_filter_is_undone() -> None:
     frequency = order * case.motion.rate / (2 * frames)
     wave = np.cos(np.pi * order * (np.arange(frames) + 0.5) / frames)[:, None] * np.arange(1.0, 7.0)
     gain = 1 / (1 + 4.0 * STRENGTH * frequency**4)
-    found = effect("filter_mismatch")("")
+    found = effect("filter_mismatch")
     mended = found.corrected(with_measured(case, gain * wave), np.array([4.0])).trial.wrench.value
     assert gain < 0.95
     np.testing.assert_allclose(mended, wave, rtol=0.02 * (1 - gain), atol=0.02 * (1 - gain))
@@ -64,7 +63,7 @@ def test_added_is_what_transform_adds(name: str) -> None:
 
 
 def test_a_load_sloshes_at_the_frequency_that_is_reported() -> None:
-    found = effect("sloshing_load")("trunk_head")
+    found = replace(effect("sloshing_load"), target="trunk_head")
     rows = found.reported(np.array([2.0, 1.0, 0.5]), np.array([0.1, 0.1, 0.05]))
     assert rows[2] == ("frequency", FREQUENCY + 0.5, 0.05, "Hz")
     case = human_case(300)

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("[0-9]*.py"))
+FOLDER = Path(__file__).parents[1] / "examples"
+EXAMPLES = [*sorted(FOLDER.glob("[0-9]*.py")), *sorted((FOLDER / "planar").glob("[0-9]*.py"))]
 SHORTEST, LONGEST = 5, 60
 
 

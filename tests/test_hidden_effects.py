@@ -13,6 +13,7 @@ import pytest
 from biodance.cli import run
 from biodance.diagnose.diagnosis import Diagnosis
 from biodance.effects import discrete_effects, effects
+from biodance.identify.physical import FailedFit
 from biodance.lab.session import read_session
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.results import SessionResult
@@ -45,7 +46,7 @@ def examined(folder: Path, monkeypatch: pytest.MonkeyPatch) -> SessionResult:
 
 def found(folder: Path, monkeypatch: pytest.MonkeyPatch, *, without: tuple[str, ...] = ()) -> Diagnosis:
     chosen = tuple(name for name in (*effects(), *discrete_effects()) if name not in without) if without else None
-    return diagnose_session(examined(folder, monkeypatch), chosen=chosen).diagnosis
+    return diagnose_session(examined(folder, monkeypatch), effects=chosen).diagnosis
 
 
 def test_a_session_without_fault_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -55,10 +56,18 @@ def test_a_session_without_fault_is_left_alone(tmp_path: Path, monkeypatch: pyte
     assert all(gate.ok for gate in diagnosis.gates)
 
 
-def test_late_forces_are_named_by_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_late_forces_are_named_by_the_command_also_where_no_body_can_be_identified(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("biodance.identify.identification.physical_fit", lambda *_: FailedFit("No possible body, by force."))
     folder = hidden(tmp_path / "s", "time_delay:delay=0.025")
-    assert run(["diagnose", str(folder), "--out", str(tmp_path / "out"), "--json"]) == 1
+    assert run(["diagnose", str(folder), "--accept", "--out", str(tmp_path / "out"), "--json"]) == 1
     document = json.loads(capsys.readouterr().out)
+    assert set(document["failures"]) == {"segments", "what accepting changes"}
+    assert all("by force" in cause for cause in document["failures"].values())
+    assert document["masses"] == {"before": None, "accepted": None}
+    assert (tmp_path / "out" / "report.html").read_text().count("by force") >= 2
+    assert not (tmp_path / "out" / "body.json").exists()
     assert document["verdict"].startswith("named")
     first = document["findings"][0]
     assert (first["effect"], first["target"]) == ("time_delay", "")
@@ -106,7 +115,7 @@ def test_without_the_culprit_nobody_else_is_called_the_whole_truth(tmp_path: Pat
 def test_a_clipped_channel_is_named_before_any_statistics(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = hidden(tmp_path / "s", "clipping:target=Fz,limit=640")
     result = examined(folder, monkeypatch)
-    diagnosis = diagnose_session(result, chosen=("clipping", "plate_offset")).diagnosis
+    diagnosis = diagnose_session(result, effects=("clipping", "plate_offset")).diagnosis
     assert diagnosis.findings[0].effect == "clipping"
     assert [gate.effect for gate in diagnosis.gates if not gate.ok] == ["clipping"]
 

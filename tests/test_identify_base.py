@@ -6,8 +6,8 @@ from random_bodies import random_body, random_motion
 
 from biodance.identify.base_parameters import estimate_base, structural_base
 from biodance.identify.information import information, merge
-from biodance.identify.noise import Noise
 from biodance.motion.regressor import predict_wrench, regressor
+from biodance.uncertainty.noise import Noise
 
 
 @pytest.mark.parametrize("seed", range(4))

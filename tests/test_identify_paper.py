@@ -6,10 +6,10 @@ from random_bodies import random_body, random_motion
 from scipy.optimize import nnls
 
 from biodance.identify.information import information
-from biodance.identify.noise import Noise
 from biodance.identify.paper_programme import _solve, directions, inequalities, paper_programme
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Wrench
+from biodance.uncertainty.noise import Noise
 
 UNIT = Noise.of_sd(1.0, 1.0, np.zeros(3))
 

@@ -8,11 +8,11 @@ from random_bodies import random_body, random_motion
 
 from biodance.body.inertia import pseudo_inertia, smallest_eigenvalues
 from biodance.identify.information import information
-from biodance.identify.noise import Noise
 from biodance.identify.physical import physical_fit
 from biodance.identify.posterior import posterior
 from biodance.motion.regressor import predict_wrench, regressor
 from biodance.records import Sip, Wrench
+from biodance.uncertainty.noise import Noise
 
 NOISE = Noise.of_sd(2.0, 0.5, np.zeros(3))
 

@@ -9,10 +9,10 @@ from scipy.signal import lfilter
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identify.information import information
 from biodance.identify.learning import learn
-from biodance.identify.noise import Noise
 from biodance.identify.statistics import Fit, layout_for, statistics
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Motion, Sip, Wrench
+from biodance.uncertainty.noise import Noise
 
 ABOUT = np.array([0.1, 0.2, 0.0])
 LAYOUT = layout_for(ABOUT)
@@ -43,8 +43,8 @@ def coloured(rng: np.random.Generator, frames: int) -> np.ndarray:
 def test_information_equals_the_direct_triangle() -> None:
     body, fit = smooth_fit(0, noise=coloured)
     rng = np.random.default_rng(1)
-    root = rng.normal(size=(len(LAYOUT.edges) - 1, 6, 6))
-    noise = Noise(root @ np.swapaxes(root, 1, 2) + np.eye(6), ABOUT, LAYOUT.edges, LAYOUT.rate)
+    root = rng.normal(size=(len(LAYOUT.bands), 6, 6))
+    noise = Noise(root @ np.swapaxes(root, 1, 2) + np.eye(6), ABOUT, LAYOUT.bands)
     direct = information(body, fit.motion, fit.wrench, noise)
     through = statistics(body, fit, LAYOUT).information(noise)
     scale = np.maximum(np.linalg.norm(direct.R, axis=0), 1e-9)

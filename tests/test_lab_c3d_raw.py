@@ -177,7 +177,7 @@ def test_jumps_of_a_metre_are_confirmed_by_the_second_reader_and_said(tmp_path, 
     points[3, 0, 0] += 5000
     raw = read_raw(save(tmp_path, File(points, analog)))
     assert raw.points[3, 0, 0] == points[3, 0, 0]
-    assert "2 places; a second reader finds the same numbers" in raw.warnings[0]
+    assert "2 places; ezc3d finds the same numbers" in raw.warnings[0]
 
 
 def damaged(numbers):

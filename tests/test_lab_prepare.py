@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from biodance.errors import TrialRefused
-from biodance.lab.filters import LowPass
 from biodance.lab.marker_sets import read_marker_set
 from biodance.lab.prepare import prepare
 from biodance.records import Markers, Plate, Source, Trial, Wrench
+from biodance.settings import Settings
 
 CORNERS = np.array([[0.4, 0.6, 0], [0, 0.6, 0], [0, 0, 0], [0.4, 0, 0]])
 LABELS = (*(label for label in read_marker_set("plug_in_gait").labels if label not in ("SACR", "LKNM", "RKNM", "LMED", "RMED")), "*115")
@@ -108,4 +108,4 @@ def test_unknown_samples_stay_unknown() -> None:
 
 def test_a_cutoff_above_half_the_marker_rate_is_refused() -> None:
     with pytest.raises(TrialRefused, match=r"Trial walk: The cut-off 60 Hz is not below half"):
-        prepare(trial(), low_pass=LowPass(cutoff=60.0))
+        prepare(replace(trial(), settings=Settings().changed({"filter.cutoff": 60})))

@@ -1,10 +1,15 @@
 """The door: which reader a file gets, by its content, and what is refused in a sentence."""
 
+import os
+from dataclasses import replace
+from types import SimpleNamespace
+
 import pytest
 from lab_sessions import two_trials
 
-from biodance.errors import FileRefused
+from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.read import format_of, read_trial
+from biodance.lab.session import read_session
 
 
 @pytest.fixture
@@ -39,9 +44,39 @@ def test_fault_in_a_reader_is_a_refusal_of_that_file(folder, monkeypatch):
     def broken(path, *, role):
         raise IndexError("index 3 is out of bounds")
 
-    monkeypatch.setattr("biodance.lab.read.read_trc", broken)
+    monkeypatch.setattr("biodance.lab.readers.trc.read_trc", broken)
     with pytest.raises(FileRefused, match=r"IndexError: index 3 .* Please report this file"):
         read_trial(folder / "static01.trc")
+
+
+def test_a_pipe_never_hangs(tmp_path, folder):
+    os.mkfifo(folder / "squat_9.c3d")
+    with pytest.raises(FileRefused, match=r"squat_9\.c3d: is a pipe, socket or device, an ordinary file is expected"):
+        read_trial(folder / "squat_9.c3d")
+    assert "is a pipe" in read_session(folder).refused["squat_9.c3d"]
+
+
+def test_only_the_head_of_a_large_file_is_looked_at(tmp_path):
+    path = tmp_path / "huge.bin"
+    with open(path, "wb") as stream:
+        stream.truncate(60_000_000_000)  # a hole: no disk is used
+    with pytest.raises(FileRefused, match="none of the formats that can be read"):
+        read_trial(path)
+
+
+def test_a_reader_may_be_given_as_an_object(folder):
+    reader = SimpleNamespace(
+        NAME="stick figures",
+        EXTENSIONS=(".stick",),
+        PREFERENCE=5,
+        sniff=lambda head: head.startswith(b"STICK"),
+        read=lambda path, *, role, subject: replace(read_trial(folder / "static01.trc", role=role), name=path.stem),
+    )
+    (folder / "walk.stick").write_bytes(b"STICK 1")
+    assert "walk" not in [trial.name for trial in read_session(folder).trials]
+    assert [trial.role for trial in read_session(folder, readers=[reader]).trials if trial.name == "walk"] == ["fit"]
+    with pytest.raises(BiodanceError, match="lacks sniff, read, so it is no reader"):
+        read_session(folder, readers=[SimpleNamespace(NAME="x", EXTENSIONS=(), PREFERENCE=1)])
 
 
 def test_content_counts_more_than_the_name(tmp_path, folder):

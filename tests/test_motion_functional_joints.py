@@ -150,7 +150,7 @@ def test_a_virtual_person_s_trunk_and_left_elbow_come_nearer_to_the_truth(tmp_pa
 @pytest.mark.parametrize("folder", ["adl_gait", "biomechzoo/HC032A"])
 def test_a_real_walk_of_two_seconds_leaves_the_joints_alone(folder: str) -> None:
     session = read_session(Path(str(DATA)) / folder)
-    (static,), (walk,) = session.of_role("static"), session.of_role("fit")
+    (static,), (walk, *_) = session.of_role("static"), session.of_role("fit")
     before = measure(session.subject, prepare(static))
     found = functional_joints(before, [prepare(walk).markers])
     assert {"trunk", "right_hip", "left_hip", "right_elbow", "left_elbow"} <= set(found.kept)

@@ -9,11 +9,11 @@ from marker_trials import dance, markers_of, points
 
 from biodance.body.human import human
 from biodance.errors import TrialRefused
-from biodance.lab.filters import LowPass
 from biodance.lab.session import read_session
 from biodance.motion.kinematics import poses
 from biodance.motion.track import track
 from biodance.records import Markers, Source, Subject, Trial
+from biodance.settings import Settings
 from biodance.virtual_lab.laboratory import Laboratory, Visit, perform_in, set_up
 from biodance.virtual_lab.person import make_person
 from biodance.virtual_lab.protocol_file import read_protocol
@@ -76,7 +76,9 @@ def test_absent_markers_and_leaning_frames_are_named(markers):
 
 
 def test_the_low_pass_is_the_one_asked_for(markers):
-    soft, hard = (track(WOMAN, trial_of(markers), settings=LowPass(cutoff=cutoff)) for cutoff in (10.0, 3.0))
+    soft, hard = (
+        track(WOMAN, replace(trial_of(markers), settings=Settings().changed({"filter.cutoff": cutoff}))) for cutoff in (10.0, 3.0)
+    )
     assert np.array_equal(soft.residual, hard.residual)
     assert np.abs(hard.a[30:-30, :6]).mean() < 0.7 * np.abs(soft.a[30:-30, :6]).mean()
 

@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 from diagnosed_sessions import RATE, body, looks, motion
 
+from biodance.body.error_sizes import error_size
 from biodance.diagnose.problem import Look
-from biodance.diagnose.spectrum import EDGES
-from biodance.diagnose.tolerances import shipped
 from biodance.motion.regressor import predict_wrench
-from biodance.pipeline.looked_at import MARKERS, UNREST, left_out, looked_at, own_tolerances, soft_tissue, unrest
+from biodance.pipeline.looked_at import UNREST, left_out, looked_at, own_tolerances, soft_tissue, unrest
 from biodance.pipeline.results import Step, TrialResult, WrenchComparison
 from biodance.records import Array, Motion, Role, Wrench
+from biodance.uncertainty.bands import BANDS
+from biodance.uncertainty.tolerances import shipped
+
+MARKERS = error_size("marker_distance", "first quartile", state="after")
 
 
 def still(seconds: float) -> Motion:
@@ -56,7 +59,7 @@ def test_the_unrest_of_standing_is_measured_and_bounded() -> None:
     shaken[:, 1] = 10 * UNREST * np.sin(2 * np.pi * 4.0 * time)
     shaken[:, 2] = 5 * np.sin(2 * np.pi * 0.1 * time)
     covariance = unrest(body(), (standing(shaken),), np.zeros(3))
-    size = np.sqrt(2 * np.diff(EDGES)[:, None] / 25.0 * covariance.diagonal(axis1=1, axis2=2))
+    size = np.sqrt(2 * np.diff(BANDS.edges)[:, None] / 25.0 * covariance.diagonal(axis1=1, axis2=2))
     assert size[3, 0] == pytest.approx(0.8, rel=0.05)
     assert size[4, 1] == pytest.approx(UNREST, rel=0.05)
     assert not size[:2].any(), "slow sway is weight and posture, and no unrest"

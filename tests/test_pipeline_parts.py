@@ -17,6 +17,7 @@ from biodance.pipeline.steps import attempt
 from biodance.pipeline.still import bones
 from biodance.pipeline.trial import marker_fit
 from biodance.records import Markers, Motion, Plate, Subject, Trial, Wrench
+from biodance.settings import CheckLimits
 
 SUBJECT = Subject(60.0, 1.7, "F")
 SQUARE = np.array([[0.3, 0.3, 0.0], [-0.3, 0.3, 0.0], [-0.3, -0.3, 0.0], [0.3, -0.3, 0.0]])
@@ -151,18 +152,18 @@ def standing(mass: float, ahead: float = 0.0) -> Standing:
 
 @pytest.mark.parametrize(("mass", "inside"), [(60.0, True), (61.1, True), (61.3, False), (58.7, False)])
 def test_the_mass_check_allows_two_percent(mass, inside):
-    assert [check.inside for check in mass_check(SUBJECT, standing(mass))] == [inside]
+    assert [check.inside for check in mass_check(SUBJECT, standing(mass), CheckLimits())] == [inside]
 
 
 def test_what_is_not_known_is_not_checked():
-    assert mass_check(Subject(float("nan"), 1.7, "F"), standing(60.0)) == []
-    assert mass_check(Subject(60.0, 1.7, "F", guessed=("mass",)), standing(60.0)) == []
-    assert mass_check(SUBJECT, None) == []
-    assert standing_check(None) == []
+    assert mass_check(Subject(float("nan"), 1.7, "F"), standing(60.0), CheckLimits()) == []
+    assert mass_check(Subject(60.0, 1.7, "F", guessed=("mass",)), standing(60.0), CheckLimits()) == []
+    assert mass_check(SUBJECT, None, CheckLimits()) == []
+    assert standing_check(None, CheckLimits()) == []
 
 
 def test_the_standing_check_is_in_millimetres():
-    (check,) = standing_check(standing(60.0, ahead=-0.06))
+    (check,) = standing_check(standing(60.0, ahead=-0.06), CheckLimits())
     assert (check.value, check.inside) == ("60.0 mm", False)
 
 

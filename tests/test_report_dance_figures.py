@@ -3,9 +3,9 @@
 import numpy as np
 
 from biodance.body.human import human
-from biodance.dance.account import ZmpPath
 from biodance.dance.expectation import Expectation
-from biodance.dance.stance import stance
+from biodance.dance.metrics import ZmpPath
+from biodance.dance.problem.stance import stance
 from biodance.motion.kinematics import poses
 from biodance.records import Subject
 from biodance.report.dance_figures import bones, criterion_figure, expectation_figure, postures_figure, zmp_figure

@@ -16,7 +16,7 @@ from biodance.pipeline.provenance import provenance
 from biodance.pipeline.results import SessionResult
 from biodance.report.marker_figure import marker_figure
 from biodance.report.page import check_table, page
-from biodance.report.solid import still_address
+from biodance.report.solid import still_addresses
 from biodance.report.still import still_figure
 from biodance.report.style import svg_address
 from biodance.report.wording import millimetres, number, without_path
@@ -52,7 +52,7 @@ def outline(html: str) -> Outline:
 
 def html_of(result: SessionResult, created: str = TIME) -> str:
     still = svg_address(still_figure(result.still)) if result.still else ""
-    return page(result, provenance(result, created=created), still=still)
+    return page(result, provenance(result, created=created), stills=[still] if still else [])
 
 
 @pytest.fixture(scope="module")
@@ -144,7 +144,7 @@ def test_a_comparison_without_a_used_frame_can_be_drawn():
 def test_a_child_that_dies_or_draws_nothing_leaves_the_drawing(monkeypatch, child):
     monkeypatch.setattr("biodance.report.solid.sys.executable", child)
     still = full_session().still
-    assert still_address(still) == svg_address(still_figure(still))
+    assert still_addresses([still]) == [svg_address(still_figure(still))]
 
 
 def test_figures_carry_no_date():

@@ -10,13 +10,13 @@ import pytest
 
 from biodance.body.human import human
 from biodance.body.limits import joint_limits
-from biodance.dance.between import Near
-from biodance.dance.chain import Chain
 from biodance.dance.dance import Dance
-from biodance.dance.plan import Plan
-from biodance.dance.postures import KEPT, solve, start
-from biodance.dance.sequence import sequence, under
-from biodance.dance.stance import seat
+from biodance.dance.limits import family
+from biodance.dance.postures.ordering import support_sequence
+from biodance.dance.postures.posture import KEPT, Near, initial_guess, solve
+from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.plan import Plan
+from biodance.dance.problem.stance import seat, under
 from biodance.errors import BiodanceError
 from biodance.lab.session import read_session
 from biodance.motion.kinematics import poses
@@ -36,13 +36,13 @@ EXACT = Performer(tracking=0.0, pace=1.0)
 def dance() -> Dance:
     """Return two postures on both feet, one on the right leg, those in between included, straight ways between them."""
     chain, rng = Chain(BODY), np.random.default_rng(2)
-    stances = sequence(BODY, Plan("test", "", (("parallel", 2), ("single_right", 1)), hold=1.0))
+    stances = support_sequence(BODY, Plan("test", "", (("parallel", 2), ("single_right", 1)), hold=1.0))
     rows = []
     for stance in stances:
         for _ in range(40):
-            begin = start(chain, stance, rng)
+            begin = initial_guess(chain, stance, rng)
             begin[3:] *= 0.3
-            found = solve(chain, stance, begin, Near(begin), iterations=40)
+            found = solve(chain, stance, begin, Near(begin), family(), iterations=40)
             if found.violation <= KEPT:
                 break
         rows.append(found.x)

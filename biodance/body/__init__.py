@@ -1,1 +1,1 @@
-"""Who moves: tables, the human, HOAP-3, the planar chain, scaling, joint and torque limits, boxes; model export."""
+"""Who moves: tables, the human, HOAP-3, scaling, joint and torque limits, boxes; model export."""

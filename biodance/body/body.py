@@ -11,10 +11,13 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
+from biodance import display
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import Array, Sip, frozen_array
+from biodance.settings import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
+    import pandas as pd
     import pinocchio as pin
 
 NO_SEGMENT = -1
@@ -109,11 +112,39 @@ class Foot:
 class Body:
     """A person or robot as a tree of rigid segments.
 
-    ``segments`` (N) names, the first is the root's; ``joints`` (n) in topological order = Pinocchio's order; ``sip`` prior with covariance;
-    ``limits`` per joint; ``markers`` on segments; ``boxes`` (N, 2, 3) m, lower and upper corner of the shape box in the segment frame;
-    ``com_boxes`` (N, 2, 3) m, where the CoM may be; ``feet`` soles by side ("left", "right"); ``root`` "free_flyer" (nq = 7 + n, nv =
-    6 + n) or "fixed" (nq = nv = n; the root joint carries no segment then); ``notes`` how the body was made: table, scaling, warnings;
-    ``joint_errors`` of the joints that a movement placed, none of those that only landmarks did.
+    Parameters
+    ----------
+    name : str
+        Of the person or robot.
+    segments : tuple of str
+        (N) names; the first is the root's.
+    joints : tuple
+        (n) joints of one degree of freedom, in topological order = Pinocchio's order.
+    sip : Sip
+        What is known of the inertial parameters, with covariance.
+    limits : JointLimits
+        Per joint: range rad, speed rad/s, torque N·m.
+    markers : SegmentMarkers
+        Where each marker sits: segment, position m in its frame, weight.
+    boxes : array_like
+        (N, 2, 3) m, lower and upper corner of the segment's shape box in its frame.
+    com_boxes : array_like
+        (N, 2, 3) m, where the centre of mass may be.
+    feet : dict
+        Soles by side ("left", "right").
+    root : {"free_flyer", "fixed"}
+        Free: nq = 7 + n, nv = 6 + n; fixed: nq = nv = n, the root joint carries no segment.
+    notes : tuple of str
+        How the body was made: table, scaling, warnings.
+    joint_errors : tuple
+        Of the joints that a movement placed; none of those that only landmarks did.
+    gravity : array_like
+        (3,) m/s², lab frame, where it moves, as a pinocchio model has it.
+
+    Examples
+    --------
+    >>> result.body
+    Body('visit', 12 segments, 23 joint angles, 61.9 kg)
     """
 
     name: str
@@ -128,10 +159,12 @@ class Body:
     root: Literal["free_flyer", "fixed"] = "free_flyer"
     notes: tuple[str, ...] = ()
     joint_errors: tuple[JointError, ...] = ()
+    gravity: Array = field(default_factory=lambda: np.array([0.0, 0.0, -STANDARD_GRAVITY]))
 
     def __post_init__(self) -> None:
         count = len(self.segments)
         object.__setattr__(self, "boxes", frozen_array(self.boxes, (count, 2, 3), f"{self.name}.boxes"))
+        object.__setattr__(self, "gravity", frozen_array(self.gravity, (3,), f"{self.name}.gravity"))
         object.__setattr__(self, "com_boxes", frozen_array(self.com_boxes, (count, 2, 3), f"{self.name}.com_boxes"))
         if self.sip.segments != self.segments:
             raise BiodanceError(f"{self.name}: the SIP name other segments ({self.sip.segments}) than the body ({self.segments}).")
@@ -139,6 +172,30 @@ class Body:
             raise BiodanceError(f"{self.name}: {len(self.joints)} joints but limits for {len(self.limits.lower)}.")
         if any(joint.parent >= i for i, joint in enumerate(self.joints)):
             raise BiodanceError(f"{self.name}: a joint comes before its parent.")
+
+    def __repr__(self) -> str:
+        return f"Body({self.name!r}, {len(self.segments)} segments, {len(self.joints)} joint angles, {self.sip.mass.sum():.1f} kg)"
+
+    def _repr_html_(self) -> str:
+        return display.card(repr(self), self.table(), self.notes)
+
+    def table(self) -> "pd.DataFrame":
+        """Return one row for each segment, with the parameters known beforehand.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Index segment; as `Sip.table`, and ``box x (m)`` ..., the size of the segment's shape box.
+
+        Examples
+        --------
+        >>> bool(result.body.table().loc["left_thigh", "box y (m)"] > 0.3)
+        True
+        """
+        out = self.sip.table()
+        for k, axis in enumerate("xyz"):
+            out[f"box {axis} (m)"] = self.boxes[:, 1, k] - self.boxes[:, 0, k]
+        return out
 
     @property
     def n_root(self) -> int:
@@ -157,26 +214,68 @@ class Body:
 
     @cached_property
     def segment_joint(self) -> tuple[int, ...]:
-        """(N) index in ``joints`` of the joint that carries each segment; -1 for the root's segment."""
+        """Index in `joints` of the joint that carries each segment, (N); -1 for the root's segment."""
         carried = {joint.segment: i for i, joint in enumerate(self.joints) if joint.segment != NO_SEGMENT}
         return tuple(carried.get(i, NO_JOINT) for i in range(len(self.segments)))
 
     def joint_index(self, name: str) -> int:
-        """Return the index of a joint in ``joints``; its column is ``7 + index`` in q and ``6 + index`` in v for a free-flyer root."""
+        """Return the index of a joint in ``joints``.
+
+        Parameters
+        ----------
+        name : str
+            Of a joint angle, as ``left_knee_flexion``.
+
+        Returns
+        -------
+        int
+            Its column is 7 + index in q and 6 + index in v for a free-flyer root.
+
+        Raises
+        ------
+        UnknownName
+            There is no such joint; the legal names are listed.
+
+        Examples
+        --------
+        >>> result.body.joint_index("right_hip_flexion")
+        0
+        """
         names = tuple(joint.name for joint in self.joints)
         if name not in names:
             raise UnknownName.of("joint", name, names)
         return names.index(name)
 
     def segment_index(self, name: str) -> int:
-        """Return the index of a segment by name."""
+        """Return the index of a segment by name.
+
+        Parameters
+        ----------
+        name : str
+            Of a segment, as ``left_thigh``.
+
+        Returns
+        -------
+        int
+            Its row in every table of segments.
+
+        Raises
+        ------
+        UnknownName
+            There is no such segment; the legal names are listed.
+
+        Examples
+        --------
+        >>> result.body.segment_index("pelvis")
+        0
+        """
         if name not in self.segments:
             raise UnknownName.of("segment", name, self.segments)
         return self.segments.index(name)
 
     @property
     def neutral(self) -> Array:
-        """(nq,) upright posture at zero joint angles, root at the lab origin, facing lab x."""
+        """Upright posture, (nq,): zero joint angles, root at the lab origin, facing lab x."""
         q = np.zeros(self.nq)
         if self.n_root:
             q[3:7] = np.array([1.0, 0.0, 0.0, 1.0]) / np.sqrt(2.0)
@@ -184,7 +283,7 @@ class Body:
 
     @cached_property
     def model(self) -> "pin.Model":
-        """The pinocchio model of this body; never written to. Joint ids are 2 + index in ``joints`` (1 + index for a fixed root)."""
+        """Its pinocchio model; never written to. Joint ids are 2 + index in `joints` (1 + index for a fixed root)."""
         from biodance.body.pinocchio_model import build
 
         return build(self)

@@ -67,6 +67,7 @@ def _body(found: dict[str, Any]) -> Body:
         root=found["root"],
         notes=tuple(found["notes"]),
         joint_errors=tuple(JointError(*error) for error in found["joint_errors"]),
+        **({"gravity": found["gravity"]} if "gravity" in found else {}),
     )
 
 

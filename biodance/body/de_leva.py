@@ -5,12 +5,13 @@ hand = forearm_hand.
 """
 
 from collections.abc import Mapping
+from functools import cache
 
 import numpy as np
 
 from biodance.body.inertia import Lump, merge
 from biodance.body.reference import Reference, Sex, normalised, proportion
-from biodance.body.tables import Row, numbers, read_table
+from biodance.body.segment_data import SegmentTable, read_segment_table
 from biodance.records import Subject
 
 PARTS = {
@@ -33,16 +34,17 @@ def de_leva(subject: Subject) -> Reference:
 
 def stature(sex: Sex) -> float:
     """Return the stature of the reference person, m."""
-    return float(read_table("segments", "de_leva_1996").provenance["reference_stature_m"][sex])
+    return float(_table().provenance["reference_stature_m"][sex])
 
 
-def _row(segment: str, sex: Sex) -> Row:
-    return read_table("segments", "de_leva_1996").row(segment=segment, sex=sex)
+@cache
+def _table() -> SegmentTable:
+    return read_segment_table("de_leva_1996")
 
 
 def length(segment: str, sex: Sex) -> float:
-    """Return the length of a row, m, of the reference person."""
-    return float(_row(segment, sex)["length_m"])
+    """Return the length of a segment, m, of the reference person."""
+    return _table().value(segment, "length", sex=sex)
 
 
 def lengths(sex: Sex) -> dict[str, float]:
@@ -70,30 +72,36 @@ def parts(sex: Sex) -> dict[str, Lump]:
     middle, upper = length("middle_trunk", sex), length("upper_trunk", sex)
     neck = middle + upper + length("trunk_2", sex) - length("trunk", sex)  # cervicale lies higher than suprasternale
     return {
-        "lower_trunk": _down(_row("lower_trunk", sex), length("lower_trunk", sex)),
-        "middle_trunk": _down(_row("middle_trunk", sex), middle),
-        "upper_trunk": _down(_row("upper_trunk", sex), middle + upper),
-        "head": _down(_row("head_2", sex), neck + length("head_2", sex)),
-        "thigh": _down(_row("thigh", sex), 0.0),
-        "shank": _down(_row("shank_2", sex), 0.0),
+        "lower_trunk": _down("lower_trunk", sex, length("lower_trunk", sex)),
+        "middle_trunk": _down("middle_trunk", sex, middle),
+        "upper_trunk": _down("upper_trunk", sex, middle + upper),
+        "head": _down("head_2", sex, neck + length("head_2", sex)),
+        "thigh": _down("thigh", sex, 0.0),
+        "shank": _down("shank_2", sex, 0.0),
         "foot": _foot(sex),
-        "upper_arm": _down(_row("upper_arm", sex), 0.0),
-        "forearm": _down(_row("forearm", sex), 0.0),
-        "hand": _down(_row("hand", sex), -length("forearm", sex)),
+        "upper_arm": _down("upper_arm", sex, 0.0),
+        "forearm": _down("forearm", sex, 0.0),
+        "hand": _down("hand", sex, -length("forearm", sex)),
     }
 
 
-def _down(row: Row, top: float) -> Lump:
-    """Return the lump of a row whose origin is at height ``top`` m and whose end lies under it."""
-    mass, size, fraction = numbers(row, "mass_fraction length_m com_fraction")
-    radii = np.array(numbers(row, "gyration_sagittal gyration_longitudinal gyration_transverse")) * size
+def _sizes(segment: str, sex: Sex) -> tuple[float, float, float]:
+    """Return mass fraction, length m and CoM as a fraction of it."""
+    table = _table()
+    along = table.value(segment, "com", "longitudinal", sex=sex)
+    return table.value(segment, "mass", sex=sex), table.value(segment, "length", sex=sex), along
+
+
+def _down(segment: str, sex: Sex, top: float) -> Lump:
+    """Return the lump of a segment whose origin is at height ``top`` m and whose end lies under it."""
+    mass, size, fraction = _sizes(segment, sex)
+    radii = np.array(_table().values(segment, "gyration", "sagittal longitudinal transverse", sex=sex)) * size
     return Lump(mass, np.array([0.0, top - fraction * size, 0.0]), mass * np.diag(radii**2))
 
 
 def _foot(sex: Sex) -> Lump:
     """Return the foot: long axis forwards, CoM on the heel-toe line at 0.6 of the ankle's height under the ankle joint."""
-    row = _row("foot", sex)
-    mass, size, fraction = numbers(row, "mass_fraction length_m com_fraction")
-    radii = np.array(numbers(row, "gyration_longitudinal gyration_sagittal gyration_transverse")) * size
+    mass, size, fraction = _sizes("foot", sex)
+    radii = np.array(_table().values("foot", "gyration", "longitudinal sagittal transverse", sex=sex)) * size
     forward = (fraction - proportion("heel_behind_ankle", sex)) * size
     return Lump(mass, np.array([forward, -0.6 * proportion("ankle_height", sex) * stature(sex), 0.0]), mass * np.diag(radii**2))

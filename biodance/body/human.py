@@ -6,22 +6,36 @@ from biodance.body.body import Body, SegmentMarkers
 from biodance.body.boxes import com_boxes, shape_boxes, sole
 from biodance.body.limits import joint_limits
 from biodance.body.prior import prior
-from biodance.body.segment_tables import reference
+from biodance.body.segment_tables import measured_whole, reference, studies, trunk_joint
 from biodance.body.skeleton import SEGMENTS, SIDES, Skeleton, generic_skeleton, joint_tree, side_of
-from biodance.body.tables import read_table
 from biodance.lab.marker_sets import MarkerSet, read_marker_set
 from biodance.records import Subject
+from biodance.settings import STANDARD_GRAVITY, Settings
 
-DEFAULT_TABLE = "de_leva_1996"
 ADULT = (18.0, 65.0)
-"""years: the ages that the default table speaks for."""
+"""years: the ages that the usual table speaks for."""
 
 
-def human(subject: Subject, *, table: str = DEFAULT_TABLE, markers: str = "plug_in_gait") -> Body:
+def human(subject: Subject, *, table: str = Settings.table, markers: str = "plug_in_gait", gravity: float = STANDARD_GRAVITY) -> Body:
     """Return a generic person of the subject's stature, mass and sex, with the markers of a marker set at their usual places.
 
-    Lengths, masses, CoM and inertias come from ``table`` (see ``segment_tables``), widths and feet from ``anthropometry/human``. For a
-    person who was measured use ``scale``: generic lengths miss by centimetres, and the wand markers have no usual place.
+    For a person who was measured use `scale`: generic lengths miss by centimetres, and the wand markers have no usual place.
+
+    Parameters
+    ----------
+    subject : Subject
+        Mass kg, stature m, sex; the age where strength matters.
+    table : str
+        Table of segment inertial parameters, which also gives the lengths.
+    markers : str
+        Name of a marker set, or the path of its file.
+    gravity : float
+        Of the laboratory, m/s² along -z.
+
+    Returns
+    -------
+    Body
+        12 segments, 23 joint angles, inertial parameters with covariance.
 
     Raises
     ------
@@ -29,14 +43,36 @@ def human(subject: Subject, *, table: str = DEFAULT_TABLE, markers: str = "plug_
         There is no such table for this sex, or no such marker set.
     SessionRefused
         The mass or the stature is not known.
+
+    See Also
+    --------
+    scale : The body of a person with a static trial.
+
+    References
+    ----------
+    The usual table: de Leva 1996, doi:10.1016/0021-9290(95)00178-6.
+
+    Examples
+    --------
+    >>> biodance.human(biodance.Subject(62.0, 1.70, "F", name="S01"))
+    Body('S01', 12 segments, 23 joint angles, 62.0 kg)
     """
     subject.require("mass", "stature")
     skeleton = generic_skeleton(reference(table, subject), subject)
     note = f"Segment lengths: table {table} at stature {subject.stature:.3f} m; nobody was measured. Markers: usual places of {markers}."
-    return assemble(subject, skeleton, table=table, markers=generic_markers(skeleton, read_marker_set(markers)), notes=(note,))
+    worn = generic_markers(skeleton, read_marker_set(markers))
+    return assemble(subject, skeleton, table=table, markers=worn, notes=(note,), gravity=gravity)
 
 
-def assemble(subject: Subject, skeleton: Skeleton, *, table: str, markers: SegmentMarkers, notes: tuple[str, ...]) -> Body:
+def assemble(
+    subject: Subject,
+    skeleton: Skeleton,
+    *,
+    table: str,
+    markers: SegmentMarkers,
+    notes: tuple[str, ...],
+    gravity: float = STANDARD_GRAVITY,
+) -> Body:
     """Return the Body of a skeleton: joint tree, prior SIP, limits, boxes and soles."""
     sip, boxes = prior(reference(table, subject), skeleton, subject), shape_boxes(skeleton)
     return Body(
@@ -50,17 +86,18 @@ def assemble(subject: Subject, skeleton: Skeleton, *, table: str, markers: Segme
         com_boxes=com_boxes(sip, skeleton, boxes),
         feet={side: sole(skeleton, subject, side) for side in SIDES},
         notes=(*notes, *_prior_notes(subject, table)),
+        gravity=np.array([0.0, 0.0, -gravity]),
     )
 
 
 def _prior_notes(subject: Subject, table: str) -> tuple[str, ...]:
-    joint = "L5/S1" if table in ("dumas_2018", "winter_2009") else "the navel"
+    joint = trunk_joint(table)
     sex = {"F": "woman", "M": "man"}[subject.sex]
     notes = [
         f"Prior SIP: {table} for a {sex} of {subject.mass:.2f} kg, standard deviations from the spread of tables; trunk joint at {joint}."
     ]
-    if table in ("de_leva_1996", "dumas_2018") and not (np.isnan(subject.age) or ADULT[0] <= subject.age <= ADULT[1]):
-        groups = {row["study"] for row in read_table("segments", "mass_studies").rows if row["group"] in ("child", "older")}
+    if table in measured_whole() and not (np.isnan(subject.age) or ADULT[0] <= subject.age <= ADULT[1]):
+        groups = {study for sex in ("F", "M") for study, group in studies(sex).items() if group in ("child", "older")}
         notes.append(f"Table {table} is of young adults, the subject is {subject.age:.0f} years old; consider {', '.join(sorted(groups))}.")
     return tuple(notes)
 

@@ -8,8 +8,8 @@ import numpy as np
 from biodance.body.body import JointLimits
 from biodance.body.tables import Table, numbers, read_table
 from biodance.records import Array, Subject
+from biodance.settings import STANDARD_GRAVITY
 
-GRAVITY = 9.80665
 REFERENCE_MASS = {"F": 65.0, "M": 75.0}
 """kg: the bodies for which joints_23.csv gives torques; other bodies in proportion to mass."""
 Range = Literal["anatomical", "comfortable"]
@@ -52,7 +52,7 @@ def joint_limits(subject: Subject, *, within: Range = "anatomical") -> JointLimi
 
 def peak_torque(anderson: Table, subject: Subject, joint: str, direction: str) -> float:
     """Return the largest isometric torque, N·m > 0: C1 * mass * g * stature, C1 linear in age between 25, 60 and 70 years."""
-    return _coefficient(anderson, subject, joint, direction) * subject.mass * GRAVITY * subject.stature
+    return _coefficient(anderson, subject, joint, direction) * subject.mass * STANDARD_GRAVITY * subject.stature
 
 
 def age_factor(anderson: Table, subject: Subject) -> float:

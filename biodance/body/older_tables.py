@@ -8,26 +8,25 @@ import numpy as np
 from biodance.body import de_leva, dumas
 from biodance.body.inertia import Lump, merge
 from biodance.body.reference import Reference, normalised, proportion
-from biodance.body.tables import numbers, read_table
+from biodance.body.segment_data import read_segment_table
 from biodance.errors import UnknownName
 from biodance.records import Subject
 
 
 def winter(subject: Subject) -> Reference:
     """Return Winter 2009 at the subject's stature; longitudinal radii from de Leva 1996, trunk shape and joint (L5/S1) from Dumas 2018."""
-    sex, height, table = subject.sex, subject.stature, read_table("segments", "winter_2009")
+    sex, height, table = subject.sex, subject.stature, read_segment_table("winter_2009")
     shape = dumas.dumas(subject)
     scale = height / shape.stature
     lengths = {kind: scale * value for kind, value in shape.lengths.items()}
     lumps = {kind: _winter_limb(kind, subject) for kind in ("thigh", "shank", "upper_arm", "forearm", "hand")}
-    lengths |= {kind: float(table.row(segment=kind)["length_over_stature"]) * height for kind in ("thigh", "shank", "upper_arm")}
-    lengths["forearm_hand"] = float(table.row(segment="forearm")["length_over_stature"]) * height
+    lengths |= {kind: table.value(kind, "length", sex=sex) * height for kind in ("thigh", "shank", "upper_arm")}
+    lengths["forearm_hand"] = table.value("forearm", "length", sex=sex) * height
     hand = lumps.pop("hand")
     lumps["forearm_hand"] = merge(lumps.pop("forearm"), Lump(hand.mass, hand.com - [0.0, lengths["forearm_hand"], 0.0], hand.inertia))
     names = ("pelvis", "abdomen", "thorax", "head_neck")
     pelvis, *upper = (
-        _with_mass(part, float(table.row(segment=name)["mass_fraction"]), scale)
-        for part, name in zip(dumas.trunk_parts(sex), names, strict=True)
+        _with_mass(part, table.value(name, "mass", sex=sex), scale) for part, name in zip(dumas.trunk_parts(sex), names, strict=True)
     )
     return normalised(
         "winter_2009", height, lengths, {"pelvis": pelvis, "trunk_head": merge(*upper), "foot": _winter_foot(subject), **lumps}
@@ -35,17 +34,22 @@ def winter(subject: Subject) -> Reference:
 
 
 def _winter_limb(kind: str, subject: Subject) -> Lump:
-    row = read_table("segments", "winter_2009").row(segment=kind)
-    mass, fraction, radius, ratio = numbers(row, "mass_fraction com_fraction gyration_transverse length_over_stature")
-    size = ratio * subject.stature
+    mass, fraction, radius = _winter_sizes(kind, subject)
+    size = read_segment_table("winter_2009").value(kind, "length", sex=subject.sex) * subject.stature
     across = (radius * size) ** 2
     return Lump(mass, np.array([0.0, -fraction * size, 0.0]), mass * np.diag([across, _along(kind, subject), across]))
 
 
+def _winter_sizes(kind: str, subject: Subject) -> tuple[float, float, float]:
+    """Return mass fraction, CoM and transverse radius of gyration as fractions of the length."""
+    table, sex = read_segment_table("winter_2009"), subject.sex
+    radius = table.value(kind, "gyration", "transverse", sex=sex)
+    return table.value(kind, "mass", sex=sex), table.value(kind, "com", "longitudinal", sex=sex), radius
+
+
 def _winter_foot(subject: Subject) -> Lump:
     """Return Winter's foot: from the malleolus to the second metatarsal head, that is forwards and down to the sole."""
-    row = read_table("segments", "winter_2009").row(segment="foot")
-    mass, fraction, radius = numbers(row, "mass_fraction com_fraction gyration_transverse")
+    mass, fraction, radius = _winter_sizes("foot", subject)
     sex, size = subject.sex, proportion("foot_length", subject.sex) * subject.stature
     toe = np.array([(proportion("ball_from_heel", sex) - proportion("heel_behind_ankle", sex)) * size, 0.0, 0.0])
     toe[1] = -proportion("ankle_height", sex) * subject.stature
@@ -80,8 +84,8 @@ def zatsiorsky(subject: Subject) -> Reference:
     scale = subject.stature / de_leva.stature("M")
     lumps = {}
     for part, lump in de_leva.parts("M").items():
-        mass = regression(part, "mass", subject)[0]
-        moments = [regression(part, f"inertia_{axis}", subject)[0] for axis in ("sagittal", "longitudinal", "transverse")]
+        mass = regression(part, "mass", "", subject)[0]
+        moments = [regression(part, "inertia", axis, subject)[0] for axis in ("sagittal", "longitudinal", "transverse")]
         inertia = np.diag(moments if part != "foot" else [moments[1], moments[0], moments[2]])
         lumps[part] = Lump(mass, scale * lump.com, inertia)
         if mass <= 0 or 2 * max(moments) > sum(moments) or min(moments) <= 0:
@@ -92,11 +96,10 @@ def zatsiorsky(subject: Subject) -> Reference:
     return de_leva.joined("zatsiorsky_2002", subject.stature, "M", lumps)
 
 
-def regression(part: str, quantity: str, subject: Subject) -> tuple[float, float]:
+def regression(part: str, quantity: str, axis: str, subject: Subject) -> tuple[float, float]:
     """Return value and printed standard deviation (between men of the same mass and stature) of one regression, SI."""
-    row = read_table("segments", "zatsiorsky_2002").row(segment=part, quantity=quantity)
-    constant, per_kg, per_m, sd = numbers(row, "constant per_kg per_m sd")
-    return constant + per_kg * subject.mass + per_m * subject.stature, sd
+    found = read_segment_table("zatsiorsky_2002").number(part, quantity, axis, sex="M")
+    return found.of(subject), found.sd
 
 
 def study(name: str, subject: Subject) -> Reference:
@@ -112,8 +115,8 @@ def study(name: str, subject: Subject) -> Reference:
 
 def study_masses(name: str, subject: Subject) -> dict[str, float]:
     """Return the mass fraction of each kind of segment in one study; the trunk over the joint with the head is what remains."""
-    rows = read_table("segments", "mass_studies").where(study=name)
-    part = {row["part"]: float(row["mass_fraction"]) for row in rows if subject.sex in row["sex"]}
+    numbers = read_segment_table("mass_studies").numbers
+    part = {segment: one.value for (which, segment, sex, *_), one in numbers.items() if (which, sex) == (name, subject.sex)}
     limbs = {kind: part[kind] for kind in ("thigh", "shank", "foot", "upper_arm")} | {"forearm_hand": part["forearm"] + part["hand"]}
     above = 1.0 - 2 * sum(limbs.values())
     own = de_leva.parts(subject.sex)

@@ -33,6 +33,7 @@ def build(body: "Body") -> "pin.Model":
     pin = load_pinocchio()
     model = pin.Model()
     model.name = body.name
+    model.gravity.linear = np.array(body.gravity)
     root = 0
     if body.n_root:
         root = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")

@@ -1,26 +1,25 @@
 """The prior segment inertial parameters of a person: a table scaled to the skeleton, with a covariance that is consistent.
 
 Per segment the uncertain quantities are mass m, CoM c and inertia per unit mass J about the CoM, with the standard deviations of
-``spread`` and of ``anthropometry/segments/uncertainty.csv``. Left and right are correlated as mirror images. Tables that disagree do so
-as a whole (``disagreement``): what the data say of one limb in this respect, they say of all. The masses are conditioned on the scale
-(their sum is the body mass within ``scale_sd``). The covariance of phi = [m, m c, m (J + |c|² 1 - c c')] is the Jacobian times that
-covariance times the Jacobian's transpose: positive semi-definite by construction.
+``spread`` and of ``anthropometry/uncertainty/sizes.csv``. Left and right are correlated as mirror images. Tables that disagree do so as a
+whole (``disagreement``): what the data say of one limb in this respect, they say of all. The masses are conditioned on the scale (their
+sum is the body mass within its error). The covariance of phi = [m, m c, m (J + |c|² 1 - c c')] is the Jacobian times that covariance
+times the Jacobian's transpose: positive semi-definite by construction.
 """
 
 from dataclasses import replace
 
 import numpy as np
 
+from biodance.body.error_sizes import error_size
 from biodance.body.inertia import TENSOR, Lump, mirrored, parameters, turned
 from biodance.body.reference import Reference
+from biodance.body.segment_tables import measured_whole
 from biodance.body.segment_tables import reference as reference_of
 from biodance.body.skeleton import SEGMENTS, Skeleton, kind_of, side_of
 from biodance.body.spread import spread
-from biodance.body.tables import read_table
 from biodance.records import Array, Sip, Subject
 
-MEASURED = ("de_leva_1996", "dumas_2018")
-"""Tables of whole bodies for both sexes: one laid every CoM on the line between the joint centres, the other measured where it lies."""
 TRUNK = ("pelvis", "trunk_head")
 MIRROR = np.array([1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0])
 """Signs of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] under reflection at z = 0."""
@@ -32,7 +31,7 @@ def prior(reference: Reference, skeleton: Skeleton, subject: Subject) -> Sip:
     jacobian = np.zeros((10 * len(lumps), 10 * len(lumps)))
     for i, lump in enumerate(lumps):
         jacobian[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] = parameter_jacobian(lump)
-    others = tuple(scaled_lumps(reference_of(name, subject), skeleton, subject) for name in MEASURED if name != reference.table)
+    others = tuple(scaled_lumps(reference_of(name, subject), skeleton, subject) for name in measured_whole() if name != reference.table)
     covariance = jacobian @ primitive_covariance(lumps, skeleton, others) @ jacobian.T
     return Sip(SEGMENTS, np.concatenate([parameters(lump) for lump in lumps]), (covariance + covariance.T) / 2)
 
@@ -83,28 +82,23 @@ def primitive_covariance(lumps: tuple[Lump, ...], skeleton: Skeleton, others: tu
     """
     ways = np.array([disagreement(lumps, other) for other in others]).reshape(-1, 10 * len(lumps))
     variance = np.concatenate([primitive_sd(s, lump, skeleton) for s, lump in zip(SEGMENTS, lumps, strict=True)]) ** 2
-    own = np.sqrt(np.maximum(variance - np.sum(ways**2, axis=0), uncertainty("own_share") * variance))
+    own = np.sqrt(np.maximum(variance - np.sum(ways**2, axis=0), error_size("own_share", "variance") * variance))
     together = np.eye(len(SEGMENTS))
     for i, segment in enumerate(SEGMENTS):
         if segment.startswith("right_"):
             left = SEGMENTS.index(segment.replace("right_", "left_"))
-            together[i, left] = together[left, i] = uncertainty("left_right_correlation")
+            together[i, left] = together[left, i] = error_size("left_right_correlation", "mass")
     scale = own * np.concatenate([MIRROR if side_of(s) < 0 else np.ones(10) for s in SEGMENTS])
     covariance = np.kron(together, np.eye(10)) * np.outer(scale, scale) + ways.T @ ways
     total = np.tile(np.eye(10)[0], len(SEGMENTS))
     gain = covariance @ total
-    return covariance - np.outer(gain, gain) / (total @ gain + uncertainty("scale_sd") ** 2)
-
-
-def uncertainty(quantity: str) -> float:
-    """Return a number of ``anthropometry/segments/uncertainty.csv``."""
-    return float(read_table("segments", "uncertainty").row(quantity=quantity)["value"])
+    return covariance - np.outer(gain, gain) / (total @ gain + error_size("scale", "mass") ** 2)
 
 
 def com_sd(segment: str, skeleton: Skeleton) -> Array:
     """Return the standard deviations (3,) m of a segment's CoM in its joint frame: tables, people and misplaced joint centres."""
     length = skeleton.lengths["trunk_head" if segment == "pelvis" else segment]
-    return np.hypot(spread(kind_of(segment)).com * length, uncertainty("joint_centre_sd"))
+    return np.hypot(spread(kind_of(segment)).com * length, error_size("joint_centre", "other", state="before"))
 
 
 def primitive_sd(segment: str, lump: Lump, skeleton: Skeleton) -> Array:
@@ -115,7 +109,7 @@ def primitive_sd(segment: str, lump: Lump, skeleton: Skeleton) -> Array:
     tensor = [
         2 * own[i, i] * kind.radii[i]
         if i == j
-        else np.hypot(products[i, j] * length**2, uncertainty("product_floor") * np.sqrt(own[i, i] * own[j, j]))
+        else np.hypot(products[i, j] * length**2, error_size("product_floor", "inertia") * np.sqrt(own[i, i] * own[j, j]))
         for i, j in TENSOR
     ]
     return np.array([kind.mass * lump.mass, *com_sd(segment, skeleton), *tensor])

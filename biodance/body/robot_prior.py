@@ -8,6 +8,8 @@ from biodance.records import Array
 
 RELATIVE_MASS_SD, RELATIVE_INERTIA_SD = 0.15, 0.30
 """Of every segment: covers, cables and cards come and go (judgement; Bonnet 2016 finds 0.4 kg of 8 kg in all)."""
+POINT = 1e-6
+"""m: links with a smaller radius of gyration are point masses, as some files write them."""
 COM_SD = 0.2
 """m of CoM per m of radius of gyration: 10 mm for the links of HOAP-3."""
 
@@ -21,6 +23,17 @@ def robot_covariance(lumps: list[Lump], com_sd: list[float]) -> Array:
         block = slice(10 * i, 10 * i + 10)
         out[block, block] = jacobian @ np.diag([RELATIVE_MASS_SD * lump.mass, *[com] * 3, *[size] * 6]) ** 2 @ jacobian.T
     return out
+
+
+def is_point(lump: Lump) -> bool:
+    """Whether a lump has no extension: its radius of gyration is below `POINT`."""
+    return bool(np.trace(lump.inertia) <= 2 * lump.mass * POINT**2)
+
+
+def extended(lump: Lump, box: Array) -> Lump:
+    """Return the lump, or in place of a point mass one that fills its ``box`` (2, 3) m: what is left out is not known exactly."""
+    square = np.square(box[1] - box[0])
+    return Lump(lump.mass, lump.com, lump.mass / 12 * np.diag(square.sum() - square)) if is_point(lump) else lump
 
 
 def com_deviation(lump: Lump) -> float:

@@ -9,16 +9,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.body.body import Body, Joint, SegmentMarkers
-from biodance.body.human import DEFAULT_TABLE, assemble
+from biodance.body.human import assemble
 from biodance.body.measures import Measures, measures
 from biodance.body.reference import proportion
 from biodance.body.segment_tables import reference
 from biodance.body.skeleton import JOINTS, SEGMENTS, SIDES, Skeleton, kind_of
 from biodance.body.standing import Standing, standing
-from biodance.body.static_centres import Centres, Hip, static_centres
+from biodance.body.static_centres import Centres, static_centres
 from biodance.body.static_frames import Frames, segment_frames, turn
 from biodance.body.tracking_limits import widen
 from biodance.records import Array, Subject, Trial
+from biodance.settings import STANDARD_GRAVITY, Hip
 
 ANKLE_HEIGHT = (0.04, 0.12)
 """m: an ankle centre so high over z = 0 of the lab is taken to stand on that floor."""
@@ -36,8 +37,8 @@ LENGTH_RATIO = {
 
 @dataclass(frozen=True, eq=False)
 class Scaling:
-    """All that a scaled body is made of: the standing posture, its measures, the joint centres and the ``table`` of masses. With other
-    ``centres`` (``dataclasses.replace``) it makes the body of the same person with joints elsewhere.
+    """All that a scaled body is made of: the standing posture, its measures, the joint centres, the ``table`` of masses,
+    ``gravity`` m/s². With other ``centres`` (``dataclasses.replace``) it makes the body of the same person with joints elsewhere.
     """
 
     subject: Subject
@@ -46,6 +47,7 @@ class Scaling:
     sizes: Measures
     centres: Centres
     notes: tuple[str, ...]
+    gravity: float = STANDARD_GRAVITY
 
     def body(self) -> tuple[Body, Array]:
         """Return the scaled body and its posture q (30,) in the static trial, at which all calibrated markers are met exactly."""
@@ -53,14 +55,15 @@ class Scaling:
         skeleton = static_skeleton(frames, self.posture, self.sizes, self.subject)
         doubts = _doubts(skeleton, self.subject)
         markers = calibrated_markers(frames, self.posture)
-        body = assemble(self.subject, skeleton, table=self.table, markers=markers, notes=(*self.notes, *doubts))
+        notes = (*self.notes, *doubts)
+        body = assemble(self.subject, skeleton, table=self.table, markers=markers, notes=notes, gravity=self.gravity)
         q = static_posture(body, frames)
         limits, widened = widen(body, q)
         return replace(body, limits=limits, notes=(*body.notes, *widened), joint_errors=self.centres.errors), q
 
 
-def measure(subject: Subject, static: Trial, *, hip: Hip = "harrington", table: str = DEFAULT_TABLE) -> Scaling:
-    """Return what the static trial says about the body of a subject.
+def measure(subject: Subject, static: Trial, *, hip: Hip | None = None, table: str | None = None) -> Scaling:
+    """Return what the static trial says about the body of a subject; what is None is as ``static.settings`` have it.
 
     ``hip``: "harrington" (regressions on the pelvis markers) or "davis" (plug-in gait). ``table`` gives masses, CoM, inertias and where the
     trunk joint lies between mid hip and mid shoulder. ``notes`` of the body say what was measured, assumed, contradicted and warned about.
@@ -75,16 +78,52 @@ def measure(subject: Subject, static: Trial, *, hip: Hip = "harrington", table: 
         The mass or the stature of the subject is not known.
     """
     subject.require("mass", "stature")
+    hip, table = hip or static.settings.hip, table or static.settings.table
     posture = standing(static)
     sizes = measures(posture, static, subject)
     lengths = reference(table, subject).lengths
     centres = static_centres(posture.landmarks, sizes, hip=hip, trunk_fraction=lengths["pelvis"] / lengths["trunk_head"])
     notes = (f"Scaled on static trial {static.name}; hip centres: {hip}.", *posture.notes, *sizes.notes, *centres.notes)
-    return Scaling(subject, table, posture, sizes, centres, notes)
+    return Scaling(subject, table, posture, sizes, centres, notes, static.settings.gravity)
 
 
-def scale(subject: Subject, static: Trial, *, hip: Hip = "harrington", table: str = DEFAULT_TABLE) -> Body:
-    """Return the body of a subject, scaled on the static trial alone, with every marker calibrated in its segment; see ``measure``."""
+def scale(subject: Subject, static: Trial, *, hip: Hip | None = None, table: str | None = None) -> Body:
+    """Return the body of a subject, scaled on the static trial alone, with every marker calibrated in its segment.
+
+    Parameters
+    ----------
+    subject : Subject
+        Mass kg, stature m, sex.
+    static : Trial
+        Standing still, with markers of a known set.
+    hip : {"harrington", "davis"}, optional
+        Regression of the hip joint centres; by default as ``static.settings`` say.
+    table : str, optional
+        Table of segment inertial parameters; by default as ``static.settings`` say.
+
+    Returns
+    -------
+    Body
+        In the static posture every marker and joint centre has residual zero.
+
+    Raises
+    ------
+    TrialRefused
+        The static trial has no markers, no known marker set, or misses a landmark; all missing ones are named.
+    UnknownName
+        There is no such table.
+    SessionRefused
+        The mass or the stature of the subject is not known.
+
+    References
+    ----------
+    Harrington et al. 2007, doi:10.1016/j.jbiomech.2006.02.003; Davis et al. 1991, doi:10.1016/0167-9457(91)90046-Z.
+
+    Examples
+    --------
+    >>> biodance.scale(session.subject, session["static"])
+    Body('visit', 12 segments, 23 joint angles, 61.9 kg)
+    """
     return measure(subject, static, hip=hip, table=table).body()[0]
 
 

@@ -83,10 +83,10 @@ def _in_lengths(person: Reference, kind: str) -> Lump:
 def _within(kind: str) -> Spread:
     """Return the spread between men of one mass and stature; parts of a compound segment vary independently."""
     parts = PARTS[kind]
-    mass, mass_sd = np.array([regression(part, "mass", MAN) for part in parts]).T
+    mass, mass_sd = np.array([regression(part, "mass", "", MAN) for part in parts]).T
     share = mass / mass.sum()
     length = reference_lengths("M")["trunk_head" if kind == "pelvis" else kind]
-    com = np.linalg.norm(share * [regression(part, "com_distance", MAN)[1] for part in parts]) / length
+    com = np.linalg.norm(share * [regression(part, "com", "longitudinal", MAN)[1] for part in parts]) / length
     along = np.array([com, 0.0, 0.0]) if kind == "foot" else np.array([0.0, com, 0.0])
     names = ("longitudinal", "sagittal", "transverse") if kind == "foot" else _AXES
     radii = np.array([share @ [_radius_sd(part, axis) for part in parts] for axis in names])
@@ -94,5 +94,5 @@ def _within(kind: str) -> Spread:
 
 
 def _radius_sd(part: str, axis: str) -> float:
-    (moment, moment_sd), (mass, mass_sd) = regression(part, f"inertia_{axis}", MAN), regression(part, "mass", MAN)
+    (moment, moment_sd), (mass, mass_sd) = regression(part, "inertia", axis, MAN), regression(part, "mass", "", MAN)
     return 0.5 * float(np.sqrt(max((moment_sd / moment) ** 2 - (mass_sd / mass) ** 2, 0.0)))

@@ -47,7 +47,8 @@ def standing(static: Trial) -> Standing:
     if not static.marker_set:
         raise TrialRefused(
             f"{where}: its {len(static.markers.names)} labels are of no known marker set. Label them as in anthropometry/marker_sets, "
-            "or describe your own set in a TOML file of that form."
+            "or describe your own set in a TOML file of that form "
+            "and give it with --markers FILE, or say [markers] file or map in session.toml."
         )
     marker_set = read_marker_set(static.marker_set)
     markers = canonical(static.markers, marker_set)

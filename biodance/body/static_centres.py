@@ -2,30 +2,22 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from biodance.body.body import JointError
+from biodance.body.error_sizes import error_size
 from biodance.body.joint_centres import chord, davis_hip, elbow, harrington_hip, pelvis_frame, shoulder, unit, wrist
 from biodance.body.measures import Measures
 from biodance.records import Array
+from biodance.settings import Hip
 
-Hip = Literal["harrington", "davis"]
 SIGN = {"right": 1.0, "left": -1.0}
 UP = np.array([0.0, 0.0, 1.0])
 WRIST_BAR = 0.03
 """m: wrist markers this much farther apart than markers on the styloids would be sit on a bar."""
 AXIS_TOLERANCE = 30.0
 """deg: a thigh marker that turns the knee's axis further, seen from above, is not believed."""
-MEDIAL_SD = {"knee": 0.10, "elbow": 0.15}
-"""rad: how far an axis between lateral and medial marker may be turned about the bone (palpation of the epicondyles: 5 to 6 degrees at the
-femur, Della Croce 1999, DOI 10.1007/BF02513272; the humerus is shorter across)."""
-WAND_SD, MARCH_SD = 0.12, 0.25
-"""rad: the same for a knee axis from a thigh marker, and for one that was taken square to the line of march."""
-STRAIGHT_ARM_SD = 0.8
-"""rad: the same for an elbow without medial marker: its axis is square to a plane that a hanging arm hardly defines (40 to 65 degrees off
-on virtual persons)."""
 Places = Mapping[str, Array]
 
 
@@ -69,11 +61,12 @@ def static_centres(mark: Places, sizes: Measures, *, hip: Hip, trunk_fraction: f
         place |= {f"{side}_hip": hips[side], f"{side}_knee": knee, f"{side}_ankle": ankle_centre(mark, sizes, knee, side)}
         place[f"{side}_shoulder"] = shoulders[side]
         place[f"{side}_elbow"], place[f"{side}_wrist"] = arm_centres(mark, sizes, shoulders[side], side)
-        for joint, otherwise in (("knee", MARCH_SD if note else WAND_SD), ("elbow", STRAIGHT_ARM_SD)):
+        for joint, otherwise in (("knee", "line of march" if note else "thigh marker"), ("elbow", "straight arm")):
             name = f"{side}_{joint}"
             lateral[name] = mark[f"{name}_lateral"]
             right[name] = sign * (lateral[name] - place[name])
-            axis_sd[name] = MEDIAL_SD[joint] if f"{name}_medial" in mark else otherwise
+            way = "medial marker" if f"{name}_medial" in mark else otherwise
+            axis_sd[name] = error_size("axis_turn", f"{joint} {way}", state="before")
         across[side] = np.cross(mark[f"{side}_toe"] - mark[f"{side}_heel"], UP)
     return Centres(place, right, axis_sd, lateral, pelvis, across, trunk_fraction, tuple(notes))
 

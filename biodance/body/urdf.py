@@ -1,36 +1,42 @@
 """A robot from its URDF file: links to segments, fixed joints merged, limits from the file, soles under the links that are named as feet.
 
-The root's frame is turned to x forwards, y up, z right (as the human pelvis) where the file has z up (ROS REP 103). All other segments keep
-the frames of their links, so that a file that biodance wrote comes back as it was.
+The root's frame is turned to x forwards, y up, z right (as the human pelvis) where the file has z up (ROS REP 103) or x backwards. All
+other segments keep the frames of their links, so that a file that biodance wrote comes back as it was.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from biodance.body.body import NO_SEGMENT, UPRIGHT, Body, Foot, Joint, JointLimits, SegmentMarkers
+from biodance.body.body import NO_SEGMENT, Body, Foot, Joint, JointLimits, SegmentMarkers
 from biodance.body.export import refuse_impossible
 from biodance.body.inertia import Lump, merge, parameters
-from biodance.body.robot_prior import com_deviation, robot_covariance
+from biodance.body.robot_prior import com_deviation, extended, is_point, robot_covariance
+from biodance.body.robot_sole import alike, sole_outline
 from biodance.body.standing_frames import reframed
 from biodance.body.urdf_file import Connection, UrdfFile, read_urdf_file
 from biodance.errors import BiodanceError, FileRefused, UnknownName
 from biodance.records import Array, Sip
 
-FLAT = 0.0005
-"""m: corners of a foot this near to the plane of its sole belong to it."""
-
 
 @dataclass
 class _Carrier:
-    """A link that moves, while all that is fixed to it is gathered: its ``joint`` index, ``lumps`` and ``shapes`` in its frame."""
+    """A link that moves, while all that is fixed to it is gathered: its ``joint`` index, ``lumps``, ``shapes`` and ``hulls`` in its frame,
+    and why meshes could not be read.
+    """
 
     link: str
     joint: int
     lumps: list[Lump]
-    shapes: list[Array]
-    meshes: bool = False
+    shapes: list[Array] = field(default_factory=list)
+    hulls: list[Array] = field(default_factory=list)
+    unread: list[str] = field(default_factory=list)
+
+    @property
+    def corners(self) -> Array:
+        """(K, 3) m, corners of all shapes; empty without any."""
+        return np.concatenate([np.empty((0, 3)), *self.shapes, *self.hulls])
 
 
 def read_urdf(path: str | Path, *, feet: tuple[str, str]) -> Body:
@@ -77,13 +83,14 @@ def _body(file: UrdfFile, joints: list[Joint], limits: JointLimits, heavy: list[
         SegmentMarkers((), (), np.empty((0, 3)), np.empty(0)),
         boxes,
         np.concatenate([np.minimum(boxes[:, :1], com), np.maximum(boxes[:, 1:], com)], axis=1),
-        notes=_notes(file, heavy),
+        notes=_notes(file, heavy, [carrier.link for carrier, lump in zip(heavy, lumps, strict=True) if is_point(lump)]),
     )
     try:
         refuse_impossible(body)
     except BiodanceError as error:
         raise FileRefused(f"{file.path}: {error}") from error
-    return replace(body, sip=Sip(segments, phi, robot_covariance(lumps, [com_deviation(lump) for lump in lumps])))
+    spread = [extended(lump, box) for lump, box in zip(lumps, boxes, strict=True)]
+    return replace(body, sip=Sip(segments, phi, robot_covariance(spread, [com_deviation(lump) for lump in spread])))
 
 
 def _tree(file: UrdfFile) -> tuple[list[Joint], JointLimits, list[_Carrier], dict[str, _Carrier]]:
@@ -91,7 +98,7 @@ def _tree(file: UrdfFile) -> tuple[list[Joint], JointLimits, list[_Carrier], dic
 
     A joint is followed by all that hangs on it, as pinocchio's algorithms need it; joints on one link keep the order of the file.
     """
-    first = _Carrier(_root(file), -1, [], [])
+    first = _Carrier(_root(file), -1, [])
     owner, frame = {first.link: first}, {first.link: (np.eye(3), np.zeros(3))}
     joints, rows, carriers, waiting = list[Joint](), list[Connection](), [first], _on(file, first.link)
     while waiting:
@@ -103,7 +110,7 @@ def _tree(file: UrdfFile) -> tuple[list[Joint], JointLimits, list[_Carrier], dic
         else:
             joints.append(Joint(c.name, above.joint, c.axis, turn, place))
             rows.append(c)
-            owner[c.child], frame[c.child] = _Carrier(c.child, len(joints) - 1, [], []), (np.eye(3), np.zeros(3))
+            owner[c.child], frame[c.child] = _Carrier(c.child, len(joints) - 1, []), (np.eye(3), np.zeros(3))
             carriers.append(owner[c.child])
         waiting = [*_on(file, c.child), *waiting]
     lost = [name for name in file.links if name not in owner]
@@ -114,7 +121,8 @@ def _tree(file: UrdfFile) -> tuple[list[Joint], JointLimits, list[_Carrier], dic
         if link.lump is not None:
             carrier.lumps.append(Lump(link.lump.mass, turn @ link.lump.com + place, turn @ link.lump.inertia @ turn.T))
         carrier.shapes += [corners @ turn.T + place for corners in link.shapes]
-        carrier.meshes |= link.meshes and not link.shapes
+        carrier.hulls += [corners @ turn.T + place for corners in link.hulls]
+        carrier.unread += link.unread
     table = np.array([[c.lower, c.upper, c.velocity, c.effort] for c in rows]).reshape(-1, 4)
     return joints, JointLimits(table[:, 0], table[:, 1], table[:, 2], -table[:, 3], table[:, 3]), carriers, owner
 
@@ -136,19 +144,20 @@ def _on(file: UrdfFile, link: str) -> list[Connection]:
 
 def _box(carrier: _Carrier, lump: Lump) -> Array:
     """Return the box (2, 3) m around the shapes of a segment; without any, a box with its moments of inertia about its axes."""
-    if carrier.shapes:
-        corners = np.concatenate(carrier.shapes)
+    corners = carrier.corners
+    if corners.size:
         return np.stack([corners.min(axis=0), corners.max(axis=0)])
     moments = np.diag(lump.inertia)
     half = np.sqrt(np.maximum(1.5 * (moments.sum() - 2 * moments) / lump.mass, 1e-6))
     return np.stack([lump.com - half, lump.com + half])
 
 
-def _notes(file: UrdfFile, heavy: list[_Carrier]) -> tuple[str, ...]:
-    guessed = [carrier.link for carrier in heavy if not carrier.shapes]
+def _notes(file: UrdfFile, heavy: list[_Carrier], points: list[str]) -> tuple[str, ...]:
+    guessed = [carrier.link for carrier in heavy if not carrier.corners.size]
     turning = [c.name for c in file.connections if c.kind == "continuous"]
     notes = [f"No boxes in the file, taken from the inertia instead: {', '.join(guessed)}."] if guessed else []
     notes += [f"Continuous joints are used within half a turn to either side: {', '.join(turning)}."] if turning else []
+    notes += [f"Point masses in the file, of which the boxes say how sure they are: {', '.join(points)}."] if points else []
     return tuple(notes)
 
 
@@ -162,22 +171,41 @@ def _standing(file: UrdfFile, body: Body, feet: dict[str, _Carrier]) -> Body:
             f"{file.path}: at zero joint angles the feet are at {np.round(below, 3)} m from the root; the root must have x forwards and "
             "y or z up, and the robot must stand upright at zero angles."
         )
-    up = np.eye(3)[axis]
-    soles = {}
-    for side, carrier in feet.items():
-        if not carrier.shapes:
-            why = "its shapes are meshes, which are not read" if carrier.meshes else "it has no shape"
-            raise FileRefused(f"{file.path}: the {side} foot {carrier.link} shows no sole, since {why}. Give it a collision <box>.")
-        turn, _ = place[side]
-        ahead, sideways = turn.T @ np.eye(3)[0], turn.T @ np.cross(np.eye(3)[0], up)
-        soles[side] = Foot(body.segment_index(carrier.link), _sole(file, carrier, turn.T @ up, ahead, sideways))
-    right, left = (float(place[side][1] @ np.cross(np.eye(3)[0], up)) for side in ("right", "left"))
+    up, ahead = np.eye(3)[axis], np.eye(3)[0]
+    if _backwards(feet, place, np.cross(ahead, up)):
+        ahead = -ahead
+    soles = _soles(file, feet, place, up, ahead)
+    sideways = np.cross(ahead, up)
+    right, left = (float(place[side][1] @ sideways) for side in ("right", "left"))
     if not right > left:
         raise FileRefused(
             f"{file.path}: {feet['right'].link} stands left of {feet['left'].link}; name the right foot first, then the left one."
         )
-    standing = replace(body, feet=soles)
-    return reframed(standing, 0, UPRIGHT, np.zeros(3)) if axis == 2 else standing
+    standing = replace(body, feet={side: Foot(body.segment_index(feet[side].link), soles[side]) for side in feet})
+    turn = np.stack([ahead, up, sideways], axis=1)
+    return standing if np.array_equal(turn, np.eye(3)) else reframed(standing, 0, turn, np.zeros(3))
+
+
+def _backwards(feet: dict[str, _Carrier], place: dict[str, tuple[Array, Array]], sideways: Array) -> bool:
+    """Whether the root's x axis points backwards (iCub): seen along it the right foot is on the left, and the names say right and left."""
+    crossed = float((place["right"][1] - place["left"][1]) @ sideways) < 0
+    right, left = (feet[side].link.lower() for side in ("right", "left"))
+    pairs = (("right", "left"), ("r_", "l_"), ("_r", "_l"))
+    return crossed and any(one in right and right.replace(one, other) == left for one, other in pairs)
+
+
+def _soles(file: UrdfFile, feet: dict[str, _Carrier], place: dict[str, tuple[Array, Array]], up: Array, ahead: Array) -> dict[str, Array]:
+    """Return the outlines (P, 3) m of both soles in the frames of the feet."""
+    soles = {}
+    for side, carrier in feet.items():
+        if not carrier.corners.size:
+            why = f"of its meshes {carrier.unread[0]}" if carrier.unread else "it has no shape"
+            raise FileRefused(f"{file.path}: the {side} foot {carrier.link} shows no sole, since {why}. Give it a collision <box>.")
+        turn, _ = place[side]
+        axes = np.stack([ahead, up, np.cross(ahead, up)]) @ turn
+        soles[side] = sole_outline(f"{file.path}: the foot {carrier.link}", carrier.shapes, carrier.hulls, axes)
+    soles["right"], soles["left"] = alike(soles["right"], soles["left"])
+    return soles
 
 
 def _at_zero(body: Body, joint: int) -> tuple[Array, Array]:
@@ -187,26 +215,3 @@ def _at_zero(body: Body, joint: int) -> tuple[Array, Array]:
         one = body.joints[joint]
         turn, place, joint = one.rotation @ turn, one.translation + one.rotation @ place, one.parent
     return turn, place
-
-
-def _sole(file: UrdfFile, carrier: _Carrier, up: Array, ahead: Array, sideways: Array) -> Array:
-    """Return the sole (P, 3) m, counter-clockwise from above: the face of a foot's shapes that lies lowest and nearest to horizontal."""
-    from scipy.spatial import ConvexHull
-
-    normals = np.concatenate([_normals(corners) for corners in carrier.shapes])
-    down = normals[np.argmax(-normals @ up)]
-    if -down @ up < 0.5:
-        raise FileRefused(
-            f"{file.path}: no face of the foot {carrier.link} points to the ground at zero joint angles. Give it a collision <box>."
-        )
-    corners = np.concatenate(carrier.shapes)
-    low = corners[corners @ down > (corners @ down).max() - FLAT]
-    flat = np.stack([low @ ahead, -(low @ sideways)], axis=1)  # x forwards, y left: counter-clockwise is from above
-    return np.asarray(low[ConvexHull(flat).vertices])
-
-
-def _normals(corners: Array) -> Array:
-    """Return the outward normals (6, 3) of a box from its corners (8, 3), ordered as `urdf_file` does."""
-    axes = np.array([corners[4] - corners[0], corners[2] - corners[0], corners[1] - corners[0]])
-    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-    return np.concatenate([axes, -axes])

@@ -1,7 +1,7 @@
 """What a URDF file says: links and joints, checked and in SI units, with nothing left out in silence.
 
-Read are <link> (inertial, collision and visual boxes, cylinders, spheres) and <joint> (revolute, continuous, fixed) with their placements
-and limits. Meshes, transmissions, sensors and colours do not matter here. Format: wiki.ros.org/urdf/XML.
+Read are <link> (inertial, collision and visual boxes, cylinders, spheres and meshes) and <joint> (revolute, continuous, fixed) with their
+placements and limits. Transmissions, sensors and colours do not matter here. Format: wiki.ros.org/urdf/XML.
 """
 
 from dataclasses import dataclass
@@ -11,6 +11,7 @@ from xml.etree.ElementTree import Element, ParseError, fromstring
 import numpy as np
 
 from biodance.body.inertia import Lump
+from biodance.body.urdf_mesh import mesh_file, mesh_hull
 from biodance.errors import FileRefused
 from biodance.records import Array
 
@@ -22,14 +23,16 @@ TURN = np.pi
 
 @dataclass(frozen=True, eq=False)
 class Link:
-    """One link: ``lump`` in the link's frame, None without mass; ``shapes`` corners (8, 3) m of the boxes around its collision
-    (else visual) shapes, in the link's frame; ``meshes`` True where some of its shapes are meshes, which are not read.
+    """One link: ``lump`` in the link's frame, None without mass; of its collision (else visual) shapes, in the link's frame: ``shapes``
+    corners (8, 3) m of the boxes around those that are no meshes, ``hulls`` corners (K, 3) m of the convex hulls of those that are;
+    ``unread`` why a mesh could not be read.
     """
 
     name: str
     lump: Lump | None
     shapes: tuple[Array, ...]
-    meshes: bool
+    hulls: tuple[Array, ...] = ()
+    unread: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,10 +117,13 @@ def placement(path: Path, element: Element, what: str) -> tuple[Array, Array]:
 def _link(path: Path, element: Element) -> Link:
     name = element.get("name") or ""
     what = f"link {name!r}"
-    collisions = _shapes(path, element.findall("collision"), what)
-    shapes = collisions if collisions else _shapes(path, element.findall("visual"), what)
-    meshes = element.find("collision/geometry/mesh") is not None or element.find("visual/geometry/mesh") is not None
-    return Link(name, _lump(path, element.find("inertial"), what), shapes, meshes)
+    lump, unread = _lump(path, element.find("inertial"), what), list[str]()
+    for kind in ("collision", "visual"):
+        elements = element.findall(kind)
+        shapes, hulls = _shapes(path, elements, what), mesh_hulls(path, elements, what, unread)
+        if shapes or hulls:
+            return Link(name, lump, shapes, hulls)
+    return Link(name, lump, (), (), tuple(unread))
 
 
 def _lump(path: Path, inertial: Element | None, what: str) -> Lump | None:
@@ -155,6 +161,22 @@ def _shapes(path: Path, elements: list[Element], what: str) -> tuple[Array, ...]
         turn, place = placement(path, element, what)
         signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
         found.append(signs * half @ turn.T + place)
+    return tuple(found)
+
+
+def mesh_hulls(path: Path, elements: list[Element], what: str, unread: list[str]) -> tuple[Array, ...]:
+    """Return the corners (K, 3) m of the convex hulls of all shapes that are meshes; what cannot be read is said in ``unread``."""
+    found = []
+    for element in elements:
+        mesh = element.find("geometry/mesh")
+        if mesh is None:
+            continue
+        scale = _row(path, mesh, "scale", what, "1 1 1")
+        turn, place = placement(path, element, what)
+        try:
+            found.append(mesh_hull(mesh_file(path, mesh.get("filename", "")), tuple(scale)) @ turn.T + place)
+        except FileRefused as error:
+            unread.append(str(error))
     return tuple(found)
 
 

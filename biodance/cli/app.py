@@ -24,7 +24,16 @@ app = App(
 
 Json = Annotated[bool, Parameter(name="--json", negative="", help="Print one JSON document on stdout and nothing else there.")]
 Force = Annotated[bool, Parameter(name="--force", negative="", help="Write into a folder that already holds files.")]
+Tables = Annotated[Path | None, Parameter(name="--tables", help="Folder for the same numbers as tables, CSV and Parquet.")]
 Out = Annotated[Path, Parameter(name="--out", help="Folder for the results; it is made if it is missing.")]
+
+Set = Annotated[
+    tuple[str, ...],
+    Parameter(name="--set", negative=(), help="Choose a setting: --set filter.cutoff=6; may be repeated. `biodance settings` prints all."),
+]
+MarkersFile = Annotated[
+    str | None, Parameter(name="--markers", help="The marker set that was worn: a TOML file of your own (see CONTRIBUTING.md), or a name.")
+]
 
 
 def say(sentence: str) -> None:

@@ -1,4 +1,4 @@
-"""Commands of the dance: dance, criteria."""
+"""The command dance."""
 
 import shutil
 import sys
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, STOPPED, Force, Json, Out, app, print_json, progress, say
+from biodance.cli.app import DONE, NEEDS_A_PERSON, STOPPED, Force, Json, Out, app, print_json, say
 from biodance.errors import BiodanceError
 
 if TYPE_CHECKING:
@@ -38,8 +38,8 @@ def dance(
     results.json. Ctrl-C keeps what is finished, and the same command goes on from there. A dance that cannot exist is refused with the
     constraint that forbids it (exit code 1).
     """
-    from biodance.dance.person import HEALTHY, read_person
-    from biodance.dance.protocol import read_plan
+    from biodance.dance.problem.person import HEALTHY, read_person
+    from biodance.dance.problem.plan import read_plan
     from biodance.pipeline.dance import UNFINISHED, dance_folder, dancer, make_dance
     from biodance.pipeline.robot_dance import make_robot_dance, robot_dancer
     from biodance.report.dance_write import print_dance, write_dance
@@ -91,29 +91,3 @@ def counted_progress() -> Iterator[Callable[[str, int, int], None]]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
         task = bars.add_task("", total=None)
         yield lambda what, done, of: bars.update(task, description=what, completed=done, total=of or None)
-
-
-@app.command
-def criteria(*, ranges: str = "frontal", json: Json = False) -> int:
-    """Compare all excitation criteria on the planar chain: each designs a motion of 2 s, each judges all of them.
-
-    Parameters
-    ----------
-    ranges
-        Assumed joint ranges of the chain: frontal, equal or wide.
-    """
-    from biodance.body.planar import planar_chain
-    from biodance.dance.planar import compared
-
-    body = planar_chain(ranges=ranges)
-    with progress() as tell:
-        tell("designing one motion with every criterion")
-        found = compared(body)
-    if json:
-        score = {name: dict(zip(found.names, row, strict=True)) for name, row in zip(found.names, found.score.tolist(), strict=True)}
-        print_json(
-            {"criteria": list(found.names), "score": score, "sd_before": found.sd_before.tolist(), "sd_after": found.sd_after.tolist()}
-        )
-    else:
-        sys.stdout.write(f"{found.table()}\nA row is a design, a column a judge; * is the best of the column; smaller is better.\n")
-    return DONE

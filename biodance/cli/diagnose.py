@@ -6,8 +6,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, Force, Json, Out, app, print_json, progress
-from biodance.cli.session import compared
+from biodance.cli.app import DONE, NEEDS_A_PERSON, Force, Json, MarkersFile, Out, Set, Tables, app, print_json, progress
+from biodance.cli.session import Reading, compared, ready, tabled
 
 
 @app.command
@@ -43,6 +43,9 @@ def diagnose(
     reference: Path | None = None,
     accept: Annotated[bool, Parameter(name="--accept", negative="", help="Also write the body with the findings accepted.")] = False,
     subject: str | None = None,
+    chosen: Set = (),
+    tables: Tables = None,
+    markers: MarkersFile = None,
     json: Json = False,
     force: Force = False,
 ) -> int:
@@ -59,18 +62,21 @@ def diagnose(
     """
     from rich.console import Console
 
-    from biodance.pipeline.diagnosis import diagnose_session
+    from biodance.pipeline import front
     from biodance.report.terminal import print_diagnosis
     from biodance.report.write import write_diagnosis
 
     with progress() as tell:
-        result, before, folder = compared(session, reference, out, subject=subject, force=force, tell=tell)
-        found = diagnose_session(result, reference=before, tell=tell)
+        place = ready(tables, session, force=force)
+        options = Reading(subject, markers, chosen)
+        result, before, folder = compared(session, reference, out, options, force=force, tell=tell)
+        found = front.diagnose(result, reference=before, tell=tell)
         tell("writing the page")
+        tabled(result, place, found.diagnosis)
         document = write_diagnosis(result, found, folder, accepted=accept)
     if json:
         print_json(document)
     else:
         print_diagnosis(document, Console())
         sys.stdout.write(f"{folder / 'report.html'}\n")
-    return DONE if document["verdict"] == "nothing wrong" else NEEDS_A_PERSON
+    return DONE if document["verdict"] == "nothing wrong" and not document["failures"] else NEEDS_A_PERSON

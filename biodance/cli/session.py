@@ -1,23 +1,58 @@
-"""Commands on a recorded session: inspect, report, identify, export."""
+"""Commands on a recorded session: inspect, report, identify, settings, export."""
 
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED, Force, Json, Out, app, print_json, progress, say
+from biodance.cli.app import (
+    DONE,
+    NEEDS_A_PERSON,
+    NOT_DONE,
+    STOPPED,
+    Force,
+    Json,
+    MarkersFile,
+    Out,
+    Set,
+    Tables,
+    app,
+    print_json,
+    progress,
+    say,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from biodance.diagnose.diagnosis import Diagnosis
     from biodance.pipeline.identification import SessionIdentification
     from biodance.pipeline.results import SessionResult
     from biodance.records import Session
 
 
-def reported(recording: "Session", folder: Path, tell: "Callable[[str], None]") -> "tuple[SessionResult, dict[str, Any]]":
-    """Examine a session and report it into ``folder``; return the result and the content of results.json."""
+@dataclass(frozen=True)
+class Reading:
+    """How a folder is read: the person where files hold several, the marker set that was worn, the settings chosen."""
+
+    subject: str | None
+    markers: str | None
+    chosen: tuple[str, ...]
+
+    def read(self, folder: Path, tell: "Callable[[str], None]") -> "Session":
+        """Return the session in ``folder``."""
+        from biodance.lab.session import read_session
+        from biodance.settings import assignments
+
+        return read_session(folder, subject_name=self.subject, markers=self.markers, settings=assignments(self.chosen), tell=tell)
+
+
+def reported(
+    recording: "Session", folder: Path, tell: "Callable[[str], None]", *, tables: Path | None = None
+) -> "tuple[SessionResult, dict[str, Any]]":
+    """Examine a session and report it into ``folder``, as tables into ``tables``; return the result and the content of results.json."""
     from biodance.pipeline.diagnosis import diagnosed
     from biodance.pipeline.session import examine
     from biodance.report.write import write_report
@@ -25,7 +60,24 @@ def reported(recording: "Session", folder: Path, tell: "Callable[[str], None]") 
     result = examine(recording, tell=tell)
     found = diagnosed(result, tell=tell) if not result.stopped else None
     tell("writing the page")
+    tabled(result, tables, found.diagnosis if found else None)
     return result, write_report(result, folder, diagnosis=found)
+
+
+def tabled(result: "SessionResult", folder: Path | None, diagnosis: "Diagnosis | None" = None) -> None:
+    """Write the tables of a result into a folder that is ready for them; nothing without one."""
+    from biodance.pipeline.tables import session_tables
+    from biodance.report.tables import write_tables
+
+    if folder is not None:
+        write_tables(session_tables(result, diagnosis), folder)
+
+
+def ready(tables: Path | None, session: Path, *, force: bool) -> Path | None:
+    """Return the folder for tables, made; None where none are wanted."""
+    from biodance.report.tables import tables_folder
+
+    return None if tables is None else tables_folder(tables, session, force=force)
 
 
 def told(result: "SessionResult", folder: Path, found: "dict[str, Any]", json: bool) -> int:
@@ -46,20 +98,26 @@ def told(result: "SessionResult", folder: Path, found: "dict[str, Any]", json: b
 
 
 def compared(
-    session: Path, reference: Path | None, out: Path, *, subject: str | None, force: bool, tell: "Callable[[str], None]"
+    session: Path,
+    reference: Path | None,
+    out: Path,
+    options: Reading,
+    *,
+    force: bool,
+    tell: "Callable[[str], None]",
 ) -> "tuple[SessionResult, SessionIdentification | None, Path]":
     """Examine a session beside an earlier one of the same person; return what was found, what that one said, and the results' folder.
 
     What cannot be read or written is said before the long work starts.
     """
     from biodance.lab.results_folder import results_folder
-    from biodance.lab.session import read_session
-    from biodance.pipeline.session import examine, identified
+    from biodance.pipeline.front import identify
+    from biodance.pipeline.session import examine
 
-    earlier = read_session(reference, subject_name=subject, tell=tell) if reference else None
-    recording = read_session(session, subject_name=subject, tell=tell)
+    earlier = options.read(reference, tell) if reference else None
+    recording = options.read(session, tell)
     folder = results_folder(out, session, force=force)
-    before = identified(examine(earlier, tell=tell)) if earlier else None
+    before = identify(earlier, tell=tell) if earlier else None
     return examine(recording, reference=before, tell=tell), before, folder
 
 
@@ -74,11 +132,11 @@ def _told_identified(result: "SessionResult", folder: Path, found: "dict[str, An
     else:
         print_identification(found, Console())
         sys.stdout.write(f"{folder / 'report.html'}\n")
-    return NEEDS_A_PERSON if result.needs_a_person or found["status"] != "solved" else DONE
+    return NEEDS_A_PERSON if result.needs_a_person else DONE
 
 
 @app.command
-def inspect(*paths: Path, json: Json = False) -> int:
+def inspect(*paths: Path, markers: MarkersFile = None, json: Json = False) -> int:
     """Say what is in recordings: markers, gaps, plates, the weight on them, and every decision the readers take.
 
     Parameters
@@ -92,7 +150,7 @@ def inspect(*paths: Path, json: Json = False) -> int:
     from biodance.report.terminal import print_inspected
 
     with progress() as tell:
-        records = inspect_paths(paths, tell=tell)
+        records = inspect_paths(paths, markers=markers, tell=tell)
     if json:
         print_json(records)
     else:
@@ -102,7 +160,17 @@ def inspect(*paths: Path, json: Json = False) -> int:
 
 
 @app.command
-def report(session: Path, *, out: Out, subject: str | None = None, json: Json = False, force: Force = False) -> int:
+def report(
+    session: Path,
+    *,
+    out: Out,
+    subject: str | None = None,
+    markers: MarkersFile = None,
+    chosen: Set = (),
+    tables: Tables = None,
+    json: Json = False,
+    force: Force = False,
+) -> int:
     """Take a session through all stages and write report.html and results.json.
 
     Parameters
@@ -113,18 +181,26 @@ def report(session: Path, *, out: Out, subject: str | None = None, json: Json = 
         The person to report where C3D files hold several; without it a file with several persons is refused and names them.
     """
     from biodance.lab.results_folder import results_folder
-    from biodance.lab.session import read_session
 
     with progress() as tell:
-        recording = read_session(session, subject_name=subject, tell=tell)
-        folder = results_folder(out, session, force=force)
-        result, found = reported(recording, folder, tell)
+        recording = Reading(subject, markers, chosen).read(session, tell)
+        folder, place = results_folder(out, session, force=force), ready(tables, session, force=force)
+        result, found = reported(recording, folder, tell, tables=place)
     return told(result, folder, found, json)
 
 
 @app.command
 def identify(
-    session: Path, *, out: Out, reference: Path | None = None, subject: str | None = None, json: Json = False, force: Force = False
+    session: Path,
+    *,
+    out: Out,
+    reference: Path | None = None,
+    subject: str | None = None,
+    chosen: Set = (),
+    tables: Tables = None,
+    markers: MarkersFile = None,
+    json: Json = False,
+    force: Force = False,
 ) -> int:
     """Identify what every segment weighs, with intervals, validate it on the trials kept, and look for an added mass.
 
@@ -137,25 +213,50 @@ def identify(
     subject
         The person to identify where C3D files hold several.
     """
-    from biodance.pipeline.session import identified
+    from biodance.pipeline import front
     from biodance.report.write import write_identification
 
     with progress() as tell:
-        result, _, folder = compared(session, reference, out, subject=subject, force=force, tell=tell)
-        found = identified(result)
+        place = ready(tables, session, force=force)
+        options = Reading(subject, markers, chosen)
+        result, _, folder = compared(session, reference, out, options, force=force, tell=tell)
+        found = front.identify(result)
         tell("writing the page")
+        tabled(result, place)
         document = write_identification(result, found, folder)
     return _told_identified(result, folder, document, json)
+
+
+@app.command
+def settings(session: Path | None = None, *, chosen: Set = (), json: Json = False) -> int:
+    """Print everything an analyst may choose: value, unit, meaning and legal range, as it may stand in session.toml.
+
+    Parameters
+    ----------
+    session
+        A session folder, whose session.toml is then followed.
+    """
+    from biodance.lab.session_file import read_session_file
+    from biodance.settings import USUAL, assignments
+
+    found = (read_session_file(session).settings if session else USUAL).changed(assignments(chosen))
+    if json:
+        print_json([row._asdict() for row in found.all()])
+    else:
+        sys.stdout.write(found.to_toml())
+    return DONE
 
 
 @app.command
 def export(
     source: Path,
     *,
-    format: Annotated[str, Parameter(help="osim, urdf, mjcf, biomod, csv; or trc, mot of one trial.")],
+    format: Annotated[str, Parameter(help="osim, urdf, mjcf, biomod, glb, csv; or trc, mot, c3d of one trial.")],
     out: Annotated[Path, Parameter(help="The file to write.")],
-    trial: Annotated[str | None, Parameter(help="Name of the trial for trc and mot.")] = None,
+    trial: Annotated[str | None, Parameter(help="Name of the trial for trc, mot and c3d.")] = None,
     subject: Annotated[str | None, Parameter(help="The person to export where C3D files hold several.")] = None,
+    meshes: Annotated[Path | None, Parameter(help="Folder with a closed mesh a segment (right_thigh.stl, m) for glb and osim.")] = None,
+    markers: MarkersFile = None,
     force: Annotated[bool, Parameter(name="--force", negative="", help="Replace the file if it exists.")] = False,
 ) -> int:
     """Write a session, or the results of `biodance identify`, for another program.
@@ -169,7 +270,7 @@ def export(
     from biodance.pipeline.export import replaceable
 
     with progress() as tell, replaceable(out, force=force) as place:
-        _, sentence = write(source, place, format=format, trial=trial, subject=subject, tell=tell)
+        _, sentence = write(source, place, format=format, trial=trial, subject=subject, markers=markers, meshes=meshes, tell=tell)
     say(sentence)
     sys.stdout.write(f"{out}\n")
     return DONE

@@ -30,18 +30,14 @@ def simulate(
     protocol
         Name of a protocol: dance, short, squat, standing ...; a wrong name lists all.
     """
+    from biodance.pipeline import front
     from biodance.records import Subject
-    from biodance.virtual_lab.hide import hide, parse
-    from biodance.virtual_lab.protocol_file import read_protocol
-    from biodance.virtual_lab.simulate import simulate as write_session
 
     if force:
         _forget_simulated(out)
     with progress() as tell:
         tell(f"simulating {protocol}")
-        subject, plan = Subject(mass, height, sex, age), read_protocol(protocol)
-        visit, loads = hide(tuple(parse(text) for text in effect), subject, plan, seed=seed)
-        folder = write_session(subject, plan, out, seed=seed, loads=loads, visit=visit)
+        folder = front.simulate(Subject(mass, height, sex, age), protocol, out, seed=seed, effects=effect)
     sys.stdout.write(f"{folder}\n")
     return DONE
 

@@ -1,7 +1,8 @@
-"""The cue sheet: a dance in plain words, posture by posture, for the person who calls it and the person who performs it.
+"""The cue sheet: a dance in plain words, posture by posture, for the person who calls it and the person who performs
+it.
 
-Only what moves is said, largest first, pairs together, angles rounded to what a person can follow; what goes beyond ``MOST`` things is
-said after them, so that nothing is left out.
+Only what moves is said, largest first, pairs together, angles rounded to what a person can follow; what goes beyond
+``MOST`` things is said after them, so that nothing is left out.
 """
 
 from dataclasses import dataclass
@@ -52,7 +53,8 @@ def cue_sheet(
 ) -> str:
     """Return the cue sheet (Markdown) of postures ``angles`` (P, n) rad of the joints of ``body``.
 
-    ``stances`` (P,) say in words where the feet are; ``planted`` (P,) which feet ("right", "left") stand. ``move`` and ``hold`` s.
+    ``stances`` (P,) say in words where the feet are; ``planted`` (P,) which feet ("right", "left") stand. ``move`` and
+    ``hold`` s.
 
     Raises
     ------

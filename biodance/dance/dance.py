@@ -1,34 +1,39 @@
 """The Dance: postures held for a while, moves between them, and where the feet stand meanwhile.
 
-A dance is written in the coordinates of its `Chain`; planted legs are not written but solved in closed form, so that planted feet stay
-where they are at every instant, not only at samples.
+A dance is written in the coordinates of its `Chain`; planted legs are not written but solved in closed form, so that
+planted feet stay where they are at every instant, not only at samples.
 """
 
 import json
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from biodance import display
 from biodance.body.body import Body
 from biodance.body.body_file import body_text, parse_body
-from biodance.dance.chain import Chain
-from biodance.dance.programme import closed
-from biodance.dance.splines import basis_at
-from biodance.dance.stance import Stance
-from biodance.dance.state import State
+from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.splines import basis_at
+from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.state import State, close_legs
 from biodance.errors import BiodanceError, FileRefused
 from biodance.records import Array, Motion, frozen_array
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 VERSION = 1
 
 
 @dataclass(frozen=True)
 class Phase:
-    """A stretch of a dance from ``start`` to ``end`` s in which the feet do not change; ``posture`` is held, or moved to."""
+    """A stretch of a dance from ``start`` to ``end`` s in which the feet do not change; ``posture`` is held, or moved
+    to.
+    """
 
     start: float
     end: float
@@ -39,12 +44,36 @@ class Phase:
 
 @dataclass(frozen=True, eq=False)
 class Dance:
-    """One continuous movement.
+    """One continuous movement: postures held for a while, and moves between them.
 
-    ``protocol`` its name; ``body`` whose it is; ``postures`` (P, n) coordinates of the chain (m, rad); ``stances`` (P,) the feet during
-    each hold, with ``over`` set for postures in between that only carry the weight from one foot configuration to the next;
-    ``hold`` (P,) s; ``via`` (P - 1, 2, n) via points of the moves, ``move`` (P - 1,) s how long each takes, ``under`` (P - 1,) the feet
-    meanwhile; ``seed`` of the random numbers; ``notes`` in plain sentences what differs from the plan, because a move was impossible.
+    Parameters
+    ----------
+    protocol : str
+        Its name.
+    body : Body
+        Whose it is.
+    postures : array_like
+        (P, n) coordinates of the chain, m and rad.
+    stances : tuple
+        (P) the feet during each hold, with ``over`` set for postures that only carry the weight to the next feet.
+    hold : array_like
+        (P,) s.
+    via : array_like
+        (P - 1, 2, n) via points of the moves.
+    move : array_like
+        (P - 1,) s that each takes.
+    under : tuple
+        (P - 1) the feet meanwhile.
+    seed : int
+        Of the random numbers.
+    notes : tuple of str
+        What differs from the plan because a move was impossible.
+
+    Examples
+    --------
+    >>> dance = biodance.Dance.load("dance.npz")
+    >>> dance
+    Dance('one_segment', 2 postures, 4 s)
     """
 
     protocol: str
@@ -69,6 +98,35 @@ class Dance:
                 f"together; expected as many stances as postures, one move less, and {self.chain.size} coordinates."
             )
 
+    def __repr__(self) -> str:
+        return f"Dance({self.protocol!r}, {len(self.postures)} postures, {self.duration:.0f} s)"
+
+    def _repr_html_(self) -> str:
+        return display.card(repr(self), self.table(), self.notes)
+
+    def table(self) -> "pd.DataFrame":
+        """Return one row for each posture that is held.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Index posture; start (s), hold (s), feet on the ground, then as `Motion.table`: root and joint angles (deg).
+
+        Examples
+        --------
+        >>> dance.table()["start (s)"].to_list(), dance.table()["feet"].to_list()
+        ([0.0, 3.0], ['right and left', 'right and left'])
+        """
+        import pandas as pd
+
+        held = [phase for phase in self.phases if phase.kind == "hold"]
+        x = np.concatenate([self.state(phase, np.array([phase.start])).x for phase in held])
+        out = self.chain.motion(np.array([phase.start for phase in held]), x, *np.zeros((2, *x.shape))).table()
+        out.insert(0, "start (s)", out.index.to_numpy())
+        out.insert(1, "hold (s)", [phase.end - phase.start for phase in held])
+        out.insert(2, "feet", [" and ".join(("right", "left")[foot] for foot in phase.stance.planted) or "none" for phase in held])
+        return out.set_index(pd.Index([phase.posture for phase in held], name="posture"))
+
     @cached_property
     def chain(self) -> Chain:
         """The coordinates in which the dance is written."""
@@ -81,7 +139,7 @@ class Dance:
 
     @property
     def counted(self) -> NDArray[np.bool_]:
-        """(P,) False for the postures in between: where the weight is over one foot of two, and stops that are not held as long."""
+        """False for postures in between, (P,) bool: weight over one foot of two, and stops that are not held as long."""
         return np.array([stance.over is None for stance in self.stances]) & (self.hold == self.hold.max())
 
     @cached_property
@@ -96,22 +154,56 @@ class Dance:
         return tuple(out)
 
     def state(self, phase: Phase, time: Array) -> State:
-        """Return the coordinates at instants ``time`` (T,) s of the dance that lie in ``phase``."""
+        """Return the coordinates at instants of one phase.
+
+        Parameters
+        ----------
+        phase : Phase
+            One of `phases`.
+        time : numpy.ndarray
+            (T,) s of the dance, within the phase.
+
+        Returns
+        -------
+        State
+            Coordinates of the chain with derivatives, (T, n).
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> dance.state(dance.phases[0], np.array([0.0, 0.5])).x.shape
+        (2, 29)
+        """
         if phase.kind == "hold":
             x = np.repeat(self.postures[None, phase.posture], len(time), axis=0)
-            return closed(self.chain, phase.stance, x, *np.zeros((2, *x.shape)))
+            return close_legs(self.chain, phase.stance, x, *np.zeros((2, *x.shape)))
         move = phase.posture - 1
         points = np.stack([self.postures[move], *self.via[move], self.postures[move + 1]])
         basis = basis_at(np.clip(time - phase.start, 0.0, phase.end - phase.start), phase.end - phase.start)
-        return closed(self.chain, phase.stance, basis.position @ points, basis.velocity @ points, basis.acceleration @ points)
+        return close_legs(self.chain, phase.stance, basis.position @ points, basis.velocity @ points, basis.acceleration @ points)
 
     def motion(self, rate: float) -> Motion:
-        """Return the whole dance, holds included, sampled at ``rate`` Hz from 0 to its end.
+        """Return the whole dance, holds included, from 0 to its end.
+
+        Parameters
+        ----------
+        rate : float
+            Samples per second, Hz.
+
+        Returns
+        -------
+        Motion
+            Of the body.
 
         Raises
         ------
         BiodanceError
             The rate is not positive.
+
+        Examples
+        --------
+        >>> dance.motion(100.0)
+        Motion(23 joint angles, 401 frames at 100 Hz, 4.00 s)
         """
         if not rate > 0:
             raise BiodanceError(f"A dance cannot be sampled at {rate:g} Hz; give a positive rate, for example 100.")
@@ -127,7 +219,17 @@ class Dance:
         return self.chain.motion(time, x, v, a)
 
     def save(self, path: str | Path) -> None:
-        """Write the dance, its body included, as an npz file."""
+        """Write the dance, its body included, as an npz file.
+
+        Parameters
+        ----------
+        path : str or pathlib.Path
+            The file.
+
+        Examples
+        --------
+        >>> dance.save("again.npz")
+        """
         words = {"biodance_dance": VERSION, "protocol": self.protocol, "seed": self.seed, "notes": self.notes}
         words |= {"stances": [_told(s) for s in self.stances], "under": [_told(s) for s in self.under]}
         arrays = {name: getattr(self, name) for name in ("postures", "hold", "via", "move")}
@@ -137,10 +239,25 @@ class Dance:
     def load(cls, path: str | Path) -> "Dance":
         """Return the dance of a file that `save` made.
 
+        Parameters
+        ----------
+        path : str or pathlib.Path
+            The file.
+
+        Returns
+        -------
+        Dance
+            With its body.
+
         Raises
         ------
         FileRefused
             The file cannot be read, is of another version, or is not such a file.
+
+        Examples
+        --------
+        >>> biodance.Dance.load("dance.npz").duration
+        4.0
         """
         try:
             with np.load(path, allow_pickle=False) as found:

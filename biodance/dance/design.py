@@ -1,9 +1,12 @@
-"""Design a dance: postures, their order, postures in between, moves; checked at the end by other code, and never returned if it fails.
+"""Design a dance: postures, their order, postures in between, moves; checked at the end by other code, and never
+returned if it fails.
 
-Two processes work side by side: the searches for postures, then the moves, where those that excite the same segments follow each other and
-all others do not wait for them. The result depends on body, plan and seed only, not on who was faster or how often it was interrupted.
+Two processes work side by side: the searches for postures, then the moves, where those that excite the same segments
+follow each other and all others do not wait for them. The result depends on body, plan and seed only, not on who was
+faster or how often it was interrupted.
 """
 
+from collections.abc import Iterable
 from concurrent.futures import Executor, ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -11,21 +14,20 @@ from pathlib import Path
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.dance.between import middle_posture
-from biodance.dance.chain import Chain
 from biodance.dance.dance import Dance
-from biodance.dance.excitation import blocks
-from biodance.dance.ledger import Ledger
-from biodance.dance.mend import passable
-from biodance.dance.order import walk
-from biodance.dance.plan import Plan
-from biodance.dance.postures import find_postures
-from biodance.dance.selection import choose
-from biodance.dance.sequence import sequence, under
-from biodance.dance.stance import Stance
+from biodance.dance.limits import Limit
+from biodance.dance.postures.ordering import order_postures, support_sequence
+from biodance.dance.postures.posture import intermediate_posture
+from biodance.dance.postures.search import find_postures
+from biodance.dance.postures.selection import choose
+from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.excitation import excitation_blocks
+from biodance.dance.problem.plan import Plan
+from biodance.dance.problem.stance import Stance, under
+from biodance.dance.transitions.context import Checkpoint, Course, DesignContext, Tell
+from biodance.dance.transitions.planner import Way
+from biodance.dance.transitions.schedule import replan
 from biodance.dance.verify import Margin, broken, verify_with
-from biodance.dance.ways import Way
-from biodance.dance.work import Course, Tell, Work
 from biodance.errors import BiodanceError
 
 WORKERS = 2
@@ -34,12 +36,21 @@ SHORT = 1.0
 
 
 def design(
-    body: Body, plan: Plan, *, seed: int = 0, tell: Tell | None = None, resume: Path | None = None, workers: Executor | None = None
+    body: Body,
+    plan: Plan,
+    *,
+    limits: Iterable[Limit | type[Limit]] = (),
+    seed: int = 0,
+    tell: Tell | None = None,
+    resume: Path | None = None,
+    workers: Executor | None = None,
 ) -> tuple[Dance, tuple[Margin, ...]]:
-    """Return the dance of ``body`` (its limits count) after ``plan``, and what is left of every limit on a grid of 100 Hz (`verify`).
+    """Return the dance of ``body`` (its limits count) after ``plan``, and what is left of every limit on a grid of 100
+    Hz (`verify`).
 
-    ``tell`` is told the progress; with ``resume``, a folder, an interrupted design of the same body, plan and seed goes on; ``workers``
-    run the searches (default: two processes).
+    ``limits`` are kept beside those of the plan, or in place of one of the same name; ``tell`` is told the progress;
+    with ``resume``, a folder, an interrupted design of the same body, plan and seed goes on; ``workers`` run the
+    searches (default: two processes).
 
     Raises
     ------
@@ -48,13 +59,14 @@ def design(
     """
     if workers is None:
         with ProcessPoolExecutor(WORKERS) as pool:
-            return design(body, plan, seed=seed, tell=tell, resume=resume, workers=pool)
-    chain, parts = Chain(body), blocks(body)
+            return design(body, plan, limits=limits, seed=seed, tell=tell, resume=resume, workers=pool)
+    plan = plan.with_limits(limits)
+    chain, parts = Chain(body), excitation_blocks(body)
     parts = replace(parts, weight=parts.weight * plan.emphasis(body.segments), simplicity=plan.simplicity)
-    work = Work(chain, parts, plan, seed, Ledger(resume, body, plan, seed), workers, tell or (lambda what, done, of: None))
-    dance = _joined(work, *passable(work, _postures(work)))
+    work = DesignContext(chain, parts, plan, seed, Checkpoint(resume, body, plan, seed), workers, tell or (lambda what, done, of: None))
+    dance = _joined(work, *replan(work, _postures(work)))
     work.tell("checking every limit", 0, 0)
-    margins = verify_with(workers, body, dance, plan)
+    margins = verify_with(workers, body, dance, plan.limits)
     if wrong := broken(margins):
         told = "; ".join(f"{m.limit.replace('_', ' ')} by {-m.worst:.3g} {m.unit} at {m.where_s:.2f} s {m.what}" for m in wrong)
         raise BiodanceError(
@@ -63,23 +75,23 @@ def design(
     return dance, margins
 
 
-def _postures(work: Work) -> Course:
+def _postures(work: DesignContext) -> Course:
     """Return all postures in the order of the dance, those in between included."""
     plan, chain = work.plan, work.chain
-    counted = [s for s in sequence(chain.body, plan) if s.over is None]
+    counted = [s for s in support_sequence(chain.body, plan) if s.over is None]
     kept = work.ledger.get("postures")
     if kept is None:
         work.tell("postures", 0, len(counted))
-        found = find_postures(chain, work.blocks, tuple(counted), seed=work.seed, workers=work.workers)
+        found = find_postures(chain, work.blocks, tuple(counted), plan.limits, seed=work.seed, workers=work.workers)
         kept = {"x": found.x}
         work.ledger.put("postures", **kept)
     work.tell("postures", len(counted), len(counted))
     x, names = kept["x"], [s.name for s in counted]
     chosen = range(len(x)) if np.isinf(plan.budget) else choose(chain, x, tuple(names), plan).order
     groups = [[p for p in chosen if names[p] == name] for name in dict.fromkeys(names)]
-    order = walk(x, [group for group in groups if group])
+    order = order_postures(x, [group for group in groups if group])
     blocks_ = tuple((name, len(group)) for name, group in zip(dict.fromkeys(names), groups, strict=True) if group)
-    stances = sequence(chain.body, replace(plan, blocks=blocks_))
+    stances = support_sequence(chain.body, replace(plan, blocks=blocks_))
     rows, walked = np.full((len(stances), chain.size), np.nan), iter(order)
     for k, stance in enumerate(stances):
         if stance.over is None:
@@ -87,12 +99,14 @@ def _postures(work: Work) -> Course:
     known = np.flatnonzero(~np.isnan(rows[:, 0]))
     for k in sorted(set(range(len(stances))) - set(known)):
         near = [known[known < k][-1], *known[known > k][:1]]
-        rows[k] = middle_posture(chain, stances[k], rows[near], seed=[work.seed, 2, k]).x
+        rows[k] = intermediate_posture(chain, stances[k], rows[near], plan.limits, seed=[work.seed, 2, k]).x
     return Course(rows, stances)
 
 
-def _joined(work: Work, course: Course, ways: list[Way], notes: tuple[str, ...]) -> Dance:
-    """Return the dance of the postures of a course and the ways between them, stops on the way included, which are not held."""
+def _joined(work: DesignContext, course: Course, ways: list[Way], notes: tuple[str, ...]) -> Dance:
+    """Return the dance of the postures of a course and the ways between them, stops on the way included, which are not
+    held.
+    """
     plan, (x, stances) = work.plan, (course.x, course.stances)
     rows, feet, hold, under_ = [x[0]], [stances[0]], [plan.hold], list[Stance]()
     for k, way in enumerate(ways):

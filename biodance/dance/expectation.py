@@ -1,53 +1,45 @@
-"""What will be known after a dance, segment by segment, and how that grows with its duration - before anybody has danced.
+"""What will be known after a dance, segment by segment, and how that grows with its duration - before anybody has
+danced.
 
-The same machinery as identification, on the planned motion: information of the whitened regressor, discounted by what twins of the
-person (soft tissue, joint centres, hinge axes) and plates within their tolerances would disturb, on top of the table. Only the noise is
-not the session's own but a typical one.
+The same machinery as identification, on the planned motion: information of the whitened regressor, discounted by what
+twins of the person (soft tissue, joint centres, hinge axes) and plates within their tolerances would disturb, on top of
+the table. Only the noise is not the session's own but that of virtual dances.
 """
 
 from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
 
 import numpy as np
 
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
-from biodance.identify.caution import widened
 from biodance.identify.information import Information
 from biodance.identify.knowledge import segment_quantities
 from biodance.identify.mismatch import Mismatch, Sizes, mismatch, temper
-from biodance.identify.noise import BANDS, Noise
 from biodance.identify.posterior import Posterior, posterior
 from biodance.identify.statistics import Fit, statistics
+from biodance.library import locate, read_toml
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion
-
-TYPICAL = np.array(
-    [
-        [35.0, 11.0, 80.0, 19.0, 11.0, 2.9],
-        [3.6, 3.6, 5.0, 4.0, 3.6, 1.9],
-        [2.6, 2.6, 3.2, 3.1, 3.5, 1.3],
-        [2.3, 2.1, 2.1, 1.9, 2.6, 0.9],
-        [2.7, 2.4, 2.6, 2.2, 2.9, 0.8],
-        [2.1, 1.5, 2.3, 1.3, 1.9, 0.6],
-        [1.7, 1.3, 1.6, 1.1, 1.5, 0.5],
-    ]
-)
-"""(7, 6) N, N·m: noise of one coefficient in each of `identify.noise.BANDS` up to 6 Hz at 25 Hz, as learned from three virtual subjects who
-danced with realistic tolerances (root mean square)."""
-SIZES = Sizes(kinematics=1.0, noise=7.0)
-"""Sizes of the disturbances that the evidence chose in those sessions (noise: 4.5, 7, 7)."""
+from biodance.uncertainty.bands import BANDS, Bands
+from biodance.uncertainty.caution import widened
+from biodance.uncertainty.noise import Noise
 
 RATE = 12.5
 """Hz at which a plan is judged: moves of 2 s from rest to rest have nothing to say above 6 Hz."""
 STILL = 1.5
-"""s of every hold that count: the noise is so slow that longer standing tells next to nothing (docs/benchmarks/dance.md), and costs time."""
+"""s of every hold that count: the noise is so slow that longer standing tells next to nothing (docs/benchmarks/dance.md), and it
+would cost time.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Expectation:
-    """Standard deviations expected after ``duration`` (D,) s, the first row 0 s = the table: ``mass`` (D, N) kg, ``com`` (D, N) m (root
-    mean square over the axes), ``inertia`` (D, N) kg·m² (of the three moments about the centre of mass), ``share`` (D, N) of the table's
-    variance that the dance removes (mean over the ten parameters of a segment).
+    """Standard deviations expected after ``duration`` (D,) s, the first row 0 s = the table: ``mass`` (D, N) kg,
+    ``com`` (D, N) m (root mean square over the axes), ``inertia`` (D, N) kg·m² (of the three moments about the
+    centre of mass), ``share`` (D, N) of the table's variance that the dance removes (mean over the ten parameters of
+    a segment).
     """
 
     segments: tuple[str, ...]
@@ -63,12 +55,14 @@ def expect(dance: Dance, *, steps: int = 10) -> Expectation:
     brief = replace(dance, hold=np.minimum(dance.hold, STILL))
     ends, durations = ([phase.end for phase in one.phases if phase.kind == "hold"] for one in (brief, dance))
     chosen = sorted({int(k) for k in np.linspace(0, len(ends) - 1, steps + 1).round()[1:]})
-    found = expected(brief.body, brief.motion(RATE), np.array([ends[k] for k in chosen]))
+    found = expected_spread(brief.body, brief.motion(RATE), np.array([ends[k] for k in chosen]))
     return replace(found, duration=np.array([0.0, *(durations[k] for k in chosen)]))
 
 
-def expected(body: Body, motion: Motion, ends: Array) -> Expectation:
-    """Return what is expected when a ``motion`` at ``RATE`` or a multiple stops at each of the instants ``ends`` (D,) s, increasing."""
+def expected_spread(body: Body, motion: Motion, ends: Array) -> Expectation:
+    """Return what is expected when a ``motion`` at ``RATE`` or a multiple stops at each of the instants ``ends`` (D,)
+    s, increasing.
+    """
     wrench = predict_wrench(body, motion)
     noise = typical_noise(np.asarray(wrench.cop().mean(axis=0)))
     size = 10 * len(body.segments)
@@ -91,8 +85,19 @@ def expected(body: Body, motion: Motion, ends: Array) -> Expectation:
 
 def typical_noise(about: Array) -> Noise:
     """Return the noise of a typical session about the standing point ``about`` (3,) m; a coefficient's variance grows with the rate."""
-    covariance = RATE / 25.0 * np.array([np.diag(row**2) for row in TYPICAL])
-    return Noise(covariance, about, BANDS[: len(TYPICAL) + 1], RATE)
+    covariance = RATE / BANDS.rate * np.array([np.diag(np.square(row)) for row in _danced()["noise"]])
+    return Noise(covariance, about, Bands(BANDS.edges, RATE))
+
+
+def typical_sizes() -> Sizes:
+    """Return the sizes of the disturbances that the evidence chose in typical sessions."""
+    return Sizes(**_danced()["sizes"])
+
+
+@cache
+def _danced() -> dict[str, Any]:
+    """Return what virtual dances left: ``anthropometry/uncertainty/dances.toml``."""
+    return read_toml(locate("anthropometry/uncertainty", "dances"))
 
 
 def _gram(information: Information) -> Array:
@@ -109,7 +114,7 @@ def _belief(body: Body, H: Array, found: Mismatch) -> Posterior:
     R = np.zeros((len(H) + 1, len(H) + 1))
     R[: len(triangle)] = triangle
     data = Information(R, 1)
-    return posterior(temper(data, found, SIZES) if H.any() else data, prior)
+    return posterior(temper(data, found, typical_sizes()) if H.any() else data, prior)
 
 
 def _deviations(belief: Posterior, first: int) -> Array:

@@ -1,11 +1,12 @@
 """Dances of robots: designed for the robot's person-sized likeness, danced by the robot itself.
 
-All that the design knows of noticeable sizes (scales of the limits, reserves, starts) is that of persons. So a robot is made as large and
-as heavy as a person, with all times, speeds and strengths as gravity demands (`body.similar`), its dance is designed, and shrunk again: the
-same angles, slower or faster. Nothing is approximated by that, and the dance is checked on the robot as it is.
+All that the design knows of noticeable sizes (scales of the limits, reserves, starts) is that of persons. So a robot is
+made as large and as heavy as a person, with all times, speeds and strengths as gravity demands (`body.similar`), its
+dance is designed, and shrunk again: the same angles, slower or faster. Nothing is approximated by that, and the dance
+is checked on the robot as it is.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,27 +14,39 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.similar import Likeness, likeness
-from biodance.dance.chain import Chain
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
-from biodance.dance.plan import Plan
-from biodance.dance.stance import Stance
+from biodance.dance.expectation import Expectation
+from biodance.dance.limits import Limit
+from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.plan import Plan
+from biodance.dance.problem.stance import Stance
 from biodance.dance.verify import Margin, verify
 from biodance.errors import BiodanceError
+from biodance.identify.information import Information, fold
+from biodance.identify.knowledge import segment_quantities
+from biodance.identify.posterior import Posterior, posterior
+from biodance.motion.regressor import regressor
+from biodance.records import Array, Motion
 
 LEG, MASS = 0.9, 65.0
 """m from hip to sole, kg: the person whose size a robot is given."""
 FORWARD = 2.0
-"""1/m: the right foot stands ahead by this times the protocol's m times the leg's: 0.1 m for 0.2 m and legs of 0.25 m (paper III.D)."""
+"""1/m: the right foot stands ahead by this times the protocol's m times the leg's: 0.1 m for 0.2 m and legs of 0.25 m
+(paper III.D).
+"""
 UNHURRIED = 2.5
-"""rad/s: a robot of slower joints (median) takes more time for its moves, in proportion: 5 s, not 2 s, at 1 rad/s (paper, Fig. 11)."""
+"""rad/s: a robot of slower joints (median) takes more time for its moves, in proportion: 5 s, not 2 s, at 1 rad/s
+(paper, Fig. 11).
+"""
 LIGHTEST = 4.0
 """kg: what lighter robots press on the ground cannot be told from noise (`motion.dynamics.zmp` needs 20 N)."""
 Tell = Callable[[str, int, int], None]
 
 
 def robot_plan(body: Body, plan: Plan) -> Plan:
-    """Return the plan for the robot ``body`` (in standing frames): its own time for a move, its own distance between the feet.
+    """Return the plan for the robot ``body`` (in standing frames): its own time for a move, its own distance between
+    the feet.
 
     Raises
     ------
@@ -61,17 +74,23 @@ def person_sized(body: Body) -> Likeness:
 
 
 def design_robot(
-    body: Body, plan: Plan, *, seed: int = 0, tell: Tell | None = None, resume: Path | None = None
+    body: Body,
+    plan: Plan,
+    *,
+    limits: Iterable[Limit | type[Limit]] = (),
+    seed: int = 0,
+    tell: Tell | None = None,
+    resume: Path | None = None,
 ) -> tuple[Dance, tuple[Margin, ...]]:
-    """Return the dance of the robot ``body`` (in standing frames; its limits count) after ``plan`` (`robot_plan`), and what is left of
-    every limit; see `design.design`.
+    """Return the dance of the robot ``body`` (in standing frames; its limits count) after ``plan`` (`robot_plan`), and
+    what is left of every limit; see `design.design`.
 
     Raises
     ------
     BiodanceError
         There is no such dance: the message names the posture or move and the limit that forbids it.
     """
-    to = person_sized(body)
+    plan, to = plan.with_limits(limits), person_sized(body)
     time, length = to.time, to.length
     long = replace(
         plan,
@@ -79,10 +98,11 @@ def design_robot(
         hold=time * plan.hold,
         budget=time * plan.budget,
         forward=float(np.clip(length * plan.forward, 0.05, 0.4)),
+        limits=tuple(limit.resized(length) for limit in plan.limits),
     )
     large, _ = design(likeness(body, to), long, seed=seed, tell=tell, resume=resume)
     dance = shrunk(large, body, to)
-    return dance, verify(body, dance, plan)
+    return dance, verify(body, dance, plan.limits)
 
 
 def shrunk(dance: Dance, body: Body, to: Likeness) -> Dance:
@@ -104,3 +124,47 @@ def shrunk(dance: Dance, body: Body, to: Likeness) -> Dance:
         stances=tuple(small(stance) for stance in dance.stances),
         under=tuple(small(stance) for stance in dance.under),
     )
+
+
+ERROR = np.array([1.1, 0.5, 0.9, 0.2, 0.7, 0.4])
+"""N, N·m: error of one sample of the wrench; what Bonnet 2016 left unexplained of an unseen movement of HOAP-3 (table
+II).
+"""
+RATE = 4.0
+"""Hz: independent samples of the wrench."""
+
+
+def robot_rows(body: Body, motion: Motion, wrench: Array) -> Array:
+    """Return the whitened rows (6 T, 10N + 1) of [W y] for a ``motion`` and a ``wrench`` (T, 6) N, N·m at ``RATE`` or
+    slower.
+    """
+    rows = np.concatenate([regressor(body, motion), wrench[:, :, None]], axis=2) / ERROR[:, None]
+    return np.asarray(rows.reshape(-1, rows.shape[2]))
+
+
+def expect_robot(dance: Dance, *, steps: int = 10) -> Expectation:
+    """Return what is expected after ``steps`` durations of ``dance``, evenly spread over its postures, if it is danced
+    exactly.
+    """
+    body, motion = dance.body, dance.motion(RATE)
+    rows = robot_rows(body, motion, regressor(body, motion) @ body.sip.phi)
+    ends = [phase.end for phase in dance.phases if phase.kind == "hold"]
+    chosen = [ends[k] for k in sorted({int(k) for k in np.linspace(0, len(ends) - 1, steps + 1).round()[1:]})]
+    triangle, start = np.zeros((rows.shape[1], rows.shape[1])), 0
+    beliefs = [posterior(Information(triangle, 1), body.sip)]
+    for end in chosen:
+        stop = int(np.searchsorted(motion.time, end)) * 6
+        triangle, start = fold(rows[start:stop], triangle), stop
+        beliefs.append(posterior(Information(triangle, stop), body.sip))
+    sd = np.array([[_deviations(belief, 10 * i) for i in range(len(body.segments))] for belief in beliefs])
+    share = np.array([belief.information.reshape(-1, 10).mean(axis=1) for belief in beliefs])
+    mass, com, inertia = np.moveaxis(sd, 2, 0)
+    return Expectation(body.segments, np.array([0.0, *chosen]), mass, com, inertia, share)
+
+
+def _deviations(belief: Posterior, first: int) -> Array:
+    """Return the standard deviations (3,) of mass kg, CoM m (per axis) and moments of inertia kg·m² of one segment."""
+    cut = slice(first, first + 10)
+    _, slope = segment_quantities(belief.prior.phi[cut])
+    variance = np.diag(slope @ belief.covariance[cut, cut] @ slope.T)
+    return np.sqrt([variance[0], np.mean(variance[1:4]), np.mean(variance[[4, 6, 9]])])

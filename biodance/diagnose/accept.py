@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.diagnose.diagnosis import Gain
 from biodance.diagnose.model import Named
-from biodance.effects.case import Case
+from biodance.effects import Case
 from biodance.errors import BiodanceError
-from biodance.identify.noise import BANDS, blocks
-from biodance.identify.statistics import Fit, layout_for
+from biodance.identify.statistics import Fit
 from biodance.identify.validation import BLOCK_SECONDS, moved
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array
+from biodance.uncertainty.bands import BANDS
 
 DRAWS = 1000
 """Bootstrap samples of the interval."""
@@ -59,7 +59,7 @@ def judged(body: Body, fits: tuple[Fit, ...], about: Array) -> Judged:
     return Judged(tuple(f.name for f in fits), left, tuple(f.use for f in fits), tuple(f.motion.rate for f in fits))
 
 
-def gain(before: Judged, after: Judged, *, fitted: tuple[Judged, Judged], seed: int = 0) -> Gain:
+def gain_by_naming(before: Judged, after: Judged, *, fitted: tuple[Judged, Judged], seed: int = 0) -> Gain:
     """Return what naming the causes gains on trials that were not used: ``before`` and ``after`` hold the same trials.
 
     ``fitted`` the same two bodies on the trials that were used: what the better one leaves there is the unit in which the channels are
@@ -131,12 +131,11 @@ def _blocks(left: Array, use: NDArray[np.bool_], rate: float) -> Array:
 
 def _coefficients(found: Judged) -> tuple[Array, NDArray[np.intp]]:
     """Return the cosine coefficients (n, 6) of all residuals and their bands (n,)."""
-    layout = layout_for(np.zeros(3), edges=BANDS)
     values, bands = [], []
     for left, use, rate in zip(found.left, found.use, found.rate, strict=True):
-        there = layout.at(rate)
-        for pick in blocks(use, rate, layout):
-            band = there.bands_of(pick.size)
+        there = BANDS.at(rate)
+        for pick in BANDS.runs(use, rate):
+            band = there.of(pick.size)
             values.append(there.coefficients(left[pick])[band >= 0])
             bands.append(band[band >= 0])
     return np.concatenate(values), np.concatenate(bands)

@@ -4,16 +4,15 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.fft import idct
 from scipy.ndimage import uniform_filter1d
 
 from biodance.diagnose.diagnosis import Adequacy, Verdict
 from biodance.diagnose.model import Model
-from biodance.diagnose.spectrum import EDGES
 from biodance.records import CHANNELS, Array
+from biodance.uncertainty.bands import BANDS
 
 if TYPE_CHECKING:
-    from biodance.effects.gate import Gate
+    from biodance.effects import Gate
 
 LIMIT = 4.5
 """Standard deviations of null sessions beyond which one band of one channel is not adequate."""
@@ -30,7 +29,7 @@ def energies(found: Model) -> Array:
     """Return (B, 6): mean square of the whitened residual that is left, per band and channel."""
     band = found.problem.spectrum.band
     square = found.belief.left[: 6 * band.size].reshape(-1, 6) ** 2
-    return np.array([square[band == b].mean(axis=0) if (band == b).any() else np.ones(6) for b in range(len(EDGES) - 1)])
+    return np.array([square[band == b].mean(axis=0) if (band == b).any() else np.ones(6) for b in range(len(BANDS))])
 
 
 def unlikely(found: Model) -> Array:
@@ -40,7 +39,7 @@ def unlikely(found: Model) -> Array:
     their cube root is nearly normal (Wilson and Hilferty 1931, doi:10.1073/pnas.17.12.684).
     """
     where, known, mean = found.problem.spectrum, found.tolerances, energies(found)
-    count = np.maximum(1, np.bincount(where.band, minlength=len(EDGES) - 1))[:, None]
+    count = np.maximum(1, np.bincount(where.band, minlength=len(BANDS)))[:, None]
     chance = 2 * known.energy**2 / count * max(0.0, 1 - where.seconds / SECONDS)
     spread = np.sqrt(known.energy_sd**2 + chance)
     root = spread / known.energy / 3
@@ -57,7 +56,7 @@ def adequacy(found: Model) -> tuple[Adequacy, ...]:
         here = spectrum.band == b
         total = np.array([[square[here & (spectrum.trial == t), c].sum() for c in range(6)] for t in range(len(names))])
         for c in range(6):
-            rows.append(Adequacy(CHANNELS[c], (EDGES[b], EDGES[b + 1]), float(z[b, c]), names[int(np.argmax(total[:, c]))]))
+            rows.append(Adequacy(CHANNELS[c], (BANDS.edges[b], BANDS.edges[b + 1]), float(z[b, c]), names[int(np.argmax(total[:, c]))]))
     worst, *others = sorted(rows, key=lambda row: -row.z)
     return (replace(worst, second=_when(found, worst)), *others)
 
@@ -67,15 +66,15 @@ def _when(found: Model, row: Adequacy) -> float:
     spectrum = found.problem.spectrum
     index = [case.trial.name for case in found.problem.cases].index(row.trial)
     left = found.belief.left[: 6 * spectrum.band.size].reshape(-1, 6)[spectrum.trial == index, CHANNELS.index(row.channel)]
-    layout, time = spectrum.layout.at(spectrum.rates[index]), found.problem.cases[index].motion.time
+    bands, time = spectrum.layout.bands.at(spectrum.rates[index]), found.problem.cases[index].motion.time
     best, second, start = -1.0, float("nan"), 0
     for pick in spectrum.picks[index]:
-        band = layout.bands_of(pick.size)
+        band = bands.of(pick.size)
         full = np.zeros(pick.size)
         full[band >= 0] = left[start : start + int(np.sum(band >= 0))]
         start += int(np.sum(band >= 0))
-        full[band != EDGES.index(row.band_hz[0])] = 0.0
-        power = uniform_filter1d(idct(full, norm="ortho") ** 2, max(1, round(layout.rate)))
+        full[band != BANDS.edges.index(row.band_hz[0])] = 0.0
+        power = uniform_filter1d(bands.samples(full) ** 2, max(1, round(bands.rate)))
         if power.max() > best:
             best, second = float(power.max()), float(time[pick[int(np.argmax(power))]])
     return second

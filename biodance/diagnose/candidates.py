@@ -4,15 +4,14 @@ A cause that is linear in its parameters has its own columns. One that is not (t
 spanned by what it does at its typical size: the columns at zero, and the differences that the other parameters make there.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from biodance.diagnose.problem import Problem
-from biodance.effects import effects
-from biodance.effects.case import Case
-from biodance.effects.effect import Effect
+from biodance.discovery import Chosen
+from biodance.effects import Case, Effect, effects
 from biodance.records import Array
 
 SCALE = 3.0
@@ -48,9 +47,9 @@ class Candidate:
         return theta
 
 
-def candidates(problem: Problem, chosen: Iterable[str] | None = None) -> tuple[Candidate, ...]:
-    """Return all causes of the family (or those ``chosen`` by name) at all their targets; those without any trace are left out."""
-    every = [kind(target) for kind in effects(chosen).values() for target in kind.targets(problem.cases[0])]
+def candidates(problem: Problem, chosen: Chosen[Effect] = None) -> tuple[Candidate, ...]:
+    """Return all causes of the family (or those ``chosen``, see `effects`) at all their targets; those without any trace are left out."""
+    every = [one for effect in effects(chosen).values() for one in effect.everywhere(problem.cases[0])]
     if not every:
         return ()
     found = [candidate(problem, effect, columns) for effect, columns in zip(every, problem.columns(every), strict=True)]

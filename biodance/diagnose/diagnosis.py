@@ -8,10 +8,15 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from biodance import display
 from biodance.records import Array, frozen_array
 
 if TYPE_CHECKING:
-    from biodance.effects.gate import Gate
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+    from biodance.effects import Gate
+
 
 Verdict = Literal["nothing wrong", "named, complete", "named, incomplete", "unexplained"]
 SIGMAS = 1.959964
@@ -75,10 +80,27 @@ class Gain:
 class Finding:
     """One cause that was named.
 
-    ``effect`` and ``target`` as in the family `biodance.effects`; ``parameters`` with intervals; ``set`` all causes that the data cannot
-    tell apart, the named one first; ``visible_fraction`` share of its effect that remains visible when the body's own parameters and
-    tolerances may adapt (1 = fully visible, 0 = hides in the body); ``gain`` None without a trial to judge on; ``advice`` what settles it
-    in the laboratory; ``changes`` what accepting it changes in the body, in words.
+    Parameters
+    ----------
+    effect, target : str
+        As in the family `biodance.effects`: what, and where.
+    parameters : tuple
+        Each with name, value, sd, unit and 95 % interval.
+    set : tuple
+        All causes that the data cannot tell apart, the named one first.
+    visible_fraction : float
+        Share of its effect that remains visible when the body's own parameters and tolerances may adapt (0 = hides in the body).
+    gain : Gain or None
+        On trials that were kept; None without one.
+    advice : str
+        What settles it in the laboratory.
+    changes : tuple of str
+        What accepting it changes in the body.
+
+    Examples
+    --------
+    >>> for finding in found.findings:
+    ...     print(finding)
     """
 
     effect: str
@@ -89,6 +111,13 @@ class Finding:
     gain: Gain | None = None
     advice: str = ""
     changes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        sizes = ", ".join(f"{one.name} {one.value:.3g} ± {one.sd:.2g} {one.unit}" for one in self.parameters)
+        return f"Finding({' '.join(filter(None, (self.effect, self.target)))}{f': {sizes}' if sizes else ''})"
+
+    def _repr_html_(self) -> str:
+        return display.card(repr(self), None, (self.advice, *self.changes))
 
     @property
     def log_bayes_factor(self) -> float:
@@ -128,9 +157,29 @@ class Unobservable:
 class Diagnosis:
     """What the simulation of a session gets wrong.
 
-    ``verdict``; ``findings`` in the order found; ``gates`` checks before any statistics; ``adequacy`` of what is left, worst first;
-    ``unobservable`` the causes that would stay unseen at their typical size; ``limits`` smallest sizes of all causes looked for; ``notes``
-    for the reader; ``candidates`` every cause at the first round, most probable first.
+    Parameters
+    ----------
+    verdict : str
+        "nothing wrong", "named, complete", "named, incomplete" or "unexplained".
+    findings : tuple of Finding
+        In the order found.
+    gates : tuple
+        Checks before any statistics.
+    adequacy : tuple
+        Of what is left, worst first.
+    unobservable : tuple
+        Causes that would stay unseen at their typical size.
+    limits : tuple
+        Smallest sizes of all causes looked for.
+    notes : tuple of str
+        For the reader.
+    candidates : tuple
+        Every cause at the first round, most probable first.
+
+    Examples
+    --------
+    >>> found.diagnosis
+    Diagnosis(nothing wrong)
     """
 
     verdict: Verdict
@@ -141,6 +190,65 @@ class Diagnosis:
     limits: tuple[Unobservable, ...] = ()
     notes: tuple[str, ...] = ()
     candidates: tuple[Alias, ...] = field(default=())
+
+    def __repr__(self) -> str:
+        return f"Diagnosis({self.told})"
+
+    def _repr_html_(self) -> str:
+        return display.card(repr(self), self.table(), self.notes)
+
+    @property
+    def told(self) -> str:
+        """Verdict and names of the causes in one line."""
+        causes = ", ".join(f"{one.effect} {one.target}".strip() for one in self.findings)
+        return f"{self.verdict}{f': {causes}' if causes else ''}"
+
+    def table(self) -> "pd.DataFrame":
+        """Return one row for each parameter of each finding.
+
+        Returns
+        -------
+        pandas.DataFrame
+            effect, target, parameter, value, sd, low and high of the 95 % interval, unit, visible fraction, log Bayes factor, advice.
+
+        Examples
+        --------
+        >>> list(found.diagnosis.table().columns[:4])
+        ['effect', 'target', 'parameter', 'value']
+        """
+        import pandas as pd
+
+        columns = "effect target parameter value sd low high unit"
+        rows = [
+            (f.effect, f.target, p.name, p.value, p.sd, *p.interval, p.unit, f.visible_fraction, f.log_bayes_factor, f.advice)
+            for f in self.findings
+            for p in (f.parameters or (Estimate("", float("nan"), float("nan"), ""),))
+        ]
+        return pd.DataFrame(rows, columns=[*columns.split(), "visible fraction", "log Bayes factor", "advice"])
+
+    def plot_adequacy(self, *, axes: "Axes | None" = None) -> "Axes":
+        """Draw how far what is left is from sessions without fault, per channel and band.
+
+        Parameters
+        ----------
+        axes : matplotlib.axes.Axes, optional
+            Where to draw; by default a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            Bars of z in standard deviations, worst first.
+
+        Examples
+        --------
+        >>> found.diagnosis.plot_adequacy().get_xlabel()
+        'z of what is left'
+        """
+        drawn = display.axes_or_new(axes)
+        names = [f"{one.channel} {one.band_hz[0]:g}-{one.band_hz[1]:g} Hz" for one in self.adequacy]
+        drawn.barh(names[::-1], [one.z for one in self.adequacy][::-1], color=display.BLUE)
+        drawn.set_xlabel("z of what is left")
+        return drawn
 
     @property
     def worst(self) -> float:

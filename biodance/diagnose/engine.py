@@ -1,6 +1,5 @@
 """A session's diagnosis: name causes, ask whether what is left is like a session without fault, and say what could not be seen."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,9 +12,11 @@ from biodance.diagnose.naming import Naming, Round, name_causes, suspicious
 from biodance.diagnose.observability import hidden, limits, visibility
 from biodance.diagnose.passing import with_passing
 from biodance.diagnose.problem import Look, problem
-from biodance.diagnose.tolerances import Tolerances, key_of, shipped
-from biodance.effects.gate import Gate
+from biodance.discovery import Chosen
+from biodance.effects import DiscreteEffect, Effect, Gate
+from biodance.effects import effects as family
 from biodance.records import Sip
+from biodance.uncertainty.tolerances import Tolerances, key_of, shipped
 
 STRANGE = (
     "What the plates measured fits only a body that is more unlike the table than people are. Something that looks like a body is wrong: "
@@ -48,14 +49,14 @@ def diagnose(
     gates: tuple[Gate, ...] = (),
     tolerances: Tolerances | None = None,
     prior: Sip | None = None,
-    chosen: Iterable[str] | None = None,
+    effects: Chosen[Effect | DiscreteEffect] = None,
     search: bool = True,
 ) -> Examined:
     """Return what the simulation of ``body`` (with the SIP known before, by default the table's) gets wrong in the trials ``looks``.
 
     ``gates`` the checks made before; ``tolerances`` of everything that is no fault (those of virtual subjects by default);
-    ``prior`` of the parameters (an earlier session's; by default the table's); ``chosen`` limits the causes to some effects by name;
-    without ``search`` nothing is named: only what is left is judged.
+    ``prior`` of the parameters (an earlier session's; by default the table's); ``effects`` names limit the causes to these, objects
+    (``[MyEffect()]``) are looked for beside the family; without ``search`` nothing is named: only what is left is judged.
 
     Raises
     ------
@@ -63,8 +64,8 @@ def diagnose(
         No trial has a second of believable, fully measured frames.
     """
     known = tolerances or shipped()
-    asked = None if chosen is None else tuple(chosen)
-    put = problem(body, looks, prior=prior)
+    asked = family(effects)
+    put = problem(body, looks, prior=prior, chosen=asked)
     naming = with_passing(name_causes(put, known, asked), asked) if search else name_causes(put, known, asked, rounds=0)
     rows = limits(visibility(naming.first, naming.first_causes), body, known.threshold)
     left, strained = adequacy(naming.found), strain(naming.found) > STRAINED

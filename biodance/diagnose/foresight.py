@@ -14,10 +14,12 @@ from biodance.diagnose.diagnosis import Unobservable
 from biodance.diagnose.naming import built
 from biodance.diagnose.observability import Visibility, hidden, limits, visibility
 from biodance.diagnose.problem import Look, problem
-from biodance.diagnose.tolerances import Tolerances, shipped
+from biodance.discovery import Chosen
+from biodance.effects import Effect
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Markers, Motion, Plate, Source, Trial
+from biodance.uncertainty.tolerances import Tolerances, shipped
 
 HALF = 0.3
 """m: half the side of the plate that is put under the movement."""
@@ -52,10 +54,8 @@ class Foresight:
         return self.confusions[0].difference if self.confusions else 0.0
 
 
-def foresee(
-    body: Body, motions: tuple[Motion, ...], *, tolerances: Tolerances | None = None, chosen: tuple[str, ...] | None = None
-) -> Foresight:
-    """Return what ``motions`` (the planned trials, in order) of ``body`` will be able to see; ``chosen`` limits the causes by name.
+def foresee(body: Body, motions: tuple[Motion, ...], *, tolerances: Tolerances | None = None, effects: Chosen[Effect] = None) -> Foresight:
+    """Return what ``motions`` (the planned trials, in order) of ``body`` will be able to see; ``effects`` as for `diagnose`.
 
     Raises
     ------
@@ -69,8 +69,8 @@ def foresee(
         Look(planned(body, one, f"planned_{i + 1}"), one, np.ones(one.time.size, dtype=bool), a / ends[-1], b / ends[-1])
         for i, (one, a, b) in enumerate(zip(motions, starts, ends, strict=True))
     )
-    put = problem(body, looks)
-    found, causes = built(put, known, chosen)
+    put = problem(body, looks, chosen=effects)
+    found, causes = built(put, known, effects)
     seen = visibility(found, causes)
     rows = tuple(sorted(limits(seen, body, known.threshold), key=lambda row: row.limit / row.typical))
     return Foresight(rows, hidden(rows), _confusions(seen, rows))

@@ -1,7 +1,7 @@
-"""Learn from sessions without fault how large everything is that is no fault: expectation maximisation over all of them at once.
+"""Learn from sessions without fault how large everything is that is no fault, all of them at once (`uncertainty/learning`).
 
-A coefficient of a nuisance is normal with the mean and the size of its key; one mean is believed to a third of itself, because virtual
-persons are no better known than that, and counted only where the sessions agree on it.
+A coefficient of a nuisance is normal with the mean and the size of its key; a mean counts only where the sessions agree on it. What a joint
+may err before functional calibration is the literature's, and stays.
 """
 
 from collections.abc import Iterable
@@ -14,13 +14,9 @@ from scipy.linalg import cho_factor, cho_solve
 from biodance.diagnose.candidates import Candidate
 from biodance.diagnose.model import marker_keys, nuisances, shown_left_out
 from biodance.diagnose.problem import Problem
-from biodance.diagnose.tolerances import FLOOR, REFERENCE, Tolerances, whitened
 from biodance.records import Array
-
-DOUBT = 1 / 3
-"""Standard deviation of a mean, as a share of itself."""
-AGREED = 4.0
-"""Standard errors from which on a mean is kept; smaller ones are chance."""
+from biodance.uncertainty.learning import Moments, maximise, moments_of, noise_of, sizes_of
+from biodance.uncertainty.tolerances import BEFORE, REFERENCE_PERSON, Tolerances, whitened
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,9 +48,8 @@ def learn(nulls: Iterable[Null], start: Tolerances, *, rounds: int = 10) -> Tole
     """Return the sizes, means and noise under which the null sessions are most probable after ``rounds`` of expectation maximisation, and
     the energies that they leave. Only what has a size in ``start`` is learned.
     """
-    sessions, found = tuple(nulls), start
-    for _ in range(rounds):
-        found = _improved(sessions, found)
+    sessions = tuple(nulls)
+    found = maximise(start, lambda known: _improved(sessions, known), lambda known: known.noise, rounds=rounds)
     left = np.array([_energy(null, found) for null in sessions])
     spread = left.std(axis=0, ddof=1) if len(sessions) > 1 else found.energy_sd
     return replace(found, energy=left.mean(axis=0), energy_sd=spread)
@@ -91,7 +86,8 @@ def _posterior(null: Null, found: Tolerances) -> _Posterior:
 def _improved(sessions: tuple[Null, ...], found: Tolerances) -> Tolerances:
     """Return the tolerances after one round."""
     rows: list[tuple[str, str, float, float]] = []
-    noise, count = np.zeros_like(found.noise), np.zeros(len(found.noise))
+    bands = len(found.noise)
+    total = Moments(np.zeros_like(found.noise), np.zeros(bands))
     for null in sessions:
         some = _posterior(null, found)
         names = null.mean_keys or ("",) * len(null.keys)
@@ -100,34 +96,11 @@ def _improved(sessions: tuple[Null, ...], found: Tolerances) -> Tolerances:
         seen = some.left[wrench:] ** 2 + (some.spread[wrench:] ** 2).sum(axis=1)
         rows += [(key, "", float(np.sqrt(square)), 0.0) for key, square in zip(null.marker_keys, seen, strict=True)]
         parts = np.concatenate([some.left[:wrench, None], some.spread[:wrench]], axis=1).reshape(null.band.size, 6, -1)
-        for b in range(len(noise)):
-            here = parts[null.band == b].transpose(1, 0, 2).reshape(6, -1)
-            noise[b] += (here @ here.T).astype(float) * (REFERENCE / null.mass) ** 2
-            count[b] += np.sum(null.band == b)
-    means, sizes = _moments(rows)
-    return replace(found, sizes={**found.sizes, **sizes}, noise=noise / np.maximum(count, 1)[:, None, None] + FLOOR, means=means)
-
-
-def _moments(rows: list[tuple[str, str, float, float]]) -> tuple[dict[str, float], dict[str, float]]:
-    """Return means and sizes from rows of key, name of the mean, posterior mean and posterior variance."""
-    named: dict[str, list[tuple[float, float]]] = {}
-    for _, name, value, variance in rows:
-        if name:
-            named.setdefault(name, []).append((value, variance))
-    means = {name: mean for name, pairs in named.items() if (mean := _agreed(np.array(pairs)))}
-    square: dict[str, list[float]] = {}
-    for key, name, value, variance in rows:
-        centre = means.get(name, 0.0)
-        square.setdefault(key, []).append((value - centre) ** 2 + variance + (DOUBT * centre) ** 2)
-    return means, {key: float(np.sqrt(np.mean(some))) for key, some in square.items()}
-
-
-def _agreed(pairs: Array) -> float:
-    """Return the mean of values with variances (n, 2); 0 where it may be chance."""
-    value, variance = pairs.T
-    mean = float(value.mean())
-    error = np.sqrt(np.mean((value - mean) ** 2 + variance) / max(len(value) - 1, 1))
-    return mean if len(value) > 2 and abs(mean) > AGREED * error else 0.0
+        here = moments_of(parts, null.band, bands)
+        total = total + replace(here, residual=here.residual * (REFERENCE_PERSON / null.mass) ** 2)
+    means, sizes = sizes_of(rows)
+    learned = {key: size for key, size in sizes.items() if not key.endswith(BEFORE)}
+    return replace(found, sizes={**found.sizes, **learned}, noise=noise_of(total), means=means)
 
 
 def _energy(null: Null, found: Tolerances) -> Array:

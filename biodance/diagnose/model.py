@@ -5,13 +5,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from biodance.body.skeleton import kind_of
 from biodance.diagnose.candidates import SCALE, Candidate, removed
 from biodance.diagnose.evidence import Belief, believe
-from biodance.diagnose.kinematic_errors import kind_of
 from biodance.diagnose.problem import Problem
-from biodance.diagnose.tolerances import Tolerances, key_of, mean_key, whitened
-from biodance.effects.effect import Effect
+from biodance.effects import Effect
+from biodance.motion.marker_jacobian import chains
 from biodance.records import Array
+from biodance.uncertainty.joints import joint_of
+from biodance.uncertainty.tolerances import Tolerances, in_state, key_of, mean_key, whitened
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,13 +83,17 @@ def nuisances(problem: Problem, causes: tuple[Candidate, ...]) -> tuple[Array, t
     """Return columns (r, K) per unit of all that may be no fault, the keys of their sizes and of their means ("" for those that have none:
     the signs of slides and tilts are mirrored between sides and persons).
     """
+    body = problem.cases[0].body
+    joints = {joint_of(body, chain) for chain in chains(body)}
     parts, keys = [problem.kinematics], list(problem.groups)
     means = [group if group.startswith("sag ") else "" for group in problem.groups]
     for one in causes:
         parts.append(one.basis / (SCALE * one.effect.typical[0]))
-        keys += [key_of(*one.names)] * one.basis.shape[1]
+        key, width = key_of(*one.names), one.basis.shape[1]
+        own = in_state(key, one.effect.target if one.effect.target in joints else "", body)
         loud = [p.name for p, silent in zip(one.effect.parameters, one.silent, strict=True) if not silent]
-        means += [mean_key(*one.names, name) for name in loud] + [""] * (one.basis.shape[1] - len(loud))
+        keys += [own] * width
+        means += [mean_key(*one.names, name) if own == key else "" for name in loud] + [""] * (width - len(loud))
     return np.concatenate(parts, axis=1), tuple(keys), tuple(means)
 
 

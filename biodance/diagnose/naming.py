@@ -1,6 +1,5 @@
 """Name the causes one after the other: screen all, refine the best, take the most probable off, rebuild what depends on it, look again."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,9 +10,10 @@ from biodance.diagnose.diagnosis import Alias
 from biodance.diagnose.evidence import evidence
 from biodance.diagnose.model import Model, Named, model
 from biodance.diagnose.problem import Problem
-from biodance.diagnose.tolerances import Tolerances
-from biodance.effects import effects
+from biodance.discovery import Chosen
+from biodance.effects import Effect, effects
 from biodance.records import Array
+from biodance.uncertainty.tolerances import Tolerances
 
 ROUNDS = 3
 """Causes named at most."""
@@ -77,8 +77,8 @@ class Naming:
     bare: Model
 
 
-def name_causes(problem: Problem, tolerances: Tolerances, chosen: Iterable[str] | None = None, *, rounds: int = ROUNDS) -> Naming:
-    """Return the causes that the session shows, at most ``rounds``; ``chosen`` limits the family to some effects by name.
+def name_causes(problem: Problem, tolerances: Tolerances, chosen: Chosen[Effect] = None, *, rounds: int = ROUNDS) -> Naming:
+    """Return the causes that the session shows, at most ``rounds``; ``chosen`` limits or extends the family (`effects`).
 
     What a body predicts that is unlike people is not believed: causes are then not predicted again.
     """
@@ -116,7 +116,7 @@ def heavier(found: Model) -> bool:
     return bool(np.any(found.phi[::10] - before > HEAVIER * before))
 
 
-def rebuilt(found: Model, tolerances: Tolerances, chosen: Iterable[str] | None) -> tuple[Model, tuple[Candidate, ...]]:
+def rebuilt(found: Model, tolerances: Tolerances, chosen: Chosen[Effect]) -> tuple[Model, tuple[Candidate, ...]]:
     """Return the model and all causes with columns predicted by the parameters that ``found`` believes in, its named causes settled again.
 
     A load and a delay together show in the delay's columns only once the load is predicted, if only by a segment that is too heavy.
@@ -134,10 +134,10 @@ def stale(found: Model) -> bool:
     return bool(both[0] > STALE**2 * both[1])
 
 
-def built(problem: Problem, tolerances: Tolerances, chosen: Iterable[str] | None) -> tuple[Model, tuple[Candidate, ...]]:
+def built(problem: Problem, tolerances: Tolerances, chosen: Chosen[Effect]) -> tuple[Model, tuple[Candidate, ...]]:
     """Return the model without any name and the causes to look for; what is not looked for keeps its tolerance."""
     family = effects(chosen)
-    every = candidates(problem, {*family, *(name for name in effects() if tolerances.knows(name))})
+    every = candidates(problem, {n: one for n, one in {**effects(), **family}.items() if n in family or tolerances.knows(n)})
     return model(problem, every, tolerances), tuple(one for one in every if one.names[0] in family)
 
 

@@ -16,7 +16,7 @@ from biodance.diagnose.diagnosis import Unobservable
 from biodance.diagnose.evidence import smallest
 from biodance.diagnose.model import Model
 from biodance.diagnose.naming import TOGETHER
-from biodance.motion.functional_joints import FIXED_POINT
+from biodance.motion.functional_joints import fixed_point
 from biodance.motion.joint_unknowns import centre_sd
 from biodance.records import Array
 
@@ -107,7 +107,7 @@ def placed(seen: Visibility, body: Body) -> Visibility:
 
 def placing_leaves(error: JointError) -> float:
     """Return the share of a wrong joint centre that placing the joint by movement has left, 0..1."""
-    fixed = FIXED_POINT.get(error.joint.split("_")[-1], 0.0)
+    fixed = fixed_point(error.joint)
     return float(np.clip((error.centre**2 - fixed**2) / centre_sd(error.joint) ** 2, 0.01, 1.0))
 
 

@@ -4,7 +4,6 @@ Each trial has its own course of the force in time, so there are hundreds of col
 a force does not explain just anything.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,8 +13,8 @@ from biodance.diagnose.candidates import Candidate, local_basis
 from biodance.diagnose.evidence import Evidence, believe, evidence
 from biodance.diagnose.model import Model, Named
 from biodance.diagnose.naming import Naming, Round, Suspect
-from biodance.effects import effects
-from biodance.effects.effect import Effect
+from biodance.discovery import Chosen
+from biodance.effects import Effect, effects
 from biodance.records import Array
 
 SIZES = (2.0, 8.0, 30.0)
@@ -34,7 +33,7 @@ class _Passing:
     found: Evidence
 
 
-def with_passing(naming: Naming, chosen: Iterable[str] | None = None) -> Naming:
+def with_passing(naming: Naming, chosen: Chosen[Effect] = None) -> Naming:
     """Return the naming with a cause that comes and goes, if steady causes leave too much and it leaves less; else as it is.
 
     It is tried instead of what was named, and beside it; what leaves less is kept.
@@ -51,9 +50,9 @@ def with_passing(naming: Naming, chosen: Iterable[str] | None = None) -> Naming:
     return best
 
 
-def _with(naming: Naming, base: Model, accepted: tuple[Round, ...], chosen: Iterable[str] | None) -> Naming | None:
+def _with(naming: Naming, base: Model, accepted: tuple[Round, ...], chosen: Chosen[Effect]) -> Naming | None:
     """Return the naming of ``base`` with the most probable cause that comes and goes; None without one above the threshold."""
-    kinds = [kind(target) for kind in effects(chosen).values() for target in kind.targets(base.problem.cases[0])]
+    kinds = [one for effect in effects(chosen).values() for one in effect.everywhere(base.problem.cases[0])]
     found = [one for one in (_passing(base, effect) for effect in kinds) if one is not None]
     if not found:
         return None

@@ -5,7 +5,7 @@
 Columns of faults come from `candidates`; sizes of everything from `tolerances`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -13,16 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.diagnose.kinematic_errors import Errors, kinematic_errors
 from biodance.diagnose.spectrum import Spectrum, spectrum, thinned
-from biodance.effects import effects
-from biodance.effects.case import Case
-from biodance.effects.effect import Effect
-from biodance.identify.caution import widened
+from biodance.discovery import Chosen
+from biodance.effects import Case, Effect, effects
 from biodance.identify.identification import usable
 from biodance.identify.posterior import prior_factor
 from biodance.identify.statistics import Fit
 from biodance.records import Array, Motion, Sip, Trial
+from biodance.uncertainty.caution import widened
+from biodance.uncertainty.sources import Errors, forward, of_clusters
+from biodance.uncertainty.tolerances import in_state
 
 LIGHTEST = 0.2
 """Share of the table's mass below which an identified segment is not believed."""
@@ -114,8 +114,10 @@ class Problem:
         return replace(self, kinematics=np.concatenate([rows, markers, np.zeros((len(self.shown), rows.shape[1]))]))
 
 
-def problem(body: Body, looks: tuple[Look, ...], *, prior: Sip | None = None) -> Problem:
+def problem(body: Body, looks: tuple[Look, ...], *, prior: Sip | None = None, chosen: Chosen[Effect] = None) -> Problem:
     """Return the problem of ``looks`` at a session of ``body``; ``prior`` of its parameters, by default the table's with widened sd.
+
+    What the markers show by themselves is read for the whole family and for the ``chosen`` effects (`effects`).
 
     Raises
     ------
@@ -137,28 +139,31 @@ def problem(body: Body, looks: tuple[Look, ...], *, prior: Sip | None = None) ->
     W = where.rows(tuple(case.regressor @ factor for case in cases))
     errors = _errors(body, cases, where)
     rows, markers = _kinematic_rows(where, errors)
-    shown = sizes_shown(cases)
+    shown = sizes_shown(cases, {**effects(), **effects(chosen)})
     sip = np.concatenate([W.reshape(-1, W.shape[2]), np.zeros((len(markers) + len(shown), W.shape[2]))])
-    groups = next(one.groups for some in errors for one in some)
+    unit = next(one for some in errors for one in some)
+    groups = tuple(in_state(group, joint, body) for group, joint in zip(unit.groups, unit.joints, strict=True))
     measured = where.rows(tuple(case.residual[:, :, None] for case in cases))
     target = np.concatenate([measured.ravel(), _mean_markers(cases, where).ravel(), list(shown.values())])
     rows = np.concatenate([rows, markers, np.zeros((len(shown), rows.shape[1]))])
     return Problem(cases, where, target, before, factor, sip, rows, groups, len(markers), notes, tuple(shown))
 
 
-def sizes_shown(cases: tuple[Case, ...]) -> dict[tuple[str, str], float]:
+def sizes_shown(cases: tuple[Case, ...], causes: Mapping[str, Effect]) -> dict[tuple[str, str], float]:
     """Return by effect and target the size of the first parameter that the markers of the session show by themselves."""
     found = {}
-    for name, kind in effects().items():
-        for target in kind.targets(cases[0]) if kind.shown is not Effect.shown else ():
-            size = kind(target).shown(*cases)
-            found[name, target] = 0.0 if size is None else float(size[0])
+    for name, kind in causes.items():
+        for one in kind.everywhere(cases[0]) if type(kind).shown is not Effect.shown else ():
+            size = one.shown(*cases)
+            found[name, one.target] = 0.0 if size is None else float(size[0])
     return found
 
 
 def _errors(body: Body, cases: tuple[Case, ...], where: Spectrum) -> list[list[Errors]]:
     """Return the elementary errors of every run of every trial."""
-    return [[kinematic_errors(body, _part(case.motion, pick)) for pick in picks] for case, picks in zip(cases, where.picks, strict=True)]
+    return [
+        [forward(of_clusters(body), _part(case.motion, pick)) for pick in picks] for case, picks in zip(cases, where.picks, strict=True)
+    ]
 
 
 def _part(motion: Motion, pick: NDArray[np.intp]) -> Motion:
@@ -166,15 +171,15 @@ def _part(motion: Motion, pick: NDArray[np.intp]) -> Motion:
 
 
 def _kinematic_rows(where: Spectrum, errors: list[list[Errors]]) -> tuple[Array, Array]:
-    """Return the rows (6 m, K) of the errors' wrenches and (3M, K) of the mean marker residuals, measured minus model."""
+    """Return the rows (6 m, K) of the errors' wrenches and (3M, K) of the mean marker residuals; signs as `forward` has them."""
     wrench, frames = [], 0
     markers = np.zeros_like(next(one for some in errors for one in some).markers)
     for index, some in enumerate(errors):
-        layout = where.layout.at(where.rates[index])
+        bands = where.layout.bands.at(where.rates[index])
         for pick, one in zip(where.picks[index], some, strict=True):
-            kept = layout.bands_of(pick.size) >= 0
-            wrench.append(layout.coefficients(layout.shift @ one.wrench)[kept])
-            markers -= pick.size * one.markers
+            kept = bands.of(pick.size) >= 0
+            wrench.append(bands.coefficients(where.layout.shift @ one.wrench)[kept])
+            markers += pick.size * one.markers
             frames += pick.size
     rows = np.concatenate(wrench)
     return rows.reshape(-1, rows.shape[2]), (markers / frames).reshape(-1, rows.shape[2])

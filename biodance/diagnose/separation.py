@@ -7,7 +7,8 @@ a load on segment j (prior U_j U_j') by
 
     D_ij = 1/2 (d'M d - a' (1 + B)^-1 a),  a = U_j'M d,  B = U_j'M U_j,     dD_ij = 1/2 e' dM e,  e = d - U_j (1 + B)^-1 a.
 
-The criterion is log sum_ij 1 / D_ij: the worst confused pairs decide; smaller is better. The signature is that of `dance/criteria`.
+The criterion is log sum_ij 1 / D_ij: the worst confused pairs decide; smaller is better. Its signature is that of
+examples/planar/criteria.py.
 """
 
 from typing import Protocol

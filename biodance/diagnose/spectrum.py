@@ -1,7 +1,7 @@
 """From the samples of a session's trials to rows by frequency: orthonormal cosine transform per run of used frames, low bands only.
 
 A stationary error is nearly independent between coefficients; within a band its six channels share a covariance. Recordings are low-passed
-at 10 Hz; what lies above `EDGES[-1]` is not looked at, because there soft tissue and filters rule.
+at 10 Hz; what lies above the last of `BANDS` is not looked at.
 """
 
 from dataclasses import dataclass, replace
@@ -9,14 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.effects.case import Case
+from biodance.effects import Case
 from biodance.errors import TrialRefused
-from biodance.identify.noise import Noise, blocks
-from biodance.identify.statistics import layout_for
 from biodance.records import Array, Markers, Motion, Wrench
+from biodance.uncertainty.bands import BANDS
+from biodance.uncertainty.noise import Noise
 
-EDGES = (0.0, 0.04, 0.3, 1.0, 2.5, 6.0)
-"""Hz: rest, slow, three bands of movement. The first holds the mean of a trial alone."""
 RATE = 50.0
 """Hz at which trials are looked at: derivatives of columns are still good to 7 % at the upper edge."""
 SHORTEST = 1.0
@@ -44,11 +42,11 @@ class Spectrum:
 
     def of_trial(self, index: int, samples: Array) -> Array:
         """Return the coefficients (m_i, 6, n) of one trial's ``samples`` (T, 6, n)."""
-        layout = self.layout.at(self.rates[index])
+        bands = self.layout.bands.at(self.rates[index])
         parts = []
         for pick in self.picks[index]:
-            kept = layout.bands_of(pick.size) >= 0
-            parts.append(layout.coefficients(layout.shift @ samples[pick])[kept])
+            kept = bands.of(pick.size) >= 0
+            parts.append(bands.coefficients(self.layout.shift @ samples[pick])[kept])
         return np.concatenate(parts) if parts else np.empty((0, 6, samples.shape[2]))
 
 
@@ -60,22 +58,21 @@ def spectrum(cases: tuple[Case, ...], uses: tuple[NDArray[np.bool_], ...], about
     TrialRefused
         No trial has a run of `SHORTEST` s.
     """
-    layout = layout_for(about, edges=EDGES)
     picks, band, trial, seconds = [], [], [], 0.0
     rates = tuple(case.motion.rate for case in cases)
     for index, (rate, use) in enumerate(zip(rates, uses, strict=True)):
-        there = layout.at(rate)
-        runs = tuple(pick for pick in blocks(use, rate, layout) if pick.size >= SHORTEST * there.rate)
+        there = BANDS.at(rate)
+        runs = tuple(pick for pick in BANDS.runs(use, rate) if pick.size >= SHORTEST * there.rate)
         picks.append(runs)
         for pick in runs:
-            own = there.bands_of(pick.size)
+            own = there.of(pick.size)
             band.append(own[own >= 0])
             trial.append(np.full(band[-1].size, index))
             seconds += pick.size / there.rate
     if not band:
         names = ", ".join(case.trial.name for case in cases)
         raise TrialRefused(f"No trial of {names} has {SHORTEST:g} s of fully measured ground contact, so there is nothing to diagnose.")
-    return Spectrum(layout, tuple(picks), rates, np.concatenate(band), np.concatenate(trial), seconds)
+    return Spectrum(Noise.unit(about, BANDS), tuple(picks), rates, np.concatenate(band), np.concatenate(trial), seconds)
 
 
 def thinned(case: Case, use: NDArray[np.bool_]) -> tuple[Case, NDArray[np.bool_]]:

@@ -1,61 +1,87 @@
 """FAMILY: one candidate cause of disagreement per file, found automatically: to extend the model, add one file.
 
-The virtual lab injects effects, the diagnosis fits them. The name of an effect is the name of its file. Most causes have columns and are
-fitted (``effects``); those that a look at the recording settles before any statistics are checks (``discrete_effects``).
+The diagnosis fits these causes. The virtual lab makes its faults by OTHER code (``virtual_lab/faults.py``, ``causes.py``): what is hidden
+is not made by the formula that finds it. The name of an effect is the name of its file, which gives it as ``EFFECT``; the contract is
+`Effect` for causes that have columns and are fitted, `DiscreteEffect` for those that a look at the recording settles before any statistics.
+Other packages join by the entry points ``biodance.effects``, objects as arguments of ``diagnose``.
 """
 
-import importlib
 import inspect
-import pkgutil
-from collections.abc import Iterable
+from collections.abc import Mapping
+from dataclasses import replace
 from types import MappingProxyType
-from typing import TypeVar
 
-from biodance.effects.effect import Effect
-from biodance.effects.gate import DiscreteEffect
-from biodance.errors import BiodanceError, UnknownName
+from biodance.discovery import Chosen, Family
+from biodance.effects._base.case import Case, at_origin, at_point
+from biodance.effects._base.effect import Effect, Parameter
+from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded, unit_of
+from biodance.errors import UnknownName
+from biodance.records import Session
 
-Kind = TypeVar("Kind")
+__all__ = [
+    "Case",
+    "DiscreteEffect",
+    "Effect",
+    "Gate",
+    "Parameter",
+    "Recorded",
+    "at_origin",
+    "at_point",
+    "causes",
+    "discrete_effects",
+    "effect",
+    "effects",
+    "gates",
+    "unit_of",
+]
 
-CONTRACT = ("case", "effect", "gate", "geometry", "missing_joint", "moved_matter", "oscillator", "posture_answer", "reader_words")
-"""Modules of this folder that are not effects."""
+Cause = Effect | DiscreteEffect
 
 
-def effects(chosen: Iterable[str] | None = None) -> MappingProxyType[str, type[Effect]]:
-    """Return the effects of this folder that have columns, by name; only the ``chosen`` ones if given (UnknownName for others)."""
-    return _selection({name: kind for name, kind in _family().items() if issubclass(kind, Effect)}, chosen)
+def missing(candidate: object) -> tuple[str, ...]:
+    """Return what an object or class lacks to be an effect."""
+    kind = candidate if isinstance(candidate, type) else type(candidate)
+    if not issubclass(kind, Effect | DiscreteEffect):
+        return ("the base class Effect or DiscreteEffect",)
+    lacks = ["a name"] if not kind.name else []
+    lacks += sorted(getattr(kind, "__abstractmethods__", ())) if inspect.isabstract(kind) else []
+    if issubclass(kind, Effect) and kind.columns is Effect.columns and kind.transform is Effect.transform:
+        lacks.append("columns or transform")
+    return tuple(lacks)
 
 
-def discrete_effects(chosen: Iterable[str] | None = None) -> MappingProxyType[str, type[DiscreteEffect]]:
-    """Return the effects of this folder that a check finds, by name; only the ``chosen`` ones if given (UnknownName for others)."""
-    return _selection({name: kind for name, kind in _family().items() if issubclass(kind, DiscreteEffect)}, chosen)
+FAMILY: Family[Cause | type[Cause]] = Family("effect", "biodance.effects", __name__, "EFFECT", missing, lambda kind: kind.name)
 
 
-def effect(name: str) -> type[Effect]:
+def causes(chosen: Chosen[Cause | type[Cause]] = None) -> Mapping[str, Cause]:
+    """Return the effects of both kinds by name, without a target: all, or the ``chosen`` ones.
+
+    Names choose from the family (UnknownName for others); objects and classes join what is chosen, the whole family where no name is given.
+    """
+    found = FAMILY.choose(chosen)
+    return MappingProxyType({name: kind() if isinstance(kind, type) else kind for name, kind in found.items()})
+
+
+def effects(chosen: Chosen[Cause | type[Cause]] = None) -> Mapping[str, Effect]:
+    """Return the effects that have columns among `causes`, by name."""
+    return MappingProxyType({name: one for name, one in causes(chosen).items() if isinstance(one, Effect)})
+
+
+def discrete_effects(chosen: Chosen[Cause | type[Cause]] = None) -> Mapping[str, DiscreteEffect]:
+    """Return the effects that a check finds among `causes`, by name."""
+    return MappingProxyType({name: one for name, one in causes(chosen).items() if isinstance(one, DiscreteEffect)})
+
+
+def effect(name: str) -> Effect:
     """Return one effect that has columns; UnknownName lists all of them."""
-    return effects((name,))[name]
+    family = effects()
+    if name not in family:
+        raise UnknownName.of("effect", name, tuple(family))
+    return family[name]
 
 
-def _family() -> dict[str, type[Effect] | type[DiscreteEffect]]:
-    """Return what every file of this folder describes, by name."""
-    return {name: _described(name) for name in (info.name for info in pkgutil.iter_modules(__path__)) if name not in CONTRACT}
-
-
-def _described(name: str) -> type[Effect] | type[DiscreteEffect]:
-    """Return the effect that a file of this folder describes; BiodanceError where it leaves out what its author must write."""
-    kind: type[Effect] | type[DiscreteEffect] = importlib.import_module(f"{__name__}.{name}").EFFECT
-    if inspect.isabstract(kind):
-        missing = ", ".join(sorted(getattr(kind, "__abstractmethods__", ())))
-        raise BiodanceError(f"biodance/effects/{name}.py: {kind.__name__} lacks {missing}. Write it as {kind.mro()[1].__name__} describes.")
-    return kind
-
-
-def _selection(family: dict[str, type[Kind]], chosen: Iterable[str] | None) -> MappingProxyType[str, type[Kind]]:
-    """Return the members named, in the family's order; all for None."""
-    if chosen is None:
-        return MappingProxyType(family)
-    names = tuple(chosen)
-    for name in names:
-        if name not in family:
-            raise UnknownName.of("effect", name, tuple(family))
-    return MappingProxyType({name: kind for name, kind in family.items() if name in names})
+def gates(session: Session, cases: tuple[Case, ...] = (), *, chosen: Chosen[Cause | type[Cause]] = None) -> tuple[Gate, ...]:
+    """Return all checks of a session, those that are not well first; ``chosen`` limits or extends the effects (`causes`)."""
+    recorded = Recorded(session, cases)
+    found = [replace(gate, advice=kind.advice) for kind in discrete_effects(chosen).values() for gate in kind.look(recorded)]
+    return tuple(sorted(found, key=lambda gate: gate.ok))

@@ -7,8 +7,8 @@ Separated by moving that segment alone, by a reference session without the load,
 
 import numpy as np
 
-from biodance.effects.case import Case
-from biodance.effects.effect import Effect, Parameter
+from biodance.effects._base.case import Case
+from biodance.effects._base.effect import Effect, Parameter
 from biodance.records import Array
 
 

@@ -6,9 +6,9 @@ Look-alikes: a rotation of the plate by 90 or 180 degrees, which is the same thi
 
 import numpy as np
 
-from biodance.effects.case import Case, at_point
-from biodance.effects.gate import DiscreteEffect, Gate, Recorded
-from biodance.effects.reader_words import overruled
+from biodance.effects._base.case import Case, at_point
+from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded
+from biodance.effects._base.reader_words import overruled
 from biodance.records import CHANNELS, Array
 
 ALONE = 0.95

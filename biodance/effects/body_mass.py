@@ -5,8 +5,8 @@ Look-alikes: all six gains together (exactly), a load near the body's centre (pe
 weighing the person on the plate and on a scale.
 """
 
-from biodance.effects.case import Case
-from biodance.effects.effect import Effect, Parameter
+from biodance.effects._base.case import Case
+from biodance.effects._base.effect import Effect, Parameter
 from biodance.records import Array
 
 

@@ -7,8 +7,8 @@ squats, which change the height, and by weighing the person without the support.
 
 import numpy as np
 
-from biodance.effects.case import Case
-from biodance.effects.effect import Effect, Parameter
+from biodance.effects._base.case import Case
+from biodance.effects._base.effect import Effect, Parameter
 from biodance.records import Array
 
 ROPE = 2.0

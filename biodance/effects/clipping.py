@@ -6,8 +6,8 @@ Look-alikes: an unloaded plate whose noise was set to zero (flat at zero, not at
 
 import numpy as np
 
-from biodance.effects.case import at_point
-from biodance.effects.gate import DiscreteEffect, Gate, Recorded, unit_of
+from biodance.effects._base.case import at_point
+from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded, unit_of
 from biodance.records import CHANNELS, Array, Trial
 
 LONGEST = 0.015

@@ -6,8 +6,8 @@ Look-alikes: a delay in one trial only; drift of the plate. Separated by a long 
 
 import numpy as np
 
-from biodance.effects.case import Case
-from biodance.effects.effect import Effect, Parameter
+from biodance.effects._base.case import Case
+from biodance.effects._base.effect import Effect, Parameter
 from biodance.effects.time_delay import moved_in_time
 from biodance.records import Array
 

@@ -6,8 +6,8 @@ force. Look-alikes: contact at a neighbouring segment; for a steady touch, offse
 
 import numpy as np
 
-from biodance.effects.case import Case
-from biodance.effects.effect import Effect, Parameter
+from biodance.effects._base.case import Case
+from biodance.effects._base.effect import Effect, Parameter
 from biodance.records import Array
 
 STEP = 0.4

@@ -8,8 +8,8 @@ movements, and by the settings of the recording software.
 import numpy as np
 from scipy.fft import dct, idct
 
-from biodance.effects.case import Case
-from biodance.effects.effect import Effect, Parameter
+from biodance.effects._base.case import Case
+from biodance.effects._base.effect import Effect, Parameter
 from biodance.records import Array
 
 REFERENCE = 10.0

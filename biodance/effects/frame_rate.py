@@ -9,15 +9,15 @@ delay (from the start on). Separated by a jump on the plate: flight time against
 import numpy as np
 from scipy.fft import dct
 
-from biodance.effects.case import Case
+from biodance.effects._base.case import Case
+from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded
 from biodance.effects.clipping import clipped
-from biodance.effects.gate import DiscreteEffect, Gate, Recorded
-from biodance.identify.caution import widened
 from biodance.identify.posterior import prior_factor
-from biodance.identify.twins import skew
 from biodance.lab.filters import LowPass, low_pass
+from biodance.motion.marker_jacobian import skew
 from biodance.motion.regressor import predict_wrench, regressor
 from biodance.records import Array, Motion
+from biodance.uncertainty.caution import widened
 
 BAND = 3.0
 """Hz: above, soft tissue decides how large accelerations seem."""

@@ -10,9 +10,9 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.branch import Cut, branch_off
-from biodance.effects.case import Case
-from biodance.effects.effect import Parameter
-from biodance.effects.missing_joint import MissingJoint, share_of_body, shoulders
+from biodance.effects._base.case import Case
+from biodance.effects._base.effect import Parameter
+from biodance.effects._base.missing_joint import MissingJoint, share_of_body, shoulders
 
 NECK = 0.41
 """Height, between shoulders and vertex, about which the head turns: the angle of the jaw (de Leva 1996: 0.39 men, 0.45 women). Nodding is

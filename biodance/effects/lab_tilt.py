@@ -7,9 +7,8 @@ by a plumb line with two markers.
 
 import numpy as np
 
-from biodance.effects.case import Case
-from biodance.effects.effect import Effect, Parameter, axis_vector
-from biodance.motion.regressor import GRAVITY
+from biodance.effects._base.case import Case
+from biodance.effects._base.effect import Effect, Parameter, axis_vector
 from biodance.records import Array
 
 
@@ -28,7 +27,7 @@ class LabTilt(Effect):
 
     def columns(self, case: Case) -> Array:
         """Return the change of the predicted wrench per radian: the weight turns by axis x gravity, and its moment with it."""
-        turned = np.cross(axis_vector(self.target), GRAVITY)
+        turned = np.cross(axis_vector(self.target), case.body.gravity)
         table = case.phi.reshape(-1, 10)
         move = case.segments
         first = np.einsum("tnij,nj->ti", move.rotation, table[:, 1:4]) + np.einsum("tni,n->ti", move.position, table[:, 0])

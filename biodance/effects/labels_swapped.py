@@ -7,8 +7,8 @@ Look-alikes: a marker that fell off (one of the two is right then). Separated by
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.effects.case import Case
-from biodance.effects.gate import DiscreteEffect, Gate, Recorded
+from biodance.effects._base.case import Case
+from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded
 from biodance.errors import BiodanceError
 from biodance.motion.inverse_kinematics import solve_ik
 from biodance.records import Array, Markers, Trial

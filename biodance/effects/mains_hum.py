@@ -7,8 +7,8 @@ low-pass nothing is left of it, unless it was sampled so slowly that it was fold
 
 import numpy as np
 
-from biodance.effects.case import at_point
-from biodance.effects.gate import DiscreteEffect, Gate, Recorded, unit_of
+from biodance.effects._base.case import at_point
+from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded, unit_of
 from biodance.records import CHANNELS, Array, Trial
 
 MAINS = (50.0, 60.0)

@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from biodance.body.moved import move_marker
-from biodance.effects.case import Case
-from biodance.effects.effect import Effect, Parameter
+from biodance.effects._base.case import Case
+from biodance.effects._base.effect import Effect, Parameter
 from biodance.motion.track import track
 from biodance.records import Array
 

@@ -7,8 +7,8 @@ by movements that change Fz much and by standing at other places of the plate.
 
 import numpy as np
 
-from biodance.effects.case import Case, at_origin
-from biodance.effects.effect import Effect, Parameter
+from biodance.effects._base.case import Case, at_origin
+from biodance.effects._base.effect import Effect, Parameter
 from biodance.records import CHANNELS, Array
 
 

@@ -7,8 +7,8 @@ recordings before and after.
 
 import numpy as np
 
-from biodance.effects.case import Case, at_origin
-from biodance.effects.effect import Effect, Parameter, channel_index, plate_channels
+from biodance.effects._base.case import Case, at_origin
+from biodance.effects._base.effect import Effect, Parameter, channel_index, plate_channels
 from biodance.records import Array
 
 

@@ -7,8 +7,8 @@ fit as good as before. Separated by the scale's weight and by differences betwee
 
 import numpy as np
 
-from biodance.effects.case import Case, at_origin
-from biodance.effects.effect import Effect, Parameter, channel_index, plate_channels
+from biodance.effects._base.case import Case, at_origin
+from biodance.effects._base.effect import Effect, Parameter, channel_index, plate_channels
 from biodance.records import Array
 
 

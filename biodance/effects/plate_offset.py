@@ -7,8 +7,8 @@ follow Fz), for Fx a tilted plate. Separated by movements that change Fz (squats
 
 import numpy as np
 
-from biodance.effects.case import Case, at_origin
-from biodance.effects.effect import Effect, Parameter, channel_index, plate_channels
+from biodance.effects._base.case import Case, at_origin
+from biodance.effects._base.effect import Effect, Parameter, channel_index, plate_channels
 from biodance.records import Array
 
 

@@ -7,8 +7,8 @@ Separated by the centre of pressure against the foot markers, by Fz dynamics, an
 
 import numpy as np
 
-from biodance.effects.case import Case
-from biodance.effects.effect import Effect, Parameter, axis_vector, plate_axes
+from biodance.effects._base.case import Case
+from biodance.effects._base.effect import Effect, Parameter, axis_vector, plate_axes
 from biodance.records import Array
 
 

@@ -7,8 +7,8 @@ the plate's corners measured with markers.
 
 import numpy as np
 
-from biodance.effects.case import Case, at_origin
-from biodance.effects.effect import Effect, Parameter, axis_vector, plate_axes
+from biodance.effects._base.case import Case, at_origin
+from biodance.effects._base.effect import Effect, Parameter, axis_vector, plate_axes
 from biodance.motion.kinematics import axis_rotation
 from biodance.records import Array
 

@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from biodance.body.moved import move_joint
-from biodance.effects.case import Case
-from biodance.effects.effect import Effect, Parameter
-from biodance.effects.geometry import joint_chains
+from biodance.effects._base.case import Case
+from biodance.effects._base.effect import Effect, Parameter
+from biodance.effects._base.geometry import joint_chains
 from biodance.motion.track import track
 from biodance.records import Array
 

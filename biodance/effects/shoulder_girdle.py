@@ -9,9 +9,9 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.branch import Cut, branch_off
-from biodance.effects.case import Case
-from biodance.effects.effect import Parameter
-from biodance.effects.missing_joint import MissingJoint, doubting, shoulders
+from biodance.effects._base.case import Case
+from biodance.effects._base.effect import Parameter
+from biodance.effects._base.missing_joint import MissingJoint, doubting, shoulders
 
 STERNOCLAVICULAR = np.array([0.2, 0.0, 0.12])
 """Forwards, upwards and sideways from the middle of the shoulders, in half shoulder widths."""

@@ -7,10 +7,10 @@ seconds of standing still: what rings down there is not the person.
 
 import numpy as np
 
+from biodance.effects._base.case import Case
+from biodance.effects._base.effect import Effect, Parameter
+from biodance.effects._base.oscillator import point_motion, relative_motion, riding_wrench
 from biodance.effects.added_mass import point_mass
-from biodance.effects.case import Case
-from biodance.effects.effect import Effect, Parameter
-from biodance.effects.oscillator import point_motion, relative_motion, riding_wrench
 from biodance.records import Array
 
 FREQUENCY = 1.5
@@ -62,7 +62,7 @@ class SloshingLoad(Effect):
         place, acceleration = point_motion(case, index, local)
         x, relative = relative_motion(acceleration, case.motion.rate, frequency=frequency, damping=DAMPING)
         level = np.array([1.0, 1.0, 0.0])
-        return rigid, riding_wrench(place, acceleration, (x * level, relative * level))
+        return rigid, riding_wrench(place, acceleration, (x * level, relative * level), gravity=case.body.gravity)
 
     def reported(self, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
         """Return the frequency itself instead of its difference."""

@@ -7,8 +7,8 @@ Look-alikes: another filter on forces than on markers. Separated by fast alterna
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from biodance.effects.case import Case
-from biodance.effects.effect import Effect, Parameter
+from biodance.effects._base.case import Case
+from biodance.effects._base.effect import Effect, Parameter
 from biodance.records import Array
 
 

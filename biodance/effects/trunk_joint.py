@@ -10,9 +10,9 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.branch import Cut, branch_off
-from biodance.effects.case import Case
-from biodance.effects.effect import Parameter
-from biodance.effects.missing_joint import MissingJoint, doubting, share_of_body, shoulders
+from biodance.effects._base.case import Case
+from biodance.effects._base.effect import Parameter
+from biodance.effects._base.missing_joint import MissingJoint, doubting, share_of_body, shoulders
 
 XIPHION = 0.61
 """Height of the xiphion between the trunk's joint and the shoulders (de Leva 1996, from the omphalion: 0.58 men, 0.65 women)."""

@@ -7,19 +7,19 @@ Separated by the scale's weight and by the size of the person and the plates.
 
 import numpy as np
 
-from biodance.effects.gate import DiscreteEffect, Gate, Recorded
-from biodance.effects.reader_words import overruled
-from biodance.lab.weight import STANDARD_GRAVITY
+from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded
+from biodance.effects._base.reader_words import overruled
 from biodance.records import Trial
+from biodance.settings import STANDARD_GRAVITY
 
 FACTORS = {
     1000.0: "newtons declared as kilonewtons, or a gain that was forgotten",
-    9.80665: "newtons declared as kilograms-force",
+    STANDARD_GRAVITY: "newtons declared as kilograms-force",
     4.4482216: "newtons declared as pounds",
     2.2046226: "kilograms declared as pounds, in the plates or in the mass",
     1 / 2.2046226: "pounds declared as kilograms, in the plates or in the mass",
     1 / 4.4482216: "pounds declared as newtons",
-    1 / 9.80665: "kilograms-force declared as newtons",
+    1 / STANDARD_GRAVITY: "kilograms-force declared as newtons",
     1e-3: "kilonewtons declared as newtons",
 }
 NEAR = 0.06

@@ -6,9 +6,9 @@ Look-alikes: another filter on forces than on markers; a delay; an error of that
 excite more than 5 Hz; below that even ten kilograms hardly show.
 """
 
-from biodance.effects.case import Case
-from biodance.effects.effect import Effect, Parameter
-from biodance.effects.oscillator import point_motion, relative_motion, riding_wrench
+from biodance.effects._base.case import Case
+from biodance.effects._base.effect import Effect, Parameter
+from biodance.effects._base.oscillator import point_motion, relative_motion, riding_wrench
 from biodance.records import Array
 
 FREQUENCY = {"trunk_head": 5.0}
@@ -38,7 +38,7 @@ class WobblingMass(Effect):
         table = case.phi[10 * index : 10 * index + 10]
         place, acceleration = point_motion(case, index, table[1:4] / table[0])
         moved = relative_motion(acceleration, case.motion.rate, frequency=FREQUENCY.get(self.target, LIMBS), damping=DAMPING)
-        return riding_wrench(place, acceleration, moved)[:, :, None]
+        return riding_wrench(place, acceleration, moved, gravity=case.body.gravity)[:, :, None]
 
     def possible(self, theta: Array) -> bool:
         """Return whether the size is positive: only a mass that is there wobbles."""

@@ -83,6 +83,11 @@ def added_mass(session: Identification, *, reference: Identification | None = No
 
     Against the table alone, a load on pelvis, trunk or thigh cannot be told from a wrong table or a wrong scale: ``set`` then holds several
     segments.
+
+    Raises
+    ------
+    NotSolved
+        Nothing was identified from the reference.
     """
     before = session.belief.prior if reference is None else expected(reference, session)
     rows, surprise = surprised(session.data, before)
@@ -100,6 +105,11 @@ def expected(reference: Identification, session: Identification) -> Sip:
     """Return what ``reference`` lets expect of the unloaded body in ``session``, with covariance.
 
     The belief of the reference, moved by what the table itself changed between the sessions (another static trial, other lengths).
+
+    Raises
+    ------
+    NotSolved
+        The reference contradicts every possible body, so its belief is none of a body.
     """
     shift = session.belief.prior.phi - reference.belief.prior.phi
     return Sip(reference.sip.segments, reference.belief.mean + shift, reference.belief.covariance)

@@ -1,4 +1,8 @@
-"""Frames that no wrong body explains: a posture that jumps, a plate that somebody else steps on. They are masked before identification."""
+"""Frames that no wrong body explains: a posture that jumps, a plate that somebody else steps on. They are masked before identification.
+
+The usual limit is 0.3 of the body weight: the table misses at most 0.18 of it in virtual squats and dances; a load of a quarter of
+the mass passes.
+"""
 
 from dataclasses import replace
 
@@ -7,11 +11,9 @@ from scipy.ndimage import binary_dilation
 
 from biodance.body.body import Body
 from biodance.identify.statistics import Fit
-from biodance.motion.regressor import GRAVITY, predict_wrench
+from biodance.motion.regressor import predict_wrench
 from biodance.records import Array
 
-LIMIT = 0.3
-"""Share of the body weight: the table misses at most 0.18 of it in virtual squats and dances; a load of a quarter of the mass passes."""
 LEVER = 0.5
 """m: the same limit for moments about the standing point."""
 AROUND = 0.5
@@ -19,8 +21,8 @@ AROUND = 0.5
 
 
 def believable(body: Body, fit: Fit, about: Array) -> tuple[Fit, str]:
-    """Return the trial without frames whose wrench differs from the table's by more than `LIMIT` of the weight, and a sentence or ""."""
-    limit = -LIMIT * GRAVITY[2] * body.sip.mass.sum()
+    """Return the trial without frames in which table and plates differ by more than ``fit.outlier``, and a sentence or ""."""
+    limit = -fit.outlier * body.gravity[2] * body.sip.mass.sum()
     difference = fit.wrench.value - predict_wrench(body, fit.motion).value
     moment = difference[:, 3:] - np.cross(about, difference[:, :3])
     size = np.maximum(np.linalg.norm(difference[:, :3], axis=1), np.linalg.norm(moment, axis=1) / LEVER)

@@ -6,25 +6,30 @@ can exist. A session that cannot tell a parameter leaves it at the table's value
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from biodance import display
 from biodance.body.body import Body
-from biodance.errors import TrialRefused
+from biodance.errors import NotSolved, TrialRefused, UnknownName
 from biodance.identify.base_parameters import BaseEstimate, estimate_base, structural_base
-from biodance.identify.caution import about_true_centres, widened
 from biodance.identify.gate import believable
 from biodance.identify.information import Information
-from biodance.identify.knowledge import Known, knowledge
+from biodance.identify.knowledge import QUANTITIES, Known, knowledge, mass_interval
 from biodance.identify.learning import learn
 from biodance.identify.loads import may_carry
 from biodance.identify.mismatch import Mismatch, Sizes, evident_sizes, mismatch, temper
-from biodance.identify.noise import Noise
-from biodance.identify.physical import PhysicalFit, physical_fit
+from biodance.identify.physical import FailedFit, PhysicalFit, physical_fit
 from biodance.identify.posterior import Posterior, posterior
 from biodance.identify.statistics import Fit, Statistics, empty, layout_for, statistics
 from biodance.records import Array, Sip
+from biodance.uncertainty.caution import about_true_centres, widened
+from biodance.uncertainty.noise import Noise
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
 
 NOISE_ALONE = "The intervals count the noise alone, not soft tissue, joint centres and plates: they are several times too short."
 
@@ -33,32 +38,143 @@ NOISE_ALONE = "The intervals count the noise alone, not soft tissue, joint centr
 class Identification:
     """What a session says about a body.
 
-    ``body`` as given, with the table as its SIP; ``sip`` the identified parameters, physically consistent, with their covariance
-    about the true joint centres;
-    ``belief`` the Gaussian posterior before the consistency constraint; ``data`` what the trials alone say (whitened, disturbances
-    discounted); ``base`` the weighted least-squares estimate of the base parameters; ``noise`` as learned; ``sizes`` of the disturbances;
-    ``fit`` what the constraint did; ``trials`` used, ``frames`` coefficients counted; ``known`` every quantity with interval and verdict;
-    ``status``, with ``cause`` and cure in words; ``notes`` what a person should know.
+    Parameters
+    ----------
+    body : Body
+        As given, with the table as its inertial parameters.
+    belief : Posterior
+        The Gaussian posterior before the consistency constraint.
+    data : Information
+        What the trials alone say: whitened, disturbances discounted.
+    base : BaseEstimate
+        Weighted least-squares estimate of the base parameters.
+    noise : Noise
+        As learned.
+    sizes : Sizes
+        Of the disturbances.
+    fit : PhysicalFit
+        The nearest body that can exist, its covariance about the true joint centres, or why there is none.
+    trials : tuple of str
+        Used.
+    frames : int
+        Coefficients counted.
+    known : tuple
+        Every quantity of every segment with interval and verdict; () where the fit failed.
+    notes : tuple of str
+        What a person should know.
+
+    References
+    ----------
+    Physical consistency: Traversaro et al. 2016, doi:10.1109/IROS.2016.7759801; Wensing et al. 2018, doi:10.1109/LRA.2017.2729659.
+
+    Examples
+    --------
+    >>> identified.identification
+    Identification(solved, 12 segments from dance_1)
     """
 
     body: Body
-    sip: Sip
     belief: Posterior
     data: Information
     base: BaseEstimate
     noise: Noise
     sizes: Sizes
-    fit: PhysicalFit
+    fit: PhysicalFit | FailedFit
     trials: tuple[str, ...]
     frames: int
     known: tuple[Known, ...]
-    status: Literal["solved", "failed"]
-    cause: str
     notes: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        return f"Identification({self.status}, {len(self.sip.segments)} segments from {', '.join(self.trials)})"
+
+    def _repr_html_(self) -> str:
+        return display.card(repr(self), self.table(), self.notes)
+
+    def table(self, quantity: str = "mass") -> "pd.DataFrame":
+        """Return one row for each segment.
+
+        Parameters
+        ----------
+        quantity : str
+            "mass" (kg); "com x", "com y", "com z" (m, in the segment's joint frame); "Ixx" ... "Izz" (kg·m², about the centre of mass).
+
+        Returns
+        -------
+        pandas.DataFrame
+            Index segment; table, table sd, identified, sd, low and high of the 95 % interval, each with its unit; ``from data`` (share of
+            the table's variance that the data removed), verdict.
+
+        Raises
+        ------
+        UnknownName
+            There is no such quantity; the legal ones are listed.
+
+        Examples
+        --------
+        >>> bool(identified.identification.table("com y").loc["left_thigh", "identified (m)"] < 0)
+        True
+        """
+        import pandas as pd
+
+        if quantity not in QUANTITIES:
+            raise UnknownName.of("quantity of a segment", quantity, QUANTITIES)
+        rows = [k for k in self.known if k.quantity == quantity]
+        numbers = [(k.table, k.table_sd, k.value, k.sd, *k.interval) for k in rows]
+        columns = [f"{name} ({rows[0].unit})" for name in ("table", "table sd", "identified", "sd", "low", "high")]
+        out = pd.DataFrame(numbers, pd.Index([k.segment for k in rows], name="segment"), columns)
+        out["from data"] = [k.from_data for k in rows]
+        out["verdict"] = [k.verdict for k in rows]
+        return out
+
+    def plot_masses(self, *, axes: "Axes | None" = None) -> "Axes":
+        """Draw the mass of every segment, of the table and identified, with 95 % intervals.
+
+        Parameters
+        ----------
+        axes : matplotlib.axes.Axes, optional
+            Where to draw; by default a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            Kilograms; squares are the table's, circles identified: filled = known, pale = partly known, open = cannot be known.
+
+        Examples
+        --------
+        >>> identified.identification.plot_masses().get_xlabel()
+        'mass (kg), 95 % intervals'
+        """
+        drawn = display.intervals([mass_interval(known) for known in self.known if known.quantity == "mass"], axes=axes)
+        drawn.set_xlabel("mass (kg), 95 % intervals")
+        return drawn
+
+    @property
+    def status(self) -> Literal["solved", "failed"]:
+        """Whether a body that can exist was found; if it "failed", `cause` says why and what to do."""
+        return self.fit.status
+
+    @property
+    def cause(self) -> str:
+        """Cause and cure of a failure in words, "" if there is none."""
+        return self.fit.cause
+
+    @property
+    def sip(self) -> Sip:
+        """The identified parameters, physically consistent, with their covariance about the true joint centres.
+
+        Raises
+        ------
+        NotSolved
+            The fit failed, so there are none.
+        """
+        if self.fit.status == "failed":
+            raise NotSolved(f"Nothing was identified from {', '.join(self.trials)}. {self.fit.cause}")
+        return self.fit.sip
 
     @property
     def identified(self) -> Body:
-        """The body with the identified parameters."""
+        """The body with the identified parameters; raises `NotSolved` like `sip`."""
         return replace(self.body, sip=self.sip, notes=(*self.body.notes, f"SIP identified from {', '.join(self.trials)}."))
 
     @property
@@ -135,10 +251,13 @@ def conclude(
     belief = posterior(data, before)
     fit = physical_fit(belief, body)
     base = estimate_base(data, structural_base(body))
-    sip = about_true_centres(fit.sip, body.joint_errors)
-    known = knowledge(sip, about_true_centres(before, body.joint_errors), belief)
-    words = (*(() if found else (NOISE_ALONE,)), *_notes(known, fit))
-    return Identification(body, sip, belief, data, base, noise, sizes, fit, trials, data.frames, known, fit.status, fit.cause, words)
+    known: tuple[Known, ...] = ()
+    words: tuple[str, ...] = () if found else (NOISE_ALONE,)
+    if fit.status == "solved":
+        fit = replace(fit, sip=about_true_centres(fit.sip, body.joint_errors))
+        known = knowledge(fit.sip, about_true_centres(before, body.joint_errors), belief)
+        words += _notes(known, fit)
+    return Identification(body, belief, data, base, noise, sizes, fit, trials, data.frames, known, words)
 
 
 def standing_point(fits: tuple[Fit, ...]) -> Array:
@@ -154,6 +273,6 @@ def _notes(known: tuple[Known, ...], fit: PhysicalFit) -> tuple[str, ...]:
     if lost:
         notes.append(f"Cannot be known from this session (the table's value stands): {', '.join(lost)}.")
     moved = [name for name, acts in zip(fit.sip.segments, fit.moved, strict=True) if acts]
-    if moved and fit.status == "solved":
+    if moved:
         notes.append(f"At the edge of what a body can be: {', '.join(moved)}.")
     return tuple(notes)

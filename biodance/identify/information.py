@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.identify.noise import Noise, blocks
 from biodance.motion.kinematics import segment_motion
 from biodance.motion.regressor import regressor_of
 from biodance.records import Array, Motion, Wrench
+from biodance.uncertainty.noise import Noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,9 +85,9 @@ def information(body: Body, motion: Motion, wrench: Wrench, noise: Noise, *, use
 
 def whitened_rows(body: Body, motion: Motion, wrench: Wrench, noise: Noise, used: NDArray[np.bool_]) -> Iterator[Array]:
     """Yield whitened rows (m, 6, 10N + 1) of [W y], block by block."""
-    for pick in blocks(used, motion.rate, noise):
+    for pick in noise.bands.runs(used, motion.rate):
         part = Motion(motion.time[pick], motion.q[pick], motion.v[pick], motion.a[pick])
-        W = regressor_of(segment_motion(body, part))
+        W = regressor_of(segment_motion(body, part), gravity=body.gravity)
         yield noise.at(motion.rate).whiten(np.concatenate([W, wrench.value[pick][:, :, None]], axis=2))
 
 

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from biodance.body.inertia import TENSOR
+from biodance.display import Interval
 from biodance.identify.posterior import Posterior
 from biodance.records import Array, Sip
 
@@ -45,6 +46,12 @@ class Known:
     def interval(self) -> tuple[float, float]:
         """95 % interval."""
         return self.value - SIGMAS * self.sd, self.value + SIGMAS * self.sd
+
+
+def mass_interval(known: Known) -> Interval:
+    """Return the table's and the identified value of a quantity with their 95 % intervals, as they are drawn."""
+    reach = SIGMAS * known.table_sd
+    return Interval(known.segment, (known.table, known.table - reach, known.table + reach), (known.value, *known.interval), known.verdict)
 
 
 def segment_quantities(phi: Array) -> tuple[Array, Array]:

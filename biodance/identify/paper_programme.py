@@ -8,7 +8,6 @@ exceeds the smallest moments of inertia of the table's own feet and forearms, so
 relative to the table's smallest eigenvalue of each segment.
 """
 
-import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -16,7 +15,9 @@ import numpy as np
 
 from biodance.body.inertia import TENSOR
 from biodance.identify.base_parameters import BaseEstimate, estimate_base, structural_base
+from biodance.identify.convex import solve_convex
 from biodance.identify.information import Information
+from biodance.identify.physical import FailedFit
 from biodance.records import Array
 
 if TYPE_CHECKING:
@@ -30,12 +31,12 @@ DIRECTIONS = 100
 
 @dataclass(frozen=True, eq=False)
 class PaperFit:
-    """Solution ``phi`` (10N,), the base estimate it was tied to, ``equalities`` how many, ``status`` and its ``cause`` in words."""
+    """Solution ``phi`` (10N,), the base estimate it was tied to, ``equalities`` how many; ``cause`` why there are none."""
 
     phi: Array
     base: BaseEstimate
     equalities: int
-    status: Literal["solved", "solved without equalities", "failed"]
+    status: Literal["solved", "solved without equalities"]
     cause: str = ""
 
 
@@ -75,7 +76,7 @@ def inequalities(body: "Body") -> tuple[Array, Array]:
     return np.concatenate(rows), np.concatenate(level)
 
 
-def paper_programme(data: Information, body: "Body") -> PaperFit:
+def paper_programme(data: Information, body: "Body") -> PaperFit | FailedFit:
     """Return the solution of eq. 8 for ``data`` compressed with unit noise (1 N, 1 N·m), table values from ``body.sip``.
 
     The equalities (eq. 11) tie the base parameters with a relative standard deviation of at most 10 %; where they contradict the boxes the
@@ -91,7 +92,7 @@ def paper_programme(data: Information, body: "Body") -> PaperFit:
     phi, word = _solve(data, body, E[:0], e[:0])
     if phi is not None:
         return PaperFit(phi, base, 0, "solved without equalities", cause)
-    return PaperFit(np.array(body.sip.phi), base, 0, "failed", f"The solver stopped with {word!r} even without equalities.")
+    return FailedFit(f"The paper's programme has no solution ({word}), not even without equalities: the CoM boxes contradict each other.")
 
 
 def _solve(data: Information, body: "Body", E: Array, e: Array) -> tuple[Array | None, str]:
@@ -113,13 +114,5 @@ def _solve(data: Information, body: "Body", E: Array, e: Array) -> tuple[Array |
         scale = 1 / np.maximum(np.linalg.norm(slope, axis=1), 1e-12)
         left, right = scale[:, None] * slope @ x, scale * (level - matrix @ centre)
         constraints.append(left == right if equal else left >= right)
-    problem = cp.Problem(cp.Minimize(cp.sum_squares(x)), constraints)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # an inaccurate solve is not taken: its word is returned
-            problem.solve(solver=cp.CLARABEL)
-    except cp.error.SolverError as error:
-        return None, str(error)
-    if problem.status != "optimal":
-        return None, str(problem.status)
-    return centre + inverse @ np.asarray(x.value), "optimal"
+    word = solve_convex(cp.Problem(cp.Minimize(cp.sum_squares(x)), constraints))
+    return (centre + inverse @ np.asarray(x.value) if word == "optimal" else None), word

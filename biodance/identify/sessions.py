@@ -5,13 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from biodance.errors import BiodanceError
+from biodance.errors import BiodanceError, NotSolved
 from biodance.identify.added_mass import added_mass
 from biodance.identify.identification import Identification
 from biodance.identify.knowledge import QUANTITIES, SIGMAS, UNITS, segment_quantities
 from biodance.identify.loads import may_carry
 from biodance.identify.physical import physical_fit
 from biodance.identify.posterior import Posterior, posterior
+from biodance.records import Array
 
 
 @dataclass(frozen=True)
@@ -46,14 +47,15 @@ def differences(earlier: Identification, later: Identification) -> tuple[Differe
     ------
     BiodanceError
         The sessions have different segments.
+    NotSolved
+        No possible body is near what one of the sessions says, with or without that room.
     """
     if earlier.sip.segments != later.sip.segments:
         raise BiodanceError("The two sessions have different segments and cannot be compared. Use the same kind of body in both.")
     first, second = _with_room(earlier, later), _with_room(later, earlier)
-    keep1, keep2 = (one.covariance @ np.linalg.pinv(one.prior.covariance, rcond=1e-12, hermitian=True) for one in (first, second))
-    mutual = keep1 @ earlier.belief.prior.covariance @ keep2.T
+    mutual = _owed(first) @ earlier.belief.prior.covariance @ _owed(second).T
     spread = first.covariance + second.covariance - mutual - mutual.T
-    values = [physical_fit(belief, one.body).sip.phi for belief, one in ((first, earlier), (second, later))]
+    values = [_possible(belief, one) for belief, one in ((first, earlier), (second, later))]
     rows = []
     for i, segment in enumerate(earlier.sip.segments):
         cut = slice(10 * i, 10 * i + 10)
@@ -68,7 +70,29 @@ def differences(earlier: Identification, later: Identification) -> tuple[Differe
     return tuple(rows)
 
 
+def _owed(belief: Posterior) -> Array:
+    """Return A (p, p) = C P^-1 of a belief with covariance C: what of a step of the prior's mean is still in its mean.
+
+    In the units of each parameter's own standard deviation, where the inverse hangs on no rounding.
+    """
+    scale = np.sqrt(np.diag(belief.prior.covariance))
+    unit = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0)
+    inverse = np.linalg.pinv(belief.prior.covariance * np.outer(unit, unit), rcond=1e-12, hermitian=True)
+    return belief.covariance @ (unit[:, None] * inverse * unit)
+
+
+def _possible(belief: Posterior, one: Identification) -> Array:
+    """Return the parameters (10N,) of the possible body nearest to ``belief`` of session ``one``."""
+    fit = physical_fit(belief, one.body)
+    if fit.status == "failed":
+        raise NotSolved(f"The sessions cannot be compared: {', '.join(one.trials)}, with room for a load: {fit.cause}")
+    return fit.sip.phi
+
+
 def _with_room(one: Identification, other: Identification) -> Posterior:
-    """Return the belief of session ``one`` with room for the loads that it carries beyond ``other``."""
-    chance = {found.segment: found.probability * (found.mass > 0) for found in added_mass(one, reference=other).suspects}
+    """Return the belief of session ``one`` with room for the loads that it carries beyond ``other``.
+
+    A load is positive: its probability counts as far as its mass is above zero, by degrees, so that rounding opens and closes no room.
+    """
+    chance = {found.segment: found.probability * norm.cdf(found.mass / found.sd) for found in added_mass(one, reference=other).suspects}
     return posterior(one.data, may_carry(one.body, one.belief.prior, share=np.array([chance[s] for s in one.body.segments])))

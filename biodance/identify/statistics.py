@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identify.information import Information
-from biodance.identify.noise import BANDS, Noise, blocks
 from biodance.motion.kinematics import segment_motion
 from biodance.motion.regressor import regressor_of
 from biodance.records import Array, Motion, Wrench
+from biodance.settings import Settings
+from biodance.uncertainty.bands import BANDS, Bands
+from biodance.uncertainty.learning import Moments
+from biodance.uncertainty.noise import Noise
 
-RATE = 25.0
-"""Hz at which low-passed recordings are sampled for identification: more than twice the highest band."""
 STILL, POSTURE_BANDS = 0.03, 2
 """A run whose segments all stay within this RMS displacement (m) is standing: soft tissue and marker noise are as large as its sway, and
 regressors that are themselves wrong pull masses towards smaller sway. Its posture tells of CoM, so that only the slowest bands count."""
@@ -27,12 +28,15 @@ regressors that are themselves wrong pull masses towards smaller sway. Its postu
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """One trial to identify from: ``motion`` and ``wrench`` (about the lab origin) at the same times, ``use`` (T,) True where both hold."""
+    """One trial to identify from: ``motion`` and ``wrench`` (about the lab origin) at the same times, ``use`` (T,) True where both hold;
+    ``outlier`` the share of body weight by which a frame may differ from the table's prediction (`Settings.outlier`).
+    """
 
     name: str
     motion: Motion
     wrench: Wrench
     use: NDArray[np.bool_]
+    outlier: float = Settings.outlier
 
     def __post_init__(self) -> None:
         frames = self.motion.time.size
@@ -57,7 +61,7 @@ class Statistics:
 
     def __add__(self, other: "Statistics") -> "Statistics":
         """Return the statistics of both; they must have the same layout."""
-        if self.layout.edges != other.layout.edges or not np.array_equal(self.layout.about, other.layout.about):
+        if self.layout.bands.edges != other.layout.bands.edges or not np.array_equal(self.layout.about, other.layout.about):
             raise BiodanceError("Statistics with different bands or points cannot be added; use one layout for all trials of a session.")
         return Statistics(self.gram + other.gram, self.count + other.count, self.layout)
 
@@ -70,23 +74,22 @@ class Statistics:
         rows = np.sqrt(np.maximum(value, 0.0))[:, None] * vector.T * scale
         return Information(np.asarray(np.linalg.qr(rows, mode="r")), int(self.count.sum()))
 
-    def residual_covariance(self, phi: Array, covariance: Array) -> Array:
-        """Return (B, 6, 6): mean square of y - W phi per band, plus what the ``covariance`` (p, p) of phi adds (E step of EM)."""
+    def moments(self, phi: Array, covariance: Array) -> Moments:
+        """Return the summed squares of y - W phi per band, plus what the ``covariance`` (p, p) of phi adds (expectation step)."""
         z = np.append(-phi, 1.0)
         square = np.einsum("i,bcidj,j->bcd", z, self.gram, z, optimize=True)
         spread = np.einsum("bcidj,ij->bcd", self.gram[:, :, :-1, :, :-1], covariance, optimize=True)
-        total = (square + spread) / np.maximum(self.count, 1)[:, None, None]
-        return 0.5 * (total + np.swapaxes(total, 1, 2))
+        return Moments(square + spread, self.count.astype(float))
 
 
-def layout_for(about: Array, *, edges: tuple[float, ...] = BANDS, rate: float = RATE) -> Noise:
+def layout_for(about: Array, bands: Bands = BANDS) -> Noise:
     """Return the layout of bands about a point: the noise of unit covariance that Statistics are built on."""
-    return Noise(np.tile(np.eye(6), (len(edges) - 1, 1, 1)), about, edges, rate)
+    return Noise.unit(about, bands)
 
 
 def empty(parameters: int, layout: Noise) -> Statistics:
     """Return the statistics of no data for ``parameters`` unknowns."""
-    bands, size = len(layout.edges) - 1, parameters + 1
+    bands, size = len(layout.bands), parameters + 1
     return Statistics(np.zeros((bands, 6, size, 6, size)), np.zeros(bands, dtype=np.intp), layout)
 
 
@@ -103,14 +106,14 @@ def statistics(body: Body, fit: Fit, layout: Noise) -> Statistics:
     total = empty(10 * len(body.segments), layout)
     gram, count = total.gram.copy(), total.count.copy()
     size = gram.shape[2]
-    for pick in blocks(fit.use, fit.motion.rate, layout):
+    for pick in layout.bands.runs(fit.use, fit.motion.rate):
         part = Motion(fit.motion.time[pick], fit.motion.q[pick], fit.motion.v[pick], fit.motion.a[pick])
         moved = segment_motion(body, part)
-        W = regressor_of(moved)
+        W = regressor_of(moved, gravity=body.gravity)
         rows = np.concatenate([W, fit.wrench.value[pick][:, :, None]], axis=2)
-        X = layout.coefficients(layout.shift @ rows)
-        band = layout.at(fit.motion.rate).bands_of(len(X))
-        last = POSTURE_BANDS if _is_standing(moved.position) and not layout.is_white else len(gram)
+        X = layout.bands.coefficients(layout.shift @ rows)
+        band = layout.bands.at(fit.motion.rate).of(len(X))
+        last = POSTURE_BANDS if _is_standing(moved.position) and not layout.bands.white else len(gram)
         for b in np.unique(band[(band >= 0) & (band < last)]):
             flat = X[band == b].reshape(-1, 6 * size)
             gram[b] += (flat.T @ flat).reshape(6, size, 6, size)

@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.identify.caution import widened
 from biodance.identify.identification import Identification, conclude
 from biodance.identify.knowledge import Known
 from biodance.identify.learning import learn
 from biodance.identify.loads import may_carry
 from biodance.identify.mismatch import SHORTEST, Mismatch, mismatch, nothing
-from biodance.identify.noise import BLOCK, blocks
 from biodance.identify.statistics import Fit, Statistics, empty, layout_for, statistics
 from biodance.records import Array, Motion, Wrench
+from biodance.uncertainty.bands import BLOCK_SAMPLES
+from biodance.uncertainty.caution import widened
 
 ENOUGH = ("mass", "com x", "com y", "com z")
 """Quantities that must all be known before a segment is known well enough."""
@@ -30,11 +30,12 @@ ENOUGH = ("mass", "com x", "com y", "com z")
 class Stream:
     """A session that is being recorded.
 
-    ``body`` with the table as prior; ``rate`` Hz of the frames; ``total`` statistics of all full blocks, about the lab origin;
-    ``disturbed`` what twins and plates make of these blocks, each under the noise known when it was closed (so that verdicts on the way
-    are as careful as the last one); ``pending`` (n < BLOCK, 1 + nq + 2 nv + 6 + 1) thinned frames of the running block: time, q, v, a,
-    wrench, RMS marker distance; ``pressure`` (4,) sum over the loaded frames of the centre of pressure m, and their number; ``run`` frames
-    since the run of used frames began; ``last`` s, time of the last frame.
+    ``body`` with the table as prior; ``rate`` Hz of the frames; ``total`` statistics of all full blocks, about the
+    lab origin; ``disturbed`` what twins and plates make of these blocks, each under the noise known when it was
+    closed (so that verdicts on the way are as careful as the last one); ``pending`` (n < BLOCK_SAMPLES, 1 + nq + 2 nv
+    + 6 + 1) thinned frames of the running block: time, q, v, a, wrench, RMS marker distance; ``pressure`` (4,) sum
+    over the loaded frames of the centre of pressure m, and their number; ``run`` frames since the run of used frames
+    began; ``last`` s, time of the last frame.
     """
 
     body: Body
@@ -92,11 +93,11 @@ class Stream:
         found = settled.statistics
         if not found.count.any():
             raise TrialRefused("No frame of this stream could be used yet: ground contact not measured, or markers hidden.")
-        known = conclude(self.body, found, ("stream",), found=settled.disturbed).known
-        verdicts = {
-            name: [k.verdict == "known" for k in known if k.segment == name and k.quantity in ENOUGH] for name in self.body.segments
-        }
-        return Progress(known, tuple(name for name, all_known in verdicts.items() if all(all_known)))
+        one = conclude(self.body, found, ("stream",), found=settled.disturbed)
+        if one.status == "failed":
+            return Progress((), (), one.cause)
+        open_ = {k.segment for k in one.known if k.quantity in ENOUGH and k.verdict != "known"}
+        return Progress(one.known, tuple(name for name in self.body.segments if name not in open_))
 
     def identification(self, fits: tuple[Fit, ...] = ()) -> Identification:
         """Return the identification from all frames so far: the batch's.
@@ -112,10 +113,14 @@ class Stream:
 
 @dataclass(frozen=True)
 class Progress:
-    """What a stream knows: every quantity with its interval, and the segments whose mass and centre of mass are known well enough."""
+    """What a stream knows: every quantity with its interval, and the segments whose mass and centre of mass are known well enough.
+
+    Both are empty where the frames so far contradict every possible body: ``cause`` then says why and what to do.
+    """
 
     known: tuple[Known, ...]
     enough: tuple[str, ...]
+    cause: str = ""
 
     @property
     def missing(self) -> tuple[tuple[str, str], ...]:
@@ -140,7 +145,7 @@ def begin(body: Body, *, rate: float) -> Stream:
 
 def about(found: Statistics, point: Array) -> Statistics:
     """Return the statistics with wrenches about another ``point`` (3,) m of the lab: an exact linear map of the channels."""
-    layout = layout_for(point, edges=found.layout.edges, rate=found.layout.rate)
+    layout = layout_for(point, found.layout.bands)
     move = layout.shift @ np.linalg.inv(found.layout.shift)
     return Statistics(np.einsum("ab,nbicj,dc->naidj", move, found.gram, move, optimize=True), found.count, layout)
 
@@ -154,8 +159,7 @@ def _pressure(fit: Fit) -> Array:
 
 def _stride(stream: Stream) -> int:
     """Return how many frames the batch takes one of."""
-    every = next(blocks(np.ones(BLOCK * 100, dtype=bool), stream.rate, stream.total.layout))
-    return int(every[1] - every[0])
+    return stream.total.layout.bands.stride(stream.rate)
 
 
 def _extended(stream: Stream, rows: Array) -> Stream:
@@ -164,10 +168,10 @@ def _extended(stream: Stream, rows: Array) -> Stream:
     thin = rows[-stream.run % stride :: stride]
     stream = replace(stream, run=stream.run + len(rows))
     while len(thin):
-        room = BLOCK - len(stream.pending)
+        room = BLOCK_SAMPLES - len(stream.pending)
         stream = replace(stream, pending=np.concatenate([stream.pending, thin[:room]]))
         thin = thin[room:]
-        if len(stream.pending) == BLOCK:
+        if len(stream.pending) == BLOCK_SAMPLES:
             stream = _settle(stream)
     return stream
 

@@ -37,7 +37,7 @@ class TrialValidation:
 
 
 @dataclass(frozen=True, eq=False)
-class Gain:
+class ResidualRatio:
     """How much smaller the RMS residual of the second model is: ratio first / second of forces and of moments with 95 % intervals.
 
     ``force``, ``moment`` the ratios; ``force_interval``, ``moment_interval`` (2,) from a block bootstrap; ``blocks`` drawn from.
@@ -72,7 +72,7 @@ def moved(wrench: Wrench, about: Array) -> Wrench:
     return Wrench(wrench.time, np.concatenate([wrench.force, wrench.moment - np.cross(about, wrench.force)], axis=1))
 
 
-def gain(trials: tuple[TrialValidation, ...], *, draws: int = 1000, seed: int = 0) -> Gain:
+def residual_ratio(trials: tuple[TrialValidation, ...], *, draws: int = 1000, seed: int = 0) -> ResidualRatio:
     """Return the ratio of RMS residuals table / identified over all ``trials`` with a block-bootstrap interval.
 
     Raises
@@ -94,7 +94,7 @@ def gain(trials: tuple[TrialValidation, ...], *, draws: int = 1000, seed: int = 
     ratio = np.sqrt(a[drawn].sum(axis=1) / b[drawn].sum(axis=1))
     low, high = np.percentile(ratio, [2.5, 97.5], axis=0)
     force, moment = np.sqrt(a.sum(axis=0) / b.sum(axis=0))
-    return Gain(float(force), float(moment), (float(low[0]), float(high[0])), (float(low[1]), float(high[1])), len(a))
+    return ResidualRatio(float(force), float(moment), (float(low[0]), float(high[0])), (float(low[1]), float(high[1])), len(a))
 
 
 def _squares(measured: Wrench, simulated: Wrench, frames: NDArray[np.intp]) -> Array:

@@ -14,6 +14,7 @@ from biodance.lab.plate_corners import LONGEST_SIDE, SHORTEST_SIDE
 from biodance.lab.plate_signs import DEEPEST
 from biodance.lab.plate_units import INCH, POUND
 from biodance.records import Array, Role, Source, Trial
+from biodance.settings import STANDARD_GRAVITY
 
 LIGHTEST, HEAVIEST = 10.0, 300.0  # kg
 
@@ -102,7 +103,7 @@ def _measurements(main: Any) -> dict[str, float]:
     """Return the subject's mass (kg) and height (m) from the header where they make sense."""
     mass, height = float(main["weight"]), float(main["height"])
     if not int(main["metric"]):
-        mass, height = mass * POUND / 9.80665, height * INCH
+        mass, height = mass * POUND / STANDARD_GRAVITY, height * INCH
     elif height > 3:
         height /= 100
     found = {"Bodymass": mass} if LIGHTEST <= mass <= HEAVIEST else {}

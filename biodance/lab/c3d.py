@@ -19,14 +19,34 @@ from biodance.records import Array, Markers, Plate, Role, Source, Trial
 def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None) -> Trial:
     """Read one C3D file: markers in m with z up (time starts at 0), force plates as ground-on-subject wrenches about the lab origin.
 
-    ``subject`` chooses the person by the prefix of the labels, needed only where a file holds several. ``history`` and ``warnings`` of the
-    trial say what was decided: reader, units, axes, labels, gaps, plates.
+    Parameters
+    ----------
+    path : str or pathlib.Path
+        The file.
+    role : {"fit", "static", "validate", "check", "skip"}
+        What it is for.
+    subject : str, optional
+        Chooses the person by the prefix of the labels, needed only where a file holds several.
+
+    Returns
+    -------
+    Trial
+        ``history`` and ``warnings`` say what was decided: reader, units, axes, labels, gaps, plates.
 
     Raises
     ------
     FileRefused
         The file is missing, damaged or contradicts itself; holds several subjects and none was chosen; its unit of length or its rate is
         not known.
+
+    References
+    ----------
+    The C3D file format user guide, c3d.org.
+
+    Examples
+    --------
+    >>> biodance.read_c3d("visit/static.c3d", role="static").markers
+    Markers(39 markers, 301 frames at 100 Hz, 3.00 s)
     """
     raw = read_raw(path)
     labels = marker_labels(raw, subject=subject)
@@ -50,6 +70,20 @@ def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None
         history=(*_read(raw), *labels.history, *unit_history, *turn_history, *_gaps(markers), *measure_history),
         warnings=warnings,
     )
+
+
+def file_frame(raw: RawC3d, *, subject: str | None = None) -> tuple[float, Array]:
+    """Return the file's unit of length in m and lab_R_file (3, 3), as `read_c3d` takes them.
+
+    Raises
+    ------
+    FileRefused
+        As `read_c3d`.
+    """
+    labels = marker_labels(raw, subject=subject)
+    points = raw.points[:, list(labels.columns)]
+    metres, _, _ = metres_per_unit(raw.parameters, points, where=str(raw.path))
+    return metres, turn_to_z_up(raw, _markers(raw, labels, points))[0]
 
 
 def _read(raw: RawC3d) -> tuple[str, ...]:

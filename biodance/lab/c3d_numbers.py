@@ -1,7 +1,5 @@
-"""Read the numbers of a C3D file whose layout is known, and have them confirmed by a second reader where they smell of a misread."""
+"""Read the numbers of a C3D file whose layout is known."""
 
-import io
-import warnings
 from typing import Any
 
 import numpy as np
@@ -42,28 +40,3 @@ def read_numbers(content: bytes, layout: Layout) -> Numbers:
         analog -= layout.offset
         analog *= layout.gain
     return points, analog
-
-
-def second_opinion(content: bytes, numbers: Numbers) -> str:
-    """Return "confirmed" if the package c3d reads the same numbers, "refuted" if it reads others, else why it does not read the file.
-
-    The package finds the layout on its own, so it also judges ours; a file that contradicts itself it does not take.
-    """
-    import c3d
-
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            frames = [(points, analog.T) for _, points, analog in c3d.Reader(io.BytesIO(content)).read_frames(check_nan=False)]
-            points = np.array([p for p, _ in frames], dtype=float)
-            analog = np.concatenate([a for _, a in frames]) if numbers[1].size else numbers[1]
-    except Exception as error:
-        return f"the package c3d does not take the file ({' '.join(str(error).split())[:120] or type(error).__name__})"
-    ours = np.nan_to_num(numbers[0])
-    theirs = np.where(np.isfinite(numbers[0]), points[..., :3], 0.0) if points[..., :3].shape == ours.shape else points
-    return "confirmed" if _same(ours, theirs) and _same(numbers[1], analog) else "refuted"
-
-
-def _same(one: NDArray[Any], other: NDArray[Any]) -> bool:
-    size = np.abs(one[np.isfinite(one)]).max(initial=1.0)
-    return one.shape == other.shape and np.allclose(one, other, rtol=1e-5, atol=1e-6 * size, equal_nan=True)

@@ -1,11 +1,12 @@
-"""The one low-pass filter of biodance: Butterworth, forwards and backwards, for forces and joint coordinates alike.
+"""The one low-pass filter of biodance: forwards and backwards, for forces and joint coordinates alike.
 
 Two passes give zero phase, double the order and square the gain. A filter designed for the stated cut-off would therefore damp by 6 dB
 there; the single pass is designed for a higher frequency, so that the two passes TOGETHER are 3 dB down (gain 1/sqrt(2)) at the stated
-cut-off. With the bilinear map the correction is exact: tan(pi f_design / rate) = tan(pi f_cutoff / rate) (sqrt(2) - 1)^(-1 / (2 order)).
+cut-off. With the bilinear map the correction is exact: tan(pi f_design / rate) = tan(pi f_cutoff / rate) c, for a Butterworth filter with
+c = (sqrt(2) - 1)^(-1 / (2 order)), for a critically damped one (``order`` equal real poles) with c = (2^(1 / (2 order)) - 1)^(-1/2).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,14 +14,18 @@ from scipy.signal import butter, sosfiltfilt
 
 from biodance.errors import BiodanceError
 from biodance.records import Array
+from biodance.settings import FilterKind, FilterSettings, Settings
+
+NAMES: dict[FilterKind, str] = {"butterworth": "Butterworth", "critically_damped": "critically damped"}
 
 
 @dataclass(frozen=True)
 class LowPass:
-    """Butterworth low-pass: ``order`` of one pass (the two passes have twice that), ``cutoff`` in Hz where both together are 3 dB down."""
+    """Low-pass of a ``kind``: ``order`` of one pass (both have twice that), ``cutoff`` Hz where both together are 3 dB down."""
 
-    order: int = 5
-    cutoff: float = 10.0
+    order: int = FilterSettings.order
+    cutoff: float = FilterSettings.cutoff
+    kind: FilterKind = FilterSettings.kind
 
     def __post_init__(self) -> None:
         if not 1 <= self.order <= 10:
@@ -29,13 +34,23 @@ class LowPass:
             raise BiodanceError(f"The low-pass has the cut-off {self.cutoff} Hz; it must be positive. Use 10 Hz.")
 
     def __str__(self) -> str:
-        return (
-            f"Butterworth low-pass of order {self.order}, forwards and backwards, 3 dB down at {self.cutoff:g} Hz in both passes together"
-        )
+        down = f"3 dB down at {self.cutoff:g} Hz in both passes together"
+        return f"{NAMES[self.kind]} low-pass of order {self.order}, forwards and backwards, {down}"
 
     def shortest(self, rate: float) -> int:
         """Return the shortest run of samples that is filtered: one period of the cut-off frequency."""
         return int(np.ceil(rate / self.cutoff)) + 1
+
+
+def motion_filter(settings: Settings) -> LowPass:
+    """Return the low-pass that an analyst chose for the joint coordinates."""
+    return LowPass(settings.filter.order, settings.filter.cutoff, settings.filter.kind)
+
+
+def force_filter(settings: Settings) -> LowPass:
+    """Return the low-pass that an analyst chose for the forces: that of the joint coordinates, unless another cut-off was asked for."""
+    chosen, same = settings.filter.force_cutoff, motion_filter(settings)
+    return same if chosen == "same" else replace(same, cutoff=float(chosen))
 
 
 def design(settings: LowPass, rate: float) -> Array:
@@ -52,7 +67,11 @@ def design(settings: LowPass, rate: float) -> Array:
         raise BiodanceError(
             f"The cut-off {settings.cutoff:g} Hz is not below half the sampling rate ({rate:g} Hz). Choose a cut-off below {rate / 2:g} Hz."
         )
-    raised = np.tan(np.pi * settings.cutoff / rate) * (np.sqrt(2) - 1) ** (-0.5 / settings.order)
+    wanted = np.tan(np.pi * settings.cutoff / rate)
+    if settings.kind == "critically_damped":
+        raised = wanted / np.sqrt(2 ** (0.5 / settings.order) - 1)
+        return np.tile(butter(1, np.arctan(raised) * rate / np.pi, fs=rate, output="sos"), (settings.order, 1))
+    raised = wanted * (np.sqrt(2) - 1) ** (-0.5 / settings.order)
     return butter(settings.order, np.arctan(raised) * rate / np.pi, fs=rate, output="sos")
 
 

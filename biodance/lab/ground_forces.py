@@ -12,8 +12,8 @@ from biodance.errors import FileRefused
 from biodance.lab.mot import Table
 from biodance.lab.vertical import Y_UP_TO_Z_UP
 from biodance.records import Array, Plate, Wrench
+from biodance.settings import COP_FORCE
 
-LOADED = 20.0  # N, from here on a centre of pressure has a meaning
 FOOT_MARGIN = 0.15  # m, how far a foot reaches beyond its centres of pressure
 FARTHEST = 50.0  # m
 AXES = "xyz"
@@ -52,10 +52,10 @@ def plates_of(table: Table, *, where: str) -> tuple[tuple[Plate, ...], tuple[str
     plates = []
     for number, (name, value) in enumerate(raw.items(), start=1):
         wrench = Wrench(time, sign * np.hstack([value[:, :3] @ turn.T, value[:, 3:] @ turn.T]))
-        cop = wrench.cop(height=_height(table, groups[name], turn), threshold=LOADED)
+        cop = wrench.cop(height=_height(table, groups[name], turn), threshold=COP_FORCE)
         if np.isnan(cop).all():
             history.append(
-                f"Plate {number} ({name}) is never loaded above {LOADED:g} N and was left out: the file does not say where it lies."
+                f"Plate {number} ({name}) is never loaded above {COP_FORCE:g} N and was left out: the file does not say where it lies."
             )
             continue
         corners = "The file does not say where the plate lies: its corners enclose the centres of pressure under load with 0.15 m to spare."
@@ -108,7 +108,7 @@ def _wrench(table: Table, columns: dict[str, str], where: str) -> Array:
             f"{where}: the point of application is NaN at {table.time[bad][0]:g} s although there is a force. Export it again."
         )
     point = np.where(loaded[:, None], point, 0.0)
-    under_load = np.linalg.norm(force, axis=1) >= LOADED
+    under_load = np.linalg.norm(force, axis=1) >= COP_FORCE
     if under_load.any() and (far := float(np.median(np.abs(point[under_load]).max(axis=1)))) > FARTHEST:
         raise FileRefused(f"{where}: the point of application lies {far:.0f} m from the origin; it must be in metres. Export it in metres.")
     return np.hstack([force, np.cross(point, force) + torque])
@@ -123,7 +123,7 @@ def _equal_steps(time: Array, raw: dict[str, Array]) -> tuple[Array, dict[str, A
 
 def _upright(mean_force: Array) -> tuple[Array, float, list[str]]:
     """Return the turn (3, 3) to z up, the sign that makes the ground push upwards, and the sentences that say so."""
-    z_up = abs(mean_force[2]) > max(abs(mean_force[1]), LOADED)
+    z_up = abs(mean_force[2]) > max(abs(mean_force[1]), COP_FORCE)
     turn = np.eye(3) if z_up else Y_UP_TO_Z_UP
     said = (
         ["The largest mean force is along z: taken as z up."]
@@ -138,7 +138,7 @@ def _upright(mean_force: Array) -> tuple[Array, float, list[str]]:
 def _height(table: Table, columns: dict[str, str], turn: Array) -> float:
     """Return the median height (m, z up) of the points of application under load; 0 if there is no load."""
     force, point = (np.stack([table[columns[part + axis]] for axis in AXES], axis=1) for part in "vp")
-    loaded = np.linalg.norm(force, axis=1) >= LOADED
+    loaded = np.linalg.norm(force, axis=1) >= COP_FORCE
     return float(np.median((point[loaded] @ turn.T)[:, 2])) if loaded.any() else 0.0
 
 

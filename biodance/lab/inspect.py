@@ -9,22 +9,24 @@ import numpy as np
 
 from biodance.errors import BiodanceError
 from biodance.lab.gaps import report_gaps
-from biodance.lab.marker_sets import canonical, read_marker_set
+from biodance.lab.marker_sets import MarkerSet, canonical, read_marker_set
 from biodance.lab.read import format_of, read_trial
 from biodance.lab.recordings import recordings_below
 from biodance.lab.subject import declared_mass, declared_stature
 from biodance.lab.weight import standing_mass
 from biodance.records import Markers, Plate, Trial
-
-LOADED = 20.0
-"""Vertical force in N from which on the centre of pressure counts."""
+from biodance.settings import COP_FORCE
 
 SHORTEST_STEP = 0.05
 """Seconds under load from which on a plate has a centre of pressure; less is noise."""
 
 
-def inspect_paths(paths: Sequence[str | Path], *, tell: Callable[[str], None] | None = None) -> list[dict[str, Any]]:
+def inspect_paths(
+    paths: Sequence[str | Path], *, markers: str | Path | None = None, tell: Callable[[str], None] | None = None
+) -> list[dict[str, Any]]:
     """Return one record (see `inspect_file`) for each file, and for each recording in each folder and below it.
+
+    ``markers`` is the name or file of the marker set that was worn.
 
     Raises
     ------
@@ -33,6 +35,7 @@ def inspect_paths(paths: Sequence[str | Path], *, tell: Callable[[str], None] | 
     """
     if not paths:
         raise BiodanceError("There is nothing to inspect: name files, or folders with recordings.")
+    worn = read_marker_set(markers) if markers is not None else None
     records = []
     for path in map(Path, paths):
         files = recordings_below(path) if path.is_dir() else [path]
@@ -41,11 +44,11 @@ def inspect_paths(paths: Sequence[str | Path], *, tell: Callable[[str], None] | 
         for file in files:
             if tell:
                 tell(file.name)
-            records.append(inspect_file(file))
+            records.append(inspect_file(file, markers=worn))
     return records
 
 
-def inspect_file(path: str | Path) -> dict[str, Any]:
+def inspect_file(path: str | Path, *, markers: MarkerSet | None = None) -> dict[str, Any]:
     """Return what is in one recording; a file that cannot be read gives the status "refused" and the reason.
 
     Keys: ``file``; ``status`` "ok", "warning" or "refused"; ``reason`` (None if ok); ``format``; ``frames``, ``rate_hz``,
@@ -57,7 +60,7 @@ def inspect_file(path: str | Path) -> dict[str, Any]:
     """
     path = Path(path)
     try:
-        trial = read_trial(path)
+        trial = read_trial(path, markers=markers)
     except BiodanceError as error:
         return _refused(path, str(error))
     warnings = [*trial.warnings, *_never_seen(trial)]
@@ -118,7 +121,7 @@ def _subjects(path: Path) -> list[str]:
 
 def _plate(plate: Plate) -> dict[str, Any]:
     force = plate.wrench.force.mean(axis=0) if plate.wrench.time.size else np.full(3, math.nan)
-    cop = plate.wrench.cop(height=plate.height, threshold=LOADED)[:, :2]
+    cop = plate.wrench.cop(height=plate.height, threshold=COP_FORCE)[:, :2]
     loaded = cop[np.isfinite(cop).all(axis=1)]
     stepped_on = loaded.size > 0 and len(loaded) >= SHORTEST_STEP * plate.wrench.rate
     return {

@@ -26,6 +26,19 @@ LANDMARKS = (
     *("mid_psis", "c7", "t10", "jugular_notch", "xiphoid", "head_front", "head_back"),
 )
 """The anatomical landmarks that joint centres, scaling and contact ask for."""
+MIDLINE = ("mid_psis", "head_front", "head_back")
+"""Landmarks that may be the mean of several markers in a map."""
+
+SEGMENT_OF = {
+    **dict.fromkeys(("asis", "psis", "hip_centre", "mid_psis"), "pelvis"),
+    **dict.fromkeys(("knee_lateral", "knee_medial", "thigh_wand"), "thigh"),
+    **dict.fromkeys(("ankle_lateral", "ankle_medial", "shank_wand"), "shank"),
+    **dict.fromkeys(("heel", "toe", "toe_lateral", "toe_medial"), "foot"),
+    **dict.fromkeys(("acromion", "c7", "t10", "jugular_notch", "xiphoid", "head_front", "head_back"), "trunk_head"),
+    **dict.fromkeys(("elbow_lateral", "elbow_medial"), "upper_arm"),
+    **dict.fromkeys(("wrist_radial", "wrist_ulnar", "hand"), "forearm_hand"),
+}
+"""The segment that a marker on a landmark sits on, without its side."""
 
 NORMALISERS = (
     *("asis_width", "foot_length", "thigh_length", "shank_length", "upper_arm_length", "forearm_length"),
@@ -79,6 +92,46 @@ def parse(path: Path) -> Contents:
     _legal(path, "landmark", tuple(landmarks), LANDMARKS)
     chosen = {name: _alternatives(path, name, value, markers) for name, value in landmarks.items()}
     return Contents(str(table.get("description", "")), str(table.get("source", "")), required, dict(aliases), markers, chosen)
+
+
+def parse_map(path: Path) -> Contents:
+    """Read ``[markers] map`` of a session.toml: which label of the recordings is which landmark, or merely sits on which segment.
+
+    Several labels on a landmark of the midline are its mean, and both posterior iliac spines together are ``mid_psis``. Landmarks of the
+    pelvis must be in a recording (the first label, without one); the others may be left out.
+
+    Raises
+    ------
+    BiodanceError
+        There is no map, or it names a landmark or segment that does not exist.
+    """
+    table = read_toml(path).get("markers")
+    given = table.get("map") if isinstance(table, dict) else None
+    if not isinstance(given, dict) or not given:
+        raise BiodanceError(f'{path}: [markers] has no map. Write map = {{LABEL = "left_asis", ...}}, one label per landmark.')
+    markers: dict[str, dict[str, Any]] = {}
+    landmarks: dict[str, tuple[tuple[str, ...], ...]] = {}
+    for label, place in given.items():
+        if place not in (*LANDMARKS, *SEGMENTS):
+            legal = f"landmarks {', '.join(LANDMARKS)}; segments {', '.join(SEGMENTS)}"
+            raise BiodanceError(f"{path}: [markers] map says {label} = {place!r}, which is no landmark and no segment. Legal are {legal}.")
+        if place in landmarks and place not in MIDLINE:
+            raise BiodanceError(f"{path}: [markers] map gives {place} to {landmarks[place][0][0]} and to {label}. Keep one of the two.")
+        markers[label] = {"segment": place if place in SEGMENTS else segment_of(place)}
+        if place in LANDMARKS:
+            landmarks[place] = ((*landmarks.get(place, ((),))[0], label),)
+    if "mid_psis" not in landmarks and {"left_psis", "right_psis"} <= landmarks.keys():
+        landmarks["mid_psis"] = ((*landmarks["left_psis"][0], *landmarks["right_psis"][0]),)
+    pelvis = tuple(names[0][0] for place, names in landmarks.items() if segment_of(place) == "pelvis")
+    required = pelvis or tuple(markers)[:1]
+    return Contents("labels of the session's own", str(path), required, {}, markers, landmarks)
+
+
+def segment_of(landmark: str) -> str:
+    """Return the segment that a marker on a landmark sits on."""
+    side, _, part = landmark.rpartition("_") if landmark.startswith("mid") else landmark.partition("_")
+    segment = SEGMENT_OF.get(landmark) or SEGMENT_OF[part]
+    return f"{side}_{segment}" if f"{side}_{segment}" in SEGMENTS else segment
 
 
 def _legal(path: Path, kind: str, found: tuple[str, ...], legal: tuple[str, ...]) -> None:

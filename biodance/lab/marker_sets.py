@@ -6,18 +6,22 @@ must be there (``required``), other spellings (``aliases``), per marker its segm
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
 
-from biodance.errors import TrialRefused, UnknownName
-from biodance.lab.marker_set_file import LANDMARKS, parse
-from biodance.library import locate, names
-from biodance.records import Array, Markers
+from biodance.discovery import DataFamily
+from biodance.errors import FileRefused, TrialRefused, UnknownName
+from biodance.lab.marker_set_file import LANDMARKS, parse, parse_map
+from biodance.records import Array, Markers, Trial
 
 FOLDER = "anthropometry/marker_sets"
+FAMILY = DataFamily("marker set", "biodance.marker_sets", FOLDER, ".toml")
+MAPS = ("session.toml", "subject.toml")
+"""Files whose ``[markers] map`` is a marker set of its own."""
 
 
 @dataclass(frozen=True)
@@ -83,20 +87,30 @@ class MarkerSet:
 
 
 def read_marker_set(name_or_path: str | Path) -> MarkerSet:
-    """Return a marker set: a shipped one by its name, a user's own by the path of its TOML file (then the path is its name).
+    """Return a marker set: a shipped or installed one by its name, a user's own by the path of its TOML file (then the path is its name),
+    or by the path of a session.toml that has a ``[markers] map``.
 
     Raises
     ------
     UnknownName
-        There is no shipped set of that name.
+        There is no set of that name.
     BiodanceError
         The file is missing, is not TOML, or breaks a rule; the message names the file, the entry and what would be legal.
     """
-    own = str(name_or_path).endswith(".toml")
-    path = Path(name_or_path) if own else locate(FOLDER, str(name_or_path))
-    contents = parse(path)
+    path = FAMILY.locate(name_or_path)
+    if not path.is_file():
+        raise FileRefused(
+            f"{path}: cannot be opened, there is no such marker set. Check the path; sets known by name are {', '.join(FAMILY.files())}."
+        )
+    return _read(str(name_or_path), path, path.stat().st_mtime_ns)
+
+
+@cache
+def _read(name: str, path: Path, _stamp: int) -> MarkerSet:
+    """Return the marker set in a file; read anew when the file has changed."""
+    contents = parse_map(path) if path.name in MAPS else parse(path)
     return MarkerSet(
-        str(path) if own else str(name_or_path),
+        name,
         contents.description,
         contents.source,
         tuple(SetMarker(label, **fields) for label, fields in contents.markers.items()),
@@ -109,13 +123,26 @@ def read_marker_set(name_or_path: str | Path) -> MarkerSet:
 def recognise(labels: Iterable[str], *, candidates: Iterable[MarkerSet] | None = None) -> MarkerSet | None:
     """Return the set whose required labels are all among ``labels`` and of which most markers are there; None if there is none.
 
-    ``candidates`` are the sets to choose from, by default all shipped ones.
+    ``candidates`` are the sets to choose from, by default all known by name.
     """
     labels = tuple(labels)
-    sets = tuple(read_marker_set(name) for name in names(FOLDER)) if candidates is None else tuple(candidates)
+    sets = tuple(read_marker_set(name) for name in FAMILY.files()) if candidates is None else tuple(candidates)
     matches = [(marker_set, marker_set.match(labels)) for marker_set in sets]
     complete = [(marker_set, match) for marker_set, match in matches if match.keys() >= set(marker_set.required)]
     return max(complete, key=lambda pair: len(pair[1]))[0] if complete else None
+
+
+def wearing(trial: Trial, marker_set: MarkerSet) -> Trial:
+    """Return the trial with its markers taken as ``marker_set``, which a person chose; with a warning where required labels are absent."""
+    if trial.markers is None or trial.marker_set == marker_set.name:
+        return trial
+    match = marker_set.match(trial.markers.names)
+    absent = [label for label in marker_set.required if label not in match]
+    if not absent:
+        said = f"The markers were read as the set {marker_set.name}: {len(match)} of its {len(marker_set.labels)} labels are there."
+        return replace(trial, marker_set=marker_set.name, history=(*trial.history, said))
+    warning = f"The markers are not of the chosen set {marker_set.name}: {', '.join(absent)} missing. Choose the set that was worn."
+    return replace(trial, warnings=(*trial.warnings, warning))
 
 
 def canonical(markers: Markers, marker_set: MarkerSet) -> Markers:

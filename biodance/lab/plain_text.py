@@ -16,8 +16,9 @@ def read_bytes(path: Path) -> bytes:
     Raises
     ------
     FileRefused
-        There is no such file, it cannot be opened, or it is empty.
+        There is no such file, it is a pipe or device, it cannot be opened, or it is empty.
     """
+    refuse_special(path)
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -25,6 +26,12 @@ def read_bytes(path: Path) -> bytes:
     if not content:
         raise FileRefused(f"{path}: is empty (0 bytes). Export the recording again.")
     return content
+
+
+def refuse_special(path: Path) -> None:
+    """Raise FileRefused for a pipe, socket or device, on which reading could wait for ever."""
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise FileRefused(f"{path}: is a pipe, socket or device, an ordinary file is expected. Copy the recording into a file.")
 
 
 def sha256(content: bytes) -> str:

@@ -6,9 +6,10 @@ from numpy.typing import NDArray
 from biodance.lab.baseline import block_means, runs
 from biodance.lab.plate_types import centre_of_pressure
 from biodance.records import Array
+from biodance.settings import TOUCH_FORCE
 
 DEEPEST = 0.3  # m, no sensor lies farther below the surface
-LOADED, CONTACT = 30.0, 0.1  # N, s
+CONTACT = 0.1  # s
 SWAY_BAND = (0.5, 5.0)  # Hz
 SWAY_TIME = 2.5  # s of standing that the sway test needs
 SWAY_STEADY = 0.05  # share of the weight by which the vertical force may vary
@@ -39,7 +40,7 @@ def loaded_samples(wrench: Array, rate: float) -> NDArray[np.bool_]:
     So a plate that only trembles under a neighbour's step does not count as loaded.
     """
     means, size = block_means(wrench[:, 2], rate, length=CONTACT)
-    threshold = max(LOADED, 0.05 * float(np.abs(means).max()))
+    threshold = max(TOUCH_FORCE, 0.05 * float(np.abs(means).max()))
     lasting = np.repeat(np.abs(means) >= threshold, size)
     lasting = np.append(lasting, np.full(len(wrench) - lasting.size, lasting[-1]))
     return lasting & (np.abs(wrench[:, 2]) >= threshold)
@@ -80,7 +81,7 @@ def _standing(vertical: Array, rate: float) -> slice | None:
     """Return the longest run of whole half-seconds in which the vertical force stays near the trial's median; None below 2.5 s."""
     size = round(0.5 * rate)
     middle = float(np.median(vertical))
-    if size < 4 or abs(middle) < 5 * LOADED:
+    if size < 4 or abs(middle) < 5 * TOUCH_FORCE:
         return None
     blocks = vertical[: vertical.size // size * size].reshape(-1, size)
     steady = (np.abs(blocks.mean(axis=1) - middle) <= SWAY_STEADY * abs(middle)) & (blocks.std(axis=1) <= SWAY_STEADY * abs(middle))

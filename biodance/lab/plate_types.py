@@ -8,10 +8,11 @@ import numpy as np
 
 from biodance.lab.plate_parameters import PlateParameters
 from biodance.records import Array
+from biodance.settings import COP_FORCE
 
 EIGHT_CHANNELS, TWELVE_CHANNELS = (3, 7), (6,)
 FOUR_SENSORS = EIGHT_CHANNELS + TWELVE_CHANNELS
-LOADED, FARTHEST = 20.0, 1.5  # N, m: a centre of pressure under less load, or farther away, has no meaning
+FARTHEST = 1.5  # m: a centre of pressure farther away has no meaning
 
 
 def calibrated(plate: PlateParameters, channels: Array) -> Array:
@@ -57,7 +58,7 @@ def moved(wrench: Array, vector: Array) -> Array:
 
 def centre_of_pressure(wrench: Array) -> Array:
     """Return the centre of pressure (S, 2) m on the surface from a wrench about its centre; NaN below 20 N."""
-    loaded = np.abs(wrench[:, 2]) >= LOADED
+    loaded = np.abs(wrench[:, 2]) >= COP_FORCE
     vertical = np.where(loaded, wrench[:, 2], np.nan)
     return np.stack([-wrench[:, 4] / vertical, wrench[:, 3] / vertical], axis=1)
 

@@ -3,8 +3,9 @@
 import re
 
 from biodance.lab.plate_parameters import MATRIX_OF_TYPE, PlateParameters
+from biodance.settings import STANDARD_GRAVITY
 
-POUND, KILOGRAM_FORCE, INCH = 4.4482216152605, 9.80665, 0.0254
+POUND, KILOGRAM_FORCE, INCH = 4.4482216152605, STANDARD_GRAVITY, 0.0254
 FORCE = {
     "n": 1.0, "newton": 1.0, "newtons": 1.0, "nt": 1.0, "kn": 1000.0, "lbf": POUND, "lb": POUND, "lbs": POUND, "pound": POUND,
     "pounds": POUND, "kgf": KILOGRAM_FORCE, "kp": KILOGRAM_FORCE,

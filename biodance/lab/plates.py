@@ -10,8 +10,9 @@ from biodance.lab.plate_reading import PlateReading, read_plate_signals
 from biodance.lab.plate_signs import gravity_sign
 from biodance.lab.plate_units import POUND
 from biodance.lab.raw_c3d import RawC3d
-from biodance.lab.weight import STILL, movement, steady_mass
+from biodance.lab.weight import movement, steady_mass
 from biodance.records import Array, Markers, Plate, Wrench
+from biodance.settings import StandingRules
 
 OFF_WEIGHT = 0.05  # share of the declared mass from which on the weight on the plates is worth a warning
 AS_POUNDS = 0.03
@@ -92,7 +93,7 @@ def _time(raw: RawC3d, markers: Markers | None) -> Array:
 
 def _weight_said(plates: tuple[Plate, ...], markers: Markers | None, body_mass: float | None) -> tuple[str, ...]:
     """Return a warning if the weight in quiet standing contradicts the declared mass."""
-    walks = markers is not None and movement(markers) > STILL
+    walks = markers is not None and movement(markers) > StandingRules.still
     mass = steady_mass(total_wrench(plates)) if plates and not walks else None
     if mass is None or body_mass is None or not body_mass > 0 or abs(mass / body_mass - 1) <= OFF_WEIGHT:
         return ()

@@ -9,22 +9,21 @@ import numpy as np
 
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab import filters
-from biodance.lab.filters import LowPass
+from biodance.lab.filters import LowPass, force_filter
 from biodance.lab.gaps import Gap, fill_gaps, report_gaps
 from biodance.lab.marker_sets import canonical, read_marker_set
 from biodance.records import Array, Markers, Plate, Trial, Wrench
+from biodance.settings import GapSettings
 
 PREPARED = "Prepared for the model."
-OFTEN_HIDDEN = 10.0
-"""Percent of the frames from which on an unseen marker is worth a warning."""
 
 
-def prepare(trial: Trial, *, low_pass: LowPass | None = None, short_gap: float = 0.2) -> Trial:
+def prepare(trial: Trial) -> Trial:
     """Return the trial with only its set's markers, gaps filled where that is safe, and the plates' wrenches at marker times.
 
-    ``low_pass`` filters the forces, by default ``LowPass()``; gaps up to ``short_gap`` s are bridged by a spline. Without markers the
-    plates keep their own times; markers outside the plates' time are cut off. Every step is a sentence in ``history``. A trial that
-    was prepared already is returned as it is.
+    ``trial.settings`` say how forces are filtered and up to which length gaps are bridged by a spline. Without markers the plates keep
+    their own times; markers outside the plates' time are cut off. Every step is a sentence in ``history``. A trial that was prepared
+    already is returned as it is.
 
     Raises
     ------
@@ -33,18 +32,18 @@ def prepare(trial: Trial, *, low_pass: LowPass | None = None, short_gap: float =
     """
     if PREPARED in trial.history:
         return trial
-    settings = low_pass or LowPass()
+    low_pass = force_filter(trial.settings)
     history, warnings = [PREPARED], []
     markers = trial.markers
     try:
         if markers is not None:
             if markers.time.size > 1:
-                filters.design(settings, markers.rate)
+                filters.design(low_pass, markers.rate)
             markers, said = _common_time(markers, trial)
             history += said
-            markers, said, warned = _fill(markers, trial.marker_set, short_gap)
+            markers, said, warned = _fill(markers, trial.marker_set, trial.settings.gaps)
             history, warnings = history + said, warned
-        plates = tuple(_plate(plate, markers, settings) for plate in trial.plates)
+        plates = tuple(_plate(plate, markers, low_pass) for plate in trial.plates)
     except TrialRefused:
         raise
     except BiodanceError as error:
@@ -73,7 +72,7 @@ def _common_time(markers: Markers, trial: Trial) -> tuple[Markers, list[str]]:
     return kept, [f"{int((~inside).sum())} of {inside.size} frames were cut off: the plates recorded only {first:.3f} to {last:.3f} s."]
 
 
-def _fill(markers: Markers, set_name: str, short_gap: float) -> tuple[Markers, list[str], list[str]]:
+def _fill(markers: Markers, set_name: str, rules: GapSettings) -> tuple[Markers, list[str], list[str]]:
     """Return the set's markers with filled gaps, the history and the warnings."""
     history, segments = [], {}
     if set_name:
@@ -86,9 +85,9 @@ def _fill(markers: Markers, set_name: str, short_gap: float) -> tuple[Markers, l
     warnings = [
         f"{gaps.label} was not seen in {gaps.percent:.0f} % of the frames (longest gap {gaps.longest:.2f} s)."
         for gaps in report_gaps(markers)
-        if gaps.percent > OFTEN_HIDDEN
+        if gaps.percent > rules.often
     ]
-    filled, gaps = fill_gaps(markers, segments, short=short_gap)
+    filled, gaps = fill_gaps(markers, segments, short=rules.bridged)
     return filled, [*history, *_sentences(gaps, markers.time)], warnings
 
 
@@ -102,16 +101,16 @@ def _sentences(gaps: tuple[Gap, ...], time: Array) -> list[str]:
     return said or ["No marker has a gap."]
 
 
-def _plate(plate: Plate, markers: Markers | None, settings: LowPass) -> Plate:
+def _plate(plate: Plate, markers: Markers | None, low_pass: LowPass) -> Plate:
     """Return the plate with its wrench filtered and at marker times; the last decision says how."""
     wrench = plate.wrench
-    if wrench.time.size < 2 or wrench.time.size < settings.shortest(wrench.rate):
+    if wrench.time.size < 2 or wrench.time.size < low_pass.shortest(wrench.rate):
         mean = np.broadcast_to(wrench.value.mean(axis=0), wrench.value.shape)
         wrench, how = Wrench(wrench.time, mean), f"mean of {wrench.time.size} samples, too few for the low-pass"
     else:
-        raw = filters.left_raw(wrench.value, wrench.rate, settings).any(axis=1).sum()
-        wrench = Wrench(wrench.time, filters.low_pass(wrench.value, wrench.rate, settings))
-        how = f"{settings}" + (f"; {raw} samples between gaps left unfiltered" if raw else "")
+        raw = filters.left_raw(wrench.value, wrench.rate, low_pass).any(axis=1).sum()
+        wrench = Wrench(wrench.time, filters.low_pass(wrench.value, wrench.rate, low_pass))
+        how = f"{low_pass}" + (f"; {raw} samples between gaps left unfiltered" if raw else "")
     if markers is None:
         return replace(plate, wrench=wrench, decisions=(*plate.decisions, f"{how}; no markers, own times kept."))
     value, sampled = _sample(wrench, markers.time)

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from biodance.errors import FileRefused
 from biodance.lab.c3d_layout import Layout, read_layout, texts
-from biodance.lab.c3d_numbers import Numbers, read_numbers, second_opinion
+from biodance.lab.c3d_numbers import Numbers, read_numbers
 from biodance.lab.c3d_parameters import RESAVE, Parameters, read_header, read_parameters
 from biodance.lab.model_outputs import model_outputs, unlabelled
+from biodance.lab.second_opinion import second_opinion
 from biodance.lab.units import metres_per_unit
 from biodance.records import Array
 
@@ -27,7 +28,7 @@ class RawC3d:
     ``points`` (T, K, 3) in file units and file axes, NaN = not seen; ``rate`` Hz, NaN = none; ``first_frame`` number of the first frame;
     ``analog`` (S, C) scaled as the file says, ``(number - OFFSET) * SCALE * GEN_SCALE``; ``analog_rate`` Hz, NaN = none;
     ``analog_units`` (C) as written ("" = none). ``parameters[GROUP][NAME]`` (upper case): arrays with the file's own dimensions, first
-    dimension fastest, or lists of stripped strings. ``reader`` names the readers that agree on the numbers, "biodance" or "biodance, c3d";
+    dimension fastest, or lists of stripped strings. ``reader`` names who agrees on the numbers, "biodance" or "biodance, ezc3d";
     ``warnings`` say where the file contradicts itself or smells of a misread, and how that was decided.
     """
 
@@ -68,7 +69,7 @@ def read_raw(path: str | Path) -> RawC3d:
     layout = read_layout(len(content), header, parameters, str(path))
     points, analog = numbers = read_numbers(content, layout)
     labels = _fit(texts(parameters, "POINT", "LABELS"), layout.points)
-    smells, reader = _smells(content, numbers, labels, layout, parameters, path)
+    smells, reader = _smells(numbers, labels, layout, parameters, path)
     for values in numbers:
         values.setflags(write=False)
     return RawC3d(
@@ -88,21 +89,19 @@ def read_raw(path: str | Path) -> RawC3d:
     )
 
 
-def _smells(
-    content: bytes, numbers: Numbers, labels: tuple[str, ...], layout: Layout, parameters: Parameters, path: Path
-) -> tuple[tuple[str, ...], str]:
+def _smells(numbers: Numbers, labels: tuple[str, ...], layout: Layout, parameters: Parameters, path: Path) -> tuple[tuple[str, ...], str]:
     """Have suspicious numbers judged by a second reader; return what it says and who agrees; refuse the file if it reads others."""
     no_markers = {*model_outputs(labels, parameters), *unlabelled(labels)}
     leaps = _leaps(numbers[0][:, [column for column in range(layout.points) if column not in no_markers]], parameters)
     if not leaps and not layout.notes:
         return (), "biodance"
-    opinion = second_opinion(content, numbers)
+    opinion = second_opinion(path, numbers, layout)
     smell = f"Markers jump by more than {LEAP:g} m between two frames in {leaps} places" if leaps else "Header and parameters disagree"
     if opinion == "refuted":
-        raise FileRefused(f"{path}: {smell[0].lower()}{smell[1:]}, and the package c3d reads other numbers than biodance. {RESAVE}")
+        raise FileRefused(f"{path}: {smell[0].lower()}{smell[1:]}, and ezc3d reads other numbers than biodance. {RESAVE}")
     if opinion == "confirmed":
-        return (f"{smell}; a second reader finds the same numbers.",), "biodance, c3d"
-    return (f"{smell}; {opinion}.",), "biodance"
+        return (f"{smell}; ezc3d finds the same numbers.",), "biodance, ezc3d"
+    return (f"{smell}; {opinion}, so only biodance has read these numbers.",), "biodance"
 
 
 def _leaps(points: Array, parameters: Parameters) -> int:

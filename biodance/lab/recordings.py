@@ -4,27 +4,30 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
+from biodance.discovery import Chosen
 from biodance.errors import BiodanceError
-from biodance.lab.read import FORMATS, forces_beside, format_of
+from biodance.lab.read import read_head, sniffed
+from biodance.lab.readers import Reader, extensions
 from biodance.lab.vicon import EclipseNotes, read_enf, read_mp, read_vsk
 
 TEXT = (".txt", ".csv")
+"""Extensions that notes and tables for people have, too: there the content decides."""
 PART_FOLDERS = re.compile(r"static|cal|dynamic|trials?|fit|validat|squat|walk|movement|recordings?", flags=re.IGNORECASE)
 
 
-def find_recordings(folder: Path) -> tuple[list[Path], list[str]]:
+def find_recordings(folder: Path, readers: Chosen[Reader] = None) -> tuple[list[Path], list[str]]:
     """Return the recordings of a session, sorted by name, and notes on what was left aside.
 
     They lie in the folder itself, else in its parts (folders such as ``static`` and ``dynamic``). A table of forces that belongs to a .trc
     file is no recording of its own; of one trial in several formats the C3D file is taken; text that holds no table of numbers is none.
     """
-    files = recordings_in(folder)
+    files, order = recordings_in(folder, readers), list(extensions(readers))
     if not files:
         parts = [part for part in sorted(folder.iterdir()) if part.is_dir() and PART_FOLDERS.match(part.name)]
-        files = [file for part in parts for file in recordings_in(part)]
+        files = [file for part in parts for file in recordings_in(part, readers)]
     notes: list[str] = []
     kept: dict[tuple[Path, str], Path] = {}
-    for file in sorted(_without_companions(files), key=lambda f: (list(FORMATS).index(f.suffix.lower()), str(f))):
+    for file in sorted(_without_companions(files, readers), key=lambda f: (order.index(f.suffix.lower()), str(f))):
         trial = (file.parent, file.stem.lower())
         if trial in kept:
             notes.append(f"{file.name} was left aside: it is the same trial as {kept[trial].name}.")
@@ -33,16 +36,17 @@ def find_recordings(folder: Path) -> tuple[list[Path], list[str]]:
     return sorted(kept.values()), notes
 
 
-def recordings_in(folder: Path) -> list[Path]:
+def recordings_in(folder: Path, readers: Chosen[Reader] = None) -> list[Path]:
     """Return the files directly in a folder whose extension or content says that they are recordings, sorted by name."""
-    files = (path for path in sorted(folder.iterdir()) if path.is_file() and not path.name.startswith("."))
-    return [path for path in files if path.suffix.lower() in FORMATS and _is_data(path)]
+    legal = extensions(readers)
+    files = (path for path in sorted(folder.iterdir()) if not path.is_dir() and not path.name.startswith("."))
+    return [path for path in files if path.suffix.lower() in legal and _is_data(path, readers)]
 
 
-def recordings_below(folder: Path) -> list[Path]:
+def recordings_below(folder: Path, readers: Chosen[Reader] = None) -> list[Path]:
     """Return the recordings in a folder and all folders below it, sorted by path; tables that belong to a .trc file are left out."""
     folders = [folder, *(path for path in sorted(folder.rglob("*")) if path.is_dir() and not path.name.startswith("."))]
-    return sorted(_without_companions([file for place in folders for file in recordings_in(place)]))
+    return sorted(_without_companions([file for place in folders for file in recordings_in(place, readers)], readers))
 
 
 def vicon_notes(folders: Iterable[Path]) -> tuple[dict[str, EclipseNotes], dict[str, dict[str, float]], dict[str, str]]:
@@ -62,23 +66,25 @@ def vicon_notes(folders: Iterable[Path]) -> tuple[dict[str, EclipseNotes], dict[
     return eclipse, dict(sorted(measurements.items(), key=lambda item: not item[0].lower().endswith(".mp"))), refused
 
 
-def _without_companions(files: list[Path]) -> list[Path]:
-    companions = {forces for file in files if file.suffix.lower() == ".trc" and (forces := _forces(file))}
+def _without_companions(files: list[Path], readers: Chosen[Reader]) -> list[Path]:
+    companions = {other for file in files if (other := _beside(file, readers))}
     return [file for file in files if file not in companions]
 
 
-def _is_data(file: Path) -> bool:
+def _is_data(file: Path, readers: Chosen[Reader]) -> bool:
     """Return False for .txt and .csv files whose content is no recording: notes, exports for people."""
     if file.suffix.lower() not in TEXT:
         return True
     try:
-        return format_of(file) != file.suffix.lower()
+        return sniffed(file, read_head(file), readers) is not None
     except BiodanceError:
         return False
 
 
-def _forces(file: Path) -> Path | None:
+def _beside(file: Path, readers: Chosen[Reader]) -> Path | None:
+    """Return the file that the reader of ``file``, by its extension, reads together with it; None if there is none."""
+    beside = getattr(extensions(readers)[file.suffix.lower()], "beside", None)
     try:
-        return forces_beside(file)
+        return beside(file) if beside else None
     except BiodanceError:
         return None

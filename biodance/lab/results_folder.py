@@ -3,7 +3,8 @@
 from pathlib import Path
 
 from biodance.errors import SessionRefused
-from biodance.lab.read import FORMATS
+from biodance.lab.readers import extensions
+from biodance.lab.recordings import TEXT
 
 DEFAULT = "biodance"
 OURS = ("results.json", "report.html", "results.partial.json")
@@ -27,7 +28,7 @@ def results_folder(out: str | Path | None, session: str | Path, *, force: bool =
     if folder.exists() and not folder.is_dir():
         raise SessionRefused(f"{folder}: is a file; the results need a folder. Choose another name.")
     files = [path for path in folder.iterdir() if not path.name.startswith(".")] if folder.is_dir() else []
-    raw = [path.name for path in files if path.suffix.lower() in FORMATS and path.suffix.lower() not in (".txt", ".csv")]
+    raw = [path.name for path in files if path.suffix.lower() in extensions() and path.suffix.lower() not in TEXT]
     ours = any(path.name in OURS for path in files)
     if raw and not ours:
         raise SessionRefused(f"{folder}: holds recordings ({raw[0]}); results are never written beside them. Give another folder.")

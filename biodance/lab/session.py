@@ -4,8 +4,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from biodance.discovery import Chosen
 from biodance.errors import BiodanceError, SessionRefused
-from biodance.lab.read import FORMATS, read_trial
+from biodance.lab.marker_sets import read_marker_set
+from biodance.lab.read import read_trial
+from biodance.lab.readers import Reader, extensions
 from biodance.lab.recordings import find_recordings, recordings_in, vicon_notes
 from biodance.lab.roles import guess_static, role_by_eclipse, role_by_name
 from biodance.lab.session_file import SessionFile, read_session_file
@@ -13,50 +16,96 @@ from biodance.lab.subject import identify_subject
 from biodance.lab.vicon import EclipseNotes
 from biodance.lab.weight import is_still, movement
 from biodance.records import Role, Session, Trial
+from biodance.settings import Settings
 
 
-def read_session(folder: str | Path, *, subject_name: str | None = None, tell: Callable[[str], None] | None = None) -> Session:
-    """Return the session in a folder: the subject and every trial that can be read.
+def read_session(
+    folder: str | Path,
+    *,
+    subject_name: str | None = None,
+    settings: Settings | Mapping[str, object] | None = None,
+    readers: Chosen[Reader] = None,
+    markers: str | Path | None = None,
+    tell: Callable[[str], None] | None = None,
+) -> Session:
+    """Read the session in a folder: the subject and every trial that can be read.
 
     Roles come from session.toml, else from the Eclipse notes (.enf), else from the names (static*, cal* = static; squat* = validate;
     others = fit); without a static by these, the stillest trial is taken. The subject comes from session.toml, .mp, .vsk and the files' own
-    parameters, in this order. ``subject_name`` chooses the person in C3D files that hold several; ``tell`` is called with the name of each
-    file before it is read. A file that cannot be read never stops the session: it stands in ``Session.refused`` with the reason. What was
-    followed, guessed or left aside stands in ``Session.notes``.
+    parameters, in this order. A file that cannot be read never stops the session: it stands in ``Session.refused`` with the reason. What
+    was followed, guessed or left aside stands in ``Session.notes``.
+
+    Parameters
+    ----------
+    folder : str or pathlib.Path
+        With the recordings of one visit, and session.toml where there is one.
+    subject_name : str, optional
+        Chooses the person in C3D files that hold several.
+    settings : Settings or mapping, optional
+        A record: these and no others. A mapping, ``{"filter.cutoff": 6}``: as session.toml says, with these changed.
+    readers : iterable, optional
+        As for `read_trial`.
+    markers : str or pathlib.Path, optional
+        The marker set that was worn, a name or the path of a file; before what session.toml says of it.
+    tell : callable, optional
+        Called with the name of each file before it is read.
+
+    Returns
+    -------
+    Session
+        ``session["squat_1"]`` is a trial.
 
     Raises
     ------
     SessionRefused
         Not a folder, no recording in it, none that can be read, or a session.toml with a mistake.
+    UnknownName
+        There is no such setting.
+    BiodanceError
+        A setting is not legal.
+
+    See Also
+    --------
+    examine : Take it through all stages.
+
+    Examples
+    --------
+    >>> session = biodance.read_session("visit", settings={"filter.cutoff": 6})
+    >>> session.settings
+    Settings(filter.cutoff=6.0)
     """
     folder = _checked(Path(folder))
-    settings = read_session_file(folder)
-    files, notes = find_recordings(folder)
+    file_says = read_session_file(folder)
+    chosen = settings if isinstance(settings, Settings) else file_says.settings.changed(settings or {})
+    worn = str(markers) if markers is not None else file_says.marker_set
+    marker_set = read_marker_set(worn) if worn else None
+    files, notes = find_recordings(folder, readers)
     eclipse, measurements, refused = vicon_notes({folder, *(file.parent for file in files)})
     trials: list[Trial] = []
     reasons: dict[str, str] = {}
     for file in files:
         operator = eclipse.get(file.stem.lower())
-        role, reason = _role(file, folder, settings, operator)
+        role, reason = _role(file, folder, file_says, operator)
         if role == "skip":
             notes.append(f"{file.name} was left aside: {reason}.")
             continue
         if tell:
             tell(file.name)
         try:
-            trial = _with_strikes(read_trial(file, role=role, subject=subject_name), operator)
+            trial = read_trial(file, role=role, subject=subject_name, readers=readers, markers=marker_set)
+            trial = _with_strikes(replace(trial, settings=chosen), operator)
         except BiodanceError as error:
             refused[file.name] = str(error)
             continue
         trials.append(replace(trial, name=f"{file.parent.name}_{trial.name}") if trial.name in reasons else trial)
         reasons[trials[-1].name] = reason
     if not trials:
-        raise SessionRefused(_nothing_left(folder, refused))
-    trials = _settle_static(trials, settings, reasons, notes)
-    subject, guesses = identify_subject(settings.subject, measurements, trials, name=subject_name or folder.resolve().name)
-    read = [f"{path.name} in {path.parent.name} was followed." for path in settings.read]
+        raise SessionRefused(_nothing_left(folder, refused, readers))
+    trials = _settle_static(trials, file_says, reasons, notes)
+    subject, guesses = identify_subject(file_says.subject, measurements, trials, name=subject_name or folder.resolve().name)
+    read = [f"{path.name} in {path.parent.name} was followed." for path in file_says.read]
     roles = [f"{trial.name} has the role {trial.role}: {reasons[trial.name]}." for trial in trials]
-    slips = settings.unused([file.stem for file in files])
+    slips = file_says.unused([file.stem for file in files])
     return Session(subject, tuple(trials), folder, refused, (*read, *slips, *roles, *notes, *guesses))
 
 
@@ -109,12 +158,12 @@ def _settle_static(trials: list[Trial], settings: SessionFile, reasons: dict[str
     return [replace(trial, role="static") if trial is guess else trial for trial in trials]
 
 
-def _nothing_left(folder: Path, refused: Mapping[str, str]) -> str:
+def _nothing_left(folder: Path, refused: Mapping[str, str], readers: Chosen[Reader]) -> str:
     """Return the sentence for a folder of which no recording is left: nothing there, or nothing that can be read."""
     if refused:
         name, reason = next(iter(refused.items()))
         return f"{folder}: none of its {len(refused)} files can be read. The first, {name}: {reason}"
-    inside = [part.name for part in sorted(folder.iterdir()) if part.is_dir() and recordings_in(part)]
+    inside = [part.name for part in sorted(folder.iterdir()) if part.is_dir() and recordings_in(part, readers)]
     if inside:
         return f"{folder}: holds no recording itself, but these folders do: {', '.join(inside[:8])}. Point at one of them."
-    return f"{folder}: holds no recording. Legal are files of the formats {', '.join(FORMATS)}."
+    return f"{folder}: holds no recording. Legal are files of the formats {', '.join(extensions(readers))}."

@@ -10,7 +10,13 @@ name = "S01"
 
 [trials."static*"]    # file name without extension, * and ? allowed; the exact name wins over a pattern
 role = "static"       # static, fit, validate, check or skip
+
+[settings]            # as `biodance settings` prints them
+filter.cutoff = 6
 ```
+
+``[markers] file = "my_set.toml"`` names the marker set that was worn (a set's name or a file, relative to this one);
+``[markers] map = {LASI = "left_asis", BACK4 = "trunk_head"}`` says it here: which label is which landmark, or sits on which segment.
 
 A ``subject.toml`` or ``session.toml`` in the folder above (the subject's folder) has the same keys and fills in what the session's own
 file leaves out.
@@ -24,9 +30,10 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from biodance.errors import SessionRefused
+from biodance.errors import BiodanceError, SessionRefused
 from biodance.library import read_toml
 from biodance.records import Role
+from biodance.settings import USUAL, Settings
 
 FILES = ("subject.toml", "session.toml")
 
@@ -51,18 +58,32 @@ class TrialEntry(_Entry):
     role: Role | None = None
 
 
+class MarkersEntry(_Entry):
+    """The table ``[markers]``: the ``file`` (or name) of a marker set, or the ``map`` of labels to landmarks and segments."""
+
+    file: str | None = None
+    map: dict[str, str] | None = None
+
+
 class _Contents(_Entry):
     subject: SubjectEntry = SubjectEntry()
+    markers: MarkersEntry = MarkersEntry()
     trials: dict[str, TrialEntry] = {}
+    settings: dict[str, Any] = {}
 
 
 @dataclass(frozen=True)
 class SessionFile:
-    """What all files of the chain say together: ``subject``, ``trials`` by name or pattern (the innermost file first), ``read`` paths."""
+    """What all files of the chain say together: ``subject``, ``trials`` by name or pattern (the innermost file first), ``read`` paths,
+    ``settings`` with what ``[settings]`` changes; ``marker_set`` the name or file of the set that was worn, "" where none is said (see
+    `marker_sets.read_marker_set`).
+    """
 
     subject: SubjectEntry = field(default_factory=SubjectEntry)
     trials: tuple[tuple[str, TrialEntry], ...] = ()
     read: tuple[Path, ...] = field(default=())
+    settings: Settings = USUAL
+    marker_set: str = ""
 
     def role(self, name: str) -> Role | None:
         """Return the role of a trial: by its exact name, else by the first pattern that fits; upper and lower case count the same."""
@@ -96,7 +117,28 @@ def read_session_file(folder: Path) -> SessionFile:
     for content in contents:
         said |= content.subject.model_dump(exclude_none=True)
     trials = tuple((key, entry) for content in reversed(contents) for key, entry in content.trials.items())
-    return SessionFile(SubjectEntry(**said), trials, tuple(paths))
+    worn = [name for path, content in zip(paths, contents, strict=True) if (name := _marker_set(path, content.markers))]
+    return SessionFile(SubjectEntry(**said), trials, tuple(paths), _settings(paths, contents), worn[-1] if worn else "")
+
+
+def _settings(paths: list[Path], contents: list[_Contents]) -> Settings:
+    """Return the settings with what the files change, the innermost file last."""
+    settings = USUAL
+    for path, content in zip(paths, contents, strict=True):
+        try:
+            settings = settings.changed(content.settings)
+        except BiodanceError as error:
+            raise SessionRefused(f"{path}: [settings] {error}") from None
+    return settings
+
+
+def _marker_set(path: Path, said: MarkersEntry) -> str:
+    """Return the marker set of one file: the name of a known set, the path of a file, the file itself for a map; "" where it says none."""
+    if said.file is not None and said.map is not None:
+        raise SessionRefused(f"{path}: [markers] has both file and map. Keep one of the two.")
+    if said.map is not None:
+        return str(path)
+    return str(path.parent / said.file) if said.file and said.file.endswith(".toml") else said.file or ""
 
 
 def _read(path: Path) -> _Contents:
@@ -128,7 +170,7 @@ def _sentence(path: Path, fault: Any) -> str:
 
 
 def _legal_keys(table: list[str]) -> list[str]:
-    models: dict[str, type[BaseModel]] = {"subject": SubjectEntry, "trials": TrialEntry}
+    models: dict[str, type[BaseModel]] = {"subject": SubjectEntry, "trials": TrialEntry, "markers": MarkersEntry}
     return list(models.get(table[0] if table else "", _Contents).model_fields)
 
 
@@ -137,5 +179,7 @@ _HELP = {
     "height_m": "Give the stature in m.",
     "sex": 'Write "F" or "M".',
     "age": "Give the age in years.",
+    "file": 'Write the path of a marker set, for example "my_set.toml".',
+    "map": 'Write {LABEL = "left_asis", ...}.',
     "role": f"Legal are {', '.join(get_args(Role))}.",
 }

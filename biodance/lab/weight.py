@@ -4,13 +4,9 @@ import numpy as np
 
 from biodance.errors import TrialRefused
 from biodance.records import Array, Markers, Trial, Wrench
+from biodance.settings import STANDARD_GRAVITY, StandingRules
 
-STANDARD_GRAVITY = 9.80665  # m/s²
-STILL = 0.03  # m, a marker that stays within this counts as still
-LOADED = 100.0  # N, nobody stands on plates that carry less
-SWAY = 0.03  # share of the weight by which the vertical force may sway in quiet standing
 BLOCK = 0.05  # s, the force is averaged over blocks of this length before it is judged
-SHORTEST = 0.4  # s of quiet standing
 
 
 def movement(markers: Markers) -> float:
@@ -27,27 +23,27 @@ def movement(markers: Markers) -> float:
 
 
 def is_still(trial: Trial) -> bool:
-    """Return True if the trial has markers and the typical one stays within 3 cm."""
-    return trial.markers is not None and movement(trial.markers) <= STILL
+    """Return True if the trial has markers and the typical one stays within ``trial.settings.standing.still``."""
+    return trial.markers is not None and movement(trial.markers) <= trial.settings.standing.still
 
 
 def standing_mass(trial: Trial) -> float | None:
-    """Return the mass in kg that the plates carry in the longest quiet part (vertical force within 3 %, at least 0.4 s); None without one.
+    """Return the mass in kg that the plates carry in the longest quiet part (as ``trial.settings.standing`` has it); None without one.
 
     Only for trials in which the markers are still or that have no markers: a walker may have one foot beside the plates.
     """
     if not trial.plates or (trial.markers is not None and not is_still(trial)):
         return None
     try:
-        return steady_mass(trial.wrench)
+        return steady_mass(trial.wrench, rules=trial.settings.standing, gravity=trial.settings.gravity)
     except TrialRefused:
         return None
 
 
-def steady_mass(wrench: Wrench) -> float | None:
-    """Return the mass in kg that a wrench carries in its longest quiet part (within 3 %, at least 0.4 s); None without one."""
-    quiet = _longest_steady(_blocks(wrench.force[:, 2], wrench.rate))
-    return float(quiet.mean() / STANDARD_GRAVITY) if quiet is not None else None
+def steady_mass(wrench: Wrench, *, rules: StandingRules | None = None, gravity: float = STANDARD_GRAVITY) -> float | None:
+    """Return the mass in kg that a wrench carries in its longest quiet part, by default within 3 % for 0.4 s; None without one."""
+    quiet = _longest_steady(_blocks(wrench.force[:, 2], wrench.rate), rules or StandingRules())
+    return float(quiet.mean() / gravity) if quiet is not None else None
 
 
 def _blocks(vertical: Array, rate: float) -> Array:
@@ -57,15 +53,15 @@ def _blocks(vertical: Array, rate: float) -> Array:
     return vertical[: count * size].reshape(count, size).mean(axis=1)
 
 
-def _longest_steady(blocks: Array) -> Array | None:
+def _longest_steady(blocks: Array, rules: StandingRules) -> Array | None:
     """Return the longest run of blocks that stay within the sway of their median; None if it is too short or carries nobody."""
     middle = float(np.median(blocks)) if blocks.size else 0.0
-    if not middle >= LOADED:
+    if not middle >= rules.force:
         return None
-    steady = np.concatenate([[0], np.abs(blocks - middle) <= SWAY * middle, [0]]).astype(int)
+    steady = np.concatenate([[0], np.abs(blocks - middle) <= rules.sway * middle, [0]]).astype(int)
     starts, ends = np.flatnonzero(np.diff(steady) == 1), np.flatnonzero(np.diff(steady) == -1)
     if not starts.size:
         return None
     longest = int(np.argmax(ends - starts))
     run = blocks[starts[longest] : ends[longest]]
-    return run if run.size * BLOCK >= SHORTEST - 1e-9 else None
+    return run if run.size * BLOCK >= rules.shortest - 1e-9 else None

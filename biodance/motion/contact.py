@@ -14,30 +14,12 @@ from numpy.typing import NDArray
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.motion.dynamics import distribute
 from biodance.motion.footing import Footing, cop_outside, footing
-from biodance.motion.regressor import GRAVITY
 from biodance.motion.soles import SIDES, Soles
 from biodance.motion.surfaces import Surfaces, dilate, find_surfaces, resting, speeds
 from biodance.records import Array, Trial, Wrench
+from biodance.settings import ContactRules
 
 Mask = NDArray[np.bool_]
-
-
-@dataclass(frozen=True)
-class ContactRules:
-    """When a foot may touch: a point of the sole lower than ``height`` m over a surface and slower than ``speed`` m/s, and ``around`` s
-    before and after that. It rests where all points are slower than ``still`` m/s for ``lasting`` s. A plate is loaded above the share
-    ``loaded`` of the trial's largest vertical force. Above the share ``pressed`` its centre of pressure is held against the soles on it: a
-    median of more than ``outside`` m off them is said.
-    """
-
-    height: float = 0.04
-    speed: float = 0.8
-    around: float = 0.05
-    still: float = 0.15
-    lasting: float = 0.1
-    loaded: float = 0.05
-    pressed: float = 0.2
-    outside: float = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +43,7 @@ def ground_contact(trial: Trial, soles: Soles, *, mass: float = float("nan"), ru
     """Return the ground contact of a prepared trial.
 
     ``mass`` kg of the body, NaN = unknown: a foot that rests away from all known heights while the plates carry at least nine tenths of
-    the weight is held in the air; without the mass it counts as standing on something.
+    the weight is held in the air; without the mass it counts as standing on something. ``rules`` None: those of ``trial.settings``.
 
     Raises
     ------
@@ -70,17 +52,17 @@ def ground_contact(trial: Trial, soles: Soles, *, mass: float = float("nan"), ru
     BiodanceError
         Plates and soles have different times: the trial was not prepared.
     """
-    rules = rules or ContactRules()
+    rules = rules or trial.settings.contact
     if not trial.plates:
         raise TrialRefused(f"Trial {trial.name}: no force plate was recorded, so no frame is measured. Record with the plates on.")
     if any(plate.wrench.time.shape != soles.time.shape or not np.allclose(plate.wrench.time, soles.time) for plate in trial.plates):
         raise BiodanceError(f"Trial {trial.name}: the plates and the feet have different times. Prepare the trial first.")
     force = np.stack([plate.wrench.force[:, 2] for plate in trial.plates], axis=1)
     largest = float(np.nanmax(force.sum(axis=1), initial=0.0))
-    load, pressed = force > max(20.0, rules.loaded * largest), force > max(20.0, rules.pressed * largest)
+    load, pressed = (force > max(rules.force, share * largest) for share in (rules.loaded, rules.pressed))
     speed = speeds(soles)
     rests = resting(speed, soles.time, still=rules.still, lasting=rules.lasting)
-    surfaces = find_surfaces(trial, soles, rests, load, weight=-GRAVITY[2] * mass)
+    surfaces = find_surfaces(trial, soles, rests, load, weight=trial.settings.gravity * mass)
     touching = _touching(soles, speed, surfaces, rules)
     place = footing(trial.plates, soles, surfaces, touching)
     faults = _faults(trial, place, touching, rests, load)

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.body.pinocchio_model import load_pinocchio
 from biodance.errors import BiodanceError
-from biodance.motion.regressor import GRAVITY
 from biodance.records import Array, Motion, Wrench, frozen_array
+from biodance.settings import COP_FORCE
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,11 +34,11 @@ class JointTorques:
     residual: Array
 
 
-def joint_torques(body: Body, motion: Motion, contacts: Mapping[str, Wrench], *, gravity: Array = GRAVITY) -> JointTorques:
+def joint_torques(body: Body, motion: Motion, contacts: Mapping[str, Wrench]) -> JointTorques:
     """Return the torques of ``motion`` under the wrenches that act on the named segments.
 
-    ``contacts`` segment name -> wrench of the surroundings ON that segment, about the lab origin, at the times of the motion; ``gravity``
-    (3,) m/s². The inertial parameters are ``body.sip``.
+    ``contacts`` segment name -> wrench of the surroundings ON that segment, about the lab origin, at the times of the motion. The
+    inertial parameters are ``body.sip``, gravity is the body's.
 
     Raises
     ------
@@ -51,8 +51,7 @@ def joint_torques(body: Body, motion: Motion, contacts: Mapping[str, Wrench], *,
         if wrench.time.shape != motion.time.shape or not np.allclose(wrench.time, motion.time, rtol=0, atol=1e-6):
             raise BiodanceError(f"The wrench on {segment} has other times than the motion. Prepare the trial before tracking it.")
     pin = load_pinocchio()
-    model = pin.Model(body.model)
-    model.gravity.linear = np.array(gravity)
+    model = body.model
     data = model.createData()
     first = 2 if body.n_root else 1
     owner = {name: body.segment_joint[body.segment_index(name)] + first for name in contacts}
@@ -69,7 +68,7 @@ def joint_torques(body: Body, motion: Motion, contacts: Mapping[str, Wrench], *,
     return JointTorques(motion.time, total[:, root:], residual)
 
 
-def zmp(wrench: Wrench, *, height: float = 0.0, threshold: float = 20.0) -> Array:
+def zmp(wrench: Wrench, *, height: float = 0.0, threshold: float = COP_FORCE) -> Array:
     """Return the zero-moment point (T, 3) m of a wrench on the horizontal plane ``z = height`` m; NaN where |Fz| < ``threshold`` N.
 
     For a measured wrench it is the centre of pressure, for a simulated one the point that must lie inside the base of support.
@@ -77,7 +76,9 @@ def zmp(wrench: Wrench, *, height: float = 0.0, threshold: float = 20.0) -> Arra
     return wrench.cop(height=height, threshold=threshold)
 
 
-def distribute(total: Wrench, right: Array, left: Array, touching: NDArray[np.bool_], *, threshold: float = 20.0) -> tuple[Wrench, Wrench]:
+def distribute(
+    total: Wrench, right: Array, left: Array, touching: NDArray[np.bool_], *, threshold: float = COP_FORCE
+) -> tuple[Wrench, Wrench]:
     """Return the wrenches of the right and the left foot, whose sum is ``total``.
 
     ``right``, ``left`` (T, 3) m: centres of the soles, their z the height of the ground there; ``touching`` (T, 2) True where the right,

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body, JointError
+from biodance.body.error_sizes import error_size
 from biodance.body.scaling import Scaling
 from biodance.body.skeleton import JOINTS
 from biodance.errors import TrialRefused
@@ -27,14 +28,12 @@ ALIKE = 8.0
 """s of movement that count as one independent posture, because skin slides with the posture and neighbours err alike. On virtual dances
 the places are the same from 1 to 16 s, their standard deviations are true at 8 s; in real walks of 2 s less than 1 s moves joints by
 decimetres."""
-SOFT_TISSUE = 0.008
-"""m per axis: marker against bone at weight 1, at least (3 to 10 mm over a dance; Leardini 2005, DOI 10.1016/j.gaitpost.2004.05.002)."""
 EXCITED = 0.3
 """Share of a joint's prior standard deviation that the movement must remove; below it the static trial's answer is kept, because what
 little the markers say of such a joint is soft tissue."""
-FIXED_POINT = {"shoulder": 0.008, "trunk": 0.008}
-"""m per axis: what no fixed point of the trunk can give; the shoulder rides on its blade, the trunk bends along its length. Added to the
-standard deviations, which are then those of 12 virtual dances."""
+NO_FIXED_POINT = ("shoulder", "trunk")
+"""Joints of which no fixed point of the trunk gives the centre: what the table says of that is added to their standard deviations, which
+are then those of 12 virtual dances."""
 FAR = 4.5
 """Standard deviations from the static trial's place beyond which a joint is not believed (5 sessions without fault: 1.5 at most): a marker
 has moved since then, and pulls the joint along."""
@@ -113,9 +112,10 @@ def _without(postures: Markers, name: str) -> Markers:
 
 def _placed(scaling: Scaling, postures: Markers, seconds: float) -> tuple[FunctionalJoints, State]:
     """Return the joints that ``postures`` from so many ``seconds`` of movement show, and the unknowns found."""
-    fresh = evaluate(scaling, postures, np.zeros(SIZE), None, noise=SOFT_TISSUE)
+    skin = error_size("soft_tissue", "marker")
+    fresh = evaluate(scaling, postures, np.zeros(SIZE), None, noise=skin)
     alike = max(1.0, postures.time.size * ALIKE / seconds)
-    noise = max(SOFT_TISSUE, fresh.rms / np.sqrt(3)) * np.sqrt(alike)
+    noise = max(skin, fresh.rms / np.sqrt(3)) * np.sqrt(alike)
     start = evaluate(scaling, postures, np.zeros(SIZE), fresh.q, noise=noise)
     shown = excited(scaling, start)
     found = descend(scaling, postures, start, shown, noise=noise)
@@ -251,4 +251,10 @@ def _told(scaling: Scaling, start: State, found: State, shown: NDArray[np.bool_]
 
 def _centre_sd(joint: str, deviation: Array) -> float:
     """Return the standard deviation of a centre per axis, m (root mean square), from those of the unknowns (37,)."""
-    return float(np.hypot(np.sqrt(np.mean(deviation[own_centre(joint)] ** 2)), FIXED_POINT.get(joint.split("_")[-1], 0.0)))
+    return float(np.hypot(np.sqrt(np.mean(deviation[own_centre(joint)] ** 2)), fixed_point(joint)))
+
+
+def fixed_point(joint: str) -> float:
+    """Return what no fixed point can give of a joint's centre, m per axis."""
+    kind = joint.split("_")[-1]
+    return error_size("fixed_point", kind, state="after") if kind in NO_FIXED_POINT else 0.0

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.body.error_sizes import error_size, joint_size
 from biodance.body.skeleton import JOINTS
 from biodance.body.static_centres import Centres
 from biodance.motion.kinematics import Poses, axis_rotation, poses
@@ -13,19 +14,21 @@ from biodance.records import Array
 
 HINGES = ("right_knee", "left_knee", "right_elbow", "left_elbow")
 ABOVE = {"knee": "hip", "elbow": "shoulder"}
-CENTRE_SD = {"hip": 0.012, "ankle": 0.008, "trunk": 0.040, "shoulder": 0.015}
-"""m per axis: regressions miss hip and shoulder by 5 to 25 mm (Harrington 2007, DOI 10.1016/j.jbiomech.2006.02.003); the level at which a
-one-piece trunk bends differs by 5 to 8 cm between tables."""
-HINGE_SD = 0.008
-"""m per axis: centre of a knee or elbow about the place that its lateral marker and its axis give it."""
 TURNS = 3 * len(JOINTS)
 SIZE = TURNS + len(HINGES)
 """Unknowns: 3 m per joint of ``JOINTS`` (displacement, lab axes, in the static posture), then rad per hinge about the bone above it."""
 
 
 def centre_sd(joint: str) -> float:
-    """Return the standard deviation (m per axis) of a ``joint``'s centre as the static trial places it, before any movement."""
-    return CENTRE_SD.get(joint.split("_")[-1], HINGE_SD)
+    """Return the standard deviation (m per axis) of a ``joint``'s centre as the static trial places it, before any movement; of a hinge
+    about the place that its lateral marker and its axis give it.
+    """
+    return hinge_sd() if joint in HINGES else joint_size("joint_centre", joint)
+
+
+def hinge_sd() -> float:
+    """Return the standard deviation (m per axis) of the centre of a knee or elbow about where lateral marker and axis place it."""
+    return error_size("hinge_centre", "hinge", state="before")
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +66,8 @@ class JointUnknowns:
             rows, k, sd = own_centre(hinge), own_turn(hinge), self.centres.axis_sd[hinge]
             arm = self.centres.place[hinge] - self.centres.lateral[hinge]
             swung = self._turn(hinge, theta) @ arm
-            residual[rows] -= (swung - arm) / HINGE_SD
-            slope[rows, k] = -np.cross(self.bone(hinge), swung) / HINGE_SD
+            residual[rows] -= (swung - arm) / hinge_sd()
+            slope[rows, k] = -np.cross(self.bone(hinge), swung) / hinge_sd()
             residual[k], slope[k, k] = theta[k] / sd, 1 / sd
         return residual, slope
 

@@ -15,9 +15,10 @@ from biodance.body.body import Body
 from biodance.body.inertia import TENSOR
 from biodance.motion.kinematics import SegmentMotion, segment_motion
 from biodance.records import Array, Motion, Wrench
+from biodance.settings import STANDARD_GRAVITY
 
-GRAVITY = np.array([0.0, 0.0, -9.80665])
-"""(3,) m/s², lab frame, z up (standard gravity, CGPM 1901)."""
+GRAVITY = np.array([0.0, 0.0, -STANDARD_GRAVITY])
+"""(3,) m/s², lab frame, z up: where no body says otherwise (`Body.gravity`)."""
 
 
 def _skew(vector: Array) -> Array:
@@ -39,8 +40,8 @@ def _inertia_columns(local: Array) -> Array:
     return out
 
 
-def regressor_of(segments: SegmentMotion, *, gravity: Array = GRAVITY) -> Array:
-    """Return W (T, 6, 10N): wrench about the lab origin, force first, per unit of each parameter of each segment."""
+def regressor_of(segments: SegmentMotion, *, gravity: Array) -> Array:
+    """Return W (T, 6, 10N): wrench about the lab origin, force first, per unit of each parameter; ``gravity`` (3,) m/s², lab frame."""
     rotation, position = segments.rotation, segments.position
     frames, count = position.shape[:2]
     turned = np.swapaxes(rotation, -1, -2)
@@ -60,16 +61,41 @@ def regressor_of(segments: SegmentMotion, *, gravity: Array = GRAVITY) -> Array:
     return np.moveaxis(columns, 1, 2).reshape(frames, 6, 10 * count)
 
 
-def regressor(body: Body, motion: Motion, *, gravity: Array = GRAVITY) -> Array:
+def regressor(body: Body, motion: Motion) -> Array:
     """Return W (T, 6, 10N) of ``body`` during ``motion``: ``W[t] @ sip.phi`` is the ground wrench about the lab origin (N, N·m).
 
     Parameters of segment i are columns 10i..10i+9 in Pinocchio's order [m, mc (3), Ixx, Ixy, Iyy, Ixz, Iyz, Izz] about the segment's joint
-    frame. ``gravity`` (3,) m/s² in the lab frame.
+    frame. Gravity is the body's.
     """
-    return regressor_of(segment_motion(body, motion), gravity=gravity)
+    return regressor_of(segment_motion(body, motion), gravity=body.gravity)
 
 
-def predict_wrench(body: Body, motion: Motion, phi: Array | None = None, *, gravity: Array = GRAVITY) -> Wrench:
-    """Return the wrench that ``motion`` needs from the ground with the parameters ``phi`` (10N,), by default the body's prior."""
-    W = regressor(body, motion, gravity=gravity)
+def predict_wrench(body: Body, motion: Motion, phi: Array | None = None) -> Wrench:
+    """Return the wrench that a motion needs from the ground.
+
+    Parameters
+    ----------
+    body : Body
+        Who moves, and under which gravity.
+    motion : Motion
+        At T instants.
+    phi : numpy.ndarray, optional
+        (10N,) inertial parameters, see `Sip`; by default the body's.
+
+    Returns
+    -------
+    Wrench
+        (T, 6) N, N·m ON the subject about the lab origin, force first.
+
+    References
+    ----------
+    Ground wrench of a tree of rigid bodies, linear in the inertial parameters; docs/derivations.md.
+
+    Examples
+    --------
+    >>> needed = biodance.predict_wrench(result.body, result["squat_1"].motion)
+    >>> round(float(needed.force[:, 2].mean()), -1)
+    610.0
+    """
+    W = regressor(body, motion)
     return Wrench(motion.time, W @ (body.sip.phi if phi is None else phi))

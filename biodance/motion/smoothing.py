@@ -38,8 +38,9 @@ def smooth(body: Body, time: Array, q: Array, *, settings: LowPass | None = None
     """
     settings = settings or LowPass()
     _check(time, q, settings)
+    names = tuple(joint.name for joint in body.joints)
     if len(time) == 1:
-        return Motion(time, q, np.zeros((1, body.nv)), np.zeros((1, body.nv)))
+        return Motion(time, q, np.zeros((1, body.nv)), np.zeros((1, body.nv)), joint_names=names)
     chart = chart_of(body)
     rough = np.asarray(q).T
     filtered = chart.split(low_pass(chart.smooth(rough).stacked().T, _rate(time), settings).T)
@@ -54,7 +55,7 @@ def smooth(body: Body, time: Array, q: Array, *, settings: LowPass | None = None
         v[body.n_root + chart.joints.first + k], a[body.n_root + chart.joints.first + k] = rates[0][k], rates[1][k]
     if body.n_root:
         v[:6], a[:6] = _root_rates(even, first, second)
-    return Motion(time, posture.T, v.T, a.T)
+    return Motion(time, posture.T, v.T, a.T, joint_names=names)
 
 
 def _derivatives(time: Array, values: Array) -> tuple[Array, Array]:

@@ -6,28 +6,47 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.errors import TrialRefused
-from biodance.lab.filters import LowPass
+from biodance.lab.filters import motion_filter
 from biodance.motion.inverse_kinematics import FrameStatus, InverseKinematics, solve_ik
 from biodance.motion.smoothing import smooth
 from biodance.records import Motion, Trial
 
 
-def track(body: Body, trial: Trial, *, settings: LowPass | None = None) -> Motion:
-    """Return the motion of ``body`` under the markers of ``trial``, matched by name; ``settings`` None: the default low-pass.
+def track(body: Body, trial: Trial) -> Motion:
+    """Return the motion of a body under the markers of a trial, matched by name, low-passed as ``trial.settings`` say.
 
-    ``residual`` (T, K) m are the distances before smoothing, of the markers that body and trial share. ``determined`` (T,) is False
-    where a frame's own markers leave its posture open or do not let it settle; ``notes`` say so in plain sentences.
+    Parameters
+    ----------
+    body : Body
+        Who moves, with its markers.
+    trial : Trial
+        With markers, best prepared (gaps filled).
+
+    Returns
+    -------
+    Motion
+        ``residual`` (T, K) m are the distances before smoothing, of the markers that both share; ``determined`` (T,) is False where a
+        frame's own markers leave its posture open or do not let it settle; ``notes`` say so.
 
     Raises
     ------
     TrialRefused
         The trial has no markers, no frame with enough of them (the missing ones are named), or too few or uneven frames to smooth.
+
+    References
+    ----------
+    Multi-body optimisation: Lu & O'Connor 1999, doi:10.1016/S0021-9290(98)00158-4; docs/derivations.md.
+
+    Examples
+    --------
+    >>> biodance.track(biodance.scale(session.subject, session["static"]), session["squat_1"])
+    Motion(23 joint angles, 611 frames at 100 Hz, 6.10 s)
     """
     if trial.markers is None or not trial.markers.time.size:
         raise TrialRefused(f"Trial {trial.name}: no markers were recorded, so there is no motion. Export the trial with its markers.")
     try:
         found = solve_ik(body, trial.markers)
-        motion = smooth(body, trial.markers.time, found.q, settings=settings)
+        motion = smooth(body, trial.markers.time, found.q, settings=motion_filter(trial.settings))
     except TrialRefused as error:
         raise TrialRefused(f"Trial {trial.name}: {error}") from error
     return replace(

@@ -5,7 +5,7 @@ about is said.
 from functools import partial
 
 from biodance.body.body import Body
-from biodance.body.human import DEFAULT_TABLE, human
+from biodance.body.human import human
 from biodance.body.scaling import Scaling, measure
 from biodance.body.tracking_limits import tracked
 from biodance.errors import TrialRefused
@@ -14,9 +14,10 @@ from biodance.pipeline.results import Step
 from biodance.pipeline.steps import attempt
 from biodance.pipeline.trial import Prepared
 from biodance.records import Subject
+from biodance.settings import Settings
 
 
-def body_of(subject: Subject, read: tuple[Prepared, ...], steps: list[Step]) -> tuple[Body | None, str]:
+def body_of(subject: Subject, read: tuple[Prepared, ...], settings: Settings, steps: list[Step]) -> tuple[Body | None, str]:
     """Return the body of the session and one sentence on where it comes from; None without mass, stature or markers, with the step refused.
 
     Every static trial is tried in turn; where none can be used, lengths come from stature and markers from their usual places.
@@ -28,18 +29,20 @@ def body_of(subject: Subject, read: tuple[Prepared, ...], steps: list[Step]) -> 
     for static in statics:
         scaling = attempt(steps, "scale", partial(measure, subject, static))
         if scaling is not None:
-            placed = attempt(steps, "joints", partial(placed_by_movement, scaling, read))
+            functional = settings.joints == "functional"
+            placed = attempt(steps, "joints", partial(placed_by_movement, scaling, read)) if functional else None
             how = "joints placed by movement" if placed else "joints where it shows them"
             return (placed or scaling).body()[0], (
-                f"Scaled on the static trial {static.name}, {how}; masses and inertias from the table {DEFAULT_TABLE}."
+                f"Scaled on the static trial {static.name}, {how}; masses and inertias from the table {settings.table}."
             )
     if not statics:
         steps.append(Step("scale", "refused", "No static trial can be used, so the body comes from stature alone. Record a static trial."))
     sets = [one.trial.marker_set for one in read if one.trial.marker_set]
     if not sets:
         return None, "No body: no trial has markers of a known set."
-    body = attempt(steps, "body from stature", lambda: tracked(human(subject, markers=sets[0])))
-    return body, f"From stature alone, with the usual places of the markers; masses and inertias from the table {DEFAULT_TABLE}."
+    generic = partial(human, subject, table=settings.table, markers=sets[0], gravity=settings.gravity)
+    body = attempt(steps, "body from stature", lambda: tracked(generic()))
+    return body, f"From stature alone, with the usual places of the markers; masses and inertias from the table {settings.table}."
 
 
 def placed_by_movement(scaling: Scaling, read: tuple[Prepared, ...]) -> Scaling:

@@ -1,22 +1,24 @@
 """A dance for one person, from what is known of the person to the numbers of the finished dance, all steps in order."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from biodance import display
 from biodance.body.body import Body
 from biodance.body.human import human
 from biodance.body.limits import joint_limits
-from biodance.dance.account import Account, account
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.expectation import Expectation, expect
-from biodance.dance.person import PersonLimits, fitted
-from biodance.dance.plan import Plan
+from biodance.dance.limits import Limit
+from biodance.dance.metrics import DanceMetrics, dance_metrics
+from biodance.dance.problem.person import PersonLimits, fit_to_person
+from biodance.dance.problem.plan import Plan
 from biodance.dance.verify import Margin, broken
 from biodance.errors import BiodanceError
 from biodance.records import Subject
@@ -47,21 +49,47 @@ PERSONS = Makers(design, expect)
 class DanceResult:
     """What came of designing a dance.
 
-    ``plan`` and ``body`` as fitted to the person; ``dance`` with its ``margins`` (worst of every limit, checked by other code than the
-    optimiser's), ``account`` and ``expectation``; where there is none that keeps all limits, ``reason`` says which constraint forbids it
-    and ``dance`` is None. ``notes`` what was left out for the person (``dance.notes``: what was exchanged or left out because a move was
-    impossible); ``seconds`` of computing.
+    Parameters
+    ----------
+    body : Body
+        As fitted to the person.
+    plan : Plan
+        The protocol, as fitted to the person.
+    dance : Dance or None
+        None where none keeps all limits.
+    margins : tuple
+        Worst of every limit, judged by other code than the optimiser's.
+    account, expectation : Account, Expectation or None
+        What the dance tells, and what will be known after it; None without a dance.
+    reason : str
+        Which limit forbids the dance; "" with one.
+    notes : tuple of str
+        What was left out for the person (``dance.notes``: because a move was impossible).
+    seconds : float
+        Of computing.
+
+    Examples
+    --------
+    >>> made = biodance.design_dance(biodance.Subject(65.0, 1.75, "F"), "one_segment")  # doctest: +SKIP
+    >>> made.feasible  # doctest: +SKIP
+    True
     """
 
     body: Body
     plan: Plan
     dance: Dance | None
     margins: tuple[Margin, ...]
-    account: Account | None
+    account: DanceMetrics | None
     expectation: Expectation | None
     reason: str
     notes: tuple[str, ...]
     seconds: float
+
+    def __repr__(self) -> str:
+        return f"DanceResult({self.dance!r})" if self.dance is not None else f"DanceResult(no dance: {self.reason})"
+
+    def _repr_html_(self) -> str:
+        return display.card(repr(self), self.dance.table() if self.dance is not None else None, self.notes)
 
     @property
     def feasible(self) -> bool:
@@ -98,6 +126,7 @@ def make_dance(
     plan: Plan,
     person: PersonLimits,
     *,
+    limits: Iterable[Limit | type[Limit]] = (),
     seed: int = 0,
     tell: Tell = lambda *_: None,
     resume: Path | None = None,
@@ -105,13 +134,15 @@ def make_dance(
 ) -> DanceResult:
     """Design, check and count a dance of ``plan`` for ``body`` with the limits of ``person``; ``resume`` keeps what is finished meanwhile.
 
+    ``limits`` are kept beside those of the plan, or in place of one of the same name (`dance.limits`).
+
     Raises
     ------
     BiodanceError
-        The protocol and the person contradict each other (`person.fitted`).
+        The protocol and the person contradict each other (`fit_to_person`).
     """
     started = time.perf_counter()
-    own, plan, notes = fitted(body, plan, person)
+    own, plan, notes = fit_to_person(body, plan.with_limits(limits), person)
     reason, margins, dance = "", tuple[Margin, ...](), None
     try:
         dance, margins = makers.design(own, plan, seed=seed, tell=tell, resume=resume)
@@ -121,7 +152,7 @@ def make_dance(
     if dance is not None:
         tell("counting what the dance tells", 0, 0)
         with ProcessPoolExecutor(1) as aside:
-            numbers = aside.submit(account, dance, plan)
+            numbers = aside.submit(dance_metrics, dance, plan)
             expected, counted = makers.expect(dance), numbers.result()
         reason = " ".join(_told(margin) for margin in broken(margins))
     if reason:

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from biodance.dance.account import zmp
 from biodance.dance.dance import Dance, Phase
+from biodance.dance.metrics import zmp_path
 from biodance.errors import BiodanceError
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion, Subject
@@ -53,7 +53,7 @@ def _shown(dance: Dance, motion: Motion, phases: list[Phase], name: str) -> Show
     rows = (motion.time >= phases[0].start - 1e-9) & (motion.time <= phases[-1].end + 1e-9)
     part = Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.a[rows])
     raised = np.max([_raised(dance, phase, part.time) for phase in phases], axis=0)
-    return Shown(name, dance.body, part, phases[0].stance.ankle, raised, zmp(predict_wrench(dance.body, part).value))
+    return Shown(name, dance.body, part, phases[0].stance.ankle, raised, zmp_path(predict_wrench(dance.body, part).value))
 
 
 def _raised(dance: Dance, phase: Phase, time: Array) -> Array:

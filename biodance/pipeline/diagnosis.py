@@ -1,27 +1,32 @@
 """What the simulation of a session gets wrong: checks first, then causes; what accepting them changes in the body and gains elsewhere."""
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from biodance import display
 from biodance.body.body import Body
-from biodance.diagnose.accept import Judged, accept, fit_of, gain, judged
-from biodance.diagnose.diagnosis import Alias, Diagnosis, Estimate, Finding
+from biodance.diagnose.accept import Judged, accept, fit_of, gain_by_naming, judged
+from biodance.diagnose.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
 from biodance.diagnose.engine import Examined, diagnose
 from biodance.diagnose.foresight import Foresight, foresee, session_of
 from biodance.diagnose.problem import Look
-from biodance.diagnose.tolerances import Tolerances
-from biodance.effects.case import Case
-from biodance.effects.gate import Gate, gates
-from biodance.errors import BiodanceError, SessionRefused, TrialRefused
+from biodance.discovery import Chosen
+from biodance.effects import Case, DiscreteEffect, Effect, Gate, causes, gates
+from biodance.errors import BiodanceError, NotSolved, SessionRefused, TrialRefused
 from biodance.identify.added_mass import expected
 from biodance.identify.identification import Identification, identify, standing_point
 from biodance.pipeline.identification import FITTED, KEPT, SessionIdentification
 from biodance.pipeline.looked_at import Own, left_out, looked_at, looks, own_tolerances
 from biodance.pipeline.results import SessionResult
 from biodance.records import Role, Sip
+from biodance.uncertainty.tolerances import Tolerances
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 TRIAL_SECONDS = 20.0
 """s: a designed dance is looked at as trials of about this length."""
@@ -29,9 +34,25 @@ TRIAL_SECONDS = 20.0
 
 @dataclass(frozen=True, eq=False)
 class SessionDiagnosis:
-    """``diagnosis``; ``accepted`` what is identified once the findings are accepted (None without findings), ``before`` without them;
-    ``examined`` what the engine looked at (None where a check stopped it); ``left`` what the body in use leaves of the kept trials,
-    and what is left once the findings are accepted.
+    """What the simulation of a visit gets wrong, and what accepting it changes.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Verdict and findings.
+    examined : Examined or None
+        What the engine looked at; None where a check stopped it.
+    before, accepted : Identification or None
+        What is identified without the findings and once they are accepted; None without findings.
+    left : tuple or None
+        What the body in use leaves of the kept trials, and what is left once the findings are accepted.
+    failures : mapping
+        What could not be computed ("what accepting changes"), with cause and cure.
+
+    Examples
+    --------
+    >>> found.verdict
+    'nothing wrong'
     """
 
     diagnosis: Diagnosis
@@ -39,6 +60,38 @@ class SessionDiagnosis:
     before: Identification | None = None
     accepted: Identification | None = None
     left: tuple[Judged, Judged] | None = None
+    failures: Mapping[str, str] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        return f"SessionDiagnosis({self.diagnosis.told})"
+
+    def _repr_html_(self) -> str:
+        return display.card(repr(self), self.table(), self.diagnosis.notes)
+
+    @property
+    def verdict(self) -> Verdict:
+        """One of "nothing wrong", "named, complete", "named, incomplete", "unexplained"."""
+        return self.diagnosis.verdict
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """The causes named, in the order found."""
+        return self.diagnosis.findings
+
+    def table(self) -> "pd.DataFrame":
+        """Return one row for each parameter of each finding, see `Diagnosis.table`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Empty where nothing is wrong.
+
+        Examples
+        --------
+        >>> len(found.table())
+        0
+        """
+        return self.diagnosis.table()
 
 
 def diagnose_session(
@@ -46,13 +99,13 @@ def diagnose_session(
     *,
     reference: SessionIdentification | None = None,
     tolerances: Tolerances | None = None,
-    chosen: Iterable[str] | None = None,
+    effects: Chosen[Effect | DiscreteEffect] = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> SessionDiagnosis:
     """Return the diagnosis of an examined session, with the gain of every finding on the trials that were kept.
 
     ``reference`` an earlier session of the same person without fault or load: its posterior is then what is known of the body;
-    ``tolerances`` as learned by the laboratory; ``chosen`` limits the causes to some effects by name.
+    ``tolerances`` as learned by the laboratory; ``effects`` names limit the causes to these, objects (``[MyEffect()]``) join the family.
 
     Raises
     ------
@@ -61,8 +114,8 @@ def diagnose_session(
     """
     fitted = looked_at(result.trials)
     tell("checking units, signs, labels and clocks")
-    names = None if chosen is None else tuple(chosen)
-    checks = gates(result.session, _cases(result.body, (*fitted, *looks(result.trials, KEPT))), chosen=_discrete(names))
+    asked = causes(effects)
+    checks = gates(result.session, _cases(result.body, (*fitted, *looks(result.trials, KEPT))), chosen=asked)
     failed = tuple(gate for gate in checks if not gate.ok)
     if result.body is None or not fitted:
         if failed:
@@ -77,14 +130,14 @@ def diagnose_session(
             gates=checks,
             tolerances=own.tolerances,
             prior=_prior(reference, result),
-            chosen=_continuous(names),
+            effects=asked,
             search=not failed,
         )
     except TrialRefused:
         if failed:
             return SessionDiagnosis(_by_checks(checks))
         raise
-    examined = _noted(examined, *result.doubts, *standing_notes(result), *left_out(result.trials), *own.notes)
+    examined = _noted(examined, *_untold(reference), *result.doubts, *standing_notes(result), *left_out(result.trials), *own.notes)
     if failed:
         return SessionDiagnosis(_by_checks(checks, examined), examined)
     if examined.named and not own.believed:
@@ -139,23 +192,18 @@ def _noted(examined: Examined, *notes: str) -> Examined:
     return replace(examined, diagnosis=replace(examined.diagnosis, notes=(*examined.diagnosis.notes, *notes)))
 
 
-def _discrete(names: tuple[str, ...] | None) -> tuple[str, ...] | None:
-    from biodance.effects import discrete_effects
-
-    return None if names is None else tuple(name for name in names if name in discrete_effects())
-
-
-def _continuous(names: tuple[str, ...] | None) -> tuple[str, ...] | None:
-    from biodance.effects import effects
-
-    return None if names is None else tuple(name for name in names if name in effects())
-
-
 def _prior(reference: SessionIdentification | None, result: SessionResult) -> Sip | None:
-    """Return what an earlier session lets expect of the body; None without one."""
-    if reference is None or result.identification is None:
+    """Return what an earlier session lets expect of the body; None without one, or where nothing was identified from it."""
+    if reference is None or result.identification is None or reference.identification.status == "failed":
         return None
     return expected(reference.identification, result.identification.identification)
+
+
+def _untold(reference: SessionIdentification | None) -> tuple[str, ...]:
+    """Say that the reference tells nothing of the body, if so."""
+    if reference is None or reference.identification.status == "solved":
+        return ()
+    return (f"Session {reference.name} tells nothing of the body, so the table is what is known before. {reference.identification.cause}",)
 
 
 def _cases(body: Body | None, found: tuple[Look, ...]) -> tuple[Case, ...]:
@@ -186,12 +234,9 @@ def _by_checks(checks: tuple[Gate, ...], examined: Examined | None = None) -> Di
 
 def _finding(gate: Gate) -> Finding:
     """Return a failed check as a finding."""
-    from biodance.effects import discrete_effects
-
-    kind = discrete_effects().get(gate.effect)
     size = () if np.isnan(gate.size) else (Estimate(gate.quantity, gate.size, float("nan"), gate.unit),)
     cause = Alias(gate.effect, gate.target, float("inf"))
-    return Finding(gate.effect, gate.target, size, (cause,), 1.0, advice=f"{gate.text} {kind.advice if kind else ''}".strip())
+    return Finding(gate.effect, gate.target, size, (cause,), 1.0, advice=f"{gate.text} {gate.advice}".strip())
 
 
 def _reasons(result: SessionResult) -> str:
@@ -207,6 +252,8 @@ def _with_gains(result: SessionResult, examined: Examined) -> SessionDiagnosis:
         return _accepted(result, examined, before)
     except TrialRefused as why:  # named in standing, and no movement to identify from
         return SessionDiagnosis(_noted(examined, f"What accepting the findings changes is not known. {why}").diagnosis, examined, before)
+    except NotSolved as why:
+        return SessionDiagnosis(examined.diagnosis, examined, before, failures={"what accepting changes": str(why)})
 
 
 def _accepted(result: SessionResult, examined: Examined, before: Identification) -> SessionDiagnosis:
@@ -227,7 +274,7 @@ def _accepted(result: SessionResult, examined: Examined, before: Identification)
         judged(after.identified, tuple(fit_of(*pair) for pair in mended), about),
     )
     try:
-        measured = gain(*left, fitted=used)
+        measured = gain_by_naming(*left, fitted=used)
     except BiodanceError:
         measured = None
     findings = tuple(replace(one, gain=measured) for one in findings)

@@ -2,24 +2,27 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from biodance.body.body import Body
 from biodance.body.body_file import read_body
 from biodance.body.export import formats, write_model
+from biodance.body.solids import segment_solids
 from biodance.errors import SessionRefused, TrialRefused, UnknownName
 from biodance.lab.mot import write_mot
 from biodance.lab.session import read_session
 from biodance.lab.trc import write_trc
 from biodance.motion.opensim_coordinates import opensim_coordinates
-from biodance.pipeline.results import SessionResult, TrialResult
+from biodance.pipeline.results import SessionResult
+from biodance.pipeline.results_c3d import results_into_c3d
 from biodance.pipeline.session import examine
 from biodance.pipeline.trial import prepared
 from biodance.records import Session, Trial
 
 BODY = "body.json"
 """File in which `biodance identify` keeps the identified body."""
-MOTION_FORMATS = ("trc", "mot")
+MOTION_FORMATS = ("trc", "mot", "c3d")
 
 
 def legal_formats() -> tuple[str, ...]:
@@ -28,44 +31,103 @@ def legal_formats() -> tuple[str, ...]:
 
 
 def export(
-    source: Path,
-    out: Path,
+    source: Session | SessionResult | str | Path,
+    out: str | Path,
     *,
     format: str,
     trial: str | None = None,
     subject: str | None = None,
+    meshes: Path | None = None,
+    markers: str | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> tuple[Path, str]:
-    """Write ``source`` to the file ``out`` and return its path and one sentence on what it holds.
+    """Write a session, or what was identified from it, in the format of another program.
 
-    ``source`` a session folder, or the results folder (or its body.json) of `biodance identify`. Model formats write the body with the
-    identified parameters, where there are trials to identify from, else with the table's; ``trc`` writes the prepared markers and ``mot``
-    the joint coordinates (of the model that ``osim`` writes) of one trial. ``subject`` names the person where files hold several.
+    Parameters
+    ----------
+    source : Session, SessionResult, str or pathlib.Path
+        A visit, its folder, or the results folder (or its body.json) of ``biodance identify``.
+    out : str or pathlib.Path
+        The file to write; it must not exist.
+    format : str
+        ``osim``, ``urdf``, ``mjcf``, ``biomod``, ``csv``: the body with the identified parameters, where there are trials to identify from,
+        else with the table's. ``trc``: the prepared markers of a trial, ``mot``: its joint coordinates, of the model that ``osim`` writes;
+        ``c3d``: a copy of its recording with angles, moments, wrenches, centre of mass and events.
+    trial : str, optional
+        Name of the trial for ``trc`` and ``mot``; by default the only one that moves.
+    subject : str, optional
+        The person where files hold several.
+    markers : str, optional
+        The marker set that was worn: a file or a name.
+    meshes : pathlib.Path, optional
+        Folder with a closed mesh a segment (``right_thigh.stl``, m, in the segment's axes), shown by glb and osim.
+    tell : callable, optional
+        Called with what is being done, in words.
+
+    Returns
+    -------
+    path : pathlib.Path
+        Of the file written.
+    sentence : str
+        What it holds.
 
     Raises
     ------
     UnknownName
-        No such format or trial.
+        No such format or trial; the legal names are listed.
     BiodanceError
         The body's inertia cannot exist, the session gives no body or motion, or the file exists.
+
+    Examples
+    --------
+    >>> path, sentence = biodance.export(result, "visit.osim", format="osim")
+    >>> sentence
+    'Session visit: inertial parameters identified from dance_1.'
     """
     if format not in legal_formats():
         raise UnknownName.of("format", format, legal_formats())
-    kept = source if source.is_file() else source / BODY
-    if kept.is_file():
-        if format in MOTION_FORMATS:
-            raise SessionRefused(f"{source}: holds a body and no trial. Give the session folder to export {format}.")
-        body, words = read_body(kept)
-        return write_model(body, out, format=format, source=words), words
-    session = read_session(source, subject_name=subject, tell=tell)
+    out = Path(out)
+    if isinstance(source, SessionResult):
+        return _of_result(source, out, format, trial, meshes, subject=subject)
+    session = source if isinstance(source, Session) else None
+    if session is None:
+        folder = Path(source) if isinstance(source, str | Path) else Path()
+        kept = folder if folder.is_file() else folder / BODY
+        if kept.is_file():
+            if format in MOTION_FORMATS:
+                raise SessionRefused(f"{folder}: holds a body and no trial. Give the session folder to export {format}.")
+            body, words = read_body(kept)
+            return _model(body, out, format, words, meshes), words
+        session = read_session(folder, subject_name=subject, markers=markers, tell=tell)
     if format == "trc":
         return _markers(_chosen(session, trial), out)
     if format == "mot":
         one = _chosen(session, trial)
-        session = Session(session.subject, tuple(t for t in session.trials if t.role == "static" or t is one), session.folder)
+        session = replace(session, trials=tuple(t for t in session.trials if t.role == "static" or t is one))
         return _motion(examine(session, tell=tell), one.name, out)
-    body, words = body_of_result(examine(session, tell=tell))
-    return write_model(body, out, format=format, source=words), words
+    return _of_result(examine(session, tell=tell), out, format, trial, meshes, subject=subject)
+
+
+def _of_result(
+    result: SessionResult, out: Path, format: str, trial: str | None, meshes: Path | None, *, subject: str | None
+) -> tuple[Path, str]:
+    """Write what was found in a session, see `export`."""
+    if format == "trc":
+        return _markers(_chosen(result.session, trial), out)
+    if format == "mot":
+        return _motion(result, _chosen(result.session, trial).name, out)
+    body, words = body_of_result(result)
+    if format == "c3d":
+        name = _chosen(result.session, trial).name
+        one = next(found for found in result.trials if found.trial.name == name)
+        return results_into_c3d(one, body, out, source=words, subject=subject)
+    return _model(body, out, format, words, meshes), words
+
+
+def _model(body: Body, out: Path, format: str, source: str, meshes: Path | None) -> Path:
+    """Write the body in a model format, with the solids of ``meshes`` where there are some."""
+    solids = None if meshes is None else segment_solids(body, meshes)
+    return write_model(body, out, format=format, source=source, solids=solids)
 
 
 def body_of_result(result: SessionResult) -> tuple[Body, str]:
@@ -75,6 +137,8 @@ def body_of_result(result: SessionResult) -> tuple[Body, str]:
     ------
     SessionRefused
         The session gives no body.
+    NotSolved
+        The identification failed.
     """
     name = result.session.folder.name
     if result.body is None:
@@ -103,14 +167,11 @@ def replaceable(out: Path, *, force: bool) -> Iterator[Path]:
 
 def _chosen(session: Session, name: str | None) -> Trial:
     """Return the named trial; without a name the only one that moves."""
-    named = {trial.name: trial for trial in session.trials}
     if name is not None:
-        if name not in named:
-            raise UnknownName.of("trial of this session", name, tuple(named))
-        return named[name]
+        return session[name]
     moving = [trial for trial in session.trials if trial.role != "static"]
     if len(moving) != 1:
-        raise TrialRefused(f"{session.folder}: holds the trials {', '.join(named)}. Choose one with --trial.")
+        raise TrialRefused(f"{session.folder}: holds the trials {', '.join(trial.name for trial in session)}. Choose one with --trial.")
     return moving[0]
 
 
@@ -122,7 +183,7 @@ def _markers(trial: Trial, out: Path) -> tuple[Path, str]:
 
 
 def _motion(result: SessionResult, name: str, out: Path) -> tuple[Path, str]:
-    one: TrialResult = next(trial for trial in result.trials if trial.trial.name == name)
+    one = result[name]
     if result.body is None or one.motion is None:
         raise TrialRefused(f"Trial {name}: it gives no motion. {one.reason or result.body_source}")
     table = opensim_coordinates(result.body, one.motion)

@@ -1,24 +1,29 @@
 """What the session says about the body: identification from the fit trials, validation on the others, search for a load."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from biodance import display
 from biodance.body.body import Body
-from biodance.errors import BiodanceError, TrialRefused
+from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identify.added_mass import AddedMass, added_mass
 from biodance.identify.identification import Identification, identify, standing_point
 from biodance.identify.sessions import Difference, differences
 from biodance.identify.statistics import Fit
 from biodance.identify.torques import TorqueBands, torque_bands
-from biodance.identify.validation import Gain, TrialValidation, gain, validate
+from biodance.identify.validation import ResidualRatio, TrialValidation, residual_ratio, validate
 from biodance.motion.comparison import Agreement, compare
 from biodance.motion.contact import foot_wrenches, ground_contact
-from biodance.motion.regressor import GRAVITY, predict_wrench
+from biodance.motion.regressor import predict_wrench
 from biodance.motion.soles import SIDES, soles_from_body
 from biodance.pipeline.results import TrialResult
 from biodance.records import ROLES, Role, Wrench
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 UNEXPLAINED = 0.5
 """kg between plates and identified body over the fit trials: more than the scale's uncertainty, shoes and a zero allow."""
@@ -28,26 +33,81 @@ KEPT: tuple[Role, ...] = ("validate", "check")
 
 @dataclass(frozen=True, eq=False)
 class SessionIdentification:
-    """All that identification found in a session.
+    """All that identification found in a visit.
 
-    ``fitted`` and ``validations`` compare the trials used and the trials kept, about the mean centre of pressure; ``agreements`` the
-    identified body on every compared trial by name, about the lab origin; ``gain`` table / identified over the validations (None without
-    an interval); ``search`` the loads looked for, against ``search.reference``; ``changes`` since the reference session, empty without one;
-    ``torques`` of the joints in the first trial kept (else fitted), None where the feet's wrenches are not known; ``name`` of the session;
-    ``notes`` what a person should know.
+    Parameters
+    ----------
+    name : str
+        Of the session.
+    identification : Identification
+        What the segments weigh.
+    fitted, validations : tuple
+        The trials used and the trials kept, each with table and identified body, about the mean centre of pressure.
+    agreements : mapping
+        Trial -> how well the identified body agrees with the plates, about the lab origin.
+    gain : Gain or None
+        RMS residual of the table over that of the identified body on the trials kept; None without an interval.
+    search : AddedMass
+        The loads looked for, against ``search.reference``.
+    changes : tuple
+        Since the reference session; () without one.
+    torques : TorqueBands or None
+        Of the joints in the first trial kept (else fitted); None where the feet's wrenches are not known.
+    notes : tuple of str
+        What a person should know.
+    failures : mapping
+        What could not be computed ("segments", "reference", "differences"), each with cause and cure: without segments there is nothing
+        to compare, to validate or to drive joints with, and those fields are empty.
+
+    Examples
+    --------
+    >>> identified.status
+    'solved'
     """
 
     name: str
-
     identification: Identification
     fitted: tuple[TrialValidation, ...]
     validations: tuple[TrialValidation, ...]
     agreements: Mapping[str, Agreement]
-    gain: Gain | None
+    gain: ResidualRatio | None
     search: AddedMass
     changes: tuple[Difference, ...] = ()
     torques: TorqueBands | None = None
     notes: tuple[str, ...] = ()
+    failures: Mapping[str, str] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        sip = self.identification.sip
+        return f"SessionIdentification({self.name!r}: {self.status}, {len(sip.segments)} segments, {sip.mass.sum():.1f} kg)"
+
+    def _repr_html_(self) -> str:
+        return display.card(repr(self), self.table(), self.notes)
+
+    @property
+    def status(self) -> Literal["solved", "failed"]:
+        """Whether the fit was solved; a failed one keeps the table's values and says so."""
+        return self.identification.status
+
+    def table(self, quantity: str = "mass") -> "pd.DataFrame":
+        """Return one row for each segment, see `Identification.table`.
+
+        Parameters
+        ----------
+        quantity : str
+            "mass", "com x" ... or "Ixx" ....
+
+        Returns
+        -------
+        pandas.DataFrame
+            Table and identified value with intervals, each with its unit.
+
+        Examples
+        --------
+        >>> list(identified.table().columns[:3])
+        ['table (kg)', 'table sd (kg)', 'identified (kg)']
+        """
+        return self.identification.table(quantity)
 
 
 def fit_of(result: TrialResult) -> Fit | None:
@@ -55,7 +115,7 @@ def fit_of(result: TrialResult) -> Fit | None:
     found = result.comparison
     if found is None or result.motion is None or not found.used.any():
         return None
-    return Fit(result.trial.name, result.motion, Wrench(found.time, found.measured), found.used)
+    return Fit(result.trial.name, result.motion, Wrench(found.time, found.measured), found.used, result.trial.settings.outlier)
 
 
 def can_identify(results: tuple[TrialResult, ...]) -> bool:
@@ -83,22 +143,56 @@ def identify_trials(
             "Record movement on the plates, or set roles in session.toml."
         )
     found = identify(body, fits)
-    about, identified = standing_point(fits), found.identified
-    fitted, kept = (tuple(validate(body, identified, fit, about=about) for fit in some) for some in (fits, others))
-    notes = list(found.notes)
-    if not kept:
-        notes.append("No trial was kept for validation, so the gain is not proven. Record squats, or give a trial the role validate.")
-    notes += _weight(fitted)
+    failures = {"segments": found.cause} if found.status == "failed" else {}
+    if reference is not None and "segments" in reference.failures:
+        failures["reference"] = (
+            f"Session {reference.name} tells no body to compare with, so loads are looked for against the table and no change is told. "
+            f"{reference.failures['segments']}"
+        )
+        reference = None
     search = added_mass(found, reference=reference.identification if reference else None)
-    return SessionIdentification(
+    one = SessionIdentification(
         name,
         found,
-        fitted,
-        kept,
+        (),
+        (),
+        {},
+        None,
+        replace(search, reference=f"session {reference.name}") if reference else search,
+        changes=_changes(reference, found, failures),
+        notes=found.notes,
+        failures=failures,
+    )
+    return one if found.status == "failed" else _predicted(one, results, fits, others)
+
+
+def _changes(reference: SessionIdentification | None, found: Identification, failures: dict[str, str]) -> tuple[Difference, ...]:
+    """Return what changed since the session ``reference``; why that cannot be told is added to ``failures``."""
+    if reference is None or found.status == "failed":
+        return ()
+    try:
+        return differences(reference.identification, found)
+    except NotSolved as why:
+        failures["differences"] = str(why)
+        return ()
+
+
+def _predicted(
+    one: SessionIdentification, results: tuple[TrialResult, ...], fits: tuple[Fit, ...], others: tuple[Fit, ...]
+) -> SessionIdentification:
+    """Return the same with what the identified body predicts of all trials."""
+    found, about, identified = one.identification, standing_point(fits), one.identification.identified
+    fitted, kept = (tuple(validate(found.body, identified, fit, about=about) for fit in some) for some in (fits, others))
+    notes = list(one.notes)
+    if not kept:
+        notes.append("No trial was kept for validation, so the gain is not proven. Record squats, or give a trial the role validate.")
+    notes += _weight(fitted, -float(found.body.gravity[2]))
+    return replace(
+        one,
+        fitted=fitted,
+        validations=kept,
         agreements={fit.name: _at_origin(identified, fit) for fit in _fits(results, ROLES)},
         gain=_gain(kept, notes),
-        search=replace(search, reference=f"session {reference.name}") if reference else search,
-        changes=differences(reference.identification, found) if reference else (),
         torques=_torques(found, results),
         notes=tuple(notes),
     )
@@ -117,9 +211,9 @@ def _torques(found: Identification, results: tuple[TrialResult, ...]) -> TorqueB
     return None
 
 
-def _weight(fitted: tuple[TrialValidation, ...]) -> list[str]:
+def _weight(fitted: tuple[TrialValidation, ...], gravity: float) -> list[str]:
     """Say it where the plates carry another weight than the identified body has: the table's total is pinned to the declared mass."""
-    missing = np.concatenate([(trial.measured.force - trial.identified.force)[trial.use, 2] for trial in fitted]).mean() / -GRAVITY[2]
+    missing = np.concatenate([(trial.measured.force - trial.identified.force)[trial.use, 2] for trial in fitted]).mean() / gravity
     if abs(missing) <= UNEXPLAINED:
         return []
     return [
@@ -138,11 +232,11 @@ def _fits(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[Fi
     return tuple(fit for fit in found if fit is not None)
 
 
-def _gain(kept: tuple[TrialValidation, ...], notes: list[str]) -> Gain | None:
+def _gain(kept: tuple[TrialValidation, ...], notes: list[str]) -> ResidualRatio | None:
     if not kept:
         return None
     try:
-        return gain(kept)
+        return residual_ratio(kept)
     except BiodanceError as error:
         notes.append(str(error))
         return None

@@ -6,16 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
+from biodance.body.error_sizes import error_size
 from biodance.diagnose.problem import Look
-from biodance.diagnose.spectrum import EDGES, SHORTEST, spectrum, thinned
-from biodance.diagnose.tolerances import REFERENCE, Tolerances, shipped
-from biodance.effects.case import Case
+from biodance.diagnose.spectrum import SHORTEST, spectrum, thinned
+from biodance.effects import Case
 from biodance.identify.identification import standing_point
-from biodance.identify.statistics import RATE, Fit
+from biodance.identify.statistics import Fit
 from biodance.lab.filters import runs
 from biodance.pipeline.identification import FITTED, KEPT
 from biodance.pipeline.results import TrialResult
 from biodance.records import Array, Role
+from biodance.uncertainty.bands import BANDS
+from biodance.uncertainty.tolerances import REFERENCE_PERSON, Tolerances, shipped
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,12 +31,9 @@ class Own:
 
 ENOUGH = 10.0
 """s of fully measured movement beside which quiet standing tells nothing more."""
-MARKERS = 0.0026
-"""m: first quartile over the markers of their RMS distance to the body in virtual sessions, on which tolerances are learned (0.0021 to
-0.0034 with and without faults; a fault moves some markers, soft tissue all)."""
 MORE = 1.6
 """So many times as large it must be before soft tissue is believed to be larger than theirs (five real walks: 2.4 to 4.8 times)."""
-SOFT = ("centre ", "flesh ", "sag ", "slide ", "tilt ", "marker ", "joint_centre ", "segment_length ", "marker_misplaced ", "shown ")
+SOFT = ("flesh ", "sag ", "slide ", "tilt ", "marker ", "joint_centre ", "segment_length ", "marker_misplaced ", "shown ")
 """Keys of the tolerances that grow with it."""
 SWAYING = 0.3
 """Hz: above, what a person who stands still does to the plates is heart, breath and muscles, which no marker shows."""
@@ -92,7 +91,7 @@ def own_tolerances(body: Body, chosen: tuple[Look, ...]) -> Own:
     sessions, and with the unrest of a person who stands still where standing is looked at.
     """
     found, notes = shipped(), []
-    factor = soft_tissue(chosen) / MARKERS
+    factor = soft_tissue(chosen) / error_size("marker_distance", "first quartile", state="after")
     if factor > MORE:
         sizes = {key: size * (factor if key.startswith(SOFT) else 1.0) for key, size in found.sizes.items()}
         found = replace(found, sizes=sizes)
@@ -104,8 +103,8 @@ def own_tolerances(body: Body, chosen: tuple[Look, ...]) -> Own:
     standing = tuple(look for look in chosen if look.trial.role == "static" and _seconds(look) > 0)
     if standing:
         shaken = unrest(body, standing, standing_point(tuple(map(_fit, chosen))))
-        found = replace(found, noise=found.noise + shaken * (REFERENCE / body.sip.mass.sum()) ** 2)
-        size = np.sqrt(np.einsum("b,bcc->c", 2 * np.diff(EDGES) / RATE, shaken))
+        found = replace(found, noise=found.noise + shaken * (REFERENCE_PERSON / body.sip.mass.sum()) ** 2)
+        size = np.sqrt(np.einsum("b,bcc->c", 2 * np.diff(BANDS.edges) / BANDS.rate, shaken))
         notes.append(
             f"Standing still, the person moves the forces by {size[:3].max():.1f} N and the moments by {size[3:].max():.1f} N·m above "
             f"{SWAYING:g} Hz (heart, breath, muscles; root mean square), which no marker shows: a fault must be larger to be seen."
@@ -128,10 +127,10 @@ def unrest(body: Body, standing: tuple[Look, ...], about: Array) -> Array:
     cases, uses = zip(*(_thinned(body, look) for look in standing), strict=True)
     where = spectrum(cases, uses, about)
     left = where.rows(tuple(case.residual[:, :, None] for case in cases))[:, :, 0]
-    out = np.zeros((len(EDGES) - 1, 6, 6))
-    for b in np.flatnonzero(np.array(EDGES[:-1]) >= SWAYING):
+    out = np.zeros((len(BANDS), 6, 6))
+    for b in np.flatnonzero(np.array(BANDS.edges[:-1]) >= SWAYING):
         here = left[where.band == b]
-        size = np.sqrt(np.sum(here**2, axis=0) / (RATE * where.seconds))
+        size = np.sqrt(np.sum(here**2, axis=0) / (BANDS.rate * where.seconds))
         believed = here * np.minimum(1.0, UNREST / np.maximum(size, 1e-9))
         out[b] = believed.T @ believed / max(1, len(here))
     return out

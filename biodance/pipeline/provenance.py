@@ -1,35 +1,45 @@
 """Which software made a result, from which files, with which settings: enough to make it again."""
 
 import platform
+import subprocess
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from biodance import __version__
+from biodance.library import PACKAGE
 from biodance.pipeline.results import SessionResult
+from biodance.settings import Value
 
-LIBRARIES = ("numpy", "scipy", "pin", "c3d", "cvxpy", "clarabel", "matplotlib")
+LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "pin", "cvxpy", "clarabel", "pandas", "ezc3d", "trimesh", "pyvista", "matplotlib")
+UNKNOWN = "unknown"
 
 
 @dataclass(frozen=True)
 class Provenance:
-    """``created`` UTC time, ISO 8601: the only thing that differs when the same software runs again on the same files; ``versions``
-    library -> version; ``inputs`` file name -> sha256; ``settings`` name -> value.
+    """``created`` UTC time, ISO 8601: the only thing that differs when the same software runs again on the same files and machine;
+    ``commit`` of biodance, "unknown" in an installed wheel, with "+changed" where files differ from it; ``versions`` library -> version;
+    ``blas`` that numpy multiplies matrices with; ``inputs`` file name -> sha256; ``settings`` dotted key -> value, all of them.
     """
 
     created: str
+    commit: str
     versions: Mapping[str, str]
+    blas: str
     inputs: Mapping[str, str]
-    settings: Mapping[str, str]
+    settings: Mapping[str, Value]
 
     def as_dict(self) -> dict[str, Any]:
         """Return all fields as plain dictionaries."""
         return {
             "created_utc": self.created,
+            "commit": self.commit,
             "versions": dict(self.versions),
+            "blas": self.blas,
             "inputs_sha256": dict(self.inputs),
             "settings": dict(self.settings),
         }
@@ -52,8 +62,42 @@ def _name(path: Path, folder: Path) -> str:
     return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.name
 
 
+@cache
+def commit(package: Path = PACKAGE) -> str:
+    """Return the git commit of the checkout that holds ``package``, with "+changed" where files of it differ; else "unknown"."""
+    if not (package.parent / ".git").exists():
+        return UNKNOWN
+    try:
+        found = _git(package.parent, "rev-parse", "HEAD")
+        return found + ("+changed" if _git(package.parent, "status", "--porcelain", "--untracked-files=no") else "")
+    except (OSError, subprocess.SubprocessError):
+        return UNKNOWN
+
+
+def _git(folder: Path, *words: str) -> str:
+    return subprocess.run(["git", *words], cwd=folder, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
+
+
+@cache
+def blas() -> str:
+    """Return which BLAS numpy runs on: the library and version it was built with, and the kernel where that can be asked."""
+    import numpy as np
+
+    built = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
+    said = f"{built.get('name', UNKNOWN)} {built.get('version', '')}".strip()
+    return " ".join([said, *_kernels()])
+
+
+def _kernels() -> list[str]:
+    """Return the kernel and the number of threads of every BLAS in this process."""
+    from threadpoolctl import threadpool_info
+
+    found = [one for one in threadpool_info() if one.get("user_api") == "blas"]
+    return sorted({f"({one.get('architecture', UNKNOWN)}, {one['num_threads']} threads)" for one in found})
+
+
 def provenance(result: SessionResult, *, created: str) -> Provenance:
     """Collect the provenance of ``result``; ``created`` is the UTC time to write into it (see `now`)."""
     versions = {"biodance": __version__, "python": platform.python_version(), **{name: _version(name) for name in LIBRARIES}}
     inputs = {_name(trial.trial.source.path, result.session.folder): trial.trial.source.sha256 for trial in result.trials}
-    return Provenance(created, versions, inputs, dict(result.settings))
+    return Provenance(created, commit(), versions, blas(), inputs, result.settings.as_dict())

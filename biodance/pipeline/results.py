@@ -3,18 +3,22 @@
 All records are frozen; arrays are in SI units in the lab frame (z up); a wrench is the ground's action on the subject about the lab origin.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from biodance import display
 from biodance.body.body import Body
 from biodance.lab.gaps import MarkerGaps
-from biodance.records import Array, Motion, Session, Subject, Trial
+from biodance.records import CHANNEL_TITLES, Array, Motion, Session, Subject, Trial, by_name
+from biodance.settings import Settings
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from biodance.pipeline.identification import SessionIdentification
 
 Status = Literal["ok", "warning", "refused"]
@@ -60,6 +64,40 @@ class WrenchComparison:
     correlation: Array
     notes: tuple[str, ...] = ()
 
+    def table(self) -> "pd.DataFrame":
+        """Return measured and simulated wrench over time, and whether a frame is used.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Index time (s); ``Fx measured (N)`` ..., ``Fx simulated (N)`` ... about the lab origin, ``used``.
+
+        Examples
+        --------
+        >>> result["squat_1"].comparison.table().shape[1]
+        13
+        """
+        import pandas as pd
+
+        titles = [title.replace(" (", f" {which} (") for which in ("measured", "simulated") for title in CHANNEL_TITLES]
+        out = pd.DataFrame(np.hstack([self.measured, self.simulated]), pd.Index(self.time, name="time (s)"), titles)
+        return out.assign(used=self.used)
+
+    def plot_wrench(self) -> NDArray[Any]:
+        """Draw the measured beside the simulated wrench; frames that are not used are grey.
+
+        Returns
+        -------
+        numpy.ndarray
+            (6,) matplotlib axes: Fx, Fy, Fz, Mx, My, Mz over time.
+
+        Examples
+        --------
+        >>> result["squat_1"].comparison.plot_wrench()[2].get_ylabel()
+        'Fz (N)'
+        """
+        return display.beside(self.time, self.measured, self.simulated, self.used, CHANNEL_TITLES)
+
 
 @dataclass(frozen=True, eq=False)
 class Standing:
@@ -91,7 +129,9 @@ class Still:
 
     ``bones`` (B, 2, 3) m lines with ``sides`` (B) "left", "right" or "middle"; ``markers`` (K, 3) m as measured; ``plates`` (P, 4, 3) m
     corners; ``com`` (3,) m; ``force`` and ``cop`` (3,) N, m of the total wrench (NaN = unloaded); ``forward`` (2,) unit vector the
-    subject faces.
+    subject faces. ``boxes`` (N, 2, 3) m of the segments with ``rotations`` (N, 3, 3) and ``positions`` (N, 3) m in the lab and their
+    ``box_sides``; ``residual`` (3,) N measured minus predicted force, ``load`` (3,) m place of a load that was found (NaN = none);
+    ``about`` what the picture shows, one sentence.
     """
 
     trial: str
@@ -104,6 +144,13 @@ class Still:
     force: Array
     cop: Array
     forward: Array
+    boxes: Array = field(default_factory=lambda: np.empty((0, 2, 3)))
+    rotations: Array = field(default_factory=lambda: np.empty((0, 3, 3)))
+    positions: Array = field(default_factory=lambda: np.empty((0, 3)))
+    box_sides: tuple[str, ...] = ()
+    residual: Array = field(default_factory=lambda: np.full(3, np.nan))
+    load: Array = field(default_factory=lambda: np.full(3, np.nan))
+    about: str = ""
 
 
 @dataclass(frozen=True)
@@ -134,6 +181,18 @@ class TrialResult:
     standing: Standing | None = None
     checks: tuple[Check, ...] = ()
 
+    def __repr__(self) -> str:
+        close = f", markers {1000 * self.fit.total_rms:.1f} mm from the body" if self.fit else ""
+        return f"TrialResult({self.name!r}, {self.trial.role}, {self.status}{close})"
+
+    def _repr_html_(self) -> str:
+        return display.card(repr(self), None, self.reasons)
+
+    @property
+    def name(self) -> str:
+        """Name of the trial."""
+        return self.trial.name
+
     @property
     def gaps_percent(self) -> float:
         """Share of all marker samples that were not seen, %; NaN without markers."""
@@ -160,11 +219,39 @@ class TrialResult:
 
 @dataclass(frozen=True, eq=False)
 class SessionResult:
-    """The whole session.
+    """A whole visit after all stages: ``result["squat_1"]`` is what was found in one trial.
 
-    ``body`` that moved (None: no markers or no stature) and ``body_source`` in words; ``standing`` the one whose weight is compared with
-    the declared mass; ``settings`` name -> value of every number that shaped the result; ``identification`` None where no trial is to be
-    identified from, or it was refused.
+    Parameters
+    ----------
+    session : Session
+        As read.
+    subject : Subject
+        The person.
+    body : Body or None
+        That moved; None: no markers, mass or stature.
+    body_source : str
+        Where the body comes from, in words.
+    steps : tuple
+        What was done with the session, and what was refused with the reason.
+    trials : tuple
+        What was found in every trial: motion, comparison of the wrenches, quality.
+    checks : tuple
+        The session's own rows of the quality table.
+    standing : Standing or None
+        The quiet standing whose weight is compared with the declared mass, or None.
+    still : Still or None
+        One instant to draw, or None.
+    more_stills : tuple of Still
+        The frame with the largest residual force, and a load that was found.
+    identification : SessionIdentification or None
+        None where no trial is to be identified from, or it was refused.
+
+    Examples
+    --------
+    >>> result
+    SessionResult('visit': static ok, dance_1 ok, squat_1 ok)
+    >>> result["squat_1"]
+    TrialResult('squat_1', validate, ok, markers 6.8 mm from the body)
     """
 
     session: Session
@@ -176,8 +263,47 @@ class SessionResult:
     checks: tuple[Check, ...]
     standing: Standing | None
     still: Still | None
-    settings: Mapping[str, str]
     identification: "SessionIdentification | None" = None
+    more_stills: tuple[Still, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"SessionResult({self.session.folder.name!r}: {', '.join(f'{one.name} {one.status}' for one in self.trials)})"
+
+    def _repr_html_(self) -> str:
+        return display.card(repr(self), self.table(), [self.body_source])
+
+    def __getitem__(self, name: str) -> TrialResult:
+        """Return what was found in the trial of that name; UnknownName lists all names."""
+        return by_name(self.trials, name, f"trial of session {self.session.folder.name}")
+
+    def __iter__(self) -> Iterator[TrialResult]:
+        return iter(self.trials)
+
+    def __len__(self) -> int:
+        return len(self.trials)
+
+    def table(self) -> "pd.DataFrame":
+        """Return one row for each trial.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Index trial; role, status, markers to the body (mm, RMS and largest), measured frames, RMS difference of force (N) and moment
+            (N·m, about the lab origin) between plates and simulation with the table, reason.
+
+        Examples
+        --------
+        >>> list(result.table().index)
+        ['static', 'dance_1', 'squat_1']
+        """
+        import pandas as pd
+
+        return pd.DataFrame([_row(one) for one in self.trials]).set_index("trial")
+
+    @property
+    def settings(self) -> Settings:
+        """All that the analyst chose."""
+        return self.session.settings
 
     @property
     def all_checks(self) -> tuple[Check, ...]:
@@ -205,7 +331,28 @@ class SessionResult:
         return tuple(note for note in (self.body.notes if self.body else ()) if note.startswith("Warning"))
 
     @property
+    def failures(self) -> Mapping[str, str]:
+        """What identification could not compute, each with cause and cure."""
+        return self.identification.failures if self.identification else {}
+
+    @property
     def needs_a_person(self) -> bool:
-        """Whether anything was refused, warned about or outside its limit."""
-        trouble = any(step.status != "done" for step in self.steps) or any(t.status != "ok" for t in self.trials)
+        """Whether anything was refused, warned about, not computed or outside its limit."""
+        trouble = bool(self.failures) or any(step.status != "done" for step in self.steps) or any(t.status != "ok" for t in self.trials)
         return trouble or bool(self.session.refused or self.doubts) or any(not check.inside for check in self.all_checks)
+
+
+def _row(one: TrialResult) -> dict[str, Any]:
+    """Return what the table of a session says about one trial."""
+    nan, found = float("nan"), one.comparison
+    return {
+        "trial": one.name,
+        "role": one.trial.role,
+        "status": one.status,
+        "marker rms (mm)": 1000 * one.fit.total_rms if one.fit else nan,
+        "marker largest (mm)": 1000 * one.fit.total_max if one.fit else nan,
+        "measured frames": int(found.used.sum()) if found else 0,
+        "force rms (N)": float(np.linalg.norm(found.rms[:3])) if found else nan,
+        "moment rms (N·m)": float(np.linalg.norm(found.rms[3:])) if found else nan,
+        "reason": one.reason,
+    }

@@ -1,16 +1,17 @@
 """A dance for a robot, from its URDF file to the numbers of the finished dance."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
 from biodance.body.body import Body
 from biodance.body.standing_frames import standing_frames
 from biodance.body.urdf import read_urdf
-from biodance.dance.person import PersonLimits
-from biodance.dance.plan import Plan
-from biodance.dance.robot import design_robot, robot_plan
-from biodance.dance.robot_expectation import expect_robot
-from biodance.dance.shapes import unchecked_pairs
+from biodance.dance.limits import Limit
+from biodance.dance.problem.person import PersonLimits
+from biodance.dance.problem.plan import Plan
+from biodance.dance.problem.shapes import unchecked_pairs
+from biodance.dance.robot import design_robot, expect_robot, robot_plan
 from biodance.errors import BiodanceError
 from biodance.pipeline.dance import DanceResult, Makers, Tell, make_dance
 
@@ -32,16 +33,25 @@ def robot_dancer(path: Path, feet: str) -> Body:
 
 
 def make_robot_dance(
-    body: Body, plan: Plan, limits: PersonLimits, *, seed: int = 0, tell: Tell = lambda *_: None, resume: Path | None = None
+    body: Body,
+    plan: Plan,
+    person: PersonLimits,
+    *,
+    limits: Iterable[Limit | type[Limit]] = (),
+    seed: int = 0,
+    tell: Tell = lambda *_: None,
+    resume: Path | None = None,
 ) -> DanceResult:
-    """Design, check and count a dance for a robot (`robot_dancer`) with ``limits`` beyond those of its file; see `dance.make_dance`.
+    """Design, check and count a dance for a robot (`robot_dancer`), with the limits of ``person`` beyond those of its file.
+
+    See `dance.make_dance`.
 
     Raises
     ------
     BiodanceError
         The protocol is not one for robots.
     """
-    found = make_dance(body, robot_plan(body, plan), limits, seed=seed, tell=tell, resume=resume, makers=ROBOTS)
+    found = make_dance(body, robot_plan(body, plan), person, limits=limits, seed=seed, tell=tell, resume=resume, makers=ROBOTS)
     coarse = unchecked_pairs(body)
     words = (f"Not kept apart, since their boxes overlap at zero angles: {', '.join(coarse)}.",) if coarse else ()
     return replace(found, notes=(*body.notes, *words, *found.notes))

@@ -4,20 +4,18 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-from biodance.body.human import DEFAULT_TABLE
+from biodance.body.body import Body
+from biodance.body.segment_tables import reference as reference_person
 from biodance.errors import SessionRefused, TrialRefused
-from biodance.lab.filters import LowPass
-from biodance.lab.weight import SHORTEST, SWAY
-from biodance.motion.contact import ContactRules
-from biodance.motion.regressor import GRAVITY
 from biodance.pipeline.body import body_of
 from biodance.pipeline.checks import mass_check, standing_check, trial_checks
 from biodance.pipeline.identification import SessionIdentification, can_identify, identify_trials
-from biodance.pipeline.results import SessionResult, Standing, Step, TrialResult
+from biodance.pipeline.results import SessionResult, Standing, Step, Still, TrialResult
 from biodance.pipeline.steps import attempt
-from biodance.pipeline.still import still_of
+from biodance.pipeline.still import load_still, still_of, worst_still
 from biodance.pipeline.trial import examine_trial, prepared
 from biodance.records import Session
+from biodance.settings import StandingRules
 
 STOPPED = Step("stop", "refused", "Not done: the run was stopped by Ctrl-C before this trial.")
 
@@ -28,19 +26,48 @@ def examine(
     reference: SessionIdentification | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> SessionResult:
-    """Take a session through all stages and return all that was found; ``tell`` is called with what is being done.
-
-    ``reference`` is what an earlier, unloaded session of the same person said: a load is then looked for against it, not the table.
+    """Take a session through all stages: prepare, scale, track, compare, identify; one trial that fails never stops the others.
 
     Ctrl-C ends the work after the trials that are done; the others say so (``SessionResult.stopped``).
+
+    Parameters
+    ----------
+    session : Session
+        As `read_session` returns it, with its settings.
+    reference : SessionIdentification, optional
+        What an earlier, unloaded session of the same person said: a load is then looked for against it, not the table.
+    tell : callable, optional
+        Called with what is being done, in words.
+
+    Returns
+    -------
+    SessionResult
+        All that was found; what the data could not carry is a step with its reason.
+
+    Raises
+    ------
+    UnknownName
+        There is no such table of segment inertial parameters for the subject's sex.
+
+    See Also
+    --------
+    identify : What the segments weigh.
+    diagnose : What the simulation gets wrong.
+
+    Examples
+    --------
+    >>> result = biodance.examine(session)
+    >>> result["squat_1"].motion
+    Motion(23 joint angles, 611 frames at 100 Hz, 6.10 s)
     """
+    reference_person(session.settings.table, session.subject)
     steps: list[Step] = []
     read = []
     for trial in sorted(session.trials, key=lambda trial: trial.role != "static"):
         tell(f"preparing {trial.name}")
         read.append(prepared(trial))
     tell("scaling the body")
-    body, source = body_of(session.subject, tuple(read), steps)
+    body, source = body_of(session.subject, tuple(read), session.settings, steps)
     results: list[TrialResult] = []
     try:
         for one in read:
@@ -50,7 +77,7 @@ def examine(
         results += [TrialResult(one.trial, (*one.steps, STOPPED), one.gaps) for one in read[len(results) :]]
     done = tuple(replace(result, checks=tuple(trial_checks(result, session.subject.mass))) for result in results)
     standing = attempt(steps, "standing", lambda: best_standing(done))
-    identification = None
+    identification, limits = None, session.settings.checks
     if body is not None and can_identify(done):
         tell("identifying the segments")
         identification = attempt(steps, "identify", partial(identify_trials, body, done, name=session.folder.name, reference=reference))
@@ -61,12 +88,19 @@ def examine(
         body_source=source,
         steps=tuple(steps),
         trials=done,
-        checks=(*mass_check(session.subject, standing), *standing_check(standing)),
+        checks=(*mass_check(session.subject, standing, limits), *standing_check(standing, limits)),
         standing=standing,
         still=attempt(steps, "still", lambda: still_of(body, done)) if body else None,
-        settings=settings(),
         identification=identification,
+        more_stills=_stills(body, done, identification) if body else (),
     )
+
+
+def _stills(body: Body, done: tuple[TrialResult, ...], found: SessionIdentification | None) -> tuple[Still, ...]:
+    """Return the worst frame of the body that is believed, and the load that was found."""
+    worst = worst_still(found.identification.identified if found else body, done)
+    load = load_still(body, done, found.search) if found and worst else None
+    return tuple(still for still in (worst, load) if still is not None)
 
 
 def best_standing(results: tuple[TrialResult, ...]) -> Standing:
@@ -79,24 +113,13 @@ def best_standing(results: tuple[TrialResult, ...]) -> Standing:
     """
     found = [(result.trial.role, result.standing) for result in results if result.standing is not None]
     if not found:
+        shortest = min((one.trial.settings.standing.shortest for one in results), default=StandingRules.shortest)
         raise TrialRefused(
-            f"Nobody stands still for {SHORTEST:g} s with both feet on the plates in any trial, so the declared mass cannot be checked. "
+            f"Nobody stands still for {shortest:g} s with both feet on the plates in any trial, so the declared mass cannot be checked. "
             "Record a few seconds of quiet standing on the plates."
         )
     order = {"static": 0, "check": 1}
     return min(found, key=lambda pair: (order.get(pair[0], 2), pair[1].start - pair[1].end))[1]
-
-
-def settings() -> dict[str, str]:
-    """Return every number that shaped the results and is no property of the data, as text."""
-    rules = ContactRules()
-    return {
-        "low-pass of forces and joint coordinates": str(LowPass()),
-        "gravity": f"{-GRAVITY[2]:g} m/s²",
-        "table": DEFAULT_TABLE,
-        "a foot may touch": f"lower than {1000 * rules.height:g} mm over a surface and slower than {rules.speed:g} m/s",
-        "quiet standing": f"at least {SHORTEST:g} s with the vertical force within {100 * SWAY:g} % of its median",
-    }
 
 
 def identified(result: SessionResult) -> SessionIdentification:

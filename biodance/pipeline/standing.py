@@ -1,7 +1,7 @@
 """Quiet standing on the plates: the mass they carry, and the centre of mass beside the centre of pressure.
 
 Standing still, the mean centre of mass lies over the mean centre of pressure, and the mean vertical force is the weight: two checks
-that need no model of motion. Quiet is the longest run in which the vertical force stays within `SWAY` of its median.
+that need no model of motion. Quiet is the longest run in which the vertical force stays within a few percent of its median.
 """
 
 import numpy as np
@@ -10,23 +10,24 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.lab.filters import runs
 from biodance.lab.marker_sets import landmark, read_marker_set
-from biodance.lab.weight import LOADED, SHORTEST, STILL, SWAY, movement
+from biodance.lab.weight import movement
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import GRAVITY
 from biodance.pipeline.results import Standing
 from biodance.records import Array, Markers, Motion, Trial
+from biodance.settings import StandingRules
 
 FOOT_LANDMARKS = tuple(f"{side}_{place}" for side in ("left", "right") for place in ("heel", "toe", "ankle_lateral", "toe_lateral"))
 
 
-def quiet_run(vertical: Array, used: NDArray[np.bool_], rate: float) -> slice | None:
+def quiet_run(vertical: Array, used: NDArray[np.bool_], rate: float, rules: StandingRules | None = None) -> slice | None:
     """Return the longest run of ``used`` frames (T,) in which the ``vertical`` force (T,) N is steady; None if it is too short."""
-    if not used.any() or np.median(vertical[used]) < LOADED:
+    rules = rules or StandingRules()
+    if not used.any() or np.median(vertical[used]) < rules.force:
         return None
     middle = float(np.median(vertical[used]))
-    steady = runs((np.abs(vertical - middle) <= SWAY * middle) & used)
+    steady = runs((np.abs(vertical - middle) <= rules.sway * middle) & used)
     first, stop = max(steady, key=lambda run: run[1] - run[0], default=(0, 0))
-    return slice(first, stop) if stop - first >= SHORTEST * rate else None
+    return slice(first, stop) if stop - first >= rules.shortest * rate else None
 
 
 def centre_of_mass(body: Body, motion: Motion) -> Array:
@@ -53,9 +54,9 @@ def _feet(trial: Trial, run: slice) -> tuple[tuple[str, ...], Array]:
     return tuple(places), np.array(list(places.values())).reshape(-1, 2)
 
 
-def _still(markers: Markers | None, run: slice) -> bool:
-    """Return whether the typical marker stays within `STILL` during ``run``; True without markers."""
-    return markers is None or movement(Markers(markers.names, markers.time[run], markers.xyz[run])) <= STILL
+def _still(markers: Markers | None, run: slice, within: float) -> bool:
+    """Return whether the typical marker stays ``within`` m during ``run``; True without markers."""
+    return markers is None or movement(Markers(markers.names, markers.time[run], markers.xyz[run])) <= within
 
 
 def quiet_standing(trial: Trial, used: NDArray[np.bool_], body: Body | None, motion: Motion | None) -> Standing | None:
@@ -63,9 +64,9 @@ def quiet_standing(trial: Trial, used: NDArray[np.bool_], body: Body | None, mot
 
     Steady means the vertical force, and the markers where there are any: walking, too, loads the plates evenly for a moment.
     """
-    wrench = trial.wrench
-    run = quiet_run(wrench.force[:, 2], used, wrench.rate)
-    if run is None or not _still(trial.markers, run):
+    wrench, rules = trial.wrench, trial.settings.standing
+    run = quiet_run(wrench.force[:, 2], used, wrench.rate, rules)
+    if run is None or not _still(trial.markers, run, rules.still):
         return None
     height = float(np.mean([plate.height for plate in trial.plates]))
     cop = wrench.cop(height=height)[run, :2]
@@ -73,7 +74,7 @@ def quiet_standing(trial: Trial, used: NDArray[np.bool_], body: Body | None, mot
     if body is not None and motion is not None:
         com, ahead = centre_of_mass(body, motion)[run, :2], facing(body, motion)
     arm = com.mean(axis=0) - cop.mean(axis=0) if com.size else np.full(2, np.nan)
-    mass = wrench.force[run, 2] / -GRAVITY[2]
+    mass = wrench.force[run, 2] / trial.settings.gravity
     names, feet = _feet(trial, run)
     return Standing(
         trial=trial.name,

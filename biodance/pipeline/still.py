@@ -1,13 +1,18 @@
-"""Choose and lay out one instant of a session to draw in 3-D."""
+"""Choose and lay out one instant of a session to draw in 3-D: standing, where the residual is largest, where a load sits."""
+
+from dataclasses import replace
 
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.body.solids import shape_parts
 from biodance.errors import TrialRefused
+from biodance.identify.added_mass import AddedMass
 from biodance.motion.kinematics import Poses, poses
+from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.results import Still, TrialResult
 from biodance.pipeline.standing import centre_of_mass, facing
-from biodance.records import Array
+from biodance.records import Array, Motion
 
 
 def _parents(body: Body) -> list[int]:
@@ -72,21 +77,81 @@ def still_of(body: Body, results: tuple[TrialResult, ...]) -> Still:
     moving = sorted((r for r in results if r.motion is not None), key=lambda r: r.trial.role != "static")
     if not moving or moving[0].motion is None or moving[0].trial.markers is None:
         raise TrialRefused("No trial has a tracked motion, so there is no body to draw.")
-    trial, motion = moving[0].trial, moving[0].motion
-    middle = motion.time.size // 2
+    return still_at(body, moving[0], moving[0].motion.time.size // 2)
+
+
+def still_at(body: Body, one: TrialResult, frame: int) -> Still:
+    """Return one frame of a trial that has markers and a motion."""
+    trial, motion = one.trial, one.motion
+    assert motion is not None
+    assert trial.markers is not None
     force, cop = np.full(3, np.nan), np.full(3, np.nan)
     if trial.plates:
-        force, cop = trial.wrench.force[middle], trial.wrench.cop(height=float(np.mean([p.height for p in trial.plates])))[middle]
-    lines, sides = bones(body, poses(body, motion.q[middle]))
-    return Still(
-        trial=trial.name,
-        time=float(motion.time[middle]),
-        bones=lines,
-        sides=sides,
-        markers=moving[0].trial.markers.xyz[middle],
+        force, cop = trial.wrench.force[frame], trial.wrench.cop(height=float(np.mean([p.height for p in trial.plates])))[frame]
+    posed = posture_still(body, motion.q[frame], trial.name)
+    return replace(
+        posed,
+        time=float(motion.time[frame]),
+        markers=trial.markers.xyz[frame],
         plates=np.array([plate.corners for plate in trial.plates]).reshape(-1, 4, 3),
-        com=centre_of_mass(body, motion)[middle],
         force=force,
         cop=cop,
         forward=facing(body, motion),
     )
+
+
+def posture_still(body: Body, q: Array, title: str) -> Still:
+    """Return a posture ``q`` (nq,) alone: bones, boxes and centre of mass, without markers, plates or forces."""
+    motion = Motion(np.zeros(1), q[None], np.zeros((1, body.nv)), np.zeros((1, body.nv)))
+    pose, nothing, parts = poses(body, q), np.full(3, np.nan), shape_parts(body)
+    on = [segment for segment, _ in parts]
+    lines, sides = bones(body, pose)
+    return Still(
+        trial=title,
+        time=0.0,
+        bones=lines,
+        sides=sides,
+        markers=np.empty((0, 3)),
+        plates=np.empty((0, 4, 3)),
+        com=centre_of_mass(body, motion)[0],
+        force=nothing,
+        cop=nothing,
+        forward=facing(body, motion),
+        boxes=np.reshape([box for _, box in parts], (-1, 2, 3)),
+        rotations=pose.rotation[0, on],
+        positions=pose.position[0, on],
+        box_sides=tuple(_side(body.segments[segment]) for segment in on),
+    )
+
+
+def worst_still(body: Body, results: tuple[TrialResult, ...]) -> Still | None:
+    """Return the fully measured frame in which the force that ``body`` needs differs most from the measured one; None without any."""
+    worst: tuple[float, TrialResult, int, Array] | None = None
+    for one in results:
+        found, motion = one.comparison, one.motion
+        if found is None or motion is None or one.trial.markers is None or not found.used.any():
+            continue
+        residual = np.where(found.used[:, None], found.measured[:, :3] - predict_wrench(body, motion).force, 0.0)
+        size = np.linalg.norm(residual, axis=1)
+        frame = int(np.argmax(size))
+        if worst is None or size[frame] > worst[0]:
+            worst = (float(size[frame]), one, frame, residual[frame])
+    if worst is None:
+        return None
+    size_n, one, frame, force = worst
+    x, y, z = (f"{value:+.0f}" for value in force)
+    about = f"The worst frame: the plates measured {size_n:.0f} N other than the body needs (x {x}, y {y}, z {z} N; arrow: 1 m for 100 N)."
+    return replace(still_at(body, one, frame), residual=force, about=about)
+
+
+def load_still(body: Body, results: tuple[TrialResult, ...], search: AddedMass) -> Still | None:
+    """Return the still of the body with the load that was found, where it sits; None without one, or where its place is not known."""
+    if not search.found or not np.isfinite(search.best.place).all():
+        return None
+    still, best = still_of(body, results), search.best
+    one = next(result for result in results if result.trial.name == still.trial and result.motion is not None)
+    assert one.motion is not None
+    pose, segment = poses(body, one.motion.q[one.motion.time.size // 2]), body.segment_index(best.segment)
+    place = pose.position[0, segment] + pose.rotation[0, segment] @ best.place
+    about = f"The load that was found: {best.mass:.2f} kg ± {best.sd:.2f} kg on the {best.segment.replace('_', ' ')} (yellow)."
+    return replace(still, load=place, about=about)

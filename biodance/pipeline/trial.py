@@ -9,7 +9,6 @@ from biodance.errors import TrialRefused
 from biodance.lab.gaps import MarkerGaps, report_gaps
 from biodance.lab.marker_sets import canonical, read_marker_set
 from biodance.lab.prepare import prepare
-from biodance.lab.weight import LOADED
 from biodance.motion.comparison import compare
 from biodance.motion.contact import Contact, ground_contact
 from biodance.motion.regressor import predict_wrench
@@ -87,7 +86,7 @@ def compare_wrenches(trial: Trial, body: Body, motion: Motion, contact: Contact)
         No frame is fully measured; the message says why.
     """
     measured, simulated = trial.wrench, predict_wrench(body, motion)
-    if np.nanmax(measured.force[:, 2], initial=0.0) < LOADED:
+    if np.nanmax(measured.force[:, 2], initial=0.0) < trial.settings.standing.force:
         raise TrialRefused(f"Trial {trial.name}: nobody stands on the plates, so there is no wrench to compare with.")
     if not contact.measured.any():
         raise TrialRefused(f"Trial {trial.name}: {' '.join(contact.notes)} So measured and simulated wrench cannot be compared.")
@@ -114,7 +113,8 @@ def tracked(trial: Trial, body: Body | None) -> Motion:
     if not trial.marker_set:
         raise TrialRefused(
             f"Trial {trial.name}: its {len(trial.markers.names)} labels are of no known marker set, so no body can follow them. "
-            "Label them as in anthropometry/marker_sets, or describe your own set in a TOML file of that form."
+            "Label them as in anthropometry/marker_sets, or describe your own set in a TOML file of that form "
+            "and give it with --markers FILE, or say [markers] file or map in session.toml."
         )
     if body is None:
         raise TrialRefused(f"Trial {trial.name}: there is no body to follow the markers (see the session).")

@@ -5,9 +5,10 @@ from biodance.report.wording import without_path
 
 
 def attention(result: SessionResult) -> list[tuple[str, str]]:
-    """Return (where, sentence) of every file refused, step refused, warning, and check outside its limit."""
+    """Return (where, sentence) of every file refused, step refused, fit that failed, warning, and check outside its limit."""
     found = [(file, without_path(why, file)) for file, why in result.session.refused.items()]
     found += [("Session", step.text) for step in result.steps if step.status != "done"]
+    found += [(f"Identification, {what}", f"Not solved. {cause}") for what, cause in result.failures.items()]
     found += [("Body", text.removeprefix("Warning: ")) for text in result.doubts]
     for trial in result.trials:
         name = trial.trial.name

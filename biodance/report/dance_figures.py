@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from biodance.dance.account import ZmpPath
     from biodance.dance.expectation import Expectation
+    from biodance.dance.metrics import ZmpPath
 
 COLUMNS = 10
 VIEW = np.array([[0.80, -0.60, 0.0], [0.18, 0.24, 0.95]])

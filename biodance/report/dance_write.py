@@ -8,16 +8,17 @@ import numpy as np
 
 from biodance.dance.cues import cue_sheet
 from biodance.dance.dance import Dance
-from biodance.dance.refusal import told
-from biodance.dance.stance import Stance
+from biodance.dance.problem.stance import Stance, stance_words
 from biodance.dance.verify import Margin
 from biodance.lab.write_c3d import write_c3d
 from biodance.motion.kinematics import poses
 from biodance.pipeline.dance import DanceResult
+from biodance.pipeline.still import posture_still
 from biodance.records import Markers
 from biodance.report.dance_figures import criterion_figure, expectation_figure, postures_figure, zmp_figure
 from biodance.report.results_json import plain, to_text
 from biodance.report.robot_dance import angle_sheet, write_angles
+from biodance.report.solid import solid_pngs
 
 RATE = 100.0
 """Hz of the preview's markers."""
@@ -52,6 +53,9 @@ def write_dance(result: DanceResult, folder: Path) -> dict[str, Any]:
         }
         for name, figure in drawn.items():
             figure.savefig(folder / f"{name}.png", dpi=DOTS, metadata={"Software": None})
+        stills = [posture_still(dance.body, q, title) for q, title in zip(still.q, titles, strict=True)]
+        for picture in solid_pngs(stills, sheet=True) or ():
+            (folder / "postures_3d.png").write_bytes(picture)
     (folder / "results.json").write_text(to_text(found), encoding="utf-8", newline="\n")
     return found
 
@@ -116,7 +120,7 @@ def cues(dance: Dance) -> str:
     """Return the cue sheet of all postures, those in between included: in words for a person, joint angles for a robot without markers."""
     if not dance.body.markers.names:
         return angle_sheet(dance, _held(dance, range(len(dance.stances)))[0][:, 6:])
-    words = tuple(told(s) if s.over is None else f"{told(s.on(0, 1))}, the weight on the {SIDES[s.over]} one" for s in dance.stances)
+    words = tuple(stance_words(s) for s in dance.stances)
     angles = _held(dance, range(len(dance.stances)))[0][:, 6:]
     planted = tuple(tuple(SIDES[side] for side in s.planted) for s in dance.stances)
     return cue_sheet(dance.body, angles, words, planted, move=float(np.median(dance.move)), hold=float(np.max(dance.hold)))

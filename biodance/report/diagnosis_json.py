@@ -65,7 +65,7 @@ def foresight_document(found: Foresight) -> dict[str, Any]:
 
 
 def _masses(found: Identification | None) -> list[dict[str, Any]] | None:
-    if found is None:
+    if found is None or found.status == "failed":
         return None
     sd = np.sqrt(np.diag(found.sip.covariance)[::10])
     return [{"name": n, "mass_kg": m, "mass_sd_kg": s} for n, m, s in zip(found.sip.segments, found.sip.mass, sd, strict=True)]
@@ -85,5 +85,6 @@ def diagnosis_document(found: SessionDiagnosis) -> dict[str, Any]:
         "limits": [_limit(row) for row in one.limits],
         "candidates": [_alias(a) for a in one.candidates],
         "masses": {"before": _masses(found.before), "accepted": _masses(found.accepted)},
+        "failures": found.failures,
         "notes": one.notes,
     }

@@ -43,10 +43,14 @@ def odds(log_bayes_factor: float) -> str:
     return f"{number(2.718281828**log_bayes_factor, 0)} times as probable as nothing wrong"
 
 
-def diagnosis_section(one: Diagnosis) -> str:
+def diagnosis_section(found: SessionDiagnosis) -> str:
     """Return the section of the session's report on what the simulation gets wrong, as HTML text."""
     from markupsafe import Markup
 
+    one = found.diagnosis
+    failures = Markup("").join(
+        Markup("<p class='look'><strong>Not solved, {}:</strong> {}</p>").format(what, cause) for what, cause in found.failures.items()
+    )
     rows = Markup("").join(
         Markup("<tr><th scope='row'>{}</th><td>{}</td><td>{}</td></tr>").format(
             named(f.effect, f.target), "; ".join(f"{p.name.replace('_', ' ')} {estimated(p)}" for p in f.parameters), f.advice
@@ -55,9 +59,9 @@ def diagnosis_section(one: Diagnosis) -> str:
     )
     table = Markup("<table><tbody>{}</tbody></table>").format(rows) if one.findings else Markup("")
     return Markup(
-        "<section><h2>What the simulation gets wrong</h2><p class='look'><strong>{}</strong></p>{}"
+        "<section><h2>What the simulation gets wrong</h2><p class='look'><strong>{}</strong></p>{}{}"
         "<p class='small'>biodance diagnose says how we know, what else it could be and what accepting it changes.</p></section>"
-    ).format(answer(one), table)
+    ).format(answer(one), failures, table)
 
 
 def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: Provenance) -> str:
@@ -79,6 +83,7 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
         result=result,
         one=one,
         answer=answer(one),
+        failures={**result.failures, **found.failures},
         provenance=provenance,
         channels=list(zip(CHANNELS, ("N",) * 3 + ("N·m",) * 3, strict=True)),
         masses=masses,

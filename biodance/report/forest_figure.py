@@ -2,33 +2,16 @@
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
+from biodance.display import intervals
 from biodance.identify.identification import Identification
-from biodance.identify.knowledge import SIGMAS, Known
+from biodance.identify.knowledge import mass_interval
 from biodance.report.style import BLACK, GREY, RED, figure, look
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 LIGHT = 5.0
 """kg: segments below are drawn in an axes of their own, or their intervals could not be seen beside the trunk's."""
-
-
-def _rows(axes: "Axes", rows: list[Known]) -> None:
-    place = np.arange(len(rows))[::-1]
-    for y, row in zip(place, rows, strict=True):
-        axes.plot([row.table - SIGMAS * row.table_sd, row.table + SIGMAS * row.table_sd], [y + 0.17] * 2, color=GREY, linewidth=1.0)
-        axes.plot(row.table, y + 0.17, marker="s", color=GREY, markersize=4, markerfacecolor="white")
-        axes.plot(row.interval, [y - 0.17] * 2, color=RED if row.verdict != "cannot be known" else BLACK, linewidth=1.8)
-        known = {"known": RED, "partly known": "#F2B08A", "cannot be known": "white"}[row.verdict]
-        edge = BLACK if row.verdict == "cannot be known" else RED
-        axes.plot(row.value, y - 0.17, marker="o", color=edge, markersize=5.5, markerfacecolor=known)
-    axes.set_yticks(place, [row.segment.replace("_", " ") for row in rows])
-    axes.set_ylim(-0.7, len(rows) - 0.3)
-    axes.grid(axis="y", visible=False)
-    axes.set_xlim(left=max(axes.get_xlim()[0], 0.0))
 
 
 def forest_figure(found: Identification) -> "Figure":
@@ -41,7 +24,8 @@ def forest_figure(found: Identification) -> "Figure":
         drawn = figure(0.9 + 0.36 * len(masses))
         grid = drawn.subplots(len(groups), 1, height_ratios=[len(group) + 1 for group in groups], squeeze=False)
         for axes, group in zip(grid[:, 0], groups, strict=True):
-            _rows(axes, group)
+            intervals([mass_interval(known) for known in group], axes=axes)
+            axes.set_xlim(left=max(axes.get_xlim()[0], 0.0))
         grid[-1, 0].set_xlabel("mass (kg), 95 % intervals")
         handles = [
             Line2D([], [], color=GREY, marker="s", markerfacecolor="white", markersize=4, label="table"),

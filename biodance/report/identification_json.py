@@ -10,7 +10,7 @@ from biodance.identify.identification import Identification
 from biodance.identify.knowledge import Known
 from biodance.identify.sessions import Difference
 from biodance.identify.torques import TorqueBands
-from biodance.identify.validation import Gain, TrialValidation
+from biodance.identify.validation import ResidualRatio, TrialValidation
 from biodance.motion.comparison import Agreement
 from biodance.pipeline.identification import SessionIdentification
 
@@ -64,7 +64,7 @@ def _validation(trial: TrialValidation) -> dict[str, Any]:
     }
 
 
-def _gain(found: Gain | None) -> dict[str, Any] | None:
+def _gain(found: ResidualRatio | None) -> dict[str, Any] | None:
     if found is None:
         return None
     return {"force": found.force, "force_ci95": found.force_interval, "moment": found.moment, "moment_ci95": found.moment_interval}
@@ -146,14 +146,16 @@ def identification_document(found: SessionIdentification) -> dict[str, Any]:
     ``about_m``, the mean centre of pressure. ``added_mass`` null: no load is announced; ``added_mass_search`` says what was looked for;
     ``joint_torques`` of one trial with what the
     parameters leave uncertain (not this trial's own skin and plates); ``differences`` to the reference session, empty without one.
+    ``failures`` what could not be computed, with cause and cure; after a failed fit (``status``) there are no segments.
     """
     one = found.identification
     return {
         "status": one.status,
         "cause": one.cause,
+        "failures": found.failures,
         "trials": one.trials,
         "frames": one.frames,
-        "segments": [_segment(one, name) for name in one.sip.segments],
+        "segments": [_segment(one, name) for name in one.sip.segments] if one.status == "solved" else [],
         "inertia_order": TENSOR,
         "base_parameters": {"count": one.base.base.count, "well_known": len(one.base.well_known), "rank": one.base.rank},
         "disturbances": {"kinematics": one.sizes.kinematics, "noise_variance": one.sizes.noise},

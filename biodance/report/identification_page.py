@@ -36,12 +36,13 @@ def identification_section(found: SessionIdentification) -> str:
     environment.filters.update(number=number, mm=millimetres, spaced=spaced, small=small)
     template = (files("biodance.report") / "templates" / "identification.html.j2").read_text(encoding="utf-8")
     one = found.identification
-    rows = [(name, segment_rows(one, name)) for name in one.sip.segments]
+    rows = [(name, segment_rows(one, name)) for name in one.sip.segments] if one.status == "solved" else []
     shown = found.validations or found.fitted[:1]
     return environment.from_string(template).render(
         one=one,
         notes=[note for note in found.notes if not note.startswith(LISTED)],
-        forest=svg_address(forest_figure(one)),
+        failures=found.failures,
+        forest=svg_address(forest_figure(one)) if rows else "",
         segments=[(name, known, information(known)) for name, known in rows],
         quantities=QUANTITIES,
         marks=MARKS,

@@ -1,5 +1,6 @@
 """The analyst's page: one HTML file that holds all it shows and asks nothing of the network."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 
@@ -68,9 +69,9 @@ def _trial_part(result: TrialResult) -> TrialPart:
     )
 
 
-def page(result: SessionResult, provenance: Provenance, *, still: str = "", diagnosis: str = "") -> str:
-    """Return the page of ``result`` as HTML text; ``still`` is the address of its 3-D image, ``diagnosis`` the section on what
-    the simulation gets wrong, "" for none.
+def page(result: SessionResult, provenance: Provenance, *, stills: Sequence[str] = (), diagnosis: str = "") -> str:
+    """Return the page of ``result`` as HTML text; ``stills`` are the addresses of its 3-D images (`still`, then
+    `more_stills`), ``diagnosis`` the section on what the simulation gets wrong, "" for none.
 
     The same arguments give the same characters.
     """
@@ -88,7 +89,8 @@ def page(result: SessionResult, provenance: Provenance, *, still: str = "", diag
         provenance=provenance,
         parts=[_trial_part(trial) for trial in result.trials],
         standing=svg_address(standing_figure(result.standing)) if result.standing else "",
-        still=still,
+        still=stills[0] if stills else "",
+        more_stills=list(zip(stills[1:], result.more_stills, strict=True)) if stills else [],
         diagnosis=Markup(diagnosis),
         identification=Markup(identification_section(result.identification)) if result.identification else "",
         words=STATUS_WORDS,

@@ -5,12 +5,11 @@ from pathlib import Path
 import numpy as np
 
 from biodance.dance.dance import Dance
-from biodance.dance.refusal import told
+from biodance.dance.problem.stance import stance_words
 from biodance.records import Array
 
 RATE = 100.0
 """Hz of the table of joint angles."""
-SIDES = ("right", "left")
 
 
 def write_angles(dance: Dance, path: Path) -> None:
@@ -36,6 +35,5 @@ def angle_sheet(dance: Dance, angles: Array) -> str:
         "|---" * (len(joints) + 2) + "|",
     ]
     for number, (stance, row) in enumerate(zip(dance.stances, np.degrees(angles), strict=True), start=1):
-        where = told(stance) if stance.over is None else f"{told(stance.on(0, 1))}, the weight on the {SIDES[stance.over]} one"
-        lines.append(f"| {number} | {where} | {' | '.join(f'{angle + 0.0:.1f}' for angle in row)} |")
+        lines.append(f"| {number} | {stance_words(stance)} | {' | '.join(f'{angle + 0.0:.1f}' for angle in row)} |")
     return "\n".join(lines) + "\n"

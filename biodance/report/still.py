@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from biodance.pipeline.results import Still
-from biodance.report.style import BLACK, GREEN, GREY, SIDES, figure, look
+from biodance.report.style import BLACK, GREEN, GREY, SIDES, YELLOW, figure, look
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -13,6 +13,9 @@ if TYPE_CHECKING:
 
 FORCE_SCALE = 0.001
 """Length of the drawn force, m per N."""
+
+RESIDUAL_SCALE = 0.01
+"""Length of the drawn residual force, m per N: ten times the measured force's."""
 
 VIEWS = ((12.0, -35.0, "from the front, right"), (0.0, -90.0, "from the right"))
 """Elevation and azimuth in degrees, the latter from where the subject looks, and title of each view."""
@@ -40,6 +43,10 @@ def _body(axes: "Axes3D", still: Still) -> None:
             axes.plot(*still.bones[i].T, color=colour, linestyle=line, linewidth=2.2)
     axes.plot(*still.markers.T, linestyle="", marker="o", markersize=2.2, color=BLACK)
     axes.plot(*still.com, linestyle="", marker="D", markersize=5, color=GREEN)
+    if np.isfinite(still.residual).all():
+        axes.plot(*np.stack([still.com, still.com + RESIDUAL_SCALE * still.residual]).T, color=BLACK, linewidth=2.2)
+    if np.isfinite(still.load).all():
+        axes.plot(*still.load, linestyle="", marker="o", markersize=9, color=YELLOW, markeredgecolor=BLACK)
 
 
 def _plates(axes: "Axes3D", still: Still) -> None:

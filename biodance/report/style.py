@@ -6,15 +6,19 @@ from contextlib import contextmanager
 from io import BytesIO
 from typing import TYPE_CHECKING, Any, Literal
 
+from biodance.display import BLACK as BLACK
+from biodance.display import BLUE as BLUE
+from biodance.display import GREEN as GREEN
+from biodance.display import GREY as GREY
+from biodance.display import ORANGE as ORANGE
+from biodance.display import PINK as PINK
+from biodance.display import RED as RED
+from biodance.display import SKY as SKY
+from biodance.display import YELLOW as YELLOW
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, RED, PINK = (
-    "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7",
-)  # fmt: skip
-"""The eight colours of Okabe & Ito (2008), told apart with every common colour vision."""
-
-GREY = "#767676"
 SIDES: dict[str, tuple[str, Literal["-", "--"]]] = {"left": (RED, "--"), "right": (BLUE, "-"), "middle": (GREY, "-")}
 """Colour and line style of the body's sides: never the colour alone."""
 

@@ -56,15 +56,22 @@ def print_session(result: SessionResult, console: Console) -> None:
         console.print(f"look: [bold]{escape(where)}[/]: {escape(sentence)}", soft_wrap=True)
 
 
+def _print_failures(failures: dict[str, str], console: Console) -> None:
+    for what, cause in failures.items():
+        console.print(f"look: [bold]not solved, {escape(what)}[/]: {escape(cause)}", soft_wrap=True)
+
+
 def print_identification(found: dict[str, Any], console: Console) -> None:
     """Print one line a segment, the validation, the added mass and the notes of `biodance identify`."""
+    _print_failures(found["failures"], console)
     table = Table(box=None, pad_edge=False)
     for heading in ("segment", "mass (kg)", "table (kg)", "from the data"):
         table.add_column(heading)
     for row in found["segments"]:
         mass = f"{number(row['mass_kg'], 2)} ± {number(row['mass_sd_kg'], 2)}"
         table.add_row(row["name"], mass, number(row["mass_prior_kg"], 2), f"{number(100 * row['information'], 0)} %")
-    console.print(table)
+    if found["segments"]:
+        console.print(table)
     for row in found["validation"]:
         told = ", ".join(f"{name} {' '.join(number(x) for x in row[name]['rms'])}" for name in ("table", "identified"))
         console.print(f"{escape(row['trial'])}, RMS Fx Fy Fz Mx My Mz: {told}", soft_wrap=True)
@@ -97,6 +104,7 @@ def print_foresight(found: dict[str, Any], console: Console) -> None:
 def print_diagnosis(found: dict[str, Any], console: Console) -> None:
     """Print the verdict, what was named with size and interval, and what could not be seen, of `biodance diagnose`."""
     console.print(f"verdict: [bold]{found['verdict']}[/]")
+    _print_failures(found["failures"], console)
     for finding in found["findings"]:
         sizes = ", ".join(
             f"{name} {p['value']:.4g} {p['unit']}" + (f" ± {p['sd']:.2g}" if p["sd"] is not None else "")

@@ -14,7 +14,7 @@ from biodance.report.diagnosis_page import diagnosis_page, diagnosis_section
 from biodance.report.identification_json import identification_document
 from biodance.report.page import page
 from biodance.report.results_json import document, plain, to_text
-from biodance.report.solid import still_address
+from biodance.report.solid import still_addresses
 
 PAGE, NUMBERS = "report.html", "results.json"
 
@@ -28,11 +28,16 @@ def write_report(result: SessionResult, folder: Path, *, diagnosis: SessionDiagn
 
 
 def write_identification(result: SessionResult, found: SessionIdentification, folder: Path) -> dict[str, Any]:
-    """Write ``report.html``, ``results.json`` with the identification alone and ``body.json``, the identified body; return the numbers."""
+    """Write ``report.html``, ``results.json`` with the identification alone and ``body.json``, the identified body; return the numbers.
+
+    After a failed fit there is no ``body.json``.
+    """
     made = provenance(result, created=now())
     numbers = {"session": result.session.folder.name, **identification_document(found), "provenance": made.as_dict()}
-    body, source = body_of_result(result)
-    _write(folder, {NUMBERS: to_text(numbers), PAGE: _page(result, made), BODY: body_text(body, source)})
+    files = {NUMBERS: to_text(numbers), PAGE: _page(result, made)}
+    if found.identification.status == "solved":
+        files[BODY] = body_text(*body_of_result(result))
+    _write(folder, files)
     return dict(plain(numbers))
 
 
@@ -42,7 +47,8 @@ def write_diagnosis(result: SessionResult, found: SessionDiagnosis, folder: Path
     Return the numbers.
     """
     made = provenance(result, created=now())
-    numbers = {"session": result.session.folder.name, **diagnosis_document(found), "provenance": made.as_dict()}
+    failures = {**result.failures, **found.failures}
+    numbers = {"session": result.session.folder.name, **diagnosis_document(found), "failures": failures, "provenance": made.as_dict()}
     files = {NUMBERS: to_text(numbers), PAGE: diagnosis_page(result, found, made)}
     if accepted and found.accepted is not None:
         named = ", ".join(f"{one.effect} {one.target}".strip() for one in found.diagnosis.findings)
@@ -52,8 +58,9 @@ def write_diagnosis(result: SessionResult, found: SessionDiagnosis, folder: Path
 
 
 def _page(result: SessionResult, made: Provenance, diagnosis: SessionDiagnosis | None = None) -> str:
-    told = diagnosis_section(diagnosis.diagnosis) if diagnosis else ""
-    return page(result, made, still=still_address(result.still) if result.still else "", diagnosis=told)
+    told = diagnosis_section(diagnosis) if diagnosis else ""
+    stills = still_addresses((result.still, *result.more_stills)) if result.still else []
+    return page(result, made, stills=stills, diagnosis=told)
 
 
 def _write(folder: Path, files: dict[str, str]) -> None:

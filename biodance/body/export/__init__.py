@@ -1,29 +1,56 @@
-"""FAMILY: one model format per file, found automatically.
+"""FAMILY: one model format per file, found automatically; other packages join by the entry points ``biodance.exports``.
 
-A format has a ``FORMAT`` name, the usual ``SUFFIX`` of its files and one function ``text(body, source)``, which returns the whole file:
-the joints of the body, its inertial parameters and, where the format knows them, markers, limits and boxes. ``source`` is one line that
-says where the parameters come from. All lengths in m, angles in rad, masses in kg.
+
+A member is a module or object of the form `ModelFormat`; it writes the joints of the body, its inertial parameters and, where the format
+knows them, markers, limits and boxes. All lengths in m, angles in rad, masses in kg.
 """
 
-import importlib
-import pkgutil
+import inspect
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from types import MappingProxyType, ModuleType
+from typing import Protocol
 
 import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.inertia import pseudo_inertia
-from biodance.errors import BiodanceError, FileRefused, UnknownName
+from biodance.body.solids import Solids
+from biodance.discovery import Chosen, Family, missing_of
+from biodance.errors import BiodanceError, FileRefused
 
 ROUNDING = 1e-9
 """Share of a pseudo-inertia's largest eigenvalue by which its smallest may be negative from rounding alone."""
 
 
-def formats() -> MappingProxyType[str, ModuleType]:
-    """Return the modules of this folder by the name of their format."""
-    modules = [importlib.import_module(f"{__name__}.{info.name}") for info in pkgutil.iter_modules(__path__)]
-    return MappingProxyType({module.FORMAT: module for module in modules})
+class ModelFormat(Protocol):
+    """One format of models: a module, a class or an object."""
+
+    FORMAT: str
+    """Its name on the command line."""
+    SUFFIX: str
+    """The usual suffix of its files, with the dot."""
+
+    def text(self, body: Body, source: str) -> str:
+        """Return the whole file; ``source`` is one line that says where the parameters come from.
+
+        A binary format has ``data(body, source)``, which returns bytes, instead. A format that shows the shapes of segments takes
+        ``solids`` as a third argument, a closed mesh by segment; if it keeps them in files of their own, ``beside(body, solids)`` returns
+        those by their path beside the file.
+        """
+
+
+def _lacking(member: object) -> tuple[str, ...]:
+    """Return what a model format lacks; ``data`` serves instead of ``text``."""
+    missing = missing_of(ModelFormat)(member)
+    return tuple(name for name in missing if name != "text" or not hasattr(member, "data"))
+
+
+FAMILY: Family[ModelFormat] = Family("model format", "biodance.exports", __name__, "", _lacking, lambda one: one.FORMAT)
+
+
+def formats(chosen: Chosen[ModelFormat] = None) -> Mapping[str, ModelFormat]:
+    """Return the formats by name; ``chosen`` names choose from the family, objects join it."""
+    return FAMILY.choose(chosen)
 
 
 def refuse_impossible(body: Body) -> None:
@@ -42,28 +69,51 @@ def refuse_impossible(body: Body) -> None:
             )
 
 
-def write_model(body: Body, path: str | Path, *, format: str, source: str = "") -> Path:
-    """Write ``body`` as a model file and return the path.
+def write_model(body: Body, path: str | Path, *, format: str | ModelFormat, source: str = "", solids: Solids | None = None) -> Path:
+    """Write ``body`` as a model file and return the path; ``format`` is the name of one, or an object that writes it.
+
+    ``solids`` a closed mesh by segment (m, in its axes) for the formats that show shapes (osim, glb).
 
     Raises
     ------
     UnknownName
         There is no such format.
     BiodanceError
-        The inertia of a segment cannot exist, or the format cannot hold the joints of this body.
+        The inertia of a segment cannot exist, or the format cannot hold the joints or the solids of this body.
     FileRefused
-        The file exists (nothing is overwritten), or cannot be written.
+        The file, or one that belongs beside it, exists (nothing is overwritten), or cannot be written.
     """
-    family, path = formats(), Path(path)
-    if format not in family:
-        raise UnknownName.of("model format", format, tuple(family))
+    path = Path(path)
+    (kind,) = (FAMILY.choose([format]) if isinstance(format, str) else FAMILY.judged([format])).values()
     refuse_impossible(body)
-    content = family[format].text(body, source)
+    _write_new(path, _content(kind, body, source, solids))
+    for name, content in _beside(kind, body, solids).items():
+        file = path.parent / name
+        if not (file.is_file() and file.read_bytes() == content):
+            file.parent.mkdir(exist_ok=True)
+            _write_new(file, content)
+    return path
+
+
+def _content(member: ModelFormat, body: Body, source: str, solids: Solids | None) -> bytes:
+    """Return the file as bytes, by ``data`` or by ``text``."""
+    write: Callable[..., str | bytes] = getattr(member, "data", None) or member.text
+    if solids is not None and "solids" not in inspect.signature(write).parameters:
+        raise BiodanceError(f"The format {member.FORMAT} shows no meshes. Leave them out, or choose glb or osim.")
+    content = write(body, source) if solids is None else write(body, source, solids)
+    return content if isinstance(content, bytes) else str(content).encode()
+
+
+def _beside(member: ModelFormat, body: Body, solids: Solids | None) -> dict[str, bytes]:
+    return dict(member.beside(body, solids)) if solids is not None and hasattr(member, "beside") else {}
+
+
+def _write_new(path: Path, content: bytes) -> None:
+    """Write a file that does not exist yet."""
     try:
-        with open(path, "x", encoding="utf-8", newline="\n") as stream:
+        with open(path, "xb") as stream:
             stream.write(content)
     except FileExistsError:
         raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.") from None
     except OSError as error:
         raise FileRefused(f"{path}: cannot be written ({error.strerror or error}). Choose a place where you may write.") from error
-    return path

@@ -18,7 +18,7 @@ SUFFIX = ".bioMod"
 
 def text(body: Body, source: str) -> str:
     """Return the .bioMod of ``body``."""
-    lines = ["version 4", "", *([f"// {source}", ""] if source else []), "gravity 0 0 -9.80665", ""]
+    lines = ["version 4", "", *([f"// {source}", ""] if source else []), f"gravity {row(body.gravity)}", ""]
     if body.n_root:
         ranges = ["rangesQ", *["  -100 100"] * 3, *["  -10 10"] * 3]
         lines += _segment(body.segments[0], ["translations xyz", "rotations xyz", *ranges, *_mass(body, 0)])

@@ -20,7 +20,7 @@ def text(body: Body, source: str) -> str:
     """Return the MJCF of ``body``; the root's free joint is named ``root``."""
     root = Element("mujoco", model=body.name)
     add(root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false", balanceinertia="false")
-    add(root, "option", gravity="0 0 -9.80665")
+    add(root, "option", gravity=row(body.gravity))
     world = add(root, "worldbody")
     made: dict[int, Element] = {WORLD: world}
     for branch in segment_tree(body):

@@ -2,29 +2,33 @@
 
 OpenSim's ground has y up, as the .trc and .mot files that ``lab`` writes. The free root has six coordinates, in the order and with the
 signs that OpenSim's own gait models use: <root>_tilt about z, _list about x, _rotation about y (body-fixed, in this order), _tx, _ty, _tz.
-A body with a fixed root keeps the frame of its first joint, z up.
+A body with a fixed root keeps the frame of its first joint, z up. Segments are shown as their boxes, or, with ``solids``, as meshes in
+the folder Geometry beside the model, where OpenSim looks for them.
 """
 
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from biodance.body.body import Body
+from biodance.body.body import UPRIGHT, Body
 from biodance.body.inertia import lump_of
 from biodance.body.segment_tree import WORLD, Branch, segment_tree
+from biodance.body.solids import Solids
 from biodance.body.xml_text import add, document, plain, row, six
 from biodance.errors import BiodanceError
 from biodance.records import Array
 
 FORMAT = "osim"
 SUFFIX = ".osim"
+GEOMETRY = "Geometry"
+"""Folder beside the model in which OpenSim looks for meshes."""
 ROOT_ROTATIONS = ("tilt", "list", "rotation")
 ROOT_AXES = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 ROOT_TRANSLATIONS = ("tx", "ty", "tz")
 
 
-def text(body: Body, source: str) -> str:
-    """Return the .osim of ``body``.
+def text(body: Body, source: str, solids: Solids | None = None) -> str:
+    """Return the .osim of ``body``; with ``solids`` it names the meshes that ``beside`` writes.
 
     Raises
     ------
@@ -34,11 +38,11 @@ def text(body: Body, source: str) -> str:
     root = Element("OpenSimDocument", Version="40000")
     model = add(root, "Model", name=plain(body.name))
     add(model, "credits", source or "written by biodance")
-    add(model, "gravity", "0 -9.80665 0" if body.n_root else "0 0 -9.80665")
+    add(model, "gravity", row(UPRIGHT.T @ body.gravity if body.n_root else body.gravity))
     bodies = add(add(model, "BodySet", name="bodyset"), "objects")
     joints = add(add(model, "JointSet", name="jointset"), "objects")
     for branch in segment_tree(body):
-        _body(bodies, body, branch.segment)
+        _body(bodies, body, branch.segment, solids or {})
         _joint(joints, body, branch)
     markers = add(add(model, "MarkerSet", name="markerset"), "objects")
     for name, segment, position in zip(body.markers.names, body.markers.segment, body.markers.position, strict=True):
@@ -49,12 +53,26 @@ def text(body: Body, source: str) -> str:
     return document(root, source)
 
 
-def _body(bodies: Element, body: Body, segment: int) -> None:
-    lump = lump_of(body.sip.of(body.segments[segment]))
-    element = add(bodies, "Body", name=body.segments[segment])
+def beside(body: Body, solids: Solids) -> dict[str, bytes]:
+    """Return the meshes (STL, m) by their path beside the model."""
+    return {f"{GEOMETRY}/{_mesh_file(body, name)}": bytes(solids[name].export(file_type="stl")) for name in body.segments if name in solids}
+
+
+def _mesh_file(body: Body, segment: str) -> str:
+    return f"{plain(body.name)}_{segment}.stl"
+
+
+def _body(bodies: Element, body: Body, segment: int, solids: Solids) -> None:
+    name = body.segments[segment]
+    lump = lump_of(body.sip.of(name))
+    element = add(bodies, "Body", name=name)
     low, high = body.boxes[segment]
-    if np.all(high > low):
-        _box(element, body.segments[segment], low, high)
+    if name in solids:
+        mesh = add(add(element, "attached_geometry"), "Mesh", name=f"{name}_mesh")
+        add(mesh, "socket_frame", "..")
+        add(mesh, "mesh_file", _mesh_file(body, name))
+    elif np.all(high > low):
+        _box(element, name, low, high)
     add(element, "mass", row([lump.mass]))
     add(element, "mass_center", row(lump.com))
     add(element, "inertia", six(lump.inertia))

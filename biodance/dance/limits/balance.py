@@ -1,19 +1,68 @@
-"""The zero-moment point (at rest: the projected centre of mass) stays inside the reduced base of support (paper eq. 16)."""
+"""The zero-moment point (at rest: the projected centre of mass) stays inside the reduced base of support (paper eq.
+16).
+"""
+
+from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.dance.limits import Margins
-from biodance.dance.state import State
+from biodance.dance.limits import CheckedMotion, Limit, Margins, Remaining, bounded
+from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.state import State
+from biodance.motion.dynamics import zmp
+from biodance.records import Array
 
-NAME, UNIT, SCALE = "balance", "m", 0.03
+
+@dataclass(frozen=True)
+class Balance(Limit):
+    """``share`` of every half width of the base of support, from its middle, that may be used (paper: 0.6)."""
+
+    share: float = bounded(0.6, 0.1, 1.0)
+    name, unit, scale, suspicion = "balance", "m", 0.03, 30
+
+    @property
+    def support_share(self) -> float:
+        """The share itself."""
+        return self.share
+
+    def hold_reserve(self, stance: Stance) -> float:
+        """More than others': whoever leaves the edge of the support first pushes the zero-moment point towards it.
+
+        With the weight over one foot there is no more room.
+        """
+        return 0.2 if stance.over is None else super().hold_reserve(stance)
+
+    def margins(self, state: State) -> Margins:
+        """Return distance inside every edge of the reduced support, (T, edges) m."""
+        normals, offsets = state.stance.reduced(self.share)
+        wrench, slopes = state.wrench, state.wrench_slopes
+        lift = wrench[:, 2]
+        point = np.stack([-wrench[:, 4] / lift, wrench[:, 3] / lift], axis=1)
+        turned = np.stack([-slopes[:, :, 4], slopes[:, :, 3]], axis=2)
+        moved = (turned - point[None, :, :, None] * slopes[:, :, None, 2]) / lift[None, :, None, None]
+        return Margins(point @ normals.T + offsets, normals @ moved)
+
+    def check(self, motion: CheckedMotion) -> Remaining:
+        """Return the distance (T, 1) m inside the reduced base, drawn from where the soles really are, of all feet that
+        may bear all.
+        """
+        point, soles = zmp(motion.wrench)[:, :2], [sole[0, :, :2] for sole in motion.soles]
+        corners = [np.concatenate([*(soles[side] for side in base), motion.stance.props]) for base in motion.bases]
+        least = np.min([_inside(point, some, self.share) for some in corners], axis=0)
+        return Remaining(least[:, None], (motion.stance.name,))
 
 
-def margins(state: State) -> Margins:
-    """Return distance inside every edge of the reduced support, (T, edges) m."""
-    normals, offsets = state.stance.edges
-    wrench, slopes = state.wrench, state.wrench_slopes
-    lift = wrench[:, 2]
-    point = np.stack([-wrench[:, 4] / lift, wrench[:, 3] / lift], axis=1)
-    turned = np.stack([-slopes[:, :, 4], slopes[:, :, 3]], axis=2)
-    moved = (turned - point[None, :, :, None] * slopes[:, :, None, 2]) / lift[None, :, None, None]
-    return Margins(point @ normals.T + offsets, normals @ moved)
+LIMIT = Balance
+
+
+def _inside(point: Array, corners: Array, share: float) -> Array:
+    """Return the distance (T,) m of points (T, 2) inside the hull of ``corners`` (K, 2), drawn together to ``share``
+    about its middle.
+    """
+    from scipy.spatial import ConvexHull
+
+    hull = ConvexHull(corners)
+    middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
+    normals, offsets = hull.equations[:, :2], hull.equations[:, 2]
+    room = -(middle @ normals.T + offsets)  # from the middle to every edge
+    return np.asarray((share * room - (point - middle) @ normals.T).min(axis=1))

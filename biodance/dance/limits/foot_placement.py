@@ -1,22 +1,80 @@
 """Planted feet stay where they are: the legs, solved in closed form, must reach them with the knee not quite straight."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from biodance.dance.limits import Margins
-from biodance.dance.state import State
+from biodance.body.body import UPRIGHT, Body
+from biodance.dance.limits import CheckedMotion, Limit, Margins, Remaining, bounded, unconcerned
+from biodance.dance.limits._checked import SIDES
+from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.state import State
+from biodance.motion.kinematics import poses
 
-NAME, UNIT, SCALE = "foot_placement", "m", 0.03
-STRAIGHT = np.radians(9.0)
-"""Least knee flexion: the closed-form legs bend reach smoothly over the last 2 mm, and nobody is asked to lock the knees."""
+STILL = 1e-6
+"""m, rad: how far a planted foot may be from where it stands: rounding."""
 
 
-def margins(state: State) -> Margins:
-    """Return how much longer each planted leg could be, (T, planted feet) m; none for hanging legs."""
-    if not state.stance.planted:
-        return Margins(np.empty((len(state.x), 0)), np.empty((1, len(state.x), 0, state.chain.size)))
-    hips = [state.chain.legs[side] for side in state.stance.planted]
-    place, slope = state.points([0] * len(hips), np.array([leg.hip for leg in hips]))
-    away = place - state.stance.ankle[list(state.stance.planted)]
-    distance = np.linalg.norm(away, axis=2)
-    longest = np.array([float(leg.length(STRAIGHT)) for leg in hips])
-    return Margins(longest - distance, -np.einsum("tkc,tkcn->tkn", away / distance[..., None], slope)[None])
+@dataclass(frozen=True)
+class FootPlacement(Limit):
+    """``least_knee`` degrees of flexion: the closed-form legs bend reach smoothly over the last 2 mm, and nobody is
+    asked to lock the knees.
+    """
+
+    least_knee: float = bounded(9.0, 3.0, 60.0, "degrees")
+    name, unit, scale, suspicion = "foot_placement", "m", 0.03, 80
+    move_reserve = 0.3  # legs are singular when straight
+
+    def hold_reserve(self, stance: Stance) -> float:
+        """More than others': straight legs are singular."""
+        return 0.4
+
+    def margins(self, state: State) -> Margins:
+        """Return how much longer each planted leg could be, (T, planted feet) m; none for hanging legs."""
+        if not state.stance.planted:
+            return unconcerned(state)
+        hips = [state.chain.legs[side] for side in state.stance.planted]
+        place, slope = state.points([0] * len(hips), np.array([leg.hip for leg in hips]))
+        away = place - state.stance.ankle[list(state.stance.planted)]
+        distance = np.linalg.norm(away, axis=2)
+        longest = np.array([float(leg.length(np.radians(self.least_knee))) for leg in hips])
+        return Margins(longest - distance, -np.einsum("tkc,tkcn->tkn", away / distance[..., None], slope)[None])
+
+    def check(self, motion: CheckedMotion) -> Remaining:
+        """Return how much longer each planted leg could be, or how far its foot is from where it stands, negative, (T,
+        planted feet) m.
+
+        The reach of legs whose hip is no single point (some robots') is not judged, only their feet.
+        """
+        sides = list(motion.stance.planted)
+        segments = [motion.body.feet[SIDES[side]].segment for side in sides]
+        moved = np.linalg.norm(motion.pose.position[:, segments] - motion.stance.ankle[sides], axis=2)
+        turned = np.abs(motion.pose.rotation[:, segments] - UPRIGHT).max(axis=(2, 3), initial=0.0)
+        off = np.maximum(moved, turned)
+        left = STILL - off
+        for k, side in enumerate(sides):
+            if leg := _measured(motion.body, SIDES[side], np.radians(self.least_knee)):
+                thigh, longest = leg
+                reach = longest - np.linalg.norm(motion.pose.position[:, thigh] - motion.stance.ankle[side], axis=1)
+                left[:, k] = np.where(off[:, k] > STILL, np.minimum(left[:, k], reach), reach)
+        return Remaining(left, tuple(SIDES[side] for side in sides))
+
+
+LIMIT = FootPlacement
+
+
+def _measured(body: Body, side: str, knee: float) -> tuple[int, float] | None:
+    """Return the segment that begins at the hip and the way m from there to the ankle with the knee bent by ``knee``
+    rad, measured on the body; None where hip or ankle is no single point.
+    """
+    foot = body.feet[side].segment
+    path = [body.segment_joint[foot]]
+    while body.joints[path[0]].parent >= 0:
+        path.insert(0, body.joints[path[0]].parent)
+    spread = [body.joints[j].translation for j in (*path[1:3], *path[5:])]
+    if not np.allclose(spread, 0.0, atol=1e-12):
+        return None
+    q = body.neutral.copy()
+    q[len(q) - len(body.joints) + path[3]] = knee
+    pose, thigh = poses(body, q[None]), body.segment_joint.index(path[2])
+    return thigh, float(np.linalg.norm(pose.position[0, thigh] - pose.position[0, foot]))

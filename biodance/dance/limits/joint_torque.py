@@ -1,22 +1,38 @@
-"""Every joint torque stays within the strength of the person."""
+"""Every joint torque stays within the strength of the person (``Body.limits``)."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.dance.limits import Margins
-from biodance.dance.state import State
-
-NAME, UNIT, SCALE = "joint_torque", "N m", 15.0
+from biodance.dance.limits import CheckedMotion, Limit, Margins, Remaining, bounded
+from biodance.dance.problem.state import State
 
 
-def margins(state: State) -> Margins:
-    """Return distance to the lower and to the upper torque limit, (T, 2 joints) N m; with the weight over one foot of two, (T, 4 joints):
-    as the feet share the load, and as that one bears all of it.
-    """
-    parts = [_margins(state)] + ([_margins(state.alone)] if state.stance.over is not None else [])
-    return Margins(np.concatenate([part.value for part in parts], axis=1), np.concatenate([part.slopes for part in parts], axis=2))
+@dataclass(frozen=True)
+class JointTorque(Limit):
+    """``share`` of every joint's strength that may be used."""
+
+    share: float = bounded(1.0, 0.1, 1.0)
+    name, unit, scale, suspicion = "joint_torque", "N m", 15.0, 10
+
+    def margins(self, state: State) -> Margins:
+        """Return distance to the lower and to the upper torque limit, (T, 2 joints) N m; with the weight over one foot
+        of two, (T, 4 joints): as the feet share the load, and as that one bears all of it.
+        """
+        parts = [self._of(state)] + ([self._of(state.alone)] if state.stance.over is not None else [])
+        return Margins(np.concatenate([part.value for part in parts], axis=1), np.concatenate([part.slopes for part in parts], axis=2))
+
+    def _of(self, state: State) -> Margins:
+        limits, torque = state.chain.body.limits, state.torque
+        value = np.concatenate([torque - self.share * limits.torque_lower, self.share * limits.torque_upper - torque], axis=1)
+        return Margins(value, np.concatenate([state.torque_slopes, -state.torque_slopes], axis=2))
+
+    def check(self, motion: CheckedMotion) -> Remaining:
+        """Return the distance to the nearer torque limit, (T, joints) N m, whichever feet bear the load."""
+        limits = motion.body.limits
+        low, high = self.share * limits.torque_lower, self.share * limits.torque_upper
+        torques = [motion.torques(base) for base in motion.bases]
+        return Remaining(np.min([np.minimum(torque - low, high - torque) for torque in torques], axis=0), motion.joints)
 
 
-def _margins(state: State) -> Margins:
-    limits, torque = state.chain.body.limits, state.torque
-    value = np.concatenate([torque - limits.torque_lower, limits.torque_upper - torque], axis=1)
-    return Margins(value, np.concatenate([state.torque_slopes, -state.torque_slopes], axis=2))
+LIMIT = JointTorque

@@ -3,27 +3,51 @@
 Exact distances: of two line segments for two capsules, of a line segment from a box for a capsule and a box.
 """
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 
-from biodance.dance.limits import FAR, Margins
-from biodance.dance.state import State
+from biodance.body.body import Body
+from biodance.dance.limits import FAR, CheckedMotion, Limit, Margins, Remaining, bounded
+from biodance.dance.problem.shapes import Solids
+from biodance.dance.problem.state import State
+from biodance.motion.kinematics import Poses
 from biodance.records import Array
 
-NAME, UNIT, SCALE = "self_collision", "m", 0.05
 SAMPLES = np.linspace(0.0, 1.0, 33)
 """Places on the axis of a capsule that are held against a box in each round of the search."""
 ROUNDS = 6
 """Of the search, which leaves a sixteenth of the line each time."""
+ENOUGH = 0.05
+"""m: a distance above it is given as what is certain."""
+POINTS = 5
+"""Points on the axis of a capsule for the first look."""
 
 
-def margins(state: State) -> Margins:
-    """Return the distances (T, pairs) m between surfaces."""
-    near, far = _capsules(state), _boxes(state)
-    return Margins(np.concatenate([near.value, far.value], axis=1), np.concatenate([near.slopes, far.slopes], axis=2))
+@dataclass(frozen=True)
+class SelfCollision(Limit):
+    """``gap`` m that is left between the surfaces of any two segments at least."""
+
+    gap: float = bounded(0.0, 0.0, 0.04, "m")
+    name, unit, scale, suspicion = "self_collision", "m", 0.05, 50
+
+    def margins(self, state: State) -> Margins:
+        """Return the distances (T, pairs) m between surfaces, less the gap."""
+        near, far = (part(state, self.gap + FAR * self.scale) for part in (_capsules, _boxes))
+        return Margins(np.concatenate([near.value, far.value], axis=1) - self.gap, np.concatenate([near.slopes, far.slopes], axis=2))
+
+    def check(self, motion: CheckedMotion) -> Remaining:
+        """Return the distances (T, pairs) m between surfaces by coal, less the gap; a large one is a lower bound."""
+        apart, pairs = solid_distances(motion.body, motion.pose)
+        return Remaining(apart - self.gap, tuple(pairs))
 
 
-def _capsules(state: State) -> Margins:
-    solids = state.chain.solids
+LIMIT = SelfCollision
+
+
+def _capsules(state: State, near: float) -> Margins:
+    solids = Solids.of(state.chain.body)
     first, second = solids.first, solids.second
     a, b = (state.placed(np.repeat(side, 2), solids.axis[side].reshape(-1, 3)) for side in (first, second))
     a, b = (place.reshape(len(place), -1, 2, 3) for place in (a, b))
@@ -32,7 +56,7 @@ def _capsules(state: State) -> Margins:
     apart = here - there
     distance = np.maximum(np.linalg.norm(apart, axis=2), 1e-9)
     value = distance - solids.radius[first] - solids.radius[second]
-    slopes, close = np.zeros((1, *value.shape, state.chain.size)), (value < FAR * SCALE).any(axis=0)
+    slopes, close = np.zeros((1, *value.shape, state.chain.size)), (value < near).any(axis=0)
     normal = (apart / distance[..., None])[:, close]
     slopes[0][:, close] = state.along(first[close], here[:, close], normal) - state.along(second[close], there[:, close], normal)
     return Margins(value, slopes)
@@ -49,8 +73,8 @@ def nearest(a: Array, b: Array) -> tuple[Array, Array]:
     return s, np.clip((B * s + F) / E, 0.0, 1.0)
 
 
-def _boxes(state: State) -> Margins:
-    solids = state.chain.solids
+def _boxes(state: State, near: float) -> Margins:
+    solids = Solids.of(state.chain.body)
     limb, box = solids.limb, solids.box
     ends = state.placed(np.repeat(limb, 2), solids.axis[limb].reshape(-1, 3)).reshape(len(state.x), -1, 2, 3)
     low, high = np.swapaxes(state.chain.body.boxes[box], 0, 1)
@@ -59,7 +83,7 @@ def _boxes(state: State) -> Margins:
     share = deepest(local, half)
     depth, away = outside(_on(local, share), half)
     value = depth - solids.radius[limb]
-    slopes, close = np.zeros((1, *value.shape, state.chain.size)), (value < FAR * SCALE).any(axis=0)
+    slopes, close = np.zeros((1, *value.shape, state.chain.size)), (value < near).any(axis=0)
     normal, place = np.einsum("tkij,tkj->tki", turn, away)[:, close], _on(ends, share)[:, close]
     slopes[0][:, close] = state.along(limb[close], place, normal) - state.along(box[close], place, normal)
     return Margins(value, slopes)
@@ -71,7 +95,9 @@ def _on(ends: Array, share: Array) -> Array:
 
 
 def outside(point: Array, half: Array) -> tuple[Array, Array]:
-    """Return the signed distance (...) of points (..., 3) from a box about the origin with half sides ``half`` (..., 3), and its slope."""
+    """Return the signed distance (...) of points (..., 3) from a box about the origin with half sides ``half`` (...,
+    3), and its slope.
+    """
     over = np.abs(point) - half
     depth = _depth(over)
     nearest_side = np.eye(3)[np.argmax(over, axis=-1)]
@@ -87,9 +113,11 @@ def _depth(over: Array) -> Array:
 
 
 def deepest(ends: Array, half: Array) -> Array:
-    """Return where (T, K), 0..1, the lines between ``ends`` (T, K, 2, 3) come nearest to their boxes with half sides (K, 3).
+    """Return where (T, K), 0..1, the lines between ``ends`` (T, K, 2, 3) come nearest to their boxes with half sides
+    (K, 3).
 
-    The signed distance from a convex body is convex along a line, so that the smallest sample and its neighbours enclose the minimum.
+    The signed distance from a convex body is convex along a line, so that the smallest sample and its neighbours
+    enclose the minimum.
     """
     start, width = np.zeros(ends.shape[:2]), np.ones(ends.shape[:2])
     for _ in range(ROUNDS):
@@ -98,3 +126,72 @@ def deepest(ends: Array, half: Array) -> Array:
         start = np.clip(start + width * (best - 1) / (len(SAMPLES) - 1), 0.0, 1.0)
         width = np.minimum(width * 2 / (len(SAMPLES) - 1), 1.0 - start)
     return start + width / 2
+
+
+def solid_distances(body: Body, pose: Poses) -> tuple[Array, list[str]]:
+    """Return the distances (T, pairs) m between surfaces, negative where they overlap, and the names of the pairs.
+
+    A distance above ``ENOUGH`` is a lower bound of the true one.
+    """
+    solids = Solids.of(body)
+    limbs = list(zip(solids.first, solids.second, strict=True))
+    boxes = list(zip(solids.limb, solids.box, strict=True))
+    out = np.stack(
+        [*(_limbs_at_least(solids, pose, *pair) for pair in limbs), *(_box_at_least(body, solids, pose, *pair) for pair in boxes)], axis=1
+    )
+    shapes = _Shapes(body, solids)
+    for t, k in zip(*np.nonzero(out < ENOUGH), strict=True):
+        i, j = (limbs + boxes)[k]
+        out[t, k] = shapes.distance(pose, t, i, j, box=k >= len(limbs))
+    return out, [f"{body.segments[i]} - {body.segments[j]}" for i, j in limbs + boxes]
+
+
+def _axis(solids: Solids, pose: Poses, segment: int) -> tuple[Array, float]:
+    """Return points (T, K, 3) m on the axis of a capsule and half the way between them, m."""
+    a, b = solids.axis[segment]
+    points = a + np.linspace(0, 1, POINTS)[:, None] * (b - a)
+    return pose.points([segment] * POINTS, points), float(np.linalg.norm(b - a)) / (POINTS - 1) / 2
+
+
+def _limbs_at_least(solids: Solids, pose: Poses, i: int, j: int) -> Array:
+    (a, near), (b, far) = _axis(solids, pose, i), _axis(solids, pose, j)
+    apart = np.linalg.norm(a[:, :, None] - b[:, None], axis=3).min(axis=(1, 2))
+    return np.asarray(apart - near - far - solids.radius[i] - solids.radius[j])
+
+
+def _box_at_least(body: Body, solids: Solids, pose: Poses, limb: int, box: int) -> Array:
+    points, near = _axis(solids, pose, limb)
+    local = np.einsum("tji,tkj->tki", pose.rotation[:, box], points - pose.position[:, box, None])
+    low, high = body.boxes[box]
+    beyond = np.maximum(np.maximum(low - local, local - high), 0.0)
+    return np.asarray(np.linalg.norm(beyond, axis=2).min(axis=1) - near - solids.radius[limb])
+
+
+class _Shapes:
+    """coal's solids of a body, made once."""
+
+    def __init__(self, body: Body, solids: Solids) -> None:
+        import coal
+
+        self.coal: Any = coal
+        self.capsules, self.turns, self.boxes = [], [], []
+        for (a, b), radius in zip(solids.axis, solids.radius, strict=True):
+            along = (b - a) / max(float(np.linalg.norm(b - a)), 1e-12)
+            side = np.cross(along, np.eye(3)[int(np.argmin(np.abs(along)))])
+            side /= np.linalg.norm(side)
+            self.capsules.append(coal.Capsule(float(radius), float(np.linalg.norm(b - a))))
+            self.turns.append((np.stack([side, np.cross(along, side), along], axis=1), (a + b) / 2))
+        for low, high in body.boxes:
+            self.boxes.append((coal.Box(*(high - low)), (low + high) / 2))
+
+    def distance(self, pose: Poses, t: int, limb: int, other: int, *, box: bool) -> float:
+        """Return the distance m of a limb's capsule from another one or from the box of another segment in frame ``t``."""
+        solid, middle = self.boxes[other] if box else (self.capsules[other], self.turns[other][1])
+        own = np.eye(3) if box else self.turns[other][0]
+        first, second = ((pose.rotation[t, s], pose.position[t, s]) for s in (limb, other))
+        places = (
+            self.coal.Transform3s(first[0] @ self.turns[limb][0], first[1] + first[0] @ self.turns[limb][1]),
+            self.coal.Transform3s(second[0] @ own, second[1] + second[0] @ middle),
+        )
+        found = self.coal.DistanceResult()
+        return float(self.coal.distance(self.capsules[limb], places[0], solid, places[1], self.coal.DistanceRequest(), found))

@@ -1,0 +1,172 @@
+"""Closed meshes of segments: made of their boxes, of their markers, or read from a file; and what a mesh weighs.
+
+All meshes are `trimesh.Trimesh` in m, in the axes of their segment (x anterior, y up, z right; origin at the proximal joint).
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.body.inertia import Lump
+from biodance.errors import BiodanceError, FileRefused
+from biodance.records import Array
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
+
+Solids = Mapping[str, "Trimesh"]
+"""A closed mesh by the name of its segment."""
+MESHES = (".stl", ".obj", ".ply", ".off", ".glb", ".dae")
+"""Mesh files that are read, by the ending of their name."""
+ROUNDNESS = 4.0
+"""Exponent of the solid in a box, |x/a|^p + |y/b|^p + |z/c|^p = 1: 2 is an ellipsoid, infinity the box."""
+HEAD, SHOULDER = 0.7, 0.3
+"""Of the height over the shoulders: the head from the vertex down, and how far the trunk reaches up (they meet)."""
+HEAD_BREADTH, HEAD_DEPTH = 0.68, 0.85
+"""Of the height of the head."""
+
+
+def box_solid(box: Array) -> "Trimesh":
+    """Return a rounded solid that fills a ``box`` (2, 3) m: a superellipsoid that touches all six faces."""
+    from trimesh.creation import icosphere
+
+    sphere = icosphere(subdivisions=3)
+    size = (np.abs(sphere.vertices) ** ROUNDNESS).sum(axis=1, keepdims=True) ** (1 / ROUNDNESS)
+    low, high = np.asarray(box)
+    sphere.vertices = (low + high) / 2 + (high - low) / 2 * sphere.vertices / size
+    return sphere
+
+
+def shape_parts(body: Body) -> list[tuple[int, Array]]:
+    """Return the boxes (2, 3) m that segments are drawn as, each with the index of its segment: one each, but trunk and head apart.
+
+    The head takes `HEAD` of what is above the shoulders, in the proportions of a person (Winter 2009); segments without a box have none.
+    """
+    parts = []
+    for index, box in enumerate(body.boxes):
+        if not np.all(box[1] > box[0]):
+            continue
+        arms = [joint.translation[1] for joint in body.joints if joint.parent == body.segment_joint[index]]
+        if body.segments[index] == "trunk_head" and arms and box[0, 1] < np.mean(arms) < box[1, 1]:
+            low, high = np.array(box), np.array(box)
+            low[1, 1] = np.mean(arms) + SHOULDER * (box[1, 1] - np.mean(arms))
+            height = HEAD * (box[1, 1] - np.mean(arms))
+            middle, half = (box[0] + box[1]) / 2, height * np.array([HEAD_DEPTH, 1.0, HEAD_BREADTH]) / 2
+            high = np.stack([middle - half, middle + half])
+            high[:, 1] = box[1, 1] - height, box[1, 1]
+            parts += [(index, low), (index, high)]
+        else:
+            parts.append((index, box))
+    return parts
+
+
+def marker_hull(body: Body, segment: str) -> "Trimesh":
+    """Return the convex hull of the markers on a segment, its own joint and the joints of the segments that hang on it.
+
+    Raises
+    ------
+    UnknownName
+        The body has no such segment.
+    BiodanceError
+        These points lie in one plane and enclose nothing.
+    """
+    from scipy.spatial import QhullError
+    from trimesh.convex import convex_hull
+
+    index = body.segment_index(segment)
+    carrier = body.segment_joint[index]
+    joints = [joint.translation for joint in body.joints if joint.parent == carrier]
+    on = np.array(body.markers.segment, dtype=int) == index
+    points = np.concatenate([np.zeros((1, 3)), np.reshape(joints, (-1, 3)), body.markers.position[on]])
+    try:
+        hull = convex_hull(points)
+    except (QhullError, ValueError, IndexError) as error:
+        raise BiodanceError(f"Segment {segment}: its {on.sum()} markers and its joints enclose no volume. Put on more markers.") from error
+    return hull
+
+
+def read_mesh(path: str | Path, *, scale: float | Array = 1.0) -> "Trimesh":
+    """Return the mesh in a file, all its parts as one, times ``scale`` (one number or (3,): m per unit of the file).
+
+    Raises
+    ------
+    FileRefused
+        The file is missing, of no known format, damaged, or holds no triangles.
+    """
+    import trimesh
+
+    path = Path(path)
+    if path.suffix.lower() not in MESHES:
+        raise FileRefused(f"{path}: is no mesh that is read. Legal are {', '.join(MESHES)}.")
+    if not path.is_file():
+        raise FileRefused(f"{path}: there is no such file. Check the path.")
+    try:
+        mesh = trimesh.load(path, force="mesh")
+    except Exception as error:  # the parsers of six formats raise what they like
+        raise FileRefused(f"{path}: is damaged ({type(error).__name__}: {str(error)[:120]}). Export the mesh again.") from error
+    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces) or not np.isfinite(mesh.vertices).all():
+        raise FileRefused(f"{path}: holds no triangles with finite corners. Export a surface mesh.")
+    mesh.apply_transform(np.diag([*np.broadcast_to(np.asarray(scale, dtype=float), 3), 1.0]))
+    return mesh
+
+
+def segment_solids(body: Body, folder: str | Path | None = None) -> dict[str, "Trimesh"]:
+    """Return a mesh of every segment: the file of its name in ``folder`` (``right_thigh.stl``), else the solids in its `shape_parts`.
+
+    Segments whose box is empty have none.
+
+    Raises
+    ------
+    FileRefused
+        The folder is missing, holds a mesh that is named like no segment or two for one, or a mesh cannot be read.
+    """
+    from trimesh import Trimesh
+    from trimesh.util import concatenate
+
+    given = {} if folder is None else _mesh_files(body, Path(folder))
+    parts: dict[str, list[Trimesh]] = {}
+    for index, box in shape_parts(body):
+        parts.setdefault(body.segments[index], []).append(box_solid(box))
+    made = {name: several[0] if len(several) == 1 else concatenate(several) for name, several in parts.items()}
+    return {name: read_mesh(given[name]) if name in given else made[name] for name in body.segments if name in given or name in made}
+
+
+def _mesh_files(body: Body, folder: Path) -> dict[str, Path]:
+    if not folder.is_dir():
+        raise FileRefused(f"{folder}: is no folder. Give the folder that holds one mesh a segment, named like right_thigh.stl.")
+    found: dict[str, Path] = {}
+    for path in sorted(folder.iterdir()):
+        if path.suffix.lower() not in MESHES:
+            continue
+        if path.stem not in body.segments:
+            raise FileRefused(f"{path}: is named like no segment. Legal are {', '.join(body.segments)}.")
+        if path.stem in found:
+            raise FileRefused(f"{path}: {found[path.stem].name} is a mesh of this segment, too. Keep one.")
+        found[path.stem] = path
+    return found
+
+
+def mesh_lump(mesh: "Trimesh", *, density: float) -> Lump:
+    """Return mass, centre of mass and inertia of a closed mesh that is filled evenly with ``density`` kg/m³.
+
+    Integrals over the enclosed volume by the divergence theorem, exact for the polyhedron (Eberly 2002, "Polyhedral mass properties").
+
+    Raises
+    ------
+    BiodanceError
+        The mesh is not closed, its triangles face different ways, it encloses nothing, or the density is not positive.
+    """
+    if not (np.isfinite(density) and density > 0):
+        raise BiodanceError(f"A density of {density:g} kg/m³ cannot be; a body's is near 1000.")
+    if not mesh.is_watertight:
+        raise BiodanceError("The mesh is not closed, so it encloses no volume. Close its holes in the program that made it.")
+    if not mesh.is_winding_consistent:
+        raise BiodanceError("The triangles of the mesh face different ways, so its inside is not known. Orient them alike.")
+    volume = abs(mesh.volume)
+    if volume < 1e-12:
+        raise BiodanceError("The mesh encloses no volume. Give a solid.")
+    outward = np.sign(mesh.volume)
+    return Lump(density * volume, np.array(mesh.center_mass), outward * density / mesh.density * np.array(mesh.moment_inertia))

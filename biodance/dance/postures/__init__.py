@@ -1,0 +1,1 @@
+"""Postures: found, exchanged, chosen, put in order."""

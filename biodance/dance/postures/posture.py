@@ -1,0 +1,207 @@
+"""One static posture on given feet: found within all limits, near its neighbours, or refused by the name of the limit
+that forbids it.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import partial
+from typing import NoReturn
+
+import numpy as np
+
+from biodance.body.body import UPRIGHT
+from biodance.dance.limits import CheckedMotion, Limit
+from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.excitation import Blocks, effort, smooth_condition, static_grams, total, upright_slopes, uprights
+from biodance.dance.problem.nlp import Evaluation, NonlinearProgramme, Objective, free_coordinates, minimise
+from biodance.dance.problem.stance import Stance, stance_words
+from biodance.dance.problem.state import State, close_legs
+from biodance.errors import BiodanceError
+from biodance.records import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Posture:
+    """``x`` (n,) coordinates, ``up`` (N, 3) the vertical in the segments; ``violation`` of the reserved limits in their
+    scales and the worst ``limit``; ``hard`` how hard it is to take.
+    """
+
+    x: Array
+    up: Array
+    violation: float = np.inf
+    limit: str = ""
+    hard: float = 0.0
+
+
+KEPT = 0.01
+"""Violation, in scales of the limits, of the reserved margins that is accepted."""
+EASE = 5e-4
+"""Worth of a joint at its stop against the criterion: postures near mid range are easier to take."""
+ATTEMPTS = 8
+"""Starts of a posture that is not feasible."""
+
+
+def initial_guess(chain: Chain, stance: Stance, rng: np.random.Generator) -> Array:
+    """Return the coordinates (n,) of a squat of any depth over the support, arms and trunk anywhere; seated: all joints
+    anywhere.
+    """
+    low, high, x = chain.body.limits.lower, chain.body.limits.upper, np.zeros(chain.size)
+    x[ROOT:] = low + (high - low) * rng.uniform(0.15, 0.85, len(low))
+    if stance.seat:
+        x[2] = stance.seat
+        return x
+    reach = min(float(leg.length(np.radians(rng.uniform(15, 110)))) for leg in chain.legs)
+    above = UPRIGHT @ np.mean([leg.hip for leg in chain.legs], axis=0)  # of a person's hips: zero, the root is in their middle
+    x[:3] = [*(stance.centre - [0.02, 0.0]), stance.ankle[0, 2] + 0.97 * reach] - above
+    x[3:6] = rng.normal([0.0, 0.0, -0.2], [0.25, 0.25, 0.4])
+    return x
+
+
+def anyhow(state: State) -> tuple[float, Array]:
+    """Objective of a posture that need only keep its limits."""
+    return 0.0, np.zeros((3, *state.x.shape))
+
+
+ITERATIONS = 30
+MILD = 0.3
+"""Share of the neighbours' joint angles that a posture in between keeps: it is a rest."""
+
+
+@dataclass(frozen=True, eq=False)
+class Near:
+    """Objective: mean squared distance (rad, m) of the coordinates from ``target`` (n,)."""
+
+    target: Array
+
+    def __call__(self, state: State) -> tuple[float, Array]:
+        """Return the objective and its slopes by x."""
+        gap, by = state.x - self.target, np.zeros((3, *state.x.shape))
+        by[0] = 2 * gap / len(self.target)
+        return float(np.mean(gap**2)), by
+
+
+def intermediate_posture(
+    chain: Chain, stance: Stance, neighbours: Array, limits: tuple[Limit, ...], *, seed: list[int], mild: float = MILD
+) -> Posture:
+    """Return a posture on the feet ``stance`` between ``neighbours`` (K, n) coordinates; ``mild`` share of whose angles
+    is the aim.
+
+    Raises
+    ------
+    BiodanceError
+        There is none within the limits; the message names the limit.
+    """
+    rng, tried = np.random.default_rng(seed), list[Array]()
+    begin = initial_guess(chain, stance, rng)
+    begin[3:] = mild * neighbours[:, 3:].mean(axis=0)
+    for _ in range(ATTEMPTS):
+        found = solve(chain, stance, begin, Near(begin), limits, iterations=ITERATIONS)
+        if found.violation <= KEPT:
+            return found
+        tried.append(begin)
+        begin = initial_guess(chain, stance, rng)
+    refuse(chain, stance, tried, limits)
+
+
+def refuse(chain: Chain, stance: Stance, begin: list[Array], limits: tuple[Limit, ...]) -> NoReturn:
+    """Raise the BiodanceError that says which limit forbids every posture on these feet: the first without which there
+    would be one.
+    """
+    kept = [limit for limit in limits if limit.at_rest]
+    for limit in sorted(kept, key=lambda limit: limit.suspicion):
+        others = tuple(other for other in kept if other is not limit)
+        for x in begin:
+            posture = solve(chain, stance, x, Excess(limit), others, iterations=60)
+            if posture.violation <= KEPT:
+                what = describe(State(chain, stance, posture.x[None], *np.zeros((2, 1, chain.size))), limit)
+                raise BiodanceError(
+                    f"No posture {stance_words(stance)} keeps all limits; there would be one without the limit on {what}. "
+                    "Widen that limit, or leave this stance out of the protocol."
+                )
+    raise BiodanceError(
+        f"No posture {stance_words(stance)} keeps all limits, whichever of them is left out. Leave this stance out of the protocol."
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Exciting:
+    """Objective of one posture beside the Gram matrices of the ``others`` (N, 3, 3), per ``unit`` kg, and the
+    performer's ease.
+    """
+
+    blocks: Blocks
+    others: Array
+    unit: float
+    sharpness: int
+
+    def __call__(self, state: State) -> tuple[float, Array]:
+        """Return the criterion and its slopes by x."""
+        up = uprights(state)
+        measure = partial(smooth_condition, sharpness=self.sharpness)
+        value, slope = total(self.blocks.weight, self.others + static_grams(up), self.blocks.first, measure=measure)
+        by = np.zeros((3, *state.x.shape))
+        by[0] = upright_slopes(state, -2 * np.einsum("nij,tnj->tni", slope, up)) / self.unit
+        ends = state.chain.body.limits
+        half = np.maximum((ends.upper - ends.lower) / 2, 1e-3)
+        off = (state.x[:, ROOT:] - (ends.upper + ends.lower) / 2) / half
+        by[0][:, ROOT:] += 2 * EASE * off / half
+        value = value / self.unit + EASE * float(np.sum(off**2))
+        if not self.blocks.simplicity:
+            return value, by
+        hard, slopes = effort(state)
+        return value + 10 * self.blocks.simplicity * hard, by + 10 * self.blocks.simplicity * slopes
+
+
+def solve(chain: Chain, stance: Stance, begin: Array, objective: Objective, limits: tuple[Limit, ...], *, iterations: int) -> Posture:
+    """Return the posture on the feet ``stance`` that is best for ``objective`` near ``begin`` (n,) and keeps those of
+    the ``limits`` that count at rest.
+    """
+    free = free_coordinates(chain, stance)
+    base, basis = np.zeros((3, 1, chain.size)), np.zeros((3, 1, 1))
+    base[0, 0] = begin
+    base[0, 0, free] = 0.0
+    basis[0] = 1.0
+    kept = tuple(limit for limit in limits if limit.at_rest)
+    reserve = np.array([[limit.hold_reserve(stance) for limit in kept]])
+    problem = NonlinearProgramme(chain, stance, base, basis, free, kept, objective, reserve)
+    found = minimise(problem.evaluate, begin[free], iterations=iterations)
+    state = problem.state(found.y)
+    return Posture(state.x[0], uprights(state)[0], *Evaluation(problem, state).worst, hard=effort(state)[0])
+
+
+def posture_at(chain: Chain, stance: Stance, x: Array) -> Posture:
+    """Return the posture with the coordinates x (n,), its planted feet in place, not judged."""
+    state = close_legs(chain, stance, x[None], *np.zeros((2, 1, chain.size)))
+    return Posture(state.x[0], uprights(state)[0])
+
+
+def describe(state: State, limit: Limit) -> str:
+    """Return in words how much a ``state`` (one sample) breaks a ``limit``, and where: in which joint, on which side,
+    between what.
+    """
+    motion = state.chain.motion(np.zeros(len(state.x)), state.x, state.v, state.a)
+    left = limit.check(CheckedMotion(state.chain.body, motion, state.stance))
+    column = int(np.argmin(left.value[0]))
+    missing, unit = -float(left.value[0, column]), limit.unit
+    if unit == "rad":
+        missing, unit = math.degrees(missing), "degrees"
+    elif unit == "m":
+        missing, unit = 100 * missing, "cm"
+    what = f"{limit.name} of {left.of[column]}".replace("_", " ")
+    return f"{what} (short by about {missing:.0f} {unit})"
+
+
+@dataclass(frozen=True)
+class Excess:
+    """Objective of a posture that breaks one ``limit`` as little as it can: sum of squares of what is missing, in its
+    scale.
+    """
+
+    limit: Limit
+
+    def __call__(self, state: State) -> tuple[float, Array]:
+        """Return the objective and its slopes (3, T, n) by x, v, a."""
+        margins, slopes = self.limit.margins(state), np.zeros((3, *state.x.shape))
+        missing = np.minimum(margins.value / self.limit.scale, 0.0)
+        slopes[0] = 2 * np.einsum("tm,tmn->tn", missing, margins.slopes[0]) / self.limit.scale
+        return float(np.sum(missing**2)), slopes

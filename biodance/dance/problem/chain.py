@@ -1,0 +1,156 @@
+"""The body as a chain of one-degree-of-freedom joints, root included: the coordinates in which a dance is designed.
+
+Coordinates x (29): root position forward, left, up (m, lab frame), root turn about its own up axis, drop about forward,
+tilt about right (rad; all zero in the upright posture that faces lab x), then the joints of the body. Linear spaces of
+splines suit them, and pinocchio's analytic derivatives hold for every coordinate alike.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from threading import local
+from typing import Any
+
+import numpy as np
+
+from biodance.body.body import UPRIGHT, Body
+from biodance.body.pinocchio_model import load_pinocchio
+from biodance.errors import BiodanceError
+from biodance.motion.general_legs import GeneralLeg
+from biodance.motion.kinematics import axis_rotation
+from biodance.motion.legs import Leg
+from biodance.motion.regressor import GRAVITY
+from biodance.records import Array, Motion
+
+ROOT = 6
+TURNS = ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+"""Axes of turn, drop and tilt in the root's frame (up, forward, right), in the order of rotation."""
+SIDES = ("right", "left")
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """A body with a free root and two six-joint legs, in the coordinates of this module."""
+
+    body: Body
+
+    def __post_init__(self) -> None:
+        if not self.body.n_root or set(SIDES) - set(self.body.feet):
+            raise BiodanceError(f"{self.body.name}: a dance needs a body with a free root and two feet; this one has none.")
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what goes to other processes: all but what pinocchio computes in, which takes longer to send than to
+        make.
+        """
+        return {name: value for name, value in self.__dict__.items() if name != "_own"}
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates, 6 + joints."""
+        return ROOT + len(self.body.joints)
+
+    @cached_property
+    def legs(self) -> tuple[Leg, Leg] | tuple[GeneralLeg, GeneralLeg]:
+        """Right and left leg: with closed-form angles where they are built like a person's, else closed numerically."""
+        if all(Leg.fits(self.body, side) for side in SIDES):
+            return Leg.of(self.body, "right"), Leg.of(self.body, "left")
+        return GeneralLeg.of(self.body, "right"), GeneralLeg.of(self.body, "left")
+
+    @cached_property
+    def leg_columns(self) -> tuple[list[int], list[int]]:
+        """Coordinates of the right and of the left leg, hip to ankle."""
+        right, left = ([ROOT + c for c in leg.columns] for leg in self.legs)
+        return right, left
+
+    @cached_property
+    def upper(self) -> list[int]:
+        """Coordinates of trunk and arms: every joint that is in no leg."""
+        taken = {c for leg in self.leg_columns for c in leg}
+        return [c for c in range(ROOT, self.size) if c not in taken]
+
+    @cached_property
+    def carriers(self) -> tuple[int, ...]:
+        """(N) coordinate after which each segment turns; 5 for the root's segment."""
+        return tuple(ROOT + j if j >= 0 else ROOT - 1 for j in self.body.segment_joint)
+
+    @cached_property
+    def ancestors(self) -> Array:
+        """(n, n) 1 where coordinate i moves link k (row k, column i, itself included)."""
+        table = np.eye(self.size)
+        for k in range(1, self.size):
+            above = self.body.joints[k - ROOT].parent if k >= ROOT else k - 1 - ROOT
+            table[k] += table[max(above, -1) + ROOT if k >= ROOT else k - 1]
+        return table
+
+    @cached_property
+    def axes(self) -> Array:
+        """(n, 3) axis of each rotating coordinate in its link's frame; zero for the three slides."""
+        return np.concatenate([np.zeros((3, 3)), TURNS, [joint.axis for joint in self.body.joints]])
+
+    @cached_property
+    def model(self) -> Any:
+        """The pinocchio model of the chain; joint id = coordinate + 1."""
+        pin = load_pinocchio()
+        model, none = pin.Model(), pin.SE3.Identity()
+        model.gravity.linear = np.array(GRAVITY)
+        slides = (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ)
+        for k, slide in enumerate(slides):
+            model.addJoint(k, slide(), none, f"root_slide_{k}")
+        for k, axis in enumerate(TURNS):
+            place = pin.SE3(UPRIGHT.copy(), np.zeros(3)) if k == 0 else none
+            model.addJoint(3 + k, pin.JointModelRevoluteUnaligned(np.array(axis)), place, f"root_turn_{k}")
+        for joint in self.body.joints:
+            place = pin.SE3(np.array(joint.rotation), np.array(joint.translation))
+            parent = ROOT if joint.parent < 0 else ROOT + joint.parent + 1
+            model.addJoint(parent, pin.JointModelRevoluteUnaligned(np.array(joint.axis)), place, joint.name)
+        for name, carrier in zip(self.body.segments, self.carriers, strict=True):
+            model.appendBodyToJoint(carrier + 1, pin.Inertia.FromDynamicParameters(np.array(self.body.sip.of(name))), none)
+        return model
+
+    @property
+    def data(self) -> Any:
+        """What pinocchio computes in, one for each thread: every call overwrites it."""
+        if not hasattr(self._own, "data"):
+            self._own.data = self.model.createData()
+        return self._own.data
+
+    @cached_property
+    def _own(self) -> local:
+        return local()
+
+    def root_rotation(self, x: Array) -> Array:
+        """Return lab_R_root (T, 3, 3) of coordinates (T, n)."""
+        turn, drop, tilt = (axis_rotation(np.array(axis), x[:, 3 + k]) for k, axis in enumerate(TURNS))
+        return UPRIGHT @ turn @ drop @ tilt
+
+    def plant(self, x: Array, planted: tuple[int, ...], ankle: Array) -> Array:
+        """Return x (T, n) with the angles of the planted legs (0 right, 1 left) that hold each foot flat, facing lab x,
+        at ``ankle`` (2, 3) m.
+        """
+        out, turn = x.copy(), self.root_rotation(x)
+        flat = np.broadcast_to(UPRIGHT, turn.shape)
+        for side in planted:
+            out[:, self.leg_columns[side]] = self.legs[side].solve(turn, x[:, :3], flat, np.broadcast_to(ankle[side], (len(x), 3)))
+        return out
+
+    def motion(self, time: Array, x: Array, rate: Array, rate2: Array) -> Motion:
+        """Return the Motion of the body from coordinates (T, n) and their first and second derivatives."""
+        from scipy.spatial.transform import Rotation
+
+        turn = self.root_rotation(x)
+        drop, tilt = (axis_rotation(np.array(TURNS[k]), x[:, 3 + k]) for k in (1, 2))
+        spin = np.zeros((len(x), 3))
+        spin2 = np.zeros((len(x), 3))
+        for k, onward in enumerate((drop, tilt, None)):
+            axis = np.array(TURNS[k])
+            spin2 = spin2 + axis * rate2[:, 3 + k, None] + np.cross(spin, axis * rate[:, 3 + k, None])
+            spin = spin + axis * rate[:, 3 + k, None]
+            if onward is not None:
+                spin, spin2 = (np.einsum("tji,tj->ti", onward, s) for s in (spin, spin2))
+        linear = np.einsum("tji,tj->ti", turn, rate[:, :3])
+        linear2 = np.einsum("tji,tj->ti", turn, rate2[:, :3]) - np.cross(spin, linear)
+        quaternion = Rotation.from_matrix(turn).as_quat()
+        quaternion *= np.where(quaternion[:, 3:] < 0, -1.0, 1.0)
+        q = np.concatenate([x[:, :3], quaternion, x[:, ROOT:]], axis=1)
+        v = np.concatenate([linear, spin, rate[:, ROOT:]], axis=1)
+        a = np.concatenate([linear2, spin2, rate2[:, ROOT:]], axis=1)
+        return Motion(time, q, v, a, joint_names=tuple(joint.name for joint in self.body.joints))

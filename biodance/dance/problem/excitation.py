@@ -1,0 +1,234 @@
+"""What a movement is worth: the paper's criterion on segments (eq. 12) and the effort of the performer, with slopes by
+the motion.
+
+First moments count at rest, inertias in motion. Effort is how hard a posture is to take and to remember; three terms
+over the joints, angles in units of half the joint's range:
+- few joints at once: mean of sqrt(r² + e²) - e, r the angle from standing (a smooth absolute value: what need not move stays);
+- symmetric pairs: mean of (right - left)² over the pairs of joints, the same movement on both sides being one thing to do;
+- no discomfort: mean of c⁸, c the angle from standing over the way to the stop on that side.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.body.inertia import TENSOR
+from biodance.dance.problem.chain import ROOT
+from biodance.dance.problem.state import State
+from biodance.identify.base_parameters import structural_base
+from biodance.records import Array
+
+
+def condition(gram: Array) -> tuple[Array, Array]:
+    """Return cond = sqrt(largest / smallest eigenvalue) of Gram matrices (..., k, k), (...), and its gradient (..., k,
+    k).
+    """
+    value, vector = _spectrum(gram)
+    cond = np.sqrt(value[..., -1] / value[..., 0])
+    by = np.zeros_like(value)
+    by[..., -1] += 1 / value[..., -1]
+    by[..., 0] -= 1 / value[..., 0]
+    return cond, (vector * (0.5 * cond[..., None] * by)[..., None, :]) @ np.swapaxes(vector, -1, -2)
+
+
+def smooth_condition(gram: Array, *, sharpness: int) -> tuple[Array, Array]:
+    """Return a condition number without kinks and its gradient: power means of the eigenvalues instead of largest and
+    smallest.
+
+    sqrt(mean(value^p)^(1/p) * mean(value^-p)^(1/p)), p = ``sharpness``: at most cond, 1 exactly where cond is, cond for
+    p -> infinity.
+    """
+    value, vector = _spectrum(gram)
+    high, low = (value / value[..., -1:]) ** sharpness, (value[..., :1] / value) ** sharpness
+    cond = np.sqrt(value[..., -1] / value[..., 0] * (high.mean(axis=-1) * low.mean(axis=-1)) ** (1 / sharpness))
+    by = 0.5 * cond[..., None] * (high / high.sum(axis=-1, keepdims=True) - low / low.sum(axis=-1, keepdims=True)) / value
+    return cond, (vector * by[..., None, :]) @ np.swapaxes(vector, -1, -2)
+
+
+def _spectrum(gram: Array) -> tuple[Array, Array]:
+    value, vector = np.linalg.eigh(gram)
+    return np.maximum(value, 1e-12 * np.maximum(value[..., -1:], 1e-12)), vector
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """What counts of each segment: ``first`` (of MX, MY, MZ) and ``second`` (of the six inertias) base columns,
+    ``weight`` (N,) kg; and of the performer: ``simplicity``, what a hardness of 1 (`simplicity.hardness`) is worth
+    in mean condition numbers.
+    """
+
+    first: tuple[list[int], ...]
+    second: tuple[list[int], ...]
+    weight: Array
+    simplicity: float = 0.0
+
+
+def excitation_blocks(body: Body) -> Blocks:
+    """Return the base columns of every segment, weighted by its mass in the table (structural base:
+    docs/derivations.md).
+    """
+    columns = structural_base(body).columns
+    first, second = (
+        tuple([c % 10 - low for c in columns if c // 10 == i and low <= c % 10 < high] for i in range(len(body.segments)))
+        for low, high in ((1, 4), (4, 10))
+    )
+    return Blocks(first, second, np.array(body.sip.mass))
+
+
+Measure = Callable[[Array], tuple[Array, Array]]
+"""Says of Gram matrices (..., k, k) how badly conditioned they are (...), and the gradient (..., k, k)."""
+
+
+def total(weight: Array, grams: Array, pick: tuple[list[int], ...], *, measure: Measure = condition) -> tuple[float, Array]:
+    """Return sum_i M_i cond(W_bi) and its gradient by the Gram matrices (N, k, k); segments without weight or columns
+    do not count.
+    """
+    value, slope = 0.0, np.zeros_like(grams)
+    alike: dict[tuple[int, ...], list[int]] = {}
+    for i, columns in enumerate(pick):
+        if columns and weight[i] > 0:
+            alike.setdefault(tuple(columns), []).append(i)
+    for picked, segments in alike.items():
+        block = np.ix_(segments, picked, picked)
+        cond, part = measure(grams[block])
+        value += float(weight[segments] @ cond)
+        slope[block] = weight[segments][:, None, None] * part
+    return value, slope
+
+
+def uprights(state: State) -> Array:
+    """Return (T, N, 3) the vertical in each segment's frame."""
+    return state.rotation[:, :, 2, :]
+
+
+def static_grams(up: Array) -> Array:
+    """Return (N, 3, 3) sum over postures of 1 - u u', the Gram matrices of the first moments over g²."""
+    return len(up) * np.eye(3) - np.einsum("tni,tnj->nij", up, up) + 1e-6 * np.eye(3)
+
+
+def upright_slopes(state: State, slope: Array) -> Array:
+    """Return (T, n) derivative by x of sum <slope (T, N, 3), u>."""
+    lab = np.einsum("tnij,tnj->tni", state.rotation, slope)
+    lever = np.stack([lab[..., 1], -lab[..., 0], 0 * lab[..., 0]], axis=-1)  # lab x z
+    moved = state.chain.ancestors[list(state.chain.carriers)]
+    return np.einsum("tnc,tkc,nk->tk", lever, state.twists[:, :, 3:], moved)
+
+
+class Inertias:
+    """The moment K(w, dw) (3, 6) by the six inertias of one segment: dw-part and w-w-part as constant tensors."""
+
+    @cached_property
+    def linear(self) -> Array:
+        """(3, 3, 6): linear[c] = K of unit acceleration along c."""
+        out = np.zeros((3, 3, 6))
+        for k, (i, j) in enumerate(TENSOR):
+            out[j, i, k] = out[i, j, k] = 1.0
+        return out
+
+    @cached_property
+    def square(self) -> Array:
+        """(3, 3, 3, 6): sum_bc w_b w_c square[b, c] = w x (I w)."""
+        skew = np.zeros((3, 3, 3))
+        for b, (i, j) in enumerate(((2, 1), (0, 2), (1, 0))):
+            skew[b, i, j], skew[b, j, i] = 1.0, -1.0
+        return np.einsum("bij,cjk->bcik", skew, self.linear)
+
+
+INERTIAS = Inertias()
+
+
+def moments(w: Array, dw: Array) -> Array:
+    """Return K (..., 3, 6) of angular velocity and acceleration (..., 3) in the segment's frame."""
+    return np.einsum("...c,cik->...ik", dw, INERTIAS.linear) + np.einsum("...b,...c,bcik->...ik", w, w, INERTIAS.square)
+
+
+def turning(state: State, segments: list[int]) -> tuple[Array, Array]:
+    """Return angular velocity and acceleration (T, S, 3) of segments in their own frames."""
+    links = [state.chain.carriers[i] for i in segments]
+    turn = state.rotation[:, segments]
+    return tuple(np.einsum("tsij,tsi->tsj", turn, s[:, links, 3:]) for s in (state.velocity, state.acceleration))  # type: ignore[return-value]
+
+
+def dynamic_grams(state: State, segments: list[int]) -> Array:
+    """Return (S, 6, 6) sum over samples of K'K."""
+    K = moments(*turning(state, segments))
+    return np.einsum("tsik,tsil->skl", K, K)
+
+
+def dynamic_slopes(state: State, segments: list[int], slope: Array) -> Array:
+    """Return (3, T, n) derivative by x, v, a of sum <slope (S, 6, 6), K'K>."""
+    w, dw = turning(state, segments)
+    Y = 2 * np.einsum("tsik,skl->tsil", moments(w, dw), slope)
+    by_dw = np.einsum("tsik,cik->tsc", Y, INERTIAS.linear)
+    by_w = np.einsum("tsik,tsb,bcik->tsc", Y, w, INERTIAS.square + np.swapaxes(INERTIAS.square, 0, 1))
+    links = [state.chain.carriers[i] for i in segments]
+    turn, moved = state.rotation[:, segments], state.chain.ancestors[links]
+    by_dw, by_w = (np.einsum("tsij,tsj->tsi", turn, s) for s in (by_dw, by_w))
+    axis, V, A = state.twists[..., 3:], state.velocity[..., 3:], state.acceleration[..., 3:]
+    swept = np.cross(V, axis)
+    gap = V[:, links][:, :, None] - V[:, None]
+    back = np.cross(np.broadcast_to(swept[:, None], gap.shape), gap) - np.cross(axis, A)[:, None]
+    ahead = swept[:, None] + np.cross(np.broadcast_to(axis[:, None], gap.shape), gap)
+    # in the segment's own frame: d(R'w) = R'(-w_i x w_i-link), d(R'dw) = R'(back)
+    dx = np.einsum("tsc,tkc,sk->tk", by_w, swept, moved) + np.einsum("tsc,tskc,sk->tk", by_dw, back, moved)
+    dv = np.einsum("tsc,tkc,sk->tk", by_w, axis, moved) + np.einsum("tsc,tskc,sk->tk", by_dw, ahead, moved)
+    da = np.einsum("tsc,tkc,sk->tk", by_dw, axis, moved)
+    return np.stack([dx, dv, da])
+
+
+SOFT = 0.05
+"""e: angles below a twentieth of half the range are not worth saving."""
+SIDE, STOP = 0.25, 1.0
+"""Worth of the second and the third term beside the first."""
+
+
+def effort(state: State) -> tuple[float, Array]:
+    """Return the mean over the samples, about 0 standing and 1 for a contortion, and its slopes (3, T, n) by x, v, a.
+
+    Planted legs are not counted: they follow from the pelvis.
+    """
+    scale, slopes = _Scale.of(state.chain.body), np.zeros((3, *state.x.shape))
+    planted = [c - ROOT for side in state.stance.planted for c in state.chain.leg_columns[side]]
+    counts = np.ones(len(scale.half))
+    counts[planted] = 0.0
+    angle = state.x[:, ROOT:]
+    away = (angle - scale.rest) / scale.half
+    way = np.where(angle > scale.rest, scale.upward, scale.downward)
+    near = (angle - scale.rest) / way
+    root = np.sqrt(away**2 + SOFT**2)
+    value = (root - SOFT + STOP * near**8) @ counts
+    by = counts * (away / root / scale.half + 8 * STOP * near**7 / way)
+    for right, left in scale.pairs:
+        if counts[right] and counts[left]:
+            gap = (angle[:, right] - angle[:, left]) / scale.half[right]
+            value = value + 2 * SIDE * gap**2
+            by[:, right] += 4 * SIDE * gap / scale.half[right]
+            by[:, left] -= 4 * SIDE * gap / scale.half[right]
+    share = 1.0 / (max(1.0, counts.sum()) * len(angle))
+    slopes[0][:, ROOT:] = share * by
+    return float(share * value.sum()), slopes
+
+
+@dataclass(frozen=True, eq=False)
+class _Scale:
+    """Angles (n,) rad of every joint: ``rest`` standing, ``half`` of the range, ``upward``, ``downward`` from standing
+    to the stops (at least 0.2); ``pairs`` of right and left joints.
+    """
+
+    rest: Array
+    half: Array
+    upward: Array
+    downward: Array
+    pairs: tuple[tuple[int, int], ...]
+
+    @classmethod
+    def of(cls, body: Body) -> "_Scale":
+        low, high = body.limits.lower, body.limits.upper
+        names, rest = [joint.name for joint in body.joints], np.clip(0.0, low, high)
+        others = [name.replace("right_", "left_", 1) for name in names]
+        pairs = [(j, names.index(other)) for j, other in enumerate(others) if other != names[j] and other in names]
+        upward, downward = np.maximum(high - rest, 0.2), np.maximum(rest - low, 0.2)
+        return cls(rest, np.maximum((high - low) / 2, 1e-3), upward, downward, tuple(pairs))

@@ -1,0 +1,240 @@
+"""Nonlinear programmes: one small design problem with exact slopes, and its solution by sequential quadratic
+programming.
+
+The problem: the points of some coordinates, through a spline, give objective and margins: min f(y) subject to c(y) >=
+0. Every step solves a strictly convex quadratic programme with one common slack (so it always has a solution), as a
+least-distance problem by non-negative least squares (Lawson & Hanson 1974, ch. 23); the Hessian is a damped BFGS
+estimate, the merit function f + weight * largest violation, steps are bounded by a trust region.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.state import Closure, State, close_legs
+from biodance.records import Array
+
+Objective = Callable[[State], tuple[float, Array]]
+"""Returns f and its slopes (3, T, n) by x, v, a; f may be judged without the slopes only at the price of computing
+them.
+"""
+
+
+class ConstraintMargins(Protocol):
+    """What is left of a constraint: ``value`` (T, m) >= 0 where it holds, ``slopes`` (k, T, m, n) by x, v, a."""
+
+    @property
+    def value(self) -> Array:
+        """(T, m)."""
+
+    @property
+    def slopes(self) -> Array:
+        """(k, T, m, n)."""
+
+
+class Constraint(Protocol):
+    """What the problem needs of a limit."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def scale(self) -> float:
+        """A noticeable amount of it."""
+
+    def margins(self, state: State) -> ConstraintMargins:
+        """Return what is left of it in every sample."""
+
+
+def free_coordinates(chain: Chain, stance: Stance) -> list[int]:
+    """Return the coordinates that are free when the planted legs follow the pelvis, and a seated pelvis rests."""
+    held = {c for side in stance.planted for c in chain.leg_columns[side]} | set(range(ROOT if stance.seat else 0))
+    return [c for c in range(chain.size) if c not in held]
+
+
+@dataclass(frozen=True, eq=False)
+class NonlinearProgramme:
+    """``base`` (3, T, n) coordinates, rates and accelerations to which the points of the ``free`` coordinates add
+    through ``basis`` (3, T, K); ``limits`` to keep, each by its column of ``reserve`` (T, limits) in its scale.
+    """
+
+    chain: Chain
+    stance: Stance
+    base: Array
+    basis: Array
+    free: list[int]
+    limits: tuple[Constraint, ...]
+    objective: Objective
+    reserve: Array
+
+    def state(self, y: Array) -> State:
+        """Return the motion of the points y (K * free,)."""
+        samples = self.base.copy()
+        samples[:, :, self.free] += self.basis @ y.reshape(self.basis.shape[2], -1)
+        return close_legs(self.chain, self.stance, *samples)
+
+    def evaluate(self, y: Array) -> "Evaluation":
+        """Return objective and margins at y."""
+        return Evaluation(self, self.state(y))
+
+
+class Evaluation:
+    """Objective and margins at a point of a problem, slopes on demand (`Point`)."""
+
+    def __init__(self, problem: NonlinearProgramme, state: State) -> None:
+        self.problem, self.state = problem, state
+        self.value, self._slope = problem.objective(state)
+        self._found = [(limit.margins(state), limit.scale) for limit in problem.limits]
+        spare = problem.reserve.T[:, :, None]
+        self._spare = [m.value / scale - r for (m, scale), r in zip(self._found, spare, strict=True)]
+        self.margins = np.concatenate([np.empty(0), *(spare.ravel() for spare in self._spare)])
+
+    @property
+    def worst(self) -> tuple[float, str]:
+        """The largest violation in the scale of its limit (negative: room left), and the name of the limit."""
+        least = [float(spare.min(initial=np.inf)) for spare in self._spare]
+        k = int(np.argmin(least))
+        return -least[k], self.problem.limits[k].name
+
+    @property
+    def least(self) -> Array:
+        """(T,) what is left in each sample, in the scales of the limits."""
+        return np.min([spare.min(axis=1, initial=np.inf) for spare in self._spare], axis=0)
+
+    def slopes(self, rows: NDArray[np.intp]) -> tuple[Array, Array]:
+        """Return the gradient and the chosen rows of the Jacobian."""
+        closure = Closure(self.state)
+        frames, first, parts = len(self.state.x), 0, []
+        for margin, scale in self._found:
+            size = margin.value.size
+            inside = rows[(rows >= first) & (rows < first + size)] - first
+            time, which = np.unravel_index(inside, margin.value.shape)
+            parts.append(self._chain([s[time, which] / scale for s in margin.slopes], time, closure))
+            first += size
+        gradient = self._chain(list(self._slope), np.arange(frames), closure).sum(axis=0)
+        return gradient, np.concatenate([np.empty((0, gradient.size)), *parts])
+
+    def _chain(self, slopes: list[Array], time: NDArray[np.intp], closure: Closure) -> Array:
+        """Return slopes (R, K * free) by the points of slopes (R, n) by coordinates, rates and accelerations at
+        instants ``time`` (R,).
+        """
+        free, basis = self.problem.free, self.problem.basis
+        by = [closure.followed(slopes[0], time)]
+        if len(slopes) > 1 and basis[1].any():
+            by[0] += closure.turned(slopes[1], "v", time)
+            by.append(closure.followed(slopes[1], time))
+        if len(slopes) > 2 and basis[2].any():
+            by[0] += closure.turned(slopes[2], "ax", time)
+            by[1] += closure.turned(slopes[2], "av", time)
+            by.append(closure.followed(slopes[2], time))
+        out = sum(basis[k][time][:, :, None] * part[:, None, free] for k, part in enumerate(by))
+        return np.asarray(out).reshape(len(time), basis.shape[2] * len(free))
+
+
+class Point(Protocol):
+    """What a problem says about one y: ``value`` f, ``margins`` c (m,), and, only when asked, the slopes."""
+
+    value: float
+    margins: Array
+
+    def slopes(self, rows: NDArray[np.intp]) -> tuple[Array, Array]:
+        """Return df/dy (n,) and dc/dy (len(rows), n) of the chosen margins."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """``y`` (n,), ``value`` f, ``violation`` = largest -c (negative: room left), ``iterations``."""
+
+    y: Array
+    value: float
+    violation: float
+    iterations: int
+
+
+WEIGHT = 100.0
+NEAR = 1.5
+"""Margins (in their scale) larger than this cannot become active within one step."""
+
+
+def minimise(
+    evaluate: Callable[[Array], Point], start: Array, *, iterations: int = 30, radius: float = 0.3, tolerance: float = 1e-3
+) -> Solution:
+    """Return a local minimum from ``start``; f and c should be scaled so that 1 is a large amount."""
+    y, n = start.copy(), start.size
+    point, hessian = evaluate(y), np.eye(n)
+    count = 0
+    for count in range(1, iterations + 1):  # noqa: B007
+        rows = np.flatnonzero(point.margins < NEAR)
+        gradient, jacobian = point.slopes(rows)
+        step, price = quadratic_step(hessian, gradient, jacobian, point.margins[rows], radius)
+        predicted = -(gradient @ step) + WEIGHT * (worst(point.margins) - worst(point.margins[rows] + jacobian @ step))
+        trial = evaluate(y + step)
+        gained = point.value - trial.value + WEIGHT * (worst(point.margins) - worst(trial.margins))
+        if gained < 0.05 * predicted or not np.isfinite(gained):
+            radius *= 0.35
+            if radius < 1e-3 or predicted < 1e-6:
+                break
+            if not gained > 0:
+                continue
+        elif gained > 0.7 * predicted:
+            radius = min(2 * radius, 1.0)
+        new_gradient, new_jacobian = trial.slopes(rows)
+        hessian = update(hessian, step, new_gradient - gradient - price @ (new_jacobian - jacobian))
+        y, point = y + step, trial
+        if gained < tolerance and worst(point.margins) < 1e-4:
+            break
+    return Solution(y, point.value, float(-point.margins.min(initial=np.inf)), count)
+
+
+def worst(margins: Array) -> float:
+    """Return the largest violation, 0 if there is none."""
+    return max(0.0, -float(margins.min(initial=0.0)))
+
+
+def quadratic_step(hessian: Array, gradient: Array, jacobian: Array, margins: Array, radius: float) -> tuple[Array, Array]:
+    """Return the step d (n,) and the prices (m,) of the margins: min d'Hd/2 + g'd + t + t²/2, Jd + t/weight >= -c, |d|
+    <= radius.
+    """
+    from scipy.optimize import nnls
+
+    n, box, price = gradient.size, np.eye(gradient.size), np.zeros(len(jacobian))
+    within = margins < radius * np.abs(jacobian).sum(axis=1) + 1 / WEIGHT  # the others cannot be reached by this step
+    jacobian, margins = jacobian[within], margins[within]
+    lower = np.linalg.cholesky(hessian)
+    rows = np.concatenate([jacobian, box, -box])
+    needed = np.concatenate([-margins, np.full(2 * n, -radius)])
+    slack = np.concatenate([np.full(len(jacobian), 1 / WEIGHT), np.zeros(2 * n)])
+    inner = np.linalg.solve(lower, rows.T).T
+    shift = np.linalg.solve(lower, gradient)
+    G = np.concatenate([np.column_stack([inner, slack]), np.eye(n + 1)[-1:]])
+    h = np.concatenate([needed + inner @ shift + slack, [1.0]])
+    try:
+        multiplier, _ = nnls(np.vstack([G.T, h]), np.eye(n + 2)[-1], maxiter=20 * len(h))
+    except RuntimeError:
+        return np.zeros(n), price
+    rest = max(1.0 - float(h @ multiplier), 1e-12)
+    step = np.linalg.solve(lower.T, (G.T @ multiplier)[:n] / rest - shift)
+    price[within] = np.minimum(multiplier[: len(jacobian)] / rest, WEIGHT)
+    return np.clip(step, -radius, radius), price
+
+
+def update(hessian: Array, step: Array, change: Array) -> Array:
+    """Return the BFGS update, damped after Powell so that it stays positive definite; the identity where it would not."""
+    curved = hessian @ step
+    bend = float(step @ curved)
+    if bend < 1e-14:
+        return hessian
+    along = float(step @ change)
+    mix = 1.0 if along >= 0.2 * bend else 0.8 * bend / (bend - along)
+    change = mix * change + (1 - mix) * curved
+    out = hessian - np.outer(curved, curved) / bend + np.outer(change, change) / float(step @ change)
+    out = (out + out.T) / 2
+    sound = np.isfinite(out).all() and float(np.linalg.eigvalsh(out)[0]) > 1e-6 * max(float(np.abs(out).max()), 1e-6)
+    return out if sound else np.eye(len(out))

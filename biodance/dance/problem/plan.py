@@ -1,0 +1,211 @@
+"""What a dance is asked to be: postures, feet, times, limits, weights; read from a protocol file. The person's limits
+are in the Body.
+
+A person's reduced range, strength or speed go into ``body.limits`` and a person who may not stand on one leg takes
+blocks out of the plan (`person.fitted`), so that whoever designs needs the two records only. The file is TOML; the
+shipped ones are in ``protocols/dances``:
+
+    name = "short"
+    description = "what it is for, one sentence"
+    move_s = 2.0                 seconds from posture to posture
+    hold_s = 1.5                 seconds of standing still in each
+    forward_m = 0.2              how far the right foot stands in front in "right_forward"
+    share_of_support = 0.6       short for the share under [limits.balance]
+    budget_s = 115               the postures that inform most per second are danced until the time is used up; without it: all
+    simplicity = 0.0             the performer's term: 0 = excitation only; 1 = a simple dance is worth as much as an exciting one
+    other_weight = 1.0           emphasis of the segments that [weights] does not name
+    ranges = "comfortable"       what joints may use: what is reached without effort, or "anatomical": all that a healthy joint allows
+
+    [postures]                   how many postures on which feet, in the order of the dance
+    parallel = 15                both feet side by side
+    right_forward = 15           right foot in front
+    single_right = 15            on the right leg
+    single_left = 15             on the left leg
+    seated = 20                  on a stool
+
+    [limits.friction]            numbers of the limits, each named as its file in biodance/dance/limits
+    mu = 0.4
+
+    [weights]                    emphasis of segments, on top of their masses
+    trunk_head = 2.0
+
+Only [postures] is needed; everything else has the value of the paper or none.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+
+from biodance.body.limits import Range
+from biodance.dance.limits import Limit, family, join_limits, limits_with
+from biodance.errors import BiodanceError, UnknownName
+from biodance.library import locate, read_toml
+from biodance.records import Array
+
+STANCES = ("parallel", "right_forward", "single_right", "single_left", "seated")
+"""Foot configurations: both feet side by side, right foot in front, on the right leg, on the left leg (paper Table I),
+on a stool.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A protocol of a dance.
+
+    ``blocks``: (stance, number of postures) in the order in which they are danced, each stance of ``STANCES`` at most
+    once; ``move``, ``hold`` s of a transition and of a posture (the paper: 2 and 5); ``forward`` m by which the right
+    foot stands in front; ``limits`` that all of it keeps, with their numbers; ``budget`` s: from the postures found,
+    those that inform most per second are danced until the time is used up (inf: all); ``weights`` (segment, factor) in
+    eq. 12 on top of the masses, ``other_weight`` the factor of all segments not named; ``simplicity`` >= 0 of the
+    performer's term beside the excitation; ``alone`` the legs on which the person may stand alone, be it for a step;
+    ``holds`` the hands that stay on the grips of a frame; ``ranges`` what joints may use: what is reached without
+    effort, or all that a healthy joint allows (the paper).
+    """
+
+    name: str
+    description: str
+    blocks: tuple[tuple[str, int], ...]
+    move: float = 2.0
+    hold: float = 5.0
+    forward: float = 0.2
+    budget: float = float("inf")
+    weights: tuple[tuple[str, float], ...] = ()
+    other_weight: float = 1.0
+    simplicity: float = 0.0
+    alone: tuple[str, ...] = ("right", "left")
+    holds: tuple[str, ...] = ()
+    ranges: Range = "comfortable"
+    limits: tuple[Limit, ...] = field(default_factory=family)
+
+    def __post_init__(self) -> None:
+        names = [name for name, _ in self.blocks]
+        for name in names:
+            if name not in STANCES:
+                raise UnknownName.of("stance", name, STANCES)
+        if not names or len(set(names)) < len(names) or any(count < 1 for _, count in self.blocks):
+            raise BiodanceError(f"Plan {self.name}: blocks {self.blocks}; expected at least one, each stance once, with 1 posture or more.")
+        if self.ranges not in get_args(Range):
+            raise UnknownName.of(f"range of joints in plan {self.name}", self.ranges, get_args(Range))
+        self._check()
+
+    def _check(self) -> None:
+        for name, low, high, unit in (
+            ("move", 0.5, 20.0, "s"),
+            ("hold", 0.0, 60.0, "s"),
+            ("forward", 0.05, 0.4, "m"),
+            ("simplicity", 0.0, 100.0, ""),
+        ):
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise BiodanceError(f"Plan {self.name}: {name} = {value:g} {unit}; legal are {low:g} to {high:g}.")
+        if not self.budget > 0:
+            raise BiodanceError(f"Plan {self.name}: budget = {self.budget:g} s; it must be positive (inf: no limit).")
+        factors = [self.other_weight, *(factor for _, factor in self.weights)]
+        if not all(np.isfinite(f) and f >= 0 for f in factors) or not any(factors):
+            raise BiodanceError(f"Plan {self.name}: weights {factors}; expected numbers >= 0, at least one of them positive.")
+
+    @property
+    def count(self) -> int:
+        """Number of postures of all blocks."""
+        return sum(count for _, count in self.blocks)
+
+    @property
+    def seated(self) -> bool:
+        """True where the whole dance is on a stool."""
+        return all(name == "seated" for name, _ in self.blocks)
+
+    @property
+    def share(self) -> float:
+        """Share of every half width of the base of support that all limits leave: for it the feet are set."""
+        return min((limit.support_share for limit in self.limits), default=1.0)
+
+    def with_limits(self, more: Iterable[Limit | type[Limit]]) -> "Plan":
+        """Return the plan with ``more`` limits, objects or classes; one of a name that is there already takes its
+        place.
+        """
+        return replace(self, limits=join_limits(self.limits, more))
+
+    def emphasis(self, segments: tuple[str, ...]) -> Array:
+        """Return the factor (N,) of each of the ``segments`` in eq. 12; UnknownName if a weight names none of them."""
+        named = dict(self.weights)
+        for name in named:
+            if name not in segments:
+                raise UnknownName.of(f"segment to weight in plan {self.name}", name, segments)
+        return np.array([named.get(name, self.other_weight) for name in segments])
+
+
+NUMBERS = {
+    "move_s": "move",
+    "hold_s": "hold",
+    "forward_m": "forward",
+    "budget_s": "budget",
+    "simplicity": "simplicity",
+    "other_weight": "other_weight",
+}
+"""Key of the file: field of the Plan."""
+SHORT = {"share_of_support": ("balance", "share")}
+"""Key of the file: limit and its number."""
+KEYS = ("name", "description", "postures", "limits", "weights", "ranges", *NUMBERS, *SHORT)
+
+
+def read_plan(name_or_path: str | Path) -> Plan:
+    """Return a shipped protocol by name ("full", "short", "chair", "one_segment"), or one of the user's by the path of
+    its TOML file.
+
+    Raises
+    ------
+    UnknownName
+        No shipped protocol has this name; a key of the file or a stance does not exist.
+    BiodanceError
+        The file cannot be read, or a value is not legal; the message names file, key, value and what would be legal.
+    """
+    path = Path(name_or_path)
+    if path.suffix != ".toml":
+        path = locate("protocols/dances", str(name_or_path))
+    raw = read_toml(path)
+    for key in raw:
+        if key not in KEYS:
+            raise UnknownName.of(f"key of {path}", key, KEYS)
+    words = {"ranges": str(raw["ranges"])} if "ranges" in raw else {}
+    fields: dict[str, Any] = words | {field: finite_number(path, key, raw[key]) for key, field in NUMBERS.items() if key in raw}
+    counts = table(path, raw, "postures")
+    for stance, count in counts.items():
+        if not isinstance(count, int) or isinstance(count, bool):
+            raise BiodanceError(f"{path}: postures.{stance} = {count!r}; expected a whole number of postures.")
+    weights = {name: finite_number(path, f"weights.{name}", value) for name, value in table(path, raw, "weights").items()}
+    plan = Plan(str(raw.get("name", path.stem)), str(raw.get("description", "")), tuple(counts.items()), weights=tuple(weights.items()))
+    return replace(plan, limits=_limits(path, raw), **fields)
+
+
+def _limits(path: Path, raw: dict[str, Any]) -> tuple[Limit, ...]:
+    """Return all limits with the numbers that the file gives them."""
+    given = table(path, raw, "limits")
+    found = {
+        name: {key: finite_number(path, f"limits.{name}.{key}", value) for key, value in table(path, given, name, of="limits.").items()}
+        for name in given
+    }
+    for short, (name, key) in SHORT.items():
+        if short in raw and key in found.get(name, {}):
+            raise BiodanceError(f"{path}: {short} and limits.{name}.{key} say the same; keep one of them.")
+        if short in raw:
+            found.setdefault(name, {})[key] = finite_number(path, short, raw[short])
+    return limits_with(found, where=str(path))
+
+
+def finite_number(path: Path, where: str, value: object) -> float:
+    """Return ``value`` as a float; BiodanceError names ``where`` it is if it is no finite number."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise BiodanceError(f"{path}: {where} = {value!r}; expected a finite number.")
+    return float(value)
+
+
+def table(path: Path, raw: dict[str, Any], key: str, *, of: str = "") -> dict[str, Any]:
+    """Return a table of a TOML file, empty if it is missing; BiodanceError if it is something else."""
+    value = raw.get(key, {})
+    if not isinstance(value, dict):
+        raise BiodanceError(f"{path}: [{of}{key}] must be a table, found {value!r}.")
+    return value

@@ -1,0 +1,173 @@
+"""The room that segments take: limbs are the widest capsules in their boxes, trunk and pelvis the boxes themselves."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.body.body import Body
+from biodance.records import Array
+
+BOXES = ("pelvis", "trunk_head")
+_KINDS = {
+    *(("foot", "shank"), ("foot", "thigh"), ("forearm_hand", "thigh"), ("forearm_hand", "forearm_hand")),  # the paper's
+    *(("forearm_hand", "shank"), ("forearm_hand", "upper_arm"), ("shank", "shank"), ("foot", "foot"), ("upper_arm", "thigh")),
+    *(("shank", "thigh"), ("forearm_hand", "foot")),
+}
+
+
+def capsule_pairs(body: Body) -> list[tuple[int, int]]:
+    """Return the pairs of limbs (segment indices) that must not touch: the paper's and others that a dance could bring
+    together.
+    """
+    kinds = [s.removeprefix("right_").removeprefix("left_") for s in body.segments]
+    side = [s.split("_")[0] for s in body.segments]
+    near = {("shank", "thigh"), ("foot", "shank"), ("foot", "thigh"), ("forearm_hand", "upper_arm")}  # only the opposite side
+    pairs = []
+    for i, j in combinations(range(len(kinds)), 2):
+        for pair in ((kinds[i], kinds[j]), (kinds[j], kinds[i])):
+            if pair in _KINDS and not (pair in near and side[i] == side[j]):
+                pairs.append((i, j))
+                break
+    return pairs
+
+
+def box_pairs(body: Body) -> list[tuple[int, int]]:
+    """Return the pairs (limb, trunk or pelvis) that must not touch: the forearms against both."""
+    arms = [i for i, s in enumerate(body.segments) if s.endswith("forearm_hand")]
+    return [(arm, body.segment_index(box)) for arm in arms for box in BOXES]
+
+
+def pairs_of(body: Body) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+    """Return the pairs of limbs, and of a limb and a box, that must not touch: by name in a person's body, else by the
+    tree.
+    """
+    return (capsule_pairs(body), box_pairs(body)) if _is_named(body) else tree_pairs(body)[:2]
+
+
+def unchecked_pairs(body: Body) -> tuple[str, ...]:
+    """Return the pairs of a robot's segments that should be kept apart and cannot, in words (`tree_pairs`)."""
+    return () if _is_named(body) else tree_pairs(body)[2]
+
+
+def _is_named(body: Body) -> bool:
+    named = {kind for pair in _KINDS for kind in pair} | set(BOXES)
+    return all(segment.removeprefix("right_").removeprefix("left_") in named for segment in body.segments)
+
+
+@dataclass(frozen=True, eq=False)
+class Solids:
+    """What must not touch: capsules ``first`` and ``second`` (C,) of segments, limbs ``limb`` (B,) and boxes ``box``
+    (B,) of segments; ``axis`` (N, 2, 3) m and ``radius`` (N,) m of the capsule in every segment's box.
+    """
+
+    first: NDArray[np.intp]
+    second: NDArray[np.intp]
+    limb: NDArray[np.intp]
+    box: NDArray[np.intp]
+    axis: Array
+    radius: Array
+
+    @classmethod
+    @lru_cache(maxsize=8)
+    def of(cls, body: Body) -> "Solids":
+        """Return the pairs of a body, worked out once."""
+        capsules, boxes = (np.array(pairs, dtype=np.intp).reshape(-1, 2) for pairs in pairs_of(body))
+        shape = [capsule(body, i) for i in range(len(body.segments))]
+        axis, radius = np.array([ends for ends, _ in shape]), np.array([radius for _, radius in shape])
+        return cls(capsules[:, 0], capsules[:, 1], boxes[:, 0], boxes[:, 1], axis, radius)
+
+
+def palm(body: Body, side: str) -> tuple[int, Array]:
+    """Return the segment of a hand and the middle of its palm (3,) m in that segment: 0.85 of the way to the
+    fingertips.
+    """
+    segment = body.segment_index(f"{side}_forearm_hand")
+    low, high = body.boxes[segment]
+    return segment, np.array([(low[0] + high[0]) / 2, 0.85 * low[1], (low[2] + high[2]) / 2])
+
+
+NEAR = 2
+"""Segments away along the tree: closer limbs are neighbours, or neighbours of the same segment."""
+POINTS = np.linspace(0.0, 1.0, 41)
+"""Places on a limb's axis at which it is held against others at zero angles."""
+LEAST = 0.01
+"""Half length of a capsule in a cube, in its radius: a line of no length has no direction."""
+Pairs = list[tuple[int, int]]
+
+
+def capsule(body: Body, segment: int) -> tuple[Array, float]:
+    """Return the ends (2, 3) m of the axis, in the segment frame, and the radius m of a limb's capsule: the widest in
+    its box.
+    """
+    low, high = body.boxes[segment]
+    half, centre = (high - low) / 2, (high + low) / 2
+    axis = int(np.argmax(half))
+    radius = float(np.sort(half)[0])
+    reach = max(half[axis] - radius, LEAST * radius) * np.eye(3)[axis]
+    return np.array([centre - reach, centre + reach]), radius
+
+
+def tree_pairs(body: Body) -> tuple[Pairs, Pairs, tuple[str, ...]]:
+    """Return the pairs of limbs and of a limb and a box (segment indices) to keep apart, and the pairs that cannot be
+    checked, in words.
+    """
+    above = [_carrier(body, i) for i in range(len(body.segments))]
+    boxes = [i for i in range(len(above)) if i == 0 or above.count(i) > 1]
+    legs = {k for foot in body.feet.values() for k in _up(above, foot.segment)}
+    limbs = [i for i in range(len(above)) if i not in boxes]
+    solid = [(i, j) for i, j in combinations(limbs, 2) if _apart(above, i, j) > NEAR]
+    walls = [(i, j) for i in limbs if i not in legs for j in boxes if above[i] != j]
+    axes = {i: _axis_at_zero(body, i) for i in limbs}
+    free = [pair for pair in solid if _limbs_gap(body, axes, *pair) > 0]
+    clear = [pair for pair in walls if _box_gap(body, axes[pair[0]], *pair) > 0]
+    left = [pair for pair in solid + walls if pair not in free and pair not in clear]
+    return free, clear, tuple(f"{body.segments[i]} - {body.segments[j]}" for i, j in left)
+
+
+def _carrier(body: Body, segment: int) -> int:
+    """Return the segment on which one hangs, -1 for the root's."""
+    joint = body.segment_joint[segment]
+    while joint >= 0:
+        joint = body.joints[joint].parent
+        if joint < 0 or body.joints[joint].segment >= 0:
+            return 0 if joint < 0 else body.joints[joint].segment
+    return -1
+
+
+def _up(above: list[int], segment: int) -> list[int]:
+    path = [segment]
+    while above[path[-1]] >= 0:
+        path.append(above[path[-1]])
+    return path
+
+
+def _apart(above: list[int], i: int, j: int) -> int:
+    """Return how many segments apart two segments are along the tree."""
+    one, two = _up(above, i), _up(above, j)
+    return len(set(one) ^ set(two))
+
+
+def _axis_at_zero(body: Body, segment: int) -> Array:
+    """Return points (K, 3) m on the axis of a limb at zero angles, lab frame."""
+    from biodance.motion.kinematics import poses
+
+    (a, b), _ = capsule(body, segment)
+    return poses(body, body.neutral[None]).points([segment] * len(POINTS), a + POINTS[:, None] * (b - a))[0]
+
+
+def _limbs_gap(body: Body, axes: dict[int, Array], i: int, j: int) -> float:
+    distance = np.linalg.norm(axes[i][:, None] - axes[j][None], axis=2).min()
+    return float(distance - capsule(body, i)[1] - capsule(body, j)[1])
+
+
+def _box_gap(body: Body, axis: Array, limb: int, box: int) -> float:
+    from biodance.motion.kinematics import poses
+
+    pose = poses(body, body.neutral[None])
+    local = (axis - pose.position[0, box]) @ pose.rotation[0, box]
+    low, high = body.boxes[box]
+    beyond = np.maximum(np.maximum(low - local, local - high), 0.0)
+    return float(np.linalg.norm(beyond, axis=1).min() - capsule(body, limb)[1])

@@ -1,0 +1,62 @@
+"""Sixth-order B-splines through via points, rest to rest (paper III.A, eq. 18).
+
+A transition of duration D starts and ends with zero velocity and acceleration and passes through K via points at equal
+distances in time. The spline is linear in its points, so a whole trajectory, its velocity and its acceleration are
+constant matrices times the points.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from biodance.errors import BiodanceError
+from biodance.records import Array, frozen_array
+
+DEGREE = 5
+"""Order six: continuous up to the fourth derivative."""
+
+
+@dataclass(frozen=True, eq=False)
+class Basis:
+    """Sampled spline: ``time`` (n,) s; ``position``, ``velocity`` 1/s, ``acceleration`` 1/s² (n, K + 2) matrices that
+    map the points [start, via 1 ... via K, end] of a joint to its samples.
+    """
+
+    time: Array
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+    def __post_init__(self) -> None:
+        for name in ("time", "position", "velocity", "acceleration"):
+            value = getattr(self, name)
+            object.__setattr__(self, name, frozen_array(value, (None,) * np.ndim(value), f"Basis.{name}"))
+
+
+def rest_to_rest(duration: float, *, via: int = 2, rate: float = 50.0) -> Basis:
+    """Return the sampled basis of a rest-to-rest transition with ``via`` points; samples at ``rate`` Hz include both
+    ends.
+
+    Raises
+    ------
+    BiodanceError
+        The duration or the rate is not positive, or there are fewer than two samples.
+    """
+    if duration <= 0 or rate <= 0 or duration * rate < 1:
+        raise BiodanceError(f"A transition of {duration:g} s at {rate:g} Hz has no samples; give a longer duration or a higher rate.")
+    time = np.linspace(0.0, duration, round(duration * rate) + 1)
+    return basis_at(time, duration, via=via)
+
+
+def basis_at(time: Array, duration: float, *, via: int = 2) -> Basis:
+    """Return the basis of a rest-to-rest transition of ``duration`` s at the instants ``time`` (n,) in [0, duration]."""
+    count = via + 6  # two ends with position, velocity and acceleration each, and the via points
+    inner = np.linspace(0, duration, count - DEGREE + 1)[1:-1]
+    knots = np.concatenate([np.zeros(DEGREE + 1), inner, np.full(DEGREE + 1, duration)])
+    spline = BSpline(knots, np.eye(count), DEGREE)
+    stops = np.array([0.0, duration])
+    through = np.linspace(0, duration, via + 2)
+    conditions = np.concatenate([spline(through), spline(stops, nu=1), spline(stops, nu=2)])
+    coefficients = np.linalg.inv(conditions)[:, : via + 2]
+    return Basis(time, *(spline(time, nu=nu) @ coefficients for nu in range(3)))

@@ -1,0 +1,206 @@
+"""Where the feet stand and which part of the ground may carry the weight."""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.records import Array, frozen_array
+
+WIDTH = 0.12
+"""Distance between the ankles, fraction of stature (about 1.3 times the width of the hips)."""
+STRIP, CLEAR = 0.1, 1.25
+"""Of the width of a sole: how much the reduced supports of both feet and of one overlap at least; of its inner half:
+room between feet.
+"""
+FORWARD = 0.2
+"""m: how far the right foot stands in front (paper III.D, human subject)."""
+SINGLE = {"single_right": (0,), "single_left": (1,)}
+STOOL = np.array([[-0.15, -0.2], [0.25, -0.2], [0.25, 0.2], [-0.15, 0.2]])
+"""(4, 2) m where the legs of a stool stand, from below the hips: a seat of 0.4 m by 0.4 m that bears the thighs to
+their middle.
+"""
+HANGING = 0.08
+"""m between the ground and the soles of hanging legs on a stool."""
+GRIP = (0.18, 0.28, 0.50)
+"""Grips of a walking frame: m ahead of the heels' line, m to the side, and height over stature (crease of the wrist, as
+they are set).
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Stance:
+    """One foot configuration.
+
+    ``name``; ``ankle`` (2, 3) m lab frame, right and left, where each foot stands or would stand, flat and facing lab
+    x; ``planted`` the feet on the ground (0 right, 1 left); ``soles`` (2, P, 3) m their outlines; ``share`` of every
+    half width of the support for which the stance is laid out (`Limit.support_share`); ``props`` (K, 2) m corners on
+    the ground of what else bears weight: the legs of a stool; ``hands`` (2, 3) m grips that the right and the left hand
+    hold, NaN = free; ``seat`` m height of the hip centres of a person on a stool, pelvis upright and still over the lab
+    origin; 0 standing; ``over`` the one of two planted feet (0, 1) over which the weight is, so that the other could be
+    lifted; None anywhere.
+    """
+
+    name: str
+    ankle: Array
+    planted: tuple[int, ...]
+    soles: Array
+    share: float = 1.0
+    props: Array = field(default_factory=lambda: np.empty((0, 2)))
+    seat: float = 0.0
+    over: int | None = None
+    hands: Array = field(default_factory=lambda: np.full((2, 3), np.nan))
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "planted", tuple(self.planted))
+        object.__setattr__(self, "ankle", frozen_array(self.ankle, (2, 3), "Stance.ankle"))
+        object.__setattr__(self, "soles", frozen_array(self.soles, (2, None, 3), "Stance.soles"))
+        object.__setattr__(self, "hands", frozen_array(self.hands, (2, 3), "Stance.hands"))
+        props = self.props if np.size(self.props) else np.empty((0, 2))
+        object.__setattr__(self, "props", frozen_array(props, (None, 2), "Stance.props"))
+
+    @cached_property
+    def support(self) -> Array:
+        """(P, 2) m corners of the base of support (convex hull of planted soles and props), counter-clockwise."""
+        from scipy.spatial import ConvexHull
+
+        points = np.concatenate([*(self.soles[side][:, :2] for side in self.planted), self.props])
+        return points[ConvexHull(points).vertices]
+
+    @cached_property
+    def centre(self) -> Array:
+        """(2,) m middle of the base of support: of its bounding box; with the weight over one foot: deepest inside both
+        bases.
+        """
+        if self.over is not None:
+            from scipy.optimize import linprog
+
+            normals, offsets = self.reduced(self.share)
+            rows = np.column_stack([-normals, np.ones(len(normals))])
+            return np.asarray(linprog([0.0, 0.0, -1.0], rows, offsets, bounds=(None, None)).x[:2])
+        return (self.support.min(axis=0) + self.support.max(axis=0)) / 2
+
+    def reduced(self, share: float) -> tuple[Array, Array]:
+        """Return unit inward normals (P, 2) and offsets (P,) m of the base of support, drawn together to ``share``
+        about its middle: ``normals @ p + offsets`` is the distance inside. With the weight over one foot: of both
+        feet's base and of that one's.
+        """
+        if share not in self._reduced:
+            self._reduced[share] = self._edges(share)
+        return self._reduced[share]
+
+    @cached_property
+    def _reduced(self) -> dict[float, tuple[Array, Array]]:
+        return {}
+
+    def _edges(self, share: float) -> tuple[Array, Array]:
+        if self.over is not None:
+            normals, offsets = zip(self.on(0, 1).reduced(share), self.on(self.over).reduced(share), strict=True)
+            return np.concatenate(normals), np.concatenate(offsets)
+        corners = self.centre + share * (self.support - self.centre)
+        along = np.roll(corners, -1, axis=0) - corners
+        normals = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.linalg.norm(along, axis=1, keepdims=True)
+        return normals, -np.einsum("ij,ij->i", normals, corners)
+
+    @cached_property
+    def sole_centres(self) -> Array:
+        """(2, 3) m middle of each sole on the ground."""
+        return self.soles.mean(axis=1)
+
+    def on(self, *planted: int) -> "Stance":
+        """Return the stance with only these feet on the ground."""
+        apart = "parallel" if self.ankle[0, 0] == self.ankle[1, 0] else "right_forward"
+        return replace(self, planted=planted, over=None, name=apart if len(planted) == 2 else ("single_right", "single_left")[planted[0]])
+
+
+def stance(
+    body: Body, name: str, *, left: float = 0.0, right: float = 0.0, planted: tuple[int, ...] = (0, 1), share: float = 1.0
+) -> Stance:
+    """Return a stance with the ankles ``left`` and ``right`` m ahead of the lab origin, side by side at the person's
+    width.
+    """
+    height = -float(body.feet["right"].outline[:, 1].min())
+    half = apart(body, share) / 2
+    ankle = np.array([[right, -half, height], [left, half, -float(body.feet["left"].outline[:, 1].min())]])
+    soles = [
+        ankle[k] + np.stack([o[:, 0], -o[:, 2], o[:, 1]], axis=1)
+        for k, o in enumerate(body.feet[side].outline for side in ("right", "left"))
+    ]
+    return Stance(name, ankle, planted, np.array(soles), share)
+
+
+def holding(feet: Stance, body: Body, hands: tuple[str, ...]) -> Stance:
+    """Return the stance in which the named ``hands`` ("right", "left") hold the grips of a frame around the person."""
+    grips, stature = np.full((2, 3), np.nan), stature_of(body)
+    for side, name in enumerate(("right", "left")):
+        if name in hands:
+            grips[side] = [GRIP[0], (-GRIP[1], GRIP[1])[side], GRIP[2] * stature]
+    return replace(feet, hands=grips)
+
+
+def seat(body: Body, *, share: float = 1.0) -> Stance:
+    """Return the stance of a person on a stool, hips over the lab origin, feet hanging above the ground."""
+    feet = stance(body, "seated", planted=(), share=share)
+    legs = [np.linalg.norm(body.joints[body.joint_index(f"{side}_ankle_dorsiflexion")].translation) for side in ("right", "left")]
+    return replace(feet, props=STOOL, seat=float(max(legs) + feet.ankle[:, 2].max()) + HANGING)
+
+
+def apart(body: Body, share: float) -> float:
+    """Return the distance (m) between the ankles: of a person about 1.3 times the width of the hips; of a robot at
+    least that of its hips.
+
+    Never so wide that the reduced support of both feet ends before that of one begins: then the weight could not be
+    shifted. Never so narrow that the feet touch.
+    """
+    sideways = body.feet["right"].outline[:, 2]
+    outer, inner = float(sideways.max()), -float(sideways.min())
+    usual = max(WIDTH * stature_of(body), hip_width(body))
+    if share >= 1.0:
+        return usual
+    middle, wide = (outer - inner) / 2, outer + inner
+    widest = 2 * (share * outer - middle + (share / 2 - STRIP) * wide) / (1 - share)
+    return min(usual, max(widest, CLEAR * 2 * inner))
+
+
+def hip_width(body: Body) -> float:
+    """Return the distance (m) sideways between the ankles of the upright body at zero angles: that of its hips where
+    legs are straight.
+    """
+    from biodance.motion.kinematics import poses
+
+    place = poses(body, body.neutral[None]).position[0]
+    return float(place[body.feet["left"].segment, 1] - place[body.feet["right"].segment, 1])
+
+
+def stature_of(body: Body) -> float:
+    """Return the height (m) of the upright body: top of its highest box over its soles."""
+    from biodance.motion.kinematics import poses
+
+    pose = poses(body, body.neutral[None])
+    tops = [float((pose.position[0, i] + pose.rotation[0, i] @ box[1])[2]) for i, box in enumerate(body.boxes)]
+    foot = body.feet["right"]
+    return max(tops) - float(pose.points([foot.segment], foot.outline[:1])[0, 0, 2])
+
+
+def under(first: Stance, second: Stance) -> Stance:
+    """Return the feet on the ground during the move from one stance to the next."""
+    for one in (first, second):
+        if len(one.planted) < 2:
+            return one
+    return replace(second, over=None) if np.array_equal(first.ankle, second.ankle) else second.on(1)
+
+
+FEET = {
+    "parallel": "with both feet side by side",
+    "right_forward": "with the right foot in front",
+    "single_right": "on the right leg alone",
+    "single_left": "on the left leg alone",
+    "seated": "on the stool",
+}
+
+
+def stance_words(stance: Stance) -> str:
+    """Return where the feet are, in words, and on which of them the weight is where it must be over one."""
+    weight = "" if stance.over is None else f", the weight on the {('right', 'left')[stance.over]} one"
+    return FEET[stance.name] + weight

@@ -1,0 +1,281 @@
+"""What the limits judge: positions, forces and torques of samples of a motion, with their exact derivatives.
+
+Notation: J_i (6,) is the twist of coordinate i in the lab frame (linear part at the lab origin first), V_k and A_k the
+spatial velocity and acceleration of link k, x the spatial cross product. For link n and a coordinate i that moves it
+
+    dV_n/dx_i = J_i x (V_n - V_i)                       dA_n/dx_i  = J_i x (A_n - A_i) + (V_i x J_i) x (V_n - V_i)
+    dV_n/dv_i = J_i                                     dA_n/dv_i  = V_i x J_i + J_i x (V_n - V_i)
+
+(derivation: docs/derivations.md section 12). Forces come from pinocchio's RNEA derivatives.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.body.pinocchio_model import load_pinocchio
+from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.stance import Stance
+from biodance.records import Array
+
+Index = list[int] | NDArray[np.intp]
+
+
+def spatial_cross(a: Array, b: Array) -> Array:
+    """Return the spatial (6) or ordinary (3) cross product along the last axis."""
+    if a.shape[-1] == 3:
+        return np.asarray(a[..., _NEXT] * b[..., _LAST] - a[..., _LAST] * b[..., _NEXT])
+    w1, w2 = a[..., 3:], b[..., 3:]
+    linear = spatial_cross(w1, b[..., :3]) + spatial_cross(a[..., :3], w2)
+    return np.concatenate([linear, spatial_cross(w1, w2)], axis=-1)
+
+
+_NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """``x``, ``v``, ``a`` (T, n) coordinates of the chain and their derivatives; ``stance`` the feet, the same in all
+    samples.
+    """
+
+    chain: Chain
+    stance: Stance
+    x: Array
+    v: Array
+    a: Array
+
+    @cached_property
+    def _frames(self) -> tuple[Array, Array, Array]:
+        pin = load_pinocchio()
+        model, data, count = self.chain.model, self.chain.data, self.chain.size
+        twists = np.empty((len(self.x), count, 6))
+        rotation, position = np.empty((len(self.x), count, 3, 3)), np.empty((len(self.x), count, 3))
+        links = sorted({*self.chain.carriers})
+        for t, x in enumerate(self.x):
+            twists[t] = pin.computeJointJacobians(model, data, x).T
+            for k in links:
+                place = data.oMi[k + 1]
+                rotation[t, k], position[t, k] = place.rotation, place.translation
+        return twists, rotation, position
+
+    @property
+    def twists(self) -> Array:
+        """(T, n, 6) J_i."""
+        return self._frames[0]
+
+    @cached_property
+    def rotation(self) -> Array:
+        """(T, N, 3, 3) lab_R_segment."""
+        return self._frames[1][:, list(self.chain.carriers)]
+
+    @cached_property
+    def position(self) -> Array:
+        """(T, N, 3) m origins of the segments."""
+        return self._frames[2][:, list(self.chain.carriers)]
+
+    @cached_property
+    def velocity(self) -> Array:
+        """(T, n, 6) V_k of every link."""
+        return self.chain.ancestors @ (self.twists * self.v[:, :, None])
+
+    @cached_property
+    def acceleration(self) -> Array:
+        """(T, n, 6) A_k of every link."""
+        return self.chain.ancestors @ (self.twists * self.a[:, :, None] + spatial_cross(self.velocity, self.twists) * self.v[:, :, None])
+
+    def placed(self, segment: Index, local: Array) -> Array:
+        """Return positions (T, K, 3) m of points ``local`` (K, 3) of the segments (K)."""
+        return np.asarray((self.rotation[:, segment] @ local[:, :, None])[..., 0] + self.position[:, segment])
+
+    def along(self, segment: Index, place: Array, direction: Array) -> Array:
+        """Return (T, K, n) derivative by x of the places (T, K, 3) m, fixed in the segments (K), along directions (T,
+        K, 3).
+        """
+        wrench = np.concatenate([direction, spatial_cross(place, direction)], axis=2)
+        return (wrench @ np.swapaxes(self.twists, 1, 2)) * self.chain.ancestors[np.array(self.chain.carriers)[segment]]
+
+    def points(self, segment: list[int], local: Array) -> tuple[Array, Array]:
+        """Return positions (T, K, 3) m of points ``local`` (K, 3) of the segments, and their slopes (T, K, 3, n)."""
+        place = self.placed(segment, local)
+        axes = np.broadcast_to(np.eye(3)[:, None, None], (3, *place.shape))
+        return place, np.stack([self.along(segment, place, axis) for axis in axes], axis=2)
+
+    @cached_property
+    def _dynamics(self) -> tuple[Array, Array]:
+        pin = load_pinocchio()
+        model, data, n = self.chain.model, self.chain.data, self.chain.size
+        force, slopes = np.empty((len(self.x), n)), np.empty((3, len(self.x), n, n))
+        for t, (x, v, a) in enumerate(zip(self.x, self.v, self.a, strict=True)):
+            slopes[0, t], slopes[1, t], slopes[2, t] = pin.computeRNEADerivatives(model, data, x, v, a)
+            force[t] = data.tau
+        return force, slopes
+
+    @property
+    def force(self) -> Array:
+        """(T, n) N, N·m generalised force on every coordinate without the ground."""
+        return self._dynamics[0]
+
+    @cached_property
+    def still(self) -> bool:
+        """True where nothing moves: a posture."""
+        return not (self.v.any() or self.a.any())
+
+    @cached_property
+    def wrench(self) -> Array:
+        """(T, 6) N, N·m needed from the ground, about the lab origin, force first."""
+        return np.asarray(np.linalg.solve(self.twists[:, :ROOT], self.force[:, :ROOT, None])[..., 0])
+
+    @cached_property
+    def wrench_slopes(self) -> Array:
+        """(3, T, 6, n) derivative of the wrench with respect to x, v, a."""
+        inner = self._dynamics[1][:, :, :ROOT].copy()
+        inner[0, :, :, :ROOT] -= self.moved_twists(list(range(ROOT)), self.wrench)[:, :, :ROOT]
+        return np.asarray(np.linalg.solve(self.twists[None, :, :ROOT], inner))
+
+    def moved_twists(self, columns: list[int], wrench: Array) -> Array:
+        """Return (T, k, n) derivative of J_k' F with respect to x for the coordinates ``columns`` and a fixed wrench
+        (T, 6).
+        """
+        swept = self.chain.ancestors[columns] - np.eye(self.chain.size)[columns]
+        pairs = spatial_cross(self.twists[:, None], self.twists[:, columns, None])
+        return np.einsum("tkic,tc->tki", pairs, wrench) * swept
+
+    @property
+    def alone(self) -> "State":
+        """The same motion with everything on the foot over which the weight is."""
+        assert self.stance.over is not None
+        other = State(self.chain, self.stance.on(self.stance.over), self.x, self.v, self.a)
+        shared = ("_frames", "velocity", "acceleration", "_dynamics", "wrench", "wrench_slopes")
+        other.__dict__.update({name: self.__dict__[name] for name in shared if name in self.__dict__})
+        return other
+
+    @cached_property
+    def feet(self) -> tuple[Array, Array]:
+        """Wrenches (T, 2, 6) of the ground on each foot about the lab origin, and their derivative (T, 2, 6, 6) by the
+        total.
+        """
+        return foot_forces(self.wrench, self.stance)
+
+    @cached_property
+    def torque(self) -> Array:
+        """(T, n - 6) N·m of the joints."""
+        out = self.force.copy()
+        for side in self.stance.planted:
+            columns = self.chain.leg_columns[side]
+            out[:, columns] -= np.einsum("tkc,tc->tk", self.twists[:, columns], self.feet[0][:, side])
+        return out[:, ROOT:]
+
+    @cached_property
+    def torque_slopes(self) -> Array:
+        """(3, T, n - 6, n) derivative of the joint torques with respect to x, v, a."""
+        slopes = self._dynamics[1].copy()
+        for side in self.stance.planted:
+            columns = self.chain.leg_columns[side]
+            share = self.feet[1][:, side] @ self.wrench_slopes
+            slopes[:, :, columns] -= self.twists[:, columns] @ share
+            slopes[0][:, columns] -= self.moved_twists(columns, self.feet[0][:, side])
+        return slopes[:, :, ROOT:]
+
+
+TINY = 1e-30
+"""Step of the complex-step derivative: exact to machine precision."""
+
+
+def foot_forces(total: Array, stance: Stance) -> tuple[Array, Array]:
+    """Return the wrenches (T, 2, 6) of the right and left foot and their derivative (T, 2, 6, 6) with respect to the
+    total (T, 6).
+    """
+    if len(stance.planted) == 1:
+        chosen = np.eye(2)[stance.planted[0]]
+        return total[:, None] * chosen[:, None], np.broadcast_to(chosen[:, None, None] * np.eye(6), (len(total), 2, 6, 6))
+    stepped = total[:, None] + 1j * TINY * np.eye(6)
+    derivative = np.swapaxes(_share(stepped.reshape(-1, 6), stance.sole_centres).reshape(len(total), 6, 2, 6).imag / TINY, 1, 2)
+    return _share(total, stance.sole_centres), np.swapaxes(derivative, 2, 3)
+
+
+def _share(total: Array, centres: Array) -> Array:
+    force, moment = total[:, :3], total[:, 3:]
+    point = np.stack([-moment[:, 1] / force[:, 2], moment[:, 0] / force[:, 2]], axis=1)
+    reach = [np.sqrt(np.sum((point - c[:2]) ** 2, axis=1)) for c in centres]
+    right = reach[1] / (reach[0] + reach[1])
+    middle = right[:, None] * centres[0, :2] + (1 - right[:, None]) * centres[1, :2]
+    twist = moment[:, 2] - point[:, 0] * force[:, 1] + point[:, 1] * force[:, 0]
+    feet = []
+    for part, centre in ((right, centres[0]), (1 - right, centres[1])):
+        x, y = (point + centre[:2] - middle).T
+        own = np.stack([y * force[:, 2], -x * force[:, 2], x * force[:, 1] - y * force[:, 0] + twist], axis=1)
+        feet.append(part[:, None] * np.concatenate([force, own], axis=1))
+    return np.stack(feet, axis=1)
+
+
+def close_legs(chain: Chain, stance: Stance, x: Array, v: Array, a: Array) -> State:
+    """Return the state whose planted legs hold their feet still: angles, velocities and accelerations."""
+    x, v, a = chain.plant(x, stance.planted, stance.ankle), v.copy(), a.copy()
+    legs = [chain.leg_columns[side] for side in stance.planted]
+    for columns in legs:
+        v[:, columns] = a[:, columns] = 0.0
+    still = State(chain, stance, x, v, a)
+    if still.still:
+        return still
+    twists = still.twists
+    for columns in legs:
+        v[:, columns] = _solve(twists[:, columns], -np.einsum("tic,ti->tc", twists[:, :ROOT], v[:, :ROOT]))
+    moving = State(chain, stance, x, v.copy(), a)
+    moving.__dict__["_frames"] = still._frames
+    for columns in legs:
+        a[:, columns] = _solve(twists[:, columns], -moving.acceleration[:, columns[-1]])
+    state = State(chain, stance, x, v, a)
+    state.__dict__["_frames"] = still._frames
+    return state
+
+
+def _solve(twists: Array, right: Array) -> Array:
+    return np.asarray(np.linalg.solve(np.swapaxes(twists, 1, 2), right[..., None])[..., 0])
+
+
+class Closure:
+    """How planted legs follow the pelvis: slopes of their angles, rates and accelerations by those of the root, when
+    the feet stay still.
+
+    For each planted leg its columns and ``x`` (dx/dx, dv/dv and da/da), ``v`` (dv/dx), ``ax`` (da/dx), ``av`` (da/dv),
+    each (T, 6, 6); at rest only ``x``, the others are zero.
+    """
+
+    def __init__(self, state: State) -> None:
+        J = np.swapaxes(state.twists, 1, 2)
+        legs = [state.chain.leg_columns[side] for side in state.stance.planted]
+        inverse = [-np.linalg.inv(J[:, :, leg]) for leg in legs]
+        root = slice(0, ROOT)
+        self.legs = [(leg, {"x": inv @ J[:, :, root]}) for leg, inv in zip(legs, inverse, strict=True)]
+        if state.still:
+            return
+        V, A = state.velocity, state.acceleration
+        turned = spatial_cross(V, state.twists)
+        by_v, by_ax = -spatial_cross(state.twists, V), -spatial_cross(state.twists, A) - spatial_cross(turned, V)
+        rows_v, rows_ax, rows_av = (np.swapaxes(rows, 1, 2) for rows in (by_v, by_ax, 2 * turned))
+        for (leg, blocks), inv in zip(self.legs, inverse, strict=True):
+            x = blocks["x"]
+            blocks["v"] = v = inv @ (rows_v[:, :, root] + rows_v[:, :, leg] @ x)
+            blocks["ax"] = inv @ (rows_ax[:, :, root] + rows_ax[:, :, leg] @ x + rows_av[:, :, leg] @ v)
+            blocks["av"] = inv @ (rows_av[:, :, root] + rows_av[:, :, leg] @ x)
+
+    def followed(self, slopes: Array, time: NDArray[np.intp]) -> Array:
+        """Return slopes (R, n) by coordinates (or rates, or accelerations), each at its instant ``time`` (R,), with
+        those of the planted legs handed on to the root.
+        """
+        return self._handed(slopes.copy(), slopes, "x", time)
+
+    def turned(self, slopes: Array, kind: str, time: NDArray[np.intp]) -> Array:
+        """Return what slopes (R, n) by rates ("v") or accelerations ("ax", "av") become by coordinates or, last, by
+        rates of the root.
+        """
+        return self._handed(np.zeros_like(slopes), slopes, kind, time)
+
+    def _handed(self, out: Array, slopes: Array, kind: str, time: NDArray[np.intp]) -> Array:
+        for leg, blocks in self.legs:
+            if kind in blocks:
+                out[:, :ROOT] += (slopes[:, None, leg] @ blocks[kind][time])[:, 0]
+        return out

@@ -1,0 +1,1 @@
+"""Moves between postures: found one by one, planned for a whole dance, planned again where one is impossible."""

@@ -1,0 +1,91 @@
+"""What all stages of one design share, and what of it is kept on disk, so that a design that was interrupted goes on
+where it stopped.
+"""
+
+import hashlib
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import biodance
+from biodance.body.body import Body
+from biodance.body.body_file import body_text
+from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.excitation import Blocks
+from biodance.dance.problem.plan import Plan
+from biodance.dance.problem.stance import Stance
+from biodance.records import Array
+
+ROOMS = ("body", "dance", "identify", "motion")
+"""Rooms whose code decides what a dance becomes."""
+
+
+class Checkpoint:
+    """Named sets of arrays in a folder that belongs to one body, plan, seed and state of the code; without a folder
+    nothing is kept.
+    """
+
+    def __init__(self, folder: Path | None, body: Body, plan: Plan, seed: int) -> None:
+        key = hashlib.sha256(f"{code()}{body_text(body, '')}{plan!r}{seed}".encode()).hexdigest()[:16]
+        self.folder = folder / f"dance_{key}" if folder else None
+        if self.folder:
+            self.folder.mkdir(parents=True, exist_ok=True)
+
+    def get(self, name: str) -> dict[str, Array] | None:
+        """Return what was kept under ``name``, or None; a file that was cut off while written counts as nothing."""
+        path = self.folder / f"{name}.npz" if self.folder else None
+        if path is None or not path.exists():
+            return None
+        try:
+            with np.load(path, allow_pickle=False) as found:
+                return {key: found[key] for key in found.files}
+        except (OSError, ValueError, EOFError):
+            return None
+
+    def put(self, name: str, **arrays: NDArray[Any]) -> None:
+        """Keep arrays under ``name``."""
+        if self.folder:
+            part = self.folder / f"{name}.part.npz"
+            np.savez(part, allow_pickle=False, **arrays)
+            part.replace(self.folder / f"{name}.npz")
+
+
+@cache
+def code() -> str:
+    """Return a hash of the source of all `ROOMS`: parts that older code found do not fit those that newer code finds."""
+    rooms = Path(biodance.__file__).parent
+    files = sorted(file for room in ROOMS for file in (rooms / room).rglob("*.py"))
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+
+
+Tell = Callable[[str, int, int], None]
+"""Told what is being done, how many parts are finished and of how many."""
+
+
+@dataclass(frozen=True, eq=False)
+class DesignContext:
+    """One design: ``chain`` of the body, ``blocks`` that count, ``plan``, ``seed`` of all random numbers; ``ledger``
+    keeps what is finished, ``workers`` search side by side, ``tell`` is told the progress.
+    """
+
+    chain: Chain
+    blocks: Blocks
+    plan: Plan
+    seed: int
+    ledger: Checkpoint
+    workers: Executor
+    tell: Tell
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """Postures ``x`` (P, n), those in between included, in the order of the dance, on the feet ``stances`` (P,)."""
+
+    x: Array
+    stances: tuple[Stance, ...]

@@ -1,0 +1,222 @@
+"""Moves between postures: what excites the inertias within all limits (paper eq. 18-20), rest to rest through two via
+points.
+
+One problem instead of the paper's two stages: all free coordinates look for excitation, the zero-moment point is a
+limit and, weakly, part of the objective. The start is the smoothest straight move, which is nearly feasible; limits are
+kept on a coarse grid with a reserve and judged on a fine one.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance.dance.limits import Limit
+from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.excitation import Blocks, condition, dynamic_grams, dynamic_slopes, effort, total
+from biodance.dance.problem.nlp import Evaluation, NonlinearProgramme, Objective, free_coordinates, minimise
+from biodance.dance.problem.splines import basis_at
+from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.state import State
+from biodance.records import Array
+
+GRID = 10.0
+"""Hz at which limits are kept while designing; instants that turn out worse in between are added."""
+CHECK = 50.0
+"""Hz at which a move is judged before it is taken."""
+SLOW = 4.0
+"""s: longer moves, of slow robots, are judged at as many instants as a move of this time: it is the same spline through
+as many points.
+"""
+RESERVE = 0.04
+"""Share of every limit's scale that is kept in reserve for the instants in between."""
+BETWEEN = 0.004
+"""The same where a move is judged, for what is between those instants."""
+THIRDS = np.array([0.20987654, 0.79012346])
+"""Of the way at one and two thirds of the time, for least jerk (10 s³ - 15 s⁴ + 6 s⁵)."""
+ATTEMPTS = ((0.2, 1.0, (14, 8, 8)), (0.0, 0.2, (40, 12, 12)))
+"""Spread (rad) of the via points' start about the straight move, share of excitation in the objective, and iterations
+of the rounds: after each the worst instants are added and the reserve grows by a quarter.
+"""
+CENTRE = 0.1
+"""Worth of 1 dm² of mean squared distance of the zero-moment point from the middle, beside log cond."""
+LITTLE = 0.01
+"""s·(rad/s²)², information on every inertia that is supposed before the first move."""
+HOPELESS = 0.5
+"""Violation after a round, in scales, with which a start is given up; so is one whose limits cannot even be kept
+without the reserve on the coarse grid.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """A move to find: from ``ends[0]`` to ``ends[1]`` (2, n) in ``duration`` s on the feet of ``stance``, within the
+    ``limits``.
+    """
+
+    chain: Chain
+    blocks: Blocks
+    stance: Stance
+    ends: Array
+    duration: float
+    limits: tuple[Limit, ...]
+
+    @property
+    def excited(self) -> list[int]:
+        """Coordinates that excite: trunk and arms with both feet down, the free leg with one (paper Table I), all
+        joints when seated.
+        """
+        legs = [self.chain.leg_columns[side] for side in (0, 1) if side not in self.stance.planted]
+        return sorted([*([] if len(legs) == 1 else self.chain.upper), *(c for leg in legs for c in leg)])
+
+    @property
+    def segments(self) -> list[int]:
+        """The segments whose inertias the excited coordinates show."""
+        return [i for i, k in enumerate(self.chain.carriers) if k in self.excited]
+
+    def straight(self) -> Array:
+        """Return the via points (2, n) of the smoothest move."""
+        return np.asarray(self.ends[0] + THIRDS[:, None] * (self.ends[1] - self.ends[0]))
+
+    def problem(self, via: Array, free: list[int], time: Array, *, reserve: float, objective: Objective) -> NonlinearProgramme:
+        """Return the problem of the via points of the ``free`` coordinates at instants ``time`` s, the others as in
+        ``via`` (2, n).
+        """
+        basis, kept = basis_at(time, self.duration), tuple(limit for limit in self.limits if limit.in_motion)
+        points = np.stack([self.ends[0], *via, self.ends[1]])
+        points[1:3, free] = 0.0
+        parts = np.stack([basis.position, basis.velocity, basis.acceleration])
+        s = time / self.duration
+        way = s**3 * (10 - 15 * s + 6 * s**2)
+        least = [max(reserve, limit.move_reserve) if reserve > BETWEEN else reserve for limit in kept]
+        bell = np.where([limit.tapers for limit in kept], (4 * way * (1 - way))[:, None], 1.0)
+        share = np.array(least) * bell
+        return NonlinearProgramme(self.chain, self.stance, parts @ points, parts[:, :, 1:3], free, kept, objective, share)
+
+    def grid(self, rate: float) -> Array:
+        """Return the instants (T,) s between the ends at about ``rate`` Hz, of a long move fewer."""
+        return np.linspace(0.0, self.duration, round(min(self.duration, SLOW) * rate) + 1)[1:-1]
+
+    @property
+    def stretch(self) -> float:
+        """How much more time an instant of a long move stands for."""
+        return max(1.0, self.duration / SLOW)
+
+    def state(self, via: Array) -> State:
+        """Return the move through ``via`` on the coarse grid."""
+        return self.problem(via, [], self.grid(GRID), reserve=0.0, objective=_nothing).state(np.empty(0))
+
+
+@dataclass(frozen=True, eq=False)
+class Move:
+    """``via`` (2, n) of a move of ``duration`` s; ``gram`` (N, 6, 6) its own information on the inertias, integrated
+    over time; ``zmp_before``, ``zmp_after`` m, root mean square distance of the zero-moment point to the middle of
+    the support when only the excited coordinates leave the straight move, and in the move found; ``violation`` of
+    the limits in their scales (feasible: 0) and of which.
+    """
+
+    via: Array
+    duration: float
+    gram: Array
+    zmp_before: float
+    zmp_after: float
+    violation: float
+    limit: str
+
+
+@dataclass(frozen=True, eq=False)
+class MoveObjective:
+    """Mass-weighted mean log cond of the inertias after ``history`` (N, 6, 6), times ``share``, and the distance of the
+    ZMP.
+    """
+
+    task: Task
+    history: Array
+    share: float = 1.0
+
+    def __call__(self, state: State) -> tuple[float, Array]:
+        """Return the objective and its slopes by x, v, a."""
+        value, slope = off_centre(state)
+        value, slope = CENTRE * value, CENTRE * slope
+        if self.task.blocks.simplicity:
+            hard, by = effort(state)
+            value, slope = value + self.task.blocks.simplicity * hard, slope + self.task.blocks.simplicity * by
+        weight, picks = self.task.blocks.weight, self.task.blocks.second
+        segments = [i for i in self.task.segments if picks[i] and weight[i] > 0]
+        if not self.share or not segments:
+            return value, slope
+        grams = self.history + dynamic_grams(state, list(range(len(weight)))) * self.task.stretch / GRID + LITTLE * np.eye(6)
+        chosen = np.zeros(len(weight))
+        chosen[segments] = self.share * weight[segments] / weight[segments].sum()
+        found, by = total(chosen, grams, picks, measure=_logarithm)
+        return value + found, slope + dynamic_slopes(state, segments, by[segments] * self.task.stretch / GRID)
+
+
+def _logarithm(gram: Array) -> tuple[Array, Array]:
+    value, slope = condition(gram)
+    return np.log(value), slope / value[..., None, None]
+
+
+def _nothing(state: State) -> tuple[float, Array]:
+    return 0.0, np.zeros((3, *state.x.shape))
+
+
+def off_centre(state: State) -> tuple[float, Array]:
+    """Return the mean squared distance (dm²) of the zero-moment point to the middle of the support, and its slopes."""
+    wrench, slopes = state.wrench, state.wrench_slopes
+    lift = wrench[:, 2:3]
+    point = np.stack([-wrench[:, 4], wrench[:, 3]], axis=1) / lift
+    turned = np.stack([-slopes[:, :, 4], slopes[:, :, 3]], axis=2)
+    moved = (turned - point[None, :, :, None] * slopes[:, :, None, 2]) / lift[None, :, :, None]
+    gap = point - state.stance.centre
+    return 100 * float(np.mean(np.sum(gap**2, axis=1))), 200 / len(gap) * np.einsum("tc,ktcn->ktn", gap, moved)
+
+
+def find_move(task: Task, history: Array, *, rng: np.random.Generator) -> Move:
+    """Return the best feasible move found after the information ``history`` (N, 6, 6); if there is none, the one that
+    violates least.
+    """
+    best = None
+    for spread, share, rounds in ATTEMPTS:
+        via, time, objective = task.straight(), task.grid(GRID), MoveObjective(task, history, share)
+        via[:, task.excited] += rng.normal(0, spread, (2, len(task.excited)))
+        for k, iterations in enumerate(rounds):
+            reserve = RESERVE * (1 + k / 4)
+            via, violation = _improved(task, via, time, objective, iterations, reserve)
+            found, instants = evaluate_move(task, via)
+            if best is None or found.violation < best.violation:
+                best = found
+            if best.violation == 0:
+                return best
+            if violation > reserve or found.violation > HOPELESS:
+                break
+            time = np.union1d(time, instants)
+    assert best is not None
+    return best
+
+
+def _improved(task: Task, via: Array, time: Array, objective: MoveObjective, iterations: int, reserve: float) -> tuple[Array, float]:
+    """Return the via points found from ``via`` (2, n), and by how much they violate the limits with their ``reserve``
+    at ``time`` s.
+    """
+    free = free_coordinates(task.chain, task.stance)
+    problem = task.problem(via, free, time, reserve=reserve, objective=objective)
+    found, out = minimise(problem.evaluate, via[:, free].ravel(), iterations=iterations), via.copy()
+    out[:, free] = found.y.reshape(2, -1)
+    return out, found.violation
+
+
+def evaluate_move(task: Task, via: Array) -> tuple[Move, Array]:
+    """Return the move through ``via`` as it is, judged by all limits on the fine grid, and the worst instants s where
+    one is broken.
+    """
+    time = task.grid(CHECK)
+    problem = task.problem(via, [], time, reserve=BETWEEN, objective=_nothing)
+    found = Evaluation(problem, problem.state(np.empty(0)))
+    worst, limit = found.worst
+    left = np.pad(found.least, 1, constant_values=np.inf)
+    dips = (left[1:-1] < 0) & (left[1:-1] <= left[:-2]) & (left[1:-1] <= left[2:])
+    plain = task.straight()
+    plain[:, task.excited] = via[:, task.excited]
+    gram = dynamic_grams(found.state, list(range(len(task.chain.body.segments)))) * task.stretch / CHECK
+    before, after = (float(np.sqrt(off_centre(task.state(v))[0]) / 10) for v in (plain, via))
+    return Move(via, task.duration, gram, before, after, max(0.0, worst), limit if worst > 0 else ""), time[dips]

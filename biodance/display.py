@@ -1,0 +1,100 @@
+"""How a record shows itself in a notebook: a small table as HTML, and curves on matplotlib axes. Draws what it is given, computes nothing.
+
+Records are the lowest floor and may not ask the report to draw them, so what both draw lives below both.
+"""
+
+from collections.abc import Iterable, Sequence
+from html import escape
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, RED, PINK = (
+    "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7",
+)  # fmt: skip
+"""The eight colours of Okabe & Ito (2008), told apart with every common colour vision."""
+GREY = "#767676"
+STYLES: tuple[tuple[str, Any], ...] = ((BLUE, "-"), (RED, (0, (4, 2))), (GREEN, (0, (1, 1))), (BLACK, "-."), (ORANGE, "-"), (PINK, "--"))
+"""Colour and line style of curve after curve: never the colour alone."""
+ROWS = 12
+"""Rows of a table that a notebook shows; the others are counted."""
+
+
+class Interval(NamedTuple):
+    """One row of `intervals`: ``before`` and ``after`` are (value, low, high); ``known`` says how much the data tell."""
+
+    name: str
+    before: tuple[float, float, float]
+    after: tuple[float, float, float]
+    known: Literal["known", "partly known", "cannot be known"]
+
+
+def card(title: str, table: "pd.DataFrame | None" = None, notes: Iterable[str] = ()) -> str:
+    """Return HTML with a title, the first `ROWS` rows of a table, and sentences below it."""
+    parts = [f"<p><b>{escape(title)}</b></p>"]
+    if table is not None and len(table):
+        parts.append(table.head(ROWS).to_html(float_format=lambda number: f"{number:.4g}", na_rep="-"))
+        parts += [f"<p>... {len(table) - ROWS} more rows</p>"] if len(table) > ROWS else []
+    return "".join([*parts, *(f"<p>{escape(note)}</p>" for note in notes)])
+
+
+def axes_or_new(axes: "Axes | None") -> "Axes":
+    """Return ``axes``, or those of a new figure."""
+    if axes is not None:
+        return axes
+    import matplotlib.pyplot as plt
+
+    return plt.subplots(layout="constrained")[1]
+
+
+def curves(time: NDArray[Any], values: NDArray[Any], labels: Sequence[str], unit: str, *, axes: "Axes | None" = None) -> "Axes":
+    """Draw the columns of ``values`` (T, n) over ``time`` (T,) s, each with its label, and return the axes."""
+    drawn = axes_or_new(axes)
+    for k, label in enumerate(labels):
+        colour, style = STYLES[k % len(STYLES)]
+        drawn.plot(time, values[:, k], color=colour, linestyle=style, label=label)
+    drawn.set_xlabel("time (s)")
+    drawn.set_ylabel(unit)
+    drawn.legend()
+    return drawn
+
+
+def beside(
+    time: NDArray[Any], measured: NDArray[Any], simulated: NDArray[Any], used: NDArray[np.bool_], titles: Sequence[str]
+) -> "NDArray[Any]":
+    """Draw ``measured`` and ``simulated`` (T, 6), grey where frames are not ``used`` (T,), and return the six axes."""
+    import matplotlib.pyplot as plt
+
+    _, grid = plt.subplots(3, 2, sharex=True, layout="constrained", figsize=(7.1, 5.7))
+    for channel, title in enumerate(titles):
+        axes = grid[channel % 3, channel // 3]
+        axes.plot(time, measured[:, channel], color=BLACK, label="measured")
+        axes.plot(time, simulated[:, channel], color=RED, linestyle=(0, (4, 2)), label="simulated")
+        axes.fill_between(time, 0, 1, where=~used, transform=axes.get_xaxis_transform(), color="#EDEDED")
+        axes.set_ylabel(title)
+    grid[0, 0].legend()
+    for axes in grid[-1]:
+        axes.set_xlabel("time (s)")
+    return np.concatenate([grid[:, 0], grid[:, 1]])
+
+
+def intervals(rows: Sequence[Interval], *, axes: "Axes | None" = None) -> "Axes":
+    """Draw value and interval of every row, before (square) and after (circle: filled = known, pale = partly, open = not known)."""
+    drawn = axes_or_new(axes)
+    place = np.arange(len(rows))[::-1]
+    for y, row in zip(place, rows, strict=True):
+        drawn.plot(row.before[1:], [y + 0.17] * 2, color=GREY, linewidth=1.0)
+        drawn.plot(row.before[0], y + 0.17, marker="s", color=GREY, markersize=4, markerfacecolor="white")
+        drawn.plot(row.after[1:], [y - 0.17] * 2, color=RED if row.known != "cannot be known" else BLACK, linewidth=1.8)
+        inside = {"known": RED, "partly known": "#F2B08A", "cannot be known": "white"}[row.known]
+        edge = BLACK if row.known == "cannot be known" else RED
+        drawn.plot(row.after[0], y - 0.17, marker="o", color=edge, markersize=5.5, markerfacecolor=inside)
+    drawn.set_yticks(place, [row.name.replace("_", " ") for row in rows])
+    drawn.set_ylim(-0.7, len(rows) - 0.3)
+    drawn.grid(axis="y", visible=False)
+    return drawn

@@ -1,0 +1,154 @@
+"""The contract of an effect: one candidate cause of disagreement between the simulated and the measured wrench.
+
+The author of an effect writes its parameters and ONE of two methods; the other one is derived:
+
+- linear in its parameters: ``columns(case)``, what one unit of each parameter adds to the MEASURED wrench; ``transform`` adds them;
+- otherwise: ``transform(case, theta)``, the case that this cause would have produced; ``columns`` is its central difference at zero.
+
+What the markers say about a cause is optional: ``marker_columns`` (a change of their mean residual) or ``shown`` (a size by themselves).
+Causes that are found by a check instead of a fit (units, labels, clipping ...) are ``DiscreteEffect``.
+"""
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from biodance.effects._base.case import Case
+from biodance.errors import BiodanceError, UnknownName
+from biodance.records import CHANNELS, Array
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """``name``, ``unit`` as printed, ``typical`` size in that unit and the ``source`` of that size."""
+
+    name: str
+    unit: str
+    typical: float
+    source: str
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One cause at one ``target``: a segment, a channel (``Fz``), a pair (``Fz->My``), a plate and axis (``plate1:x``), or "" for none."""
+
+    target: str = ""
+    name: ClassVar[str] = ""
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
+    separated_by: ClassVar[str] = ""
+    """The movement that tells this cause from its look-alikes, in words for the analyst."""
+    placed: ClassVar[bool] = False
+    """Whether joints that a movement placed (`motion.functional_joints`) have taken up a part of this cause before anybody looks."""
+    advice: ClassVar[str] = ""
+    """What to do in the laboratory to settle it, and how it is mended."""
+
+    @classmethod
+    def targets(cls, case: Case) -> tuple[str, ...]:
+        """Return the legal targets in ``case``."""
+        return ("",)
+
+    def at(self, target: str, case: Case) -> "Effect":
+        """Return the effect at ``target``; UnknownName lists the legal targets."""
+        legal = self.targets(case)
+        if target not in legal:
+            raise UnknownName.of(f"target of {self.name}", target, legal)
+        return replace(self, target=target)
+
+    def everywhere(self, case: Case) -> tuple["Effect", ...]:
+        """Return the effect at every legal target in ``case``."""
+        return tuple(replace(self, target=target) for target in self.targets(case))
+
+    @property
+    def linear(self) -> bool:
+        """Whether ``columns`` says all: what is added, and what can be removed, is in proportion to the parameters."""
+        kind = type(self)
+        return kind.columns is not Effect.columns and all(
+            getattr(kind, name) is getattr(Effect, name) for name in ("transform", "added", "removed")
+        )
+
+    @property
+    def typical(self) -> Array:
+        """(p,) typical sizes, in the parameters' units."""
+        return np.array([parameter.typical for parameter in self.parameters])
+
+    def columns(self, case: Case) -> Array:
+        """Return (T, 6, p): what one unit of each parameter adds to the measured wrench minus the predicted one, about the lab origin."""
+        steps = 1e-3 * np.diag(self.typical)
+        return np.stack([(self.added(case, s) - self.added(case, -s)) / (2 * s.max()) for s in steps], axis=2)
+
+    def transform(self, case: Case, theta: Array) -> Case:
+        """Return the case that this cause of size ``theta`` (p,) would have produced."""
+        if type(self).columns is Effect.columns:
+            raise BiodanceError(f"Effect {self.name} defines neither columns nor transform; write one of them.")
+        return case.with_added(self.plate_of(case), self.columns(case) @ np.asarray(theta, dtype=float))
+
+    def added(self, case: Case, theta: Array) -> Array:
+        """Return (T, 6): what ``transform`` adds to measured minus predicted wrench; overridden only where that is quicker."""
+        return self.transform(case, np.asarray(theta, dtype=float)).residual - case.residual
+
+    def local(self, case: Case) -> Array | None:
+        """Return (T, 6, k): what one unit of each of k parameters of this trial alone adds, for a cause that comes and goes; None for the
+        others. The k parameters follow one another in time, as many for each of `parameters`.
+        """
+        return None
+
+    def marker_columns(self, case: Case) -> Array | None:
+        """Return (K, 3, p) m per unit: what one unit adds to ``case.marker_residual``; None where the markers say nothing."""
+        return None
+
+    def shown(self, *cases: Case) -> Array | None:
+        """Return (p,) the size that the markers of all ``cases`` show by themselves, without any force, NaN for a parameter that they do
+        not show; None where they say nothing.
+        """
+        return None
+
+    def removed(self, case: Case, theta: Array) -> Array:
+        """Return (T, 6): what this cause of size ``theta`` (p,) has added to what ``case`` measured, about the lab origin.
+
+        By default what it adds to the prediction; a cause that distorts time or frequency undoes itself in what was measured, because
+        it distorts the person's other errors and loads as well.
+        """
+        return self.added(case, theta)
+
+    def corrected(self, case: Case, theta: Array) -> Case:
+        """Return the case without this cause of size ``theta`` (p,): what would have been measured, or the body that moves right.
+
+        By default the plates lose what was ``removed``; a cause in the body returns another body and its motion instead.
+        """
+        return case.with_added(self.plate_of(case), -self.removed(case, theta))
+
+    def possible(self, theta: Array) -> bool:
+        """Return whether a cause of size ``theta`` (p,) can be: by default every size, either way."""
+        return True
+
+    def reported(self, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
+        """Return name, value, standard deviation and unit of what a report prints for ``theta`` (p,) with ``sd`` (p,)."""
+        return tuple((p.name, float(t), float(s), p.unit) for p, t, s in zip(self.parameters, theta, sd, strict=True))
+
+    def plate_of(self, case: Case):  # type: ignore[no-untyped-def]
+        """Return the plate that the target names, or the first one."""
+        name = self.target.partition(":")[0]
+        return case.plate(name) if name.startswith("plate") else case.trial.plates[0]
+
+
+def plate_channels(case: Case, channels: tuple[str, ...] = CHANNELS) -> tuple[str, ...]:
+    """Return the targets ``Fx`` ... for one plate, ``plate2:Fx`` ... for several."""
+    if len(case.trial.plates) == 1:
+        return channels
+    return tuple(f"{plate.name}:{channel}" for plate in case.trial.plates for channel in channels)
+
+
+def channel_index(target: str) -> int:
+    """Return the index 0..5 of the channel that a target names last (``Fz``, ``plate2:Fz``)."""
+    return CHANNELS.index(target.rpartition(":")[2])
+
+
+def plate_axes(case: Case) -> tuple[str, ...]:
+    """Return the targets ``plate1:x``, ``plate1:y``, ``plate1:z`` of every plate."""
+    return tuple(f"{plate.name}:{axis}" for plate in case.trial.plates for axis in "xyz")
+
+
+def axis_vector(target: str) -> Array:
+    """Return the unit vector (3,) of the axis that a target ends with."""
+    return np.eye(3)["xyz".index(target[-1])]

@@ -1,0 +1,185 @@
+"""Causes in the body's geometry: what a moved joint or marker changes in the tracked posture, the wrench and the markers' residuals.
+
+Computed at 25 Hz or more (the low-pass leaves nothing above 10 Hz) and interpolated; one factorisation per frame serves all causes.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.body.moved import carried_by, neutral_turn
+from biodance.effects._base.moved_matter import MovedMatter, centres, moved_matter, wrench_of
+from biodance.effects._base.posture_answer import PostureAnswer
+from biodance.lab.filters import LowPass, motion_filter
+from biodance.motion.kinematics import Poses, SegmentMotion
+from biodance.motion.marker_jacobian import below, chains, jacobian, skew
+from biodance.records import Array, Index
+
+if TYPE_CHECKING:
+    from biodance.effects._base.case import Case
+
+RATE = 25.0
+"""Hz, at least, of the frames in which the answer is computed."""
+ENDS = 10
+"""Frames at each end of the trial that are all computed."""
+MEANS = 60
+"""Frames, about, over which the mean marker residual is taken: it changes slowly."""
+
+
+@dataclass(frozen=True, eq=False)
+class Geometry:
+    """What a trial says about its body's geometry.
+
+    ``time`` (F,) s of the chosen frames, ``wanted`` (T,) s of all; ``answer`` of the posture; ``matter`` P, Q, S (F, 9, nv) per unit of
+    every coordinate; ``direct`` (F, 9, N, 3) per metre of every segment; ``turns`` (F, N, 3, nv) rad of the segments per unit of every
+    coordinate; ``seen`` (F, K) 1 where a marker was seen; ``phi`` (10N,) the parameters of the matter;
+    ``smoothed`` the low-pass of the motion.
+    """
+
+    time: Array
+    wanted: Array
+    answer: PostureAnswer
+    matter: Array
+    direct: Array
+    turns: Array
+    seen: Array
+    phi: Array
+    smoothed: LowPass
+
+    @cached_property
+    def marker_changes(self) -> "Changes":
+        """What one metre of every marker of the model does, three axes of its segment each: P = 3 K."""
+        answer = self.answer
+        frames, count = answer.weight.shape
+        moved = np.zeros((frames, count, 3, count, 3))
+        moved[:, range(count), :, range(count)] = np.moveaxis(answer.pose.rotation[:, list(answer.segment)], 1, 0)
+        posture = answer.follow(answer.marker_slopes())
+        return Changes(self._wrench(self.matter @ posture), self._residual(posture, moved.reshape(frames, count, 3, -1)))
+
+    @cached_property
+    def joint_changes(self) -> "Changes":
+        """What one metre does at every anatomical joint, P = 4 per joint: its centre along the three axes of the segment nearer to the
+        root, all else kept in the neutral posture; and that segment longer towards the joint, all beyond it carried along.
+        """
+        answer, slopes, direct, moved = self.answer, [], [], []
+        hanging = below(answer.body)
+        for chain in chains(answer.body):
+            centre, carried = _moves(answer, chain)
+            slopes.append(answer.joint_slopes(chain, centre, carried))
+            direct.append(self.direct[:, :, hanging[chain[-1]] > 0].sum(axis=2) @ carried)
+            moved.append(answer.hangs[chain[-1]][:, None, None] * carried[:, None])
+        posture = answer.follow(np.concatenate(slopes, axis=2))
+        wrench = self._wrench(self.matter @ posture + np.concatenate(direct, axis=2))
+        return Changes(wrench, self._residual(posture, np.concatenate(moved, axis=3)))
+
+    def _wrench(self, nine: Array) -> Array:
+        return wrench_of(nine, self.time, self.wanted, smoothed=self.smoothed, gravity=self.answer.body.gravity)
+
+    def _residual(self, posture: Array, moved: Array) -> Array:
+        """Return the change (K, 3, P) m of the mean marker residual (measured less model, segment axes) when the model's markers move by
+        ``moved`` (F, K, 3, P) m at fixed posture and the posture changes by ``posture`` (F, nv, P).
+        """
+        answer, few = self.answer, slice(None, None, max(1, len(self.time) // MEANS))
+        segment, (frames, count) = list(answer.segment), answer.weight[few].shape
+        wide = (frames, count, 3, posture.shape[2])
+        place = (answer.tangent[few].reshape(frames, 3 * count, -1) @ posture[few]).reshape(wide) + moved[few]
+        turns = self.turns[few][:, segment].reshape(frames, 3 * count, -1)
+        weight = np.where(answer.weight > 0, answer.weight, 1.0)[few]
+        apart = skew(answer.apart[few] / weight[..., None])
+        change = -(apart @ (turns @ posture[few]).reshape(wide)) - place
+        lasting = self.seen[few] * np.gradient(self.time)[few, None]
+        share = lasting / np.maximum(lasting.sum(axis=0), 1e-12)
+        back = np.swapaxes(answer.pose.rotation[few][:, segment], 2, 3) * share[..., None, None]
+        return np.asarray((back @ change).sum(axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class Changes:
+    """Per metre of P changes in the body's geometry: of the wrench (T, 6, P) about the lab origin that the tracked motion needs, and of the
+    mean marker residual (K, 3, P), measured less model in segment axes.
+    """
+
+    wrench: Array
+    residual: Array
+
+
+def _moves(answer: PostureAnswer, chain: tuple[int, ...]) -> tuple[Array, Array]:
+    """Return how a joint's origin and what hangs on it move (F, 3, 4) in the four changes of ``joint_changes``."""
+    joint, pose = answer.body.joints[chain[0]], answer.pose
+    parent = pose.root_rotation if joint.parent < 0 else pose.joint_rotation[:, joint.parent]
+    kept = pose.rotation[:, carried_by(answer.body, chain[0])] @ neutral_turn(answer.body, chain[0])
+    out = parent @ (joint.translation / max(float(np.linalg.norm(joint.translation)), 1e-9))[:, None]
+    return np.concatenate([parent, out], axis=2), np.concatenate([parent - kept, out], axis=2)
+
+
+def geometry(case: "Case") -> Geometry:
+    """Return the geometry of a tracked trial."""
+    every = _frames(case.motion.time.size, case.motion.rate)
+    pose, body = _poses(case.poses, every), case.body
+    columns = list(case.marker_columns)
+    segment = tuple(body.markers.segment[c] for c in columns)
+    markers = pose.points(list(segment), body.markers.position[columns])
+    measured = case.measured_markers[every]
+    seen = np.asarray(np.isfinite(measured).all(axis=2), dtype=float)
+    weight = seen * body.markers.weight[columns]
+    apart = weight[..., None] * np.where(seen[..., None] > 0, markers - measured, 0.0)
+    answer = PostureAnswer(body, pose, case.motion.q[every, body.nq - len(body.joints) :], segment, markers, apart, weight)
+    com = pose.points(list(range(len(body.segments))), centres(case.phi))
+    place, turn = jacobian(body, pose, list(range(len(body.segments))), com)
+    shape = (len(com), len(body.segments), 3, body.nv)
+    speed = (place @ _tangent_speed(case, pose, every)[..., None]).reshape(shape[:3])
+    parts = moved_matter(_move(case.segments, every), case.phi, speed)
+    return Geometry(
+        case.motion.time[every],
+        case.motion.time,
+        answer,
+        _by_posture(parts, place, turn),
+        parts.by_place,
+        turn.reshape(shape),
+        seen,
+        case.phi,
+        motion_filter(case.trial.settings),
+    )
+
+
+def _frames(count: int, rate: float) -> Index:
+    """Return the frames at RATE or more, and all of them at both ends, where a coarse spline would err."""
+    chosen = np.arange(count) % max(1, int(rate / RATE + 1e-6)) == 0
+    chosen[:ENDS] = chosen[-ENDS:] = True
+    return np.flatnonzero(chosen)
+
+
+def _by_posture(parts: MovedMatter, place: Array, turn: Array) -> Array:
+    """Return P, Q, S (F, 9, nv) per unit of every coordinate."""
+    frames = len(place)
+    return np.asarray(parts.by_place.reshape(frames, 9, -1) @ place + parts.by_turn.reshape(frames, 9, -1) @ turn)
+
+
+def _tangent_speed(case: "Case", pose: Poses, every: Index) -> Array:
+    """Return the velocity (F, nv) in the lab-frame tangent."""
+    v = np.array(case.motion.v[every])
+    for k in range(0, case.body.n_root, 3):
+        v[:, k : k + 3] = (pose.root_rotation @ v[:, k : k + 3, None])[..., 0]
+    return v
+
+
+def _poses(pose: Poses, every: Index) -> Poses:
+    return Poses(*(getattr(pose, name)[every] for name in Poses.__dataclass_fields__))
+
+
+def _move(move: SegmentMotion, every: Index) -> SegmentMotion:
+    return SegmentMotion(*(getattr(move, name)[every] for name in SegmentMotion.__dataclass_fields__))
+
+
+def joint_name(body: Body, chain: tuple[int, ...]) -> str:
+    """Return the name of an anatomical joint: ``right_hip`` of ``right_hip_flexion`` ...; of a lone joint its own."""
+    name = body.joints[chain[0]].name
+    return name.rpartition("_")[0] or name
+
+
+def joint_chains(body: Body) -> dict[str, tuple[int, ...]]:
+    """Return the anatomical joints by name, each with its axes from the parent outwards."""
+    return {joint_name(body, chain): chain for chain in chains(body)}

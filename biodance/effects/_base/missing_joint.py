@@ -1,0 +1,195 @@
+"""A joint that the body has and the model lacks: tracked again with it, to see how it moves and what that changes in the wrench.
+
+The author of such a cause writes the body with the joint (``loosened``) and the angle that everybody moves it by (``natural``).
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from biodance.body.body import Body
+from biodance.body.inertia import Lump, parameters
+from biodance.body.segment_data import read_segment_table
+from biodance.effects._base.case import Case
+from biodance.effects._base.effect import Effect
+from biodance.errors import TrialRefused
+from biodance.lab.filters import LowPass, low_pass, motion_filter
+from biodance.motion.inverse_kinematics import solve_ik
+from biodance.motion.kinematics import poses
+from biodance.motion.regressor import regressor
+from biodance.motion.smoothing import smooth
+from biodance.motion.track import track
+from biodance.records import Array, Markers
+
+RATE = 25.0
+"""Hz, at least: the low-pass leaves nothing that needs more."""
+
+SLACK = 0.05
+"""Weight of markers that are not to be relied on, as a share of their own."""
+
+
+class MissingJoint(Effect, ABC):
+    """A joint that turns by an angle (rad rms per axis, the first parameter) in the course of time that its markers show; the second
+    parameter is what the wrench shows beyond that.
+    """
+
+    natural: ClassVar[float] = 0.0
+    """rad rms per axis that skin, breathing and habit make in any session."""
+
+    @classmethod
+    @abstractmethod
+    def loosened(cls, case: Case) -> Body | None:
+        """Return the body of ``case`` with the joint; None where the trial's markers do not show it."""
+
+    @classmethod
+    def targets(cls, case: Case) -> tuple[str, ...]:
+        """Return one target where the markers show the joint."""
+        return ("",) if cls.loosened(case) is not None else ()
+
+    def columns(self, case: Case) -> Array:
+        """Return (T, 6, 2) the wrench that the joint's motion adds, per radian: of the angle shown, and of more than that."""
+        found = _movement(case, self)
+        if found is None:
+            return np.zeros((case.motion.time.size, 6, 2))
+        added = make_interp_spline(found.time, found.wrench(case) / max(found.angle, 1e-6), k=5)(case.motion.time)
+        return np.repeat(added[:, :, None], 2, axis=2)
+
+    def marker_columns(self, case: Case) -> Array:
+        """Return (K, 3, 2) m per radian: the mean residual that the angle shown explains."""
+        found = _movement(case, self)
+        nearer = np.zeros_like(case.marker_residual) if found is None else found.markers / max(found.angle, 1e-6)
+        return np.stack([nearer, np.zeros_like(nearer)], axis=2)
+
+    def shown(self, *cases: Case) -> Array:
+        """Return (2,) rad: the angle in all ``cases`` that is left when the natural one is taken off (squares of independent movements add
+        up), and NaN for what only the wrench can show.
+        """
+        found = [(case.motion.time.size, _movement(case, self)) for case in cases]
+        square = sum(frames * one.angle**2 for frames, one in found if one is not None) / sum(frames for frames, _ in found)
+        return np.array([np.sqrt(max(square - self.natural**2, 0.0)), np.nan])
+
+    def corrected(self, case: Case, theta: Array) -> Case:
+        """Return the trial tracked with the body that has the joint."""
+        body = self.loosened(case)
+        return case if body is None else replace(case, body=body, motion=track(body, case.trial), phi=_parameters(case, body))
+
+
+@dataclass(frozen=True, eq=False)
+class Movement:
+    """A trial tracked with the joint, at ``time`` (F,) s: ``loose`` (F, 6, 10N') regressor of the ``body`` with it, ``stiff`` (F, 6, 10N)
+    of the one without; ``markers`` (K, 3) m by which the model's markers come nearer on average, in segment axes; ``angle`` rad rms of the
+    joint's axes.
+    """
+
+    time: Array
+    body: Body
+    loose: Array
+    stiff: Array
+    markers: Array
+    angle: float
+
+    def wrench(self, case: Case) -> Array:
+        """Return (F, 6) about the lab origin: what the joint's motion adds with the parameters in use."""
+        return np.asarray(self.loose @ _parameters(case, self.body) - self.stiff @ case.phi)
+
+
+def _movement(case: Case, effect: MissingJoint) -> Movement | None:
+    """Return how the joint moves; None where the markers do not determine it or are not there."""
+    if effect.name not in case.memory:
+        body = effect.loosened(case)
+        try:
+            case.memory[effect.name] = None if body is None else _tracked(case, body)
+        except TrialRefused:
+            case.memory[effect.name] = None
+    found = case.memory[effect.name]
+    assert found is None or isinstance(found, Movement)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Slow:
+    """A trial at about `RATE`: ``markers`` low-passed, postures ``q`` (F, nq) as tracked, and the regressor (F, 6, 10N) of them."""
+
+    markers: Markers
+    q: Array
+    regressor: Array
+    settings: LowPass
+
+
+def _slow(case: Case) -> _Slow:
+    """Return the trial at about `RATE`, as it was tracked."""
+    if "slow" not in case.memory:
+        every = slice(None, None, max(1, int(case.motion.rate / RATE + 1e-6)))
+        markers, time = case.trial.markers, case.motion.time[every]
+        assert markers is not None
+        usual = motion_filter(case.trial.settings)
+        calm = Markers(markers.names, time, low_pass(markers.xyz, case.motion.rate, usual)[every])
+        settings = replace(usual, cutoff=min(usual.cutoff, 0.45 * case.motion.rate / (every.step or 1)))
+        stiff = smooth(case.body, time, case.motion.q[every], settings=settings)
+        case.memory["slow"] = _Slow(calm, stiff.q, regressor(case.body, stiff), settings)
+    found = case.memory["slow"]
+    assert isinstance(found, _Slow)
+    return found
+
+
+def _tracked(case: Case, body: Body) -> Movement:
+    slow = _slow(case)
+    names = {joint.name for joint in case.body.joints}
+    new = np.flatnonzero([joint.name not in names for joint in body.joints]) + body.nq - len(body.joints)
+    guess = np.insert(slow.q, new - np.arange(new.size), 0.0, axis=1)
+    time = slow.markers.time
+    loose = smooth(body, time, solve_ik(body, slow.markers, guess=guess).q, settings=slow.settings)
+    angle = float(np.sqrt(loose.q[:, new].var(axis=0).mean()))
+    return Movement(time, body, regressor(body, loose), slow.regressor, _markers(case, body, loose.q, slow.q), angle)
+
+
+def _markers(case: Case, body: Body, loose: Array, stiff: Array) -> Array:
+    """Return (K, 3) m: the mean step of the model's markers from the postures without to those with the joint, in segment axes."""
+    columns = list(case.marker_columns)
+    places, markers = case.body.markers, body.markers
+    before, after = poses(case.body, stiff), poses(body, loose)
+    segment = [places.segment[c] for c in columns]
+    step = after.points([markers.segment[c] for c in columns], markers.position[columns]) - before.points(segment, places.position[columns])
+    return np.asarray(np.einsum("tkij,tki->kj", before.rotation[:, segment], step) / len(step))
+
+
+def _parameters(case: Case, body: Body) -> Array:
+    """Return the parameters in use of the body with more segments: what was cut off keeps the table's."""
+    phi = np.array(body.sip.phi)
+    phi[: case.phi.size] += case.phi - case.body.sip.phi
+    return phi
+
+
+def share_of_body(body: Body, segment: str, *, top: Array, bottom: Array) -> Array:
+    """Return the ten parameters (10,) of a part of the trunk between ``bottom`` and ``top`` (3,) m, by its name in de Leva's table (mean of
+    women and men), in the frame of the two points; masses in proportion to the body's.
+    """
+    table = read_segment_table("de_leva_1996")
+    rows = [
+        (
+            table.value(segment, "mass", sex=sex),
+            table.value(segment, "com", "longitudinal", sex=sex),
+            *table.values(segment, "gyration", "sagittal transverse longitudinal", sex=sex),
+        )
+        for sex in ("F", "M")
+    ]
+    fraction, place, sagittal, transverse, along = np.mean(rows, axis=0)
+    mass, length = fraction * float(body.sip.mass.sum()), float(np.linalg.norm(top - bottom))
+    inertia = mass * length**2 * np.diag([sagittal**2, along**2, transverse**2])
+    return parameters(Lump(mass, top + place * (bottom - top), inertia))
+
+
+def shoulders(body: Body) -> Array | None:
+    """Return the middle (3,) m between the shoulder joints in the trunk's frame; None for a body without them."""
+    places = [joint.translation for joint in body.joints if joint.name.endswith("shoulder_flexion")]
+    return np.mean(places, axis=0) if len(places) == 2 and "trunk_head" in body.segments else None
+
+
+def doubting(body: Body, names: Iterable[str]) -> Body:
+    """Return the body whose markers ``names`` hardly count: what they show is not this joint, but skin or another joint."""
+    weight = np.where(np.isin(body.markers.names, list(names)), SLACK, 1.0) * body.markers.weight
+    return replace(body, markers=replace(body.markers, weight=weight))

@@ -1,0 +1,42 @@
+"""A mass on a spring and a damper that rides on a moving point: what it adds to the wrench.
+
+Relative to the point, x'' + 2 damping w x' + w² x = -a with w = 2 pi frequency and a the point's acceleration; gravity only sets the place
+of rest. The ground then carries m (a + x'') instead of m a, at the place c + x instead of c.
+"""
+
+import numpy as np
+from scipy.signal import cont2discrete, lfilter, lfilter_zi, ss2tf
+
+from biodance.effects._base.case import Case
+from biodance.motion.kinematics import cross
+from biodance.records import Array
+
+
+def relative_motion(acceleration: Array, rate: float, *, frequency: float, damping: float) -> tuple[Array, Array]:
+    """Return x (T, n) m and x'' (T, n) m/s² of the mass, exact for an ``acceleration`` (T, n) m/s² that is linear between samples.
+
+    ``rate`` Hz; ``frequency`` Hz and ``damping`` (1 = critical) of the free mass, which starts at rest on the moving point.
+    """
+    w = 2 * np.pi * frequency
+    system = (np.array([[0, 1], [-w * w, -2 * damping * w]]), np.array([[0], [-1]]), np.eye(2), np.zeros((2, 1)))
+    A, B, C, D, _ = cont2discrete(system, 1 / rate, method="foh")
+    numerators, denominator = ss2tf(A, B, C, D)
+    place, speed = (
+        lfilter(b, denominator, acceleration, axis=0, zi=lfilter_zi(b, denominator)[:, None] * acceleration[:1])[0] for b in numerators
+    )
+    return place, -acceleration - w * w * place - 2 * damping * w * speed
+
+
+def point_motion(case: Case, segment: int, local: Array) -> tuple[Array, Array]:
+    """Return place (T, 3) m and acceleration (T, 3) m/s² of the point ``local`` (3,) m of a segment, lab frame, without gravity."""
+    move = case.segments
+    arm = move.rotation[:, segment] @ local
+    omega, alpha = move.angular_velocity[:, segment], move.angular_acceleration[:, segment]
+    acceleration = move.acceleration[:, segment] + cross(alpha, arm) + cross(omega, cross(omega, arm))
+    return move.position[:, segment] + arm, acceleration
+
+
+def riding_wrench(place: Array, acceleration: Array, moved: tuple[Array, Array], *, gravity: Array) -> Array:
+    """Return (T, 6) per kilogram about the lab origin: what the relative motion ``moved`` (x, x'') adds at a point (T, 3)."""
+    x, relative = moved
+    return np.concatenate([relative, cross(place, relative) + cross(x, acceleration - gravity)], axis=1)

@@ -1,0 +1,27 @@
+"""AMTI text: one force plate as a bare table of numbers."""
+
+import re
+from pathlib import Path
+
+from biodance.lab.readers import head_text
+from biodance.records import Role, Trial
+
+NAME = "AMTI text"
+EXTENSIONS = (".asc", ".txt", ".csv")
+PREFERENCE = 90
+"""Asked last: any table of numbers looks like this format."""
+NUMBER = r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?"
+ROW = re.compile(rf"\s*{NUMBER}(?:[\s,;]+{NUMBER}){{5,}}[\s,;]*")
+
+
+def sniff(head: bytes) -> bool:
+    """Return whether the rows after the first (which may be labels) hold at least six numbers each."""
+    rows = [line for line in head_text(head).splitlines()[:4] if line.strip()]
+    return bool(rows) and all(ROW.fullmatch(line) for line in rows[1:] or rows)
+
+
+def read(path: Path, *, role: Role, subject: str | None = None) -> Trial:
+    """Return the trial of a text export (`biodance.lab.amti`)."""
+    from biodance.lab.amti import read_amti_ascii
+
+    return read_amti_ascii(path, role=role)

@@ -1,0 +1,70 @@
+"""OpenSim's table of markers, with the forces in a table of the same stem beside it."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from biodance.errors import FileRefused
+from biodance.lab.ground_forces import has_plates, plates_of
+from biodance.lab.mot import Table, columns_of, read_mot
+from biodance.lab.plain_text import read_bytes, sha256
+from biodance.lab.readers import head_text
+from biodance.lab.readers.mot import rate_of
+from biodance.lab.trc import read_trc
+from biodance.records import Role, Trial
+
+NAME = "markers of OpenSim"
+EXTENSIONS = (".trc",)
+PREFERENCE = 10
+FORCES_BESIDE = ("", "_grf", "_GRF", "_forces", "_ground_forces")
+
+
+def sniff(head: bytes) -> bool:
+    """Return whether the head begins with "PathFileType"."""
+    return head_text(head).startswith("PathFileType")
+
+
+def read(path: Path, *, role: Role, subject: str | None = None) -> Trial:
+    """Return the trial of a .trc file; with plates where a table of forces lies beside it."""
+    trial = read_trc(path, role=role)
+    forces = beside(path)
+    return _with_forces(trial, forces) if forces else trial
+
+
+def beside(path: Path) -> Path | None:
+    """Return the .mot or .sto file with plate columns that belongs to a .trc file (or should, but is damaged); None if there is none."""
+    for candidate in (path.with_name(f"{path.stem}{ending}{suffix}") for ending in FORCES_BESIDE for suffix in (".mot", ".sto")):
+        if candidate.is_file():
+            try:
+                if has_plates(columns_of(candidate)):
+                    return candidate
+            except FileRefused:
+                return candidate
+    return None
+
+
+def _with_forces(trial: Trial, path: Path) -> Trial:
+    """Return the trial of a .trc file with the plates of the table beside it; a damaged table is a warning, the markers stay."""
+    try:
+        table = read_mot(path)
+        plates, said = plates_of(table, where=str(path))
+    except FileRefused as error:
+        return replace(trial, warnings=(*trial.warnings, f"The forces beside the markers were left out. {error}"))
+    digest = sha256((trial.source.sha256 + sha256(read_bytes(path))).encode())
+    return replace(
+        trial,
+        plates=plates,
+        source=replace(trial.source, format="TRC + MOT", sha256=digest, analog_rate=rate_of(plates)),
+        history=(*trial.history, f"Forces were read from {path.name} beside it.", *said),
+        warnings=(*trial.warnings, *table.warnings, *_out_of_step(trial, table)),
+    )
+
+
+def _out_of_step(trial: Trial, table: Table) -> list[str]:
+    """Return a warning if markers and forces do not cover the same time."""
+    assert trial.markers is not None  # a .trc file always holds markers
+    time = trial.markers.time
+    overlap = min(time[-1], table.time[-1]) - max(time[0], table.time[0])
+    if overlap >= 0.9 * (time[-1] - time[0]):
+        return []
+    span = f"{time[0]:g} to {time[-1]:g} s, the forces {table.time[0]:g} to {table.time[-1]:g} s"
+    return [f"The markers cover {span}: they may not belong together."]

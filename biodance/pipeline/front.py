@@ -1,0 +1,386 @@
+"""What ``import biodance`` conducts: one function for each thing that an analyst asks of a visit; the commands call the same ones."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
+
+from biodance import display
+from biodance.body.body import Body
+from biodance.discovery import Chosen
+from biodance.effects import DiscreteEffect, Effect, causes
+from biodance.lab.session import read_session
+from biodance.pipeline.diagnosis import SessionDiagnosis, diagnose_session
+from biodance.pipeline.identification import SessionIdentification, identify_trials
+from biodance.pipeline.results import SessionResult
+from biodance.pipeline.session import examine, identified
+from biodance.records import Session, Subject
+from biodance.uncertainty.tolerances import Tolerances
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from biodance.dance.dance import Dance
+    from biodance.dance.verify import Margin
+    from biodance.pipeline.dance import DanceResult
+
+Visit: TypeAlias = Session | SessionResult | str | Path
+"""A session: as read, as examined, or its folder."""
+Earlier: TypeAlias = SessionIdentification | Visit
+"""An earlier session: as identified, or anything that can be."""
+Tell: TypeAlias = Callable[[str], None]
+
+
+def _silent(_: str) -> None:
+    """Tell nobody."""
+
+
+@dataclass(frozen=True, eq=False)
+class SessionComparison:
+    """Two visits of one person, side by side.
+
+    Parameters
+    ----------
+    earlier, later : SessionIdentification
+        What each says by itself; ``later.changes`` are the differences, ``later.search`` the load looked for against ``earlier``.
+
+    Examples
+    --------
+    >>> compared = biodance.compare_sessions(identified, identified)
+    >>> compared
+    SessionComparison('visit' -> 'visit': no certain change)
+    """
+
+    earlier: SessionIdentification
+    later: SessionIdentification
+
+    def __repr__(self) -> str:
+        sure = [one for one in self.later.changes if one.known and one.p < CERTAIN / max(1, len(self.later.changes))]
+        told = ", ".join(f"{one.segment} {one.quantity} {one.value:+.3g} {one.unit}" for one in sure) or "no certain change"
+        return f"SessionComparison({self.earlier.name!r} -> {self.later.name!r}: {told})"
+
+    def _repr_html_(self) -> str:
+        return display.card(repr(self), self.table())
+
+    def table(self) -> "pd.DataFrame":
+        """Return one row for each quantity of each segment.
+
+        Returns
+        -------
+        pandas.DataFrame
+            segment, quantity, unit, difference (later less earlier), sd, low, high (95 %), p, known.
+
+        Examples
+        --------
+        >>> compared = biodance.compare_sessions(identified, identified)
+        >>> float(compared.table()["difference"].abs().max()) < 1e-6
+        True
+        """
+        import pandas as pd
+
+        rows = [(c.segment, c.quantity, c.unit, c.value, c.sd, *c.interval, c.p, c.known) for c in self.later.changes]
+        return pd.DataFrame(rows, columns=["segment", "quantity", "unit", "difference", "sd", "low", "high", "p", "known"])
+
+
+CERTAIN = 0.05
+"""Probability that any of all changes is called certain though nothing changed (Bonferroni)."""
+
+
+def identify(session: Visit, *, reference: Earlier | None = None, tell: Tell = _silent) -> SessionIdentification:
+    """Return what every segment of a person weighs, with intervals, validated on the trials kept.
+
+    Parameters
+    ----------
+    session : Session, SessionResult, str or pathlib.Path
+        The visit: as `read_session` or `examine` return it, or its folder.
+    reference : SessionIdentification, Session, SessionResult, str or pathlib.Path, optional
+        An earlier visit of the same person without load: a load is then looked for against it instead of the table.
+    tell : callable, optional
+        Called with what is being done, in words.
+
+    Returns
+    -------
+    SessionIdentification
+        ``identification.sip`` (N segments, kg, kg·m, kg·m² in the segments' joint frames) with covariance and `status`, the agreement of
+        table and identified body with the plates on every trial, and the search for an added mass.
+
+    Raises
+    ------
+    SessionRefused
+        There is no trial to identify from; the message says why.
+
+    See Also
+    --------
+    diagnose : What the simulation gets wrong.
+
+    References
+    ----------
+    Bayesian linear regression of the ground wrench on the standard inertial parameters, physically consistent by linear matrix
+    inequalities; docs/derivations.md.
+
+    Examples
+    --------
+    >>> identified = biodance.identify(result)
+    >>> identified
+    SessionIdentification('visit': solved, 12 segments, 61.7 kg)
+    """
+    result = _examined(session, tell)
+    if reference is None:
+        return identified(result)
+    return identified(_against(result, _earlier(reference, tell)))
+
+
+def diagnose(
+    session: Visit,
+    *,
+    reference: Earlier | None = None,
+    effects: Chosen[Effect | DiscreteEffect | type[Effect | DiscreteEffect]] = None,
+    tolerances: Tolerances | None = None,
+    tell: Tell = _silent,
+) -> SessionDiagnosis:
+    """Return what the simulation of a visit gets wrong: cause, size, how sure, what else it could be, and what naming it gains.
+
+    Parameters
+    ----------
+    session : Session, SessionResult, str or pathlib.Path
+        The visit: as `read_session` or `examine` return it, or its folder.
+    reference : SessionIdentification, Session, SessionResult, str or pathlib.Path, optional
+        An earlier visit of the same person without fault or load: the body is then known ten times better than from the table.
+    effects : iterable, optional
+        The causes to look for, by name or as objects of your own; by default all.
+    tolerances : Tolerances, optional
+        Of everything that is no fault, as learned by a laboratory.
+    tell : callable, optional
+        Called with what is being done, in words.
+
+    Returns
+    -------
+    SessionDiagnosis
+        Its `verdict` is "nothing wrong", "named, complete", "named, incomplete" or "unexplained"; `findings` and `table` name the causes.
+
+    Raises
+    ------
+    SessionRefused
+        There is no trial to look at, and no check found a cause either.
+    UnknownName
+        There is no such effect; the legal names are listed.
+
+    See Also
+    --------
+    identify : What the segments weigh.
+
+    References
+    ----------
+    Candidate causes are ranked by Bayes factors under the tolerances of everything that is no fault; docs/derivations.md.
+
+    Examples
+    --------
+    >>> found = biodance.diagnose(result)
+    >>> found
+    SessionDiagnosis(nothing wrong)
+    """
+    asked = causes(effects)
+    result = _examined(session, tell)
+    before = None if reference is None else _earlier(reference, tell)
+    return diagnose_session(result, reference=before, tolerances=tolerances, effects=asked, tell=tell)
+
+
+def compare_sessions(earlier: Earlier, later: Earlier, *, tell: Tell = _silent) -> SessionComparison:
+    """Return what changed in a person from an earlier visit to a later one.
+
+    Parameters
+    ----------
+    earlier, later : SessionIdentification, Session, SessionResult, str or pathlib.Path
+        Two visits of the same person.
+    tell : callable, optional
+        Called with what is being done, in words.
+
+    Returns
+    -------
+    SessionComparison
+        Every difference of mass (kg), centre of mass (m) and inertia (kg·m²) with its 95 % interval, and the load looked for.
+
+    Raises
+    ------
+    SessionRefused
+        One of them has no trial to identify from.
+    BiodanceError
+        The two bodies have different segments.
+
+    Examples
+    --------
+    >>> biodance.compare_sessions(identified, identified).table().shape
+    (120, 9)
+    """
+    from biodance.identify.sessions import differences
+
+    first, second = _earlier(earlier, tell), _earlier(later, tell)
+    return SessionComparison(first, replace(second, changes=differences(first.identification, second.identification)))
+
+
+def design_dance(
+    subject: Subject,
+    protocol: str | Path = "full",
+    *,
+    limits: str | Path | None = None,
+    seed: int = 0,
+    tell: Callable[[str, int, int], None] = lambda *_: None,
+) -> "DanceResult":
+    """Return a dance for one person: safe, balanced, and telling much about every segment.
+
+    Parameters
+    ----------
+    subject : Subject
+        Mass kg, stature m, sex, age years (strength falls with it).
+    protocol : str or pathlib.Path
+        "full", "short", "chair", "one_segment", or a TOML file.
+    limits : str or pathlib.Path, optional
+        TOML file with what this person can and may do.
+    seed : int
+        The same seed gives the same dance.
+    tell : callable, optional
+        Called with what is being done, how many parts are finished, and of how many (0: not counted).
+
+    Returns
+    -------
+    DanceResult
+        Its `dance` is None where no dance keeps all limits; then `reason` says which limit forbids it.
+
+    Raises
+    ------
+    UnknownName
+        There is no such protocol; the legal names are listed.
+    BiodanceError
+        Mass or stature are out of range, or protocol and person contradict each other.
+
+    See Also
+    --------
+    verify_dance : Judge a dance by code that its design did not use.
+
+    References
+    ----------
+    Exciting motions by the condition number of the sub-regressors, weighted with the segments' masses; docs/derivations.md.
+
+    Examples
+    --------
+    >>> made = biodance.design_dance(biodance.Subject(65.0, 1.75, "F", 33.0), "short")  # doctest: +SKIP
+    >>> made.dance.save("short.npz")  # doctest: +SKIP
+    >>> biodance.design_dance(biodance.Subject(6.5, 1.75, "F", 33.0), "short")
+    Traceback (most recent call last):
+        ...
+    biodance.errors.BiodanceError: The mass is 6.5 kg; a dance is designed for 30 to 200 kg. Correct it.
+    """
+    from biodance.dance.problem.person import HEALTHY, read_person
+    from biodance.dance.problem.plan import read_plan
+    from biodance.pipeline.dance import dancer, make_dance
+
+    plan = read_plan(protocol)
+    return make_dance(dancer(subject, plan), plan, read_person(Path(limits)) if limits else HEALTHY, seed=seed, tell=tell)
+
+
+def verify_dance(
+    dance: "Dance | str | Path", protocol: str | Path | None = None, *, limits: str | Path | None = None, body: Body | None = None
+) -> "tuple[Margin, ...]":
+    """Return what is left of every limit over a whole dance, judged by code that its design did not use.
+
+    Parameters
+    ----------
+    dance : Dance, str or pathlib.Path
+        A dance, or the file that `biodance dance` wrote (dance.npz).
+    protocol : str or pathlib.Path, optional
+        Whose limits hold, by name or TOML file; by default the dance's own, by name.
+    limits : str or pathlib.Path, optional
+        TOML file with what this person can and may do.
+    body : Body, optional
+        Who dances it; by default the person for whom it was designed.
+
+    Returns
+    -------
+    tuple of Margin
+        Each with `limit`, `worst` in `unit` (negative: broken) at `where_s` s.
+
+    Raises
+    ------
+    FileRefused
+        The file is no dance.
+    UnknownName
+        There is no such protocol; the legal names are listed.
+
+    Examples
+    --------
+    >>> margins = biodance.verify_dance("dance.npz")
+    >>> all(margin.worst >= 0 for margin in margins)
+    True
+    """
+    from biodance.dance.dance import Dance
+    from biodance.dance.problem.person import HEALTHY, fit_to_person, read_person
+    from biodance.dance.problem.plan import read_plan
+    from biodance.dance.verify import verify
+
+    one = dance if isinstance(dance, Dance) else Dance.load(dance)
+    own, plan, _ = fit_to_person(body or one.body, read_plan(protocol or one.protocol), read_person(Path(limits)) if limits else HEALTHY)
+    return verify(own, one, plan.limits)
+
+
+def simulate(subject: Subject, protocol: str, out: str | Path, *, seed: int = 0, effects: Iterable[str] = ()) -> Path:
+    """Write a simulated visit as a laboratory would have: C3D files and session.toml, the truth apart in ``truth/truth.json``.
+
+    Parameters
+    ----------
+    subject : Subject
+        Who is simulated; mass kg, stature m.
+    protocol : str
+        Name of a protocol: dance, short, squat, standing ...; a wrong name lists all.
+    out : str or pathlib.Path
+        Folder to write; it must be empty or missing.
+    seed : int
+        The same seed gives the same person and the same files.
+    effects : iterable of str
+        Causes to hide, as ``plate_gain:target=Fz,gain=0.04``.
+
+    Returns
+    -------
+    pathlib.Path
+        The folder.
+
+    Raises
+    ------
+    UnknownName
+        There is no such protocol or cause.
+    BiodanceError
+        A cause lacks a parameter, or the folder is not empty.
+
+    Examples
+    --------
+    >>> folder = biodance.simulate(biodance.Subject(62.0, 1.70, "F", 31.0), "standing", "simulated", seed=1)
+    >>> sorted(path.name for path in folder.iterdir())
+    ['session.toml', 'standing_1.c3d', 'standing_2.c3d', 'static.c3d', 'truth']
+    """
+    from biodance.virtual_lab.hide import hide, parse
+    from biodance.virtual_lab.protocol_file import read_protocol
+    from biodance.virtual_lab.simulate import simulate as write_session
+
+    plan = read_protocol(protocol)
+    visit, loads = hide(tuple(parse(text) for text in effects), subject, plan, seed=seed)
+    return write_session(subject, plan, Path(out), seed=seed, loads=loads, visit=visit)
+
+
+def _examined(session: Visit, tell: Tell) -> SessionResult:
+    """Return the visit with all stages done."""
+    if isinstance(session, SessionResult):
+        return session
+    return examine(session if isinstance(session, Session) else read_session(session, tell=tell), tell=tell)
+
+
+def _earlier(session: Earlier, tell: Tell) -> SessionIdentification:
+    """Return what a visit says about the body."""
+    return session if isinstance(session, SessionIdentification) else identified(_examined(session, tell))
+
+
+def _against(result: SessionResult, before: SessionIdentification) -> SessionResult:
+    """Return an examined visit with its load looked for against an earlier one."""
+    if result.body is None:
+        return result
+    again = partial(identify_trials, result.body, result.trials, name=result.session.folder.name)
+    return replace(result, identification=again(reference=before))

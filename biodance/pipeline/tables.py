@@ -1,0 +1,179 @@
+"""What was found in a session as pandas tables: tidy, units in the names of the columns, angles in degrees.
+
+One row is one segment, one check, one marker of a trial, one frame of a trial, one parameter of a finding ...; everything else is SI.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from biodance.diagnose.diagnosis import Diagnosis
+from biodance.motion.regressor import predict_wrench
+from biodance.pipeline.identification import SessionIdentification
+from biodance.pipeline.results import SessionResult, TrialResult
+from biodance.records import CHANNELS, Array
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+Row = Mapping[str, Any]
+UNITS = {"F": "N", "M": "Nm"}
+AXES = ("x", "y", "z")
+TENSOR = ("xx", "xy", "yy", "xz", "yz", "zz")
+TRIALS = ("trial", "role", "status", "reason", "marker_rms_m", "marker_max_m", "gaps_percent", "frames_used")
+CHECKS = ("what", "where", "value", "limit", "inside", "advice")
+MARKERS = ("trial", "marker", "rms_m", "max_m", "gaps_percent", "longest_gap_s")
+FINDINGS = (
+    "effect",
+    "target",
+    "parameter",
+    "value",
+    "sd",
+    "unit",
+    "visible_fraction",
+    "log_bayes_factor",
+    "gain_low",
+    "gain_high",
+    "advice",
+)
+UNSEEN = ("effect", "target", "limit", "unit", "told_from", "typical")
+ADEQUACY = ("channel", "band_low_hz", "band_high_hz", "z", "trial", "second_s")
+
+
+def session_tables(result: SessionResult, diagnosis: Diagnosis | None = None) -> dict[str, "DataFrame"]:
+    """Return all tables of a session by name.
+
+    Always ``trials``, ``checks``, ``markers`` (distance to the model), ``marker_residuals`` (m by frame), ``angles`` (deg by frame),
+    ``wrench`` (N, N·m by frame: measured, of the table's body, of the identified one, about the lab origin); with an identification
+    ``segments``, ``moments`` (N·m by frame, of the trial whose feet are known) and ``validation``; with a diagnosis ``findings``,
+    ``unobservable`` and ``adequacy``. A table without rows has its columns all the same.
+    """
+    found = result.identification
+    tables = {
+        "trials": _frame(map(_trial, result.trials), TRIALS),
+        "checks": _frame(({name: getattr(check, name) for name in CHECKS} for check in result.all_checks), CHECKS),
+        "markers": _frame((row for one in result.trials for row in _markers(one)), MARKERS),
+        "marker_residuals": _joined(map(_residuals, result.trials)),
+        "angles": _joined(_angles(result, one) for one in result.trials),
+        "wrench": _joined(_wrench(result, one) for one in result.trials),
+    }
+    if found is not None:
+        tables |= {"segments": _segments(found), "moments": _moments(found), "validation": _validation(found)}
+    if diagnosis is not None:
+        tables |= _diagnosed(diagnosis)
+    return tables
+
+
+def _frame(rows: Iterable[Row], columns: Sequence[str]) -> "DataFrame":
+    import pandas as pd
+
+    return pd.DataFrame(list(rows), columns=list(columns))
+
+
+def _joined(parts: Iterable["DataFrame | None"]) -> "DataFrame":
+    """Return the tables of several trials below each other; columns that one lacks are empty there."""
+    import pandas as pd
+
+    some = [part for part in parts if part is not None]
+    return pd.concat(some, ignore_index=True) if some else pd.DataFrame(columns=["trial", "time_s"])
+
+
+def _by_frame(trial: str, time: Array, columns: Mapping[str, Any]) -> "DataFrame":
+    import pandas as pd
+
+    return pd.DataFrame({"trial": np.full(time.size, trial, dtype=object), "time_s": time, **columns})
+
+
+def _trial(one: TrialResult) -> Row:
+    fit, used = one.fit, one.comparison
+    nothing = float("nan")
+    values = (fit.total_rms if fit else nothing, fit.total_max if fit else nothing, one.gaps_percent, int(used.used.sum()) if used else 0)
+    return dict(zip(TRIALS, (one.trial.name, one.trial.role, one.status, one.reason, *values), strict=True))
+
+
+def _markers(one: TrialResult) -> Iterable[Row]:
+    distance = {n: (r, m) for n, r, m in zip(one.fit.names, one.fit.rms, one.fit.max, strict=True)} if one.fit else {}
+    gaps = {gap.label: (gap.percent, gap.longest) for gap in one.gaps}
+    nothing = (float("nan"), float("nan"))
+    for name in dict.fromkeys((*gaps, *distance)):
+        values = (one.trial.name, name, *distance.get(name, nothing), *gaps.get(name, nothing))
+        yield dict(zip(MARKERS, values, strict=True))
+
+
+def _residuals(one: TrialResult) -> "DataFrame | None":
+    motion = one.motion
+    if motion is None:
+        return None
+    return _by_frame(one.trial.name, motion.time, {f"{name}_m": motion.residual[:, k] for k, name in enumerate(motion.marker_names)})
+
+
+def _angles(result: SessionResult, one: TrialResult) -> "DataFrame | None":
+    if one.motion is None or result.body is None:
+        return None
+    names, motion = [joint.name for joint in result.body.joints], one.motion
+    angle = np.degrees(motion.q[:, motion.q.shape[1] - len(names) :])
+    columns: dict[str, Any] = {"determined": motion.determined} | {f"{name}_deg": angle[:, j] for j, name in enumerate(names)}
+    return _by_frame(one.trial.name, motion.time, columns)
+
+
+def _wrench(result: SessionResult, one: TrialResult) -> "DataFrame | None":
+    found = one.comparison
+    if found is None or one.motion is None:
+        return None
+    columns: dict[str, Any] = {"used": found.used} | _six("measured", found.measured) | _six("table", found.simulated)
+    if result.identification is not None:
+        columns |= _six("identified", predict_wrench(result.identification.identification.identified, one.motion).value)
+    return _by_frame(one.trial.name, found.time, columns)
+
+
+def _six(what: str, value: Array) -> dict[str, Array]:
+    return {f"{what}_{channel}_{UNITS[channel[0]]}": value[:, k] for k, channel in enumerate(CHANNELS)}
+
+
+def _segments(found: SessionIdentification) -> "DataFrame":
+    names = ["mass_kg", *(f"com_{a}_m" for a in AXES), *(f"inertia_{t}_kgm2" for t in TENSOR)]
+    columns = ["segment", *(f"{name}{kind}" for name in names for kind in ("", "_sd", "_table", "_table_sd", "_from_data"))]
+    rows = []
+    for segment in found.identification.sip.segments:
+        known = [one for one in found.identification.known if one.segment == segment]
+        values = [v for one in known for v in (one.value, one.sd, one.table, one.table_sd, one.from_data)]
+        rows.append(dict(zip(columns, [segment, *values], strict=True)))
+    return _frame(rows, columns)
+
+
+def _moments(found: SessionIdentification) -> "DataFrame":
+    bands = found.torques
+    if bands is None:
+        return _joined(())
+    columns: dict[str, Any] = {"used": bands.use}
+    for j, name in enumerate(bands.joints):
+        columns |= {f"{name}_Nm": bands.torque[:, j], f"{name}_Nm_sd": bands.sd[:, j], f"{name}_Nm_table": bands.table[:, j]}
+    return _by_frame(bands.trial, bands.time, columns)
+
+
+def _validation(found: SessionIdentification) -> "DataFrame":
+    columns = ("trial", "kept", "channel", "unit", "rms_table", "rms_identified", "correlation_table", "correlation_identified")
+    rows = []
+    for kept, trials in ((True, found.validations), (False, found.fitted)):
+        for one in trials:
+            table, identified = one.table_agreement, one.identified_agreement
+            for k, channel in enumerate(CHANNELS):
+                values = (table.rms[k], identified.rms[k], table.correlation[k], identified.correlation[k])
+                rows.append(dict(zip(columns, (one.name, kept, channel, UNITS[channel[0]], *values), strict=True)))
+    return _frame(rows, columns)
+
+
+def _diagnosed(one: Diagnosis) -> dict[str, "DataFrame"]:
+    rows = []
+    for finding in one.findings:
+        gain = finding.gain.ci95 if finding.gain else (float("nan"), float("nan"))
+        about = (finding.visible_fraction, finding.log_bayes_factor, *gain, finding.advice)
+        for p in finding.parameters:
+            rows.append(dict(zip(FINDINGS, (finding.effect, finding.target, p.name, p.value, p.sd, p.unit, *about), strict=True)))
+    left = [dict(zip(ADEQUACY, (a.channel, *a.band_hz, a.z, a.trial, a.second), strict=True)) for a in one.adequacy]
+    return {
+        "findings": _frame(rows, FINDINGS),
+        "unobservable": _frame(({name: getattr(cause, name) for name in UNSEEN} for cause in one.unobservable), UNSEEN),
+        "adequacy": _frame(left, ADEQUACY),
+    }

@@ -1,0 +1,83 @@
+"""Arrays and names as all records use them: checked, copied, read-only."""
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from biodance.errors import BiodanceError, UnknownName
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+CHANNELS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+CHANNEL_TITLES = ("Fx (N)", "Fy (N)", "Fz (N)", "Mx (N·m)", "My (N·m)", "Mz (N·m)")
+
+
+class _HasName(Protocol):
+    @property
+    def name(self) -> str: ...
+
+
+Named = TypeVar("Named", bound=_HasName)
+
+
+def frozen_array(value: ArrayLike, shape: tuple[int | None, ...], what: str) -> Array:
+    """Return a read-only float copy of ``value`` after checking its shape (``None`` = any length).
+
+    Raises
+    ------
+    BiodanceError
+        The shape is wrong; the message names ``what``, the shape found and the shape expected.
+    """
+    array = np.array(value, dtype=float)
+    fits = array.ndim == len(shape) and all(n is None or n == m for n, m in zip(shape, array.shape, strict=True))
+    if not fits:
+        expected = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
+        raise BiodanceError(f"{what} has shape {array.shape}, expected {expected}.")
+    array.setflags(write=False)
+    return array
+
+
+def assign(record: object, **values: object) -> None:
+    """Assign fields of a frozen record during its own ``__post_init__``."""
+    for name, value in values.items():
+        object.__setattr__(record, name, value)
+
+
+def check_time(time: ArrayLike, what: str) -> Array:
+    """Return times (T,) s as a read-only array; BiodanceError where they do not increase."""
+    time = frozen_array(time, (None,), f"{what}.time")
+    if time.size > 1 and not np.all(np.diff(time) > 0):
+        frame = int(np.argmin(np.diff(time) > 0))
+        raise BiodanceError(f"{what}.time does not increase at sample {frame + 1} ({time[frame]:g} s, {time[frame + 1]:g} s).")
+    return time
+
+
+def span(time: Array) -> str:
+    """Return duration and rate in words."""
+    rate = f" at {rate_of(time):g} Hz" if time.size > 1 else ""
+    return f"{time.size} frames{rate}, {time[-1] - time[0]:.2f} s" if time.size else "no frames"
+
+
+def rate_of(time: Array) -> float:
+    """Return the mean sampling rate in Hz; NaN for fewer than two samples."""
+    return float((time.size - 1) / (time[-1] - time[0])) if time.size > 1 else float("nan")
+
+
+def by_name(trials: Iterable[Named], name: str, kind: str) -> Named:
+    """Return the one of ``trials`` that has a ``name``; UnknownName says what it is no ``kind`` of and lists all names."""
+    found = {one.name: one for one in trials}
+    if name not in found:
+        raise UnknownName.of(kind, name, tuple(found))
+    return found[name]
+
+
+def in_time(time: Array, values: Array, columns: Iterable[str]) -> "pd.DataFrame":
+    """Return a table of ``values`` (T, n) over time."""
+    import pandas as pd
+
+    return pd.DataFrame(values, index=pd.Index(time, name="time (s)"), columns=list(columns))

@@ -1,0 +1,157 @@
+"""How a body moved."""
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance import display
+from biodance.errors import BiodanceError, UnknownName
+from biodance.records.arrays import Array, assign, check_time, frozen_array, in_time, rate_of, span
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Generalised motion of a body, in Pinocchio's order.
+
+    Parameters
+    ----------
+    time : array_like
+        (T,) s.
+    q : array_like
+        (T, nq). A free-flyer root comes first: x y z m, quaternion x y z w, then joint angles rad.
+    v, a : array_like
+        (T, nv) velocity and acceleration; of the root linear, then angular, in the root's OWN frame; m/s, rad/s and per s.
+    residual : array_like
+        (T, K) m, distance of every marker to the model; NaN = not seen.
+    marker_names : tuple of str
+        (K) labels.
+    determined : array_like of bool
+        (T,) False where a frame's own markers did not give its posture; by default all True.
+    notes : tuple of str
+        How the motion was found, in sentences.
+    joint_names : tuple of str
+        (n) names of the joint angles, the last n columns of q; () = not known.
+
+    Examples
+    --------
+    >>> motion = result["squat_1"].motion
+    >>> motion.q.shape, motion.v.shape
+    ((611, 30), (611, 29))
+    """
+
+    time: Array
+    q: Array
+    v: Array
+    a: Array
+    residual: Array = field(default_factory=lambda: np.empty((0, 0)))
+    marker_names: tuple[str, ...] = ()
+    determined: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=bool))
+    notes: tuple[str, ...] = ()
+    joint_names: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        time = check_time(self.time, "Motion")
+        frames = time.size
+        v = frozen_array(self.v, (frames, None), "Motion.v")
+        residual = self.residual if np.size(self.residual) else np.empty((frames, 0))
+        determined = np.array(self.determined, dtype=bool) if np.size(self.determined) else np.ones(frames, dtype=bool)
+        if determined.shape != (frames,):
+            raise BiodanceError(f"Motion.determined has shape {determined.shape}, expected ({frames},).")
+        determined.setflags(write=False)
+        assign(
+            self,
+            time=time,
+            determined=determined,
+            notes=tuple(self.notes),
+            q=frozen_array(self.q, (frames, None), "Motion.q"),
+            v=v,
+            a=frozen_array(self.a, (frames, v.shape[1]), "Motion.a"),
+            residual=frozen_array(residual, (frames, len(self.marker_names)), "Motion.residual"),
+            marker_names=tuple(self.marker_names),
+            joint_names=tuple(self.joint_names),
+        )
+        if self.joint_names and self._root + len(self.joint_names) != self.q.shape[1]:
+            names, columns = len(self.joint_names), self.q.shape[1]
+            raise BiodanceError(f"Motion.joint_names has {names} names for {columns} columns of q, {self._root} of them the root's.")
+
+    def __repr__(self) -> str:
+        left = int(np.sum(~self.determined))
+        return f"Motion({self.q.shape[1] - self._root} joint angles, {span(self.time)}{f', {left} frames left open' if left else ''})"
+
+    def _repr_html_(self) -> str:
+        return display.card(repr(self), self.table().describe(), self.notes)
+
+    @property
+    def _root(self) -> int:
+        """Columns of q that are the root's: 7 with a free flyer, else 0."""
+        return 7 if self.q.shape[1] == self.v.shape[1] + 1 else 0
+
+    @property
+    def rate(self) -> float:
+        """Sampling rate, Hz; NaN for fewer than two frames."""
+        return rate_of(self.time)
+
+    @property
+    def angles(self) -> Array:
+        """Joint angles, (T, n) DEGREES, anatomical signs; for people: the record itself is in rad."""
+        return np.degrees(self.q[:, self._root :])
+
+    @property
+    def _titles(self) -> tuple[str, ...]:
+        count = self.q.shape[1] - self._root
+        return self.joint_names or tuple(f"joint_{k + 1}" for k in range(count))
+
+    def table(self) -> "pd.DataFrame":
+        """Return posture over time as a table.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Index time (s); ``root x (m)`` ..., ``root qx`` ... (quaternion), then joint angles, ``left_knee_flexion (deg)`` and so on.
+
+        Examples
+        --------
+        >>> bool(result["squat_1"].motion.table()["left_knee_flexion (deg)"].max() > 60)
+        True
+        """
+        root = (*(f"root {axis} (m)" for axis in "xyz"), *(f"root q{axis}" for axis in "xyzw"))[: self._root]
+        values = np.concatenate([self.q[:, : self._root], self.angles], axis=1)
+        return in_time(self.time, values, (*root, *(f"{name} (deg)" for name in self._titles)))
+
+    def plot_angles(self, *joints: str, axes: "Axes | None" = None) -> "Axes":
+        """Draw joint angles over time.
+
+        Parameters
+        ----------
+        *joints : str
+            Names of joint angles; none: all.
+        axes : matplotlib.axes.Axes, optional
+            Where to draw; by default a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            Degrees over seconds.
+
+        Raises
+        ------
+        UnknownName
+            There is no such joint angle; the legal names are listed.
+
+        Examples
+        --------
+        >>> len(result["squat_1"].motion.plot_angles("left_knee_flexion", "right_knee_flexion").lines)
+        2
+        """
+        names = self._titles
+        for joint in joints:
+            if joint not in names:
+                raise UnknownName.of("joint angle of this motion", joint, names)
+        columns = [names.index(joint) for joint in joints or names]
+        return display.curves(self.time, self.angles[:, columns], [names[k] for k in columns], "angle (deg)", axes=axes)

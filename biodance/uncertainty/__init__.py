@@ -1,0 +1,3 @@
+"""How wrong things are: elementary sources of error, frequency bands, learning, and the one table of sizes; nothing
+else says it again.
+"""

@@ -1,0 +1,122 @@
+"""The table's standard deviations, widened by what the table cannot know: how the model's frames sit in this person.
+
+The table's numbers hold in ideal anatomical frames. Markers turn the frames by degrees (the long axis of an arm by
+tens of degrees), and a CoM that is off by d adds m d² to the inertia about the joint, which a first-order covariance
+leaves out.
+"""
+
+import numpy as np
+
+from biodance.body.body import JointError
+from biodance.body.error_sizes import error_size, joint_size
+from biodance.body.inertia import TENSOR
+from biodance.motion.marker_jacobian import skew
+from biodance.records import Array, Sip
+
+JOINT = {"thigh": "hip", "shank": "knee", "foot": "ankle", "trunk_head": "trunk", "upper_arm": "shoulder", "forearm_hand": "elbow"}
+"""The joint at the origin of each segment's frame."""
+
+
+def widened(prior: Sip) -> Sip:
+    """Return ``prior`` with the same values and a covariance that holds for frames that are turned and centres that
+    are displaced.
+    """
+    covariance = np.array(prior.covariance) + _mass_spread(prior)
+    for i, segment in enumerate(prior.segments):
+        cut = slice(10 * i, 10 * i + 10)
+        phi, own = prior.phi[cut], covariance[cut, cut].copy()
+        if phi[0] <= 0:
+            continue
+        slope = _turn_slope(phi) * frame_turn(segment)
+        covariance[cut, cut] = own + slope @ slope.T + _displacement(phi, own)
+    return Sip(prior.segments, prior.phi, covariance)
+
+
+def frame_turn(segment: str) -> Array:
+    """Return (3,) rad: standard deviation of the turn of a segment's frame about its axes."""
+    turn = np.full(3, error_size("frame_turn", "any"))
+    if segment.endswith(("upper_arm", "forearm_hand")):
+        turn[1] = error_size("frame_turn", "arm axis")
+    return turn
+
+
+def about_true_centres(sip: Sip, placed: tuple[JointError, ...] = ()) -> Sip:
+    """Return ``sip`` with a covariance that also holds about the true joint centres, which no wrench can find.
+
+    The data tell where matter is relative to the model's frames; where the person's own joint centre is stays as
+    uncertain as the formula that predicted it, or as the movement that ``placed`` it left it.
+    """
+    covariance = np.array(sip.covariance)
+    known = {error.joint: error.centre for error in placed}
+    for i, segment in enumerate(sip.segments):
+        joint = _joint_of(segment)
+        sd = known.get(joint, joint_size("joint_centre", joint or segment))
+        slope = sd * _shift_slope(sip.phi[10 * i : 10 * i + 10])
+        covariance[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] += slope @ slope.T
+    return Sip(sip.segments, sip.phi, covariance)
+
+
+def _joint_of(segment: str) -> str:
+    """Return the anatomical joint at the origin of a segment of the human, "" for other segments."""
+    return next((segment.removesuffix(kind) + joint for kind, joint in JOINT.items() if segment.endswith(kind)), "")
+
+
+def _shift_slope(phi: Array) -> Array:
+    """Return d phi / d d (10, 3) for a shift of the matter by d (3,) m."""
+    out = np.zeros((10, 3))
+    out[1:4] = phi[0] * np.eye(3)
+    for row, (i, j) in enumerate(TENSOR, start=4):
+        out[row] = 2 * phi[1:4] * (i == j)
+        out[row, i] -= phi[1 + j]
+        out[row, j] -= phi[1 + i]
+    return out
+
+
+def _mass_spread(prior: Sip) -> Array:
+    """Return the covariance (p, p) that raises every relative mass sd to the floor, sides alike, the total mass
+    unchanged.
+    """
+    table, variance = prior.phi.reshape(-1, 10), np.diag(prior.covariance)[::10]
+    mass = np.maximum(table[:, 0], 1e-12)
+    missing = np.sqrt(np.maximum(error_size("segment_mass", "floor") ** 2 - variance / mass**2, 0.0)) * (table[:, 0] > 0) * (variance > 0)
+    names = [name.removeprefix("right_").removeprefix("left_") for name in prior.segments]
+    sides = error_size("left_right_correlation", "mass")
+    alike = np.array([[1.0 if a == b else sides if x == y else 0.0 for b, y in enumerate(names)] for a, x in enumerate(names)])
+    masses = alike * np.outer(missing * mass, missing * mass)
+    total = masses.sum(axis=1)
+    masses = masses - np.outer(total, total) / (total.sum() + error_size("scale", "mass") ** 2)
+    return np.asarray(np.kron(masses, np.ones((10, 10))) * np.outer(prior.phi / np.repeat(mass, 10), prior.phi / np.repeat(mass, 10)))
+
+
+def _turn_slope(phi: Array) -> Array:
+    """Return d phi / d rho (10, 3) for a turn of the matter by rho (3,) rad."""
+    inertia = np.empty((3, 3))
+    for value, (i, j) in zip(phi[4:], TENSOR, strict=True):
+        inertia[i, j] = inertia[j, i] = value
+    out = np.zeros((10, 3))
+    for axis, S in enumerate(skew(np.eye(3))):
+        out[1:4, axis] = S @ phi[1:4]
+        change = S @ inertia - inertia @ S
+        out[4:, axis] = [change[i, j] for i, j in TENSOR]
+    return out
+
+
+def _displacement(phi: Array, own: Array) -> Array:
+    """Return the second moment (10, 10) of m (|d|² 1 - d d') for the CoM's error d ~ N(0, its covariance): its mean
+    and its variance.
+    """
+    mass, com = phi[0], phi[1:4] / phi[0]
+    slope = np.zeros((3, 10))
+    slope[:, 0], slope[:, 1:4] = -com / mass, np.eye(3) / mass
+    spread = slope @ own @ slope.T
+    forms = []
+    for i, j in TENSOR:
+        form = 2 * mass * np.eye(3) * (i == j)
+        form[i, j] -= mass
+        form[j, i] -= mass
+        forms.append(form @ spread)
+    mean = np.array([0.5 * np.trace(form) for form in forms])
+    variance = np.array([[0.5 * np.trace(a @ b) for b in forms] for a in forms])
+    out = np.zeros((10, 10))
+    out[4:, 4:] = variance + np.outer(mean, mean)
+    return out

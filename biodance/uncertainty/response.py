@@ -1,0 +1,159 @@
+"""How a trial answers small displacements: of its markers, of its centres of mass, of its segments - and the same
+backwards.
+
+Markers moved by x (m) are followed by the coordinates, dq = -(J'DJ)^-1 J'D x with D the marker weights (first order
+of the inverse kinematics). A displacement u (m, lab) of a segment's CoM and a turn r (rad, lab) of the segment change
+the wrench that the motion needs by
+
+    d2/dt2 (F2 y) + d/dt (F1 y) + F0 y,    y = (u, r),
+
+from the rate of momentum and angular momentum (docs/derivations.md, section 16). All of it is linear:
+`Response.wrench` goes forward, `Response.pull` is its exact transpose.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from biodance.body.body import Body
+from biodance.body.inertia import TENSOR
+from biodance.motion.kinematics import Poses, poses, segment_motion
+from biodance.motion.marker_jacobian import jacobian, skew
+from biodance.records import Array, Index, Motion
+
+TRACKING_RIDGE = 1e-6
+"""Share of the mean curvature of the tracking that is added to it, so that coordinates without markers stay where
+they are."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pull:
+    """Weights of p equations on displacements: ``place``, ``turn`` (F, N, 3, p) of the segments' centres of mass and
+    of the segments, ``marker`` (F, M, 3, p) of the model's markers at unchanged coordinates.
+    """
+
+    place: Array
+    turn: Array
+    marker: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """How ``body`` in ``motion`` (F frames at an even rate) with its ``pose`` answers.
+
+    ``place``, ``turn`` (F, N, 18, 3) the functionals F2, F1, F0 of a segment's CoM moved and of the segment turned;
+    ``tangent`` (F, 18, nv) the same of the coordinates; ``follow`` (F, nv, 3M) coordinates per marker displacement;
+    ``J`` (F, 3M, nv) markers per coordinate.
+    """
+
+    body: Body
+    motion: Motion
+    pose: Poses
+    place: Array
+    turn: Array
+    tangent: Array
+    follow: Array
+    J: Array
+
+    @classmethod
+    def of(cls, body: Body, motion: Motion) -> "Response":
+        """Return the response of ``body`` in ``motion``."""
+        pose, frames = poses(body, motion.q), motion.time.size
+        every, segment = list(range(len(body.segments))), list(body.markers.segment)
+        J, _ = jacobian(body, pose, segment, pose.points(segment, body.markers.position))
+        moved, turned = (part.reshape(frames, len(every), 3, body.nv) for part in jacobian(body, pose, every, centres_of_mass(body, pose)))
+        place, turn = (part.reshape(frames, len(every), 18, 3) for part in functionals(body, motion))
+        tangent = np.zeros((frames, 18, body.nv))
+        for s in every:
+            tangent += place[:, s] @ moved[:, s] + turn[:, s] @ turned[:, s]
+        return cls(body, motion, pose, place, turn, tangent, -tracking(body, J), J)
+
+    @property
+    def angles(self) -> Array:
+        """(F, n) rad, of the joints."""
+        return self.motion.q[:, self.body.nq - len(self.body.joints) :]
+
+    def of_markers(self, moved: Array, rows: Index | slice = slice(None)) -> tuple[Array, Array]:
+        """Return the functionals (F, 18, K) of model markers ``rows`` that ``moved`` (F, R, K) m, and what is left of
+        all (F, 3M, K) m.
+        """
+        change = self.follow[:, :, rows] @ moved
+        left = self.J @ change
+        left[:, rows] += moved
+        return self.tangent @ change, left
+
+    def wrench(self, functional: Array) -> Array:
+        """Return the wrench (F, 6, K) about the lab origin from functionals (F, 18, K)."""
+        second, first = derivatives(self.motion.time.size)
+        rate = self.motion.rate
+        parts = functional.reshape(len(functional), 3, -1)
+        value = rate**2 * (second @ parts[:, 0]) + rate * (first @ parts[:, 1]) + parts[:, 2]
+        return np.asarray(value).reshape(len(functional), 6, -1)
+
+    def pull(self, weight: Array) -> Pull:
+        """Return what ``weight`` (F, 6, p) on the wrench weighs on displacements: the transpose of all of the above."""
+        second, first = derivatives(self.motion.time.size)
+        frames, rate, size = len(weight), self.motion.rate, weight.shape[2]
+        flat = weight.reshape(frames, -1)
+        back = np.stack([rate**2 * (second.T @ flat), rate * (first.T @ flat), flat], axis=1).reshape(frames, 1, 18, size)
+        on_place, on_turn = (np.swapaxes(part, -1, -2) @ back for part in (self.place, self.turn))
+        marker = np.swapaxes(self.follow, 1, 2) @ (np.swapaxes(self.tangent, 1, 2) @ back[:, 0])
+        return Pull(on_place, on_turn, marker.reshape(frames, -1, 3, size))
+
+
+@lru_cache(maxsize=8)
+def derivatives(count: int) -> tuple[Array, Array]:
+    """Return (n, n) twice: second and first derivative, at ``count`` samples one unit apart, of the quintic spline
+    through them.
+    """
+    time = np.arange(count, dtype=float)
+    spline = make_interp_spline(time, np.eye(count), k=min(5, count - 1))
+    return spline.derivative(2)(time), spline.derivative(1)(time)
+
+
+def centres_of_mass(body: Body, pose: Poses) -> Array:
+    """Return the centres of mass (F, N, 3) m of the segments, lab."""
+    return pose.points(list(range(len(body.segments))), body.sip.com)
+
+
+def tracking(body: Body, J: Array) -> Array:
+    """Return (F, nv, 3M): how the coordinates follow measured markers that move, least squares weighted by the body's
+    marker weights.
+    """
+    weighted = np.swapaxes(np.repeat(body.markers.weight, 3)[:, None] * J, 1, 2)
+    normal = weighted @ J
+    ridge = TRACKING_RIDGE * np.trace(normal, axis1=1, axis2=2)[:, None, None] / body.nv * np.eye(body.nv)
+    return np.asarray(np.linalg.solve(normal + ridge, weighted))
+
+
+def functionals(body: Body, motion: Motion) -> tuple[Array, Array]:
+    """Return (F, N, 3, 6, 3) twice: F2, F1, F0 of a displacement of a segment's CoM (m, lab) and of a turn of the
+    segment (rad, lab).
+    """
+    move = segment_motion(body, motion)
+    frames, count = motion.time.size, len(body.segments)
+    mass = body.sip.mass[:, None, None]
+    com = (move.rotation @ body.sip.com[..., None])[..., 0] + move.position
+    inertia = move.rotation @ central_inertia(body) @ np.swapaxes(move.rotation, -1, -2)
+    spin = (inertia @ move.angular_velocity[..., None])[..., 0]
+    whirl = skew(move.angular_velocity)
+    place, turn = np.zeros((2, frames, count, 3, 6, 3))
+    place[:, :, 0, :3] = mass * np.eye(3)
+    place[:, :, 0, 3:] = mass * skew(com)
+    place[:, :, 1, 3:] = -2 * mass * skew(np.gradient(com, 1.0 / motion.rate, axis=0))
+    place[:, :, 2, 3:] = mass * skew(body.gravity)
+    turn[:, :, 0, 3:] = inertia
+    turn[:, :, 1, 3:] = -skew(spin) - (whirl @ inertia - inertia @ whirl)
+    return place, turn
+
+
+def central_inertia(body: Body) -> Array:
+    """Return the inertia tensors (N, 3, 3) kg·m² about the centres of mass."""
+    table, com = body.sip.phi.reshape(-1, 10), body.sip.com
+    tensor = np.empty((len(table), 3, 3))
+    for column, (i, j) in enumerate(TENSOR, start=4):
+        tensor[:, i, j] = tensor[:, j, i] = table[:, column]
+    square = np.sum(com**2, axis=1)[:, None, None] * np.eye(3) - com[:, :, None] * com[:, None]
+    return np.asarray(tensor - table[:, 0, None, None] * square)

@@ -1,0 +1,86 @@
+"""The elementary sources of error of a person who is not the model: skin, flesh, joint centres, hinges, each one by
+itself in unit size.
+
+A source displaces model markers, centres of mass or segments at unchanged coordinates; the coordinates answer through
+the inverse kinematics and the wrench changes (`response`), all to first order. Every kind of source says this twice,
+forward - what one unit adds to the wrench and leaves of the markers - and as the transpose - what given weights on
+the wrench make of it. Identification sends the columns of its regressor back, diagnosis sends the sources forward; a
+test holds the two equal.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.records import Array, Motion
+from biodance.uncertainty.joints import Centre, Tilt
+from biodance.uncertainty.response import Response
+from biodance.uncertainty.soft_tissue import Flesh, Sag, Slide
+from biodance.uncertainty.source import ErrorSource
+
+CLUSTER_REACH = 0.1
+"""m: lever that makes a turn of a marker cluster comparable with its translation."""
+
+
+def of_clusters(body: Body) -> tuple[ErrorSource, ...]:
+    """Return the errors that diagnosis takes for no fault, the markers of a segment sliding as a whole; joint centres
+    are causes there.
+    """
+    return (Slide(body, _patterns(body)), Sag(body), Flesh(body), Tilt(body))
+
+
+def of_markers(body: Body) -> tuple[Slide, Flesh, Centre, Tilt]:
+    """Return the errors with every marker sliding by itself: what identification discounts."""
+    worn = [np.sum(np.array(body.markers.segment) == s) for s in range(len(body.segments))]
+    alone = tuple(np.eye(3 * count).reshape(count, 3, 3 * count) for count in worn)
+    return (Slide(body, alone), Flesh(body), Centre(body), Tilt(body))
+
+
+@dataclass(frozen=True, eq=False)
+class Errors:
+    """What K elementary errors do in one trial.
+
+    ``groups`` (K) such as ``slide thigh`` (m/rad), ``sag thigh`` (s²), ``flesh thigh`` (m/rad), ``joint_centre hip``
+    (m), ``tilt knee`` (rad); ``joints`` (K) of the body that they belong to, or ""; ``wrench`` (T, 6, K) added to the
+    predicted wrench, predicted less measured, about the lab origin; ``markers`` (M, 3, K) m, mean residual of every
+    marker, model less measured, segment axes.
+    """
+
+    groups: tuple[str, ...]
+    joints: tuple[str, ...]
+    wrench: Array
+    markers: Array
+
+
+def forward(sources: tuple[ErrorSource, ...], motion: Motion) -> Errors:
+    """Return what the errors of unit size do in ``motion``, at about 25 Hz (what is slower than 6 Hz is then good to
+    1 %).
+    """
+    trial = Response.of(sources[0].body, motion)
+    effects = [source.forward(trial) for source in sources]
+    wrench = np.concatenate([trial.wrench(value) for value, _ in effects], axis=2)
+    names, joints = (tuple(name for source in sources for name in getattr(source, which)) for which in ("groups", "joints"))
+    return Errors(names, joints, wrench, np.concatenate([left for _, left in effects], axis=2))
+
+
+def transpose(sources: tuple[ErrorSource, ...], trial: Response, weight: Array) -> Array:
+    """Return (K, p): sum over time of ``weight`` (F, 6, p), wrench about the lab origin, times what every error adds
+    to the wrench.
+    """
+    pull = trial.pull(weight)
+    return np.concatenate([source.transpose(trial, pull) for source in sources])
+
+
+def _patterns(body: Body) -> tuple[Array, ...]:
+    """Return per segment the rigid displacements (m, 3, P) of its markers: three translations, and turns that are not
+    null.
+    """
+    worn, found = np.array(body.markers.segment), []
+    for s in range(len(body.segments)):
+        places = body.markers.position[worn == s]
+        middle = places - places.mean(axis=0) if len(places) else places
+        turns = [np.cross(axis, middle) / CLUSTER_REACH for axis in np.eye(3)]
+        kept = [np.tile(axis, (len(places), 1)) for axis in np.eye(3)] + [turn for turn in turns if np.abs(turn).max(initial=0) > 1e-6]
+        found.append(np.stack(kept, axis=2) if len(places) else np.empty((0, 3, 0)))
+    return tuple(found)

@@ -1,0 +1,168 @@
+"""How large everything is that is no fault: soft tissue, joint centres, installed plates, and what is left; learned
+from null sessions.
+
+Errors of a person repeat with the movement, so that counting residuals as independent noise would name a cause in
+every session. The sizes of all nuisances, what is expected of them, and the covariance of the rest per band are
+learned together on null sessions (`learning`): of virtual subjects, whose sizes stand in the one table and the rest
+in ``anthropometry/uncertainty/null_sessions.toml``, or a laboratory's own.
+"""
+
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.body.body import Body
+from biodance.body.error_sizes import error_rows, error_size
+from biodance.library import locate
+from biodance.records import Array, frozen_array
+
+REFERENCE_PERSON = 70.0
+"""kg: the noise is stated for a person of this mass and grows in proportion to it."""
+BEFORE = " before"
+"""End of the key of what belongs to a joint where no functional calibration was made."""
+CALIBRATED = ("joint_centre", "tilt")
+"""Quantities that a functional calibration changes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tolerances:
+    """``sizes`` standard deviation by key: an effect and its target (``plate_gain Fz``), a group of elementary errors
+    (``slide thigh``) or a marker's segment (``marker thigh``), in the unit of its column; ``noise`` (B, 6, 6)
+    covariance of one coefficient at `REFERENCE_PERSON`; ``energy``, ``energy_sd`` (B, 6) mean square of the whitened
+    residual in null sessions and its standard deviation; ``threshold`` of the evidence (natural logarithm) that no
+    more than a few null sessions reach; ``origin`` in words; ``means`` what every null session shows of a nuisance,
+    by `mean_key` or group, in the unit of its column (flesh sags downwards in everybody); ``accuracy`` by effect:
+    share of its size by which a named cause errs beyond its own standard deviation, because no fault is quite like
+    its model.
+    """
+
+    sizes: Mapping[str, float]
+    noise: Array
+    energy: Array
+    energy_sd: Array
+    threshold: float
+    origin: str = ""
+    means: Mapping[str, float] = field(default_factory=dict)
+    accuracy: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        bands = len(self.noise)
+        object.__setattr__(self, "sizes", MappingProxyType(dict(self.sizes)))
+        object.__setattr__(self, "means", MappingProxyType(dict(self.means)))
+        object.__setattr__(self, "accuracy", MappingProxyType(dict(self.accuracy)))
+        object.__setattr__(self, "noise", frozen_array(self.noise, (bands, 6, 6), "Tolerances.noise"))
+        for name in ("energy", "energy_sd"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), (bands, 6), f"Tolerances.{name}"))
+
+    def size(self, key: str) -> float:
+        """Return the standard deviation of ``key``; 0 for one that was never learned: it is then no nuisance. A joint
+        before functional calibration has the size of one after it where nothing is known of the difference.
+        """
+        return self.sizes.get(key, self.sizes.get(key.removesuffix(BEFORE), 0.0))
+
+    def mean(self, key: str) -> float:
+        """Return what is expected of ``key`` in a session without fault; 0 where nothing was learned."""
+        return self.means.get(key, 0.0)
+
+    def unlike(self, effect: str) -> float:
+        """Return the share of its size by which ``effect`` errs beyond noise; of one never measured that of "other"
+        ones.
+        """
+        return self.accuracy.get(effect, self.accuracy.get("other", 0.0))
+
+    def knows(self, effect: str) -> bool:
+        """Return whether any size of ``effect`` was learned."""
+        return any(key.split()[0] == effect for key in self.sizes)
+
+    def whiteners(self, mass: float) -> Array:
+        """Return (B, 6, 6) matrices that whiten a coefficient of a person of ``mass`` kg."""
+        return np.linalg.inv(np.linalg.cholesky(self.noise)) * (REFERENCE_PERSON / mass)
+
+
+@cache
+def shipped() -> Tolerances:
+    """Return the tolerances that come with biodance, learned from virtual subjects (``null_sessions.toml`` says
+    which).
+    """
+    rest = read_tolerances(locate("anthropometry/uncertainty", "null_sessions").read_text(encoding="utf-8"))
+    return replace(rest, sizes=table_sizes())
+
+
+def table_sizes() -> dict[str, float]:
+    """Return the sizes of the one table that sessions without fault are judged by, by key: the learned ones, and
+    those of joints before any functional calibration.
+    """
+    sizes = {}
+    for row in error_rows():
+        if row["learned_on"] == "null_sessions" or row["quantity"] in CALIBRATED:
+            key = " ".join((row["quantity"], row["target"])).removesuffix(" session")
+            sizes[key + (BEFORE if row["state"] == "before" else "")] = float(row["sd"])
+    return sizes
+
+
+def read_tolerances(text: str) -> Tolerances:
+    """Return the tolerances from the text of a TOML file."""
+    raw = tomllib.loads(text)
+    noise, energy, energy_sd = (np.array(raw[name]) for name in ("noise", "energy", "energy_sd"))
+    return Tolerances(
+        raw.get("sizes", {}), noise, energy, energy_sd, raw["threshold"], raw["origin"], raw.get("means", {}), raw.get("accuracy", {})
+    )
+
+
+def to_toml(found: Tolerances) -> str:
+    """Return the tolerances as the text of a TOML file that `read_tolerances` reads."""
+    lines = [f'origin = "{found.origin}"', f"threshold = {found.threshold:.4g}"]
+    for name in ("energy", "energy_sd"):
+        rows = ", ".join("[" + ", ".join(f"{x:.4g}" for x in row) + "]" for row in getattr(found, name))
+        lines.append(f"{name} = [{rows}]")
+    lines.append("noise = [")
+    lines += ["  [" + ", ".join("[" + ", ".join(f"{x:.5g}" for x in row) + "]" for row in band) + "]," for band in found.noise]
+    lines += ["]", "", "[sizes]"]
+    lines += [f'"{key}" = {value:.4g}' for key, value in sorted(found.sizes.items())]
+    lines += ["", "[means]"] + [f'"{key}" = {value:.4g}' for key, value in sorted(found.means.items())]
+    lines += ["", "[accuracy]"] + [f'"{key}" = {value:.4g}' for key, value in sorted(found.accuracy.items())]
+    return "\n".join(lines) + "\n"
+
+
+def key_of(name: str, target: str) -> str:
+    """Return the key of an effect at a target: plates share their tolerances, and so do the sides of the body."""
+    plate, colon, rest = target.partition(":")
+    kind = rest if colon and plate.startswith("plate") else re.sub(r"^(right_|left_|[LR](?=[A-Z]{3}))", "", target)
+    return f"{name} {kind}".strip()
+
+
+def in_state(key: str, joint: str, body: Body) -> str:
+    """Return ``key`` as it holds for a ``joint`` of ``body`` ("" for what belongs to none): before or after a
+    functional calibration.
+
+    After it, a joint that the movement did not show stays where it was; its errors hardly show in that movement
+    either, and such joints are among those that the sizes were learned on.
+    """
+    return key if not joint or body.joint_errors else key + BEFORE
+
+
+def mean_key(name: str, target: str, parameter: str) -> str:
+    """Return the key of what is expected of one parameter of an effect: sides of the body each have their own, as
+    signs may be mirrored.
+    """
+    plate, colon, rest = target.partition(":")
+    return " ".join(filter(None, (name, rest if colon and plate.startswith("plate") else target, parameter)))
+
+
+def whitened(rows: Array, band: NDArray[np.intp], marker_keys: tuple[str, ...], mass: float, tolerances: Tolerances) -> Array:
+    """Return ``rows`` (r, n) in units of their standard deviation."""
+    count = 6 * band.size
+    wrench = rows[:count].reshape(band.size, 6, -1)
+    white = np.empty_like(wrench)
+    for b, matrix in enumerate(tolerances.whiteners(mass).astype(rows.dtype)):
+        chosen = band == b
+        white[chosen] = matrix @ wrench[chosen]
+    known, cameras = [tolerances.size(key) for key in marker_keys], error_size("camera", "marker")
+    sd = np.array([max(size, cameras) if size > 0 else np.inf for size in known], dtype=rows.dtype)
+    return np.concatenate([white.reshape(count, -1), rows[count:] / sd[:, None]])

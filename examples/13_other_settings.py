@@ -1,0 +1,28 @@
+"""Diagnose a simulated visit in which the plate reads 6 % too much, and say it with other settings again.
+
+python examples/13_other_settings.py [FIGURE.png]
+"""
+
+import sys
+import tempfile
+from pathlib import Path
+
+import biodance
+
+
+def main(picture: Path) -> None:
+    """Print the causes found; draw measured and simulated wrench of the squat."""
+    with tempfile.TemporaryDirectory() as scratch:
+        subject, hidden = biodance.Subject(62.0, 1.70, "F", 31.0), ["plate_gain:target=Fz,gain=0.06"]
+        folder = biodance.simulate(subject, "short", Path(scratch) / "visit", seed=2, effects=hidden)
+        visits = [biodance.read_session(folder, settings={"filter.cutoff": cutoff}) for cutoff in (10, 6)]
+    for visit in visits:
+        found = biodance.diagnose(visit)
+        print(f"{visit.settings}: {found.verdict}", *found.findings, sep="\n  ")
+    result = biodance.examine(visits[0])
+    axes = result["squat_1"].comparison.plot_wrench()
+    axes[0].figure.savefig(picture, dpi=120)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "13_other_settings.png"))

@@ -1,0 +1,51 @@
+"""The docstrings of the front door: complete, and what their examples print is true."""
+
+import doctest
+import inspect
+import os
+
+import pytest
+from docstrings import faults, public
+from small_dances import small_dance
+
+import biodance
+
+FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+
+
+@pytest.fixture(scope="module")
+def names(tmp_path_factory):
+    """Return the names that the examples share, in a folder that holds the simulated visit they read."""
+    import matplotlib.pyplot as plt
+
+    folder, before = tmp_path_factory.mktemp("examples"), os.getcwd()
+    os.chdir(folder)
+    biodance.simulate(biodance.Subject(62.0, 1.70, "F", 31.0), "short", "visit", seed=1)
+    session = biodance.read_session("visit")
+    result = biodance.examine(session)
+    shared = {"session": session, "result": result, "identified": biodance.identify(result), "found": biodance.diagnose(result)}
+    small_dance().save("dance.npz")
+    yield {"biodance": biodance, "dance": small_dance(), **shared}
+    plt.close("all")
+    os.chdir(before)
+
+
+@pytest.mark.parametrize("name", biodance.__all__)
+def test_examples_print_what_they_say(name, names):
+    thing = biodance.front_door(name)
+    runner, told = doctest.DocTestRunner(optionflags=FLAGS), []
+    for example in doctest.DocTestFinder().find(thing, name, globs=dict(names)):
+        runner.run(example, out=told.append)
+    assert runner.failures == 0, "".join(told)
+
+
+def test_every_docstring_of_the_front_door_is_complete():
+    pytest.importorskip("numpydoc")
+    assert faults() == []
+
+
+def test_the_check_sees_methods_and_properties():
+    homes = [name for name, _ in public()]
+    assert "biodance.records.wrench.Wrench.cop" in homes
+    assert "biodance.records.motion.Motion.angles" in homes
+    assert sum(inspect.isclass(thing) for _, thing in public()) >= 15

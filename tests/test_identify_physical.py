@@ -1,0 +1,153 @@
+"""The nearest possible body hangs on no rounding: a hundred seeds, inputs moved by 1e-12, rows in another order, segments at their edge."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from identify_trials import person
+from random_bodies import random_body, random_motion
+
+from biodance.body.inertia import smallest_eigenvalues
+from biodance.errors import NotSolved
+from biodance.identify import physical
+from biodance.identify.information import Information, fold, information
+from biodance.identify.physical import FailedFit, PhysicalFit, physical_fit
+from biodance.identify.posterior import Posterior, posterior
+from biodance.motion.regressor import predict_wrench
+from biodance.records import Sip, Wrench
+from biodance.uncertainty.noise import Noise
+
+NOISE = Noise.of_sd(2.0, 0.5, np.zeros(3))
+SEEDS = range(100)
+MOVED = 1e-12
+CLOSE = 1e-3
+"""Posterior standard deviations: what two solves of one programme may differ by."""
+
+
+def rows_of(seed: int, *, sd: float = 1.0):
+    """Return a chain whose table is wrong by 10 % (every second one holds a segment that cannot exist) and whitened rows [W y] of it."""
+    body, truth, rng = person(seed, segments=3)
+    motion = random_motion(body, rng, frames=40)
+    clean = predict_wrench(body, motion, truth).value
+    wrench = Wrench(motion.time, clean + sd * rng.normal(size=clean.shape) * [2, 2, 2, 0.5, 0.5, 0.5])
+    return body, information(body, motion, wrench, NOISE).R, rng
+
+
+def flat(seed: int):
+    """Return a body whose every segment is flat: four point masses in one plane, so that its pseudo-inertia ends at zero."""
+    rng = np.random.default_rng(seed)
+    body = random_body(rng, n_segments=3)
+    frames = np.linalg.qr(rng.normal(size=(3, 3, 3)))[0]
+    phi = np.concatenate([sum(point(frame[:, :2] @ rng.normal(0, 0.1, 2)) for _ in range(4)) for frame in frames])
+    return body, phi, frames, rng
+
+
+def point(place: np.ndarray) -> np.ndarray:
+    """Return the ten parameters of 1 kg at ``place``."""
+    x, y, z = place
+    return np.array([1, x, y, z, y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y])
+
+
+def assert_same(one: PhysicalFit | FailedFit, other: PhysicalFit | FailedFit) -> None:
+    assert one.status == other.status == "solved", (one.cause, other.cause)
+    sd = np.sqrt(np.diag(one.sip.covariance))
+    np.testing.assert_array_less(np.abs(one.sip.phi - other.sip.phi), CLOSE * sd + 1e-9)
+    np.testing.assert_array_equal(one.moved, other.moved)
+
+
+def test_no_session_without_fault_fails_and_rounding_changes_nothing() -> None:
+    held = 0
+    for seed in SEEDS:
+        body, R, rng = rows_of(seed)
+        shaken = R[rng.permutation(len(R))] * (1 + MOVED * rng.normal(size=R.shape))
+        fits = [physical_fit(posterior(Information(fold(rows), 40), body.sip), body) for rows in (R, shaken)]
+        assert_same(*fits)
+        assert smallest_eigenvalues(fits[0].sip.phi).min() > -1e-12
+        held += fits[0].moved.any()
+    assert held > 30, "the cases must need the constraint"
+
+
+def test_the_posterior_of_a_session_as_prior_of_the_next() -> None:
+    for seed in SEEDS:
+        body, R, rng = rows_of(seed)
+        before = posterior(Information(R, 40), body.sip)
+        expected = Sip(body.segments, before.mean + 0.5 * before.factor @ rng.normal(size=before.factor.shape[1]), before.covariance)
+        shaken = Sip(body.segments, expected.phi * (1 + MOVED * rng.normal(size=expected.phi.size)), expected.covariance)
+        assert_same(*(physical_fit(posterior(Information(R, 40), prior), body) for prior in (expected, shaken)))
+
+
+def test_segments_that_all_lie_at_their_edge() -> None:
+    for seed in SEEDS:
+        body, phi, _, rng = flat(seed)
+        factor = np.diag(0.1 * np.abs(phi) + 1e-3)
+        fits = []
+        for mean in (phi, phi * (1 + MOVED * rng.normal(size=phi.size)), phi * (1 - MOVED)):
+            fits.append(physical_fit(Posterior(Sip(body.segments, phi, factor**2), mean, factor, 0.0, 0.0, 1), body))
+        for other in fits[1:]:
+            assert_same(fits[0], other)
+        assert fits[0].distance < 1e-3
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_plate_whose_thickness_is_fixed_has_no_room_for_a_gap(seed: int) -> None:
+    body, phi, frames, rng = flat(seed)
+    factor = np.zeros((30, 12))
+    for k, frame in enumerate(frames):
+        for column in range(4):
+            factor[10 * k : 10 * k + 10, 4 * k + column] = 0.3 * point(frame[:, :2] @ rng.normal(0, 0.1, 2))
+    mean = phi - 9.0 * factor[:, ::4].sum(axis=1)
+    needed = smallest_eigenvalues(mean) < -1e-3
+    assert needed.any(), "the case must need the constraint"
+    fit = physical_fit(Posterior(Sip(body.segments, phi, factor @ factor.T), mean, factor, 0.0, 0.0, 1), body)
+    assert fit.status == "solved", fit.cause
+    assert smallest_eigenvalues(fit.sip.phi).min() > -1e-7
+    assert fit.moved[needed].all()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_data_a_hundred_thousand_deviations_away_are_solved(seed: int) -> None:
+    body, truth, rng = person(seed, segments=3)
+    motion = random_motion(body, rng, frames=40)
+    impossible = truth * np.where(np.arange(truth.size) % 10 == 4, -3.0, 1.0)
+    data = information(body, motion, predict_wrench(body, motion, impossible), Noise.of_sd(2e-4, 5e-5, np.zeros(3)))
+    fit = physical_fit(posterior(data, replace(body.sip, covariance=100 * body.sip.covariance)), body)
+    assert fit.status == "solved", fit.cause
+    assert fit.distance > 5e4
+    assert smallest_eigenvalues(fit.sip.phi).min() > -1e-12
+
+
+def test_an_inaccurate_answer_is_asked_for_again_and_never_taken(monkeypatch) -> None:
+    body, R, _ = rows_of(0)
+    belief = posterior(Information(R, 40), replace(body.sip, covariance=1e4 * body.sip.covariance))
+    right, solve, asked = physical_fit(belief, body), physical.solve_convex, []
+    assert right.moved.any()
+
+    def inaccurate(problem) -> str:
+        asked.append(solve(problem))
+        return "optimal_inaccurate" if len(asked) == 1 else asked[-1]
+
+    monkeypatch.setattr(physical, "solve_convex", inaccurate)
+    again = physical_fit(belief, body)
+    assert len(asked) > 1
+    assert_same(right, again)
+    monkeypatch.setattr(physical, "solve_convex", lambda _: "optimal_inaccurate")
+    failed = physical_fit(belief, body)
+    assert isinstance(failed, FailedFit)
+    assert failed.status == "failed"
+    assert "optimal_inaccurate" in failed.cause
+    assert "segments s0, s2" in failed.cause
+    assert "Check the scaling" in failed.cause
+    for name in ("sip", "phi"):
+        with pytest.raises(NotSolved, match="Check the scaling"):
+            getattr(failed, name)
+
+
+def test_boxes_that_no_body_can_meet_are_a_failure_with_the_segment() -> None:
+    body, R, _ = rows_of(1)
+    boxes = np.array(body.com_boxes)
+    boxes[2] = [[5.0] * 3, [4.0] * 3]
+    belief = posterior(Information(R, 40), Sip(body.segments, body.sip.phi, body.sip.covariance))
+    pinned = replace(belief, factor=belief.factor * (np.arange(30) >= 30)[:, None])
+    failed = physical_fit(pinned, replace(body, com_boxes=boxes))
+    assert failed.status == "failed"
+    assert "s2" in failed.cause

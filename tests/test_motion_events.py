@@ -1,0 +1,44 @@
+"""A foot comes down where the force passes 20 N, and only where that is the foot's own force."""
+
+import numpy as np
+import pytest
+
+from biodance.motion.contact import Contact
+from biodance.motion.events import foot_events
+from biodance.records import Wrench
+
+TIME = np.arange(200) / 100
+
+
+def walked(*, measured=True, shared=False):
+    """Right foot from 0.405 to 1.2 s with a slope of 200 N a frame, left foot always in the air."""
+    force = np.interp(TIME, [0.395, 0.435, 1.165, 1.205], [0, 800, 800, 0], left=0, right=0)
+    value = np.zeros((200, 6))
+    value[:, 2] = force
+    on = np.zeros((200, 2, 2), dtype=bool)
+    on[:, 0, 0] = force > 0
+    on[:, 1, 0] = shared
+    contact = Contact(TIME, on.any(axis=2), on, np.full(200, measured), np.zeros((200, 2)), ())
+    return (Wrench(TIME, value), Wrench(TIME, np.zeros((200, 6)))), contact
+
+
+def test_a_step_is_one_strike_and_one_off():
+    strike, off = foot_events(*walked())
+    assert (strike.side, strike.down, off.side, off.down) == ("right", True, "right", False)
+    assert strike.time == pytest.approx(0.392, abs=1e-9)  # 20 N of the 100 N at 0.40 s, after 0.39 s
+    assert off.time == pytest.approx(1.208, abs=1e-9)
+
+
+def test_what_is_not_measured_or_shared_tells_no_event():
+    assert foot_events(*walked(measured=False)) == ()
+    assert foot_events(*walked(shared=True)) == ()
+
+
+def test_a_flicker_is_no_event():
+    (right, left), contact = walked()
+    value = np.array(right.value)
+    value[80, 2], value[20, 2] = 0.0, 400.0
+    assert [event.time for event in foot_events((Wrench(TIME, value), left), contact)] == [
+        pytest.approx(0.392),
+        pytest.approx(1.208),
+    ]

@@ -1,0 +1,116 @@
+"""What is drawn in 3-D: the frame with the largest residual, the load where it sits, postures; with GL and without."""
+
+import json
+from dataclasses import replace
+from io import BytesIO
+
+import numpy as np
+import pytest
+from identified_sessions import session_result
+
+from biodance.body.solids import shape_parts
+from biodance.identify.added_mass import added_mass
+from biodance.motion.kinematics import poses
+from biodance.pipeline.still import load_still, posture_still, worst_still
+from biodance.records import Markers
+from biodance.report import solid
+from biodance.report.solid import solid_pngs
+from biodance.report.still import RESIDUAL_SCALE, still_figure
+
+
+@pytest.fixture(scope="module")
+def result():
+    """Return the session with markers, which the stills show."""
+    found = session_result(load=2.0)
+    trials = []
+    for one in found.trials:
+        xyz = poses(found.body, one.motion.q).points(list(found.body.markers.segment), found.body.markers.position)
+        markers = Markers(found.body.markers.names, one.motion.time, xyz)
+        trials.append(replace(one, trial=replace(one.trial, markers=markers)))
+    return replace(found, trials=tuple(trials))
+
+
+def test_the_worst_frame_is_the_one_that_was_spoilt(result):
+    first = result.trials[0]
+    measured, used = np.array(first.comparison.measured), np.array(first.comparison.used)
+    measured[200, :3] += [300.0, -400.0, 1200.0]
+    measured[100, :3] += 9000.0
+    used[100] = False  # a frame that the plates do not measure does not count
+    spoilt = replace(first, comparison=replace(first.comparison, measured=measured, used=used))
+    still = worst_still(result.identification.identification.identified, (spoilt, *result.trials[1:]))
+    assert (still.trial, still.time) == (first.trial.name, pytest.approx(first.motion.time[200]))
+    np.testing.assert_allclose(still.residual, [300.0, -400.0, 1200.0], atol=60.0)
+    assert "The worst frame" in still.about
+    drawn = still_figure(still).axes[0].lines
+    arrow = [np.ptp(line.get_data_3d(), axis=1) for line in drawn]
+    assert any(np.allclose(length, RESIDUAL_SCALE * np.abs(still.residual)) for length in arrow)
+
+
+def test_without_a_measured_frame_there_is_no_worst_one(result):
+    nothing = [replace(one, comparison=replace(one.comparison, used=np.zeros_like(one.comparison.used))) for one in result.trials]
+    assert worst_still(result.body, tuple(nothing)) is None
+
+
+def test_a_load_is_drawn_where_it_sits(result):
+    search = result.identification.search
+    assert search.found
+    place = np.array([0.0, -0.2, 0.02])
+    best = replace(search.best, segment="left_forearm_hand", place=place, mass=2.0, sd=0.1)
+    still = load_still(result.body, result.trials, replace(search, suspects=(best, *search.suspects[1:])))
+    one = result.trials[0]
+    pose, segment = poses(result.body, one.motion.q[one.motion.time.size // 2]), result.body.segment_index("left_forearm_hand")
+    np.testing.assert_allclose(still.load, pose.points([segment], place[None])[0, 0], atol=1e-12)
+    assert still.about == "The load that was found: 2.00 kg ± 0.10 kg on the left forearm hand (yellow)."
+    unplaced = replace(best, place=np.full(3, np.nan))
+    assert load_still(result.body, result.trials, replace(search, suspects=(unplaced, *search.suspects[1:]))) is None
+
+
+def test_without_a_load_none_is_drawn():
+    result = session_result()
+    search = added_mass(result.identification.identification)
+    if search.found:
+        pytest.fail("a session without a load must not announce one")
+    assert load_still(result.body, result.trials, search) is None
+
+
+def test_head_and_trunk_are_two_shapes_within_their_box(result):
+    body = result.body
+    trunk = body.segment_index("trunk_head")
+    torso, head = (box for segment, box in shape_parts(body) if segment == trunk)
+    assert head[1, 1] == body.boxes[trunk, 1, 1]
+    assert torso[0, 1] == body.boxes[trunk, 0, 1]
+    assert head[0, 1] <= torso[1, 1] + 1e-9  # they meet
+    assert np.all(head[0] >= body.boxes[trunk, 0] - 0.02)
+    assert 0.15 < np.ptp(head[:, 1]) < 0.30
+    assert len(shape_parts(body)) == len(body.segments) + 1
+
+
+def test_pictures_are_drawn_where_the_machine_can(result):
+    from PIL import Image
+
+    stills = [posture_still(result.body, result.body.neutral, f"{k}") for k in range(2)]
+    pictures = solid_pngs(stills, sheet=True)
+    if pictures is None:
+        pytest.skip("this machine draws no 3-D pictures; biodance doctor says how to mend it")
+    with Image.open(BytesIO(pictures[0])) as picture:
+        assert picture.size == (600, 420)
+        pixels = np.asarray(picture.convert("RGB")).reshape(-1, 3)
+    assert 0.03 < np.mean(np.any(pixels < 240, axis=1)) < 0.6  # bodies on white ground
+    warm, cold = pixels[:, 0].astype(int) - pixels[:, 2] > 40, pixels[:, 2].astype(int) - pixels[:, 0] > 40
+    assert min(warm.mean(), cold.mean()) > 0.003  # a left and a right side
+
+
+def test_a_still_survives_the_way_to_the_child(result):
+    still = posture_still(result.body, result.body.neutral, "one")
+    back = solid._record(json.loads(json.dumps(solid._plain(still))))
+    for name in ("bones", "boxes", "rotations", "positions", "markers", "plates", "com", "load"):
+        np.testing.assert_array_equal(getattr(back, name), getattr(still, name))
+    assert (back.sides, back.box_sides, back.trial) == (still.sides, still.box_sides, "one")
+
+
+@pytest.mark.parametrize("code", ["import os; os.abort()", "print('[]')", "print('no json')", "import time; time.sleep(30)"])
+def test_a_child_without_gl_is_no_crash_and_no_hang(result, monkeypatch, code):
+    run = solid.subprocess.run
+    monkeypatch.setattr(solid, "PATIENCE", 1.5)
+    monkeypatch.setattr(solid.subprocess, "run", lambda words, **kind: run([words[0], "-c", code], **kind))
+    assert solid_pngs([posture_still(result.body, result.body.neutral, "one")]) is None

@@ -1,0 +1,216 @@
+"""Elementary errors: forward equal to the transpose, and to what tracking and the rates of momentum make of a small
+error by other code."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from diagnosed_sessions import body, motion
+from identify_trials import person, smooth_motion
+from scipy.fft import dct
+from scipy.interpolate import make_interp_spline
+from scipy.spatial.transform import Rotation
+
+from biodance.body.inertia import lump_of
+from biodance.body.moved import recentre_joint
+from biodance.motion.kinematics import poses
+from biodance.motion.marker_jacobian import chains
+from biodance.motion.regressor import GRAVITY, predict_wrench
+from biodance.records import Array, Motion
+from biodance.uncertainty.joints import Centre, Tilt, joint_of
+from biodance.uncertainty.response import Response, derivatives
+from biodance.uncertainty.soft_tissue import Flesh, Sag, Slide
+from biodance.uncertainty.source import ErrorSource, neighbours
+from biodance.uncertainty.sources import forward, of_clusters, of_markers, transpose
+
+SMALL = 1e-4
+FRAMES = 150
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("family", [lambda one: (*of_clusters(one), Centre(one)), of_markers])
+def test_forward_and_transpose_are_one_map(seed: int, family) -> None:
+    one, _, rng = person(seed)
+    moving, weight = smooth_motion(one, rng, frames=60), rng.normal(size=(60, 6, 5))
+    errors = forward(family(one), moving)
+    back = transpose(family(one), Response.of(one, moving), weight)
+    there = np.einsum("tck,tcp->kp", errors.wrench, weight)
+    x = rng.normal(size=len(errors.groups))
+    np.testing.assert_allclose(back, there, rtol=1e-9, atol=1e-9 * np.abs(there).max())
+    assert np.sum((errors.wrench @ x)[..., None] * weight) == pytest.approx(np.sum(x @ back), rel=1e-9)
+    assert len(errors.groups) == len(errors.joints) == len(back)
+
+
+@cache
+def moving() -> Motion:
+    whole = motion(3)
+    return Motion(whole.time[:FRAMES], whole.q[:FRAMES], whole.v[:FRAMES], whole.a[:FRAMES])
+
+
+def needed(com: Array, turn: Array) -> Array:
+    """Return the wrench (T, 6) of matter whose segments' centres of mass are at ``com`` (T, N, 3), turned by ``turn``
+    (T, N, 3, 3).
+    """
+    lumps, time = [lump_of(phi) for phi in body().sip.phi.reshape(-1, 10)], moving().time
+    mass, own = np.array([lump.mass for lump in lumps]), np.array([lump.inertia for lump in lumps])
+
+    def rate(values: Array) -> Array:
+        return make_interp_spline(time, values, k=5).derivative(1)(time)
+
+    whirl = rate(turn) @ np.swapaxes(turn, -1, -2)
+    spin = np.stack([whirl[..., 2, 1], whirl[..., 0, 2], whirl[..., 1, 0]], axis=-1)
+    momentum = mass[:, None] * rate(com)
+    angular = np.cross(com, momentum) + ((turn @ own @ np.swapaxes(turn, -1, -2)) @ spin[..., None])[..., 0]
+    force = rate(momentum.sum(axis=1)) - mass.sum() * GRAVITY
+    return np.concatenate([force, rate(angular.sum(axis=1)) - np.cross(com, mass[:, None] * GRAVITY).sum(axis=1)], axis=1)
+
+
+def stepped(q: Array, k: int, size: float | Array) -> Array:
+    """Return positions (T, nq) a step along coordinate ``k`` (root place, root turn in the lab, angles)."""
+    out = q.copy()
+    if 3 <= k < 6:
+        spin = Rotation.from_rotvec(np.multiply.outer(size * np.ones(len(q)), np.eye(3)[k - 3]))
+        out[:, 3:7] = (spin * Rotation.from_quat(q[:, 3:7])).as_quat()
+    else:
+        out[:, k if k < 3 else k + 1] += size
+    return out
+
+
+def tracked(target: Array, moved: Array) -> Array:
+    """Return the positions at which model markers, displaced by ``moved``, are nearest to ``target`` (T, M, 3):
+    Gauss-Newton.
+    """
+    one, q = body(), np.array(moving().q)
+    worn, weight = list(one.markers.segment), np.sqrt(np.repeat(one.markers.weight, 3))
+
+    def left(at: Array) -> Array:
+        return ((poses(one, at).points(worn, one.markers.position) + moved - target).reshape(len(at), -1)) * weight
+
+    for _ in range(2):
+        now = left(q)
+        slope = np.stack([(left(stepped(q, k, 1e-6)) - now) / 1e-6 for k in range(one.nv)], axis=2)
+        step = -np.stack([np.linalg.lstsq(a, b, rcond=1e-8)[0] for a, b in zip(slope, now, strict=True)])
+        for k in range(one.nv):
+            q = stepped(q, k, step[:, k])
+    return q
+
+
+def brute(moved: Array, places: Array, turns: Array) -> tuple[Array, Array]:
+    """Return wrench (T, 6) and mean residual (M, 3) of a model that errs by ``moved`` (T, M, 3), ``places``,
+    ``turns`` (T, N, 3).
+    """
+    one, worn = body(), list(body().markers.segment)
+    true = poses(one, moving().q)
+    target = true.points(worn, one.markers.position)
+    q = tracked(target, SMALL * moved)
+    every, found = list(range(len(one.segments))), poses(one, q)
+    turned = Rotation.from_rotvec(SMALL * turns.reshape(-1, 3)).as_matrix().reshape(*turns.shape, 3) @ found.rotation
+    after = needed(found.points(every, one.sip.com) + SMALL * places, turned)
+    before = needed(true.points(every, one.sip.com), true.rotation)
+    residual = found.points(worn, one.markers.position) + SMALL * moved - target
+    local = np.swapaxes(true.rotation[:, worn], -1, -2) @ residual[..., None]
+    return (after - before) / SMALL, local[..., 0].mean(axis=0) / SMALL
+
+
+def disturbed(kind: str) -> tuple[ErrorSource, int, Array, Array, Array]:
+    """Return a source, the index of one of its errors, and what that error displaces at unchanged coordinates, by
+    construction.
+    """
+    one = body()
+    true, worn = poses(one, moving().q), np.array(one.markers.segment)
+    marker, com = true.points(list(worn), one.markers.position), true.points(list(range(len(one.segments))), one.sip.com)
+    moved, places, turns = np.zeros_like(marker), np.zeros_like(com), np.zeros_like(com)
+    if kind in ("slide", "alone"):
+        s = one.segment_index("right_thigh")
+        source = (of_clusters if kind == "slide" else of_markers)(one)[0]
+        first, beside = source.groups.index("slide thigh"), np.flatnonzero(neighbours(one)[:, s])
+        on = np.flatnonzero(worn == s)[: None if kind == "slide" else 1]
+        moved[:, on] = -(moving().q[:, 7 + beside[1], None] * true.rotation[:, s, :, 0])[:, None]
+        return source, first + 1, moved, places, turns
+    if kind == "sag":
+        source, s = Sag(one), one.segment_index("left_shank")
+        on = worn == s
+        time, middle = moving().time, marker[:, on].mean(axis=1)
+        moved[:, on] = (make_interp_spline(time, middle, k=5).derivative(2)(time) - GRAVITY)[:, None]
+        return source, sorted(set(worn)).index(s), moved, places, turns
+    if kind == "flesh":
+        source, s = Flesh(one), one.segment_index("right_shank")
+        beside = np.flatnonzero(neighbours(one)[:, s])
+        places[:, s] = moving().q[:, 7 + beside[0], None] * true.rotation[:, s, :, 0]
+        return source, source.groups.index("flesh shank"), moved, places, turns
+    if kind == "tilt":
+        source = Tilt(one)
+        k = source.joints.index("right_knee")
+        joint = one.joint_index("right_knee_flexion")
+        axis = one.joints[joint].axis
+        across = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+        spin = moving().q[:, 7 + joint, None] * (true.joint_rotation[:, joint] @ (across / np.linalg.norm(across)))
+        origin = true.joint_position[:, joint]
+        for s in map(one.segment_index, ("right_shank", "right_foot")):
+            turns[:, s], places[:, s] = spin, np.cross(spin, com[:, s] - origin)
+            moved[:, worn == s] = np.cross(spin[:, None], marker[:, worn == s] - origin[:, None])
+        return source, k, moved, places, turns
+    source, name = Centre(one), kind
+    chain = next(chain for chain in chains(one) if joint_of(one, chain) == name)
+    away = recentre_joint(one, chain[0], SMALL * np.eye(3)[1])
+    there = poses(away, moving().q)
+    moved = (there.points(list(worn), away.markers.position) - marker) / SMALL
+    places = (there.points(list(range(len(one.segments))), away.sip.com) - com) / SMALL
+    return source, source.joints.index(name) + 1, moved, places, turns
+
+
+def slow(wrench: Array) -> Array:
+    """Return the coefficients below 1.5 Hz: accelerations of the movement have kinks, whose second derivatives no two
+    formulas share.
+    """
+    return dct(wrench, norm="ortho", axis=0)[: int(1.5 * 2 * len(wrench) / moving().rate)]
+
+
+@pytest.mark.parametrize("kind", ["slide", "alone", "sag", "flesh", "tilt", "trunk", "right_hip", "left_elbow"])
+def test_a_small_error_does_what_tracking_and_momentum_make_of_it(kind: str) -> None:
+    source, k, *displaced = disturbed(kind)
+    found = forward((source,), moving())
+    wrench, left = brute(*displaced)
+    got, wanted = (slow(value) if kind == "sag" else value[8:-8] for value in (found.wrench[..., k], wrench))
+    np.testing.assert_allclose(got, wanted, atol=(0.02 if kind == "sag" else 0.01) * np.abs(wanted).max())
+    np.testing.assert_allclose(found.markers[..., k], left, atol=0.01 * max(np.abs(left).max(), 1e-3))
+
+
+def test_squares_are_those_of_the_residuals() -> None:
+    one, _, rng = person(5)
+    trial = Response.of(one, smooth_motion(one, rng, frames=40))
+    hat = np.eye(trial.J.shape[1]) + trial.J @ trial.follow
+    segment, angle = one.markers.segment[1], np.flatnonzero(neighbours(one)[:, one.markers.segment[1]])[0]
+    source = of_markers(one)[0]
+    rank = sum(s == segment for s in one.markers.segment[:1])
+    column = sum(pattern.shape[2] * int(neighbours(one)[:, s].sum()) for s, pattern in enumerate(source.patterns[:segment]))
+    column += 3 * rank * int(neighbours(one)[:, segment].sum())
+    moved = np.zeros((40, len(one.markers.names), 3))
+    moved[:, 1] = trial.pose.rotation[:, segment, :, 0] * trial.angles[:, angle, None]
+    left = (hat @ moved.reshape(40, -1, 1)).reshape(40, -1, 3)
+    assert source.squares(trial)[column] == pytest.approx(np.mean(np.sum(left**2, axis=2)), rel=1e-9)
+    for other in (Flesh(one), Centre(one), Tilt(one), Sag(one)):
+        assert other.squares(trial).shape == (len(other.groups),)
+    assert not Flesh(one).squares(trial).any()
+
+
+def test_derivatives_of_a_wave() -> None:
+    time = np.arange(200) / 25.0
+    second, first = derivatives(200)
+    wave = np.sin(2 * np.pi * 4.0 * time)
+    inside = slice(10, -10)
+    np.testing.assert_allclose(25 * (first @ wave)[inside], 8 * np.pi * np.cos(8 * np.pi * time)[inside], atol=0.01 * 8 * np.pi)
+    np.testing.assert_allclose(25**2 * (second @ wave)[inside], -((8 * np.pi) ** 2) * wave[inside], atol=0.02 * (8 * np.pi) ** 2)
+
+
+def test_the_brute_wrench_is_the_predicted_one() -> None:
+    true = poses(body(), moving().q)
+    found = needed(true.points(list(range(12)), body().sip.com), true.rotation)
+    expected = predict_wrench(body(), moving()).value
+    np.testing.assert_allclose(found[8:-8], expected[8:-8], atol=0.01 * np.abs(expected).max())
+
+
+def test_a_slide_needs_markers() -> None:
+    one = replace(body(), markers=replace(body().markers, names=(), segment=(), position=np.zeros((0, 3)), weight=np.zeros(0)))
+    assert not Slide(one, tuple(np.empty((0, 3, 0)) for _ in one.segments)).groups
