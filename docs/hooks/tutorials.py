@@ -4,6 +4,7 @@
 """
 
 import ast
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -63,9 +64,10 @@ def short(script: Path) -> str:
 
 def run(script: Path) -> None:
     """Run one script; keep what it prints and draws."""
+    KEPT.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as scratch:
-        picture = KEPT / f"{script.stem}.png"
-        done = subprocess.run([sys.executable, script, picture], cwd=scratch, capture_output=True, text=True, check=True)
+        done = subprocess.run([sys.executable, script], cwd=scratch, capture_output=True, text=True, check=True)
+        shutil.move(Path(scratch) / f"{script.stem}.png", KEPT / f"{script.stem}.png")
     (KEPT / f"{script.stem}.txt").write_text(done.stdout)
 
 
