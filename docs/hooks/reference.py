@@ -43,20 +43,15 @@ def on_files(files: Files, *, config: MkDocsConfig) -> Files:
 
 def page() -> str:
     """Return the page as Markdown."""
-    names = sorted((n for n in getattr(biodance, "__all__", ()) if not n.startswith("_")), key=str.lower)
-    found = {name: getattr(biodance, name) for name in names}
-    functions = [entry(name, thing) for name, thing in found.items() if inspect.isfunction(thing)]
-    records = [entry(name, thing) for name, thing in found.items() if inspect.isclass(thing)]
-    contracts = [entry(name, thing) for module, name in CONTRACTS if (thing := contract(module, name)) is not None]
-    return "\n".join([START, "## Functions", "", *functions, "## Records", "", *records, FAMILIES, *contracts])
-
-
-def contract(module: str, name: str) -> Any:
-    """Return the contract of a family, None where this version has no such family yet."""
-    try:
-        return getattr(importlib.import_module(module), name, None)
-    except ModuleNotFoundError:
-        return None
+    found = {name: biodance.front_door(name) for name in sorted(biodance.__all__, key=str.lower)}
+    functions = [entry(name, thing) for name, thing in found.items() if not inspect.isclass(thing)]
+    errors = {name: thing for name, thing in found.items() if inspect.isclass(thing) and issubclass(thing, Exception)}
+    records = [entry(name, thing) for name, thing in found.items() if inspect.isclass(thing) and name not in errors]
+    refusals = [entry(name, thing) for name, thing in errors.items()]
+    contracts = [entry(name, getattr(importlib.import_module(module), name)) for module, name in CONTRACTS]
+    headed = {"Functions": functions, "Records": records, "Errors": refusals}
+    parts = [line for head, entries in headed.items() for line in (f"## {head}", "", *entries)]
+    return "\n".join([START, *parts, FAMILIES, *contracts])
 
 
 def entry(name: str, thing: Any) -> str:
