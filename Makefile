@@ -23,6 +23,7 @@ docs: $(STAMP)
 
 tutorials: $(STAMP) # runs every example, and keeps what it prints and draws for the documentation
 	$(BIN)/python docs/hooks/tutorials.py
+	$(BIN)/python docs/figures/measured_and_simulated.py docs/figures/measured_and_simulated.png
 
 $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)

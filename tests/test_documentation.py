@@ -48,7 +48,9 @@ def test_every_example_is_a_tutorial() -> None:
     contents = tutorials.contents()
     for script in tutorials.scripts():
         assert f"({script.stem}.md)" in contents
-        assert script.read_text() in tutorials.page(script)
+        code = tutorials.parts(script)[1]
+        assert script.read_text().rstrip().endswith(code)
+        assert code in tutorials.page(script)
 
 
 def test_what_a_browser_would_fetch_is_seen() -> None:

@@ -18,7 +18,6 @@ def main(picture: Path) -> None:
         person = biodance.Subject(75.0, 1.77, "M", 33.0)
         visit = biodance.simulate(person, "short", Path(scratch) / "visit", seed=3)
         trial = biodance.identify(visit).validations[0]
-    print(trial.name)
     time = trial.measured.time
     figure = Figure(figsize=(9.5, 4.2), layout="constrained")
     for channel, axes in enumerate(figure.subplots(2, 3, sharex=True).ravel()):

@@ -41,14 +41,22 @@ def contents() -> str:
 
 def page(script: Path) -> str:
     """Return the page of one script."""
-    _, *text = (ast.get_docstring(ast.parse(script.read_text())) or "").splitlines()
-    parts = [f"# {title(script)}", "\n".join(text), "```python", script.read_text(), "```"]
+    told, code = parts(script)
+    lines = [f"# {title(script)}", told, "```python", code, "```", "", f"Run it: `python examples/{script.name}`"]
     printed, drawn = KEPT / f"{script.stem}.txt", KEPT / f"{script.stem}.png"
     if printed.is_file():
-        parts += ["It prints:", "", "```text", printed.read_text(), "```"]
+        lines += ["", "It prints:", "", "```text", printed.read_text(), "```"]
     if drawn.is_file():
-        parts += ["", f"![What this script draws]({drawn.name})"]
-    return "\n".join(parts) + "\n"
+        lines += ["", "It draws:", "", f"![What this script draws]({drawn.name})"]
+    return "\n".join(lines) + "\n"
+
+
+def parts(script: Path) -> tuple[str, str]:
+    """Return what a script says about itself after its first line, and its code without that."""
+    source = script.read_text()
+    tree = ast.parse(source)
+    told = [line for line in (ast.get_docstring(tree) or "").splitlines()[1:] if not line.startswith("python ")]
+    return "\n".join(told).strip() + "\n", "\n".join(source.splitlines()[tree.body[0].end_lineno :]).strip()
 
 
 def title(script: Path) -> str:
