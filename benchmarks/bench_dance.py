@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.metrics import dance_metrics

@@ -30,15 +30,14 @@ from biodance.dance.postures.posture import KEPT, Near, initial_guess, intermedi
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.plan import Plan, read_plan
 from biodance.dance.problem.stance import under
-from biodance.lab.session import read_session
+from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.pipeline.dance import dancer
 from biodance.pipeline.danced import simulate_dance
-from biodance.pipeline.session import examine, identified
+from biodance.pipeline.session import examine, identification_of
 from biodance.records import Array, Motion, Subject
-from biodance.virtual_lab.protocol import Protocol, TrialPlan
-from biodance.virtual_lab.protocol_file import read_protocol
-from biodance.virtual_lab.simulate import simulate
+from biodance.virtual_lab.protocol import Protocol, TrialPlan, read_protocol
+from biodance.virtual_lab.simulate import simulate_session
 from biodance.virtual_lab.truth import sip_in_frames
 
 CACHE = Path(os.environ.get("BIODANCE_CACHE", Path(tempfile.gettempdir()) / "biodance_excitation"))
@@ -135,7 +134,7 @@ def examined(number: int, subject: Subject, rival: str, write: Callable[[Path], 
         write(place)
         result = examine(read_session(place))
         document = json.loads((place / "truth" / "truth.json").read_text())
-    found, body = identified(result), result.body
+    found, body = identification_of(result), result.body
     fits = [t for t in result.trials if t.trial.role == "fit" and t.motion is not None]
     static = next(t for t in result.trials if t.trial.role == "static")
     frame = int(np.argmin(np.abs(static.motion.time - document["static_pose"]["time_s"])))
@@ -170,7 +169,7 @@ def visit(number: int, subject: Subject, rival: str) -> Row:
 
     def write(place: Path) -> object:
         if rival.startswith("squats"):
-            return simulate(subject, squats(1.2 * dance.duration), place, seed=seed)
+            return simulate_session(subject, squats(1.2 * dance.duration), place, seed=seed)
         shown = random_dance(dance, read_plan(name)) if rival.startswith("random") else dance
         return simulate_dance(subject, shown, place, seed=seed)
 

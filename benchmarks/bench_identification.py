@@ -30,17 +30,17 @@ from identification_tables import (
 )
 from virtual_visits import CACHE, FRESH, TUNED, TrackedVisit, subjects
 
-import biodance.identify
+import biodance.identification
 from biodance.body.inertia import smallest_eigenvalues
-from biodance.identify.added_mass import AddedMass, added_mass
-from biodance.identify.identification import Identification, identify, standing_point
-from biodance.identify.knowledge import SIGMAS, segment_quantities
-from biodance.identify.mismatch import evidence_of_scale
-from biodance.identify.paper_programme import paper_programme
-from biodance.identify.physical import physical_fit
-from biodance.identify.posterior import posterior
-from biodance.identify.statistics import Fit, layout_for, statistics
-from biodance.identify.torques import torque_bands, torque_regressor
+from biodance.identification.added_mass import LoadSearch, added_mass
+from biodance.identification.identification import Identification, identify_body, standing_point
+from biodance.identification.knowledge import SIGMAS, segment_quantities
+from biodance.identification.mismatch import evidence_of_scale
+from biodance.identification.paper_programme import paper_programme
+from biodance.identification.physical import physical_fit
+from biodance.identification.posterior import posterior
+from biodance.identification.statistics import Fit, layout_for, statistics
+from biodance.identification.torques import torque_bands, torque_regressor
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion, Sip, Subject, Wrench
 
@@ -79,11 +79,11 @@ def own_truth(one: TrackedVisit) -> Array:
     """Return the truth about the true joint centres, in the model's axes (the pelvis in the model's frame)."""
     from virtual_visits import _orthogonal
 
-    from biodance.virtual_lab.flesh import of_parameters, parameters, placed
+    from biodance.virtual_lab.flesh import of_parameters, parameters_of_inertia, place_inertia
 
     return np.concatenate(
         [
-            parameters(placed(of_parameters(phi), _orthogonal(f[:, :3]), f[:, 3] if k == 0 else np.zeros(3)))
+            parameters_of_inertia(place_inertia(of_parameters(phi), _orthogonal(f[:, :3]), f[:, 3] if k == 0 else np.zeros(3)))
             for k, (phi, f) in enumerate(zip(one.true_own.reshape(-1, 10), one.frames, strict=True))
         ]
     )
@@ -151,7 +151,7 @@ def timing(found: Identification, one: TrackedVisit) -> dict[str, float]:
     physical_fit(found.belief, one.body)
     programme = time.process_time() - start
     start = time.process_time()
-    identify(one.body, one.fits)
+    identify_body(one.body, one.fits)
     return {
         "42,000 frames to R": until_r,
         "convex programme": programme,
@@ -160,7 +160,7 @@ def timing(found: Identification, one: TrackedVisit) -> dict[str, float]:
     }
 
 
-def pairs(subject: Subject, seed: int, reference: Identification, *, full: bool) -> tuple[list[AddedMass], Load, list[Load]]:
+def pairs(subject: Subject, seed: int, reference: Identification, *, full: bool) -> tuple[list[LoadSearch], Load, list[Load]]:
     """Return what unloaded pairs of three sessions find, both ways round, and what is found of loads in the second session."""
     later = [gather(subject, "dance", seed, session=session) for session in (1, 2)]
     found = [reference, *(one.identified() for one in later)]
@@ -168,7 +168,7 @@ def pairs(subject: Subject, seed: int, reference: Identification, *, full: bool)
     return nulls, loaded_arm(reference, later[0]), loads_table(reference, later[0]) if full else []
 
 
-def subject_of(index: int, catalogue: tuple[int, int], *, tell) -> tuple[Row, list[AddedMass], Load, list[Load]]:
+def subject_of(index: int, catalogue: tuple[int, int], *, tell) -> tuple[Row, list[LoadSearch], Load, list[Load]]:
     """Return all about one subject, from the cache while the code of identify/ is unchanged."""
     house = Path(biodance.identify.__file__).parent.parent
     code = b"".join(path.read_bytes() for room in ("identify", "uncertainty") for path in sorted((house / room).glob("*.py")))

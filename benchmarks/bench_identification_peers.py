@@ -20,17 +20,17 @@ from scipy.interpolate import CubicSpline
 
 from biodance.body.body import Body
 from biodance.body.export import write_model
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.body.inertia import smallest_eigenvalues
-from biodance.identify.identification import identify
-from biodance.identify.information import information
-from biodance.identify.knowledge import segment_quantities
-from biodance.identify.paper_programme import paper_programme
-from biodance.identify.statistics import Fit
+from biodance.identification.identification import identify_body
+from biodance.identification.information import information
+from biodance.identification.knowledge import segment_quantities
+from biodance.identification.paper_programme import paper_programme
+from biodance.identification.statistics import Fit
 from biodance.motion.regressor import regressor
 from biodance.records import Array, Motion, Subject, Wrench
 from biodance.uncertainty.noise import Noise
-from biodance.virtual_lab.flesh import of_parameters, parameters, placed
+from biodance.virtual_lab.flesh import of_parameters, parameters_of_inertia, place_inertia
 
 SUBJECTS = (Subject(52.0, 1.58, "F"), Subject(66.0, 1.71, "F"), Subject(78.0, 1.80, "M"), Subject(97.0, 1.88, "M"))
 SECONDS, RATE, NOISE = 60.0, 100.0, (5.0, 2.0)
@@ -57,12 +57,12 @@ def true_parameters(body: Body, rng: np.random.Generator) -> Array:
     for phi in body.sip.phi.reshape(-1, 10):
         J = of_parameters(phi)
         com = J[:3, 3] / J[3, 3]
-        centred = placed(J, np.eye(3), -com)
+        centred = place_inertia(J, np.eye(3), -com)
         size = np.sqrt(np.abs(np.diag(centred)[:3]) / J[3, 3])
         shift = com + 0.1 * size * rng.normal(size=3)
-        bodies.append(np.exp(0.15 * rng.normal()) * placed(centred, np.eye(3) + 0.1 * rng.normal(size=(3, 3)), shift))
+        bodies.append(np.exp(0.15 * rng.normal()) * place_inertia(centred, np.eye(3) + 0.1 * rng.normal(size=(3, 3)), shift))
     total = sum(J[3, 3] for J in bodies)
-    return np.concatenate([parameters(J * body.sip.mass.sum() / total) for J in bodies])
+    return np.concatenate([parameters_of_inertia(J * body.sip.mass.sum() / total) for J in bodies])
 
 
 def dance(body: Body, rng: np.random.Generator) -> Motion:
@@ -111,7 +111,7 @@ def score(phi: Array, truth: Array, W: Array, seconds: float) -> Score:
 def ours_and_the_papers(body: Body, motion: Motion, wrench: Wrench, truth: Array, W: Array) -> dict[str, Score]:
     """Return the scores of the table, the paper's programme and biodance."""
     start = time.perf_counter()
-    result = identify(body, (Fit("dance", motion, wrench, np.ones(motion.time.size, dtype=bool)),))
+    result = identify_body(body, (Fit("dance", motion, wrench, np.ones(motion.time.size, dtype=bool)),))
     ours = score(result.sip.phi, truth, W, time.perf_counter() - start)
     start = time.perf_counter()
     paper = paper_programme(information(body, motion, wrench, Noise.of_sd(1.0, 1.0, np.zeros(3))), body)

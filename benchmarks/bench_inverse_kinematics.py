@@ -22,11 +22,11 @@ from scipy.spatial.transform import Rotation, RotationSpline
 
 from biodance.body.body import UPRIGHT, Body
 from biodance.body.export import write_model
-from biodance.body.human import human
-from biodance.lab.trc import write_trc
-from biodance.motion.inverse_kinematics import solve_ik
+from biodance.body.human.human import human
+from biodance.lab.opensim.trc import write_trc
+from biodance.motion.ik.inverse_kinematics import solve_ik
 from biodance.motion.kinematics import poses
-from biodance.motion.opensim_coordinates import opensim_coordinates
+from biodance.pipeline.export import opensim_coordinates
 from biodance.records import Array, Markers, Motion, Subject
 
 RATE = 100.0

@@ -14,13 +14,13 @@ from pathlib import Path
 import numpy as np
 from virtual_visits import TUNED, subjects
 
-from biodance.body.scaling import Scaling, measure
+from biodance.body.human.scaling import Scaling, measure_static
 from biodance.lab.prepare import prepare
-from biodance.lab.session import read_session
-from biodance.motion.functional_joints import functional_joints
-from biodance.motion.joint_unknowns import HINGES
+from biodance.lab.session.read import read_session
+from biodance.motion.ik.functional_joints import functional_joints
+from biodance.motion.ik.joint_unknowns import HINGES
 from biodance.motion.kinematics import poses
-from biodance.virtual_lab.simulate import simulate
+from biodance.virtual_lab.simulate import simulate_session
 
 JOINTS = {"thigh": "hip", "shank": "knee", "foot": "ankle", "trunk_head": "trunk", "upper_arm": "shoulder", "forearm_hand": "elbow"}
 
@@ -51,10 +51,10 @@ def main() -> None:
     before, after, seconds = [], [], []
     for i, subject in enumerate(subjects(chosen.subjects, TUNED)):
         with tempfile.TemporaryDirectory() as folder:
-            place = simulate(subject, chosen.protocol, Path(folder) / "session", seed=TUNED[1] + i)
+            place = simulate_session(subject, chosen.protocol, Path(folder) / "session", seed=TUNED[1] + i)
             session, truth = read_session(place), json.loads((place / "truth" / "truth.json").read_text())
         (static,) = session.of_role("static")
-        scaling = measure(session.subject, prepare(static))
+        scaling = measure_static(session.subject, prepare(static))
         markers = [prepare(trial).markers for trial in session.of_role("fit")]
         start = time.process_time()
         found = functional_joints(scaling, markers)

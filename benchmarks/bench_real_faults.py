@@ -15,16 +15,15 @@ from pathlib import Path
 
 from hidden_sessions import REAL
 
-from biodance.diagnose.diagnosis import Diagnosis, Finding
+from biodance.diagnosis.diagnosis import Diagnosis, Finding
 from biodance.effects import discrete_effects, effects, unit_of
 from biodance.errors import BiodanceError
-from biodance.lab.plate_parameters import count_plates
-from biodance.lab.raw_c3d import read_raw
-from biodance.lab.session import read_session
+from biodance.lab.c3d.raw import read_raw
+from biodance.lab.plates.parameters import count_plates
+from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.session import examine
-from biodance.virtual_lab.causes import fault_of
-from biodance.virtual_lab.hide import parse
+from biodance.virtual_lab.causes import fault_of, parse_cause
 from biodance.virtual_lab.inject import inject
 
 SESSIONS = ("biomechzoo/HC030A", "biomechzoo/HC032A", "adl_gait")
@@ -41,7 +40,7 @@ def copied(source: Path, folder: Path, text: str) -> Path:
     for number, path in enumerate(files):
         clock = {path.stem: (number / len(files), (number + 1) / len(files))}
         if text and count_plates(read_raw(path))[0]:
-            inject(path, folder / path.name, fault_of(parse(text), clock))
+            inject(path, folder / path.name, fault_of(parse_cause(text), clock))
         else:
             shutil.copy(path, folder / path.name)
     return folder

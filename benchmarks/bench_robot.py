@@ -15,16 +15,16 @@ from pathlib import Path
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.inertia import lump_of, smallest_eigenvalues
-from biodance.body.similar import Likeness, likeness
+from biodance.body.inertia import rigid_inertia, smallest_eigenvalues
+from biodance.body.robot.similar import Likeness, likeness
 from biodance.dance.dance import Dance
 from biodance.dance.rehearsal import rehearse
 from biodance.dance.robot import ERROR, RATE, person_sized, robot_rows, shrunk
-from biodance.identify.base_parameters import estimate_base, structural_base
-from biodance.identify.information import Information, fold
-from biodance.identify.paper_programme import paper_programme
-from biodance.identify.physical import physical_fit
-from biodance.identify.posterior import posterior
+from biodance.identification.base_parameters import estimate_base, structural_base
+from biodance.identification.information import Information, fold
+from biodance.identification.paper_programme import paper_programme
+from biodance.identification.physical import physical_fit
+from biodance.identification.posterior import posterior
 from biodance.motion.regressor import regressor
 from biodance.records import CHANNELS, Array
 
@@ -53,7 +53,7 @@ def robot(body: Body, rng: np.random.Generator) -> Array:
 
 def quantities(phi: Array) -> tuple[Array, Array, Array]:
     """Return masses (N,) kg, centres (N, 3) m and moments of inertia (N, 3) kg·m² about them."""
-    lumps = [lump_of(ten) for ten in phi.reshape(-1, 10)]
+    lumps = [rigid_inertia(ten) for ten in phi.reshape(-1, 10)]
     return np.array([one.mass for one in lumps]), np.array([one.com for one in lumps]), np.array([np.diag(one.inertia) for one in lumps])
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.sparse import csc_matrix
 
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.dance.limits import family
 from biodance.dance.postures.posture import KEPT, Exciting, initial_guess
 from biodance.dance.problem.chain import Chain

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from hidden_sessions import Scenario, examined, session_folder
 
-from biodance.diagnose.accept import judged
-from biodance.identify.identification import standing_point
+from biodance.diagnosis.accept import residuals_of
+from biodance.identification.identification import standing_point
 from biodance.pipeline.diagnosis import SessionDiagnosis
-from biodance.pipeline.identification import KEPT, fit_of
+from biodance.pipeline.identification import KEPT_ROLES, trial_fit
 from biodance.pipeline.results import SessionResult
 from biodance.records import Array
 
@@ -44,9 +44,9 @@ def _true_masses(scenario: Scenario) -> Array:
 
 def _left_by_table(result: SessionResult) -> list[float]:
     """Return (6,) N, N·m: root mean square of what the table's body leaves of the trials that were kept."""
-    fits = tuple(fit for one in result.trials if one.trial.role in KEPT and (fit := fit_of(one)) is not None)
+    fits = tuple(fit for one in result.trials if one.trial.role in KEPT_ROLES and (fit := trial_fit(one)) is not None)
     if result.body is None or not fits:
         return []
-    left = judged(result.body, fits, standing_point(fits))
+    left = residuals_of(result.body, fits, standing_point(fits))
     pooled = np.concatenate([values[use] for values, use in zip(left.left, left.use, strict=True)])
     return [float(value) for value in np.sqrt(np.mean(pooled**2, axis=0))]

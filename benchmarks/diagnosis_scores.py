@@ -14,13 +14,13 @@ from diagnosis_contamination import contamination
 from hidden_causes import MEASURED, Name, truth
 from hidden_sessions import CACHE, Scenario, examined
 
-from biodance.diagnose.candidates import candidates
-from biodance.diagnose.diagnosis import Diagnosis, Finding
-from biodance.diagnose.observability import limits
-from biodance.diagnose.problem import problem
+from biodance.diagnosis.candidates import candidates
+from biodance.diagnosis.diagnosis import Diagnosis, Finding
+from biodance.diagnosis.observability import detection_limits
+from biodance.diagnosis.problem import problem
 from biodance.effects import discrete_effects, effects
 from biodance.pipeline.diagnosis import diagnose_session
-from biodance.virtual_lab.hide import parse
+from biodance.virtual_lab.causes import parse_cause
 
 SIGMAS = 1.959964
 
@@ -82,9 +82,9 @@ def judge(scenario: Scenario, *, absent: bool = False) -> Score:
     start = time.process_time()
     with (
         patch("biodance.effects.causes", lambda chosen=None: left if chosen is None else chosen),
-        patch("biodance.diagnose.engine.problem", planned.timed(problem)),
-        patch("biodance.diagnose.naming.candidates", planned.timed(candidates)),
-        patch("biodance.diagnose.engine.limits", planned.timed(limits)),
+        patch("biodance.diagnosis.engine.problem", planned.timed(problem)),
+        patch("biodance.diagnosis.naming.candidates", planned.timed(candidates)),
+        patch("biodance.diagnosis.engine.limits", planned.timed(detection_limits)),
     ):
         found = diagnose_session(result, effects=left)
     seconds = time.process_time() - start
@@ -137,7 +137,7 @@ def _ratio(scenario: Scenario, found: Diagnosis) -> tuple[float, float]:
     if len(scenario.hidden) != 1:
         return float("nan"), float("nan")
     same, size = truth(scenario)[0], _hidden_size(scenario.hidden[0])
-    counts = MEASURED.get(parse(scenario.hidden[0]).name)
+    counts = MEASURED.get(parse_cause(scenario.hidden[0]).name)
     rows = [row for row in found.limits if _is_among((row.effect, row.target), same) and row.effect == (counts or row.effect)]
     if not rows or size is None:
         return float("nan"), float("nan")
@@ -150,7 +150,7 @@ def _is_among(name: Name, same: set[Name]) -> bool:
 
 def _hidden_size(text: str) -> tuple[str, float] | None:
     """Return name and size of the first parameter; a filter's is how far its cut-off lies under 10 Hz."""
-    cause = parse(text)
+    cause = parse_cause(text)
     if not cause.values:
         return None
     name, numbers = next(iter(cause.values.items()))

@@ -7,12 +7,12 @@ from pathlib import Path
 
 from virtual_visits import CACHE, TrackedVisit, visit
 
-import biodance.identify
-from biodance.identify.identification import Identification, conclude, usable
-from biodance.identify.learning import learn
-from biodance.identify.loads import may_carry
-from biodance.identify.mismatch import Mismatch, mismatch
-from biodance.identify.statistics import Statistics, empty, layout_for, statistics
+import biodance.identification
+from biodance.identification.identification import Identification, conclude, usable
+from biodance.identification.learning import learn_noise
+from biodance.identification.loads import may_carry
+from biodance.identification.mismatch import Mismatch, mismatch
+from biodance.identification.statistics import Statistics, empty, layout_for, statistics
 from biodance.library import locate
 from biodance.records import Subject
 from biodance.uncertainty.caution import widened
@@ -66,5 +66,5 @@ def _gathered(one: TrackedVisit) -> Gathered:
     total = empty(10 * len(one.body.segments), layout)
     for fit in one.fits:
         total = total + statistics(one.body, fit, layout)
-    noise, _ = learn(total, may_carry(one.body, widened(one.body.sip)))
+    noise, _ = learn_noise(total, may_carry(one.body, widened(one.body.sip)))
     return Gathered(one, total, noise, mismatch(one.body, one.fits, noise))

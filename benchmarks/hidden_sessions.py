@@ -20,21 +20,20 @@ import numpy as np
 from virtual_visits import subjects
 
 from biodance.body.body import Body
-from biodance.body.scaling import Scaling
-from biodance.lab.session import read_session
+from biodance.body.human.scaling import Scaling
+from biodance.lab.session.read import read_session
 from biodance.motion.track import track
 from biodance.pipeline.body import placed_by_movement
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine
 from biodance.pipeline.trial import Prepared
 from biodance.records import Motion, Trial
-from biodance.virtual_lab.hide import hide, parse
-from biodance.virtual_lab.laboratory import Visit
+from biodance.virtual_lab.causes import hide, parse_cause
+from biodance.virtual_lab.laboratory import LabVisit
 from biodance.virtual_lab.performance import Performance, perform
 from biodance.virtual_lab.person import Person
-from biodance.virtual_lab.protocol import TrialPlan
-from biodance.virtual_lab.protocol_file import read_protocol
-from biodance.virtual_lab.simulate import simulate
+from biodance.virtual_lab.protocol import TrialPlan, read_protocol
+from biodance.virtual_lab.simulate import simulate_session
 
 CACHE = Path(os.environ.get("BIODANCE_CACHE", tempfile.gettempdir())) / "biodance_diagnosis"
 REAL = CACHE / "real.md"
@@ -87,10 +86,10 @@ def session_folder(scenario: Scenario) -> Path:
         subject, plan = subjects(SUBJECTS)[scenario.subject], read_protocol(PROTOCOL)
         if not scenario.judged:
             plan = replace(plan, trials=tuple(trial for trial in plan.trials if trial.role != "validate"))
-        causes = tuple(parse(text) for text in scenario.hidden)
-        visit, loads = hide(causes, subject, plan, seed=scenario.seed, visit=Visit(scenario.visit))
+        causes = tuple(parse_cause(text) for text in scenario.hidden)
+        visit, loads = hide(causes, subject, plan, seed=scenario.seed, visit=LabVisit(scenario.visit))
         with patch("biodance.virtual_lab.laboratory.perform", _performed):
-            simulate(subject, plan, part, seed=scenario.seed, visit=visit, loads=loads)
+            simulate_session(subject, plan, part, seed=scenario.seed, visit=visit, loads=loads)
         try:
             part.rename(folder)
         except OSError:  # another process made the same one meanwhile

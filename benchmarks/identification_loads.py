@@ -7,12 +7,12 @@ from gathered_visits import Gathered
 from identification_tables import ARM, LOADS, Load
 from virtual_visits import TrackedVisit
 
-from biodance.identify.added_mass import added_mass
-from biodance.identify.identification import Identification, conclude
-from biodance.identify.learning import learn
-from biodance.identify.loads import may_carry
-from biodance.identify.mismatch import mismatch
-from biodance.identify.statistics import Fit, Statistics
+from biodance.identification.added_mass import added_mass
+from biodance.identification.identification import Identification, conclude
+from biodance.identification.learning import learn_noise
+from biodance.identification.loads import may_carry
+from biodance.identification.mismatch import mismatch
+from biodance.identification.statistics import Fit, Statistics
 from biodance.lab.filters import LowPass, low_pass
 from biodance.motion.kinematics import segment_motion
 from biodance.motion.regressor import GRAVITY, regressor_of
@@ -31,7 +31,7 @@ def loads_table(reference: Identification, later: Gathered) -> list[Load]:
 def loaded_arm(reference: Identification, later: Gathered) -> Load:
     """Return the same for the arm's load, with noise and disturbances learned from the loaded session itself."""
     total = _combined(later, _with_loads(later), *ARM)
-    noise, _ = learn(total, may_carry(later.visit.body, widened(later.visit.body.sip)))
+    noise, _ = learn_noise(total, may_carry(later.visit.body, widened(later.visit.body.sip)))
     found = mismatch(later.visit.body, later.visit.fits, noise)
     return _load(reference, replace(later, noise=noise, found=found), total, *ARM)
 

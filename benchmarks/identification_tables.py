@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.identify.added_mass import AddedMass
-from biodance.identify.identification import Identification
+from biodance.identification.added_mass import LoadSearch
+from biodance.identification.identification import Identification
 from biodance.records import Array
 from biodance.virtual_lab.merge import MERGED
 
@@ -38,7 +38,7 @@ class Row:
     joints: tuple[str, ...]
 
 
-Load = tuple[str, float, AddedMass, AddedMass, Array]
+Load = tuple[str, float, LoadSearch, LoadSearch, Array]
 """Segment, kg, what is found with the reference and without, and the load's place (3,) m."""
 
 
@@ -131,7 +131,7 @@ def scale_lines(rows: list[Row]) -> list[str]:
     return out
 
 
-def pair_lines(nulls: list[AddedMass], arms: list[Load]) -> list[str]:
+def pair_lines(nulls: list[LoadSearch], arms: list[Load]) -> list[str]:
     """Return what two sessions find, without and with 2.4 kg on the left forearm."""
     alarms = sum(n.found for n in nulls)
     p = np.array([n.p_no_load for n in nulls])

@@ -21,7 +21,7 @@ from hidden_causes import LEVELS, SINGLE, truth
 from hidden_sessions import CACHE, Scenario, examined
 from scipy.stats import t as student
 
-from biodance.diagnose.diagnosis import SIGMAS
+from biodance.diagnosis.diagnosis import SIGMAS
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.uncertainty.tolerances import read_tolerances, shipped, to_toml
 

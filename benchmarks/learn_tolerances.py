@@ -15,12 +15,12 @@ from dataclasses import replace
 
 from hidden_sessions import Scenario, examined
 
-from biodance.diagnose.candidates import candidates
-from biodance.diagnose.learning import Null, learn, null_of
-from biodance.diagnose.problem import problem
+from biodance.diagnosis.candidates import candidates
+from biodance.diagnosis.learning import Null, learn_tolerances, null_of
+from biodance.diagnosis.problem import problem
 from biodance.library import folder
-from biodance.pipeline.diagnosis import looks
-from biodance.pipeline.identification import FITTED
+from biodance.pipeline.identification import FITTED_ROLES
+from biodance.pipeline.looked_at import looks
 from biodance.uncertainty.tolerances import Tolerances, shipped, to_toml
 
 TABLES = folder("anthropometry") / "uncertainty"
@@ -32,7 +32,7 @@ def nulls() -> Iterator[Null]:
     for scenario in SCENARIOS:
         result = examined(scenario)
         assert result.body is not None
-        put = problem(result.body, looks(result.trials, FITTED))
+        put = problem(result.body, looks(result.trials, FITTED_ROLES))
         known = shipped()
         yield null_of(put, tuple(one for one in candidates(put) if known.knows(one.effect.name)))
         print(scenario.key, flush=True)
@@ -61,7 +61,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=10)
     chosen = parser.parse_args()
     sessions = tuple(nulls())
-    found = learn(sessions, shipped(), rounds=chosen.rounds)
+    found = learn_tolerances(sessions, shipped(), rounds=chosen.rounds)
     origin = f"{len(sessions)} virtual sessions of 20 persons without fault, realistic tolerances, protocol diagnosis"
     write_sizes(found)
     (TABLES / "null_sessions.toml").write_text(to_toml(replace(found, origin=origin, sizes={})), encoding="utf-8")

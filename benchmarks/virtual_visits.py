@@ -13,21 +13,20 @@ from pathlib import Path
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.identify.statistics import Fit
-from biodance.lab.session import read_session
+from biodance.identification.statistics import Fit
+from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.pipeline.body import body_of
 from biodance.pipeline.results import TrialResult
-from biodance.pipeline.trial import examine_trial, prepared
+from biodance.pipeline.trial import examine_trial, prepare_trial
 from biodance.records import Array, Session, Subject
-from biodance.virtual_lab.flesh import of_parameters, parameters, placed
-from biodance.virtual_lab.laboratory import Visit
+from biodance.virtual_lab.flesh import of_parameters, parameters_of_inertia, place_inertia
+from biodance.virtual_lab.laboratory import LabVisit
 from biodance.virtual_lab.merge import MERGED, load_on, merged_sip
 from biodance.virtual_lab.performance import Performance, perform
 from biodance.virtual_lab.person import Person, make_person
-from biodance.virtual_lab.protocol import Protocol
-from biodance.virtual_lab.protocol_file import read_protocol
-from biodance.virtual_lab.simulate import simulate
+from biodance.virtual_lab.protocol import Protocol, read_protocol
+from biodance.virtual_lab.simulate import simulate_session
 
 CACHE = Path(os.environ.get("BIODANCE_CACHE", Path(tempfile.gettempdir()) / "biodance_visits"))
 
@@ -88,7 +87,7 @@ def _make(subject: Subject, protocol: str, seed: int, session: int, load: tuple[
     person = make_person(subject, seed, session=session, loads=loads)
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder) / "session"
-        simulate(subject, protocol, place, seed=seed, visit=Visit(session), loads=loads)
+        simulate_session(subject, protocol, place, seed=seed, visit=LabVisit(session), loads=loads)
         body, results = _tracked(read_session(place))
     fits: dict[str, list[Fit]] = {"fit": [], "validate": []}
     truth, moved = {}, []
@@ -104,7 +103,10 @@ def _make(subject: Subject, protocol: str, seed: int, session: int, load: tuple[
     frames = np.mean(np.concatenate(moved), axis=0)
     own = merged_sip(bare, bare.body).phi
     true = np.concatenate(
-        [parameters(placed(of_parameters(phi), _orthogonal(f[:, :3]), f[:, 3])) for phi, f in zip(own.reshape(-1, 10), frames, strict=True)]
+        [
+            parameters_of_inertia(place_inertia(of_parameters(phi), _orthogonal(f[:, :3]), f[:, 3]))
+            for phi, f in zip(own.reshape(-1, 10), frames, strict=True)
+        ]
     )
     carried = (load[0], load[1], _load_place(person, load[0], frames)) if load else None
     return TrackedVisit(body, tuple(fits["fit"]), tuple(fits["validate"]), true, own, frames, carried, truth)
@@ -112,7 +114,7 @@ def _make(subject: Subject, protocol: str, seed: int, session: int, load: tuple[
 
 def _tracked(session: Session) -> tuple[Body, list[TrialResult]]:
     """Return the body of a session and its trials after all steps before identification."""
-    read = tuple(prepared(trial) for trial in session.trials)
+    read = tuple(prepare_trial(trial) for trial in session.trials)
     body, _ = body_of(session.subject, read, [])
     assert body is not None
     return body, [examine_trial(one, body, mass=session.subject.mass) for one in read]

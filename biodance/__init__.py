@@ -14,28 +14,26 @@ The examples of this package share a simulated visit: ``session = read_session("
 ``identified = identify(result)``, ``found = diagnose(result)``, and a short ``dance``; what they print is checked by the tests.
 """
 
-import sys
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from biodance.body.body import Body as Body
-    from biodance.body.human import human as human
-    from biodance.body.scaling import scale as scale
+    from biodance.body.human.human import human as human
+    from biodance.body.human.scaling import scale as scale
     from biodance.dance.dance import Dance as Dance
-    from biodance.diagnose.diagnosis import Diagnosis as Diagnosis
-    from biodance.diagnose.diagnosis import Finding as Finding
+    from biodance.diagnosis.diagnosis import Diagnosis as Diagnosis
+    from biodance.diagnosis.diagnosis import Finding as Finding
     from biodance.errors import BiodanceError as BiodanceError
     from biodance.errors import FileRefused as FileRefused
     from biodance.errors import MissingLibrary as MissingLibrary
     from biodance.errors import SessionRefused as SessionRefused
     from biodance.errors import TrialRefused as TrialRefused
     from biodance.errors import UnknownName as UnknownName
-    from biodance.identify.identification import Identification as Identification
-    from biodance.lab.c3d import read_c3d as read_c3d
+    from biodance.identification.identification import Identification as Identification
+    from biodance.lab.c3d.read import read_c3d as read_c3d
     from biodance.lab.read import read_trial as read_trial
-    from biodance.lab.session import read_session as read_session
+    from biodance.lab.session.read import read_session as read_session
     from biodance.motion.regressor import predict_wrench as predict_wrench
     from biodance.motion.track import track as track
     from biodance.pipeline.dance import DanceResult as DanceResult
@@ -43,11 +41,11 @@ if TYPE_CHECKING:
     from biodance.pipeline.export import export as export
     from biodance.pipeline.front import SessionComparison as SessionComparison
     from biodance.pipeline.front import compare_sessions as compare_sessions
-    from biodance.pipeline.front import design_dance as design_dance
     from biodance.pipeline.front import diagnose as diagnose
     from biodance.pipeline.front import identify as identify
-    from biodance.pipeline.front import simulate as simulate
-    from biodance.pipeline.front import verify_dance as verify_dance
+    from biodance.pipeline.front_dance import design_dance as design_dance
+    from biodance.pipeline.front_dance import simulate as simulate
+    from biodance.pipeline.front_dance import verify_dance as verify_dance
     from biodance.pipeline.identification import SessionIdentification as SessionIdentification
     from biodance.pipeline.results import SessionResult as SessionResult
     from biodance.pipeline.session import examine as examine
@@ -65,21 +63,22 @@ __version__ = "0.1.0"
 
 HOMES = {
     "body.body": ("Body",),
-    "body.human": ("human",),
-    "body.scaling": ("scale",),
+    "body.human.human": ("human",),
+    "body.human.scaling": ("scale",),
     "dance.dance": ("Dance",),
-    "diagnose.diagnosis": ("Diagnosis", "Finding"),
+    "diagnosis.diagnosis": ("Diagnosis", "Finding"),
     "errors": ("BiodanceError", "FileRefused", "MissingLibrary", "SessionRefused", "TrialRefused", "UnknownName"),
-    "identify.identification": ("Identification",),
-    "lab.c3d": ("read_c3d",),
+    "identification.identification": ("Identification",),
+    "lab.c3d.read": ("read_c3d",),
     "lab.read": ("read_trial",),
-    "lab.session": ("read_session",),
+    "lab.session.read": ("read_session",),
     "motion.regressor": ("predict_wrench",),
     "motion.track": ("track",),
     "pipeline.dance": ("DanceResult",),
     "pipeline.diagnosis": ("SessionDiagnosis",),
     "pipeline.export": ("export",),
-    "pipeline.front": ("SessionComparison", "compare_sessions", "design_dance", "diagnose", "identify", "simulate", "verify_dance"),
+    "pipeline.front": ("SessionComparison", "compare_sessions", "diagnosis", "identification"),
+    "pipeline.front_dance": ("design_dance", "simulate", "verify_dance"),
     "pipeline.identification": ("SessionIdentification",),
     "pipeline.results": ("SessionResult",),
     "pipeline.session": ("examine",),
@@ -99,28 +98,8 @@ def front_door(name: str) -> Any:
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}. It has {', '.join(__all__)}.")
-    found = front_door(name)
-    return globals().setdefault(name, found)
+    return globals().setdefault(name, front_door(name))
 
 
 def __dir__() -> list[str]:
     return [*__all__, "__version__"]
-
-
-class _Room(ModuleType):
-    """A package whose name is also a verb of the front door (``biodance.identify``): called, it does that."""
-
-    def __call__(self, *args: Any, **options: Any) -> Any:
-        return front_door(self.__name__.rpartition(".")[2])(*args, **options)
-
-
-class _Package(ModuleType):
-    """The front door: Python sets every subpackage as an attribute here; one with the name of a verb becomes a `_Room`."""
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if name in _HOME and isinstance(value, ModuleType):
-            value.__class__ = _Room
-        super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package

@@ -64,7 +64,7 @@ def curves(time: NDArray[Any], values: NDArray[Any], labels: Sequence[str], unit
     return drawn
 
 
-def beside(
+def side_by_side(
     time: NDArray[Any], measured: NDArray[Any], simulated: NDArray[Any], used: NDArray[np.bool_], titles: Sequence[str]
 ) -> "NDArray[Any]":
     """Draw ``measured`` and ``simulated`` (T, 6), grey where frames are not ``used`` (T,), and return the six axes."""

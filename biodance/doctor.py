@@ -21,7 +21,7 @@ STILL = "import pyvista; p = pyvista.Plotter(off_screen=True); p.add_mesh(pyvist
 
 
 @dataclass(frozen=True)
-class Finding:
+class MachineFinding:
     """One line of the doctor: ``needed`` False for what only some steps or tests use; ``text`` the version, or how to mend it."""
 
     name: str
@@ -58,46 +58,48 @@ PROBES = (
 )  # fmt: skip
 
 
-def run_probe(probe: Probe) -> Finding:
+def run_probe(probe: Probe) -> MachineFinding:
     """Run ``probe`` in a child process; a crash, an exception or no answer within `PATIENCE` is a finding that says how to mend it."""
     try:
         child = subprocess.run([sys.executable, "-c", probe.code], capture_output=True, text=True, timeout=PATIENCE, check=False)
     except subprocess.TimeoutExpired:
-        return Finding(probe.name, False, probe.needed, f"gives no answer within {PATIENCE:g} s. {probe.mend}")
+        return MachineFinding(probe.name, False, probe.needed, f"gives no answer within {PATIENCE:g} s. {probe.mend}")
     if child.returncode == 0:
-        return Finding(probe.name, True, probe.needed, (child.stdout.strip().splitlines() or ["works"])[-1])
+        return MachineFinding(probe.name, True, probe.needed, (child.stdout.strip().splitlines() or ["works"])[-1])
     lines = child.stderr.strip().splitlines()
     why = lines[-1] if child.returncode > 0 and lines else f"the process died (code {child.returncode})"
-    return Finding(probe.name, False, probe.needed, f"{why}. {probe.mend}")
+    return MachineFinding(probe.name, False, probe.needed, f"{why}. {probe.mend}")
 
 
-def _python() -> Finding:
+def _python() -> MachineFinding:
     right = (3, 11) <= sys.version_info[:2] < (3, 14)
-    return Finding("python", right, True, platform.python_version() + ("" if right else ": install Python 3.11, 3.12 or 3.13."))
+    return MachineFinding("python", right, True, platform.python_version() + ("" if right else ": install Python 3.11, 3.12 or 3.13."))
 
 
-def _folder(name: str) -> Finding:
+def _folder(name: str) -> MachineFinding:
     try:
-        return Finding(f"data folder {name}", True, True, str(library.folder(name)))
+        return MachineFinding(f"data folder {name}", True, True, str(library.folder(name)))
     except BiodanceError as error:
-        return Finding(f"data folder {name}", False, True, str(error))
+        return MachineFinding(f"data folder {name}", False, True, str(error))
 
 
-def _browser() -> Finding:
+def _browser() -> MachineFinding:
     found = next(filter(None, map(shutil.which, BROWSERS)), None)
-    return Finding("chromium (page tests)", bool(found), False, found or "apt-get install chromium; only the tests of the pages use it.")
+    return MachineFinding(
+        "chromium (page tests)", bool(found), False, found or "apt-get install chromium; only the tests of the pages use it."
+    )
 
 
-def _writable() -> Finding:
+def _writable() -> MachineFinding:
     place = Path.cwd()
     try:
         with tempfile.TemporaryFile(dir=place):
-            return Finding("writable folder", True, True, str(place))
+            return MachineFinding("writable folder", True, True, str(place))
     except OSError as error:
-        return Finding("writable folder", False, True, f"{place}: {error.strerror}. Give --out a folder that you may write to.")
+        return MachineFinding("writable folder", False, True, f"{place}: {error.strerror}. Give --out a folder that you may write to.")
 
 
-def examine(*, tell: Callable[[str], None] = lambda _: None) -> tuple[Finding, ...]:
+def examine_machine(*, tell: Callable[[str], None] = lambda _: None) -> tuple[MachineFinding, ...]:
     """Try everything, ``tell`` what is being tried, and return one finding each."""
     found = [_python(), _folder("anthropometry"), _folder("protocols")]
     for probe in PROBES:

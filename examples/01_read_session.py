@@ -9,15 +9,15 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from biodance.lab.session import read_session
+from biodance.lab.session.read import read_session
 from biodance.records import Subject
-from biodance.virtual_lab.simulate import simulate
+from biodance.virtual_lab.simulate import simulate_session
 
 
 def main(folder: Path | None, picture: Path) -> None:
     """Print who was recorded and what was decided while reading; draw the vertical force of every trial."""
     with tempfile.TemporaryDirectory() as scratch:
-        where = folder or simulate(Subject(62.0, 1.70, "F"), "squat", Path(scratch) / "session", seed=1)
+        where = folder or simulate_session(Subject(62.0, 1.70, "F"), "squat", Path(scratch) / "session", seed=1)
         session = read_session(where)
     print(f"{session.subject.mass:.1f} kg, {session.subject.stature:.2f} m, {len(session.trials)} trials")
     figure = Figure(figsize=(7, 3), layout="constrained")

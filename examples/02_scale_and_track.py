@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from biodance.body.scaling import scale
+from biodance.body.human.scaling import scale
 from biodance.lab.prepare import prepare
-from biodance.lab.session import read_session
+from biodance.lab.session.read import read_session
 from biodance.motion.track import track
 from biodance.records import Subject
-from biodance.virtual_lab.simulate import simulate
+from biodance.virtual_lab.simulate import simulate_session
 
 SHOWN = ("right_hip_flexion", "right_knee_flexion", "trunk_flexion", "right_shoulder_flexion")
 
@@ -23,7 +23,7 @@ SHOWN = ("right_hip_flexion", "right_knee_flexion", "trunk_flexion", "right_shou
 def main(picture: Path) -> None:
     """Print how the body was made and how well it follows the markers; draw four joint angles."""
     with tempfile.TemporaryDirectory() as scratch:
-        session = read_session(simulate(Subject(62.0, 1.70, "F"), "squat", Path(scratch) / "session", seed=1))
+        session = read_session(simulate_session(Subject(62.0, 1.70, "F"), "squat", Path(scratch) / "session", seed=1))
     trials = {trial.name: prepare(trial) for trial in session.trials}
     body = scale(session.subject, trials["static"])
     motion = track(body, trials["squat_1"])

@@ -11,15 +11,15 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from biodance.lab.prepare import prepare
-from biodance.lab.session import read_session
+from biodance.lab.session.read import read_session
 from biodance.records import Subject
-from biodance.virtual_lab.simulate import simulate
+from biodance.virtual_lab.simulate import simulate_session
 
 
 def main(picture: Path) -> None:
     """Print what was decided about every plate; draw plates and centres of pressure from above."""
     with tempfile.TemporaryDirectory() as scratch:
-        session = read_session(simulate(Subject(62.0, 1.70, "F"), "squat", Path(scratch) / "session", seed=1))
+        session = read_session(simulate_session(Subject(62.0, 1.70, "F"), "squat", Path(scratch) / "session", seed=1))
     trial = prepare(next(trial for trial in session.trials if trial.name == "slow_squat"))
     figure = Figure(figsize=(8, 4), layout="constrained")
     axes, close = figure.subplots(1, 2)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from lab_sessions import MASS, STATURE, person, plate
 
-from biodance.lab.write_c3d import PlateRecording, write_c3d
+from biodance.lab.c3d.write import PlateRecording, write_c3d
 from biodance.records import Markers
 
 CORNERS = np.array([[0.3, 0.25, 0.0], [-0.3, 0.25, 0.0], [-0.3, -0.25, 0.0], [0.3, -0.25, 0.0]])

@@ -7,8 +7,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 from biodance.errors import BiodanceError
-from biodance.lab.c3d import read_c3d
-from biodance.lab.raw_c3d import RawC3d, read_raw
+from biodance.lab.c3d.raw import RawC3d, read_raw
+from biodance.lab.c3d.read import read_c3d
 from biodance.records import Trial
 
 

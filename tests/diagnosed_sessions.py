@@ -7,8 +7,8 @@ import numpy as np
 from scipy.fft import idct
 from scipy.interpolate import CubicSpline
 
-from biodance.body.human import human
-from biodance.diagnose.problem import Look
+from biodance.body.human.human import human
+from biodance.diagnosis.problem import Look
 from biodance.effects import at_origin
 from biodance.motion.regressor import predict_wrench
 from biodance.records import CHANNELS, Motion, Plate, Source, Subject, Trial, Wrench
@@ -64,7 +64,7 @@ def noise(rng: np.random.Generator, frames: int) -> np.ndarray:
 
 def looks(seed: int, *, trials: int = 4, hidden=lambda wrench, time, motion: wrench) -> tuple[Look, ...]:
     """Return trials of a person whose parameters differ from the table by its own standard deviations; ``hidden`` changes the wrench."""
-    from biodance.identify.posterior import prior_factor
+    from biodance.identification.posterior import prior_factor
     from biodance.uncertainty.caution import widened
 
     rng = np.random.default_rng(1000 + seed)

@@ -4,17 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from biodance.lab.gaps import MarkerGaps
-from biodance.pipeline.results import (
-    Check,
-    MarkerFit,
-    SessionResult,
-    Standing,
-    Step,
-    Still,
-    TrialResult,
-    WrenchComparison,
-)
+from biodance.lab.markers.gaps import MarkerGaps
+from biodance.pipeline.results import Check, MarkerFit, QuietStanding, SessionResult, Step, Still, TrialResult, WrenchComparison
 from biodance.records import Markers, Plate, Session, Source, Subject, Trial, Wrench
 
 SQUARE = np.array([[0.3, 0.2, 0.0], [-0.3, 0.2, 0.0], [-0.3, -0.2, 0.0], [0.3, -0.2, 0.0]])
@@ -35,13 +26,13 @@ def comparison(rng: np.random.Generator) -> WrenchComparison:
     )
 
 
-def standing(rng: np.random.Generator) -> Standing:
+def standing(rng: np.random.Generator) -> QuietStanding:
     """Return 2 s of standing, the CoM 30 mm in front of the CoP."""
     cop = 0.1 + np.cumsum(rng.normal(0, 0.0005, (200, 2)), axis=0)
     feet = np.array([[0.15, 0.25], [-0.05, 0.25], [0.15, -0.02], [-0.05, -0.02]])
     names = ("left_toe", "left_heel", "right_toe", "right_heel")
     com = cop + np.array([0.03, 0.002])
-    return Standing(
+    return QuietStanding(
         "static",
         0.5,
         2.5,

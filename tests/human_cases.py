@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from biodance.body.body import Body
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.effects import Case
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from biodance.body.human import human
-from biodance.identify.loads import point_mass
+from biodance.body.human.human import human
+from biodance.identification.loads import point_mass
 from biodance.motion.comparison import compare
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.identification import identify_trials

@@ -7,7 +7,7 @@ from random_bodies import random_body
 from scipy.interpolate import CubicSpline
 
 from biodance.body.body import Body
-from biodance.identify.statistics import Fit
+from biodance.identification.statistics import Fit
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion, Sip, Wrench
 

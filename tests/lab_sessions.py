@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from biodance.lab.ground_forces import table_of
-from biodance.lab.mot import write_mot
-from biodance.lab.trc import write_trc
+from biodance.lab.opensim.ground_forces import table_of
+from biodance.lab.opensim.mot import write_mot
+from biodance.lab.opensim.trc import write_trc
 from biodance.records import Markers, Plate, Wrench
 
 STATURE, MASS, GRAVITY = 1.70, 62.0, 9.80665

@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.dance.limits import CheckedMotion
 from biodance.dance.postures.posture import initial_guess
 from biodance.dance.problem.chain import Chain

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from biodance.lab.raw_c3d import RawC3d
+from biodance.lab.c3d.raw import RawC3d
 
 RATE = 500.0
 

@@ -3,8 +3,8 @@
 import re
 from pathlib import Path
 
-from biodance.lab.marker_sets import FAMILY as MARKER_SETS
-from biodance.lab.marker_sets import read_marker_set
+from biodance.lab.markers.sets import FAMILY as MARKER_SETS
+from biodance.lab.markers.sets import read_marker_set
 
 RENAMED = {label: f"X{i:02d}" for i, label in enumerate(read_marker_set("plug_in_gait").labels)}
 ENTRY_POINTS = """[biodance.effects]
@@ -46,7 +46,7 @@ from pathlib import Path
 
 import numpy as np
 from biodance.errors import FileRefused
-from biodance.lab.marker_sets import recognise
+from biodance.lab.markers.sets import recognise
 from biodance.records import Markers, Source, Trial
 
 NAME, EXTENSIONS, PREFERENCE = "TINY", (".tiny",), 50

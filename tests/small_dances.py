@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.dance.dance import Dance
 from biodance.dance.postures.ordering import support_sequence
 from biodance.dance.postures.posture import initial_guess

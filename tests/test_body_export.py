@@ -11,13 +11,13 @@ from biodance.body.body import UPRIGHT
 from biodance.body.export import formats, write_model
 from biodance.body.export.csv import STANDARD, read_sip
 from biodance.body.export.urdf import roll_pitch_yaw
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.errors import BiodanceError, FileRefused, UnknownName
-from biodance.lab.mot import read_mot, write_mot
+from biodance.lab.opensim.mot import read_mot, write_mot
 from biodance.motion.dynamics import joint_torques
 from biodance.motion.kinematics import poses
-from biodance.motion.opensim_coordinates import opensim_coordinates
 from biodance.motion.regressor import regressor
+from biodance.pipeline.export import opensim_coordinates
 from biodance.records import Motion, Sip, Subject
 
 WOMAN = human(Subject(58.3, 1.64, "F", 31.0, name="a woman & <co>"))

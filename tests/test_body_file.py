@@ -7,8 +7,8 @@ import pytest
 
 from biodance.body.body import JointError
 from biodance.body.body_file import body_text, read_body
-from biodance.body.hoap3 import hoap3
-from biodance.body.human import human
+from biodance.body.human.human import human
+from biodance.body.robot.hoap3 import hoap3
 from biodance.errors import FileRefused
 from biodance.records import Subject
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
 from biodance.records import Subject

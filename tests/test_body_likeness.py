@@ -9,10 +9,10 @@ from random_bodies import random_motion
 from robots import biped
 
 from biodance.body.body import UPRIGHT, Body
-from biodance.body.hoap3 import hoap3
-from biodance.body.similar import Likeness, likeness
-from biodance.body.standing_frames import reframed, sole_normal, standing_frames
-from biodance.body.urdf import read_urdf
+from biodance.body.robot.hoap3 import hoap3
+from biodance.body.robot.similar import Likeness, likeness
+from biodance.body.robot.standing_frames import reframed, sole_normal, standing_frames
+from biodance.body.robot.urdf import read_urdf
 from biodance.errors import BiodanceError
 from biodance.motion.dynamics import joint_torques
 from biodance.motion.kinematics import poses

@@ -8,19 +8,18 @@ import numpy as np
 import pytest
 
 from biodance.body.body import Body
-from biodance.body.human import human
+from biodance.body.human.human import human
+from biodance.body.human.joint_centres import chord, davis_hip, elbow, harrington_hip, pelvis_frame, shoulder, unit, wrist
+from biodance.body.human.limits import standing_tilt
+from biodance.body.human.measures import Measures
+from biodance.body.human.scaling import chain_angles, measure_static
+from biodance.body.human.static_centres import arm_centres, turn
 from biodance.body.inertia import smallest_eigenvalues
-from biodance.body.joint_centres import chord, davis_hip, elbow, harrington_hip, pelvis_frame, shoulder, unit, wrist
-from biodance.body.measures import Measures
-from biodance.body.scaling import chain_angles, measure
-from biodance.body.static_centres import arm_centres
-from biodance.body.static_frames import turn
-from biodance.body.tracking_limits import standing_tilt
 from biodance.errors import SessionRefused, TrialRefused
+from biodance.lab.c3d.raw import read_raw
 from biodance.lab.prepare import prepare
-from biodance.lab.raw_c3d import read_raw
-from biodance.lab.session import read_session
-from biodance.motion.inverse_kinematics import solve_ik
+from biodance.lab.session.read import read_session
+from biodance.motion.ik.inverse_kinematics import solve_ik
 from biodance.motion.kinematics import poses
 from biodance.records import Markers, Source, Subject, Trial
 
@@ -46,7 +45,7 @@ def standing_trial(*, drop: tuple[str, ...] = (), measurements: dict[str, float]
 
 def scaled(subject: Subject, static: Trial) -> tuple[Body, np.ndarray]:
     """Return the body and its standing posture."""
-    return measure(subject, static).body()
+    return measure_static(subject, static).body()
 
 
 def test_the_body_stands_exactly_under_its_markers() -> None:

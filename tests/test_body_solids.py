@@ -8,8 +8,8 @@ import pytest
 import trimesh
 
 from biodance.body.export import write_model
-from biodance.body.human import human
-from biodance.body.inertia import Lump
+from biodance.body.human.human import human
+from biodance.body.inertia import RigidInertia
 from biodance.body.solids import box_solid, marker_hull, mesh_lump, read_mesh, segment_solids
 from biodance.errors import BiodanceError, FileRefused, UnknownName
 from biodance.motion.kinematics import poses
@@ -55,7 +55,7 @@ def test_a_mesh_inside_out_is_the_same_solid():
     mesh, _ = turned(trimesh.creation.box(extents=[0.1, 0.2, 0.3]))
     right = mesh_lump(mesh, density=DENSITY)
     mesh.invert()
-    wrong: Lump = mesh_lump(mesh, density=DENSITY)
+    wrong: RigidInertia = mesh_lump(mesh, density=DENSITY)
     assert wrong.mass == pytest.approx(right.mass)
     np.testing.assert_allclose(wrong.inertia, right.inertia, atol=1e-12)
 

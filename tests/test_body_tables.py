@@ -7,17 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biodance.body.de_leva import PARTS
-from biodance.body.human import human
-from biodance.body.inertia import TENSOR, Lump, lump_of, parameters, smallest_eigenvalues
-from biodance.body.limits import peak_torque
-from biodance.body.older_tables import regression
-from biodance.body.prior import disagreement, parameter_jacobian, primitive_covariance, scaled_lumps
-from biodance.body.reference import COUNT, KINDS
-from biodance.body.segment_data import read_segment_table
-from biodance.body.segment_tables import measured_whole, reference, table_names
-from biodance.body.skeleton import SEGMENTS, generic_skeleton
-from biodance.body.tables import read_table
+from biodance.body.human.human import human
+from biodance.body.human.limits import peak_torque
+from biodance.body.human.skeleton import SEGMENTS, generic_skeleton
+from biodance.body.inertia import TENSOR, RigidInertia, inertial_parameters, rigid_inertia, smallest_eigenvalues
+from biodance.body.tables.anthropometry import read_table
+from biodance.body.tables.choice import measured_whole, reference, table_names
+from biodance.body.tables.de_leva import PARTS
+from biodance.body.tables.older import regression
+from biodance.body.tables.prior import disagreement, parameter_jacobian, primitive_covariance, scaled_lumps
+from biodance.body.tables.reference import COUNT, KINDS
+from biodance.body.tables.segment_data import read_segment_table
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import folder, names, read_toml
 from biodance.records import Subject
@@ -158,7 +158,7 @@ def test_every_table_makes_a_person_who_can_exist(sex: str) -> None:
         person = reference(name, subject)
         assert sum(COUNT[kind] * person.segments[kind].mass for kind in KINDS) == pytest.approx(1.0, abs=1e-12), name
         for kind in KINDS:
-            assert smallest_eigenvalues(parameters(person.segments[kind]))[0] > 0, (name, kind)
+            assert smallest_eigenvalues(inertial_parameters(person.segments[kind]))[0] > 0, (name, kind)
             assert np.linalg.norm(person.segments[kind].com) < 1.05 * person.lengths[kind], (name, kind)
 
 
@@ -200,10 +200,10 @@ def test_strength_of_the_table_is_anderson() -> None:
 
 def test_the_covariance_is_the_spread_of_drawn_bodies() -> None:
     """The analytic Jacobian: parameters of bodies with drawn mass, CoM and inertia scatter as the covariance says."""
-    lump = lump_of(human(Subject(70.0, 1.72, "M")).sip.of("right_thigh"))
+    lump = rigid_inertia(human(Subject(70.0, 1.72, "M")).sip.of("right_thigh"))
     step = 1e-6
     numeric = np.zeros((10, 10))
-    base = parameters(lump)
+    base = inertial_parameters(lump)
     for column in range(10):
         mass, com, unit = lump.mass, np.array(lump.com), lump.inertia / lump.mass
         if column == 0:
@@ -215,7 +215,7 @@ def test_the_covariance_is_the_spread_of_drawn_bodies() -> None:
             unit = unit.copy()
             unit[i, j] += step
             unit[j, i] = unit[i, j]
-        numeric[:, column] = (parameters(Lump(mass, com, mass * unit)) - base) / step
+        numeric[:, column] = (inertial_parameters(RigidInertia(mass, com, mass * unit)) - base) / step
     np.testing.assert_allclose(parameter_jacobian(lump), numeric, atol=1e-4)
 
 

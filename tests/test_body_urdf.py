@@ -9,9 +9,9 @@ from robots import biped
 
 from biodance.body.body import UPRIGHT, Body
 from biodance.body.export import write_model
-from biodance.body.hoap3 import hoap3
-from biodance.body.human import human
-from biodance.body.urdf import read_urdf
+from biodance.body.human.human import human
+from biodance.body.robot.hoap3 import hoap3
+from biodance.body.robot.urdf import read_urdf
 from biodance.errors import BiodanceError, FileRefused, UnknownName
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import regressor

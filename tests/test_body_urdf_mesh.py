@@ -5,8 +5,8 @@ import pytest
 import trimesh
 from robots import BOX, biped
 
-from biodance.body.robot_sole import CORNERS, alike, sole_outline
-from biodance.body.urdf import read_urdf
+from biodance.body.robot.sole import CORNERS, match_faces, sole_outline
+from biodance.body.robot.urdf import read_urdf
 from biodance.errors import FileRefused
 from biodance.motion.kinematics import poses
 
@@ -104,7 +104,7 @@ def test_a_round_sole_keeps_few_corners_and_all_on_its_rim():
 
 def test_two_soles_get_equally_many_points():
     triangle, square = np.array([[0, 0, 0], [4, 0, 0], [0, 1, 0.0]]), np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
-    one, other = alike(triangle, square)
+    one, other = match_faces(triangle, square)
     np.testing.assert_array_equal(other, square)
     np.testing.assert_array_equal(one, [[0, 0, 0], [4, 0, 0], [2, 0.5, 0], [0, 1, 0]])
 

@@ -31,7 +31,7 @@ def reported(session):
 
 @pytest.fixture
 def no_stills(monkeypatch):
-    monkeypatch.setattr("biodance.report.solid.solid_pngs", lambda *_, **__: None)
+    monkeypatch.setattr("biodance.report.figures.solid.solid_pngs", lambda *_, **__: None)
 
 
 def test_help_names_every_command_and_imports_nothing_heavy():
@@ -143,7 +143,7 @@ def test_ctrl_c_before_anything_was_done_writes_nothing(tmp_path, capsys, monkey
     def stopping(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("biodance.lab.session.read_session", stopping)
+    monkeypatch.setattr("biodance.lab.session.read.read_session", stopping)
     assert run(["report", str(tmp_path), "--out", str(tmp_path / "out")]) == STOPPED
     assert "Stopped" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
@@ -175,7 +175,7 @@ def test_a_fault_of_biodance_is_named_as_such(tmp_path, capsys, monkeypatch):
     def faulty(*_, **__):
         raise ZeroDivisionError("oops")
 
-    monkeypatch.setattr("biodance.lab.session.read_session", faulty)
+    monkeypatch.setattr("biodance.lab.session.read.read_session", faulty)
     monkeypatch.delenv("BIODANCE_TRACEBACK", raising=False)
     assert run(["report", str(tmp_path), "--out", str(tmp_path / "out")]) == NOT_DONE
     assert "ZeroDivisionError: oops" in capsys.readouterr().err

@@ -10,7 +10,7 @@ from identified_sessions import body, session_result
 from biodance.body.export.csv import read_sip
 from biodance.cli import run
 from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE
-from biodance.lab.mot import read_mot
+from biodance.lab.opensim.mot import read_mot
 from biodance.pipeline.export import MOTION_FORMATS, legal_formats
 
 
@@ -20,7 +20,7 @@ def lab(monkeypatch, tmp_path):
     results = {"S01": session_result(), "bare": session_result(), "idle": session_result(roles=("validate",))}
     for name in results:
         (tmp_path / name).mkdir()
-    for room in ("biodance.lab.session", "biodance.pipeline.export"):
+    for room in ("biodance.lab.session.read", "biodance.pipeline.export"):
         monkeypatch.setattr(f"{room}.read_session", lambda folder, **_: replace(results[folder.name].session, folder=folder))
     for room in ("biodance.pipeline.session", "biodance.pipeline.export"):
         monkeypatch.setattr(f"{room}.examine", lambda session, **_: results[session.folder.name])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.dance.cues import MOST, WORDS, calls, cue_sheet
 from biodance.errors import BiodanceError
 from biodance.records import Array, Subject

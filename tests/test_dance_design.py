@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.dance import design as design_module
 from biodance.dance.dance import Dance
 from biodance.dance.design import design

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.dance.expectation import RATE, expected_spread, typical_noise, typical_sizes
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.splines import rest_to_rest
-from biodance.identify.knowledge import segment_quantities
-from biodance.identify.mismatch import mismatch, temper
-from biodance.identify.posterior import posterior
-from biodance.identify.statistics import Fit, statistics
+from biodance.identification.knowledge import segment_quantities
+from biodance.identification.mismatch import mismatch, temper
+from biodance.identification.posterior import posterior
+from biodance.identification.statistics import Fit, statistics
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Motion, Subject
 from biodance.uncertainty.caution import widened

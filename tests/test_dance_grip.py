@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.dance.dance import Dance
 from biodance.dance.limits import family
 from biodance.dance.limits.grip import Grip

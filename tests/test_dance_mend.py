@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.dance.limits import family
 from biodance.dance.postures.exchange import alike
 from biodance.dance.postures.ordering import support_sequence

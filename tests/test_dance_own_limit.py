@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.cli import run
 from biodance.dance import limits
 from biodance.dance.design import design

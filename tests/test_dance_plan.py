@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from biodance import library
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.dance.problem.person import HEALTHY, PersonLimits, fit_to_person, joints, limit_body, read_person
 from biodance.dance.problem.plan import Plan, read_plan
 from biodance.errors import BiodanceError, UnknownName

@@ -5,7 +5,7 @@ import pytest
 from random_bodies import random_body
 
 from biodance.body.body import Body
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.dance.problem.splines import rest_to_rest
 from biodance.dance.rehearsal import Playback, floor_model, play
 from biodance.errors import BiodanceError

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.dance.limits import family
 from biodance.dance.postures import search
 from biodance.dance.postures.exchange import exchange, extremes

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from biodance.body.body import Body
-from biodance.body.human import human
-from biodance.body.limits import joint_limits
+from biodance.body.human.human import human
+from biodance.body.human.limits import joint_limits
 from biodance.dance.limits import family
 from biodance.dance.postures.posture import KEPT, anyhow, initial_guess, refuse, solve
 from biodance.dance.problem.chain import Chain

@@ -9,10 +9,10 @@ import pytest
 from robots import biped
 
 from biodance.body.export import write_model
-from biodance.body.hoap3 import hoap3
-from biodance.body.human import human
-from biodance.body.standing_frames import standing_frames
-from biodance.body.urdf import read_urdf
+from biodance.body.human.human import human
+from biodance.body.robot.hoap3 import hoap3
+from biodance.body.robot.standing_frames import standing_frames
+from biodance.body.robot.urdf import read_urdf
 from biodance.cli import run
 from biodance.dance.dance import Dance
 from biodance.dance.limits import family
@@ -28,10 +28,10 @@ from biodance.dance.robot import ERROR, RATE, leg_length, person_sized, robot_pl
 from biodance.dance.transitions.move import Task, evaluate_move
 from biodance.dance.verify import broken, verify
 from biodance.errors import BiodanceError
-from biodance.identify.base_parameters import estimate_base, structural_base
-from biodance.identify.information import Information, fold
+from biodance.identification.base_parameters import estimate_base, structural_base
+from biodance.identification.information import Information, fold
 from biodance.motion.regressor import predict_wrench, regressor
-from biodance.pipeline.robot_dance import robot_dancer
+from biodance.pipeline.dance import robot_dancer
 from biodance.records import Subject
 
 HOAP = standing_frames(hoap3())
@@ -158,9 +158,9 @@ def test_a_robot_dances_from_its_file(made: tuple[Path, int]) -> None:
     assert (found["postures"], found["criterion"]["static_bound"]) == (2, pytest.approx(7.942, abs=0.001))
     assert all(margin["worst"] >= 0 for margin in found["margins"])
     assert all(0 < row["mass_kg"] <= row["mass_table_kg"] for row in found["expected_sd"])
-    assert sorted(path.name for path in (place / "out").iterdir()) == sorted(
-        ["results.json", "dance.npz", "dance.csv", "cues.md", "margins.md", "postures.png", "criterion.png", "zmp.png", "expectation.png"]
-    )
+    drawn = {"postures.png", "criterion.png", "zmp.png", "expectation.png"}
+    names = {path.name for path in (place / "out").iterdir()} - {"postures_3d.png"}  # only where the machine can draw it
+    assert names == {"results.json", "dance.npz", "dance.csv", "cues.md", "margins.md", *drawn}
 
 
 def test_the_dance_keeps_the_limits_of_the_file(made: tuple[Path, int]) -> None:

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.dance.postures.selection import FORCE, MOMENT, RATE, choose, learned
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.splines import rest_to_rest
-from biodance.identify.posterior import prior_factor
+from biodance.identification.posterior import prior_factor
 from biodance.motion.regressor import regressor
 from biodance.records import Array, Subject
 

@@ -5,7 +5,7 @@ from itertools import pairwise, permutations
 import numpy as np
 import pytest
 
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.dance.postures.ordering import order_postures, support_sequence
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import stance, under

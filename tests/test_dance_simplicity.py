@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.dance.limits import family
 from biodance.dance.postures.exchange import exchange
 from biodance.dance.postures.posture import KEPT, Exciting, Posture, initial_guess, posture_at, solve

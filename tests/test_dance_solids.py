@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.dance.limits import self_collision
 from biodance.dance.limits.self_collision import ENOUGH, deepest, outside, solid_distances
 from biodance.dance.postures.posture import initial_guess

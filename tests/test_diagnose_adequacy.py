@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 from diagnosed_sessions import RATE, body, known, looks
 
-from biodance.diagnose.adequacy import LIMIT, STRAINED, adequacy, strain, verdict
-from biodance.diagnose.evidence import Belief
-from biodance.diagnose.naming import built
-from biodance.diagnose.problem import problem
+from biodance.diagnosis.adequacy import LIMIT, STRAINED, adequacy, strain, verdict
+from biodance.diagnosis.evidence import Belief
+from biodance.diagnosis.naming import built
+from biodance.diagnosis.problem import problem
 
 
 def test_chance_spreads_more_in_a_short_session() -> None:

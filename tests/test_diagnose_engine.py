@@ -7,11 +7,11 @@ import pytest
 from diagnosed_sessions import about_plate, body, known, looks
 from scipy.interpolate import make_interp_spline
 
-from biodance.diagnose.accept import accept, fit_of, gain_by_naming, judged
-from biodance.diagnose.engine import diagnose
+from biodance.diagnosis.accept import accept, case_fit, gain_by_naming, residuals_of
+from biodance.diagnosis.engine import diagnose_trials
 from biodance.effects import Case, Effect, Parameter
 from biodance.errors import BiodanceError, TrialRefused, UnknownName
-from biodance.identify.identification import standing_point
+from biodance.identification.identification import standing_point
 from biodance.motion.kinematics import poses
 from biodance.records import Sip
 
@@ -19,7 +19,7 @@ FAST = ("plate_gain", "plate_offset", "plate_position", "plate_rotation", "time_
 
 
 def found(hidden, *, seed: int = 1, chosen=FAST):
-    return diagnose(body(), looks(seed, hidden=hidden), tolerances=known(), effects=chosen)
+    return diagnose_trials(body(), looks(seed, hidden=hidden), tolerances=known(), effects=chosen)
 
 
 def gained(local, session):
@@ -117,7 +117,7 @@ def test_an_absent_culprit_is_never_complete() -> None:
 
 
 def test_a_load_is_named_with_mass_and_place() -> None:
-    from biodance.identify.added_mass import point_mass
+    from biodance.identification.loads import point_mass
     from biodance.motion.regressor import predict_wrench
 
     index = body().segment_index("left_forearm_hand")
@@ -156,16 +156,16 @@ def test_a_hand_that_comes_and_goes_is_named_with_its_force() -> None:
 
 def test_accepting_a_fault_gains_on_trials_that_were_not_used() -> None:
     looked_at = looks(1, trials=6, hidden=about_plate(gained))
-    examined = diagnose(body(), looked_at[:4], tolerances=known(), effects=FAST)
+    examined = diagnose_trials(body(), looked_at[:4], tolerances=known(), effects=FAST)
     kept = looked_at[4:]
     cases = [
         Case(body(), look.trial, look.motion, body().sip.phi, np.linspace(look.start, look.end, look.motion.time.size)) for look in kept
     ]
-    as_is = tuple(fit_of(case, look.use) for case, look in zip(cases, kept, strict=True))
-    mended = tuple(fit_of(accept(case, examined.named), look.use) for case, look in zip(cases, kept, strict=True))
+    as_is = tuple(case_fit(case, look.use) for case, look in zip(cases, kept, strict=True))
+    mended = tuple(case_fit(accept(case, examined.named), look.use) for case, look in zip(cases, kept, strict=True))
     about = standing_point(as_is)
-    before = judged(identified(examined.naming.first.phi), as_is, about)
-    after = judged(identified(examined.naming.found.phi), mended, about)
+    before = residuals_of(identified(examined.naming.first.phi), as_is, about)
+    after = residuals_of(identified(examined.naming.found.phi), mended, about)
     measured = gain_by_naming(before, after, fitted=(before, after))
     assert measured.proven
     assert measured.rms_after[2] < 0.6 * measured.rms_before[2]
@@ -183,8 +183,8 @@ def identified(phi):
 def test_a_gain_needs_three_blocks() -> None:
     look = looks(1, trials=1)[0]
     use = look.use & (look.motion.time < 1.5)
-    fit = fit_of(Case(body(), look.trial, look.motion, body().sip.phi, np.linspace(0, 1, look.motion.time.size)), use)
-    one = judged(body(), (fit,), np.zeros(3))
+    fit = case_fit(Case(body(), look.trial, look.motion, body().sip.phi, np.linspace(0, 1, look.motion.time.size)), use)
+    one = residuals_of(body(), (fit,), np.zeros(3))
     with pytest.raises(BiodanceError, match="needs 3"):
         gain_by_naming(one, one, fitted=(one, one))
 
@@ -193,12 +193,12 @@ def test_too_short_trials_are_refused() -> None:
     (look,) = looks(1, trials=1)
     short = replace(look, use=look.motion.time < 0.5)
     with pytest.raises(TrialRefused, match="1 s of fully measured"):
-        diagnose(body(), (short,), tolerances=known())
+        diagnose_trials(body(), (short,), tolerances=known())
 
 
 def test_a_cause_that_is_not_in_the_family_is_refused() -> None:
     with pytest.raises(UnknownName, match="plate_gain"):
-        diagnose(body(), looks(1, trials=1), tolerances=known(), effects=("plate_gian",))
+        diagnose_trials(body(), looks(1, trials=1), tolerances=known(), effects=("plate_gian",))
 
 
 def test_limits_come_without_the_forces() -> None:

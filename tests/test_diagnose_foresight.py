@@ -7,10 +7,10 @@ import pytest
 from diagnosed_sessions import body, known, motion
 from random_bodies import random_body, random_motion
 
-from biodance.diagnose.foresight import foresee, planned, session_of
-from biodance.diagnose.separation import evaluate
-from biodance.identify.information import fold
-from biodance.identify.posterior import prior_factor
+from biodance.diagnosis.foresight import foresee, planned, session_of
+from biodance.diagnosis.separation import evaluate
+from biodance.identification.information import fold
+from biodance.identification.posterior import prior_factor
 from biodance.motion.regressor import regressor
 
 CHOSEN = ("plate_gain", "plate_offset", "body_mass", "time_delay", "added_mass")

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from biodance.diagnose.learning import Null, learn
-from biodance.diagnose.model import shown_left_out
+from biodance.diagnosis.learning import Null, learn_tolerances
+from biodance.diagnosis.model import shown_left_out
 from biodance.uncertainty.tolerances import Tolerances, mean_key, shipped
 
 BANDS = len(shipped().noise)
@@ -28,7 +28,7 @@ def nulls(count: int) -> list[Null]:
 def learned(count: int) -> Tolerances:
     flat = np.ones((BANDS, 6))
     start = Tolerances(dict.fromkeys(KEYS, 1.0), np.tile(np.eye(6), (BANDS, 1, 1)), flat, flat, 10.0)
-    return learn(nulls(count), start, rounds=8)
+    return learn_tolerances(nulls(count), start, rounds=8)
 
 
 def test_means_are_learned_with_their_sides_and_chance_is_none() -> None:

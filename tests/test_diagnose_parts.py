@@ -8,13 +8,13 @@ from diagnosed_sessions import body, known, looks
 from scipy.stats import multivariate_normal
 
 from biodance.body.body import JointError
-from biodance.diagnose.candidates import Candidate, candidates, changes, removed, slopes
-from biodance.diagnose.evidence import believe, evidence, smallest
-from biodance.diagnose.learning import Null, learn
-from biodance.diagnose.model import model
-from biodance.diagnose.naming import screen
-from biodance.diagnose.observability import Visibility, limits, placed, placing_leaves, visibility
-from biodance.diagnose.problem import problem
+from biodance.diagnosis.candidates import Candidate, candidates, changes, removed, slopes
+from biodance.diagnosis.evidence import believe, evidence, smallest
+from biodance.diagnosis.learning import Null, learn_tolerances
+from biodance.diagnosis.model import model
+from biodance.diagnosis.naming import screen
+from biodance.diagnosis.observability import Visibility, after_calibration, detection_limits, placing_leaves, visibility
+from biodance.diagnosis.problem import problem
 from biodance.effects import effect
 from biodance.uncertainty.tolerances import Tolerances, key_of, read_tolerances, shipped, to_toml
 
@@ -89,7 +89,7 @@ def test_screening_ranks_every_cause_and_limits_them_all(put) -> None:
     found = model(put, causes, known())
     suspects = screen(found, causes)
     assert len(suspects) == 12
-    rows = limits(visibility(found, causes), put.cases[0].body, 10.0)
+    rows = detection_limits(visibility(found, causes), put.cases[0].body, 10.0)
     assert {(row.effect, row.target) for row in rows} == {one.cause.names for one in suspects}
     assert all(row.told_from >= row.limit > 0 for row in rows)
 
@@ -129,9 +129,9 @@ def test_what_placing_has_repaired_needs_a_larger_fault_to_be_seen() -> None:
     share = placing_leaves(error)
     assert share == pytest.approx((0.0095**2 - 0.008**2) / 0.015**2)
     shoulder = replace(body(), joint_errors=(error,))
-    after = placed(seen, shoulder)
+    after = after_calibration(seen, shoulder)
     np.testing.assert_allclose(np.diag(after.G)[cuts[0]] / np.diag(seen.G)[cuts[0]], share, rtol=0.1)
-    plain, now = ({row.target: row.limit for row in limits(seen, one, 10.0)} for one in (body(), shoulder))
+    plain, now = ({row.target: row.limit for row in detection_limits(seen, one, 10.0)} for one in (body(), shoulder))
     assert now["right_shoulder"] > 2 * plain["right_shoulder"]
     assert now["RSHO"] > 1.5 * plain["RSHO"]
     assert now["left_ankle"] == pytest.approx(plain["left_ankle"], rel=0.05)
@@ -150,7 +150,7 @@ def test_learning_finds_the_sizes_that_made_the_nulls() -> None:
         theta = np.array([truth[key] for key in keys]) * rng.normal(size=8)
         nulls.append(Null(columns @ theta + 1.5 * rng.normal(size=len(columns)), columns, keys, band, (), 70.0))
     start = Tolerances({"slide a": 1.0, "gain b": 1.0}, np.tile(np.eye(6), (bands, 1, 1)), np.ones((bands, 6)), np.ones((bands, 6)), 10.0)
-    found = learn(nulls, start, rounds=8)
+    found = learn_tolerances(nulls, start, rounds=8)
     assert found.size("slide a") == pytest.approx(0.5, rel=0.15)
     assert found.size("gain b") == pytest.approx(2.0, rel=0.15)
     np.testing.assert_allclose(np.sqrt(np.trace(found.noise, axis1=1, axis2=2) / 6), 1.5, rtol=0.1)

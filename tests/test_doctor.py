@@ -7,13 +7,13 @@ import pytest
 from biodance import doctor
 from biodance.cli import run
 from biodance.cli.app import DONE, NEEDS_A_PERSON
-from biodance.doctor import Finding, Probe, run_probe
+from biodance.doctor import MachineFinding, Probe, run_probe
 
 MEND = "apt-get install it."
 
 
 def test_what_works_says_its_version():
-    assert run_probe(Probe("x", "print('noise'); print('1.2')", MEND)) == Finding("x", True, True, "1.2")
+    assert run_probe(Probe("x", "print('noise'); print('1.2')", MEND)) == MachineFinding("x", True, True, "1.2")
 
 
 @pytest.mark.parametrize(
@@ -39,7 +39,7 @@ def test_what_hangs_is_given_up(monkeypatch):
 
 @pytest.mark.parametrize(("needed", "code"), [(True, NEEDS_A_PERSON), (False, DONE)])
 def test_only_what_is_needed_changes_the_exit_code(needed, code, monkeypatch, capsys):
-    found = (Finding("python", True, True, "3.12"), Finding("x", False, needed, MEND))
+    found = (MachineFinding("python", True, True, "3.12"), MachineFinding("x", False, needed, MEND))
     monkeypatch.setattr(doctor, "examine", lambda **_: found)
     assert run(["doctor", "--json"]) == code
     assert json.loads(capsys.readouterr().out)[1] == {"name": "x", "works": False, "needed": needed, "text": MEND}
@@ -48,8 +48,8 @@ def test_only_what_is_needed_changes_the_exit_code(needed, code, monkeypatch, ca
 
 
 def test_everything_that_biodance_is_made_of_is_looked_at(monkeypatch):
-    monkeypatch.setattr(doctor, "run_probe", lambda probe: Finding(probe.name, True, probe.needed, ""))
-    names = " ".join(finding.name for finding in doctor.examine())
+    monkeypatch.setattr(doctor, "run_probe", lambda probe: MachineFinding(probe.name, True, probe.needed, ""))
+    names = " ".join(finding.name for finding in doctor.examine_machine())
     for part in (
         "python",
         "anthropometry",

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from human_cases import human_case
 
-from biodance.body.human import human
-from biodance.body.moved import displaced, move_joint, move_marker, recentre_joint
+from biodance.body.changes import move_joint, move_marker, recentre_joint, shift_matter
+from biodance.body.human.human import human
 from biodance.effects import effect
 from biodance.effects.added_mass import point_mass
 from biodance.motion.kinematics import poses
@@ -97,7 +97,7 @@ def test_recentred_joint_keeps_the_neutral_body() -> None:
 
 def test_displaced_matter_is_a_point_mass_elsewhere() -> None:
     place, shift = np.array([0.1, -0.2, 0.3]), np.array([0.05, 0.02, -0.07])
-    np.testing.assert_allclose(displaced(shift) @ point_mass(2.0, place), point_mass(2.0, place + shift), atol=1e-12)
+    np.testing.assert_allclose(shift_matter(shift) @ point_mass(2.0, place), point_mass(2.0, place + shift), atol=1e-12)
 
 
 def test_moved_joint_and_marker_move_only_what_they_should() -> None:

@@ -8,15 +8,15 @@ import pytest
 from human_cases import CORNERS, human_case, moving
 
 from biodance.body.body import Body
-from biodance.body.human import human
+from biodance.body.changes import shift_matter
+from biodance.body.human.human import human
 from biodance.body.inertia import smallest_eigenvalues
-from biodance.body.moved import displaced
-from biodance.diagnose.accept import fit_of
+from biodance.diagnosis.accept import case_fit
 from biodance.effects import Case, effect
 from biodance.effects.head_joint import with_neck
 from biodance.effects.shoulder_girdle import with_clavicles
 from biodance.effects.trunk_joint import with_thorax
-from biodance.identify.identification import identify
+from biodance.identification.identification import identify_body
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
 from biodance.motion.smoothing import smooth
@@ -78,7 +78,7 @@ def test_the_parts_are_together_as_well_known_as_the_whole(name: str) -> None:
     old, count = case.body.segment_index("trunk_head"), case.body.sip.phi.size
     place = extended.joints[[joint.parent for joint in extended.joints].index(extended.segment_joint[old])].translation
     together = np.eye(count, count + 10)
-    together[10 * old : 10 * old + 10, count:] = displaced(place)
+    together[10 * old : 10 * old + 10, count:] = shift_matter(place)
     np.testing.assert_allclose(together @ extended.sip.phi, case.body.sip.phi, atol=1e-9)
     np.testing.assert_allclose(together @ extended.sip.covariance @ together.T, case.body.sip.covariance, atol=1e-9)
     sd = np.sqrt(np.diag(extended.sip.covariance)[::10]) / extended.sip.mass
@@ -91,7 +91,7 @@ def test_accepting_the_joint_identifies_the_body_that_has_it(name: str) -> None:
     right = effect(name).at("", case).corrected(case, np.array([0.12, 0.0]))
     use = np.zeros(400, dtype=bool)
     use[INSIDE] = True
-    found = identify(right.body, (fit_of(right, use),))
+    found = identify_body(right.body, (case_fit(right, use),))
     assert found.status == "solved", found.cause
     assert all(np.isfinite([known.value, known.sd]).all() for known in found.known)
     assert max(known.from_data for known in found.known if known.quantity == "mass") > 0.3

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from human_cases import human_case
 
-from biodance.diagnose.passing import one_sided
+from biodance.diagnosis.passing import one_sided
 from biodance.effects import Case, effect
 from biodance.effects.filter_mismatch import STRENGTH
 from biodance.effects.sloshing_load import FREQUENCY

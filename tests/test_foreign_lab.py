@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from biodance.lab.session import read_session
+from biodance.lab.session.read import read_session
 from biodance.pipeline.session import examine
 
 

@@ -52,10 +52,10 @@ def test_it_opens_quickly_and_loads_nothing_heavy():
     assert time.perf_counter() - start < 2.0  # 0.3 s on an idle machine
 
 
-@pytest.mark.parametrize("first", ["import biodance", "import biodance.identify.identification, biodance.diagnose.engine"])
+@pytest.mark.parametrize("first", ["import biodance", "import biodance.identification.identification, biodance.diagnosis.engine"])
 def test_a_verb_stays_a_verb_whatever_was_imported_before(first):
     code = (
-        f"{first}\nimport biodance\nfrom biodance import diagnose, identify\nimport biodance.identify.sessions as sessions\n"
+        f"{first}\nimport biodance\nfrom biodance import diagnose, identify\nimport biodance.identification.sessions as sessions\n"
         "assert callable(biodance.identify) and callable(biodance.diagnose) and callable(identify) and callable(diagnose)\n"
         "try:\n    biodance.identify('nowhere')\nexcept biodance.BiodanceError as error:\n    print(error)"
     )

@@ -11,20 +11,19 @@ from pathlib import Path
 import pytest
 
 from biodance.cli import run
-from biodance.diagnose.diagnosis import Diagnosis
+from biodance.diagnosis.diagnosis import Diagnosis
 from biodance.effects import discrete_effects, effects
-from biodance.identify.physical import FailedFit
-from biodance.lab.session import read_session
+from biodance.identification.physical import FailedFit
+from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine
 from biodance.records import Subject
-from biodance.virtual_lab.causes import fault_of
-from biodance.virtual_lab.hide import hide, parse
+from biodance.virtual_lab.causes import fault_of, hide, parse_cause
 from biodance.virtual_lab.inject import inject
-from biodance.virtual_lab.laboratory import Visit
-from biodance.virtual_lab.protocol_file import read_protocol
-from biodance.virtual_lab.simulate import simulate
+from biodance.virtual_lab.laboratory import LabVisit
+from biodance.virtual_lab.protocol import read_protocol
+from biodance.virtual_lab.simulate import simulate_session
 
 SUBJECT = Subject(64.0, 1.72, "F", 30.0)
 TRIALS = ("static", "move_1", "move_3", "move_5")
@@ -34,8 +33,8 @@ def hidden(folder: Path, *texts: str, seed: int = 41, visit: int = 0) -> Path:
     """Write a session of three moving trials with something hidden in it; ``visit`` another day of the same person."""
     plan = read_protocol("diagnosis")
     plan = replace(plan, trials=tuple(trial for trial in plan.trials if trial.name in TRIALS))
-    how, loads = hide(tuple(parse(text) for text in texts), SUBJECT, plan, seed=seed, visit=Visit(visit))
-    return simulate(SUBJECT, plan, folder, seed=seed, visit=how, loads=loads)
+    how, loads = hide(tuple(parse_cause(text) for text in texts), SUBJECT, plan, seed=seed, visit=LabVisit(visit))
+    return simulate_session(SUBJECT, plan, folder, seed=seed, visit=how, loads=loads)
 
 
 def examined(folder: Path, monkeypatch: pytest.MonkeyPatch) -> SessionResult:
@@ -59,7 +58,7 @@ def test_a_session_without_fault_is_left_alone(tmp_path: Path, monkeypatch: pyte
 def test_late_forces_are_named_by_the_command_also_where_no_body_can_be_identified(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("biodance.identify.identification.physical_fit", lambda *_: FailedFit("No possible body, by force."))
+    monkeypatch.setattr("biodance.identification.identification.physical_fit", lambda *_: FailedFit("No possible body, by force."))
     folder = hidden(tmp_path / "s", "time_delay:delay=0.025")
     assert run(["diagnose", str(folder), "--accept", "--out", str(tmp_path / "out"), "--json"]) == 1
     document = json.loads(capsys.readouterr().out)
@@ -132,7 +131,7 @@ def standing(data: Path, folder: Path, name: str, text: str = "") -> Path:
     """Write a session of a real person who stands on a plate, with a fault in the file if there is a ``text``."""
     source = data / "biomechzoo" / name / f"{name}01.c3d"
     folder.mkdir()
-    inject(source, folder / "static.c3d", fault_of(parse(text), {source.stem: (0.0, 1.0)}) if text else lambda recording: recording)
+    inject(source, folder / "static.c3d", fault_of(parse_cause(text), {source.stem: (0.0, 1.0)}) if text else lambda recording: recording)
     return folder
 
 

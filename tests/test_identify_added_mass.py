@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from identify_trials import noisy_fit, person, smooth_motion
 
-from biodance.identify.added_mass import added_mass, surprised
-from biodance.identify.identification import Identification, identify, standing_point
-from biodance.identify.learning import learn
-from biodance.identify.loads import load_moments, may_carry, point_mass
-from biodance.identify.statistics import layout_for, statistics
+from biodance.identification.added_mass import added_mass, surprised
+from biodance.identification.identification import Identification, identify_body, standing_point
+from biodance.identification.learning import learn_noise
+from biodance.identification.loads import load_moments, may_carry, point_mass
+from biodance.identification.statistics import layout_for, statistics
 from biodance.records import Sip
 
 PLACE = np.array([0.15, -0.2, 0.2])
@@ -23,7 +23,7 @@ def visits(seed: int, *, segment: int | None = None, mass: float = 2.0, frames: 
     loaded = truth.copy()
     if segment is not None:
         loaded[10 * segment : 10 * segment + 10] += mass * point_mass(PLACE)
-    first, second = (identify(body, (noisy_fit(body, smooth_motion(body, rng, frames=frames), phi, rng),)) for phi in (truth, loaded))
+    first, second = (identify_body(body, (noisy_fit(body, smooth_motion(body, rng, frames=frames), phi, rng),)) for phi in (truth, loaded))
     return first, second
 
 
@@ -83,6 +83,6 @@ def test_an_undeclared_load_is_not_learned_as_noise() -> None:
         loaded[10:20] += mass * point_mass(PLACE)
         fit = noisy_fit(body, motion, loaded, np.random.default_rng(1))
         data = statistics(body, fit, layout_for(standing_point((fit,))))
-        slow.append([learn(data, prior)[0].covariance[0][2, 2] for prior in (may_carry(body, body.sip), body.sip)])
+        slow.append([learn_noise(data, prior)[0].covariance[0][2, 2] for prior in (may_carry(body, body.sip), body.sip)])
     assert slow[1][0] < 3 * slow[0][0]
     assert slow[1][1] > 3 * slow[1][0]

@@ -7,13 +7,12 @@ import pytest
 from identify_trials import noisy_fit, person, smooth_motion
 
 from biodance.body.body import JointError
-from biodance.body.error_sizes import error_size
-from biodance.body.human import human
-from biodance.identify.information import Information
-from biodance.identify.mismatch import Mismatch, Sizes, evidence_of_scale, evident_sizes, mismatch, nothing, temper
-from biodance.identify.posterior import posterior
-from biodance.motion.kinematics import poses
-from biodance.motion.marker_jacobian import chains, jacobian
+from biodance.body.human.human import human
+from biodance.body.tables.error_sizes import error_size
+from biodance.identification.information import Information
+from biodance.identification.mismatch import Mismatch, Sizes, evidence_of_scale, evident_sizes, mismatch, nothing, temper
+from biodance.identification.posterior import posterior
+from biodance.motion.kinematics import chains, jacobian, poses
 from biodance.records import CHANNELS, Subject
 from biodance.uncertainty.bands import Bands
 from biodance.uncertainty.deviations import deviations

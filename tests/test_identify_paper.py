@@ -5,8 +5,8 @@ import pytest
 from random_bodies import random_body, random_motion
 from scipy.optimize import nnls
 
-from biodance.identify.information import information
-from biodance.identify.paper_programme import _solve, directions, inequalities, paper_programme
+from biodance.identification.information import information
+from biodance.identification.paper_programme import _solve, directions, inequalities, paper_programme
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Wrench
 from biodance.uncertainty.noise import Noise

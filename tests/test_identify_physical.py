@@ -9,10 +9,10 @@ from random_bodies import random_body, random_motion
 
 from biodance.body.inertia import smallest_eigenvalues
 from biodance.errors import NotSolved
-from biodance.identify import physical
-from biodance.identify.information import Information, fold, information
-from biodance.identify.physical import FailedFit, PhysicalFit, physical_fit
-from biodance.identify.posterior import Posterior, posterior
+from biodance.identification import physical
+from biodance.identification.information import Information, fold, information
+from biodance.identification.physical import FailedFit, PhysicalFit, physical_fit
+from biodance.identification.posterior import Posterior, posterior
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Sip, Wrench
 from biodance.uncertainty.noise import Noise

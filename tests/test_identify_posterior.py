@@ -7,9 +7,9 @@ import pytest
 from random_bodies import random_body, random_motion
 
 from biodance.body.inertia import pseudo_inertia, smallest_eigenvalues
-from biodance.identify.information import information
-from biodance.identify.physical import physical_fit
-from biodance.identify.posterior import posterior
+from biodance.identification.information import information
+from biodance.identification.physical import physical_fit
+from biodance.identification.posterior import posterior
 from biodance.motion.regressor import predict_wrench, regressor
 from biodance.records import Sip, Wrench
 from biodance.uncertainty.noise import Noise

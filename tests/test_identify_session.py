@@ -8,13 +8,13 @@ from identify_trials import noisy_fit, person, smooth_motion
 
 from biodance.body.inertia import pseudo_inertia, smallest_eigenvalues
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.identify.identification import NOISE_ALONE, conclude, identify, standing_point
-from biodance.identify.knowledge import knowledge, segment_quantities
-from biodance.identify.learning import learn
-from biodance.identify.loads import may_carry, point_mass
-from biodance.identify.sessions import differences
-from biodance.identify.statistics import layout_for, statistics
-from biodance.identify.validation import residual_ratio, validate
+from biodance.identification.identification import NOISE_ALONE, conclude, identify_body, standing_point
+from biodance.identification.knowledge import knowledge, segment_quantities
+from biodance.identification.learning import learn_noise
+from biodance.identification.loads import may_carry, point_mass
+from biodance.identification.sessions import differences
+from biodance.identification.statistics import layout_for, statistics
+from biodance.identification.validation import residual_ratio, validate
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Motion, Sip, Wrench
 from biodance.uncertainty.caution import about_true_centres, widened
@@ -29,7 +29,7 @@ def test_identify_beats_the_table_and_stays_possible() -> None:
     before, after = [], []
     for seed in range(3):
         body, truth, fits = session(seed)
-        found = identify(body, fits)
+        found = identify_body(body, fits)
         assert found.status == "solved"
         assert found.cause == ""
         assert np.all(smallest_eigenvalues(found.sip.phi) >= 0)
@@ -43,7 +43,7 @@ def test_intervals_of_a_session_cover_the_truth() -> None:
     inside = []
     for seed in range(4):
         body, truth, fits = session(seed, frames=800)
-        found = identify(body, fits)
+        found = identify_body(body, fits)
         inside.append(np.abs(found.sip.phi - truth) < 1.96 * np.sqrt(np.diag(found.sip.covariance)))
     assert np.mean(inside) > 0.9
 
@@ -52,7 +52,7 @@ def test_a_body_at_rest_cannot_be_known() -> None:
     body, truth, rng = person(5)
     frames = 1500
     still = Motion(np.arange(frames) / 100, np.tile(body.neutral, (frames, 1)), *np.zeros((2, frames, body.nv)))
-    found = identify(body, (noisy_fit(body, still, truth, rng),))
+    found = identify_body(body, (noisy_fit(body, still, truth, rng),))
     inertias = [k for k in found.known if k.quantity.startswith("I")]
     assert all(k.verdict == "cannot be known" for k in inertias)
     assert min(k.sd / k.table_sd for k in inertias) > 0.7
@@ -66,7 +66,7 @@ def test_sway_that_may_be_skin_moves_no_mass(size: float, believed: bool) -> Non
     fit = noisy_fit(body, moved, body.sip.phi, rng, size=0.1)
     away = moved.q - body.neutral
     skin = Motion(moved.time, body.neutral + 1.5 * away, 1.5 * moved.v, 1.5 * moved.a)
-    moved_mass = np.abs(identify(body, (replace(fit, motion=skin),)).sip.mass / body.sip.mass - 1).max()
+    moved_mass = np.abs(identify_body(body, (replace(fit, motion=skin),)).sip.mass / body.sip.mass - 1).max()
     assert (moved_mass > 0.1) == believed
     assert (moved_mass < 0.02) == (not believed)
 
@@ -82,8 +82,8 @@ def test_a_session_without_usable_frames_is_refused() -> None:
     body, _, fits = session(2, frames=300)
     blind = replace(fits[0], use=np.zeros(300, dtype=bool))
     with pytest.raises(TrialRefused, match="None of 1 trials"):
-        identify(body, (blind,))
-    assert "Left out" in identify(body, (fits[0], replace(blind, name="blind"))).notes[0]
+        identify_body(body, (blind,))
+    assert "Left out" in identify_body(body, (fits[0], replace(blind, name="blind"))).notes[0]
 
 
 def test_quantities_and_their_slope() -> None:
@@ -121,12 +121,14 @@ def test_a_turned_frame_and_a_shifted_centre_to_first_order() -> None:
     from scipy.spatial.transform import Rotation
 
     from biodance.uncertainty.caution import _shift_slope, _turn_slope
-    from biodance.virtual_lab.flesh import of_parameters, parameters, placed
+    from biodance.virtual_lab.flesh import of_parameters, parameters_of_inertia, place_inertia
 
     phi = np.array(person(6)[0].sip.phi[:10])
     J, step = of_parameters(phi), 1e-6
-    turn = [(parameters(placed(J, Rotation.from_rotvec(step * e).as_matrix(), np.zeros(3))) - phi) / step for e in np.eye(3)]
-    shift = [(parameters(placed(J, np.eye(3), step * e)) - phi) / step for e in np.eye(3)]
+    turn = [
+        (parameters_of_inertia(place_inertia(J, Rotation.from_rotvec(step * e).as_matrix(), np.zeros(3))) - phi) / step for e in np.eye(3)
+    ]
+    shift = [(parameters_of_inertia(place_inertia(J, np.eye(3), step * e)) - phi) / step for e in np.eye(3)]
     np.testing.assert_allclose(_turn_slope(phi), np.array(turn).T, atol=1e-4)
     np.testing.assert_allclose(_shift_slope(phi), np.array(shift).T, atol=1e-4)
     np.testing.assert_allclose(pseudo_inertia(phi)[0], J, atol=1e-12)
@@ -135,7 +137,7 @@ def test_a_turned_frame_and_a_shifted_centre_to_first_order() -> None:
 def test_equal_sessions_do_not_differ() -> None:
     body, truth, rng = person(7)
     body = replace(body, boxes=np.tile([[-0.3] * 3, [0.3] * 3], (4, 1, 1)))
-    first, second = (identify(body, (noisy_fit(body, smooth_motion(body, rng, frames=1000), truth, rng),)) for _ in range(2))
+    first, second = (identify_body(body, (noisy_fit(body, smooth_motion(body, rng, frames=1000), truth, rng),)) for _ in range(2))
     rows = differences(first, second)
     assert len(rows) == 40
     z = np.array([row.value / row.sd for row in rows if row.quantity in ("mass", "com x", "com y", "com z")])
@@ -143,7 +145,7 @@ def test_equal_sessions_do_not_differ() -> None:
     assert all(row.value == 0 and row.p == 1 for row in differences(first, first))
     changed = truth.copy()
     changed[20:30] += 2.0 * point_mass(np.array([0.15, -0.2, 0.2]))
-    third = identify(body, (noisy_fit(body, smooth_motion(body, rng, frames=1000), changed, rng),))
+    third = identify_body(body, (noisy_fit(body, smooth_motion(body, rng, frames=1000), changed, rng),))
     for pair, sign in (((first, third), 1), ((third, first), -1)):
         masses = {row.segment: row for row in differences(*pair) if row.quantity == "mass"}
         assert min(masses.values(), key=lambda row: row.p).segment == "s2"
@@ -157,7 +159,7 @@ def test_what_changed_hangs_on_no_rounding(seed: int) -> None:
     body, truth, rng = person(seed)
     fits = [noisy_fit(body, smooth_motion(body, rng, frames=500), truth, rng) for _ in range(2)]
     moved = [replace(f, wrench=Wrench(f.wrench.time, f.wrench.value * (1 + 1e-12 * rng.normal(size=f.wrench.value.shape)))) for f in fits]
-    sessions = [identify(body, (fit,)) for fit in (*fits, *moved)]
+    sessions = [identify_body(body, (fit,)) for fit in (*fits, *moved)]
     for pair, shaken in ((sessions[:2], sessions[2:]), ((sessions[0], sessions[0]), (sessions[2], sessions[0]))):
         for one, other in zip(differences(*pair), differences(*shaken), strict=True):
             assert abs(one.value - other.value) < 1e-3 * one.sd
@@ -185,7 +187,7 @@ def test_gain_has_the_known_ratio_in_its_interval() -> None:
 def test_learned_noise_is_used_when_given() -> None:
     body, _, fits = session(9, frames=600)
     total = statistics(body, fits[0], layout_for(standing_point(fits)))
-    noise, _ = learn(total, may_carry(body, widened(body.sip)))
+    noise, _ = learn_noise(total, may_carry(body, widened(body.sip)))
     np.testing.assert_allclose(conclude(body, total, ("t",), noise=noise).sip.phi, conclude(body, total, ("t",)).sip.phi)
 
 
@@ -194,10 +196,10 @@ def test_a_posture_that_jumps_is_left_out_and_said() -> None:
     spoilt = np.array(fits[0].motion.a)
     spoilt[500:510] += 400.0
     jumping = replace(fits[0], motion=replace(fits[0].motion, a=spoilt))
-    found = identify(body, (jumping,))
+    found = identify_body(body, (jumping,))
     assert any("posture that jumps" in note for note in found.notes)
-    clean = identify(body, fits)
+    clean = identify_body(body, fits)
     assert np.abs(found.sip.phi - truth)[::10].mean() < 1.5 * np.abs(clean.sip.phi - truth)[::10].mean() + 0.05
     assert not any("posture that jumps" in note for note in clean.notes)
     with pytest.raises(TrialRefused, match="No frame is left"):
-        identify(body, (replace(fits[0], motion=replace(fits[0].motion, a=fits[0].motion.a + 400.0)),))
+        identify_body(body, (replace(fits[0], motion=replace(fits[0].motion, a=fits[0].motion.a + 400.0)),))

@@ -7,9 +7,9 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.identify.information import information
-from biodance.identify.learning import learn
-from biodance.identify.statistics import Fit, layout_for, statistics
+from biodance.identification.information import information
+from biodance.identification.learning import learn_noise
+from biodance.identification.statistics import Fit, layout_for, statistics
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Motion, Sip, Wrench
 from biodance.uncertainty.noise import Noise
@@ -69,14 +69,14 @@ def test_learned_noise_gives_intervals_that_cover() -> None:
         rng = np.random.default_rng(100 + seed)
         sd = 0.15 * np.abs(truth) + 1e-2
         prior = Sip(body.segments, truth + sd * rng.normal(size=sd.size), np.diag(sd**2))
-        _, belief = learn(statistics(body, fit, LAYOUT), prior)
+        _, belief = learn_noise(statistics(body, fit, LAYOUT), prior)
         z.append((belief.mean - truth) / np.sqrt(np.diag(belief.covariance)))
     assert np.mean(np.abs(z) < 1.96) == pytest.approx(0.95, abs=0.025)
 
 
 def test_slow_noise_is_found_to_be_slow() -> None:
     body, fit = smooth_fit(5, frames=12000, noise=coloured)
-    noise, _ = learn(statistics(body, fit, LAYOUT), body.sip)
+    noise, _ = learn_noise(statistics(body, fit, LAYOUT), body.sip)
     sd = np.sqrt(np.diagonal(noise.covariance, axis1=1, axis2=2))[:, 0]
     assert sd[0] > 5 * sd[-1]
     assert sd[-1] == pytest.approx(2.0, rel=0.25)

@@ -9,9 +9,9 @@ from random_bodies import random_body
 from scipy.interpolate import CubicSpline
 
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.identify.identification import identify, standing_point
-from biodance.identify.statistics import Fit, layout_for, statistics
-from biodance.identify.streaming import about, begin
+from biodance.identification.identification import identify_body, standing_point
+from biodance.identification.statistics import Fit, layout_for, statistics
+from biodance.identification.streaming import about, begin
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Motion, Sip, Wrench
 
@@ -75,7 +75,7 @@ def test_the_identification_is_that_of_the_batch() -> None:
     sd = 0.05 * np.abs(body.sip.phi) + 0.002
     wrong = body.sip.phi + sd * np.random.default_rng(1).normal(size=sd.size)
     body = replace(body, sip=Sip(body.segments, wrong, np.diag(sd**2)))
-    stream, batch = streamed(body, fit, [*range(0, 9000, 501), 9000]), identify(body, (fit,))
+    stream, batch = streamed(body, fit, [*range(0, 9000, 501), 9000]), identify_body(body, (fit,))
     ours = stream.identification((fit,))
     sd = np.sqrt(np.diag(batch.sip.covariance))
     assert ours.trials == batch.trials
@@ -87,7 +87,7 @@ def test_the_identification_is_that_of_the_batch() -> None:
 def test_verdicts_on_the_way_count_the_disturbances_of_the_batch() -> None:
     body, fit = recording()
     body = replace(body, sip=Sip(body.segments, body.sip.phi, np.diag((0.3 * np.abs(body.sip.phi) + 0.01) ** 2)))
-    on_the_way, batch = streamed(body, fit, [*range(0, 9000, 900), 9000]).progress(), identify(body, (fit,))
+    on_the_way, batch = streamed(body, fit, [*range(0, 9000, 900), 9000]).progress(), identify_body(body, (fit,))
     ratio = np.array([mine.sd / theirs.sd for mine, theirs in zip(on_the_way.known, batch.known, strict=True)])
     assert np.median(ratio) == pytest.approx(1.0, abs=0.15)
 

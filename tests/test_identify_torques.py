@@ -7,8 +7,8 @@ import pytest
 from identify_trials import noisy_fit, person, smooth_motion
 
 from biodance.errors import UnknownName
-from biodance.identify.identification import identify
-from biodance.identify.torques import ground_torques, torque_bands, torque_regressor
+from biodance.identification.identification import identify_body
+from biodance.identification.torques import ground_torques, torque_bands, torque_regressor
 from biodance.motion.dynamics import joint_torques
 from biodance.records import Sip, Wrench
 
@@ -35,7 +35,7 @@ def test_bands_hold_the_true_torques() -> None:
     inside, ratio = [], []
     for seed in range(12):
         body, truth, rng = person(50 + seed)
-        found = identify(body, (noisy_fit(body, smooth_motion(body, rng, frames=900), truth, rng),))
+        found = identify_body(body, (noisy_fit(body, smooth_motion(body, rng, frames=900), truth, rng),))
         motion = smooth_motion(body, rng, frames=60)
         bands = torque_bands(found, motion, {}, trial="t", use=np.ones(60, dtype=bool))
         true = torque_regressor(body, motion) @ truth
@@ -48,7 +48,7 @@ def test_bands_hold_the_true_torques() -> None:
 
 def test_the_band_is_the_spread_of_the_belief() -> None:
     body, truth, rng = person(70)
-    found = identify(body, (noisy_fit(body, smooth_motion(body, rng, frames=600), truth, rng),))
+    found = identify_body(body, (noisy_fit(body, smooth_motion(body, rng, frames=600), truth, rng),))
     motion = smooth_motion(body, rng, frames=20)
     bands = torque_bands(found, motion, {}, trial="t", use=np.ones(20, dtype=bool))
     drawn = found.belief.factor @ rng.normal(size=(found.belief.factor.shape[1], 4000))

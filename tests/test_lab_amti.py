@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from biodance.errors import FileRefused
-from biodance.lab.amti import read_amti_ascii, read_bsf
-from biodance.lab.amti_bsf import INSTRUMENT, MAIN
+from biodance.lab.amti.bsf import INSTRUMENT, MAIN
+from biodance.lab.amti.read import read_amti_ascii, read_bsf
 
 POUND, INCH = 4.4482216152605, 0.0254
 IMPERIAL = np.array([POUND] * 3 + [POUND * INCH] * 3)

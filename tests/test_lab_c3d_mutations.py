@@ -10,7 +10,7 @@ from c3d_mutations import judge, mutations, original
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from biodance.lab.write_c3d import PlateRecording, write_c3d
+from biodance.lab.c3d.write import PlateRecording, write_c3d
 from biodance.records import Markers
 
 CORNERS = np.array([[0.4, 0.6, 0.0], [0.0, 0.6, 0.0], [0.0, 0.0, 0.0], [0.4, 0.0, 0.0]])

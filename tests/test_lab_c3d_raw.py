@@ -5,7 +5,7 @@ import pytest
 from c3d_files import DEC, INTEL, MIPS, File, real, text, whole
 
 from biodance.errors import FileRefused
-from biodance.lab.raw_c3d import read_raw
+from biodance.lab.c3d.raw import read_raw
 
 FRAMES, POINTS, CHANNELS, SAMPLES = 6, 3, 2, 5
 

@@ -5,8 +5,8 @@ import pytest
 from c3d_files import File, real, text, whole
 
 from biodance.errors import FileRefused
-from biodance.lab.c3d import read_c3d
-from biodance.lab.model_outputs import model_outputs
+from biodance.lab.c3d.raw import model_outputs
+from biodance.lab.c3d.read import read_c3d
 
 LABELS = ("LASI", "RASI", "LPSI", "RPSI", "LHEE", "RHEE", "LTOE", "RTOE", "C7", "CLAV", "T10", "STRN", "LKNE", "RKNE", "LANK", "RANK")
 LABELS += ("LTHI", "RTHI", "LTIB", "RTIB", "LSHO", "RSHO", "LELB", "RELB", "LWRA", "RWRA", "LWRB", "RWRB", "LFHD", "RFHD", "LBHD", "RBHD")

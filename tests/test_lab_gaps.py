@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from biodance.lab.gaps import fill_gaps, report_gaps
-from biodance.lab.marker_sets import read_marker_set
+from biodance.lab.markers.gaps import fill_gaps, report_gaps
+from biodance.lab.markers.sets import read_marker_set
 from biodance.records import Markers
 
 RATE = 100.0

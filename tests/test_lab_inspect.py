@@ -9,11 +9,11 @@ import pytest
 from lab_sessions import GRAVITY, MASS, write_trial
 
 from biodance.errors import BiodanceError
-from biodance.lab.ground_forces import table_of
 from biodance.lab.inspect import inspect_file, inspect_paths
-from biodance.lab.mot import write_mot
+from biodance.lab.opensim.ground_forces import table_of
+from biodance.lab.opensim.mot import write_mot
+from biodance.lab.opensim.trc import write_trc
 from biodance.lab.read import read_trial
-from biodance.lab.trc import write_trc
 
 KEYS = {
     "file", "status", "reason", "format", "frames", "rate_hz", "analog_rate_hz", "markers", "marker_set", "gaps_percent", "subjects",

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from biodance.errors import BiodanceError, TrialRefused, UnknownName
-from biodance.lab.marker_set_file import LANDMARKS, SEGMENTS
-from biodance.lab.marker_sets import FOLDER, canonical, landmark, read_marker_set, recognise
+from biodance.lab.markers.set_file import LANDMARKS, SEGMENTS
+from biodance.lab.markers.sets import FOLDER, canonical, landmark, read_marker_set, recognise
 from biodance.library import names
 from biodance.records import Markers
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biodance.lab.c3d import read_c3d
+from biodance.lab.c3d.read import read_c3d
 from biodance.lab.weight import standing_mass
 
 

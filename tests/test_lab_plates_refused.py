@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from plate_emulator import Emulated, channels, raw_file, step
 
-from biodance.lab.plate_corners import corners_in_lab, plate_axes
-from biodance.lab.plates import read_plates
+from biodance.lab.plates.corners import corners_in_lab, plate_axes
+from biodance.lab.plates.read import read_plates
 
 GOOD = Emulated(centre=np.array([1.0, 1.0, 0.0]))
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from biodance.errors import TrialRefused
-from biodance.lab.marker_sets import read_marker_set
+from biodance.lab.markers.sets import read_marker_set
 from biodance.lab.prepare import prepare
 from biodance.records import Markers, Plate, Source, Trial, Wrench
 from biodance.settings import Settings

@@ -9,7 +9,7 @@ from lab_sessions import two_trials
 
 from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.read import format_of, read_trial
-from biodance.lab.session import read_session
+from biodance.lab.session.read import read_session
 
 
 @pytest.fixture

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from biodance.errors import FileRefused
-from biodance.lab import results_c3d
-from biodance.lab.c3d import read_c3d
-from biodance.lab.raw_c3d import read_raw
-from biodance.lab.results_c3d import Event, Output, write_results_c3d
-from biodance.lab.write_c3d import PlateRecording, write_c3d
+from biodance.lab.c3d import results as results_c3d
+from biodance.lab.c3d.raw import read_raw
+from biodance.lab.c3d.read import read_c3d
+from biodance.lab.c3d.results import Event, Output, write_results_c3d
+from biodance.lab.c3d.write import PlateRecording, write_c3d
 from biodance.records import Markers
 
 FRAMES, RATE = 50, 100.0

@@ -5,8 +5,8 @@ import pytest
 from c3d_files import DEC, INTEL, MIPS, File, real, text, whole
 
 from biodance.errors import FileRefused
-from biodance.lab import second_opinion
-from biodance.lab.raw_c3d import read_raw
+from biodance.lab.c3d import numbers as second_opinion
+from biodance.lab.c3d.raw import read_raw
 
 
 def jumping(processor=INTEL, scale=0.5, **parameters):

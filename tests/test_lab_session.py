@@ -9,9 +9,9 @@ from lab_sessions import GRAVITY, MASS, plate, roles, said, two_trials, write_tr
 
 from biodance.errors import SessionRefused
 from biodance.lab.read import read_trial
-from biodance.lab.results_folder import results_folder
-from biodance.lab.roles import role_by_name
-from biodance.lab.session import read_session
+from biodance.lab.session.read import read_session
+from biodance.lab.session.recordings import role_by_name
+from biodance.lab.session.results_folder import results_folder
 
 
 @pytest.fixture
@@ -150,8 +150,8 @@ def test_damaged_forces_leave_the_markers(folder):
 
 def test_forces_of_another_time_are_said(folder):
     (folder / "static01.mot").unlink()
-    from biodance.lab.ground_forces import table_of
-    from biodance.lab.mot import write_mot
+    from biodance.lab.opensim.ground_forces import table_of
+    from biodance.lab.opensim.mot import write_mot
 
     write_mot(folder / "static01_grf.mot", table_of((plate(frames=300),)))
     assert any("may not belong together" in warning for warning in read_trial(folder / "static01.trc").warnings)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from biodance.errors import FileRefused, TrialRefused, UnknownName
-from biodance.lab.ground_forces import has_plates, plates_of, table_of
-from biodance.lab.mot import Table, read_mot, write_mot
+from biodance.lab.opensim.ground_forces import has_plates, plates_of, table_of
+from biodance.lab.opensim.mot import TimeTable, read_mot, write_mot
 from biodance.records import Plate, Wrench
 
 G = 9.81
@@ -84,7 +84,7 @@ def test_force_goes_up_along_y_in_the_file():
 def test_column_names_of_real_writers(columns):
     labels = tuple(part.format(a=a) for part in columns for a in "xyz")
     row = [10.0, 700.0, 5.0, 0.4, 0.0, 0.1, 0.0, 2.0, 0.0]
-    (plate,), said = plates_of(Table("t", labels, [0.0, 0.01], [row, row]), where="f")
+    (plate,), said = plates_of(TimeTable("t", labels, [0.0, 0.01], [row, row]), where="f")
     np.testing.assert_allclose(plate.wrench.force[0], [10, -5, 700])
     np.testing.assert_allclose(plate.wrench.cop()[0], [0.4, -0.1, 0.0])
     assert plate.wrench.moment[0, 2] == pytest.approx(0.4 * -5 - -0.1 * 10 + 2.0)
@@ -95,7 +95,7 @@ LABELS = tuple(part + a for part in ("ground_force_v", "ground_force_p", "ground
 
 
 def one_plate(row, time=(0.0, 0.01, 0.02, 0.03)):
-    return Table("t", LABELS, time, [row] * len(time))
+    return TimeTable("t", LABELS, time, [row] * len(time))
 
 
 def test_load_on_the_plate_is_turned_to_reaction_and_said():
@@ -112,7 +112,7 @@ def test_z_up_table_is_taken_as_it_is():
 
 def test_nan_point_without_force_is_no_fault():
     (plate,), _ = plates_of(
-        Table("t", LABELS, [0.0, 0.01], [[0, 700, 0, 0.4, 0, 0.1, 0, 0, 0], [0, 0, 0, *[np.nan] * 3, 0, 0, 0]]), where="f"
+        TimeTable("t", LABELS, [0.0, 0.01], [[0, 700, 0, 0.4, 0, 0.1, 0, 0, 0], [0, 0, 0, *[np.nan] * 3, 0, 0, 0]]), where="f"
     )
     assert np.isfinite(plate.wrench.value).all()
     assert plate.wrench.value[1] == pytest.approx(0)
@@ -153,7 +153,7 @@ def test_untrustworthy_forces_are_refused(row, sentence):
 
 
 def test_coordinates_are_no_plates():
-    table = Table("t", ("hip_flexion_r", "pelvis_tx"), [0.0], [[1.0, 2.0]])
+    table = TimeTable("t", ("hip_flexion_r", "pelvis_tx"), [0.0], [[1.0, 2.0]])
     assert not has_plates(table.columns)
     with pytest.raises(FileRefused, match="no force plate"):
         plates_of(table, where="q.mot")
@@ -198,12 +198,12 @@ def test_wrong_file_is_refused_in_a_sentence(tmp_path, text, sentence):
 
 def test_nan_is_not_written(tmp_path):
     with pytest.raises(TrialRefused, match="column b is nan at"):
-        write_mot(tmp_path / "f.sto", Table("t", ("a", "b"), [0.0, 0.5], [[1, 2], [3, np.nan]]))
+        write_mot(tmp_path / "f.sto", TimeTable("t", ("a", "b"), [0.0, 0.5], [[1, 2], [3, np.nan]]))
     assert not (tmp_path / "f.sto").exists()
 
 
 def test_nothing_is_overwritten(tmp_path):
     (tmp_path / "f.sto").write_text("mine")
     with pytest.raises(FileRefused, match="not overwritten"):
-        write_mot(tmp_path / "f.sto", Table("t", ("a",), [0.0], [[1.0]]))
+        write_mot(tmp_path / "f.sto", TimeTable("t", ("a",), [0.0], [[1.0]]))
     assert (tmp_path / "f.sto").read_text() == "mine"

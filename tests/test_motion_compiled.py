@@ -13,9 +13,9 @@ from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation
 
 import biodance.motion
-from biodance.body.human import human
-from biodance.motion.compiled import ball_step, newton
-from biodance.motion.compiled.chain import (
+from biodance.body.human.human import human
+from biodance.motion.ik.compiled import ball_step, newton
+from biodance.motion.ik.compiled.chain import (
     LENGTH,
     add_up,
     add_up_model,
@@ -27,7 +27,7 @@ from biodance.motion.compiled.chain import (
     step_from,
     sums_of,
 )
-from biodance.motion.compiled.interpolation import smooth_at
+from biodance.motion.ik.compiled.interpolation import smooth_at
 from biodance.records import Array, Subject
 
 WOMAN = human(Subject(58.3, 1.64, "F", 31.0))
@@ -217,10 +217,10 @@ def test_machine_code_is_made_again_when_another_file_of_the_folder_changes(tmp_
 
 def test_a_second_process_takes_the_kept_machine_code():
     chain = Setting("human").chain
-    newton.distances(chain, np.zeros((1, len(chain.slot), 3)), WOMAN.neutral[None].copy(), np.empty((1, len(chain.slot))))
+    newton.fill_distances(chain, np.zeros((1, len(chain.slot), 3)), WOMAN.neutral[None].copy(), np.empty((1, len(chain.slot))))
     code = (
-        "from biodance.motion.compiled import newton\nfrom biodance.body.human import human\nfrom biodance.records import Subject\n"
-        "from biodance.motion.compiled.chain import chain_of\nimport numpy as np\nb = human(Subject(58.3, 1.64, 'F', 31.0))\n"
+        "from biodance.motion.compiled import newton\nfrom biodance.body.human.human import human\nfrom biodance.records import Subject\n"
+        "from biodance.motion.ik.compiled.chain import chain_of\nimport numpy as np\nb = human(Subject(58.3, 1.64, 'F', 31.0))\n"
         "c = chain_of(b, list(b.markers.segment), b.markers.position)\n"
         "newton.distances(c, np.zeros((1, len(c.slot), 3)), b.neutral[None].copy(), np.empty((1, len(c.slot))))\n"
         "print(sum(newton.distances.stats.cache_hits.values()))"

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from walkers import WEIGHT, Stand, plate, walker
 
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.lab.marker_sets import read_marker_set
-from biodance.motion.contact import foot_wrenches, ground_contact
-from biodance.motion.footing import distance_to_hull, inside
-from biodance.motion.soles import Soles, soles_from_body, soles_from_markers
+from biodance.lab.markers.sets import read_marker_set
+from biodance.motion.contact.contact import foot_wrenches, ground_contact
+from biodance.motion.contact.footing import distance_to_hull, inside
+from biodance.motion.contact.soles import Soles, soles_from_body, soles_from_markers
 from biodance.records import Markers, Motion, Plate, Subject, Wrench
 
 MASS = WEIGHT / 9.80665

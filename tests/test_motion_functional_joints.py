@@ -9,19 +9,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biodance.body.human import human
-from biodance.body.limits import joint_limits
-from biodance.body.scaling import Scaling, measure
-from biodance.body.skeleton import JOINTS
+from biodance.body.human.human import human
+from biodance.body.human.limits import joint_limits
+from biodance.body.human.scaling import Scaling, measure_static
+from biodance.body.human.skeleton import JOINTS
 from biodance.errors import TrialRefused
 from biodance.lab.prepare import prepare
-from biodance.lab.session import read_session
-from biodance.motion.functional_joints import evaluate, functional_joints, spread_postures
-from biodance.motion.inverse_kinematics import solve_ik
-from biodance.motion.joint_unknowns import HINGES, SIZE, JointUnknowns, own_centre, own_turn
+from biodance.lab.session.read import read_session
+from biodance.motion.ik.functional_joints import evaluate_joints, functional_joints, spread_postures
+from biodance.motion.ik.inverse_kinematics import solve_ik
+from biodance.motion.ik.joint_unknowns import HINGES, SIZE, JointUnknowns, own_centre, own_turn
 from biodance.motion.kinematics import poses
 from biodance.records import Array, Markers, Source, Subject, Trial
-from biodance.virtual_lab.simulate import simulate
+from biodance.virtual_lab.simulate import simulate_session
 
 SUBJECT = Subject(65.0, 1.75, "F", 33.0)
 DATA = os.environ.get("BIODANCE_DATA")
@@ -39,7 +39,7 @@ def scaling() -> Scaling:
             q[7 + body.joint_index(f"{side}_{joint}")] = np.radians(degrees)
     xyz = poses(body, np.tile(q, (60, 1))).points(body.markers.segment, body.markers.position)
     markers = Markers(body.markers.names, np.arange(60) / 100, xyz)
-    return measure(SUBJECT, Trial("static", "static", markers, (), Source(Path("static.c3d"), "", "test", 100.0), "plug_in_gait"))
+    return measure_static(SUBJECT, Trial("static", "static", markers, (), Source(Path("static.c3d"), "", "test", 100.0), "plug_in_gait"))
 
 
 def displaced(theta: Array) -> Scaling:
@@ -120,11 +120,11 @@ def test_the_gradient_is_that_of_the_cost() -> None:
     rng = np.random.default_rng(1)
     theta = np.concatenate([0.005 * rng.normal(size=SIZE - len(HINGES)), 0.1 * rng.normal(size=len(HINGES))])
     postures = spread_postures([moving(displaced(hidden()), share=0.3, seconds=12.0)], scaling().body()[0].markers.names)
-    at = evaluate(scaling(), postures, theta, None, noise=0.008)
+    at = evaluate_joints(scaling(), postures, theta, None, noise=0.008)
     left_out = [i for joint in JOINTS if joint.endswith(("knee", "ankle")) for i in range(SIZE)[own_centre(joint)]]
     for k in rng.choice(np.setdiff1d(np.arange(SIZE), left_out), 8, replace=False):
         step = 1e-5 * np.eye(SIZE)[k]
-        up, down = (evaluate(scaling(), postures, theta + sign * step, at.q, noise=0.008).cost for sign in (1, -1))
+        up, down = (evaluate_joints(scaling(), postures, theta + sign * step, at.q, noise=0.008).cost for sign in (1, -1))
         assert (up - down) / 2e-5 == pytest.approx(at.gradient[k], rel=1e-3, abs=0.05), k
 
 
@@ -135,11 +135,11 @@ def test_trials_without_the_body_s_markers_are_refused() -> None:
 
 
 def test_a_virtual_person_s_trunk_and_left_elbow_come_nearer_to_the_truth(tmp_path: Path) -> None:
-    session = read_session(simulate(Subject(71.6, 1.704, "M"), "short", tmp_path / "short", seed=101))
+    session = read_session(simulate_session(Subject(71.6, 1.704, "M"), "short", tmp_path / "short", seed=101))
     truth = json.loads((tmp_path / "short" / "truth" / "truth.json").read_text())
     true = {one["name"]: np.array(one["position_m"]) for one in truth["static_pose"]["segments_12"]}
     (static,), fits = session.of_role("static"), session.of_role("fit")
-    before = measure(session.subject, prepare(static))
+    before = measure_static(session.subject, prepare(static))
     after = functional_joints(before, [prepare(fit).markers for fit in fits]).scaling
     for joint, segment, share in (("trunk", "trunk_head", 0.7), ("left_elbow", "left_forearm_hand", 0.7)):
         old, new = (np.linalg.norm(one.centres.place[joint] - true[segment]) for one in (before, after))
@@ -151,7 +151,7 @@ def test_a_virtual_person_s_trunk_and_left_elbow_come_nearer_to_the_truth(tmp_pa
 def test_a_real_walk_of_two_seconds_leaves_the_joints_alone(folder: str) -> None:
     session = read_session(Path(str(DATA)) / folder)
     (static,), (walk, *_) = session.of_role("static"), session.of_role("fit")
-    before = measure(session.subject, prepare(static))
+    before = measure_static(session.subject, prepare(static))
     found = functional_joints(before, [prepare(walk).markers])
     assert {"trunk", "right_hip", "left_hip", "right_elbow", "left_elbow"} <= set(found.kept)
     assert max(found.moved.values(), default=0.0) < 0.005

@@ -9,15 +9,15 @@ from robots import biped
 from scipy.spatial.transform import Rotation
 
 from biodance.body.body import UPRIGHT, Body
-from biodance.body.hoap3 import hoap3
-from biodance.body.human import human
-from biodance.body.similar import Likeness, likeness
-from biodance.body.standing_frames import standing_frames
-from biodance.body.urdf import read_urdf
+from biodance.body.human.human import human
+from biodance.body.robot.hoap3 import hoap3
+from biodance.body.robot.similar import Likeness, likeness
+from biodance.body.robot.standing_frames import standing_frames
+from biodance.body.robot.urdf import read_urdf
 from biodance.errors import BiodanceError
-from biodance.motion.general_legs import GeneralLeg
+from biodance.motion.ik.general_legs import GeneralLeg
+from biodance.motion.ik.legs import Leg
 from biodance.motion.kinematics import poses
-from biodance.motion.legs import Leg
 from biodance.records import Array, Subject
 
 HUMAN = human(Subject(65.0, 1.75, "F", 33.0))

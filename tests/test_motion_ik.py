@@ -10,9 +10,9 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from biodance.body.body import Body
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.motion.inverse_kinematics import FrameStatus, solve_ik
+from biodance.motion.ik.inverse_kinematics import FrameStatus, solve_ik
 from biodance.records import Array, Markers, Subject
 
 WOMAN = human(Subject(58.3, 1.64, "F", 31.0))

@@ -5,7 +5,7 @@ import pytest
 from marker_trials import apart, points
 from scipy.spatial.transform import Rotation
 
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.errors import TrialRefused
 from biodance.lab.filters import LowPass, low_pass
 from biodance.motion.smoothing import smooth

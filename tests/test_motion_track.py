@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from marker_trials import dance, markers_of, points
 
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.errors import TrialRefused
-from biodance.lab.session import read_session
+from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.motion.track import track
 from biodance.records import Markers, Source, Subject, Trial
 from biodance.settings import Settings
-from biodance.virtual_lab.laboratory import Laboratory, Visit, perform_in, set_up
+from biodance.virtual_lab.laboratory import Laboratory, LabVisit, perform_in, set_up
 from biodance.virtual_lab.person import make_person
-from biodance.virtual_lab.protocol_file import read_protocol
-from biodance.virtual_lab.simulate import simulate
+from biodance.virtual_lab.protocol import read_protocol
+from biodance.virtual_lab.simulate import simulate_session
 from biodance.virtual_lab.tolerances import instruments_perfect
 
 WOMAN = human(Subject(58.3, 1.64, "F", 31.0))
@@ -36,11 +36,11 @@ def markers() -> Markers:
 
 
 def test_a_simulated_squat_is_followed(tmp_path):
-    subject, visit = Subject(58.0, 1.66, "F", 28.0, "S07"), Visit(0, Laboratory(bits=32), instruments_perfect())
+    subject, visit = Subject(58.0, 1.66, "F", 28.0, "S07"), LabVisit(0, Laboratory(bits=32), instruments_perfect())
     protocol = read_protocol("short")
     squat = next(plan for plan in protocol.trials if plan.role == "validate")
     static = next(plan for plan in protocol.trials if plan.role == "static")
-    session = read_session(simulate(subject, replace(protocol, trials=(static, squat)), tmp_path / "S", seed=3, visit=visit))
+    session = read_session(simulate_session(subject, replace(protocol, trials=(static, squat)), tmp_path / "S", seed=3, visit=visit))
     trial = session.of_role("validate")[0]
     person = make_person(subject, 3, tolerances=visit.tolerances)
     truth = perform_in(set_up(person, visit), person, squat).motion(trial.markers.time)

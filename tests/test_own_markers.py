@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from test_pipeline_session import PLATE, SUBJECT, arm_swing, recorded
 
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.cli import run
 from biodance.errors import BiodanceError
-from biodance.lab.marker_set_file import LANDMARKS, SEGMENTS, segment_of
-from biodance.lab.marker_sets import FAMILY, read_marker_set
-from biodance.lab.session import read_session
-from biodance.lab.write_c3d import PlateRecording, write_c3d
+from biodance.lab.c3d.write import PlateRecording, write_c3d
+from biodance.lab.markers.set_file import LANDMARKS, SEGMENTS, segment_of
+from biodance.lab.markers.sets import FAMILY, read_marker_set
+from biodance.lab.session.read import read_session
 from biodance.pipeline.session import examine
 from biodance.records import Markers
 
@@ -96,7 +96,7 @@ def test_the_option_reaches_every_command(
         asked.append(markers)
         raise BiodanceError("far enough")
 
-    monkeypatch.setattr("biodance.lab.session.read_session", stopping)
+    monkeypatch.setattr("biodance.lab.session.read.read_session", stopping)
     for command in ("identify", "diagnose"):
         run([command, str(folder), "--out", str(tmp_path / command), "--markers", mine])
     assert asked == [mine, mine]

@@ -10,17 +10,17 @@ from identify_trials import noisy_fit, person, smooth_motion
 from biodance.cli import run
 from biodance.cli.app import NEEDS_A_PERSON, NOT_DONE
 from biodance.errors import NotSolved
-from biodance.identify.added_mass import added_mass
-from biodance.identify.identification import identify
-from biodance.identify.paper_programme import paper_programme
-from biodance.identify.physical import FailedFit
-from biodance.identify.sessions import differences
-from biodance.identify.streaming import begin
+from biodance.identification.added_mass import added_mass
+from biodance.identification.identification import identify_body
+from biodance.identification.paper_programme import paper_programme
+from biodance.identification.physical import FailedFit
+from biodance.identification.sessions import differences
+from biodance.identification.streaming import begin
 from biodance.pipeline.identification import identify_trials
-from biodance.report.attention import attention
-from biodance.report.identification_json import identification_document
-from biodance.report.identification_page import identification_section
-from biodance.report.results_json import plain
+from biodance.report.documents.identification import identification_document
+from biodance.report.documents.session import plain_values
+from biodance.report.pages.identification import identification_section
+from biodance.report.wording import attention
 
 FORCED = FailedFit("No possible body, by force. Check the scaling.")
 
@@ -33,7 +33,7 @@ def refuse(*_) -> FailedFit:
 def failing(monkeypatch):
     """Let every fit of a session fail (but of the one that other tests keep)."""
     session_result()
-    monkeypatch.setattr("biodance.identify.identification.physical_fit", refuse)
+    monkeypatch.setattr("biodance.identification.identification.physical_fit", refuse)
 
 
 def session():
@@ -42,7 +42,7 @@ def session():
 
 
 def test_an_identification_without_a_body_gives_none(failing, monkeypatch):
-    found = identify(*session())
+    found = identify_body(*session())
     assert (found.status, found.cause, found.known) == ("failed", FORCED.cause, ())
     for use in (
         lambda: found.sip,
@@ -56,9 +56,9 @@ def test_an_identification_without_a_body_gives_none(failing, monkeypatch):
 
 
 def test_sessions_whose_bodies_with_room_for_a_load_fail_cannot_be_compared(monkeypatch):
-    found = identify(*session())
+    found = identify_body(*session())
     assert found.status == "solved"
-    monkeypatch.setattr("biodance.identify.sessions.physical_fit", refuse)
+    monkeypatch.setattr("biodance.identification.sessions.physical_fit", refuse)
     with pytest.raises(NotSolved, match=r"cannot be compared: t, .*by force"):
         differences(found, found)
 
@@ -70,8 +70,8 @@ def test_a_stream_that_contradicts_every_body_knows_nothing_enough(failing):
 
 
 def test_the_paper_s_programme_without_a_solution_has_no_parameters(monkeypatch):
-    found = identify(*session())
-    monkeypatch.setattr("biodance.identify.paper_programme.solve_convex", lambda _: "infeasible")
+    found = identify_body(*session())
+    monkeypatch.setattr("biodance.identification.paper_programme.solve_convex", lambda _: "infeasible")
     failed = paper_programme(found.data, found.body)
     assert failed.status == "failed"
     with pytest.raises(NotSolved, match="infeasible"):
@@ -81,7 +81,7 @@ def test_the_paper_s_programme_without_a_solution_has_no_parameters(monkeypatch)
 def test_the_session_says_it_on_the_page_and_in_the_numbers(failing):
     trials = session_result().trials
     found = identify_trials(body(), trials, name="S01")
-    numbers = plain(identification_document(found))
+    numbers = plain_values(identification_document(found))
     assert (numbers["status"], numbers["cause"], numbers["segments"]) == ("failed", FORCED.cause, [])
     assert numbers["failures"] == {"segments": FORCED.cause}
     assert (numbers["validation"], numbers["gain"], numbers["joint_torques"], numbers["differences"]) == ([], None, None, [])
@@ -96,7 +96,7 @@ def test_the_session_says_it_on_the_page_and_in_the_numbers(failing):
 
 def test_a_reference_that_failed_is_said_and_not_compared_with(monkeypatch):
     with monkeypatch.context() as forced:
-        forced.setattr("biodance.identify.identification.physical_fit", refuse)
+        forced.setattr("biodance.identification.identification.physical_fit", refuse)
         reference = identify_trials(body(), session_result().trials, name="S00")
     found = identify_trials(body(), session_result().trials, name="S01", reference=reference)
     assert found.identification.status == "solved"
@@ -108,9 +108,9 @@ def test_a_reference_that_failed_is_said_and_not_compared_with(monkeypatch):
 
 def test_a_comparison_that_failed_is_said(monkeypatch):
     reference = session_result().identification
-    monkeypatch.setattr("biodance.identify.sessions.physical_fit", refuse)
+    monkeypatch.setattr("biodance.identification.sessions.physical_fit", refuse)
     found = identify_trials(body(), session_result().trials, name="S01", reference=reference)
-    numbers = plain(identification_document(found))
+    numbers = plain_values(identification_document(found))
     assert (numbers["status"], numbers["differences"]) == ("solved", [])
     assert "by force" in numbers["failures"]["differences"]
     assert "by force" in identification_section(found)
@@ -120,7 +120,7 @@ def test_the_command_says_it_and_writes_and_exports_no_body(failing, monkeypatch
     monkeypatch.setattr("biodance.report.write.page", lambda *_, **__: "a page")
     found = replace(session_result(), identification=identify_trials(body(), session_result().trials, name="S01"))
     (tmp_path / "S01").mkdir()
-    for room in ("biodance.lab.session", "biodance.pipeline.export"):
+    for room in ("biodance.lab.session.read", "biodance.pipeline.export"):
         monkeypatch.setattr(f"{room}.read_session", lambda folder, **_: replace(found.session, folder=folder))
     for room in ("biodance.pipeline.session", "biodance.pipeline.export"):
         monkeypatch.setattr(f"{room}.examine", lambda session, **_: found)

@@ -11,12 +11,12 @@ from biodance.errors import SessionRefused, TrialRefused
 from biodance.motion.dynamics import joint_torques
 from biodance.pipeline.identification import can_identify, identify_trials
 from biodance.pipeline.provenance import provenance
-from biodance.pipeline.session import identified
+from biodance.pipeline.session import identification_of
 from biodance.records import Plate, Wrench
-from biodance.report.identification_json import identification_document
-from biodance.report.identification_page import identification_section
-from biodance.report.page import page
-from biodance.report.results_json import document, plain, to_text
+from biodance.report.documents.identification import identification_document
+from biodance.report.documents.session import plain_values, results_document, to_text
+from biodance.report.pages.identification import identification_section
+from biodance.report.pages.session import page
 
 
 @pytest.fixture(scope="module")
@@ -57,16 +57,16 @@ def test_the_document_has_the_keys_that_programs_rely_on(numbers, found):
 
 
 def test_inertia_in_the_document_is_about_the_centre_of_mass(numbers, found):
-    from biodance.body.inertia import lump_of
+    from biodance.body.inertia import rigid_inertia
 
-    lump = lump_of(found.identification.sip.of("left_thigh"))
+    lump = rigid_inertia(found.identification.sip.of("left_thigh"))
     row = numbers["segments"][body().segment_index("left_thigh")]
     assert row["inertia_kgm2"] == pytest.approx(lump.inertia[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]], rel=1e-9)
     assert row["com_m"] == pytest.approx(lump.com, rel=1e-9)
 
 
 def test_a_load_is_found_against_the_unloaded_session(monkeypatch):
-    monkeypatch.setattr("biodance.report.identification_page.svg_address", lambda _: "data:,")
+    monkeypatch.setattr("biodance.report.pages.identification.svg_address", lambda _: "data:,")
     loaded, bare = session_result(load=1.5, seed=5), session_result()
     compared = identify_trials(body(), loaded.trials, name="S02", reference=bare.identification)
     search = compared.search
@@ -85,7 +85,7 @@ def test_a_load_is_found_against_the_unloaded_session(monkeypatch):
 
 
 def test_without_a_kept_trial_the_gain_is_not_claimed(monkeypatch):
-    monkeypatch.setattr("biodance.report.identification_page.svg_address", lambda _: "data:,")
+    monkeypatch.setattr("biodance.report.pages.identification.svg_address", lambda _: "data:,")
     alone = session_result(roles=("fit",)).identification
     assert alone.gain is None
     assert any("not proven" in note for note in alone.notes)
@@ -98,7 +98,7 @@ def test_nothing_to_fit_is_refused_with_what_to_do():
     with pytest.raises(TrialRefused, match="role fit"):
         identify_trials(body(), result.trials, name="S01")
     with pytest.raises(SessionRefused, match=r"session\.toml"):
-        identified(result)
+        identification_of(result)
 
 
 def test_the_section_shows_every_segment(found):
@@ -111,25 +111,25 @@ def test_the_section_shows_every_segment(found):
 
 @pytest.mark.parametrize("roles", [("fit", "validate"), ("validate",)])
 def test_the_report_holds_identification_where_there_is_one(roles, monkeypatch):
-    monkeypatch.setattr("biodance.report.page.svg_address", lambda _: "data:,")
-    monkeypatch.setattr("biodance.report.page.identification_section", lambda _: "<p>What it weighs</p>")
+    monkeypatch.setattr("biodance.report.pages.session.svg_address", lambda _: "data:,")
+    monkeypatch.setattr("biodance.report.pages.session.identification_section", lambda _: "<p>What it weighs</p>")
     result, there = session_result(roles=roles), "fit" in roles
     made = provenance(result, created="2026-01-01T00:00:00Z")
-    told = plain(document(result, made))
+    told = plain_values(results_document(result, made))
     assert (told["identification"] is not None) is there
     assert ("<p>What it weighs</p>" in page(result, made)) is there
     assert all((trial["wrench"]["identified"] is not None) is there for trial in told["trials"])
 
 
 def test_a_load_on_the_page_has_segment_size_and_interval(monkeypatch):
-    monkeypatch.setattr("biodance.report.identification_page.svg_address", lambda _: "data:,")
+    monkeypatch.setattr("biodance.report.pages.identification.svg_address", lambda _: "data:,")
     text = identification_section(session_result(load=2.4, seed=5).identification)
     assert "carries <strong>" in text
     assert "kg on the left forearm hand</strong>" in text
 
 
 def test_joint_torques_of_the_kept_trial_are_told_with_their_band(monkeypatch):
-    monkeypatch.setattr("biodance.report.identification_page.svg_address", lambda _: "data:,")
+    monkeypatch.setattr("biodance.report.pages.identification.svg_address", lambda _: "data:,")
     fitted, kept = session_result().trials
     corners = np.array([[0.5, 0.5, 0], [-0.5, 0.5, 0], [-0.5, -0.5, 0], [0.5, -0.5, 0]])
     plate = Plate("plate1", 2, corners, Wrench(kept.comparison.time, kept.comparison.measured))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from diagnosed_sessions import RATE, body, looks, motion
 
-from biodance.body.error_sizes import error_size
-from biodance.diagnose.problem import Look
+from biodance.body.tables.error_sizes import error_size
+from biodance.diagnosis.problem import Look
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.looked_at import UNREST, left_out, looked_at, own_tolerances, soft_tissue, unrest
 from biodance.pipeline.results import Step, TrialResult, WrenchComparison

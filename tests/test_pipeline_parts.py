@@ -6,16 +6,15 @@ import pytest
 from example_results import comparison, trial
 from random_bodies import random_body, random_motion
 
-from biodance.body.human import human
+from biodance.body.human.human import human
 from biodance.errors import TrialRefused
-from biodance.lab.gaps import MarkerGaps
+from biodance.lab.markers.gaps import MarkerGaps
 from biodance.motion.kinematics import poses
 from biodance.pipeline.checks import mass_check, standing_check, trial_checks
-from biodance.pipeline.results import MarkerFit, Standing, Step, TrialResult
+from biodance.pipeline.results import MarkerFit, QuietStanding, Step, TrialResult
 from biodance.pipeline.standing import centre_of_mass, facing, quiet_run, quiet_standing
-from biodance.pipeline.steps import attempt
-from biodance.pipeline.still import bones
-from biodance.pipeline.trial import marker_fit
+from biodance.pipeline.still import bone_lines
+from biodance.pipeline.trial import attempt, marker_fit
 from biodance.records import Markers, Motion, Plate, Subject, Trial, Wrench
 from biodance.settings import CheckLimits
 
@@ -134,7 +133,7 @@ def test_marker_distances_leave_out_what_was_not_seen():
 
 def test_every_segment_is_drawn_and_left_mirrors_right():
     body = human(SUBJECT)
-    lines, sides = bones(body, poses(body, body.neutral))
+    lines, sides = bone_lines(body, poses(body, body.neutral))
     assert {"left", "right", "middle"} == set(sides)
     height = lines[:, :, 2] - lines[:, :, 2].min()
     assert 1.55 < height.max() < 1.85
@@ -143,9 +142,9 @@ def test_every_segment_is_drawn_and_left_mirrors_right():
     assert len(lines) == 12 + 4
 
 
-def standing(mass: float, ahead: float = 0.0) -> Standing:
+def standing(mass: float, ahead: float = 0.0) -> QuietStanding:
     nothing = np.empty((0, 2))
-    return Standing(
+    return QuietStanding(
         "s", 0, 1, mass, 0.1, np.zeros((5, 2)), np.ones((5, 2)), np.array([1.0, 0]), ahead, 0.0, nothing, (), np.empty((0, 4, 2))
     )
 

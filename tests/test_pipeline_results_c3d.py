@@ -6,24 +6,23 @@ import pytest
 from biodance.cli import run
 from biodance.cli.app import DONE, NOT_DONE
 from biodance.errors import TrialRefused
-from biodance.identify.torques import ground_torques, torque_regressor
-from biodance.lab.raw_c3d import read_raw
-from biodance.lab.session import read_session
-from biodance.motion.contact import foot_wrenches, ground_contact
-from biodance.motion.soles import soles_from_body
+from biodance.identification.torques import ground_torques, torque_regressor
+from biodance.lab.c3d.raw import read_raw
+from biodance.lab.session.read import read_session
+from biodance.motion.contact.contact import foot_wrenches, ground_contact
+from biodance.motion.contact.soles import soles_from_body
 from biodance.pipeline.results_c3d import results_into_c3d
 from biodance.pipeline.session import examine
 from biodance.records import Subject
-from biodance.virtual_lab.protocol import Protocol
-from biodance.virtual_lab.protocol_file import read_protocol
-from biodance.virtual_lab.simulate import simulate
+from biodance.virtual_lab.protocol import Protocol, read_protocol
+from biodance.virtual_lab.simulate import simulate_session
 
 
 @pytest.fixture(scope="module")
 def session(tmp_path_factory):
     short = read_protocol("short")
     protocol = Protocol("shorter", "", (short.trials[0], short.trials[2]), short.postures)
-    return simulate(Subject(58.0, 1.66, "F", 28.0, "S07"), protocol, tmp_path_factory.mktemp("lab") / "S07", seed=11)
+    return simulate_session(Subject(58.0, 1.66, "F", 28.0, "S07"), protocol, tmp_path_factory.mktemp("lab") / "S07", seed=11)
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biodance.body.human import human
-from biodance.lab.session import read_session
+from biodance.body.human.human import human
+from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.session import examine

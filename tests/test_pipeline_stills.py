@@ -9,13 +9,13 @@ import pytest
 from identified_sessions import session_result
 
 from biodance.body.solids import shape_parts
-from biodance.identify.added_mass import added_mass
+from biodance.identification.added_mass import added_mass
 from biodance.motion.kinematics import poses
 from biodance.pipeline.still import load_still, posture_still, worst_still
 from biodance.records import Markers
-from biodance.report import solid
-from biodance.report.solid import solid_pngs
-from biodance.report.still import RESIDUAL_SCALE, still_figure
+from biodance.report.figures import solid
+from biodance.report.figures.solid import solid_pngs
+from biodance.report.figures.still import RESIDUAL_SCALE, still_figure
 
 
 @pytest.fixture(scope="module")

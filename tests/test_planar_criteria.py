@@ -7,8 +7,8 @@ from random_bodies import random_body, random_motion
 from target import target
 
 from biodance.errors import UnknownName
-from biodance.identify.base_parameters import structural_base
-from biodance.identify.information import fold
+from biodance.identification.base_parameters import structural_base
+from biodance.identification.information import fold
 from biodance.motion.regressor import regressor
 
 BODY = random_body(np.random.default_rng(0), n_segments=3)

@@ -8,7 +8,7 @@ from target import target
 from via_points import Excitation, design
 
 from biodance.dance.problem.splines import rest_to_rest
-from biodance.identify.base_parameters import structural_base
+from biodance.identification.base_parameters import structural_base
 from biodance.motion.regressor import GRAVITY
 
 

@@ -7,11 +7,11 @@ import pytest
 from example_results import full_session, refused_session
 
 from biodance.pipeline.provenance import provenance
-from biodance.report.results_json import document, plain, to_text
+from biodance.report.documents.session import plain_values, results_document, to_text
 
 
 def read_back(result):
-    return json.loads(to_text(document(result, provenance(result, created="2026-01-01T00:00:00Z"))))
+    return json.loads(to_text(results_document(result, provenance(result, created="2026-01-01T00:00:00Z"))))
 
 
 def test_a_trial_has_the_keys_that_others_rely_on():
@@ -52,4 +52,4 @@ def test_a_number_that_is_not_finite_becomes_null(value):
 
 
 def test_numpy_values_become_plain_ones():
-    assert plain((np.int64(3), np.bool_(True), np.arange(2.0))) == [3, True, [0.0, 1.0]]
+    assert plain_values((np.int64(3), np.bool_(True), np.arange(2.0))) == [3, True, [0.0, 1.0]]

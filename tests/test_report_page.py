@@ -14,13 +14,12 @@ from example_results import full_session, refused_session
 from biodance.doctor import BROWSERS
 from biodance.pipeline.provenance import provenance
 from biodance.pipeline.results import SessionResult
-from biodance.report.marker_figure import marker_figure
-from biodance.report.page import check_table, page
-from biodance.report.solid import still_addresses
-from biodance.report.still import still_figure
-from biodance.report.style import svg_address
-from biodance.report.wording import millimetres, number, without_path
-from biodance.report.wrench_figure import wrench_figure
+from biodance.report.figures.session import marker_figure, wrench_figure
+from biodance.report.figures.solid import still_addresses
+from biodance.report.figures.still import still_figure
+from biodance.report.figures.style import svg_address
+from biodance.report.pages.session import check_table, page
+from biodance.report.wording import format_number, millimetres, without_path
 
 TIME = "2026-01-01T00:00:00Z"
 VOID = {"meta", "img", "link", "br", "hr"}
@@ -142,7 +141,7 @@ def test_a_comparison_without_a_used_frame_can_be_drawn():
 
 @pytest.mark.parametrize("child", ["false", "true", "no-such-program"])
 def test_a_child_that_dies_or_draws_nothing_leaves_the_drawing(monkeypatch, child):
-    monkeypatch.setattr("biodance.report.solid.sys.executable", child)
+    monkeypatch.setattr("biodance.report.figures.solid.sys.executable", child)
     still = full_session().still
     assert still_addresses([still]) == [svg_address(still_figure(still))]
 
@@ -154,7 +153,7 @@ def test_figures_carry_no_date():
 
 @pytest.mark.parametrize(("value", "text"), [(1.25, "1.2"), (-0.04, "0.0"), (-3.0, "−3.0"), (float("nan"), "–"), (None, "–")])
 def test_numbers_read_like_numbers(value, text):
-    assert number(value) == text
+    assert format_number(value) == text
 
 
 def test_a_file_is_named_once():

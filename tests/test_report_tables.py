@@ -8,7 +8,7 @@ import pytest
 from example_results import full_session
 from identified_sessions import session_result
 
-from biodance.diagnose.diagnosis import Adequacy, Alias, Diagnosis, Estimate, Finding, Gain, Unobservable
+from biodance.diagnosis.diagnosis import Adequacy, Alias, Diagnosis, Estimate, Finding, Gain, Unobservable
 from biodance.errors import SessionRefused
 from biodance.pipeline.tables import session_tables
 from biodance.report.tables import tables_folder, write_tables

@@ -15,9 +15,9 @@ from second_package import ENTRY_POINTS, LIMIT_POINT, RENAMED, install
 from test_pipeline_session import SUBJECT, arm_swing, recorded
 
 import biodance.dance.limits as limits_room
-from biodance.body.human import human
-from biodance.body.segment_tables import table_names
-from biodance.diagnose.engine import diagnose
+from biodance.body.human.human import human
+from biodance.body.tables.choice import table_names
+from biodance.diagnosis.engine import diagnose_trials
 from biodance.effects import effects
 from biodance.errors import BiodanceError
 from biodance.records import Subject
@@ -78,7 +78,9 @@ def test_effect_is_fitted_like_any_other(installed: Path) -> None:
         return wrench + np.concatenate([pull, np.cross([0.0, 0.0, 1.0], pull)], axis=1)
 
     assert list(effects())[-1] == "cable"
-    found = diagnose(body(), looks(1, hidden=pulled), tolerances=known(), effects=("cable", "plate_gain", "plate_offset", "time_delay"))
+    found = diagnose_trials(
+        body(), looks(1, hidden=pulled), tolerances=known(), effects=("cable", "plate_gain", "plate_offset", "time_delay")
+    )
     (finding,) = found.diagnosis.findings
     assert (finding.effect, finding.advice) == ("cable", "Take the cable off the person.")
     assert finding.parameters[0].value == pytest.approx(8.0, rel=0.1)

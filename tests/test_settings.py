@@ -12,14 +12,14 @@ from biodance.cli.app import DONE, NOT_DONE
 from biodance.errors import BiodanceError, SessionRefused, UnknownName
 from biodance.lab.filters import LowPass, force_filter, low_pass, motion_filter
 from biodance.lab.prepare import prepare
-from biodance.lab.session_file import read_session_file
+from biodance.lab.session.file import read_session_file
 from biodance.lab.weight import is_still, movement, standing_mass
-from biodance.motion.contact import ground_contact
-from biodance.motion.soles import soles_from_body
+from biodance.motion.contact.contact import ground_contact
+from biodance.motion.contact.soles import soles_from_body
 from biodance.pipeline.checks import trial_checks
 from biodance.pipeline.provenance import provenance
 from biodance.settings import USUAL, ContactRules, Settings, assignments
-from biodance.virtual_lab.simulate import simulate
+from biodance.virtual_lab.simulate import simulate_session
 
 OTHER = {"table": "dumas_2018", "hip": "davis", "joints": "static", "filter.kind": "critically_damped", "filter.force_cutoff": 20.0}
 
@@ -27,7 +27,7 @@ OTHER = {"table": "dumas_2018", "hip": "davis", "joints": "static", "filter.kind
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Return a simulated visit."""
-    return simulate(biodance.Subject(62.0, 1.70, "F", 31.0), "short", tmp_path_factory.mktemp("lab") / "visit", seed=1)
+    return simulate_session(biodance.Subject(62.0, 1.70, "F", 31.0), "short", tmp_path_factory.mktemp("lab") / "visit", seed=1)
 
 
 @pytest.fixture(scope="module")
@@ -231,11 +231,11 @@ def test_every_rule_of_contact_is_asked_for_where_contact_is_found(usual):
 
 
 def test_an_outlier_is_what_the_analyst_says(usual):
-    from biodance.identify.gate import believable
-    from biodance.pipeline.identification import fit_of
+    from biodance.identification.statistics import believable
+    from biodance.pipeline.identification import trial_fit
 
     strict = replace(usual["squat_1"], trial=replace(usual["squat_1"].trial, settings=USUAL.changed({"outlier": 0.05})))
-    counts = [believable(usual.body, fit_of(one), np.zeros(3))[0].use.sum() for one in (usual["squat_1"], strict)]
+    counts = [believable(usual.body, trial_fit(one), np.zeros(3))[0].use.sum() for one in (usual["squat_1"], strict)]
     assert counts[0] > counts[1]
 
 

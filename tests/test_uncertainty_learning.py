@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from identify_trials import noisy_fit, person, smooth_motion
 
-from biodance.identify.statistics import layout_for, statistics
+from biodance.identification.statistics import layout_for, statistics
 from biodance.motion.regressor import regressor
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.learning import Moments, floor, maximise, moments_of, noise_of, sizes_of

@@ -10,11 +10,11 @@ from diagnosed_sessions import body, known, looks
 
 import biodance
 from biodance.body.body import JointError
-from biodance.body.error_sizes import error_rows, error_size, joint_size
-from biodance.body.tables import read_table
-from biodance.diagnose.candidates import candidates
-from biodance.diagnose.model import nuisances
-from biodance.diagnose.problem import problem
+from biodance.body.tables.anthropometry import read_table
+from biodance.body.tables.error_sizes import error_rows, error_size, joint_size
+from biodance.diagnosis.candidates import candidates
+from biodance.diagnosis.model import nuisances
+from biodance.diagnosis.problem import problem
 from biodance.effects import effect
 from biodance.errors import UnknownName
 from biodance.uncertainty.tolerances import BEFORE, in_state, key_of, table_sizes
@@ -26,15 +26,15 @@ ROOMS = ("body", "motion", "uncertainty", "identify", "diagnose", "virtual_lab",
 SAYS_A_SIZE = re.compile(r"(^|_)(SD|SIDES|SLIDE|HINGE|JOINT_CENTRE|ROOT_CENTRE|TILT|TURN|FLOOR|GAIN|OFFSET|SOFT_TISSUE|FIXED_POINT)(_|$)")
 CAUSES = ("plate_gain", "time_delay", "body_mass", "lab_tilt", "plate_position", "clock_drift", "joint_centre")
 ELSEWHERE = {
-    "body/scaling.py:TILT": "deg, a warning's threshold",
-    "body/tracking_limits.py:HAND_TURN": "a joint's range",
+    "body/human/scaling.py:TILT": "deg, a warning's threshold",
+    "body/human/limits.py:HAND_TURN": "a joint's range",
     "virtual_lab/laboratory.py:tilt": "a fault that a visit is given, 0 by default",
-    "virtual_lab/loose_masses.py:FLESH": "springs",
-    "body/robot_prior.py:RELATIVE_MASS_SD": "robots: what a data sheet is worth",
-    "body/robot_prior.py:RELATIVE_INERTIA_SD": "robots",
-    "body/robot_prior.py:COM_SD": "robots",
-    "body/hoap3.py:COM_SD": "robots",
-    "identify/physical.py:RELATIVE_FLOOR": "share of an eigenvalue",
+    "virtual_lab/forces.py:FLESH": "springs",
+    "body/robot/prior.py:RELATIVE_MASS_SD": "robots: what a data sheet is worth",
+    "body/robot/prior.py:RELATIVE_INERTIA_SD": "robots",
+    "body/robot/prior.py:COM_SD": "robots",
+    "body/robot/hoap3.py:COM_SD": "robots",
+    "identification/physical.py:RELATIVE_FLOOR": "share of an eigenvalue",
 }
 """Constants whose names sound like sizes and are none of this table's."""
 

@@ -12,10 +12,9 @@ from scipy.fft import dct
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
-from biodance.body.inertia import lump_of
-from biodance.body.moved import recentre_joint
-from biodance.motion.kinematics import poses
-from biodance.motion.marker_jacobian import chains
+from biodance.body.changes import recentre_joint
+from biodance.body.inertia import rigid_inertia
+from biodance.motion.kinematics import chains, poses
 from biodance.motion.regressor import GRAVITY, predict_wrench
 from biodance.records import Array, Motion
 from biodance.uncertainty.joints import Centre, Tilt, joint_of
@@ -52,7 +51,7 @@ def needed(com: Array, turn: Array) -> Array:
     """Return the wrench (T, 6) of matter whose segments' centres of mass are at ``com`` (T, N, 3), turned by ``turn``
     (T, N, 3, 3).
     """
-    lumps, time = [lump_of(phi) for phi in body().sip.phi.reshape(-1, 10)], moving().time
+    lumps, time = [rigid_inertia(phi) for phi in body().sip.phi.reshape(-1, 10)], moving().time
     mass, own = np.array([lump.mass for lump in lumps]), np.array([lump.inertia for lump in lumps])
 
     def rate(values: Array) -> Array:

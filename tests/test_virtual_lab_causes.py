@@ -12,19 +12,17 @@ import biodance.virtual_lab
 from biodance.errors import BiodanceError, UnknownName
 from biodance.lab.read import read_trial
 from biodance.records import Subject, Trial
-from biodance.virtual_lab.causes import CAUSES, UNKNOWN
-from biodance.virtual_lab.hide import hide, parse
-from biodance.virtual_lab.laboratory import FIRST_VISIT, Visit
-from biodance.virtual_lab.loose_masses import Spring, swing
+from biodance.virtual_lab.causes import CAUSES, UNKNOWN, hide, parse_cause
+from biodance.virtual_lab.forces import Spring, swing
+from biodance.virtual_lab.laboratory import FIRST_VISIT, LabVisit
 from biodance.virtual_lab.performance import perform
 from biodance.virtual_lab.person import make_person
-from biodance.virtual_lab.protocol import Protocol
-from biodance.virtual_lab.protocol_file import read_protocol
-from biodance.virtual_lab.simulate import simulate
+from biodance.virtual_lab.protocol import Protocol, read_protocol
+from biodance.virtual_lab.simulate import simulate_session
 from biodance.virtual_lab.tolerances import instruments_perfect
 
 SUBJECT = Subject(60.0, 1.70, "F", 30.0)
-PERFECT = Visit(tolerances=instruments_perfect())
+PERFECT = LabVisit(tolerances=instruments_perfect())
 EXAMPLES = (
     "plate_offset:target=Fz,offset=20", "plate_gain:target=Fz,gain=0.04", "plate_crosstalk:target=Fz->My,ratio=0.02",
     "plate_drift:target=Mx,drift=8", "time_delay:delay=0.02", "clock_drift:stretch=0.03", "plate_position:target=plate1:x,shift=0.02",
@@ -49,9 +47,9 @@ def squats() -> Protocol:
     return replace(plan, trials=(replace(static, lead=0.4), replace(squat, steps=steps)))
 
 
-def made(folder: Path, plan: Protocol, *texts: str, visit: Visit = PERFECT) -> Trial:
-    visit, loads = hide(tuple(parse(text) for text in texts), SUBJECT, plan, seed=4, visit=visit)
-    simulate(SUBJECT, plan, folder, seed=4, visit=visit, loads=loads)
+def made(folder: Path, plan: Protocol, *texts: str, visit: LabVisit = PERFECT) -> Trial:
+    visit, loads = hide(tuple(parse_cause(text) for text in texts), SUBJECT, plan, seed=4, visit=visit)
+    simulate_session(SUBJECT, plan, folder, seed=4, visit=visit, loads=loads)
     return read_trial(folder / "squat_1.c3d")
 
 
@@ -61,7 +59,7 @@ def clean(squats: Protocol, tmp_path_factory: pytest.TempPathFactory) -> Trial:
 
 
 def test_every_cause_has_an_example_and_the_unknown_ones_exist() -> None:
-    assert sorted(parse(text).name for text in EXAMPLES) == sorted(CAUSES)
+    assert sorted(parse_cause(text).name for text in EXAMPLES) == sorted(CAUSES)
     assert set(UNKNOWN) < set(CAUSES)
     assert len(UNKNOWN) >= 6
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biodance.body.human import human
-from biodance.body.limits import joint_limits
+from biodance.body.human.human import human
+from biodance.body.human.limits import joint_limits
 from biodance.dance.dance import Dance
 from biodance.dance.limits import family
 from biodance.dance.postures.ordering import support_sequence
@@ -18,7 +18,7 @@ from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import seat, under
 from biodance.errors import BiodanceError
-from biodance.lab.session import read_session
+from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.pipeline.danced import simulate_dance, stretches
 from biodance.records import Subject

@@ -8,10 +8,10 @@ import pytest
 from biodance.errors import BiodanceError, UnknownName
 from biodance.lab.read import read_trial
 from biodance.records import Subject, Trial
-from biodance.virtual_lab.hide import Hidden, hide, parse
-from biodance.virtual_lab.laboratory import Laboratory, Visit
-from biodance.virtual_lab.protocol_file import read_protocol
-from biodance.virtual_lab.simulate import simulate
+from biodance.virtual_lab.causes import Hidden, hide, parse_cause
+from biodance.virtual_lab.laboratory import Laboratory, LabVisit
+from biodance.virtual_lab.protocol import read_protocol
+from biodance.virtual_lab.simulate import simulate_session
 from biodance.virtual_lab.tolerances import instruments_perfect
 
 SUBJECT = Subject(60.0, 1.70, "F", 30.0)
@@ -20,9 +20,9 @@ TRIAL = "standing_1"
 
 def recorded(folder: Path, texts: tuple[str, ...], *, plate_type: int = 2) -> Trial:
     plan = read_protocol("standing")
-    visit = Visit(laboratory=Laboratory(plate_type=plate_type), tolerances=instruments_perfect())
-    visit, loads = hide(tuple(parse(t) for t in texts), SUBJECT, plan, seed=4, visit=visit)
-    simulate(SUBJECT, plan, folder, seed=4, visit=visit, loads=loads)
+    visit = LabVisit(laboratory=Laboratory(plate_type=plate_type), tolerances=instruments_perfect())
+    visit, loads = hide(tuple(parse_cause(t) for t in texts), SUBJECT, plan, seed=4, visit=visit)
+    simulate_session(SUBJECT, plan, folder, seed=4, visit=visit, loads=loads)
     return read_trial(next(p for p in sorted(folder.glob("*.c3d")) if "static" not in p.name))
 
 
@@ -87,12 +87,12 @@ def test_labels_are_exchanged_and_mass_is_underdeclared(clean: tuple[int, Trial]
 
 
 def test_words_are_read_and_wrong_ones_refused() -> None:
-    assert parse("added_mass:target=left_shank,mass=1,place=0;-0.1;0.05") == Hidden(
+    assert parse_cause("added_mass:target=left_shank,mass=1,place=0;-0.1;0.05") == Hidden(
         "added_mass", "left_shank", {"mass": (1.0,), "place": (0.0, -0.1, 0.05)}
     )
     plan = read_protocol("standing")
     for text, match in (("plate_gain:target=Fz,gian=0.1", "gain"), ("plate_gain:target=Fq,gain=0.1", "channel"), ("nothing", "Legal")):
         with pytest.raises((BiodanceError, UnknownName), match=match):
-            hide((parse(text),), SUBJECT, plan, seed=1)
+            hide((parse_cause(text),), SUBJECT, plan, seed=1)
     with pytest.raises(BiodanceError, match="not a number"):
-        parse("plate_gain:target=Fz,gain=much")
+        parse_cause("plate_gain:target=Fz,gain=much")

@@ -7,15 +7,14 @@ import numpy as np
 import pytest
 
 from biodance.errors import BiodanceError
-from biodance.lab.raw_c3d import read_raw
+from biodance.lab.c3d.raw import read_raw
 from biodance.lab.read import read_trial
 from biodance.records import Array, Subject, Trial
-from biodance.virtual_lab.causes import fault_of
-from biodance.virtual_lab.hide import hide, parse
+from biodance.virtual_lab.causes import fault_of, hide, parse_cause
 from biodance.virtual_lab.inject import inject
-from biodance.virtual_lab.laboratory import Laboratory, Visit
-from biodance.virtual_lab.protocol_file import read_protocol
-from biodance.virtual_lab.simulate import simulate
+from biodance.virtual_lab.laboratory import Laboratory, LabVisit
+from biodance.virtual_lab.protocol import read_protocol
+from biodance.virtual_lab.simulate import simulate_session
 
 SUBJECT = Subject(60.0, 1.70, "F", 30.0)
 CLOCK = (0.1, 0.9)
@@ -34,14 +33,14 @@ def data() -> Path:
 
 
 def written(path: Path, out: Path, text: str) -> Trial:
-    return read_trial(inject(path, out, fault_of(parse(text), {path.stem: CLOCK})))
+    return read_trial(inject(path, out, fault_of(parse_cause(text), {path.stem: CLOCK})))
 
 
 def simulated(folder: Path, plate_type: int, *texts: str) -> Path:
     plan = read_protocol("standing")
-    visit = Visit(laboratory=Laboratory(plate_type=plate_type))
-    visit, loads = hide(tuple(parse(text) for text in texts), SUBJECT, plan, seed=4, visit=visit)
-    simulate(SUBJECT, plan, folder, seed=4, visit=visit, loads=loads)
+    visit = LabVisit(laboratory=Laboratory(plate_type=plate_type))
+    visit, loads = hide(tuple(parse_cause(text) for text in texts), SUBJECT, plan, seed=4, visit=visit)
+    simulate_session(SUBJECT, plan, folder, seed=4, visit=visit, loads=loads)
     return next(path for path in sorted(folder.glob("*.c3d")) if "static" not in path.name)
 
 
@@ -68,7 +67,7 @@ def test_a_drift_runs_with_the_clock_given(clean: tuple[int, Path], tmp_path: Pa
 
 def test_all_other_bytes_are_the_originals(clean: tuple[int, Path], tmp_path: Path) -> None:
     _, path = clean
-    inject(path, tmp_path / "c.c3d", fault_of(parse("plate_position:target=plate1:x,shift=0.02"), {}))
+    inject(path, tmp_path / "c.c3d", fault_of(parse_cause("plate_position:target=plate1:x,shift=0.02"), {}))
     one, two = path.read_bytes(), (tmp_path / "c.c3d").read_bytes()
     assert len(one) == len(two)
     assert 4 <= sum(a != b for a, b in zip(one, two, strict=True)) <= 16  # the x of four corners, four bytes each
@@ -79,7 +78,7 @@ def test_all_other_bytes_are_the_originals(clean: tuple[int, Path], tmp_path: Pa
 def test_what_does_not_fit_into_a_copy_is_refused(clean: tuple[int, Path], tmp_path: Path) -> None:
     _, path = clean
     with pytest.raises(BiodanceError, match="rates, lengths"):
-        inject(path, tmp_path / "a.c3d", fault_of(parse("frame_rate:ratio=1.2"), {}))
+        inject(path, tmp_path / "a.c3d", fault_of(parse_cause("frame_rate:ratio=1.2"), {}))
     inject(path, tmp_path / "b.c3d", lambda recording: recording)
     with pytest.raises(BiodanceError, match="exists already"):
         inject(path, tmp_path / "b.c3d", lambda recording: recording)

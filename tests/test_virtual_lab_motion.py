@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
+from biodance.motion.ik.legs import Leg, soft_limit
 from biodance.motion.kinematics import poses
-from biodance.motion.legs import Leg, soft_limit
 from biodance.motion.regressor import GRAVITY, predict_wrench
 from biodance.records import Subject
 from biodance.virtual_lab.choreography import SIDES, septic
 from biodance.virtual_lab.performance import perform
 from biodance.virtual_lab.person import AddedLoad, make_person
-from biodance.virtual_lab.protocol_file import read_protocol
+from biodance.virtual_lab.protocol import read_protocol
 
 CENTRE = np.array([0.3, 0.2])
 

@@ -6,12 +6,11 @@ import pytest
 from biodance.errors import BiodanceError, UnknownName
 from biodance.motion.kinematics import poses
 from biodance.records import Subject
-from biodance.virtual_lab.flesh import FEMALE, of_parameters, parameters, placed, pseudo_inertia
+from biodance.virtual_lab.cameras import reference_angles
+from biodance.virtual_lab.flesh import FEMALE, of_parameters, parameters_of_inertia, place_inertia, true_pseudo_inertia
 from biodance.virtual_lab.merge import MERGED, load_on, merged_sip, place_in_12
 from biodance.virtual_lab.person import AddedLoad, make_person
-from biodance.virtual_lab.proportions import UPRIGHT_CHAIN
-from biodance.virtual_lab.skeleton import SEGMENTS
-from biodance.virtual_lab.soft_tissue import reference_angles
+from biodance.virtual_lab.skeleton import TRUE_SEGMENTS, UPRIGHT_CHAIN
 from biodance.virtual_lab.tolerances import PERFECT
 
 SUBJECTS = [Subject(45, 1.50, "F"), Subject(65, 1.75, "F"), Subject(80, 1.70, "M"), Subject(110, 1.95, "M")]
@@ -22,7 +21,7 @@ def test_a_person_is_physically_possible_and_adds_up(subject):
     person = make_person(subject, 3)
     assert person.body.sip.mass.sum() == pytest.approx(subject.mass, abs=1e-9)
     assert sum(person.size[name] for name in UPRIGHT_CHAIN) == pytest.approx(subject.stature, abs=1e-12)
-    for segment in SEGMENTS:
+    for segment in TRUE_SEGMENTS:
         assert np.linalg.eigvalsh(of_parameters(person.body.sip.of(segment))).min() > 0
     assert len(person.body.segments) == 16
     assert person.body.nv == 6 + 39
@@ -53,8 +52,8 @@ def test_a_load_changes_its_segment_alone():
     load = AddedLoad("left_forearm", 2.4, np.array([0.0, -0.12, 0.0]))
     bare, loaded = make_person(SUBJECTS[1], 5), make_person(SUBJECTS[1], 5, loads=(load,))
     change = (loaded.loaded_body.sip.phi - bare.body.sip.phi).reshape(-1, 10)
-    assert set(np.flatnonzero(np.abs(change).max(axis=1))) == {SEGMENTS.index("left_forearm")}
-    row = change[SEGMENTS.index("left_forearm")]
+    assert set(np.flatnonzero(np.abs(change).max(axis=1))) == {TRUE_SEGMENTS.index("left_forearm")}
+    row = change[TRUE_SEGMENTS.index("left_forearm")]
     np.testing.assert_allclose(row[:4], [2.4, 0.0, -0.288, 0.0], atol=1e-12)
     assert row[9] == pytest.approx(2.4 * (0.12**2 + 2 * 0.03**2 - 0.03**2), rel=1e-9)
     assert loaded.mass == pytest.approx(67.4)
@@ -69,13 +68,13 @@ def test_loads_that_make_no_sense_are_refused():
 
 def test_pseudo_inertia_round_trip_and_change_of_frame():
     rng = np.random.default_rng(1)
-    J = pseudo_inertia(2.0, np.array([0.1, -0.2, 0.05]), np.array([0.1, 0.06, 0.11]))
-    np.testing.assert_allclose(of_parameters(parameters(J)), J, atol=1e-15)
+    J = true_pseudo_inertia(2.0, np.array([0.1, -0.2, 0.05]), np.array([0.1, 0.06, 0.11]))
+    np.testing.assert_allclose(of_parameters(parameters_of_inertia(J)), J, atol=1e-15)
     turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     points = rng.normal(size=(50, 3))
     cloud = np.concatenate([points, np.ones((50, 1))], axis=1)
     moved = np.concatenate([points @ turn.T + 0.3, np.ones((50, 1))], axis=1)
-    np.testing.assert_allclose(placed(cloud.T @ cloud, turn, np.full(3, 0.3)), moved.T @ moved, atol=1e-10)
+    np.testing.assert_allclose(place_inertia(cloud.T @ cloud, turn, np.full(3, 0.3)), moved.T @ moved, atol=1e-10)
 
 
 def test_the_merge_to_12_segments_keeps_mass_centre_and_kinetic_energy():
@@ -85,13 +84,13 @@ def test_the_merge_to_12_segments_keeps_mass_centre_and_kinetic_energy():
     q = body.neutral
     q[7:] = reference_angles(person)
     pose = poses(body, q)
-    fine = sum(placed(of_parameters(body.sip.of(s)), pose.rotation[0, i], pose.position[0, i]) for i, s in enumerate(SEGMENTS))
+    fine = sum(place_inertia(of_parameters(body.sip.of(s)), pose.rotation[0, i], pose.position[0, i]) for i, s in enumerate(TRUE_SEGMENTS))
     coarse = np.zeros((4, 4))
     for segment, (joint, _) in MERGED.items():
         index = body.joint_index(joint) if joint else -1
         turn = pose.joint_rotation[0, index] if joint else pose.root_rotation[0]
         place = pose.joint_position[0, index] if joint else pose.root_position[0]
-        coarse += placed(of_parameters(merged.of(segment)), turn, place)
+        coarse += place_inertia(of_parameters(merged.of(segment)), turn, place)
     np.testing.assert_allclose(coarse, fine, atol=1e-10)
 
 

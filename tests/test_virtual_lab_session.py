@@ -7,16 +7,15 @@ import numpy as np
 import pytest
 
 from biodance.errors import BiodanceError
-from biodance.lab.c3d import read_c3d
-from biodance.lab.session import read_session
+from biodance.lab.c3d.read import read_c3d
+from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.records import Subject
-from biodance.virtual_lab.flesh import of_parameters, placed
-from biodance.virtual_lab.laboratory import Laboratory, Visit, perform_in, record, set_up
+from biodance.virtual_lab.flesh import of_parameters, place_inertia
+from biodance.virtual_lab.laboratory import Laboratory, LabVisit, perform_in, record, set_up
 from biodance.virtual_lab.person import AddedLoad, make_person
-from biodance.virtual_lab.protocol import Protocol
-from biodance.virtual_lab.protocol_file import read_protocol
-from biodance.virtual_lab.simulate import simulate
+from biodance.virtual_lab.protocol import Protocol, read_protocol
+from biodance.virtual_lab.simulate import simulate_session
 from biodance.virtual_lab.skeleton import small_rotation
 from biodance.virtual_lab.tolerances import REALISTIC, instruments_perfect
 from biodance.virtual_lab.truth import sip_in_frames
@@ -33,7 +32,7 @@ def protocol():
 
 @pytest.fixture(scope="module")
 def session(tmp_path_factory, protocol):
-    return simulate(SUBJECT, protocol, tmp_path_factory.mktemp("lab") / "S07", seed=11)
+    return simulate_session(SUBJECT, protocol, tmp_path_factory.mktemp("lab") / "S07", seed=11)
 
 
 def test_a_simulated_session_is_read_like_a_real_one(session):
@@ -80,17 +79,17 @@ def test_the_truth_can_be_told_in_another_model_s_frames(session):
     other_place = place + 0.03 * rng.normal(size=(12, 3))
     other = sip_in_frames(truth, other_turn, other_place)
     for i in range(12):
-        one = placed(of_parameters(same.phi[10 * i : 10 * i + 10]), turn[i], place[i])
-        two = placed(of_parameters(other.phi[10 * i : 10 * i + 10]), other_turn[i], other_place[i])
+        one = place_inertia(of_parameters(same.phi[10 * i : 10 * i + 10]), turn[i], place[i])
+        two = place_inertia(of_parameters(other.phi[10 * i : 10 * i + 10]), other_turn[i], other_place[i])
         np.testing.assert_allclose(two, one, atol=1e-12)
 
 
 def test_the_same_seed_writes_the_same_bytes_and_another_day_does_not(tmp_path, protocol, session):
-    again = simulate(SUBJECT, protocol, tmp_path / "again", seed=11)
+    again = simulate_session(SUBJECT, protocol, tmp_path / "again", seed=11)
     for path in sorted(session.rglob("*.*")):
         if path.is_file():
             assert (again / path.relative_to(session)).read_bytes() == path.read_bytes(), path.name
-    other = simulate(SUBJECT, protocol, tmp_path / "other", seed=11, visit=Visit(1))
+    other = simulate_session(SUBJECT, protocol, tmp_path / "other", seed=11, visit=LabVisit(1))
     assert (other / "static.c3d").read_bytes() != (session / "static.c3d").read_bytes()
     one, two = (json.loads((s / "truth" / "truth.json").read_text()) for s in (session, other))
     assert one["segments_16"] == two["segments_16"]
@@ -99,9 +98,9 @@ def test_the_same_seed_writes_the_same_bytes_and_another_day_does_not(tmp_path, 
 
 @pytest.mark.parametrize("laboratory", [Laboratory(bits=32), Laboratory(bits=32, plate_type=4, heading=1.2), Laboratory(bits=32, plates=2)])
 def test_a_perfect_laboratory_gives_the_truth_back(tmp_path, protocol, laboratory):
-    out = simulate(SUBJECT, protocol, tmp_path / "S", seed=3, visit=Visit(0, laboratory, FAITHFUL))
+    out = simulate_session(SUBJECT, protocol, tmp_path / "S", seed=3, visit=LabVisit(0, laboratory, FAITHFUL))
     person = make_person(SUBJECT, 3, tolerances=FAITHFUL)
-    act = perform_in(set_up(person, Visit(0, laboratory, FAITHFUL)), person, protocol.trials[1])
+    act = perform_in(set_up(person, LabVisit(0, laboratory, FAITHFUL)), person, protocol.trials[1])
     trial = read_c3d(out / "squat_1.c3d")
     assert len(trial.plates) == laboratory.plates
     wanted = act.wrench(trial.plates[0].wrench.time).value
@@ -115,7 +114,7 @@ def test_a_perfect_laboratory_gives_the_truth_back(tmp_path, protocol, laborator
 def test_the_two_plates_carry_the_two_feet(tmp_path):
     short = read_protocol("short")
     one_leg = Protocol("one leg", "", (short.trials[0], short.trials[1]), short.postures)
-    out = simulate(SUBJECT, one_leg, tmp_path / "S", seed=3, visit=Visit(0, Laboratory(plates=2), FAITHFUL))
+    out = simulate_session(SUBJECT, one_leg, tmp_path / "S", seed=3, visit=LabVisit(0, Laboratory(plates=2), FAITHFUL))
     trial = read_c3d(out / "dance_1.c3d")
     right, left = sorted(trial.plates, key=lambda plate: plate.centre[1])
     time = trial.plates[0].wrench.time
@@ -135,7 +134,7 @@ def test_each_instrument_fault_is_where_it_was_put(protocol):
 
     def channels(**changed):
         tolerances = replace(FAITHFUL, **changed)
-        instruments = set_up(person, Visit(0, lab, tolerances))
+        instruments = set_up(person, LabVisit(0, lab, tolerances))
         act = perform_in(instruments, person, protocol.trials[1])
         return record(act, instruments).plates[0].channels, instruments
 
@@ -158,7 +157,7 @@ def test_each_instrument_fault_is_where_it_was_put(protocol):
 def test_markers_wander_on_the_skin_by_some_millimetres(protocol):
     person = make_person(SUBJECT, 3)
     wander = replace(REALISTIC, camera_noise=0.0, camera_wander=0.0, gaps_per_minute=0.0, lab_tilt=0.0)
-    instruments = set_up(person, Visit(tolerances=wander))
+    instruments = set_up(person, LabVisit(tolerances=wander))
     act = perform_in(instruments, person, protocol.trials[1])
     markers = record(act, instruments).markers
     pose = poses(person.body, act.motion(markers.time).q)
@@ -172,7 +171,7 @@ def test_markers_wander_on_the_skin_by_some_millimetres(protocol):
 
 def test_loads_weigh_on_the_plate_but_not_in_what_the_analyst_declares(tmp_path, protocol):
     load = AddedLoad("left_forearm", 2.4, np.array([0.0, -0.1, 0.0]))
-    out = simulate(SUBJECT, protocol, tmp_path / "loaded", seed=11, loads=(load,), visit=Visit(1))
+    out = simulate_session(SUBJECT, protocol, tmp_path / "loaded", seed=11, loads=(load,), visit=LabVisit(1))
     assert read_session(out).subject.mass == pytest.approx(58.0, abs=0.2)
     static = read_c3d(out / "static.c3d")
     assert static.wrench.force[:, 2].mean() / 9.80665 == pytest.approx(60.4, rel=0.01)
@@ -188,22 +187,22 @@ def test_a_fault_changes_the_raw_recording_before_it_is_written(tmp_path, protoc
         channels[:, 4] = 0.0
         return replace(recording, plates=(replace(plate, channels=channels),))
 
-    out = simulate(SUBJECT, protocol, tmp_path / "S", seed=11, visit=Visit(faults=(dead_channel,)))
-    from biodance.lab.raw_c3d import read_raw
+    out = simulate_session(SUBJECT, protocol, tmp_path / "S", seed=11, visit=LabVisit(faults=(dead_channel,)))
+    from biodance.lab.c3d.raw import read_raw
 
     assert not read_raw(out / "static.c3d").analog[:, 4].any()
 
 
 def test_what_cannot_be_simulated_is_refused_before_anything_is_written(tmp_path, protocol):
     with pytest.raises(BiodanceError, match=r"mass = 20 kg"):
-        simulate(Subject(20, 1.2, "F"), protocol, tmp_path / "S", seed=1)
+        simulate_session(Subject(20, 1.2, "F"), protocol, tmp_path / "S", seed=1)
     with pytest.raises(BiodanceError, match=r"stature = 175 m"):
-        simulate(Subject(60, 175, "F"), protocol, tmp_path / "S", seed=1)
+        simulate_session(Subject(60, 175, "F"), protocol, tmp_path / "S", seed=1)
     assert not (tmp_path / "S").exists()
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "notes.txt").write_text("mine")
     with pytest.raises(BiodanceError, match="not an empty folder"):
-        simulate(SUBJECT, protocol, tmp_path / "full", seed=1)
+        simulate_session(SUBJECT, protocol, tmp_path / "full", seed=1)
     with pytest.raises(BiodanceError, match="TYPE 3"):
         Laboratory(plate_type=3)
 
@@ -218,8 +217,8 @@ def test_the_generator_does_not_lean_on_what_it_is_to_test():
         "biodance.identify",
         "biodance.diagnose",
         "inverse_kinematics",
-        "biodance.body.tables",
-        "biodance.body.prior",
+        "biodance.body.tables.anthropometry",
+        "biodance.body.tables.prior",
     )
     for path in Path(room.__file__).parent.glob("*.py"):
         text = path.read_text()

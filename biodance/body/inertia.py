@@ -15,7 +15,7 @@ TENSOR = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
 
 
 @dataclass(frozen=True, eq=False)
-class Lump:
+class RigidInertia:
     """A rigid lump: ``mass`` kg, ``com`` (3,) m in some frame, ``inertia`` (3, 3) kg·m² about the CoM, axes of that frame."""
 
     mass: float
@@ -23,12 +23,12 @@ class Lump:
     inertia: Array
 
 
-def merge(*lumps: Lump) -> Lump:
+def combine_inertias(*lumps: RigidInertia) -> RigidInertia:
     """Return several lumps given in one frame as one rigid lump."""
     mass = sum(lump.mass for lump in lumps)
     com = sum((lump.mass * lump.com for lump in lumps), np.zeros(3)) / mass
     inertia = sum((lump.inertia + lump.mass * _steiner(lump.com - com) for lump in lumps), np.zeros((3, 3)))
-    return Lump(mass, com, inertia)
+    return RigidInertia(mass, com, inertia)
 
 
 def _steiner(arm: Array) -> Array:
@@ -36,19 +36,19 @@ def _steiner(arm: Array) -> Array:
     return float(arm @ arm) * np.eye(3) - np.outer(arm, arm)
 
 
-def parameters(lump: Lump) -> Array:
+def inertial_parameters(lump: RigidInertia) -> Array:
     """Return [m, mc, Ixx, Ixy, Iyy, Ixz, Iyz, Izz] (10,), inertia about the origin of the lump's frame."""
     about_origin = lump.inertia + lump.mass * _steiner(lump.com)
     return np.array([lump.mass, *(lump.mass * lump.com), *(about_origin[i, j] for i, j in TENSOR)])
 
 
-def lump_of(phi: Array) -> Lump:
+def rigid_inertia(phi: Array) -> RigidInertia:
     """Return the lump of ten parameters; the inverse of ``parameters`` for a positive mass."""
     com = phi[1:4] / phi[0]
     about_origin = np.zeros((3, 3))
     for value, (i, j) in zip(phi[4:], TENSOR, strict=True):
         about_origin[i, j] = about_origin[j, i] = value
-    return Lump(float(phi[0]), com, about_origin - phi[0] * _steiner(com))
+    return RigidInertia(float(phi[0]), com, about_origin - phi[0] * _steiner(com))
 
 
 def _pseudo_inertia_map() -> Array:
@@ -80,12 +80,12 @@ def smallest_eigenvalues(phi: Array) -> Array:
     return np.asarray(np.linalg.eigvalsh(pseudo_inertia(phi))[:, 0])
 
 
-def turned(lump: Lump, rotation: Array) -> Lump:
+def turn_inertia(lump: RigidInertia, rotation: Array) -> RigidInertia:
     """Return the lump in another frame with the same origin: ``rotation`` (3, 3) is new_R_old."""
-    return Lump(lump.mass, rotation @ lump.com, rotation @ lump.inertia @ rotation.T)
+    return RigidInertia(lump.mass, rotation @ lump.com, rotation @ lump.inertia @ rotation.T)
 
 
-def mirrored(lump: Lump) -> Lump:
+def mirror_inertia(lump: RigidInertia) -> RigidInertia:
     """Return the lump of the other body side: reflected at the plane z = 0."""
     flip = np.diag([1.0, 1.0, -1.0])
-    return Lump(lump.mass, flip @ lump.com, flip @ lump.inertia @ flip)
+    return RigidInertia(lump.mass, flip @ lump.com, flip @ lump.inertia @ flip)

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.inertia import Lump
+from biodance.body.inertia import RigidInertia
 from biodance.errors import BiodanceError, FileRefused
 from biodance.records import Array
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-Solids = Mapping[str, "Trimesh"]
+SegmentSolids = Mapping[str, "Trimesh"]
 """A closed mesh by the name of its segment."""
 MESHES = (".stl", ".obj", ".ply", ".off", ".glb", ".dae")
 """Mesh files that are read, by the ending of their name."""
@@ -149,7 +149,7 @@ def _mesh_files(body: Body, folder: Path) -> dict[str, Path]:
     return found
 
 
-def mesh_lump(mesh: "Trimesh", *, density: float) -> Lump:
+def mesh_lump(mesh: "Trimesh", *, density: float) -> RigidInertia:
     """Return mass, centre of mass and inertia of a closed mesh that is filled evenly with ``density`` kg/m³.
 
     Integrals over the enclosed volume by the divergence theorem, exact for the polyhedron (Eberly 2002, "Polyhedral mass properties").
@@ -169,4 +169,4 @@ def mesh_lump(mesh: "Trimesh", *, density: float) -> Lump:
     if volume < 1e-12:
         raise BiodanceError("The mesh encloses no volume. Give a solid.")
     outward = np.sign(mesh.volume)
-    return Lump(density * volume, np.array(mesh.center_mass), outward * density / mesh.density * np.array(mesh.moment_inertia))
+    return RigidInertia(density * volume, np.array(mesh.center_mass), outward * density / mesh.density * np.array(mesh.moment_inertia))

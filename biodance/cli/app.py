@@ -22,10 +22,10 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 
-Json = Annotated[bool, Parameter(name="--json", negative="", help="Print one JSON document on stdout and nothing else there.")]
-Force = Annotated[bool, Parameter(name="--force", negative="", help="Write into a folder that already holds files.")]
+JsonOption = Annotated[bool, Parameter(name="--json", negative="", help="Print one JSON document on stdout and nothing else there.")]
+ForceOption = Annotated[bool, Parameter(name="--force", negative="", help="Write into a folder that already holds files.")]
 Tables = Annotated[Path | None, Parameter(name="--tables", help="Folder for the same numbers as tables, CSV and Parquet.")]
-Out = Annotated[Path, Parameter(name="--out", help="Folder for the results; it is made if it is missing.")]
+OutOption = Annotated[Path, Parameter(name="--out", help="Folder for the results; it is made if it is missing.")]
 
 Set = Annotated[
     tuple[str, ...],
@@ -43,7 +43,7 @@ def say(sentence: str) -> None:
 
 def print_json(document: object) -> None:
     """Write one JSON document to stdout."""
-    from biodance.report.results_json import to_text
+    from biodance.report.documents.session import to_text
 
     sys.stdout.write(to_text(document))
 

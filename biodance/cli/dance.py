@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, STOPPED, Force, Json, Out, app, print_json, say
+from biodance.cli.app import DONE, NEEDS_A_PERSON, STOPPED, ForceOption, JsonOption, OutOption, app, print_json, say
 from biodance.errors import BiodanceError
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @app.command
-def dance(
+def dance_command(
     *,
     sex: Literal["F", "M"] | None = None,
     height: Annotated[float | None, Parameter(help="Stature, m.")] = None,
@@ -27,10 +27,10 @@ def dance(
     limits: Annotated[Path | None, Parameter(help="TOML file with what this person can and may do.")] = None,
     urdf: Annotated[Path | None, Parameter(help="URDF file of a robot that dances instead of a person.")] = None,
     feet: Annotated[str | None, Parameter(help="Links of the robot's right and left foot: RIGHT,LEFT.")] = None,
-    seed: Annotated[int, Parameter(help="The same seed gives the same dance.")] = 0,
-    out: Out,
-    json: Json = False,
-    force: Force = False,
+    seed: Annotated[int, Parameter(help="The same seed gives the same dance_command.")] = 0,
+    out: OutOption,
+    json: JsonOption = False,
+    force: ForceOption = False,
 ) -> int:
     """Design a dance for one person or robot: safe, balanced, and telling much about every segment.
 
@@ -40,8 +40,7 @@ def dance(
     """
     from biodance.dance.problem.person import HEALTHY, read_person
     from biodance.dance.problem.plan import read_plan
-    from biodance.pipeline.dance import UNFINISHED, dance_folder, dancer, make_dance
-    from biodance.pipeline.robot_dance import make_robot_dance, robot_dancer
+    from biodance.pipeline.dance import UNFINISHED, dance_folder, dancer, make_dance, make_robot_dance, robot_dancer
     from biodance.report.dance_write import print_dance, write_dance
 
     plan, person = read_plan(protocol), read_person(limits) if limits else HEALTHY

@@ -6,12 +6,12 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, Force, Json, MarkersFile, Out, Set, Tables, app, print_json, progress
-from biodance.cli.session import Reading, compared, ready, tabled
+from biodance.cli.app import DONE, NEEDS_A_PERSON, ForceOption, JsonOption, MarkersFile, OutOption, Set, Tables, app, print_json, progress
+from biodance.cli.session import Reading, examine_with_reference, ready, tabled
 
 
 @app.command
-def foresee(dance: Path, *, json: Json = False) -> int:
+def foresee_command(dance: Path, *, json: JsonOption = False) -> int:
     """Say before a recording what a designed dance will be able to see, from which size on, and which causes it will confuse.
 
     Parameters
@@ -22,7 +22,7 @@ def foresee(dance: Path, *, json: Json = False) -> int:
     from rich.console import Console
 
     from biodance.pipeline.diagnosis import foresee_dance
-    from biodance.report.diagnosis_json import foresight_document
+    from biodance.report.documents.diagnosis import foresight_document
     from biodance.report.terminal import print_foresight
 
     with progress() as tell:
@@ -36,18 +36,18 @@ def foresee(dance: Path, *, json: Json = False) -> int:
 
 
 @app.command
-def diagnose(
+def diagnose_command(
     session: Path,
     *,
-    out: Out,
+    out: OutOption,
     reference: Path | None = None,
     accept: Annotated[bool, Parameter(name="--accept", negative="", help="Also write the body with the findings accepted.")] = False,
     subject: str | None = None,
     chosen: Set = (),
     tables: Tables = None,
     markers: MarkersFile = None,
-    json: Json = False,
-    force: Force = False,
+    json: JsonOption = False,
+    force: ForceOption = False,
 ) -> int:
     """Say what the simulation of a session gets wrong: the cause, its size, how sure, what else it could be, and what naming it gains.
 
@@ -69,7 +69,7 @@ def diagnose(
     with progress() as tell:
         place = ready(tables, session, force=force)
         options = Reading(subject, markers, chosen)
-        result, before, folder = compared(session, reference, out, options, force=force, tell=tell)
+        result, before, folder = examine_with_reference(session, reference, out, options, force=force, tell=tell)
         found = front.diagnose(result, reference=before, tell=tell)
         tell("writing the page")
         tabled(result, place, found.diagnosis)

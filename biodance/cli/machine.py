@@ -1,20 +1,20 @@
 """Commands about this machine: doctor."""
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, Json, app, print_json, progress
+from biodance.cli.app import DONE, NEEDS_A_PERSON, JsonOption, app, print_json, progress
 
 
 @app.command
-def doctor(*, json: Json = False) -> int:
+def doctor_command(*, json: JsonOption = False) -> int:
     """Say what works on this machine, and how to mend what does not."""
     from dataclasses import asdict
 
     from rich.console import Console
 
-    from biodance.doctor import examine
+    from biodance.doctor import examine_machine
     from biodance.report.terminal import print_findings
 
     with progress() as tell:
-        findings = examine(tell=tell)
+        findings = examine_machine(tell=tell)
     if json:
         print_json([asdict(finding) for finding in findings])
     else:

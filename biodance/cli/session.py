@@ -12,10 +12,10 @@ from biodance.cli.app import (
     NEEDS_A_PERSON,
     NOT_DONE,
     STOPPED,
-    Force,
-    Json,
+    ForceOption,
+    JsonOption,
     MarkersFile,
-    Out,
+    OutOption,
     Set,
     Tables,
     app,
@@ -27,7 +27,7 @@ from biodance.cli.app import (
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from biodance.diagnose.diagnosis import Diagnosis
+    from biodance.diagnosis.diagnosis import Diagnosis
     from biodance.pipeline.identification import SessionIdentification
     from biodance.pipeline.results import SessionResult
     from biodance.records import Session
@@ -43,13 +43,13 @@ class Reading:
 
     def read(self, folder: Path, tell: "Callable[[str], None]") -> "Session":
         """Return the session in ``folder``."""
-        from biodance.lab.session import read_session
+        from biodance.lab.session.read import read_session
         from biodance.settings import assignments
 
         return read_session(folder, subject_name=self.subject, markers=self.markers, settings=assignments(self.chosen), tell=tell)
 
 
-def reported(
+def report_session(
     recording: "Session", folder: Path, tell: "Callable[[str], None]", *, tables: Path | None = None
 ) -> "tuple[SessionResult, dict[str, Any]]":
     """Examine a session and report it into ``folder``, as tables into ``tables``; return the result and the content of results.json."""
@@ -80,7 +80,7 @@ def ready(tables: Path | None, session: Path, *, force: bool) -> Path | None:
     return None if tables is None else tables_folder(tables, session, force=force)
 
 
-def told(result: "SessionResult", folder: Path, found: "dict[str, Any]", json: bool) -> int:
+def print_reported(result: "SessionResult", folder: Path, found: "dict[str, Any]", json: bool) -> int:
     """Print what was reported and return the exit code."""
     from rich.console import Console
 
@@ -97,7 +97,7 @@ def told(result: "SessionResult", folder: Path, found: "dict[str, Any]", json: b
     return NEEDS_A_PERSON if result.needs_a_person else DONE
 
 
-def compared(
+def examine_with_reference(
     session: Path,
     reference: Path | None,
     out: Path,
@@ -110,7 +110,7 @@ def compared(
 
     What cannot be read or written is said before the long work starts.
     """
-    from biodance.lab.results_folder import results_folder
+    from biodance.lab.session.results_folder import results_folder
     from biodance.pipeline.front import identify
     from biodance.pipeline.session import examine
 
@@ -136,7 +136,7 @@ def _told_identified(result: "SessionResult", folder: Path, found: "dict[str, An
 
 
 @app.command
-def inspect(*paths: Path, markers: MarkersFile = None, json: Json = False) -> int:
+def inspect_command(*paths: Path, markers: MarkersFile = None, json: JsonOption = False) -> int:
     """Say what is in recordings: markers, gaps, plates, the weight on them, and every decision the readers take.
 
     Parameters
@@ -160,16 +160,16 @@ def inspect(*paths: Path, markers: MarkersFile = None, json: Json = False) -> in
 
 
 @app.command
-def report(
+def report_command(
     session: Path,
     *,
-    out: Out,
+    out: OutOption,
     subject: str | None = None,
     markers: MarkersFile = None,
     chosen: Set = (),
     tables: Tables = None,
-    json: Json = False,
-    force: Force = False,
+    json: JsonOption = False,
+    force: ForceOption = False,
 ) -> int:
     """Take a session through all stages and write report.html and results.json.
 
@@ -180,27 +180,27 @@ def report(
     subject
         The person to report where C3D files hold several; without it a file with several persons is refused and names them.
     """
-    from biodance.lab.results_folder import results_folder
+    from biodance.lab.session.results_folder import results_folder
 
     with progress() as tell:
         recording = Reading(subject, markers, chosen).read(session, tell)
         folder, place = results_folder(out, session, force=force), ready(tables, session, force=force)
-        result, found = reported(recording, folder, tell, tables=place)
-    return told(result, folder, found, json)
+        result, found = report_session(recording, folder, tell, tables=place)
+    return print_reported(result, folder, found, json)
 
 
 @app.command
-def identify(
+def identify_command(
     session: Path,
     *,
-    out: Out,
+    out: OutOption,
     reference: Path | None = None,
     subject: str | None = None,
     chosen: Set = (),
     tables: Tables = None,
     markers: MarkersFile = None,
-    json: Json = False,
-    force: Force = False,
+    json: JsonOption = False,
+    force: ForceOption = False,
 ) -> int:
     """Identify what every segment weighs, with intervals, validate it on the trials kept, and look for an added mass.
 
@@ -219,7 +219,7 @@ def identify(
     with progress() as tell:
         place = ready(tables, session, force=force)
         options = Reading(subject, markers, chosen)
-        result, _, folder = compared(session, reference, out, options, force=force, tell=tell)
+        result, _, folder = examine_with_reference(session, reference, out, options, force=force, tell=tell)
         found = front.identify(result)
         tell("writing the page")
         tabled(result, place)
@@ -228,7 +228,7 @@ def identify(
 
 
 @app.command
-def settings(session: Path | None = None, *, chosen: Set = (), json: Json = False) -> int:
+def settings(session: Path | None = None, *, chosen: Set = (), json: JsonOption = False) -> int:
     """Print everything an analyst may choose: value, unit, meaning and legal range, as it may stand in session.toml.
 
     Parameters
@@ -236,7 +236,7 @@ def settings(session: Path | None = None, *, chosen: Set = (), json: Json = Fals
     session
         A session folder, whose session.toml is then followed.
     """
-    from biodance.lab.session_file import read_session_file
+    from biodance.lab.session.file import read_session_file
     from biodance.settings import USUAL, assignments
 
     found = (read_session_file(session).settings if session else USUAL).changed(assignments(chosen))
@@ -248,13 +248,13 @@ def settings(session: Path | None = None, *, chosen: Set = (), json: Json = Fals
 
 
 @app.command
-def export(
+def export_command(
     source: Path,
     *,
     format: Annotated[str, Parameter(help="osim, urdf, mjcf, biomod, glb, csv; or trc, mot, c3d of one trial.")],
     out: Annotated[Path, Parameter(help="The file to write.")],
     trial: Annotated[str | None, Parameter(help="Name of the trial for trc, mot and c3d.")] = None,
-    subject: Annotated[str | None, Parameter(help="The person to export where C3D files hold several.")] = None,
+    subject: Annotated[str | None, Parameter(help="The person to export_command where C3D files hold several.")] = None,
     meshes: Annotated[Path | None, Parameter(help="Folder with a closed mesh a segment (right_thigh.stl, m) for glb and osim.")] = None,
     markers: MarkersFile = None,
     force: Annotated[bool, Parameter(name="--force", negative="", help="Replace the file if it exists.")] = False,

@@ -6,12 +6,12 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, Force, Out, app, progress
-from biodance.cli.session import reported, told
+from biodance.cli.app import DONE, ForceOption, OutOption, app, progress
+from biodance.cli.session import print_reported, report_session
 
 
 @app.command
-def simulate(
+def simulate_command(
     *,
     protocol: str,
     sex: Literal["F", "M"],
@@ -20,8 +20,8 @@ def simulate(
     age: Annotated[float, Parameter(help="Age, years.")] = float("nan"),
     seed: Annotated[int, Parameter(help="The same seed gives the same person and the same files.")],
     effect: Annotated[tuple[str, ...], Parameter(negative=(), help="Hide a cause: plate_gain:target=Fz,gain=0.04; may be repeated.")] = (),
-    out: Out,
-    force: Force = False,
+    out: OutOption,
+    force: ForceOption = False,
 ) -> int:
     """Write a simulated session: C3D files and session.toml as a lab would, and the truth apart in truth/truth.json.
 
@@ -30,25 +30,25 @@ def simulate(
     protocol
         Name of a protocol: dance, short, squat, standing ...; a wrong name lists all.
     """
-    from biodance.pipeline import front
+    from biodance.pipeline import front_dance
     from biodance.records import Subject
 
     if force:
         _forget_simulated(out)
     with progress() as tell:
         tell(f"simulating {protocol}")
-        folder = front.simulate(Subject(mass, height, sex, age), protocol, out, seed=seed, effects=effect)
+        folder = front_dance.simulate(Subject(mass, height, sex, age), protocol, out, seed=seed, effects=effect)
     sys.stdout.write(f"{folder}\n")
     return DONE
 
 
 @app.command
-def demo(*, out: Out = Path("demo"), force: Force = False) -> int:
+def demo_command(*, out: OutOption = Path("demo"), force: ForceOption = False) -> int:
     """Simulate a short session of a person whose truth is known, and report it like a real one."""
-    from biodance.lab.results_folder import results_folder
-    from biodance.lab.session import read_session
+    from biodance.lab.session.read import read_session
+    from biodance.lab.session.results_folder import results_folder
     from biodance.records import Subject
-    from biodance.virtual_lab.simulate import simulate as write_session
+    from biodance.virtual_lab.simulate import simulate_session as write_session
 
     if force:
         _forget_simulated(out / "simulated_session")
@@ -56,8 +56,8 @@ def demo(*, out: Out = Path("demo"), force: Force = False) -> int:
         tell("simulating a session")
         session = write_session(Subject(62.0, 1.70, "F", 31.0), "short", out / "simulated_session", seed=1)
         folder = results_folder(out / "report", session, force=force)
-        result, found = reported(read_session(session, tell=tell), folder, tell)
-    return told(result, folder, found, False)
+        result, found = report_session(read_session(session, tell=tell), folder, tell)
+    return print_reported(result, folder, found, False)
 
 
 def _forget_simulated(folder: Path) -> None:

@@ -14,11 +14,11 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
-from biodance.identify.information import Information
-from biodance.identify.knowledge import segment_quantities
-from biodance.identify.mismatch import Mismatch, Sizes, mismatch, temper
-from biodance.identify.posterior import Posterior, posterior
-from biodance.identify.statistics import Fit, statistics
+from biodance.identification.information import Information
+from biodance.identification.knowledge import segment_quantities
+from biodance.identification.mismatch import Mismatch, Sizes, mismatch, temper
+from biodance.identification.posterior import Posterior, posterior
+from biodance.identification.statistics import Fit, statistics
 from biodance.library import locate, read_toml
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion

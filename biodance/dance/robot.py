@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.similar import Likeness, likeness
+from biodance.body.robot.similar import Likeness, likeness
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.expectation import Expectation
@@ -23,9 +23,9 @@ from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance
 from biodance.dance.verify import Margin, verify
 from biodance.errors import BiodanceError
-from biodance.identify.information import Information, fold
-from biodance.identify.knowledge import segment_quantities
-from biodance.identify.posterior import Posterior, posterior
+from biodance.identification.information import Information, fold
+from biodance.identification.knowledge import segment_quantities
+from biodance.identification.posterior import Posterior, posterior
 from biodance.motion.regressor import regressor
 from biodance.records import Array, Motion
 

@@ -7,8 +7,7 @@ Look-alikes: a rotation of the plate by 90 or 180 degrees, which is the same thi
 import numpy as np
 
 from biodance.effects._base.case import Case, at_point
-from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded
-from biodance.effects._base.reader_words import overruled
+from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded, overruled
 from biodance.records import CHANNELS, Array
 
 ALONE = 0.95
@@ -45,7 +44,7 @@ class AxisError(DiscreteEffect):
         if not pairs:
             return ()
         measured, needed = (np.concatenate([pair[k] for pair in pairs]) for k in range(2))
-        wrong = mirrored(measured, needed)
+        wrong = sign_turned(measured, needed)
         if not wrong:
             return (Gate("signs of the channels", True, f"No channel of {plate} mirrors what the motion needs."),)
         prefix = "" if len(cases[0].trial.plates) == 1 else f"{plate}:"
@@ -79,7 +78,7 @@ def on_one_plate(case: Case, name: str) -> tuple[Array, Array] | None:
     return rest[:, :6], rest[:, 6:]
 
 
-def mirrored(measured: Array, needed: Array) -> tuple[str, ...]:
+def sign_turned(measured: Array, needed: Array) -> tuple[str, ...]:
     """Return the channels of ``measured`` (n, 6) that agree with ``needed`` (n, 6) only once their sign is turned."""
     as_is, turned = np.sum((measured - needed) ** 2, axis=0), np.sum((measured + needed) ** 2, axis=0)
     wrong = (needed.std(axis=0) > MOVING) & (turned < MIRRORED * as_is)

@@ -12,9 +12,9 @@ from scipy.fft import dct
 from biodance.effects._base.case import Case
 from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded
 from biodance.effects.clipping import clipped
-from biodance.identify.posterior import prior_factor
+from biodance.identification.posterior import prior_factor
 from biodance.lab.filters import LowPass, low_pass
-from biodance.motion.marker_jacobian import skew
+from biodance.motion.kinematics import skew
 from biodance.motion.regressor import predict_wrench, regressor
 from biodance.records import Array, Motion
 from biodance.uncertainty.caution import widened

@@ -9,7 +9,7 @@ alone, and by asking the person to look at one point.
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.branch import Cut, branch_off
+from biodance.body.changes import Cut, branch_off
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Parameter
 from biodance.effects._base.missing_joint import MissingJoint, share_of_body, shoulders

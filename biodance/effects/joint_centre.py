@@ -8,7 +8,7 @@ there. Separated by turning this joint through its whole range about all its axe
 
 from dataclasses import replace
 
-from biodance.body.moved import recentre_joint
+from biodance.body.changes import recentre_joint
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.effects._base.geometry import joint_chains

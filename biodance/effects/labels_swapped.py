@@ -10,7 +10,7 @@ from biodance.body.body import Body
 from biodance.effects._base.case import Case
 from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded
 from biodance.errors import BiodanceError
-from biodance.motion.inverse_kinematics import solve_ik
+from biodance.motion.ik.inverse_kinematics import solve_ik
 from biodance.records import Array, Markers, Trial
 
 FAR = 0.04

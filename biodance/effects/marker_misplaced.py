@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from biodance.body.moved import move_marker
+from biodance.body.changes import move_marker
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.motion.track import track

@@ -8,7 +8,7 @@ Separated by the centre of pressure against the foot markers, by Fz dynamics, an
 import numpy as np
 
 from biodance.effects._base.case import Case
-from biodance.effects._base.effect import Effect, Parameter, axis_vector, plate_axes
+from biodance.effects._base.effect import Effect, Parameter, axis_vector, plate_axis_targets
 from biodance.records import Array
 
 
@@ -23,7 +23,7 @@ class PlatePosition(Effect):
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:
         """Return every axis of every plate."""
-        return plate_axes(case)
+        return plate_axis_targets(case)
 
     def columns(self, case: Case) -> Array:
         """Return the moment of the predicted force over a shift of one metre."""

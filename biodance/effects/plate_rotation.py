@@ -8,7 +8,7 @@ the plate's corners measured with markers.
 import numpy as np
 
 from biodance.effects._base.case import Case, at_origin
-from biodance.effects._base.effect import Effect, Parameter, axis_vector, plate_axes
+from biodance.effects._base.effect import Effect, Parameter, axis_vector, plate_axis_targets
 from biodance.motion.kinematics import axis_rotation
 from biodance.records import Array
 
@@ -26,7 +26,7 @@ class PlateRotation(Effect):
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:
         """Return every axis of every plate."""
-        return plate_axes(case)
+        return plate_axis_targets(case)
 
     def transform(self, case: Case, theta: Array) -> Case:
         """Return the case whose plate wrench is turned by ``theta``: exact for any angle."""

@@ -8,7 +8,7 @@ alone, with hanging arms.
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.branch import Cut, branch_off
+from biodance.body.changes import Cut, branch_off
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Parameter
 from biodance.effects._base.missing_joint import MissingJoint, doubting, shoulders

@@ -7,8 +7,7 @@ Separated by the scale's weight and by the size of the person and the plates.
 
 import numpy as np
 
-from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded
-from biodance.effects._base.reader_words import overruled
+from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded, overruled
 from biodance.records import Trial
 from biodance.settings import STANDARD_GRAVITY
 

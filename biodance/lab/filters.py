@@ -53,7 +53,7 @@ def force_filter(settings: Settings) -> LowPass:
     return same if chosen == "same" else replace(same, cutoff=float(chosen))
 
 
-def design(settings: LowPass, rate: float) -> Array:
+def design_low_pass(settings: LowPass, rate: float) -> Array:
     """Return the second-order sections (S, 6) of one of the two passes at the sampling ``rate`` in Hz.
 
     Raises
@@ -86,7 +86,7 @@ def low_pass(values: Array, rate: float, settings: LowPass) -> Array:
     BiodanceError
         The rate or the cut-off is not legal, or the whole signal is shorter than the shortest run.
     """
-    sections = design(settings, rate)
+    sections = design_low_pass(settings, rate)
     values = np.asarray(values, dtype=float)
     need = settings.shortest(rate)
     if values.shape[0] < need:

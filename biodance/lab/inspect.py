@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from biodance.errors import BiodanceError
-from biodance.lab.gaps import report_gaps
-from biodance.lab.marker_sets import MarkerSet, canonical, read_marker_set
+from biodance.lab.markers.gaps import report_gaps
+from biodance.lab.markers.sets import MarkerSet, canonical, read_marker_set
 from biodance.lab.read import format_of, read_trial
-from biodance.lab.recordings import recordings_below
-from biodance.lab.subject import declared_mass, declared_stature
+from biodance.lab.session.recordings import recordings_below
+from biodance.lab.session.subject import declared_mass, declared_stature
 from biodance.lab.weight import standing_mass
 from biodance.records import Markers, Plate, Trial
 from biodance.settings import COP_FORCE
@@ -113,8 +113,8 @@ def _subjects(path: Path) -> list[str]:
     """Return the names of the people in a C3D file; none for the other formats, which hold none."""
     if format_of(path) != ".c3d":
         return []
-    from biodance.lab.labels import subjects_of
-    from biodance.lab.raw_c3d import read_raw
+    from biodance.lab.c3d.points import subjects_of
+    from biodance.lab.c3d.raw import read_raw
 
     return list(subjects_of(read_raw(path)))
 

@@ -71,7 +71,7 @@ def cells(line: str) -> list[str]:
     return [cell.strip() for cell in line.rstrip("\r\n").split("\t")] if "\t" in line else line.split()
 
 
-def number(cell: str, where: str) -> float:
+def parse_number(cell: str, where: str) -> float:
     """Return the number in a cell; an empty cell is NaN. FileRefused says ``where`` if it is no number."""
     if not cell:
         return math.nan

@@ -10,8 +10,8 @@ import numpy as np
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab import filters
 from biodance.lab.filters import LowPass, force_filter
-from biodance.lab.gaps import Gap, fill_gaps, report_gaps
-from biodance.lab.marker_sets import canonical, read_marker_set
+from biodance.lab.markers.gaps import Gap, fill_gaps, report_gaps
+from biodance.lab.markers.sets import canonical, read_marker_set
 from biodance.records import Array, Markers, Plate, Trial, Wrench
 from biodance.settings import GapSettings
 
@@ -38,7 +38,7 @@ def prepare(trial: Trial) -> Trial:
     try:
         if markers is not None:
             if markers.time.size > 1:
-                filters.design(low_pass, markers.rate)
+                filters.design_low_pass(low_pass, markers.rate)
             markers, said = _common_time(markers, trial)
             history += said
             markers, said, warned = _fill(markers, trial.marker_set, trial.settings.gaps)

@@ -12,7 +12,7 @@ from types import MappingProxyType
 from xml.etree import ElementTree
 
 from biodance.errors import FileRefused
-from biodance.lab.plain_text import decode, number, read_bytes, read_text
+from biodance.lab.plain_text import decode, parse_number, read_bytes, read_text
 
 MILLIMETRE = 1e-3
 MASSES = ("bodymass",)
@@ -35,7 +35,7 @@ def read_mp(path: str | Path) -> dict[str, float]:
     rows = re.findall(r"^\s*\$(\w+)\s*=\s*([-+]?[\d.,]+(?:[eE][-+]?\d+)?)\s*$", read_text(path), flags=re.MULTILINE)
     if not rows:
         raise FileRefused(f"{path}: holds no row such as '$Bodymass = 66.2'. Save the subject's measurements again in Nexus.")
-    return _in_si({name: number(value.replace(",", "."), f"{path}, {name}") for name, value in rows})
+    return _in_si({name: parse_number(value.replace(",", "."), f"{path}, {name}") for name, value in rows})
 
 
 def read_vsk(path: str | Path) -> dict[str, float]:
@@ -63,7 +63,7 @@ def read_vsk(path: str | Path) -> dict[str, float]:
         name, value = parameter.get("NAME", ""), parameter.get("VALUE", "")
         computed = parameter.get("READONLY", "").lower() in ("1", "true")
         if name and value and not computed and parameter.get("QUANTITY", "length") in ("length", "mass"):
-            typed[name] = number(value, f"{path}, {name}")
+            typed[name] = parse_number(value, f"{path}, {name}")
     return _in_si(typed)
 
 

@@ -12,8 +12,7 @@ from scipy.interpolate import make_interp_spline
 from biodance.body.body import Body
 from biodance.errors import TrialRefused
 from biodance.lab.filters import LowPass, low_pass
-from biodance.motion.ball import Balls
-from biodance.motion.chart import Smooth, chart_of
+from biodance.motion.ik.chart import Balls, Smooth, chart_of
 from biodance.motion.quaternion import conjugate, continuous, matrix, normalised, product
 from biodance.records import Array, Motion
 

@@ -7,7 +7,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.errors import TrialRefused
 from biodance.lab.filters import motion_filter
-from biodance.motion.inverse_kinematics import FrameStatus, InverseKinematics, solve_ik
+from biodance.motion.ik.inverse_kinematics import FrameStatus, InverseKinematics, solve_ik
 from biodance.motion.smoothing import smooth
 from biodance.records import Motion, Trial
 

@@ -5,14 +5,13 @@ about is said.
 from functools import partial
 
 from biodance.body.body import Body
-from biodance.body.human import human
-from biodance.body.scaling import Scaling, measure
-from biodance.body.tracking_limits import tracked
+from biodance.body.human.human import human
+from biodance.body.human.limits import with_tracking_limits
+from biodance.body.human.scaling import Scaling, measure_static
 from biodance.errors import TrialRefused
-from biodance.motion.functional_joints import functional_joints
+from biodance.motion.ik.functional_joints import functional_joints
 from biodance.pipeline.results import Step
-from biodance.pipeline.steps import attempt
-from biodance.pipeline.trial import Prepared
+from biodance.pipeline.trial import Prepared, attempt
 from biodance.records import Subject
 from biodance.settings import Settings
 
@@ -27,7 +26,7 @@ def body_of(subject: Subject, read: tuple[Prepared, ...], settings: Settings, st
         return None, "No body: the subject's mass or stature is not known."
     statics = [one.trial for one in read if one.trial.role == "static" and one.usable]
     for static in statics:
-        scaling = attempt(steps, "scale", partial(measure, subject, static))
+        scaling = attempt(steps, "scale", partial(measure_static, subject, static))
         if scaling is not None:
             functional = settings.joints == "functional"
             placed = attempt(steps, "joints", partial(placed_by_movement, scaling, read)) if functional else None
@@ -41,7 +40,7 @@ def body_of(subject: Subject, read: tuple[Prepared, ...], settings: Settings, st
     if not sets:
         return None, "No body: no trial has markers of a known set."
     generic = partial(human, subject, table=settings.table, markers=sets[0], gravity=settings.gravity)
-    body = attempt(steps, "body from stature", lambda: tracked(generic()))
+    body = attempt(steps, "body from stature", lambda: with_tracking_limits(generic()))
     return body, f"From stature alone, with the usual places of the markers; masses and inertias from the table {settings.table}."
 
 

@@ -5,7 +5,7 @@ The limits, and where they come from, are `biodance.settings.CheckLimits`.
 
 import numpy as np
 
-from biodance.pipeline.results import Check, Standing, TrialResult
+from biodance.pipeline.results import Check, QuietStanding, TrialResult
 from biodance.records import Subject
 from biodance.settings import CheckLimits
 
@@ -14,7 +14,7 @@ def _upper(what: str, where: str, value: float, limit: float, unit: str, advice:
     return Check(what, where, f"{value:.1f} {unit}", f"at most {limit:g} {unit}", bool(value <= limit), advice)
 
 
-def mass_check(subject: Subject, standing: Standing | None, limits: CheckLimits) -> list[Check]:
+def mass_check(subject: Subject, standing: QuietStanding | None, limits: CheckLimits) -> list[Check]:
     """Compare the mass on the plates with the declared mass, where both are known."""
     if standing is None or not np.isfinite(subject.mass) or "mass" in subject.guessed:
         return []
@@ -26,7 +26,7 @@ def mass_check(subject: Subject, standing: Standing | None, limits: CheckLimits)
     ]
 
 
-def standing_check(standing: Standing | None, limits: CheckLimits) -> list[Check]:
+def standing_check(standing: QuietStanding | None, limits: CheckLimits) -> list[Check]:
     """Compare the mean centre of mass with the mean centre of pressure in quiet standing."""
     if standing is None or not standing.com.size:
         return []

@@ -1,4 +1,4 @@
-"""A dance for one person, from what is known of the person to the numbers of the finished dance, all steps in order."""
+"""A dance for one person or robot, from what is known of it to the numbers of the finished dance, all steps in order."""
 
 import time
 from collections.abc import Callable, Iterable
@@ -10,8 +10,10 @@ import numpy as np
 
 from biodance import display
 from biodance.body.body import Body
-from biodance.body.human import human
-from biodance.body.limits import joint_limits
+from biodance.body.human.human import human
+from biodance.body.human.limits import joint_limits
+from biodance.body.robot.standing_frames import standing_frames
+from biodance.body.robot.urdf import read_urdf
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.expectation import Expectation, expect
@@ -19,6 +21,8 @@ from biodance.dance.limits import Limit
 from biodance.dance.metrics import DanceMetrics, dance_metrics
 from biodance.dance.problem.person import PersonLimits, fit_to_person
 from biodance.dance.problem.plan import Plan
+from biodance.dance.problem.shapes import unchecked_pairs
+from biodance.dance.robot import design_robot, expect_robot, robot_plan
 from biodance.dance.verify import Margin, broken
 from biodance.errors import BiodanceError
 from biodance.records import Subject
@@ -29,7 +33,7 @@ UNFINISHED = "unfinished"
 """Folder with what is finished of a dance whose design was stopped."""
 OURS = (
     *("results.json", "dance.npz", "dance.c3d", "dance.csv", "cues.md", "margins.md"),
-    *("postures.png", "criterion.png", "zmp.png", "expectation.png"),
+    *("postures.png", "postures_3d.png", "criterion.png", "zmp.png", "expectation.png"),
 )
 """Files that a dance consists of."""
 
@@ -187,3 +191,45 @@ def dance_folder(out: Path, *, force: bool = False) -> Path:
     for name in found:
         (out / name).unlink()
     return out
+
+
+ROBOTS = Makers(design_robot, expect_robot)
+
+
+def robot_dancer(path: Path, feet: str) -> Body:
+    """Return the robot of a URDF file, in standing frames; ``feet`` the links of its right and left foot, "right,left".
+
+    Raises
+    ------
+    BiodanceError
+        Not two feet are named, or the file cannot be used (`urdf.read_urdf`, `standing_frames`).
+    """
+    names = [name.strip() for name in feet.split(",")]
+    if len(names) != 2 or names[0] == names[1] or not all(names):
+        raise BiodanceError(f"--feet {feet}: expected the links of the right and the left foot, separated by a comma.")
+    return standing_frames(read_urdf(path, feet=(names[0], names[1])))
+
+
+def make_robot_dance(
+    body: Body,
+    plan: Plan,
+    person: PersonLimits,
+    *,
+    limits: Iterable[Limit | type[Limit]] = (),
+    seed: int = 0,
+    tell: Tell = lambda *_: None,
+    resume: Path | None = None,
+) -> DanceResult:
+    """Design, check and count a dance for a robot (`robot_dancer`), with the limits of ``person`` beyond those of its file.
+
+    See `dance.make_dance`.
+
+    Raises
+    ------
+    BiodanceError
+        The protocol is not one for robots.
+    """
+    found = make_dance(body, robot_plan(body, plan), person, limits=limits, seed=seed, tell=tell, resume=resume, makers=ROBOTS)
+    coarse = unchecked_pairs(body)
+    words = (f"Not kept apart, since their boxes overlap at zero angles: {', '.join(coarse)}.",) if coarse else ()
+    return replace(found, notes=(*body.notes, *words, *found.notes))

@@ -12,11 +12,10 @@ from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion, Subject
 from biodance.virtual_lab.choreography import septic
 from biodance.virtual_lab.dancing import USUAL, Performer, Shown, copy_dance
-from biodance.virtual_lab.laboratory import FIRST_VISIT, Visit, declared_mass, perform_in, record, set_up, write
+from biodance.virtual_lab.laboratory import FIRST_VISIT, LabVisit, perform_in, record, scale_reading, set_up, write
 from biodance.virtual_lab.performance import Performance
 from biodance.virtual_lab.person import make_person
-from biodance.virtual_lab.protocol import Protocol
-from biodance.virtual_lab.protocol_file import read_protocol
+from biodance.virtual_lab.protocol import Protocol, read_protocol
 from biodance.virtual_lab.simulate import TRUTH, session_toml
 from biodance.virtual_lab.truth import truth
 
@@ -76,7 +75,7 @@ def simulate_dance(
     *,
     seed: int,
     performer: Performer = USUAL,
-    visit: Visit = FIRST_VISIT,
+    visit: LabVisit = FIRST_VISIT,
 ) -> Path:
     """Write the session of a virtual person who dances ``dance``: static, the dance in stretches, two trials of squats for validation.
 
@@ -110,7 +109,7 @@ def simulate_dance(
     for performance in done:
         write(record(performance, instruments), out)
     plan = Protocol(dance.protocol, "a designed dance", tuple(performance.plan for performance in done))
-    (out / "session.toml").write_text(session_toml(person, plan, declared_mass(person, visit.number, visit.tolerances)))
+    (out / "session.toml").write_text(session_toml(person, plan, scale_reading(person, visit.number, visit.tolerances)))
     (out / TRUTH).mkdir()
     (out / TRUTH / "truth.json").write_text(json.dumps(truth(person, dance.protocol, instruments, done), indent=1) + "\n")
     return out

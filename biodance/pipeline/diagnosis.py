@@ -9,17 +9,17 @@ import numpy as np
 
 from biodance import display
 from biodance.body.body import Body
-from biodance.diagnose.accept import Judged, accept, fit_of, gain_by_naming, judged
-from biodance.diagnose.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
-from biodance.diagnose.engine import Examined, diagnose
-from biodance.diagnose.foresight import Foresight, foresee, session_of
-from biodance.diagnose.problem import Look
+from biodance.diagnosis.accept import Residuals, accept, case_fit, gain_by_naming, residuals_of
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
+from biodance.diagnosis.engine import Examined, diagnose_trials
+from biodance.diagnosis.foresight import Foresight, foresee, session_of
+from biodance.diagnosis.problem import Look
 from biodance.discovery import Chosen
 from biodance.effects import Case, DiscreteEffect, Effect, Gate, causes, gates
 from biodance.errors import BiodanceError, NotSolved, SessionRefused, TrialRefused
-from biodance.identify.added_mass import expected
-from biodance.identify.identification import Identification, identify, standing_point
-from biodance.pipeline.identification import FITTED, KEPT, SessionIdentification
+from biodance.identification.added_mass import expect_unloaded
+from biodance.identification.identification import Identification, identify_body, standing_point
+from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES, SessionIdentification
 from biodance.pipeline.looked_at import Own, left_out, looked_at, looks, own_tolerances
 from biodance.pipeline.results import SessionResult
 from biodance.records import Role, Sip
@@ -59,7 +59,7 @@ class SessionDiagnosis:
     examined: Examined | None = None
     before: Identification | None = None
     accepted: Identification | None = None
-    left: tuple[Judged, Judged] | None = None
+    left: tuple[Residuals, Residuals] | None = None
     failures: Mapping[str, str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
@@ -115,7 +115,7 @@ def diagnose_session(
     fitted = looked_at(result.trials)
     tell("checking units, signs, labels and clocks")
     asked = causes(effects)
-    checks = gates(result.session, _cases(result.body, (*fitted, *looks(result.trials, KEPT))), chosen=asked)
+    checks = gates(result.session, _cases(result.body, (*fitted, *looks(result.trials, KEPT_ROLES))), chosen=asked)
     failed = tuple(gate for gate in checks if not gate.ok)
     if result.body is None or not fitted:
         if failed:
@@ -124,7 +124,7 @@ def diagnose_session(
     tell("looking for causes")
     own = Own(tolerances) if tolerances else own_tolerances(result.body, fitted)
     try:
-        examined = diagnose(
+        examined = diagnose_trials(
             result.body,
             fitted,
             gates=checks,
@@ -196,7 +196,7 @@ def _prior(reference: SessionIdentification | None, result: SessionResult) -> Si
     """Return what an earlier session lets expect of the body; None without one, or where nothing was identified from it."""
     if reference is None or result.identification is None or reference.identification.status == "failed":
         return None
-    return expected(reference.identification, result.identification.identification)
+    return expect_unloaded(reference.identification, result.identification.identification)
 
 
 def _untold(reference: SessionIdentification | None) -> tuple[str, ...]:
@@ -240,7 +240,7 @@ def _finding(gate: Gate) -> Finding:
 
 
 def _reasons(result: SessionResult) -> str:
-    return " ".join(dict.fromkeys(reason for trial in result.trials if trial.trial.role in FITTED for reason in trial.reasons))
+    return " ".join(dict.fromkeys(reason for trial in result.trials if trial.trial.role in FITTED_ROLES for reason in trial.reasons))
 
 
 def _with_gains(result: SessionResult, examined: Examined) -> SessionDiagnosis:
@@ -260,18 +260,18 @@ def _accepted(result: SessionResult, examined: Examined, before: Identification)
     """Return the diagnosis with gains: identified again from the corrected trials, judged on the kept ones."""
     assert result.body is not None
     named, phi = examined.named, examined.naming.found.phi
-    fitted, kept = ([(c, look.use) for c, look in _pairs(result, phi, roles)] for roles in (FITTED, KEPT))
+    fitted, kept = ([(c, look.use) for c, look in _pairs(result, phi, roles)] for roles in (FITTED_ROLES, KEPT_ROLES))
     mended = [(accept(case, named), use) for case, use in fitted]
-    after = identify(mended[0][0].body, tuple(fit_of(*pair) for pair in mended))
+    after = identify_body(mended[0][0].body, tuple(case_fit(*pair) for pair in mended))
     findings = tuple(replace(one, changes=_changes(before, after)) for one in examined.diagnosis.findings)
     if not kept:
         return SessionDiagnosis(replace(examined.diagnosis, findings=findings), examined, before, after)
-    as_is, better = (tuple(fit_of(*pair) for pair in some) for some in (kept, [(accept(case, named), use) for case, use in kept]))
+    as_is, better = (tuple(case_fit(*pair) for pair in some) for some in (kept, [(accept(case, named), use) for case, use in kept]))
     about = standing_point(as_is)
-    left = judged(before.identified, as_is, about), judged(after.identified, better, about)
+    left = residuals_of(before.identified, as_is, about), residuals_of(after.identified, better, about)
     used = (
-        judged(before.identified, tuple(fit_of(*pair) for pair in fitted), about),
-        judged(after.identified, tuple(fit_of(*pair) for pair in mended), about),
+        residuals_of(before.identified, tuple(case_fit(*pair) for pair in fitted), about),
+        residuals_of(after.identified, tuple(case_fit(*pair) for pair in mended), about),
     )
     try:
         measured = gain_by_naming(*left, fitted=used)

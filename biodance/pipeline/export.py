@@ -5,20 +5,23 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from biodance.body.body import Body
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from biodance.body.body import UPRIGHT, Body
 from biodance.body.body_file import read_body
 from biodance.body.export import formats, write_model
+from biodance.body.export.osim import ROOT_ROTATIONS, ROOT_TRANSLATIONS
 from biodance.body.solids import segment_solids
 from biodance.errors import SessionRefused, TrialRefused, UnknownName
-from biodance.lab.mot import write_mot
-from biodance.lab.session import read_session
-from biodance.lab.trc import write_trc
-from biodance.motion.opensim_coordinates import opensim_coordinates
+from biodance.lab.opensim.mot import TimeTable, write_mot
+from biodance.lab.opensim.trc import write_trc
+from biodance.lab.session.read import read_session
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.results_c3d import results_into_c3d
 from biodance.pipeline.session import examine
-from biodance.pipeline.trial import prepared
-from biodance.records import Session, Trial
+from biodance.pipeline.trial import prepare_trial
+from biodance.records import Motion, Session, Trial
 
 BODY = "body.json"
 """File in which `biodance identify` keeps the identified body."""
@@ -176,7 +179,7 @@ def _chosen(session: Session, name: str | None) -> Trial:
 
 
 def _markers(trial: Trial, out: Path) -> tuple[Path, str]:
-    markers = prepared(trial).trial.markers
+    markers = prepare_trial(trial).trial.markers
     if markers is None:
         raise TrialRefused(f"Trial {trial.name}: it has no markers to write.")
     return write_trc(out, markers), f"Markers of trial {trial.name}, gaps filled where they were short; mm, y up."
@@ -188,3 +191,15 @@ def _motion(result: SessionResult, name: str, out: Path) -> tuple[Path, str]:
         raise TrialRefused(f"Trial {name}: it gives no motion. {one.reason or result.body_source}")
     table = opensim_coordinates(result.body, one.motion)
     return write_mot(out, table), f"Joint coordinates of trial {name}, rad and m, y up; the model is exported with --format osim."
+
+
+def opensim_coordinates(body: Body, motion: Motion) -> TimeTable:
+    """Return the coordinates of ``motion`` (T frames) by name: rad and m, root in OpenSim's ground (y up), joints as in ``body``."""
+    names = [joint.name for joint in body.joints]
+    angles = motion.q[:, body.nq - len(names) :]
+    if not body.n_root:
+        return TimeTable(body.name, tuple(names), motion.time, angles)
+    turned = UPRIGHT.T @ Rotation.from_quat(motion.q[:, 3:7]).as_matrix()
+    turns = np.unwrap(Rotation.from_matrix(turned).as_euler("ZXY"), axis=0)
+    root = [f"{body.segments[0]}_{word}" for word in (*ROOT_ROTATIONS, *ROOT_TRANSLATIONS)]
+    return TimeTable(body.name, (*root, *names), motion.time, np.hstack([turns, motion.q[:, :3] @ UPRIGHT, angles]))

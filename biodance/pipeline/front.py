@@ -1,30 +1,25 @@
-"""What ``import biodance`` conducts: one function for each thing that an analyst asks of a visit; the commands call the same ones."""
+"""What ``import biodance`` conducts: what an analyst asks of a visit; the commands call the same functions."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 from biodance import display
-from biodance.body.body import Body
 from biodance.discovery import Chosen
 from biodance.effects import DiscreteEffect, Effect, causes
-from biodance.lab.session import read_session
+from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import SessionDiagnosis, diagnose_session
 from biodance.pipeline.identification import SessionIdentification, identify_trials
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.session import examine, identified
-from biodance.records import Session, Subject
+from biodance.pipeline.session import examine, identification_of
+from biodance.records import Session
 from biodance.uncertainty.tolerances import Tolerances
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from biodance.dance.dance import Dance
-    from biodance.dance.limits import Limit
-    from biodance.dance.verify import Margin
-    from biodance.pipeline.dance import DanceResult
 
 Visit: TypeAlias = Session | SessionResult | str | Path
 """A session: as read, as examined, or its folder."""
@@ -128,8 +123,8 @@ def identify(session: Visit, *, reference: Earlier | None = None, tell: Tell = _
     """
     result = _examined(session, tell)
     if reference is None:
-        return identified(result)
-    return identified(_against(result, _earlier(reference, tell)))
+        return identification_of(result)
+    return identification_of(_against(result, _earlier(reference, tell)))
 
 
 def diagnose(
@@ -214,161 +209,10 @@ def compare_sessions(earlier: Earlier, later: Earlier, *, tell: Tell = _silent) 
     >>> biodance.compare_sessions(identified, identified).table().shape
     (120, 9)
     """
-    from biodance.identify.sessions import differences
+    from biodance.identification.sessions import differences
 
     first, second = _earlier(earlier, tell), _earlier(later, tell)
     return SessionComparison(first, replace(second, changes=differences(first.identification, second.identification)))
-
-
-def design_dance(
-    subject: Subject,
-    protocol: str | Path = "full",
-    *,
-    limits: str | Path | None = None,
-    own_limits: "Iterable[Limit | type[Limit]]" = (),
-    seed: int = 0,
-    tell: Callable[[str, int, int], None] = lambda *_: None,
-) -> "DanceResult":
-    """Return a dance for one person: safe, balanced, and telling much about every segment.
-
-    Parameters
-    ----------
-    subject : Subject
-        Mass kg, stature m, sex, age years (strength falls with it).
-    protocol : str or pathlib.Path
-        "full", "short", "chair", "one_segment", or a TOML file.
-    limits : str or pathlib.Path, optional
-        TOML file with what this person can and may do.
-    own_limits : iterable of Limit, optional
-        Limits of your own, kept beside those of the protocol or in place of one of the same name (`biodance.dance.limits`).
-    seed : int
-        The same seed gives the same dance.
-    tell : callable, optional
-        Called with what is being done, how many parts are finished, and of how many (0: not counted).
-
-    Returns
-    -------
-    DanceResult
-        Its `dance` is None where no dance keeps all limits; then `reason` says which limit forbids it.
-
-    Raises
-    ------
-    UnknownName
-        There is no such protocol; the legal names are listed.
-    BiodanceError
-        Mass or stature are out of range, or protocol and person contradict each other.
-
-    See Also
-    --------
-    verify_dance : Judge a dance by code that its design did not use.
-
-    References
-    ----------
-    Exciting motions by the condition number of the sub-regressors, weighted with the segments' masses; docs/derivations.md.
-
-    Examples
-    --------
-    >>> made = biodance.design_dance(biodance.Subject(65.0, 1.75, "F", 33.0), "short")  # doctest: +SKIP
-    >>> made.dance.save("short.npz")  # doctest: +SKIP
-    >>> biodance.design_dance(biodance.Subject(6.5, 1.75, "F", 33.0), "short")
-    Traceback (most recent call last):
-        ...
-    biodance.errors.BiodanceError: The mass is 6.5 kg; a dance is designed for 30 to 200 kg. Correct it.
-    """
-    from biodance.dance.problem.person import HEALTHY, read_person
-    from biodance.dance.problem.plan import read_plan
-    from biodance.pipeline.dance import dancer, make_dance
-
-    plan = read_plan(protocol)
-    person = read_person(Path(limits)) if limits else HEALTHY
-    return make_dance(dancer(subject, plan), plan, person, limits=own_limits, seed=seed, tell=tell)
-
-
-def verify_dance(
-    dance: "Dance | str | Path", protocol: str | Path | None = None, *, limits: str | Path | None = None, body: Body | None = None
-) -> "tuple[Margin, ...]":
-    """Return what is left of every limit over a whole dance, judged by code that its design did not use.
-
-    Parameters
-    ----------
-    dance : Dance, str or pathlib.Path
-        A dance, or the file that `biodance dance` wrote (dance.npz).
-    protocol : str or pathlib.Path, optional
-        Whose limits hold, by name or TOML file; by default the dance's own, by name.
-    limits : str or pathlib.Path, optional
-        TOML file with what this person can and may do.
-    body : Body, optional
-        Who dances it; by default the person for whom it was designed.
-
-    Returns
-    -------
-    tuple of Margin
-        Each with `limit`, `worst` in `unit` (negative: broken) at `where_s` s.
-
-    Raises
-    ------
-    FileRefused
-        The file is no dance.
-    UnknownName
-        There is no such protocol; the legal names are listed.
-
-    Examples
-    --------
-    >>> margins = biodance.verify_dance("dance.npz")
-    >>> all(margin.worst >= 0 for margin in margins)
-    True
-    """
-    from biodance.dance.dance import Dance
-    from biodance.dance.problem.person import HEALTHY, fit_to_person, read_person
-    from biodance.dance.problem.plan import read_plan
-    from biodance.dance.verify import verify
-
-    one = dance if isinstance(dance, Dance) else Dance.load(dance)
-    own, plan, _ = fit_to_person(body or one.body, read_plan(protocol or one.protocol), read_person(Path(limits)) if limits else HEALTHY)
-    return verify(own, one, plan.limits)
-
-
-def simulate(subject: Subject, protocol: str, out: str | Path, *, seed: int = 0, effects: Iterable[str] = ()) -> Path:
-    """Write a simulated visit as a laboratory would have: C3D files and session.toml, the truth apart in ``truth/truth.json``.
-
-    Parameters
-    ----------
-    subject : Subject
-        Who is simulated; mass kg, stature m.
-    protocol : str
-        Name of a protocol: dance, short, squat, standing ...; a wrong name lists all.
-    out : str or pathlib.Path
-        Folder to write; it must be empty or missing.
-    seed : int
-        The same seed gives the same person and the same files.
-    effects : iterable of str
-        Causes to hide, as ``plate_gain:target=Fz,gain=0.04``.
-
-    Returns
-    -------
-    pathlib.Path
-        The folder.
-
-    Raises
-    ------
-    UnknownName
-        There is no such protocol or cause.
-    BiodanceError
-        A cause lacks a parameter, or the folder is not empty.
-
-    Examples
-    --------
-    >>> folder = biodance.simulate(biodance.Subject(62.0, 1.70, "F", 31.0), "standing", "simulated", seed=1)
-    >>> sorted(path.name for path in folder.iterdir())
-    ['session.toml', 'standing_1.c3d', 'standing_2.c3d', 'static.c3d', 'truth']
-    """
-    from biodance.virtual_lab.hide import hide, parse
-    from biodance.virtual_lab.protocol_file import read_protocol
-    from biodance.virtual_lab.simulate import simulate as write_session
-
-    plan = read_protocol(protocol)
-    visit, loads = hide(tuple(parse(text) for text in effects), subject, plan, seed=seed)
-    return write_session(subject, plan, Path(out), seed=seed, loads=loads, visit=visit)
 
 
 def _examined(session: Visit, tell: Tell) -> SessionResult:
@@ -380,7 +224,7 @@ def _examined(session: Visit, tell: Tell) -> SessionResult:
 
 def _earlier(session: Earlier, tell: Tell) -> SessionIdentification:
     """Return what a visit says about the body."""
-    return session if isinstance(session, SessionIdentification) else identified(_examined(session, tell))
+    return session if isinstance(session, SessionIdentification) else identification_of(_examined(session, tell))
 
 
 def _against(result: SessionResult, before: SessionIdentification) -> SessionResult:

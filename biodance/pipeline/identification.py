@@ -9,16 +9,16 @@ import numpy as np
 from biodance import display
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, NotSolved, TrialRefused
-from biodance.identify.added_mass import AddedMass, added_mass
-from biodance.identify.identification import Identification, identify, standing_point
-from biodance.identify.sessions import Difference, differences
-from biodance.identify.statistics import Fit
-from biodance.identify.torques import TorqueBands, torque_bands
-from biodance.identify.validation import ResidualRatio, TrialValidation, residual_ratio, validate
+from biodance.identification.added_mass import LoadSearch, added_mass
+from biodance.identification.identification import Identification, identify_body, standing_point
+from biodance.identification.sessions import Difference, differences
+from biodance.identification.statistics import Fit
+from biodance.identification.torques import TorqueBands, torque_bands
+from biodance.identification.validation import ResidualRatio, TrialValidation, residual_ratio, validate
 from biodance.motion.comparison import Agreement, compare
-from biodance.motion.contact import foot_wrenches, ground_contact
+from biodance.motion.contact.contact import foot_wrenches, ground_contact
+from biodance.motion.contact.soles import FEET, soles_from_body
 from biodance.motion.regressor import predict_wrench
-from biodance.motion.soles import SIDES, soles_from_body
 from biodance.pipeline.results import TrialResult
 from biodance.records import ROLES, Role, Wrench
 
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
 UNEXPLAINED = 0.5
 """kg between plates and identified body over the fit trials: more than the scale's uncertainty, shoes and a zero allow."""
-FITTED: tuple[Role, ...] = ("fit",)
-KEPT: tuple[Role, ...] = ("validate", "check")
+FITTED_ROLES: tuple[Role, ...] = ("fit",)
+KEPT_ROLES: tuple[Role, ...] = ("validate", "check")
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ class SessionIdentification:
     validations: tuple[TrialValidation, ...]
     agreements: Mapping[str, Agreement]
     gain: ResidualRatio | None
-    search: AddedMass
+    search: LoadSearch
     changes: tuple[Difference, ...] = ()
     torques: TorqueBands | None = None
     notes: tuple[str, ...] = ()
@@ -110,7 +110,7 @@ class SessionIdentification:
         return self.identification.table(quantity)
 
 
-def fit_of(result: TrialResult) -> Fit | None:
+def trial_fit(result: TrialResult) -> Fit | None:
     """Return what a trial gives to identify from or to validate on; None without motion, wrench or a frame to compare."""
     found = result.comparison
     if found is None or result.motion is None or not found.used.any():
@@ -120,7 +120,7 @@ def fit_of(result: TrialResult) -> Fit | None:
 
 def can_identify(results: tuple[TrialResult, ...]) -> bool:
     """Whether any trial with role fit can be identified from."""
-    return any(result.trial.role in FITTED and fit_of(result) is not None for result in results)
+    return any(result.trial.role in FITTED_ROLES and trial_fit(result) is not None for result in results)
 
 
 def identify_trials(
@@ -136,13 +136,13 @@ def identify_trials(
     TrialRefused
         No trial with role fit has motion and fully measured ground contact.
     """
-    fits, others = _fits(results, FITTED), _fits(results, KEPT)
+    fits, others = _fits(results, FITTED_ROLES), _fits(results, KEPT_ROLES)
     if not fits:
         raise TrialRefused(
             f"Session {name} has no trial with role fit in which markers and plates measure all, so nothing can be identified. "
             "Record movement on the plates, or set roles in session.toml."
         )
-    found = identify(body, fits)
+    found = identify_body(body, fits)
     failures = {"segments": found.cause} if found.status == "failed" else {}
     if reference is not None and "segments" in reference.failures:
         failures["reference"] = (
@@ -200,13 +200,13 @@ def _predicted(
 
 def _torques(found: Identification, results: tuple[TrialResult, ...]) -> TorqueBands | None:
     """Return the joint torques of the first trial kept, else of the first fitted, whose plates tell what each foot carries."""
-    for role in (*KEPT, *FITTED):
+    for role in (*KEPT_ROLES, *FITTED_ROLES):
         for one in results:
             if one.trial.role != role or one.motion is None or one.comparison is None or not one.trial.plates:
                 continue
             soles = soles_from_body(found.body, one.motion)
             feet = foot_wrenches(one.trial, ground_contact(one.trial, soles, mass=found.sip.mass.sum()), soles)
-            ground = {f"{side}_foot": wrench for side, wrench in zip(SIDES, feet, strict=True)}
+            ground = {f"{side}_foot": wrench for side, wrench in zip(FEET, feet, strict=True)}
             return torque_bands(found, one.motion, ground, trial=one.trial.name, use=one.comparison.used)
     return None
 
@@ -228,7 +228,7 @@ def _at_origin(identified: Body, fit: Fit) -> Agreement:
 
 
 def _fits(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[Fit, ...]:
-    found = [fit_of(result) for result in results if result.trial.role in roles]
+    found = [trial_fit(result) for result in results if result.trial.role in roles]
     return tuple(fit for fit in found if fit is not None)
 
 

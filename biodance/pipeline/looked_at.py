@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.body.error_sizes import error_size
-from biodance.diagnose.problem import Look
-from biodance.diagnose.spectrum import SHORTEST, spectrum, thinned
+from biodance.body.tables.error_sizes import error_size
+from biodance.diagnosis.problem import Look
+from biodance.diagnosis.spectrum import SHORTEST_RUN, spectrum, thinned
 from biodance.effects import Case
-from biodance.identify.identification import standing_point
-from biodance.identify.statistics import Fit
+from biodance.identification.identification import standing_point
+from biodance.identification.statistics import Fit
 from biodance.lab.filters import runs
-from biodance.pipeline.identification import FITTED, KEPT
+from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES
 from biodance.pipeline.results import TrialResult
 from biodance.records import Array, Role
 from biodance.uncertainty.bands import BANDS
@@ -58,14 +58,14 @@ def looks(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[Lo
 
 def looked_at(results: tuple[TrialResult, ...]) -> tuple[Look, ...]:
     """Return the trials to look at: those to fit, else those kept, and quiet standing beside them where they are short."""
-    roles = FITTED if looks(results, FITTED) else KEPT
+    roles = FITTED_ROLES if looks(results, FITTED_ROLES) else KEPT_ROLES
     moving = looks(results, roles)
     return moving if sum(map(_seconds, moving)) >= ENOUGH else looks(results, ("static", *roles))
 
 
 def left_out(results: tuple[TrialResult, ...]) -> tuple[str, ...]:
     """Say of every trial that is not looked at, though it should be, why."""
-    roles, notes = ("static", *FITTED), []
+    roles, notes = ("static", *FITTED_ROLES), []
     seen = {look.trial.name: _seconds(look) for look in looks(results, roles)}
     for one in results:
         name = one.trial.name
@@ -74,7 +74,7 @@ def left_out(results: tuple[TrialResult, ...]) -> tuple[str, ...]:
         if name not in seen:
             notes.append(f"{name} was left out. {' '.join(one.reasons)}".strip())
         elif seen[name] == 0:
-            notes.append(f"{name} was left out: no {SHORTEST:g} s in which the plates measure all ground contact without a break.")
+            notes.append(f"{name} was left out: no {SHORTEST_RUN:g} s in which the plates measure all ground contact without a break.")
     return tuple(notes)
 
 
@@ -83,7 +83,7 @@ def _seconds(look: Look) -> float:
     rate = look.motion.rate
     if not np.isfinite(rate):
         return 0.0
-    return float(sum(stop - start for start, stop in runs(look.use) if stop - start >= SHORTEST * rate) / rate)
+    return float(sum(stop - start for start, stop in runs(look.use) if stop - start >= SHORTEST_RUN * rate) / rate)
 
 
 def own_tolerances(body: Body, chosen: tuple[Look, ...]) -> Own:
@@ -98,7 +98,7 @@ def own_tolerances(body: Body, chosen: tuple[Look, ...]) -> Own:
         notes.append(
             f"Markers are farther from the body than where tolerances were learned ({factor:.1f} times in the first quartile): soft "
             "tissue and joints may err as much more, and no cause is named from such movement. Tolerances learned on sessions of your own "
-            "laboratory without fault (biodance.diagnose.learning) hold for it."
+            "laboratory without fault (biodance.diagnosis.learning) hold for it."
         )
     standing = tuple(look for look in chosen if look.trial.role == "static" and _seconds(look) > 0)
     if standing:

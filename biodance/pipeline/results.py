@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from biodance import display
 from biodance.body.body import Body
-from biodance.lab.gaps import MarkerGaps
+from biodance.lab.markers.gaps import MarkerGaps
 from biodance.records import CHANNEL_TITLES, Array, Motion, Session, Subject, Trial, by_name
 from biodance.settings import Settings
 
@@ -96,11 +96,11 @@ class WrenchComparison:
         >>> result["squat_1"].comparison.plot_wrench()[2].get_ylabel()
         'Fz (N)'
         """
-        return display.beside(self.time, self.measured, self.simulated, self.used, CHANNEL_TITLES)
+        return display.side_by_side(self.time, self.measured, self.simulated, self.used, CHANNEL_TITLES)
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
+class QuietStanding:
     """A quiet standing on the plates from ``start`` to ``end`` s; ``mass`` kg on the plates (mean vertical force / g), ``mass_sd`` kg.
 
     ``cop`` and ``com`` (T, 2) m, horizontal lab coordinates of the centre of pressure and of the table's centre of mass (``com`` empty
@@ -178,7 +178,7 @@ class TrialResult:
     fit: MarkerFit | None = None
     motion: Motion | None = None
     comparison: WrenchComparison | None = None
-    standing: Standing | None = None
+    standing: QuietStanding | None = None
     checks: tuple[Check, ...] = ()
 
     def __repr__(self) -> str:
@@ -261,7 +261,7 @@ class SessionResult:
     steps: tuple[Step, ...]
     trials: tuple[TrialResult, ...]
     checks: tuple[Check, ...]
-    standing: Standing | None
+    standing: QuietStanding | None
     still: Still | None
     identification: "SessionIdentification | None" = None
     more_stills: tuple[Still, ...] = ()

@@ -5,15 +5,14 @@ from dataclasses import replace
 from functools import partial
 
 from biodance.body.body import Body
-from biodance.body.segment_tables import reference as reference_person
+from biodance.body.tables.choice import reference as reference_person
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.pipeline.body import body_of
 from biodance.pipeline.checks import mass_check, standing_check, trial_checks
 from biodance.pipeline.identification import SessionIdentification, can_identify, identify_trials
-from biodance.pipeline.results import SessionResult, Standing, Step, Still, TrialResult
-from biodance.pipeline.steps import attempt
+from biodance.pipeline.results import QuietStanding, SessionResult, Step, Still, TrialResult
 from biodance.pipeline.still import load_still, still_of, worst_still
-from biodance.pipeline.trial import examine_trial, prepared
+from biodance.pipeline.trial import attempt, examine_trial, prepare_trial
 from biodance.records import Session
 from biodance.settings import StandingRules
 
@@ -65,7 +64,7 @@ def examine(
     read = []
     for trial in sorted(session.trials, key=lambda trial: trial.role != "static"):
         tell(f"preparing {trial.name}")
-        read.append(prepared(trial))
+        read.append(prepare_trial(trial))
     tell("scaling the body")
     body, source = body_of(session.subject, tuple(read), session.settings, steps)
     results: list[TrialResult] = []
@@ -103,7 +102,7 @@ def _stills(body: Body, done: tuple[TrialResult, ...], found: SessionIdentificat
     return tuple(still for still in (worst, load) if still is not None)
 
 
-def best_standing(results: tuple[TrialResult, ...]) -> Standing:
+def best_standing(results: tuple[TrialResult, ...]) -> QuietStanding:
     """Return the quiet standing of a static trial, else of a check, else the longest of all.
 
     Raises
@@ -122,7 +121,7 @@ def best_standing(results: tuple[TrialResult, ...]) -> Standing:
     return min(found, key=lambda pair: (order.get(pair[0], 2), pair[1].start - pair[1].end))[1]
 
 
-def identified(result: SessionResult) -> SessionIdentification:
+def identification_of(result: SessionResult) -> SessionIdentification:
     """Return the identification of a session.
 
     Raises

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.lab.filters import runs
-from biodance.lab.marker_sets import landmark, read_marker_set
+from biodance.lab.markers.sets import landmark, read_marker_set
 from biodance.lab.weight import movement
 from biodance.motion.kinematics import poses
-from biodance.pipeline.results import Standing
+from biodance.pipeline.results import QuietStanding
 from biodance.records import Array, Markers, Motion, Trial
 from biodance.settings import StandingRules
 
@@ -59,7 +59,7 @@ def _still(markers: Markers | None, run: slice, within: float) -> bool:
     return markers is None or movement(Markers(markers.names, markers.time[run], markers.xyz[run])) <= within
 
 
-def quiet_standing(trial: Trial, used: NDArray[np.bool_], body: Body | None, motion: Motion | None) -> Standing | None:
+def quiet_standing(trial: Trial, used: NDArray[np.bool_], body: Body | None, motion: Motion | None) -> QuietStanding | None:
     """Return the quiet standing of a prepared trial, over the longest steady run of the frames ``used`` (T,); None without one.
 
     Steady means the vertical force, and the markers where there are any: walking, too, loads the plates evenly for a moment.
@@ -76,7 +76,7 @@ def quiet_standing(trial: Trial, used: NDArray[np.bool_], body: Body | None, mot
     arm = com.mean(axis=0) - cop.mean(axis=0) if com.size else np.full(2, np.nan)
     mass = wrench.force[run, 2] / trial.settings.gravity
     names, feet = _feet(trial, run)
-    return Standing(
+    return QuietStanding(
         trial=trial.name,
         start=float(wrench.time[run][0]),
         end=float(wrench.time[run][-1]),

@@ -7,7 +7,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.solids import shape_parts
 from biodance.errors import TrialRefused
-from biodance.identify.added_mass import AddedMass
+from biodance.identification.added_mass import LoadSearch
 from biodance.motion.kinematics import Poses, poses
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.results import Still, TrialResult
@@ -38,7 +38,7 @@ def _side(segment: str) -> str:
     return next((side for side in ("left", "right") if segment.startswith(side)), "middle")
 
 
-def bones(body: Body, pose: Poses) -> tuple[Array, tuple[str, ...]]:
+def bone_lines(body: Body, pose: Poses) -> tuple[Array, tuple[str, ...]]:
     """Return lines (B, 2, 3) m of the first frame of ``pose`` and their sides.
 
     A segment is drawn from its origin to the origin of its child; to the middle of a left and a right child, which a bar joins; beyond its
@@ -105,7 +105,7 @@ def posture_still(body: Body, q: Array, title: str) -> Still:
     motion = Motion(np.zeros(1), q[None], np.zeros((1, body.nv)), np.zeros((1, body.nv)))
     pose, nothing, parts = poses(body, q), np.full(3, np.nan), shape_parts(body)
     on = [segment for segment, _ in parts]
-    lines, sides = bones(body, pose)
+    lines, sides = bone_lines(body, pose)
     return Still(
         trial=title,
         time=0.0,
@@ -144,7 +144,7 @@ def worst_still(body: Body, results: tuple[TrialResult, ...]) -> Still | None:
     return replace(still_at(body, one, frame), residual=force, about=about)
 
 
-def load_still(body: Body, results: tuple[TrialResult, ...], search: AddedMass) -> Still | None:
+def load_still(body: Body, results: tuple[TrialResult, ...], search: LoadSearch) -> Still | None:
     """Return the still of the body with the load that was found, where it sits; None without one, or where its place is not known."""
     if not search.found or not np.isfinite(search.best.place).all():
         return None

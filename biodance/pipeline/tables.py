@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from biodance.diagnose.diagnosis import Diagnosis
+from biodance.diagnosis.diagnosis import Diagnosis
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.results import SessionResult, TrialResult

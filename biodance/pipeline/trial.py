@@ -1,23 +1,49 @@
 """One trial through all its steps: gaps, motion, contact, simulated wrench beside the measured one, quiet standing."""
 
+import logging
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.errors import TrialRefused
-from biodance.lab.gaps import MarkerGaps, report_gaps
-from biodance.lab.marker_sets import canonical, read_marker_set
+from biodance.errors import BiodanceError, TrialRefused
+from biodance.lab.markers.gaps import MarkerGaps, report_gaps
+from biodance.lab.markers.sets import canonical, read_marker_set
 from biodance.lab.prepare import prepare
 from biodance.motion.comparison import compare
-from biodance.motion.contact import Contact, ground_contact
+from biodance.motion.contact.contact import Contact, ground_contact
+from biodance.motion.contact.soles import Soles, soles_from_body, soles_from_markers
 from biodance.motion.regressor import predict_wrench
-from biodance.motion.soles import Soles, soles_from_body, soles_from_markers
 from biodance.motion.track import track
 from biodance.pipeline.results import MarkerFit, Step, TrialResult, WrenchComparison
 from biodance.pipeline.standing import quiet_standing
-from biodance.pipeline.steps import attempt
 from biodance.records import Motion, Trial
+
+T = TypeVar("T")
+
+log = logging.getLogger(__name__)
+
+
+def attempt(steps: list[Step], name: str, work: Callable[[], T]) -> T | None:
+    """Do ``work``, append what became of it to ``steps`` and return its result; None where it was refused or failed.
+
+    A `BiodanceError` is a refusal: the data cannot carry this step. Any other exception is a fault of biodance: it is named as such, its
+    traceback goes to the log (level debug), and the remaining steps are done all the same.
+    """
+    try:
+        value = work()
+    except BiodanceError as error:
+        steps.append(Step(name, "refused", str(error)))
+        return None
+    except Exception as error:
+        log.debug("step %s failed", name, exc_info=True)
+        fault = f"biodance itself failed in the step {name} ({type(error).__name__}: {error}); the rest was done. Please report this."
+        steps.append(Step(name, "failed", fault))
+        return None
+    steps.append(Step(name, "done"))
+    return value
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +68,7 @@ def gaps_of(trial: Trial) -> tuple[MarkerGaps, ...]:
     return report_gaps(markers)
 
 
-def prepared(trial: Trial) -> Prepared:
+def prepare_trial(trial: Trial) -> Prepared:
     """Prepare one trial; a refusal is a step, and the trial stays as it was read."""
     steps: list[Step] = []
     done = attempt(steps, "prepare", lambda: prepare(trial))
@@ -100,7 +126,7 @@ def compare_wrenches(trial: Trial, body: Body, motion: Motion, contact: Contact)
     return WrenchComparison(measured.time, measured.value, simulated.value, chosen & known, agreement.rms, correlation, notes)
 
 
-def tracked(trial: Trial, body: Body | None) -> Motion:
+def track_trial(trial: Trial, body: Body | None) -> Motion:
     """Return the motion of ``body`` under the trial's markers.
 
     Raises
@@ -129,7 +155,7 @@ def examine_trial(read: Prepared, body: Body | None, *, mass: float) -> TrialRes
     trial, steps = read.trial, list(read.steps)
     if not read.usable:
         return TrialResult(trial, read.steps, read.gaps)
-    motion = attempt(steps, "track", lambda: tracked(trial, body))
+    motion = attempt(steps, "track", lambda: track_trial(trial, body))
     fit = marker_fit(motion) if motion else None
     if not trial.plates:
         steps.append(Step("wrench", "refused", f"Trial {trial.name}: it has no usable force plate, so there is no wrench to compare with."))

@@ -8,8 +8,9 @@ checked for shape at birth and read-only afterwards; change a record with ``data
 from biodance.records.arrays import CHANNEL_TITLES, CHANNELS, Array, Index, by_name, frozen_array
 from biodance.records.markers import Markers
 from biodance.records.motion import Motion
-from biodance.records.session import ROLES, Role, Session, Source, Subject, Trial
+from biodance.records.session import ROLES, Role, Session, Source, Trial
 from biodance.records.sip import Sip
+from biodance.records.subject import Subject
 from biodance.records.wrench import Plate, Wrench
 
 __all__ = [

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from biodance import display
-from biodance.errors import BiodanceError, SessionRefused, TrialRefused, UnknownName
+from biodance.errors import BiodanceError, TrialRefused, UnknownName
 from biodance.records.arrays import assign, by_name, rate_of
 from biodance.records.markers import Markers
+from biodance.records.subject import Subject
 from biodance.records.wrench import Plate, Wrench
 from biodance.settings import USUAL, Settings
 
@@ -137,68 +138,6 @@ class Trial:
         if any(not np.array_equal(p.wrench.time, time) for p in self.plates):
             raise TrialRefused(f"Trial {self.name}: the plates have different time bases; prepare the trial first.")
         return Wrench(time, np.sum([p.wrench.value for p in self.plates], axis=0))
-
-
-@dataclass(frozen=True)
-class Subject:
-    """The person.
-
-    Parameters
-    ----------
-    mass : float
-        Body mass, kg; NaN = not known: a step that needs it refuses with the remedy.
-    stature : float
-        Stature, m; NaN = not known.
-    sex : {"F", "M"}
-        Whose tables are used.
-    age : float
-        Years; NaN = not known, always possible.
-    name : str
-        As the lab calls the person.
-    measurements : mapping
-        Other measures by name, m and kg.
-    guessed : tuple of str
-        What nobody declared: "mass", "stature", "sex".
-
-    Examples
-    --------
-    >>> biodance.Subject(62.0, 1.70, "F", 31.0).stature
-    1.7
-    """
-
-    mass: float
-    stature: float
-    sex: Literal["F", "M"]
-    age: float = float("nan")
-    name: str = ""
-    measurements: Mapping[str, float] = field(default_factory=dict)
-    guessed: tuple[str, ...] = ()
-
-    def require(self, *quantities: Literal["mass", "stature", "age"]) -> None:
-        """Refuse to go on where a quantity is not known.
-
-        Parameters
-        ----------
-        *quantities : {"mass", "stature", "age"}
-            What a step needs.
-
-        Raises
-        ------
-        SessionRefused
-            One of them is NaN; the message says which key of session.toml helps.
-
-        Examples
-        --------
-        >>> biodance.Subject(62.0, 1.70, "F").require("age")
-        Traceback (most recent call last):
-            ...
-        biodance.errors.SessionRefused: Subject: the age is not known. Set age in session.toml.
-        """
-        keys = {"mass": "mass_kg", "stature": "height_m", "age": "age"}
-        unknown = [quantity for quantity in quantities if np.isnan(getattr(self, quantity))]
-        if unknown:
-            verb, wanted = "is" if len(unknown) == 1 else "are", " and ".join(keys[quantity] for quantity in unknown)
-            raise SessionRefused(f"{self.name or 'Subject'}: the {' and '.join(unknown)} {verb} not known. Set {wanted} in session.toml.")
 
 
 @dataclass(frozen=True, eq=False)

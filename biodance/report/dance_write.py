@@ -1,4 +1,4 @@
-"""Write a designed dance into a folder: for programs, for the motion-capture screen, for the person who calls it, for the analyst."""
+"""Write a designed dance into a folder: for programs, for the motion-capture screen, for the robot, for the person who calls it."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,15 +10,14 @@ from biodance.dance.cues import cue_sheet
 from biodance.dance.dance import Dance
 from biodance.dance.problem.stance import Stance, stance_words
 from biodance.dance.verify import Margin
-from biodance.lab.write_c3d import write_c3d
+from biodance.lab.c3d.write import write_c3d
 from biodance.motion.kinematics import poses
 from biodance.pipeline.dance import DanceResult
 from biodance.pipeline.still import posture_still
-from biodance.records import Markers
-from biodance.report.dance_figures import criterion_figure, expectation_figure, postures_figure, zmp_figure
-from biodance.report.results_json import plain, to_text
-from biodance.report.robot_dance import angle_sheet, write_angles
-from biodance.report.solid import solid_pngs
+from biodance.records import Array, Markers
+from biodance.report.documents.session import plain_values, to_text
+from biodance.report.figures.dance import criterion_figure, expectation_figure, postures_figure, zmp_figure
+from biodance.report.figures.solid import solid_pngs
 
 RATE = 100.0
 """Hz of the preview's markers."""
@@ -32,7 +31,7 @@ def write_dance(result: DanceResult, folder: Path) -> dict[str, Any]:
 
     A dance that does not keep every limit is not written: then ``results.json`` alone says why.
     """
-    found: dict[str, Any] = plain(dance_document(result))
+    found: dict[str, Any] = plain_values(dance_document(result))
     if result.dance is not None and result.account is not None and result.expectation is not None:
         dance = result.dance
         dance.save(folder / "dance.npz")
@@ -175,3 +174,34 @@ def print_dance(found: dict[str, Any]) -> None:
             console.print(f"hardly tilted: {', '.join(criterion['hardly_excited'])}", markup=False)
     for note in found["notes"]:
         console.print(f"look: {note}", markup=False)
+
+
+SETPOINT_RATE = 100.0
+"""Hz of the table of joint angles."""
+
+
+def write_angles(dance: Dance, path: Path) -> None:
+    """Write time (s), place of the root (m), its quaternion x y z w, and all joint angles (rad) at 100 Hz as CSV, lab frame, z up."""
+    motion = dance.motion(SETPOINT_RATE)
+    names = ["time_s", *(f"root_{axis}_m" for axis in "xyz"), *(f"root_q{axis}" for axis in "xyzw")]
+    names += [f"{joint.name}_rad" for joint in dance.body.joints]
+    table = np.column_stack([motion.time, motion.q])
+    lines = [",".join(names), *(",".join(f"{value:.9g}" for value in row) for row in table)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+
+
+def angle_sheet(dance: Dance, angles: Array) -> str:
+    """Return the postures as a Markdown table of joint angles, degrees: ``angles`` (P, n) rad of all postures of the dance."""
+    joints = [joint.name for joint in dance.body.joints]
+    lines = [
+        "# The dance, posture by posture",
+        "",
+        f"Angles in degrees. {float(np.median(dance.move)):g} s to get to each posture (`dance.csv` says how), then "
+        f"{float(dance.hold.max()):g} s of standing still. Feet that stand are flat and point straight ahead.",
+        "",
+        f"| | feet | {' | '.join(name.replace('_', ' ') for name in joints)} |",
+        "|---" * (len(joints) + 2) + "|",
+    ]
+    for number, (stance, row) in enumerate(zip(dance.stances, np.degrees(angles), strict=True), start=1):
+        lines.append(f"| {number} | {stance_words(stance)} | {' | '.join(f'{angle + 0.0:.1f}' for angle in row)} |")
+    return "\n".join(lines) + "\n"

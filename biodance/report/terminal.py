@@ -7,10 +7,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from biodance.doctor import Finding
+from biodance.doctor import MachineFinding
 from biodance.pipeline.results import SessionResult
-from biodance.report.attention import attention
-from biodance.report.wording import millimetres, number, without_path
+from biodance.report.wording import attention, format_number, millimetres, without_path
 
 
 def _inspected_lines(record: dict[str, Any]) -> list[str]:
@@ -18,12 +17,14 @@ def _inspected_lines(record: dict[str, Any]) -> list[str]:
     lines = []
     if record.get("markers"):
         known = record.get("marker_set") or "no known set"
-        lines.append(f"{len(record['markers'])} markers ({known}), {number(record.get('gaps_percent'))} % not seen")
+        lines.append(f"{len(record['markers'])} markers ({known}), {format_number(record.get('gaps_percent'))} % not seen")
     for plate in record.get("plates") or ():
-        lines.append(f"{plate.get('name', 'plate')}, TYPE {plate['type']}: {number(plate.get('mean_vertical_n'))} N vertical on average")
+        lines.append(
+            f"{plate.get('name', 'plate')}, TYPE {plate['type']}: {format_number(plate.get('mean_vertical_n'))} N vertical on average"
+        )
         lines += [f"  {decision}" for decision in plate.get("decisions", ())]
     if record.get("plates"):
-        on_plates, declared = number(record.get("mass_on_plates_kg"), 2), number(record.get("declared_mass_kg"), 2)
+        on_plates, declared = format_number(record.get("mass_on_plates_kg"), 2), format_number(record.get("declared_mass_kg"), 2)
         lines.append(f"mass on the plates {on_plates} kg, declared {declared} kg")
     return lines + [f"look: {warning}" for warning in record.get("warnings") or ()]
 
@@ -31,7 +32,7 @@ def _inspected_lines(record: dict[str, Any]) -> list[str]:
 def print_inspected(records: Sequence[dict[str, Any]], console: Console) -> None:
     """Print what `biodance inspect` read of every file."""
     for record in records:
-        rates = f"{record.get('frames') or 0} frames, {number(record.get('rate_hz'), 0)} / {number(record.get('analog_rate_hz'), 0)} Hz"
+        rates = f"{record.get('frames') or 0} frames, {format_number(record.get('rate_hz'), 0)} / {format_number(record.get('analog_rate_hz'), 0)} Hz"
         facts = f" {record.get('format') or ''}, {rates}" if record["status"] != "refused" else ""
         console.print(f"[bold]{escape(str(record['file']))}[/]: {record['status']}{escape(facts)}", soft_wrap=True)
         lines = (
@@ -49,7 +50,11 @@ def print_session(result: SessionResult, console: Console) -> None:
     for trial in result.trials:
         rms = f"{millimetres(trial.fit.total_rms)} mm" if trial.fit else "–"
         c = trial.comparison
-        wrench = (str(int(c.used.sum())), f"{number(float(c.rms[2]))} N", number(float(c.correlation[2]), 3)) if c else ("–", "–", "–")
+        wrench = (
+            (str(int(c.used.sum())), f"{format_number(float(c.rms[2]))} N", format_number(float(c.correlation[2]), 3))
+            if c
+            else ("–", "–", "–")
+        )
         table.add_row(escape(trial.trial.name), trial.trial.role, trial.status, rms, *wrench)
     console.print(table)
     for where, sentence in attention(result):
@@ -68,17 +73,19 @@ def print_identification(found: dict[str, Any], console: Console) -> None:
     for heading in ("segment", "mass (kg)", "table (kg)", "from the data"):
         table.add_column(heading)
     for row in found["segments"]:
-        mass = f"{number(row['mass_kg'], 2)} ± {number(row['mass_sd_kg'], 2)}"
-        table.add_row(row["name"], mass, number(row["mass_prior_kg"], 2), f"{number(100 * row['information'], 0)} %")
+        mass = f"{format_number(row['mass_kg'], 2)} ± {format_number(row['mass_sd_kg'], 2)}"
+        table.add_row(row["name"], mass, format_number(row["mass_prior_kg"], 2), f"{format_number(100 * row['information'], 0)} %")
     if found["segments"]:
         console.print(table)
     for row in found["validation"]:
-        told = ", ".join(f"{name} {' '.join(number(x) for x in row[name]['rms'])}" for name in ("table", "identified"))
+        told = ", ".join(f"{name} {' '.join(format_number(x) for x in row[name]['rms'])}" for name in ("table", "identified"))
         console.print(f"{escape(row['trial'])}, RMS Fx Fy Fz Mx My Mz: {told}", soft_wrap=True)
     load = found["added_mass"]
     if load:
-        low, high = (number(x, 2) for x in load["ci95_kg"])
-        console.print(f"added mass: {number(load['kg'], 2)} kg ({low} to {high}) on {load['segment']}, beyond {escape(load['reference'])}")
+        low, high = (format_number(x, 2) for x in load["ci95_kg"])
+        console.print(
+            f"added mass: {format_number(load['kg'], 2)} kg ({low} to {high}) on {load['segment']}, beyond {escape(load['reference'])}"
+        )
     else:
         console.print(f"added mass: none found beyond {escape(found['added_mass_search']['reference'])}")
     for note in found["notes"]:
@@ -126,7 +133,7 @@ def print_diagnosis(found: dict[str, Any], console: Console) -> None:
         console.print(f"note: {escape(note)}", soft_wrap=True)
 
 
-def print_findings(findings: Sequence[Finding], console: Console) -> None:
+def print_findings(findings: Sequence[MachineFinding], console: Console) -> None:
     """Print one line a finding of the doctor."""
     table = Table(box=None, pad_edge=False, show_header=False)
     for finding in findings:

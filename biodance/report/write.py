@@ -9,12 +9,12 @@ from biodance.pipeline.export import BODY, body_of_result
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.provenance import Provenance, now, provenance
 from biodance.pipeline.results import SessionResult
-from biodance.report.diagnosis_json import diagnosis_document
-from biodance.report.diagnosis_page import diagnosis_page, diagnosis_section
-from biodance.report.identification_json import identification_document
-from biodance.report.page import page
-from biodance.report.results_json import document, plain, to_text
-from biodance.report.solid import still_addresses
+from biodance.report.documents.diagnosis import diagnosis_document
+from biodance.report.documents.identification import identification_document
+from biodance.report.documents.session import plain_values, results_document, to_text
+from biodance.report.figures.solid import still_addresses
+from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
+from biodance.report.pages.session import page
 
 PAGE, NUMBERS = "report.html", "results.json"
 
@@ -22,9 +22,9 @@ PAGE, NUMBERS = "report.html", "results.json"
 def write_report(result: SessionResult, folder: Path, *, diagnosis: SessionDiagnosis | None = None) -> dict[str, Any]:
     """Write ``report.html`` and ``results.json`` into ``folder`` (which exists) and return the content of the latter."""
     made = provenance(result, created=now())
-    found = document(result, made) | {"diagnosis": diagnosis_document(diagnosis) if diagnosis else None}
+    found = results_document(result, made) | {"diagnosis": diagnosis_document(diagnosis) if diagnosis else None}
     _write(folder, {NUMBERS: to_text(found), PAGE: _page(result, made, diagnosis)})
-    return dict(plain(found))
+    return dict(plain_values(found))
 
 
 def write_identification(result: SessionResult, found: SessionIdentification, folder: Path) -> dict[str, Any]:
@@ -38,7 +38,7 @@ def write_identification(result: SessionResult, found: SessionIdentification, fo
     if found.identification.status == "solved":
         files[BODY] = body_text(*body_of_result(result))
     _write(folder, files)
-    return dict(plain(numbers))
+    return dict(plain_values(numbers))
 
 
 def write_diagnosis(result: SessionResult, found: SessionDiagnosis, folder: Path, *, accepted: bool) -> dict[str, Any]:
@@ -54,7 +54,7 @@ def write_diagnosis(result: SessionResult, found: SessionDiagnosis, folder: Path
         named = ", ".join(f"{one.effect} {one.target}".strip() for one in found.diagnosis.findings)
         files[BODY] = body_text(found.accepted.identified, f"Session {result.session.folder.name}: identified with {named} accepted.")
     _write(folder, files)
-    return dict(plain(numbers))
+    return dict(plain_values(numbers))
 
 
 def _page(result: SessionResult, made: Provenance, diagnosis: SessionDiagnosis | None = None) -> str:

@@ -8,9 +8,9 @@ leaves out.
 import numpy as np
 
 from biodance.body.body import JointError
-from biodance.body.error_sizes import error_size, joint_size
 from biodance.body.inertia import TENSOR
-from biodance.motion.marker_jacobian import skew
+from biodance.body.tables.error_sizes import error_size, joint_size
+from biodance.motion.kinematics import skew
 from biodance.records import Array, Sip
 
 JOINT = {"thigh": "hip", "shank": "knee", "foot": "ankle", "trunk_head": "trunk", "upper_arm": "shoulder", "forearm_hand": "elbow"}

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.skeleton import kind_of
-from biodance.motion.kinematics import Poses, poses
-from biodance.motion.marker_jacobian import below, chains, skew
+from biodance.body.human.skeleton import kind_of
+from biodance.motion.kinematics import Poses, below, chains, poses, skew
 from biodance.records import Array, Index
 from biodance.uncertainty.response import Pull, Response, centres_of_mass
 from biodance.uncertainty.source import Effects, ErrorSource, mean_local, mean_squares

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.motion.marker_jacobian import skew
+from biodance.motion.kinematics import skew
 from biodance.records import CHANNELS, Array
 from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.tolerances import shipped

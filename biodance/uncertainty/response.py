@@ -19,8 +19,7 @@ from scipy.interpolate import make_interp_spline
 
 from biodance.body.body import Body
 from biodance.body.inertia import TENSOR
-from biodance.motion.kinematics import Poses, poses, segment_motion
-from biodance.motion.marker_jacobian import jacobian, skew
+from biodance.motion.kinematics import Poses, jacobian, poses, segment_motion, skew
 from biodance.records import Array, Index, Motion
 
 TRACKING_RIDGE = 1e-6

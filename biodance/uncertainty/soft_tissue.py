@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.skeleton import kind_of
+from biodance.body.human.skeleton import kind_of
 from biodance.motion.kinematics import cross, segment_motion
 from biodance.records import Array, Index
 from biodance.uncertainty.response import Pull, Response

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.motion.marker_jacobian import chains
+from biodance.motion.kinematics import chains
 from biodance.records import Array
 from biodance.uncertainty.response import Pull, Response
 

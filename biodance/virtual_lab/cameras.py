@@ -1,13 +1,111 @@
-"""What the cameras record of a performance: marker trajectories with soft tissue, noise, gaps, in the laboratory's own axes."""
+"""What the cameras record: marker trajectories with skin and fat between bone and marker, noise, gaps, in the lab's own axes."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.motion.kinematics import poses
+from biodance.body.body import SegmentMarkers
+from biodance.motion.kinematics import Poses, poses
+from biodance.motion.regressor import GRAVITY
 from biodance.records import Array, Markers
 from biodance.virtual_lab.performance import Performance
-from biodance.virtual_lab.randomness import smooth_noise
-from biodance.virtual_lab.soft_tissue import SoftTissue, displaced
-from biodance.virtual_lab.tolerances import Tolerances
+from biodance.virtual_lab.person import Person
+from biodance.virtual_lab.protocol import STAND
+from biodance.virtual_lab.randomness import smooth_noise, stream
+from biodance.virtual_lab.skeleton import ARM_AND_LEG, TRUE_SEGMENTS
+from biodance.virtual_lab.tolerances import LabTolerances
+
+PULL: dict[str, dict[str, float]] = {
+    "pelvis": {"right_hip_flexion": 4, "left_hip_flexion": 4, "lumbar_flexion": 4},
+    "lumbar": {},
+    "thorax": {"lumbar_flexion": 5, "lumbar_rotation": 5, "right_shoulder_adduction": 4, "left_shoulder_adduction": 4},
+    "head": {"neck_flexion": 3},
+    "thigh": {"hip_flexion": 11, "hip_rotation": 8, "knee_flexion": 11},
+    "shank": {"knee_flexion": 7, "ankle_dorsiflexion": 8},
+    "foot": {"ankle_dorsiflexion": 5},
+    "upper_arm": {"shoulder_flexion": 7, "shoulder_adduction": 7, "elbow_flexion": 6},
+    "forearm": {"elbow_flexion": 5, "forearm_pronation": 7},
+    "hand": {"wrist_flexion": 4},
+}
+"""mm per rad, rms length of the pull of each joint on a marker: a deep squat moves thigh markers 18 mm, shank markers 8 mm (Lahkar 2021;
+thigh and shank in gait 18 and 17 mm, PMC8631460; back 9-10 mm, Zemp 2014; foot < 9 mm)."""
+SHOULDER_PULL = {"shoulder_flexion": 12.0, "shoulder_adduction": 12.0}
+"""mm per rad for SHO and RBAK: the shoulder blade slides on the thorax."""
+SWING = {"THI": 9.0, "UPA": 10.0, "TIB": 12.0, "FRM": 14.0}
+"""Hz, natural frequency of flesh and marker where muscle lies under the skin: 9 Hz sags by 3 mm under gravity. Judgement, set so that
+fast squats leave residuals of the size of those in Jovic et al. (Table II).
+"""
+BONY = 16.0
+"""Hz, the same where bone lies under the skin: all other markers."""
+DRIFT = 0.0005
+"""m rms per axis, slower than 0.5 Hz."""
+
+
+@dataclass(frozen=True, eq=False)
+class SoftTissue:
+    """Coefficients of one person in one session: ``pull`` (n, K, 3) m/rad per true joint; ``sag`` (K,) s² multiplies the specific force."""
+
+    pull: Array
+    sag: Array
+
+
+def draw_soft_tissue(person: Person, session: int, tolerances: LabTolerances) -> SoftTissue:
+    """Draw the coefficients: most belong to the person, a share of their variance to the day (clothes, tape, place on the skin)."""
+    joints = [joint.name for joint in person.body.joints]
+    markers = person.body.markers
+    scale = np.zeros((len(joints), len(markers.names)))
+    swing = np.zeros(len(markers.names))
+    for k, (name, segment) in enumerate(zip(markers.names, markers.segment, strict=True)):
+        kind, side = _kind_and_side(TRUE_SEGMENTS[segment], name)
+        pulls = dict(PULL[kind])
+        if name.endswith(("SHO", "BAK")):
+            pulls |= SHOULDER_PULL
+        for joint, millimetres in pulls.items():
+            full = joint if joint in joints else f"{side}_{joint}"
+            scale[joints.index(full), k] = 0.001 * millimetres / np.sqrt(3.0)
+        swing[k] = 2 * np.pi * SWING.get(name[1:], BONY)
+    own, day = stream(person.seed, "soft tissue"), stream(person.seed, "soft tissue", str(session))
+    share = tolerances.soft_tissue_day
+    shape = (*scale.shape, 3)
+    direction = np.sqrt(1 - share) * own.normal(size=shape) + np.sqrt(share) * day.normal(size=shape)
+    soft = np.exp(0.3 * (np.sqrt(1 - share) * own.normal(size=swing.size) + np.sqrt(share) * day.normal(size=swing.size)))
+    return SoftTissue(tolerances.soft_tissue * scale[..., None] * direction, tolerances.soft_tissue * soft / swing**2)
+
+
+def _kind_and_side(segment: str, marker: str) -> tuple[str, str]:
+    """Return the kind of a true segment, and the side of the body a marker lies on."""
+    kind = next((k for k in ARM_AND_LEG if segment.endswith(k)), segment)
+    return kind, "right" if marker.startswith("R") else "left"
+
+
+def reference_angles(person: Person) -> Array:
+    """Return the true joint angles (39,) rad of the posture in which the markers were glued: upright, arms slightly away."""
+    angles = dict(person.habits.angles)
+    for side in ("right", "left"):
+        flexion, adduction, rotation, elbow = np.radians(STAND.values[f"{side}_arm"])
+        angles |= {f"{side}_shoulder_flexion": flexion, f"{side}_shoulder_adduction": adduction}
+        angles |= {f"{side}_shoulder_rotation": rotation, f"{side}_elbow_flexion": elbow}
+    return np.array([angles.get(joint.name, 0.0) for joint in person.body.joints])
+
+
+def skin_displacement(
+    tissue: SoftTissue, person: Person, poses: Poses, angles: Array, acceleration: Array, time: Array, rng: np.random.Generator
+) -> Array:
+    """Return the displacement (T, K, 3) m of the markers against the bone, lab frame.
+
+    ``poses`` of the true body, ``angles`` (T, 39) rad, ``acceleration`` (T, K, 3) m/s² of the marker places fixed to the bone, at
+    ``time`` (T,) s.
+    """
+    markers: SegmentMarkers = person.body.markers
+    turn = poses.rotation[:, list(markers.segment)]
+    local = np.einsum("tj,jki->tki", angles - reference_angles(person), tissue.pull)
+    specific = np.einsum("tkji,tkj->tki", turn, GRAVITY - acceleration)
+    local += tissue.sag[:, None] * (specific - np.array([0.0, GRAVITY[2], 0.0]))
+    if np.any(tissue.sag):
+        drift = smooth_noise(rng, time, columns=3 * len(markers.names), cutoff=0.3)
+        local += DRIFT * drift.reshape(time.size, len(markers.names), 3)
+    return np.einsum("tkij,tkj->tki", turn, local)
+
 
 LONGEST_GAP, SHORTEST_GAP = 0.30, 0.05
 """s."""
@@ -23,11 +121,11 @@ def true_markers(performance: Performance, tissue: SoftTissue, time: Array, rng:
     markers = person.body.markers
     bone = pose.points(markers.segment, np.array(markers.position))
     acceleration = make_interp_spline(time, bone, k=5).derivative(2)(time)
-    return bone + displaced(tissue, person, pose, motion.q[:, 7:], acceleration, time, rng)
+    return bone + skin_displacement(tissue, person, pose, motion.q[:, 7:], acceleration, time, rng)
 
 
 def film(
-    performance: Performance, tissue: SoftTissue, time: Array, tilt: Array, tolerances: Tolerances, rng: np.random.Generator
+    performance: Performance, tissue: SoftTissue, time: Array, tilt: Array, tolerances: LabTolerances, rng: np.random.Generator
 ) -> Markers:
     """Return what the cameras deliver at ``time`` (T,) s, lab frame; ``tilt`` (3, 3) turns true-vertical axes into the laboratory's.
 

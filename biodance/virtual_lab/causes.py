@@ -1,8 +1,4 @@
-"""All causes that can be hidden in a session, by name, and where each is hidden: in the files, in the person, around the person.
-
-Names and parameters are those of the diagnosis, so that its answer can be compared with the truth; the code is another. ``UNKNOWN`` are
-the causes that no diagnosis has a description of: they must come out as "unexplained".
-"""
+"""All causes that can be hidden in a session, by name: in the files, in the person, around the person; asked for in words."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -11,12 +7,15 @@ from typing import Any, Literal
 import numpy as np
 
 from biodance.errors import BiodanceError, UnknownName
-from biodance.virtual_lab import amplifier_faults, camera_faults, faults, forces
-from biodance.virtual_lab.laboratory import Fault, Visit
-from biodance.virtual_lab.loose_masses import sloshing_load, wobbling_mass
+from biodance.records import Subject
+from biodance.virtual_lab import faults, forces
+from biodance.virtual_lab import instrument_faults as amplifier_faults
+from biodance.virtual_lab import instrument_faults as camera_faults
+from biodance.virtual_lab.forces import sloshing_load, wobbling_mass
+from biodance.virtual_lab.laboratory import FIRST_VISIT, Fault, LabVisit
 from biodance.virtual_lab.merge import load_on
-from biodance.virtual_lab.performance import Force
-from biodance.virtual_lab.person import AddedLoad, Person
+from biodance.virtual_lab.performance import AppliedForce
+from biodance.virtual_lab.person import AddedLoad, Person, make_person
 from biodance.virtual_lab.protocol import Protocol
 
 
@@ -51,7 +50,7 @@ class Scene:
 
     person: Person
     protocol: Protocol
-    visit: Visit
+    visit: LabVisit
     loads: tuple[AddedLoad, ...] = ()
 
 
@@ -73,7 +72,7 @@ FAULTS: dict[str, Callable[..., Fault]] = {
         camera_faults.swaying_cameras,
     )
 }  # fmt: skip
-FORCES: dict[str, Callable[..., Force]] = {
+FORCES: dict[str, Callable[..., AppliedForce]] = {
     f.__name__: f
     for f in (forces.external_contact, forces.body_weight_support, forces.slack_harness, forces.table_edge, forces.spinning_wheel)
 }
@@ -196,3 +195,46 @@ def conceal(cause: Hidden, scene: Scene) -> Scene:
         raise UnknownName.of("effect that the virtual laboratory can make", cause.name, CAUSES)
     fault = fault_of(cause, clock_of(scene.protocol))
     return replace(scene, visit=replace(visit, faults=(*visit.faults, fault)))
+
+
+def parse_cause(text: str) -> Hidden:
+    """Read ``NAME:target=...,param=value,...``; a value of three numbers is written ``0.05;0;0``.
+
+    Raises
+    ------
+    BiodanceError
+        The text does not have that form; the message shows the part and an example.
+    """
+    name, _, rest = text.partition(":")
+    values: dict[str, tuple[float, ...]] = {}
+    target = ""
+    for part in filter(None, rest.split(",")):
+        key, equals, value = part.partition("=")
+        if not equals:
+            raise BiodanceError(f"--effect {text}: {part!r} is not parameter=value. Example: plate_gain:target=Fz,gain=0.04")
+        if key == "target":
+            target = value
+            continue
+        try:
+            values[key] = tuple(float(number) for number in value.split(";"))
+        except ValueError as error:
+            raise BiodanceError(f"--effect {text}: {value!r} is not a number (or three, as 0.05;0;0), for {key}.") from error
+    return Hidden(name, target, values)
+
+
+def hide(
+    hidden: tuple[Hidden, ...], subject: Subject, protocol: Protocol, *, seed: int, visit: LabVisit = FIRST_VISIT
+) -> tuple[LabVisit, tuple[AddedLoad, ...]]:
+    """Return the visit with the causes, and the loads that the person carries.
+
+    Raises
+    ------
+    UnknownName
+        A cause, target or channel does not exist.
+    BiodanceError
+        A parameter is missing, or a mass is not positive.
+    """
+    scene = Scene(make_person(subject, seed, tolerances=visit.tolerances, session=visit.number), protocol, visit)
+    for cause in hidden:
+        scene = conceal(cause, scene)
+    return scene.visit, scene.loads

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.records import Array
-from biodance.virtual_lab.protocol import FIELDS, STAND, Posture, Step, TrialPlan
+from biodance.virtual_lab.protocol import FIELDS, STAND, ProtocolPosture, ProtocolStep, TrialPlan
 from biodance.virtual_lab.randomness import smooth_noise
 
 COLUMNS = {
@@ -48,7 +48,7 @@ def septic(x: Array) -> Array:
     return x**4 * (35 + x * (-84 + x * (70 - 20 * x)))
 
 
-def _there_and_back(time: Array, step: Step) -> Array:
+def _there_and_back(time: Array, step: ProtocolStep) -> Array:
     """Return (T,) 0..1 of a step in cycles: a cosine whose pace rises and falls smoothly over one period."""
     x, count = time / step.period, step.cycles
     fine = np.linspace(0.0, count + 1.0, 400 * (count + 1) + 1)
@@ -60,7 +60,7 @@ def _there_and_back(time: Array, step: Step) -> Array:
     return 0.5 - 0.5 * np.cos(2 * np.pi * turned)
 
 
-def _target(posture: Posture, rng: np.random.Generator, sloppiness: float) -> Array:
+def _target(posture: ProtocolPosture, rng: np.random.Generator, sloppiness: float) -> Array:
     """Return the values (WIDTH,) of a posture as this person does it this time."""
     target = np.zeros(WIDTH)
     for name, value in posture.values.items():

@@ -13,16 +13,16 @@ from scipy.special import logsumexp
 
 from biodance.body.body import UPRIGHT, Body
 from biodance.errors import BiodanceError
+from biodance.motion.ik.legs import Leg
 from biodance.motion.kinematics import axis_rotation, poses, quaternion_matrix
-from biodance.motion.legs import Leg
 from biodance.records import Array, Motion, frozen_array
 from biodance.virtual_lab.choreography import COLUMNS, RAISED, SHIFT, SIDES, WIDTH, Curves
 from biodance.virtual_lab.performance import MARGIN, NODE_RATE, Performance, keep_balance
 from biodance.virtual_lab.person import Person
-from biodance.virtual_lab.posing import STRAIGHT, Pose, Stance, Z, upper_body
+from biodance.virtual_lab.posing import STRAIGHT, FootStance, Pose, Z, upper_body
 from biodance.virtual_lab.protocol import TrialPlan
 from biodance.virtual_lab.randomness import smooth_noise, stream
-from biodance.virtual_lab.tolerances import REALISTIC, Tolerances
+from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances
 
 ARM = ("shoulder_flexion", "shoulder_adduction", "shoulder_rotation", "elbow_flexion")
 FREE_LEG = ("hip_flexion", "hip_adduction", "hip_rotation", "knee_flexion", "ankle_dorsiflexion")
@@ -89,7 +89,7 @@ def copy_dance(
     centre: Array,
     heading: float = 0.0,
     performer: Performer = Performer(),
-    tolerances: Tolerances = REALISTIC,
+    tolerances: LabTolerances = REALISTIC,
 ) -> Performance:
     """Let ``person`` copy one stretch around ``centre`` (2,) m, facing ``heading`` rad; the same arguments give the same motion."""
     rng = stream(person.seed, "copy", str(session), shown.name)
@@ -140,7 +140,7 @@ def _depth(shown: Shown) -> Array:
     return np.asarray((highest - pose.position[:, 0, 2]) / length)
 
 
-def _height(person: Person, pose: Pose, curves: Curves, stance: Stance, xy: Array) -> Array:
+def _height(person: Person, pose: Pose, curves: Curves, stance: FootStance, xy: Array) -> Array:
     """Return the height (T,) m of the pelvis of the person who copies."""
     raised, ankle = np.stack([curves.raised(side) for side in SIDES], axis=1), np.array([stance.ankle[side] for side in SIDES])
     highest, length = _reach(person.body, pose.pelvis_turn, xy, ankle, raised)
@@ -162,7 +162,7 @@ def _reach(body: Body, turn: Array, xy: Array, ankle: Array, raised: Array) -> t
     return -logsumexp(-SOFTNESS * np.array(tops), axis=0) / SOFTNESS, float(np.mean(lengths))
 
 
-def _stand(person: Person, shown: Shown, centre: Array, heading: float, rng: np.random.Generator) -> tuple[Stance, Array, Array]:
+def _stand(person: Person, shown: Shown, centre: Array, heading: float, rng: np.random.Generator) -> tuple[FootStance, Array, Array]:
     """Return where the person's feet are, the plan's middle (2,) m and the turn (3, 3) from the plan to the lab."""
     turn = axis_rotation(Z, np.array([heading]))[0]
     middle = shown.ankle[:, :2].mean(axis=0) + np.array([0.04, 0.0])
@@ -171,4 +171,4 @@ def _stand(person: Person, shown: Shown, centre: Array, heading: float, rng: np.
         xy = centre + turn[:2, :2] @ (shown.ankle[k, :2] - middle) + 0.005 * rng.normal(size=2)
         ankle[side] = np.array([*xy, person.size["ankle_height"]])
         foot[side] = axis_rotation(Z, np.array([heading + 0.02 * rng.normal()]))[0] @ UPRIGHT
-    return Stance(heading, ankle, foot, {side: ankle[side][:2] for side in SIDES}), middle, turn
+    return FootStance(heading, ankle, foot, {side: ankle[side][:2] for side in SIDES}), middle, turn

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from biodance.errors import UnknownName
-from biodance.lab.write_c3d import PlateRecording
+from biodance.lab.c3d.write import PlateRecording
 from biodance.records import CHANNELS, Array, Markers
 from biodance.virtual_lab.laboratory import Fault, Recording
 
@@ -58,7 +58,7 @@ def _with_plate(recording: Recording, index: int, plate: PlateRecording) -> Reco
     return replace(recording, plates=(*recording.plates[:index], plate, *recording.plates[index + 1 :]))
 
 
-def channel_index(target: str) -> int:
+def fault_channel(target: str) -> int:
     """Return the place 0..5 of the channel that a target names last; UnknownName lists the channels."""
     name = target.rpartition(":")[2]
     if name not in CHANNELS:
@@ -79,13 +79,13 @@ def _axis(target: str) -> Array:
 
 def plate_offset(target: str, offset: float) -> Fault:
     """Add a constant ``offset`` (N or N·m) to a channel."""
-    step = offset * np.eye(6)[channel_index(target)]
+    step = offset * np.eye(6)[fault_channel(target)]
     return on_plate(target, lambda wrench, _: wrench + step)
 
 
 def plate_gain(target: str, gain: float) -> Fault:
     """Let a channel read ``gain`` (0.04 = 4 %) too much."""
-    factor = np.ones(6) + gain * np.eye(6)[channel_index(target)]
+    factor = np.ones(6) + gain * np.eye(6)[fault_channel(target)]
     return on_plate(target, lambda wrench, _: wrench * factor)
 
 
@@ -93,13 +93,13 @@ def plate_crosstalk(target: str, ratio: float) -> Fault:
     """Let ``ratio`` of the first channel show in the second; target ``Fz->My``."""
     first, _, second = target.rpartition(":")[2].partition("->")
     mixing = np.eye(6)
-    mixing[channel_index(second), channel_index(first)] += ratio
+    mixing[fault_channel(second), fault_channel(first)] += ratio
     return on_plate(target, lambda wrench, _: wrench @ mixing.T)
 
 
 def plate_drift(target: str, drift: float, clock: dict[str, tuple[float, float]]) -> Fault:
     """Let the zero of a channel wander by ``drift`` over the session; ``clock`` says from and to where in the session each trial lies."""
-    unit = np.eye(6)[channel_index(target)]
+    unit = np.eye(6)[fault_channel(target)]
 
     def change(wrench: Array, recording: Recording) -> Array:
         start, stop = clock[recording.name]
@@ -182,19 +182,19 @@ def unit_error(target: str, factor: float) -> Fault:
 
 def axis_error(target: str) -> Fault:
     """Turn the sign of one channel."""
-    sign = np.ones(6) - 2 * np.eye(6)[channel_index(target)]
+    sign = np.ones(6) - 2 * np.eye(6)[fault_channel(target)]
     return on_plate(target, lambda wrench, _: wrench * sign)
 
 
 def clipping(target: str, limit: float) -> Fault:
     """Let a channel saturate at +-``limit`` (N or N·m)."""
-    bound = np.where(np.eye(6)[channel_index(target)] > 0, limit, np.inf)
+    bound = np.where(np.eye(6)[fault_channel(target)] > 0, limit, np.inf)
     return on_plate(target, lambda wrench, _: np.clip(wrench, -bound, bound))
 
 
 def mains_hum(target: str, amplitude: float) -> Fault:
     """Add a 50 Hz sine of ``amplitude`` (N or N·m) to a channel."""
-    unit = amplitude * np.eye(6)[channel_index(target)]
+    unit = amplitude * np.eye(6)[fault_channel(target)]
 
     def change(wrench: Array, recording: Recording) -> Array:
         return wrench + np.sin(2 * np.pi * 50 * np.arange(len(wrench)) / recording.analog_rate)[:, None] * unit

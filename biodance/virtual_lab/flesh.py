@@ -8,12 +8,11 @@ density gives J >= 0; a linear map of the body's points, J -> A J A', keeps it s
 import numpy as np
 
 from biodance.records import Array, Sip
-from biodance.virtual_lab.proportions import Proportions
 from biodance.virtual_lab.randomness import stream
-from biodance.virtual_lab.skeleton import ARM_AND_LEG, SEGMENTS
+from biodance.virtual_lab.skeleton import ARM_AND_LEG, TRUE_SEGMENTS, Proportions
 
-Row = tuple[float, float, float, float, float, float, float]
-FEMALE: dict[str, Row] = {
+PopulationRow = tuple[float, float, float, float, float, float, float]
+FEMALE: dict[str, PopulationRow] = {
     "pelvis": (13.9, -0.080, 0.772, 0.0, 0.950, 1.050, 0.820),
     "lumbar": (4.3, 0.150, 0.590, 0.0, 0.650, 0.780, 0.520),
     "thorax": (25.2, 0.030, 0.458, 0.0, 0.380, 0.320, 0.340),
@@ -25,7 +24,7 @@ FEMALE: dict[str, Row] = {
     "forearm": (1.4, 0.010, -0.435, 0.010, 0.265, 0.117, 0.257),
     "hand": (0.53, 0.040, -0.760, 0.024, 0.580, 0.400, 0.570),
 }
-MALE: dict[str, Row] = {
+MALE: dict[str, PopulationRow] = {
     "pelvis": (13.3, 0.000, 0.720, 0.0, 1.020, 1.060, 0.960),
     "lumbar": (3.3, 0.120, 0.640, 0.0, 0.540, 0.660, 0.430),
     "thorax": (29.2, 0.015, 0.445, 0.0, 0.420, 0.330, 0.360),
@@ -40,7 +39,7 @@ MALE: dict[str, Row] = {
 """Mass in per cent of the body; CoM (x, y, z) and radii of gyration about it (x, y, z) in fractions of the segment's length."""
 
 
-def pseudo_inertia(mass: float, com: Array, radii: Array) -> Array:
+def true_pseudo_inertia(mass: float, com: Array, radii: Array) -> Array:
     """Return J (4, 4) of a body of ``mass`` kg with CoM (3,) m and radii of gyration (3,) m about the frame's axes at the CoM."""
     gyration = np.asarray(radii, float) ** 2
     second = np.diag(0.5 * gyration.sum() - gyration)
@@ -51,7 +50,7 @@ def pseudo_inertia(mass: float, com: Array, radii: Array) -> Array:
     return out
 
 
-def parameters(J: Array) -> Array:
+def parameters_of_inertia(J: Array) -> Array:
     """Return phi (10,) = [m, mc, Ixx, Ixy, Iyy, Ixz, Iyz, Izz] of a pseudo-inertia, about the frame's origin (kg, kg·m, kg·m²)."""
     second = J[:3, :3]
     inertia = np.trace(second) * np.eye(3) - second
@@ -70,7 +69,7 @@ def of_parameters(phi: Array) -> Array:
     return out
 
 
-def placed(J: Array, rotation: Array, position: Array) -> Array:
+def place_inertia(J: Array, rotation: Array, position: Array) -> Array:
     """Return J of the same body in another frame, given the pose (3, 3), (3,) m of its present frame in the other."""
     move = np.eye(4)
     move[:3, :3], move[:3, 3] = rotation, position
@@ -80,9 +79,9 @@ def placed(J: Array, rotation: Array, position: Array) -> Array:
 def _stretched(J: Array, rng: np.random.Generator, shape_sd: float, com_sd: float) -> Array:
     """Return J after a random linear map of the body about its CoM and a random shift, both relative to the body's own size."""
     com = J[:3, 3] / J[3, 3]
-    centred = placed(J, np.eye(3), -com)
+    centred = place_inertia(J, np.eye(3), -com)
     size = np.sqrt(np.diag(centred)[:3] / J[3, 3])
-    return placed(centred, np.eye(3) + shape_sd * rng.normal(size=(3, 3)), com + com_sd * size * rng.normal(size=3))
+    return place_inertia(centred, np.eye(3) + shape_sd * rng.normal(size=(3, 3)), com + com_sd * size * rng.normal(size=3))
 
 
 def draw_sip(size: Proportions, mass: float, sex: str, seed: int, *, mass_sd: float, side_sd: float, shape_sd: float, com_sd: float) -> Sip:
@@ -95,14 +94,14 @@ def draw_sip(size: Proportions, mass: float, sex: str, seed: int, *, mass_sd: fl
     rng = stream(seed, "flesh")
     factor = {kind: np.exp(mass_sd * rng.normal()) for kind in table}
     bodies = []
-    for segment in SEGMENTS:
+    for segment in TRUE_SEGMENTS:
         kind = next((k for k in ARM_AND_LEG if segment.endswith(k)), segment)
         percent, *rest = table[kind]
         place = size[kind] * np.array(rest)
         if segment.startswith("left"):
             place[2] = -place[2]
         heavy = percent * factor[kind] * np.exp(side_sd * rng.normal() if kind != segment else 0.0)
-        bodies.append(_stretched(pseudo_inertia(heavy, place[:3], place[3:]), rng, shape_sd, com_sd))
+        bodies.append(_stretched(true_pseudo_inertia(heavy, place[:3], place[3:]), rng, shape_sd, com_sd))
     total = sum(J[3, 3] for J in bodies)
-    phi = np.concatenate([parameters(J * mass / total) for J in bodies])
-    return Sip(SEGMENTS, phi, np.zeros((phi.size, phi.size)))
+    phi = np.concatenate([parameters_of_inertia(J * mass / total) for J in bodies])
+    return Sip(TRUE_SEGMENTS, phi, np.zeros((phi.size, phi.size)))

@@ -1,18 +1,19 @@
-"""What acts on the person beside gravity and the plates: rails, ropes, table edges, a spinning wheel.
+"""What acts on the person beside gravity and the plates: rails, ropes, table edges, and masses on springs."""
 
-Every builder returns a `Force`: the wrench (T, 6) on the person about the lab origin, along the true motion of the true body. Written
-without the formulas of ``effects``; where a force grips is a point of the true segments.
-"""
+from dataclasses import dataclass
 
 import numpy as np
 
 from biodance.errors import UnknownName
 from biodance.motion.kinematics import Poses, poses
+from biodance.motion.regressor import GRAVITY
 from biodance.records import Array
 from biodance.virtual_lab.choreography import septic
-from biodance.virtual_lab.performance import Force, Performance
+from biodance.virtual_lab.merge import CARRIERS, MERGED
+from biodance.virtual_lab.performance import AppliedForce, Performance
+from biodance.virtual_lab.person import AddedLoad, Person
 from biodance.virtual_lab.randomness import stream
-from biodance.virtual_lab.skeleton import SEGMENTS
+from biodance.virtual_lab.skeleton import TRUE_SEGMENTS
 
 GRIPS = {
     "right_forearm_hand": ("right_hand", (0.0, -0.08, 0.0)),
@@ -31,7 +32,7 @@ TOUCH, GRIP = 1.6, 0.25
 """s: how long a hand stays on a rail, and how long it takes to take the load and to leave it."""
 
 
-def at_point(force: Array, point: Array) -> Array:
+def force_at_point(force: Array, point: Array) -> Array:
     """Return forces (T, 3) at ``point`` (T, 3) as wrenches (T, 6) about the lab origin."""
     return np.concatenate([force, np.cross(point, force)], axis=1)
 
@@ -46,7 +47,7 @@ def grip(target: str, pose: Poses) -> Array:
     if target not in GRIPS:
         raise UnknownName.of("part of the virtual body that something can touch", target, tuple(GRIPS))
     segment, place = GRIPS[target]
-    return pose.points([SEGMENTS.index(segment)], np.array([place]))[:, 0]
+    return pose.points([TRUE_SEGMENTS.index(segment)], np.array([place]))[:, 0]
 
 
 def touches(time: Array, rng: np.random.Generator, *, every: float) -> Array:
@@ -58,19 +59,19 @@ def touches(time: Array, rng: np.random.Generator, *, every: float) -> Array:
     return out
 
 
-def external_contact(target: str, force: float) -> Force:
+def external_contact(target: str, force: float) -> AppliedForce:
     """Touch a rail or be held by a helper: touches of ``force`` (N), mostly from below, at a part of the body; one in every 4 s."""
 
     def act(performance: Performance, time: Array) -> Array:
         rng = stream(performance.person.seed, "touch", target, performance.plan.name)
         direction = np.array([0.35 * rng.normal(), 0.35 * rng.normal(), 1.0])
         strength = force * touches(time, rng, every=4.0) * (performance.plan.role != "static")
-        return at_point(strength[:, None] * direction / np.linalg.norm(direction), grip(target, true_poses(performance, time)))
+        return force_at_point(strength[:, None] * direction / np.linalg.norm(direction), grip(target, true_poses(performance, time)))
 
     return act
 
 
-def body_weight_support(target: str, force: float, stiffness: float) -> Force:
+def body_weight_support(target: str, force: float, stiffness: float) -> AppliedForce:
     """Hang a rope from the ceiling to a harness at the pelvis: ``force`` (N) when standing, ``stiffness`` (N/m) as the person goes down."""
 
     def act(performance: Performance, time: Array) -> Array:
@@ -80,12 +81,12 @@ def body_weight_support(target: str, force: float, stiffness: float) -> Force:
         away = np.array([*np.mean(list(performance.stance.pressure.values()), axis=0), CEILING]) - point
         length = np.linalg.norm(away, axis=1)
         tension = np.maximum(force + stiffness * (length - length[0]), 0.0)
-        return at_point((tension / length)[:, None] * away, point)
+        return force_at_point((tension / length)[:, None] * away, point)
 
     return act
 
 
-def slack_harness(target: str, stiffness: float) -> Force:
+def slack_harness(target: str, stiffness: float) -> AppliedForce:
     """Hang a safety rope that is loose until the hips are 5 cm down, then pulls with the square of its stretch (N = stiffness m²)."""
 
     def act(performance: Performance, time: Array) -> Array:
@@ -93,12 +94,12 @@ def slack_harness(target: str, stiffness: float) -> Force:
         away = np.array([*np.mean(list(performance.stance.pressure.values()), axis=0), CEILING]) - point
         length = np.linalg.norm(away, axis=1)
         stretch = np.maximum(length - length[0] - 0.05, 0.0)
-        return at_point((stiffness * stretch**2 / length)[:, None] * away, point)
+        return force_at_point((stiffness * stretch**2 / length)[:, None] * away, point)
 
     return act
 
 
-def table_edge(target: str, force: float) -> Force:
+def table_edge(target: str, force: float) -> AppliedForce:
     """Let the right thigh run against furniture: short horizontal pushes of ``force`` (N), one in every 2 s, of either sign."""
 
     def act(performance: Performance, time: Array) -> Array:
@@ -107,17 +108,81 @@ def table_edge(target: str, force: float) -> Force:
         for start in np.arange(time[0], time[-1] - 2.0, 2.0):
             begin = start + rng.uniform(0.0, 1.4)
             strength += rng.choice([-1.0, 1.0]) * force * np.sin(np.pi * np.clip((time - begin) / 0.6, 0.0, 1.0)) ** 2
-        return at_point(strength[:, None] * np.array([0.8, 0.6, 0.0]), grip("right_thigh", true_poses(performance, time)))
+        return force_at_point(strength[:, None] * np.array([0.8, 0.6, 0.0]), grip("right_thigh", true_poses(performance, time)))
 
     return act
 
 
-def spinning_wheel(target: str, momentum: float) -> Force:
+def spinning_wheel(target: str, momentum: float) -> AppliedForce:
     """Carry a wheel that spins in a rucksack about the right-left axis of the chest: its angular ``momentum`` (N·m·s) resists turning."""
 
     def act(performance: Performance, time: Array) -> Array:
-        turn = true_poses(performance, time).rotation[:, SEGMENTS.index("thorax")]
+        turn = true_poses(performance, time).rotation[:, TRUE_SEGMENTS.index("thorax")]
         spin = momentum * turn[:, :, 2]
         return np.concatenate([np.zeros((time.size, 3)), -np.gradient(spin, time, axis=0)], axis=1)
 
     return act
+
+
+@dataclass(frozen=True)
+class Spring:
+    """How a loose mass hangs: ``frequency`` Hz undamped, ``damping`` ratio, ``free`` (3,) 1 or 0 = it can move along lab x, y, z."""
+
+    frequency: float
+    damping: float
+    free: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+
+FLESH = {"trunk_head": Spring(5.5, 0.3)}
+"""Viscera; other flesh hangs on `MUSCLE`."""
+MUSCLE = Spring(9.0, 0.3)
+LIQUID = Spring(1.3, 0.08, (1.0, 1.0, 0.0))
+
+
+def swing(acceleration: Array, step: float, spring: Spring) -> tuple[Array, Array]:
+    """Return z (T, 3) m and z'' (T, 3) m/s² of a mass on a spring whose foot moves with ``acceleration`` (T, 3) m/s², from rest.
+
+    ``step`` s between samples; exact for an acceleration that is linear between samples.
+    """
+    from scipy.signal import cont2discrete, lfilter, ss2tf
+
+    w, damping = 2 * np.pi * spring.frequency, spring.damping
+    A, B = np.array([[0.0, 1.0], [-w * w, -2 * damping * w]]), np.array([[0.0], [-1.0]])
+    discrete = cont2discrete((A, B, np.eye(2), np.zeros((2, 1))), step, method="foh")
+    numerator, denominator = ss2tf(*discrete[:4])
+    z, rate = (lfilter(row, denominator, acceleration, axis=0) for row in numerator)
+    return z, -w * w * z - 2 * damping * w * rate - acceleration
+
+
+def loose(segment: str, place: Array, mass: float, spring: Spring) -> AppliedForce:
+    """Return the force of ``mass`` kg, counted as fixed at ``place`` (3,) m of a true segment but hanging there on a spring."""
+
+    def act(performance: Performance, time: Array) -> Array:
+        from scipy.interpolate import make_interp_spline
+
+        point = true_poses(performance, time).points([TRUE_SEGMENTS.index(segment)], place[None])[:, 0]
+        acceleration = make_interp_spline(time, point, k=5).derivative(2)(time)
+        z, z2 = (np.array(spring.free) * curve for curve in swing(acceleration, float(time[1] - time[0]), spring))
+        moment = np.cross(point + z, mass * (acceleration + z2 - GRAVITY)) - np.cross(point, mass * (acceleration - GRAVITY))
+        return -np.concatenate([mass * z2, moment], axis=1)
+
+    return act
+
+
+def wobbling_mass(person: Person, target: str, mass: float) -> AppliedForce:
+    """Return the force of ``mass`` kg of the flesh of one of the 12 segments that is not fixed to its bone."""
+    segment = _carrier(target)
+    return loose(segment, person.body.sip.com[TRUE_SEGMENTS.index(segment)], mass, FLESH.get(target, MUSCLE))
+
+
+def sloshing_load(person: Person, target: str, mass: float, sloshing: float) -> tuple[AddedLoad, AppliedForce]:
+    """Carry a vessel of ``mass`` kg behind one of the 12 segments, of which ``sloshing`` kg move: the load, and what sloshing adds."""
+    segment = _carrier(target)
+    place = person.body.sip.com[TRUE_SEGMENTS.index(segment)] + np.array([-0.16, 0.0, 0.0])
+    return AddedLoad(segment, mass, place, np.full(3, 0.05)), loose(segment, place, sloshing, LIQUID)
+
+
+def _carrier(target: str) -> str:
+    if target not in MERGED:
+        raise UnknownName.of("segment of the 12-segment model", target, tuple(MERGED))
+    return CARRIERS.get(target, target)

@@ -7,18 +7,17 @@ from pathlib import Path
 import numpy as np
 
 from biodance.errors import BiodanceError
-from biodance.lab.write_c3d import PlateRecording, write_c3d
+from biodance.lab.c3d.write import PlateRecording, write_c3d
 from biodance.records import Array, Markers, Role, frozen_array
-from biodance.virtual_lab.cameras import film
-from biodance.virtual_lab.performance import Force, Performance, perform
+from biodance.virtual_lab.cameras import SoftTissue, draw_soft_tissue, film
+from biodance.virtual_lab.performance import AppliedForce, Performance, perform
 from biodance.virtual_lab.person import Person
 from biodance.virtual_lab.placement import MARKER_RADIUS
-from biodance.virtual_lab.plates import HALF_SIZE, TruePlate, digitise, lay_plate, measure
+from biodance.virtual_lab.plates import HALF_SIZE, TruePlate, digitise, lay_plate, sense_plate
 from biodance.virtual_lab.protocol import TrialPlan
 from biodance.virtual_lab.randomness import stream
 from biodance.virtual_lab.skeleton import small_rotation
-from biodance.virtual_lab.soft_tissue import SoftTissue, draw_soft_tissue
-from biodance.virtual_lab.tolerances import REALISTIC, Tolerances
+from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +59,7 @@ Fault = Callable[[Recording], Recording]
 
 
 @dataclass(frozen=True, eq=False)
-class Visit:
+class LabVisit:
     """The day of a session: its ``number`` (another day: markers glued, postures performed, instruments drawn anew), the ``laboratory``,
     the ``tolerances`` of everything, and ``faults`` that change each recording (markers, raw analog samples, parameters) before it is
     written.
@@ -72,15 +71,15 @@ class Visit:
 
     number: int = 0
     laboratory: Laboratory = field(default_factory=Laboratory)
-    tolerances: Tolerances = REALISTIC
+    tolerances: LabTolerances = REALISTIC
     faults: tuple[Fault, ...] = ()
     tilt: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    forces: tuple[Force, ...] = ()
+    forces: tuple[AppliedForce, ...] = ()
     joint_shifts: Mapping[str, Array] = field(default_factory=dict)
     marker_shifts: Mapping[str, Array] = field(default_factory=dict)
 
 
-FIRST_VISIT = Visit()
+FIRST_VISIT = LabVisit()
 """One plate, realistic tolerances, no fault."""
 
 
@@ -88,13 +87,13 @@ FIRST_VISIT = Visit()
 class Instruments:
     """What is true of a visit's instruments: plates, the cameras' ``tilt`` (3, 3) from true vertical, the skin under the markers."""
 
-    visit: Visit
+    visit: LabVisit
     plates: tuple[TruePlate, ...]
     tilt: Array
     tissue: SoftTissue
 
 
-def set_up(person: Person, visit: Visit) -> Instruments:
+def set_up(person: Person, visit: LabVisit) -> Instruments:
     """Draw the instruments of one visit."""
     laboratory, tolerances, session = visit.laboratory, visit.tolerances, visit.number
     rng = stream(person.seed, "instruments", str(session))
@@ -127,13 +126,13 @@ def record(performance: Performance, instruments: Instruments) -> Recording:
     markers = film(performance, instruments.tissue, time, instruments.tilt, tolerances, stream(seed, "cameras", str(session), plan.name))
     noise = stream(seed, "plates", str(session), plan.name)
     plates = tuple(
-        digitise(measure(performance, plate, fine, instruments.tilt, tolerances, noise), plate, kind=lab.plate_type, bits=lab.bits)
+        digitise(sense_plate(performance, plate, fine, instruments.tilt, tolerances, noise), plate, kind=lab.plate_type, bits=lab.bits)
         for plate in instruments.plates
     )
     return Recording(plan.name, plan.role, markers, plates, analog_rate, measurements(performance.person, session, tolerances))
 
 
-def measurements(person: Person, session: int, tolerances: Tolerances) -> dict[str, dict[str, list[float] | list[str] | float | str]]:
+def measurements(person: Person, session: int, tolerances: LabTolerances) -> dict[str, dict[str, list[float] | list[str] | float | str]]:
     """Return the C3D groups with the subject's typed measurements, as Vicon stores them (mm, kg), with errors of tape and calliper."""
     rng = stream(person.seed, "measurements", str(session))
     size = person.size
@@ -147,7 +146,7 @@ def measurements(person: Person, session: int, tolerances: Tolerances) -> dict[s
         "HandThickness": size["hand_thickness"],
     }
     processing: dict[str, list[float] | list[str] | float | str] = {
-        "Bodymass": declared_mass(person, session, tolerances),
+        "Bodymass": scale_reading(person, session, tolerances),
         "Height": 1000.0 * person.subject.stature,
         "InterAsisDistance": 1000.0 * size["asis"] + 1000.0 * tolerances.measure * rng.normal(),
         "MarkerDiameter": 2000.0 * MARKER_RADIUS,
@@ -158,7 +157,7 @@ def measurements(person: Person, session: int, tolerances: Tolerances) -> dict[s
     return {"PROCESSING": processing, "SUBJECTS": {"NAMES": [person.subject.name or "virtual"]}}
 
 
-def declared_mass(person: Person, session: int, tolerances: Tolerances) -> float:
+def scale_reading(person: Person, session: int, tolerances: LabTolerances) -> float:
     """Return the body mass kg that the scale showed, in steps of 0.1 kg, without loads."""
     error = tolerances.scale * stream(person.seed, "scale", str(session)).normal()
     return round(person.subject.mass + error, 1) if tolerances.scale else person.subject.mass

@@ -6,10 +6,10 @@ from biodance.body.body import Body
 from biodance.errors import UnknownName
 from biodance.motion.kinematics import poses
 from biodance.records import Array, Sip
-from biodance.virtual_lab.flesh import of_parameters, parameters, placed
+from biodance.virtual_lab.cameras import reference_angles
+from biodance.virtual_lab.flesh import of_parameters, parameters_of_inertia, place_inertia
 from biodance.virtual_lab.person import AddedLoad, Person
-from biodance.virtual_lab.skeleton import SEGMENTS
-from biodance.virtual_lab.soft_tissue import reference_angles
+from biodance.virtual_lab.skeleton import TRUE_SEGMENTS
 
 MERGED: dict[str, tuple[str, tuple[str, ...]]] = {
     "pelvis": ("", ("pelvis",)),
@@ -28,10 +28,10 @@ MERGED: dict[str, tuple[str, tuple[str, ...]]] = {
 """Each of the 12 segments: the true joint whose frame it is written in ("" = the root), and the true segments it consists of."""
 CARRIERS = {"trunk_head": "thorax", "right_forearm_hand": "right_forearm", "left_forearm_hand": "left_forearm"}
 """The true segment that carries a load on a merged one."""
-Frames = dict[str, tuple[Array, Array]]
+TrueFrames = dict[str, tuple[Array, Array]]
 
 
-def _frames(person: Person, body: Body, q: Array | None = None) -> tuple[Frames, Frames]:
+def _frames(person: Person, body: Body, q: Array | None = None) -> tuple[TrueFrames, TrueFrames]:
     """Return the poses (3, 3), (3,) m of the 12 frames and of the 16 segments at ``q`` (46,), by default as the markers were glued."""
     if q is None:
         q = body.neutral
@@ -43,7 +43,7 @@ def _frames(person: Person, body: Body, q: Array | None = None) -> tuple[Frames,
         merged[segment] = (
             (pose.joint_rotation[0, j], pose.joint_position[0, j]) if joint else (pose.root_rotation[0], pose.root_position[0])
         )
-    return merged, {name: (pose.rotation[0, i], pose.position[0, i]) for i, name in enumerate(SEGMENTS)}
+    return merged, {name: (pose.rotation[0, i], pose.position[0, i]) for i, name in enumerate(TRUE_SEGMENTS)}
 
 
 def merged_sip(person: Person, body: Body) -> Sip:
@@ -58,8 +58,8 @@ def merged_sip(person: Person, body: Body) -> Sip:
         total = np.zeros((4, 4))
         for part in parts:
             part_turn, part_place = true[part]
-            total += placed(of_parameters(body.sip.of(part)), turn.T @ part_turn, turn.T @ (part_place - place))
-        phi.append(parameters(total))
+            total += place_inertia(of_parameters(body.sip.of(part)), turn.T @ part_turn, turn.T @ (part_place - place))
+        phi.append(parameters_of_inertia(total))
     flat = np.concatenate(phi)
     return Sip(tuple(MERGED), flat, np.zeros((flat.size, flat.size)))
 
@@ -94,6 +94,6 @@ def place_in_12(person: Person, load: AddedLoad) -> tuple[str, Array]:
     return segment, turn.T @ (part_origin + part_turn @ load.place - origin)
 
 
-def poses_12(person: Person, q: Array) -> Frames:
+def poses_12(person: Person, q: Array) -> TrueFrames:
     """Return the lab poses (3, 3), (3,) m of the 12 true joint frames at the true configuration ``q`` (46,)."""
     return _frames(person, person.body, q)[0]

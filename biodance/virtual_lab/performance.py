@@ -16,10 +16,10 @@ from biodance.motion.regressor import GRAVITY
 from biodance.records import Array, Motion, Wrench
 from biodance.virtual_lab.choreography import Curves, choreograph
 from biodance.virtual_lab.person import Person
-from biodance.virtual_lab.posing import Height, Pose, Stance, pelvis_height, stand_on_feet, take_stance, upper_body
+from biodance.virtual_lab.posing import FootStance, Height, Pose, pelvis_height, stand_on_feet, take_stance, upper_body
 from biodance.virtual_lab.protocol import TrialPlan
 from biodance.virtual_lab.randomness import smooth_noise, stream
-from biodance.virtual_lab.tolerances import REALISTIC, Tolerances
+from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances
 
 NODE_RATE = 100.0
 """Hz of the nodes of the motion's spline; the instruments sample the spline at their own rates."""
@@ -41,12 +41,12 @@ class Performance:
 
     plan: TrialPlan
     person: Person
-    stance: Stance
+    stance: FootStance
     curves: Curves
     node_time: Array
     nodes: Array
     balance_error: float = 0.0
-    forces: "tuple[Force, ...]" = ()
+    forces: "tuple[AppliedForce, ...]" = ()
 
     @cached_property
     def _splines(self) -> tuple[Any, Any, Any]:
@@ -76,12 +76,12 @@ class Performance:
         return np.clip(np.interp(time, self.curves.time, self.curves["shift"][:, 0]), 0.0, 1.0)
 
 
-Force = Callable[[Performance, Array], Array]
+AppliedForce = Callable[[Performance, Array], Array]
 """Wrench (T, 6) N, N·m on the person about the lab origin, true vertical, at times (T,) s, equidistant."""
 
 
 def perform(
-    person: Person, plan: TrialPlan, session: int, *, tolerances: Tolerances = REALISTIC, centre: Array, heading: float = 0.0
+    person: Person, plan: TrialPlan, session: int, *, tolerances: LabTolerances = REALISTIC, centre: Array, heading: float = 0.0
 ) -> Performance:
     """Let ``person`` perform one trial around ``centre`` (2,) m of the lab floor, facing ``heading`` rad from lab x (anticlockwise).
 
@@ -98,7 +98,7 @@ def perform(
     return Performance(plan, person, stance, curves, time, nodes, error)
 
 
-def wanted_pressure(curves: Curves, stance: Stance) -> Array:
+def wanted_pressure(curves: Curves, stance: FootStance) -> Array:
     """Return where the centre of pressure should be (T, 2) m: between the feet by the share of weight, plus the posture's lean."""
     right = curves["shift"]
     forward, sideways = curves["lean"][:, :1], curves["lean"][:, 1:]
@@ -109,7 +109,7 @@ def wanted_pressure(curves: Curves, stance: Stance) -> Array:
 
 
 def keep_balance(
-    person: Person, pose: Pose, curves: Curves, stance: Stance, target: Array, *, height: Height = pelvis_height
+    person: Person, pose: Pose, curves: Curves, stance: FootStance, target: Array, *, height: Height = pelvis_height
 ) -> tuple[Array, float]:
     """Return the configurations (T, 46) whose zero-moment point follows ``target`` (T, 2) m, and the largest distance left, m.
 

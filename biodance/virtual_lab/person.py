@@ -9,12 +9,11 @@ import numpy as np
 from biodance.body.body import Body, Foot, JointLimits
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import Array, Sip, Subject, frozen_array
-from biodance.virtual_lab.flesh import draw_sip, of_parameters, parameters, pseudo_inertia
+from biodance.virtual_lab.flesh import draw_sip, of_parameters, parameters_of_inertia, true_pseudo_inertia
 from biodance.virtual_lab.placement import glue_markers
-from biodance.virtual_lab.proportions import Proportions, draw_proportions
 from biodance.virtual_lab.randomness import stream
-from biodance.virtual_lab.skeleton import LIMITS_DEGREES, SEGMENTS, build_joints, mirrored
-from biodance.virtual_lab.tolerances import REALISTIC, Tolerances
+from biodance.virtual_lab.skeleton import LIMITS_DEGREES, TRUE_SEGMENTS, Proportions, build_joints, draw_proportions, on_side
+from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,8 +28,8 @@ class AddedLoad:
     radii: Array = field(default_factory=lambda: np.full(3, 0.03))
 
     def __post_init__(self) -> None:
-        if self.segment not in SEGMENTS:
-            raise UnknownName.of("segment of the true body", self.segment, SEGMENTS)
+        if self.segment not in TRUE_SEGMENTS:
+            raise UnknownName.of("segment of the true body", self.segment, TRUE_SEGMENTS)
         if not 0 < self.mass < 30:
             raise BiodanceError(f"AddedLoad on {self.segment}: mass = {self.mass} kg; legal: above 0 and below 30 kg.")
         for name in ("place", "radii"):
@@ -66,9 +65,9 @@ class Person:
         """The true body with its loads: the one that moves on the plate."""
         phi = np.array(self.body.sip.phi)
         for load in self.loads:
-            i = 10 * SEGMENTS.index(load.segment)
-            phi[i : i + 10] += parameters(pseudo_inertia(load.mass, load.place, load.radii))
-        return replace(self.body, name="virtual person with loads", sip=Sip(SEGMENTS, phi, self.body.sip.covariance))
+            i = 10 * TRUE_SEGMENTS.index(load.segment)
+            phi[i : i + 10] += parameters_of_inertia(true_pseudo_inertia(load.mass, load.place, load.radii))
+        return replace(self.body, name="virtual person with loads", sip=Sip(TRUE_SEGMENTS, phi, self.body.sip.covariance))
 
     @property
     def mass(self) -> float:
@@ -96,7 +95,7 @@ def make_person(
     subject: Subject,
     seed: int,
     *,
-    tolerances: Tolerances = REALISTIC,
+    tolerances: LabTolerances = REALISTIC,
     loads: tuple[AddedLoad, ...] = (),
     session: int = 0,
     joint_shifts: Mapping[str, Array] = NO_SHIFTS,
@@ -115,10 +114,10 @@ def make_person(
     joints = build_joints(size)
     lower, upper = np.radians([LIMITS_DEGREES[j.name.removeprefix("right_").removeprefix("left_")] for j in joints]).T
     limits = JointLimits(lower, upper, np.full(len(joints), 15.0), np.full(len(joints), -400.0), np.full(len(joints), 400.0))
-    boxes = np.stack([_box(sip.of(segment)) for segment in SEGMENTS])
+    boxes = np.stack([_box(sip.of(segment)) for segment in TRUE_SEGMENTS])
     body = Body(
         "virtual person",
-        SEGMENTS,
+        TRUE_SEGMENTS,
         joints,
         sip,
         limits,
@@ -136,7 +135,7 @@ def _with_joints_moved(size: Proportions, shifts: Mapping[str, Array]) -> Propor
         if joint not in MOVABLE:
             raise UnknownName.of("joint of the virtual subject whose centre can be moved", joint, MOVABLE)
         side, _, kind = joint.rpartition("_")
-        moved[SEGMENTS.index(f"{side}_{BEYOND[kind]}" if side else {"lumbar": "lumbar", "neck": "head"}[kind])] += shift
+        moved[TRUE_SEGMENTS.index(f"{side}_{BEYOND[kind]}" if side else {"lumbar": "lumbar", "neck": "head"}[kind])] += shift
     return replace(size, centre_shift=moved)
 
 
@@ -159,8 +158,8 @@ def _sole(size: Proportions, side: str) -> Foot:
         (0.55 * front, -half),
         (back, -0.6 * half),
     ]
-    outline = [mirrored(np.array([x, -size["ankle_height"], z]), side) for x, z in corners]
-    return Foot(SEGMENTS.index(f"{side}_foot"), np.array(outline if side == "right" else outline[::-1]))
+    outline = [on_side(np.array([x, -size["ankle_height"], z]), side) for x, z in corners]
+    return Foot(TRUE_SEGMENTS.index(f"{side}_foot"), np.array(outline if side == "right" else outline[::-1]))
 
 
 def _habits(size: Proportions, seed: int) -> Habits:

@@ -8,9 +8,8 @@ import numpy as np
 
 from biodance.body.body import SegmentMarkers
 from biodance.records import Array
-from biodance.virtual_lab.proportions import Proportions
 from biodance.virtual_lab.randomness import stream
-from biodance.virtual_lab.skeleton import SEGMENTS, mirrored
+from biodance.virtual_lab.skeleton import TRUE_SEGMENTS, Proportions, on_side
 
 MARKER_RADIUS = 0.007
 """m; 14 mm markers, the plug-in-gait default."""
@@ -74,11 +73,11 @@ def ideal_places(size: Proportions) -> tuple[tuple[str, ...], tuple[int, ...], A
             if stem in WAND_RISE:
                 point[1] += WAND_RISE[stem] * size[kind] * (1.0 if side == "right" else -1.0)
             names.append(letter + stem)
-            segments.append(SEGMENTS.index(kind if kind in SEGMENTS else f"{side}_{kind}"))
-            places.append(mirrored(point, side))
+            segments.append(TRUE_SEGMENTS.index(kind if kind in TRUE_SEGMENTS else f"{side}_{kind}"))
+            places.append(on_side(point, side))
     for name, (kind, place) in _single(size).items():
         names.append(name)
-        segments.append(SEGMENTS.index(kind))
+        segments.append(TRUE_SEGMENTS.index(kind))
         places.append(np.array(place))
     return tuple(names), tuple(segments), np.array(places)
 

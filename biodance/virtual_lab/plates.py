@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.lab.write_c3d import PlateRecording
+from biodance.lab.c3d.write import PlateRecording
 from biodance.records import Array
 from biodance.virtual_lab.performance import Performance
 from biodance.virtual_lab.skeleton import small_rotation
-from biodance.virtual_lab.tolerances import Tolerances
+from biodance.virtual_lab.tolerances import LabTolerances
 
 HALF_SIZE = np.array([0.2, 0.3])
 """m, half sides along plate x and y."""
@@ -53,7 +53,7 @@ class TruePlate:
     side: str = "both"
 
 
-def lay_plate(centre: Array, heading: float, side: str, tolerances: Tolerances, rng: np.random.Generator) -> TruePlate:
+def lay_plate(centre: Array, heading: float, side: str, tolerances: LabTolerances, rng: np.random.Generator) -> TruePlate:
     """Return a plate whose long side lies along ``heading`` (rad from lab x), surveyed at ``centre`` (3,) m and truly a little
     elsewhere.
     """
@@ -88,8 +88,8 @@ def contact_wrench(performance: Performance, time: Array, side: str) -> Array:
     return np.concatenate([weight * wrench.force, weight * (np.cross(place, wrench.force) + twist)], axis=1)
 
 
-def measure(
-    performance: Performance, plate: TruePlate, time: Array, tilt: Array, tolerances: Tolerances, rng: np.random.Generator
+def sense_plate(
+    performance: Performance, plate: TruePlate, time: Array, tilt: Array, tolerances: LabTolerances, rng: np.random.Generator
 ) -> Array:
     """Return what the plate's six channels say (S, 6) N, N·m at ``time`` (S,) s: reaction on the subject, plate axes, about the plate's
     origin.

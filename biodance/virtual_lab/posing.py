@@ -7,13 +7,13 @@ import numpy as np
 from scipy.special import logsumexp
 
 from biodance.body.body import UPRIGHT
+from biodance.motion.ik.legs import LEG, Leg, soft_limit
 from biodance.motion.kinematics import axis_rotation
-from biodance.motion.legs import LEG, Leg, soft_limit
 from biodance.records import Array
 from biodance.virtual_lab.choreography import SIDES, Curves
 from biodance.virtual_lab.person import Person
 from biodance.virtual_lab.randomness import smooth_noise
-from biodance.virtual_lab.tolerances import Tolerances
+from biodance.virtual_lab.tolerances import LabTolerances
 
 X, Y, Z = np.eye(3)
 SHARPNESS = 250.0
@@ -25,7 +25,7 @@ STRAIGHT = np.radians(9.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Stance:
+class FootStance:
     """Where the feet stand in one trial: ``heading`` rad from lab x; per side ``ankle`` (3,) m, ``foot_turn`` (3, 3), ``pressure`` (2,)
     m where the foot presses when it carries the weight.
     """
@@ -36,7 +36,7 @@ class Stance:
     pressure: dict[str, Array]
 
 
-def take_stance(person: Person, kind: str, centre: Array, heading: float, rng: np.random.Generator) -> Stance:
+def take_stance(person: Person, kind: str, centre: Array, heading: float, rng: np.random.Generator) -> FootStance:
     """Return the feet of a trial around ``centre`` (2,) m: parallel, or the right foot 0.1 m in front; re-placed by about 5 mm and 1
     degree.
     """
@@ -55,7 +55,7 @@ def take_stance(person: Person, kind: str, centre: Array, heading: float, rng: n
         ankle[side] = np.array([*xy, person.size["ankle_height"]])
         turn[side] = axis_rotation(Z, np.array([yaw]))[0] @ UPRIGHT
         pressure[side] = xy + 0.19 * person.size["sole"] * np.array([np.cos(yaw), np.sin(yaw)])
-    return Stance(heading, ankle, turn, pressure)
+    return FootStance(heading, ankle, turn, pressure)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ class Pose:
     pelvis_turn: Array
 
 
-def upper_body(person: Person, curves: Curves, stance: Stance, tolerances: Tolerances, rng: np.random.Generator) -> Pose:
+def upper_body(person: Person, curves: Curves, stance: FootStance, tolerances: LabTolerances, rng: np.random.Generator) -> Pose:
     """Return the pose above the legs: the posture's angles, shared out over the true joints, with what no instruction asks for."""
     body, t, time = person.body, tolerances, curves.time
     angle = np.zeros((time.size, len(body.joints)))
@@ -132,7 +132,7 @@ def _quaternion(turn: Array) -> Array:
     return xyzw
 
 
-def pelvis_height(person: Person, pose: Pose, curves: Curves, stance: Stance, xy: Array) -> Array:
+def pelvis_height(person: Person, pose: Pose, curves: Curves, stance: FootStance, xy: Array) -> Array:
     """Return the height (T,) m of the pelvis origin over ``xy`` (T, 2): as high as the planted legs allow, minus the posture's depth."""
     tops, lengths = [], []
     for side in SIDES:
@@ -147,11 +147,11 @@ def pelvis_height(person: Person, pose: Pose, curves: Curves, stance: Stance, xy
     return height - curves["depth"][:, 0] * np.mean(lengths)
 
 
-Height = Callable[[Person, Pose, Curves, Stance, Array], Array]
+Height = Callable[[Person, Pose, Curves, FootStance, Array], Array]
 """Says how high (T,) m the pelvis is over ``xy`` (T, 2) m, as `pelvis_height` does."""
 
 
-def stand_on_feet(person: Person, pose: Pose, curves: Curves, stance: Stance, xy: Array, *, height: Height = pelvis_height) -> Array:
+def stand_on_feet(person: Person, pose: Pose, curves: Curves, stance: FootStance, xy: Array, *, height: Height = pelvis_height) -> Array:
     """Return q (T, 46) with the pelvis over ``xy`` (T, 2) m and the legs that hold the planted feet exactly still."""
     q = pose.q.copy()
     q[:, :2], q[:, 2] = xy, height(person, pose, curves, stance, xy)

@@ -1,8 +1,13 @@
-"""What the subject is asked to do: postures, steps and trials (the file format is explained in ``protocol_file``)."""
+"""What the subject is asked to do: postures, steps and trials, read from TOML and checked."""
 
+import math
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, cast
 
-from biodance.records import Role
+from biodance.errors import BiodanceError, UnknownName
+from biodance.library import locate, read_toml
+from biodance.records import ROLES, Role
 
 FIELDS: dict[str, tuple[float, ...]] = {
     "pelvis": (0.0, 0.0, 0.0),
@@ -21,7 +26,7 @@ STANCES = ("parallel", "right_forward")
 
 
 @dataclass(frozen=True)
-class Posture:
+class ProtocolPosture:
     """One posture: ``values`` by field (degrees; depth as a fraction, lean in m, shift as a share); ``raised`` feet ("right", "left")."""
 
     name: str
@@ -30,10 +35,10 @@ class Posture:
 
 
 @dataclass(frozen=True)
-class Step:
+class ProtocolStep:
     """Go to a posture in ``move`` s and hold it for ``hold`` s, or go there and back ``cycles`` times, ``period`` s each."""
 
-    to: Posture
+    to: ProtocolPosture
     move: float = 1.0
     hold: float = 0.5
     cycles: int = 0
@@ -52,7 +57,7 @@ class TrialPlan:
     name: str
     role: Role
     stance: str
-    steps: tuple[Step, ...]
+    steps: tuple[ProtocolStep, ...]
     lead: float = 1.0
 
     @property
@@ -68,8 +73,126 @@ class Protocol:
     name: str
     description: str
     trials: tuple[TrialPlan, ...]
-    postures: dict[str, Posture] = field(default_factory=dict)
+    postures: dict[str, ProtocolPosture] = field(default_factory=dict)
 
 
-STAND = Posture("stand", dict(FIELDS))
+STAND = ProtocolPosture("stand", dict(FIELDS))
 """Upright, knees nearly straight, arms slightly away from the body."""
+
+
+STEP_KEYS = ("to", "move", "hold", "cycles", "period")
+
+
+def read_protocol(name_or_path: str | Path) -> Protocol:
+    """Return a shipped protocol by name, or one of the user's by the path of its TOML file.
+
+    Raises
+    ------
+    UnknownName
+        No shipped protocol has this name and no such file exists.
+    BiodanceError
+        The file contradicts the format; the message names the file, the place, the value and what would be legal.
+    """
+    path = Path(name_or_path)
+    if path.suffix != ".toml":
+        path = locate("protocols", str(name_or_path))
+    raw = read_toml(path)
+    postures = {"stand": STAND}
+    for name, given in _table(path, raw, "postures").items():
+        postures[name] = _posture(path, name, given, postures)
+    trials = raw.get("trials", [])
+    if not isinstance(trials, list) or not trials:
+        raise BiodanceError(f"{path}: has no [[trials]]. Describe at least one trial.")
+    plans = tuple(_trial(path, number, given, postures) for number, given in enumerate(trials, start=1))
+    names = [plan.name for plan in plans]
+    if len(set(names)) < len(names):
+        raise BiodanceError(f"{path}: trial names occur twice ({', '.join(names)}). Give every trial its own name.")
+    return Protocol(str(raw.get("name", path.stem)), str(raw.get("description", "")), plans, postures)
+
+
+def _table(path: Path, raw: dict[str, Any], key: str) -> dict[str, Any]:
+    value = raw.get(key, {})
+    if not isinstance(value, dict):
+        raise BiodanceError(f"{path}: [{key}] must be a table, found {type(value).__name__}.")
+    return value
+
+
+def _numbers(path: Path, where: str, value: object, count: int) -> tuple[float, ...]:
+    listed = value if isinstance(value, list) else [value]
+    good = all(isinstance(x, int | float) and not isinstance(x, bool) and math.isfinite(x) for x in listed)
+    if not good or len(listed) != count:
+        raise BiodanceError(f"{path}: {where} = {value!r}; expected {count} finite number{'s' if count > 1 else ''}.")
+    return tuple(float(cast(float, x)) for x in listed)
+
+
+def _posture(path: Path, name: str, given: Any, known: dict[str, ProtocolPosture]) -> ProtocolPosture:
+    if not isinstance(given, dict):
+        raise BiodanceError(f"{path}: posture {name!r} must be a table, found {given!r}.")
+    base = given.get("based_on", "stand")
+    if base not in known:
+        raise UnknownName.of(f"posture written before {name!r} in {path}", str(base), tuple(known))
+    values, raised = dict(known[base].values), set(known[base].raised)
+    for key, value in given.items():
+        if key == "based_on":
+            continue
+        if key not in FIELDS:
+            raise UnknownName.of(f"field of posture {name!r} in {path}", key, (*FIELDS, "based_on"))
+        values[key] = _numbers(path, f"postures.{name}.{key}", value, len(FIELDS[key]))
+        raised |= {key.removesuffix("_leg")} if key.endswith("_leg") else set()
+    if len(raised) == 2:
+        raise BiodanceError(f"{path}: posture {name!r} raises both feet; one must stay on the plate.")
+    if raised and "shift" not in given:
+        values["shift"] = (0.0,) if "right" in raised else (1.0,)
+    if not 0 <= values["shift"][0] <= 1 or not 0 <= values["depth"][0] <= 0.6:
+        raise BiodanceError(
+            f"{path}: posture {name!r}: shift must be in 0..1 and depth in 0..0.6, found {values['shift']}, {values['depth']}."
+        )
+    return ProtocolPosture(name, values, frozenset(raised))
+
+
+def _trial(path: Path, number: int, given: Any, postures: dict[str, ProtocolPosture]) -> TrialPlan:
+    if not isinstance(given, dict) or "name" not in given:
+        raise BiodanceError(f"{path}: trial number {number} needs a name.")
+    name, role, stance = str(given["name"]), str(given.get("role", "fit")), str(given.get("stance", "parallel"))
+    if role not in ROLES:
+        raise UnknownName.of(f"role of trial {name!r} in {path}", role, ROLES)
+    if stance not in STANCES:
+        raise UnknownName.of(f"stance of trial {name!r} in {path}", stance, STANCES)
+    lead = _numbers(path, f"{name}.lead", given.get("lead", 1.0), 1)[0]
+    steps = tuple(_step(path, name, step, postures) for step in given.get("steps", []))
+    _check_feet(path, name, steps)
+    if steps and (steps[-1].to.raised or not steps[-1].cycles) and steps[-1].to.name != "stand":
+        steps = (*steps, ProtocolStep(STAND, move=1.3, hold=0.0))
+    if lead < 0 or (not steps and lead == 0):
+        raise BiodanceError(f"{path}: trial {name!r} lasts no time; give steps or a lead in seconds.")
+    return TrialPlan(name, role, stance, steps, lead)
+
+
+def _check_feet(path: Path, trial: str, steps: tuple[ProtocolStep, ...]) -> None:
+    """Refuse steps in which a foot would have to rise while the other one is still up, or within a cycle."""
+    up: frozenset[str] = frozenset()
+    for number, step in enumerate(steps, start=1):
+        if step.to.raised != up and (step.cycles or (up and step.to.raised)):
+            raise BiodanceError(
+                f"{path}: trial {trial!r}, step {number} to {step.to.name!r} changes which foot is up "
+                f"{'within a cycle' if step.cycles else 'without putting the other one down'}. Put a step with both feet down before it."
+            )
+        up = step.to.raised
+
+
+def _step(path: Path, trial: str, given: Any, postures: dict[str, ProtocolPosture]) -> ProtocolStep:
+    if not isinstance(given, dict) or given.get("to") not in postures:
+        wanted = given.get("to", given) if isinstance(given, dict) else given
+        raise UnknownName.of(f"posture of trial {trial!r} in {path}", str(wanted), tuple(postures))
+    for key in given:
+        if key not in STEP_KEYS:
+            raise UnknownName.of(f"key of a step of trial {trial!r} in {path}", key, STEP_KEYS)
+    seconds = {k: _numbers(path, f"{trial}.{k}", given[k], 1)[0] for k in ("move", "hold", "period") if k in given}
+    if any(value < 0.25 for key, value in seconds.items() if key != "hold") or seconds.get("hold", 0.0) < 0:
+        raise BiodanceError(
+            f"{path}: trial {trial!r}, step to {given['to']!r}: {seconds}; a person needs at least 0.25 s for a move or a cycle."
+        )
+    cycles = given.get("cycles", 0)
+    if not isinstance(cycles, int) or cycles < 0:
+        raise BiodanceError(f"{path}: trial {trial!r}: cycles = {cycles!r}; expected a whole number >= 1.")
+    return ProtocolStep(postures[given["to"]], cycles=cycles, **seconds)

@@ -12,10 +12,9 @@ import numpy as np
 
 from biodance.errors import BiodanceError
 from biodance.records import Subject
-from biodance.virtual_lab.laboratory import FIRST_VISIT, Visit, declared_mass, perform_in, record, set_up, write
+from biodance.virtual_lab.laboratory import FIRST_VISIT, LabVisit, perform_in, record, scale_reading, set_up, write
 from biodance.virtual_lab.person import AddedLoad, Person, make_person
-from biodance.virtual_lab.protocol import Protocol
-from biodance.virtual_lab.protocol_file import read_protocol
+from biodance.virtual_lab.protocol import Protocol, read_protocol
 from biodance.virtual_lab.truth import truth
 
 TRUTH = "truth"
@@ -23,14 +22,14 @@ TRUTH = "truth"
 LEGAL = {"mass": (30.0, 200.0, "kg"), "stature": (1.2, 2.2, "m")}
 
 
-def simulate(
+def simulate_session(
     subject: Subject,
     protocol: Protocol | str | Path,
     out: Path,
     *,
     seed: int,
     loads: tuple[AddedLoad, ...] = (),
-    visit: Visit = FIRST_VISIT,
+    visit: LabVisit = FIRST_VISIT,
 ) -> Path:
     """Write a simulated session into ``out`` (made here, must be empty or absent) and return that folder.
 
@@ -50,7 +49,7 @@ def simulate(
     instruments = set_up(person, visit)
     out.mkdir(parents=True, exist_ok=True)
     performances = []
-    declared = declared_mass(person, visit.number, visit.tolerances)
+    declared = scale_reading(person, visit.number, visit.tolerances)
     for trial in plan.trials:
         performance = perform_in(instruments, person, trial)
         recording = record(performance, instruments)

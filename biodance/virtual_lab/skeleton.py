@@ -1,17 +1,66 @@
-"""The true skeleton: 16 segments, 39 joint angles - more than any model that will read the recording has.
+"""The true size and skeleton of a virtual person: 16 segments, 39 joint angles - more than any model that reads the recording has."""
 
-Beyond the 12 segments and 23 angles of the reading model: lumbar and thoracic trunk, head, clavicles (massless), forearm pronation, wrists.
-Frames as everywhere: x anterior, y up, z right at zero angles; origin at the joint next to the pelvis.
-"""
+from dataclasses import dataclass
 
 import numpy as np
 
 from biodance.body.body import Joint
-from biodance.records import Array
-from biodance.virtual_lab.proportions import Proportions
+from biodance.records import Array, Subject
+from biodance.virtual_lab.randomness import stream
+
+FEMALE = {"thigh": 0.2354, "shank": 0.2410, "pelvis": 0.0640, "lumbar": 0.0776, "thorax": 0.2000, "head": 0.1509}
+MALE = {"thigh": 0.2441, "shank": 0.2446, "pelvis": 0.0525, "lumbar": 0.0853, "thorax": 0.1887, "head": 0.1571}
+FEMALE_ARM = {"upper_arm": 0.1559, "forearm": 0.1534, "hand": 0.0441}
+MALE_ARM = {"upper_arm": 0.1565, "forearm": 0.1599, "hand": 0.0452}
+BREADTHS = {
+    "ankle_height": 0.039,
+    "foot": 0.0755,
+    "sole": 0.152,
+    "sole_breadth": 0.055,
+    "hips": 0.100,
+    "asis": 0.130,
+    "shoulders": 0.185,
+    "shoulder_drop": 0.048,
+    "knee_width": 0.060,
+    "ankle_width": 0.041,
+    "elbow_width": 0.040,
+    "wrist_width": 0.033,
+    "hand_thickness": 0.016,
+}
+UPRIGHT_CHAIN = ("ankle_height", "shank", "thigh", "pelvis", "lumbar", "thorax", "head")
+
+
+@dataclass(frozen=True)
+class Proportions:
+    """``size`` m by name (the keys of this module's tables); ``centre_shift`` (16, 3) m moves the joint centres off the ideal anatomy,
+    ``axis_tilt`` (16, 3) rad turns the joint axes off it; rows in the order of ``skeleton.SEGMENTS``.
+    """
+
+    size: dict[str, float]
+    centre_shift: Array
+    axis_tilt: Array
+
+    def __getitem__(self, name: str) -> float:
+        """Return one size, m."""
+        return self.size[name]
+
+
+def draw_proportions(subject: Subject, seed: int, *, length_sd: float, centre_sd: float, tilt_sd: float) -> Proportions:
+    """Draw a person's true proportions: the upright chain from sole to vertex adds up to the stature exactly.
+
+    ``length_sd`` relative standard deviation of every length; ``centre_sd`` m and ``tilt_sd`` rad per axis for joint centres and axes.
+    """
+    rng = stream(seed, "proportions")
+    female = subject.sex == "F"
+    mean = (FEMALE if female else MALE) | (FEMALE_ARM if female else MALE_ARM) | BREADTHS
+    size = {name: fraction * subject.stature * (1 + length_sd * rng.normal()) for name, fraction in mean.items()}
+    stretch = subject.stature / sum(size[name] for name in UPRIGHT_CHAIN)
+    size |= {name: size[name] * stretch for name in UPRIGHT_CHAIN} | {"stature": subject.stature}
+    return Proportions(size, centre_sd * rng.normal(size=(16, 3)), tilt_sd * rng.normal(size=(16, 3)))
+
 
 ARM_AND_LEG = ("upper_arm", "forearm", "hand", "thigh", "shank", "foot")
-SEGMENTS = ("pelvis", "lumbar", "thorax", "head", *(f"{side}_{part}" for side in ("right", "left") for part in ARM_AND_LEG))
+TRUE_SEGMENTS = ("pelvis", "lumbar", "thorax", "head", *(f"{side}_{part}" for side in ("right", "left") for part in ARM_AND_LEG))
 X, Y, Z = np.eye(3)
 
 LIMITS_DEGREES = {
@@ -42,8 +91,8 @@ LIMITS_DEGREES = {
 }
 """Hard anatomical ranges, young adults (Norkin & White, AAOS/AMA tables); dorsiflexion as in the weight-bearing lunge."""
 
-Chain = tuple[tuple[str, Array], ...]
-ROTATIONS: dict[str, Chain] = {
+TrueChain = tuple[tuple[str, Array], ...]
+ROTATIONS: dict[str, TrueChain] = {
     "lumbar": (("flexion", -Z), ("bending", X), ("rotation", Y)),
     "thorax": (("flexion", -Z), ("bending", X), ("rotation", Y)),
     "neck": (("flexion", -Z), ("bending", X), ("rotation", Y)),
@@ -59,7 +108,7 @@ ROTATIONS: dict[str, Chain] = {
 """Rotations of every joint in order, axes for the right side; on the left the x and y axes change sign."""
 
 
-def mirrored(vector: Array, side: str) -> Array:
+def on_side(vector: Array, side: str) -> Array:
     """Return a place on the right side (3,) as the same place on ``side``."""
     return vector * np.array([1.0, 1.0, -1.0 if side == "left" else 1.0])
 
@@ -81,7 +130,7 @@ class _Builder:
     def add(self, joint: str, segment: str, parent: int, place: Array, *, side: str = "") -> int:
         """Append one anatomical joint (a chain of rotations) at ``place`` (3,) m in the parent's frame; return its last index."""
         rotations = ROTATIONS[joint]
-        row = SEGMENTS.index(segment) if segment else -1
+        row = TRUE_SEGMENTS.index(segment) if segment else -1
         for k, (motion, axis) in enumerate(rotations):
             axis = axis * ([-1.0, -1.0, 1.0] if side == "left" else [1.0, 1.0, 1.0])
             turn, shift = np.eye(3), np.zeros(3)
@@ -101,7 +150,7 @@ def build_joints(size: Proportions) -> tuple[Joint, ...]:
     """Return the 39 joints of a person of the given proportions."""
     build, stature = _Builder(size), size["stature"]
     for side in ("right", "left"):
-        hip = build.add("hip", f"{side}_thigh", -1, mirrored(np.array([0, 0, size["hips"] / 2]), side), side=side)
+        hip = build.add("hip", f"{side}_thigh", -1, on_side(np.array([0, 0, size["hips"] / 2]), side), side=side)
         knee = build.add("knee", f"{side}_shank", hip, -size["thigh"] * Y, side=side)
         build.add("ankle", f"{side}_foot", knee, -size["shank"] * Y, side=side)
     lumbar = build.add("lumbar", "lumbar", -1, np.array([-0.012 * stature, size["pelvis"], 0]))
@@ -110,8 +159,8 @@ def build_joints(size: Proportions) -> tuple[Joint, ...]:
     for side in ("right", "left"):
         sternum = np.array([0.025 * stature, size["thorax"] - 0.042 * stature, 0.012 * stature])
         shoulder = np.array([0.0, size["thorax"] - size["shoulder_drop"], size["shoulders"] / 2])
-        clavicle = build.add("clavicle", "", thorax, mirrored(sternum, side), side=side)
-        arm = build.add("shoulder", f"{side}_upper_arm", clavicle, mirrored(shoulder - sternum, side), side=side)
+        clavicle = build.add("clavicle", "", thorax, on_side(sternum, side), side=side)
+        arm = build.add("shoulder", f"{side}_upper_arm", clavicle, on_side(shoulder - sternum, side), side=side)
         elbow = build.add("elbow", "", arm, -size["upper_arm"] * Y, side=side)
         forearm = build.add("forearm", f"{side}_forearm", elbow, np.zeros(3), side=side)
         build.add("wrist", f"{side}_hand", forearm, -size["forearm"] * Y, side=side)

@@ -7,11 +7,11 @@ be set to zero alone (``dataclasses.replace``); ``PERFECT`` has all of them at z
 
 from dataclasses import dataclass, fields, replace
 
-from biodance.body.error_sizes import error_rows
+from biodance.body.tables.error_sizes import error_rows
 
 
 @dataclass(frozen=True)
-class Tolerances:
+class LabTolerances:
     """Standard deviations of what is drawn for a person, a session and a trial (SI units, radians); all >= 0."""
 
     # the person: drawn once from the person's seed
@@ -54,11 +54,11 @@ class Tolerances:
     plate_delay: float
 
 
-REALISTIC = Tolerances(**{row["quantity"]: float(row["sd"]) for row in error_rows(whose="virtual")})
-PERFECT = Tolerances(**{f.name: 0.0 for f in fields(Tolerances)})
+REALISTIC = LabTolerances(**{row["quantity"]: float(row["sd"]) for row in error_rows(whose="virtual")})
+PERFECT = LabTolerances(**{f.name: 0.0 for f in fields(LabTolerances)})
 
 
-def instruments_perfect(tolerances: Tolerances = REALISTIC) -> Tolerances:
+def instruments_perfect(tolerances: LabTolerances = REALISTIC) -> LabTolerances:
     """Return the tolerances with a perfect plate, perfect cameras and bone-fixed markers, but an unchanged person and motion."""
-    from_skin_on = [f.name for f in fields(Tolerances)][list(Tolerances.__dataclass_fields__).index("marker_placement") :]
+    from_skin_on = [f.name for f in fields(LabTolerances)][list(LabTolerances.__dataclass_fields__).index("marker_placement") :]
     return replace(tolerances, **dict.fromkeys(from_skin_on, 0.0))

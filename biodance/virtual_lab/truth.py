@@ -8,12 +8,12 @@ import numpy as np
 from biodance import __version__
 from biodance.body.body import Body
 from biodance.records import Array, Sip
-from biodance.virtual_lab.flesh import of_parameters, parameters, placed
+from biodance.virtual_lab.flesh import of_parameters, parameters_of_inertia, place_inertia
 from biodance.virtual_lab.laboratory import Instruments
 from biodance.virtual_lab.merge import merged_sip, place_in_12, poses_12
 from biodance.virtual_lab.performance import Performance
 from biodance.virtual_lab.person import AddedLoad, Person
-from biodance.virtual_lab.skeleton import SEGMENTS
+from biodance.virtual_lab.skeleton import TRUE_SEGMENTS
 
 
 def _segments(sip: Sip) -> list[dict[str, Any]]:
@@ -27,7 +27,7 @@ def _segments(sip: Sip) -> list[dict[str, Any]]:
 def _joint_centres(body: Body) -> dict[str, dict[str, Any]]:
     """Return where each anatomical joint sits in the frame of the true segment next to it on the side of the pelvis."""
     centres = {}
-    carried = {index: segment for segment, index in zip(SEGMENTS, body.segment_joint, strict=True)}
+    carried = {index: segment for segment, index in zip(TRUE_SEGMENTS, body.segment_joint, strict=True)}
     for joint in body.joints:
         if joint.parent in carried:
             centres[joint.name.rsplit("_", 1)[0]] = {"segment": carried[joint.parent], "place_m": joint.translation.tolist()}
@@ -54,7 +54,7 @@ def truth(person: Person, protocol: str, instruments: Instruments, performances:
         "joint_centres": _joint_centres(bare),
         "size_m": dict(person.size.size),
         "markers": {
-            name: {"segment": SEGMENTS[s], "place_m": place.tolist()}
+            name: {"segment": TRUE_SEGMENTS[s], "place_m": place.tolist()}
             for name, s, place in zip(markers.names, markers.segment, markers.position, strict=True)
         },
         "habits": asdict(person.habits),
@@ -102,7 +102,7 @@ def sip_in_frames(document: dict[str, Any], rotation: Array, position: Array, *,
     for segment, pose, turn, place in zip(document[key], document["static_pose"]["segments_12"], rotation, position, strict=True):
         own = np.array([segment["mass_kg"], *(segment["mass_kg"] * np.array(segment["com_m"])), *segment["inertia_kgm2"]])
         there = turn.T @ np.array(pose["rotation"]), turn.T @ (np.array(pose["position_m"]) - place)
-        phi.append(parameters(placed(of_parameters(own), *there)))
+        phi.append(parameters_of_inertia(place_inertia(of_parameters(own), *there)))
     flat = np.concatenate(phi)
     return Sip(tuple(segment["name"] for segment in document[key]), flat, np.zeros((flat.size, flat.size)))
 

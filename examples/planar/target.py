@@ -10,7 +10,7 @@ from biodance.records import Array, frozen_array
 
 if TYPE_CHECKING:
     from biodance.body.body import Body
-    from biodance.identify.base_parameters import BaseParameters
+    from biodance.identification.base_parameters import BaseParameters
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ def target(
 
     ``weights`` (N,) default to the segments' masses in the table (paper eq. 12).
     """
-    from biodance.identify.posterior import prior_factor
+    from biodance.identification.posterior import prior_factor
 
     wanted = {body.segment_index(name) for name in (segments if segments is not None else body.segments)}
     kinds = {"static": range(4), "dynamic": range(4, 10), "all": range(10)}[kind]

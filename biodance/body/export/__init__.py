@@ -14,7 +14,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.inertia import pseudo_inertia
-from biodance.body.solids import Solids
+from biodance.body.solids import SegmentSolids
 from biodance.discovery import Chosen, Family, missing_of
 from biodance.errors import BiodanceError, FileRefused
 
@@ -69,7 +69,7 @@ def refuse_impossible(body: Body) -> None:
             )
 
 
-def write_model(body: Body, path: str | Path, *, format: str | ModelFormat, source: str = "", solids: Solids | None = None) -> Path:
+def write_model(body: Body, path: str | Path, *, format: str | ModelFormat, source: str = "", solids: SegmentSolids | None = None) -> Path:
     """Write ``body`` as a model file and return the path; ``format`` is the name of one, or an object that writes it.
 
     ``solids`` a closed mesh by segment (m, in its axes) for the formats that show shapes (osim, glb).
@@ -95,7 +95,7 @@ def write_model(body: Body, path: str | Path, *, format: str | ModelFormat, sour
     return path
 
 
-def _content(member: ModelFormat, body: Body, source: str, solids: Solids | None) -> bytes:
+def _content(member: ModelFormat, body: Body, source: str, solids: SegmentSolids | None) -> bytes:
     """Return the file as bytes, by ``data`` or by ``text``."""
     write: Callable[..., str | bytes] = getattr(member, "data", None) or member.text
     if solids is not None and "solids" not in inspect.signature(write).parameters:
@@ -104,7 +104,7 @@ def _content(member: ModelFormat, body: Body, source: str, solids: Solids | None
     return content if isinstance(content, bytes) else str(content).encode()
 
 
-def _beside(member: ModelFormat, body: Body, solids: Solids | None) -> dict[str, bytes]:
+def _beside(member: ModelFormat, body: Body, solids: SegmentSolids | None) -> dict[str, bytes]:
     return dict(member.beside(body, solids)) if solids is not None and hasattr(member, "beside") else {}
 
 

@@ -8,8 +8,8 @@ x y z and rotations x y z (body-fixed) in the lab frame, z up.
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.inertia import lump_of
-from biodance.body.xml_text import plain, row
+from biodance.body.export._tree import plain_name, row
+from biodance.body.inertia import rigid_inertia
 from biodance.records import Array
 
 FORMAT = "biomod"
@@ -36,7 +36,7 @@ def text(body: Body, source: str) -> str:
     markers = body.markers
     for name, segment, position in zip(markers.names, markers.segment, markers.position, strict=True):
         lines += [
-            f"marker {plain(name)}",
+            f"marker {plain_name(name)}",
             f"  parent {body.segments[segment]}",
             f"  position {row(position)}",
             "  technical 1",
@@ -64,7 +64,7 @@ def _placed(rotation: Array, translation: Array) -> list[str]:
 
 
 def _mass(body: Body, segment: int) -> list[str]:
-    lump = lump_of(body.sip.of(body.segments[segment]))
+    lump = rigid_inertia(body.sip.of(body.segments[segment]))
     return [f"mass {row([lump.mass])}", "inertia", *(f"  {row(line)}" for line in lump.inertia), f"com {row(lump.com)}"]
 
 

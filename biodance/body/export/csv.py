@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.inertia import lump_of
+from biodance.body.inertia import rigid_inertia
 from biodance.errors import FileRefused
 from biodance.records import Array, Sip
 
@@ -77,7 +77,7 @@ def _unit(quantity: str) -> str:
 
 
 def _derived(phi: Array) -> Array:
-    lump = lump_of(phi)
+    lump = rigid_inertia(phi)
     return np.concatenate([lump.com, lump.inertia[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]])
 
 

@@ -7,8 +7,8 @@ say where the parameters come from, those of a segment its mass and centre of ma
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.segment_tree import WORLD, segment_tree
-from biodance.body.solids import Solids, segment_solids
+from biodance.body.export._tree import WORLD, segment_tree
+from biodance.body.solids import SegmentSolids, segment_solids
 from biodance.errors import BiodanceError
 
 FORMAT = "glb"
@@ -20,7 +20,7 @@ MARKER = 0.007
 WORLD_NODE = "world"
 
 
-def data(body: Body, source: str, solids: Solids | None = None) -> bytes:
+def data(body: Body, source: str, solids: SegmentSolids | None = None) -> bytes:
     """Return the .glb of ``body``; ``solids`` by segment instead of those in the boxes.
 
     Raises

@@ -8,9 +8,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.inertia import lump_of
-from biodance.body.segment_tree import WORLD, Branch, segment_tree
-from biodance.body.xml_text import add, document, row, six
+from biodance.body.export._tree import WORLD, Branch, add, row, segment_tree, six, xml_document
+from biodance.body.inertia import rigid_inertia
 
 FORMAT = "mjcf"
 SUFFIX = ".xml"
@@ -28,7 +27,7 @@ def text(body: Body, source: str) -> str:
     markers = body.markers
     for name, segment, position in zip(markers.names, markers.segment, markers.position, strict=True):
         add(made[segment], "site", name=name, pos=row(position), size="0.007")
-    return document(root, source)
+    return xml_document(root, source)
 
 
 def _body(parent: Element, body: Body, branch: Branch) -> Element:
@@ -42,7 +41,7 @@ def _body(parent: Element, body: Body, branch: Branch) -> Element:
         low, high = body.limits.lower[hinge.joint], body.limits.upper[hinge.joint]
         if low < high:
             joint.set("range", row([low, high]))
-    lump = lump_of(body.sip.of(name))
+    lump = rigid_inertia(body.sip.of(name))
     add(element, "inertial", pos=row(lump.com), mass=row([lump.mass]), fullinertia=six(lump.inertia))
     low, high = body.boxes[branch.segment]
     if np.all(high > low):

@@ -11,10 +11,9 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from biodance.body.body import UPRIGHT, Body
-from biodance.body.inertia import lump_of
-from biodance.body.segment_tree import WORLD, Branch, segment_tree
-from biodance.body.solids import Solids
-from biodance.body.xml_text import add, document, plain, row, six
+from biodance.body.export._tree import WORLD, Branch, add, plain_name, row, segment_tree, six, xml_document
+from biodance.body.inertia import rigid_inertia
+from biodance.body.solids import SegmentSolids
 from biodance.errors import BiodanceError
 from biodance.records import Array
 
@@ -27,7 +26,7 @@ ROOT_AXES = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 ROOT_TRANSLATIONS = ("tx", "ty", "tz")
 
 
-def text(body: Body, source: str, solids: Solids | None = None) -> str:
+def text(body: Body, source: str, solids: SegmentSolids | None = None) -> str:
     """Return the .osim of ``body``; with ``solids`` it names the meshes that ``beside`` writes.
 
     Raises
@@ -36,7 +35,7 @@ def text(body: Body, source: str, solids: Solids | None = None) -> str:
         The axes of one joint do not meet in one point or are more than three: OpenSim's custom joint cannot hold them.
     """
     root = Element("OpenSimDocument", Version="40000")
-    model = add(root, "Model", name=plain(body.name))
+    model = add(root, "Model", name=plain_name(body.name))
     add(model, "credits", source or "written by biodance")
     add(model, "gravity", row(UPRIGHT.T @ body.gravity if body.n_root else body.gravity))
     bodies = add(add(model, "BodySet", name="bodyset"), "objects")
@@ -46,25 +45,25 @@ def text(body: Body, source: str, solids: Solids | None = None) -> str:
         _joint(joints, body, branch)
     markers = add(add(model, "MarkerSet", name="markerset"), "objects")
     for name, segment, position in zip(body.markers.names, body.markers.segment, body.markers.position, strict=True):
-        marker = add(markers, "Marker", name=plain(name))
+        marker = add(markers, "Marker", name=plain_name(name))
         add(marker, "socket_parent_frame", f"/bodyset/{body.segments[segment]}")
         add(marker, "location", row(position))
         add(marker, "fixed", "true")
-    return document(root, source)
+    return xml_document(root, source)
 
 
-def beside(body: Body, solids: Solids) -> dict[str, bytes]:
+def beside(body: Body, solids: SegmentSolids) -> dict[str, bytes]:
     """Return the meshes (STL, m) by their path beside the model."""
     return {f"{GEOMETRY}/{_mesh_file(body, name)}": bytes(solids[name].export(file_type="stl")) for name in body.segments if name in solids}
 
 
 def _mesh_file(body: Body, segment: str) -> str:
-    return f"{plain(body.name)}_{segment}.stl"
+    return f"{plain_name(body.name)}_{segment}.stl"
 
 
-def _body(bodies: Element, body: Body, segment: int, solids: Solids) -> None:
+def _body(bodies: Element, body: Body, segment: int, solids: SegmentSolids) -> None:
     name = body.segments[segment]
-    lump = lump_of(body.sip.of(name))
+    lump = rigid_inertia(body.sip.of(name))
     element = add(bodies, "Body", name=name)
     low, high = body.boxes[segment]
     if name in solids:

@@ -8,8 +8,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.inertia import lump_of
-from biodance.body.xml_text import add, document, row
+from biodance.body.export._tree import add, row, xml_document
+from biodance.body.inertia import rigid_inertia
 from biodance.records import Array
 
 FORMAT = "urdf"
@@ -45,7 +45,7 @@ def text(body: Body, source: str) -> str:
         effort = max(-limits.torque_lower[i], limits.torque_upper[i])
         ranges = {"lower": limits.lower[i], "upper": limits.upper[i], "velocity": limits.velocity[i], "effort": effort}
         add(element, "limit", **{name: row([value]) for name, value in ranges.items()})
-    return document(root, source)
+    return xml_document(root, source)
 
 
 def _link(root: Element, body: Body, name: str, segment: int) -> None:
@@ -53,7 +53,7 @@ def _link(root: Element, body: Body, name: str, segment: int) -> None:
     link = add(root, "link", name=name)
     if segment < 0:
         return
-    lump = lump_of(body.sip.of(body.segments[segment]))
+    lump = rigid_inertia(body.sip.of(body.segments[segment]))
     inertial = add(link, "inertial")
     add(inertial, "origin", xyz=row(lump.com), rpy="0 0 0")
     add(inertial, "mass", value=row([lump.mass]))

@@ -16,7 +16,7 @@ import numpy as np
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.splines import rest_to_rest
-from biodance.identify.posterior import prior_factor
+from biodance.identification.posterior import prior_factor
 from biodance.motion.regressor import regressor
 from biodance.records import Array
 

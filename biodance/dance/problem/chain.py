@@ -15,9 +15,9 @@ import numpy as np
 from biodance.body.body import UPRIGHT, Body
 from biodance.body.pinocchio_model import load_pinocchio
 from biodance.errors import BiodanceError
-from biodance.motion.general_legs import GeneralLeg
+from biodance.motion.ik.general_legs import GeneralLeg
+from biodance.motion.ik.legs import Leg
 from biodance.motion.kinematics import axis_rotation
-from biodance.motion.legs import Leg
 from biodance.motion.regressor import GRAVITY
 from biodance.records import Array, Motion
 

@@ -18,7 +18,7 @@ from biodance.body.body import Body
 from biodance.body.inertia import TENSOR
 from biodance.dance.problem.chain import ROOT
 from biodance.dance.problem.state import State
-from biodance.identify.base_parameters import structural_base
+from biodance.identification.base_parameters import structural_base
 from biodance.records import Array
 
 

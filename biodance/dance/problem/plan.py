@@ -40,7 +40,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from biodance.body.limits import Range
+from biodance.body.human.limits import Range
 from biodance.dance.limits import Limit, family, join_limits, limits_with
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import locate, read_toml

@@ -144,7 +144,7 @@ def channel_index(target: str) -> int:
     return CHANNELS.index(target.rpartition(":")[2])
 
 
-def plate_axes(case: Case) -> tuple[str, ...]:
+def plate_axis_targets(case: Case) -> tuple[str, ...]:
     """Return the targets ``plate1:x``, ``plate1:y``, ``plate1:z`` of every plate."""
     return tuple(f"{plate.name}:{axis}" for plate in case.trial.plates for axis in "xyz")
 

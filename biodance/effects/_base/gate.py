@@ -1,10 +1,6 @@
-"""Checks that run before any statistics: a cause that a look at the recording settles is named here, and never fitted.
+"""Checks that run before any statistics: a cause that a look at the recording settles is named here, and never fitted."""
 
-Units, signs, swapped labels, clipping, hum and clocks are wrong or right, not a little of both. The author of a discrete effect writes
-ONE method, ``look``: what it checked, whether that is well, and in one plain sentence what it saw. A check that cannot judge a recording
-(no plate, no body) returns nothing.
-"""
-
+import re
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
@@ -57,3 +53,38 @@ class DiscreteEffect(ABC):
 def unit_of(target: str) -> str:
     """Return the unit of the channel that a target names last: N or N·m."""
     return "N·m" if target.rpartition(":")[2].startswith("M") else "N"
+
+
+Found = tuple[str, str, str]
+"""Target, the sentence, and the number in it ("" for none)."""
+
+
+def decided(session: Session, patterns: dict[str, str]) -> tuple[Found, ...]:
+    """Return each different decision of a session once: ``patterns`` are regular expressions by what they speak of (``corners``); a group
+    in the expression is the number. The target is the plate's name and what, or only what.
+    """
+    found: dict[tuple[str, str], Found] = {}
+    for trial in session.trials:
+        said = [("", sentence) for sentence in (*trial.history, *trial.warnings)]
+        said += [(plate.name, sentence) for plate in trial.plates for sentence in plate.decisions]
+        for where, sentence in said:
+            for what, pattern in patterns.items():
+                match = re.search(pattern, sentence)
+                if match:
+                    place = where or _plate(sentence)
+                    target = f"{place}:{what}" if place else what
+                    found.setdefault((target, match[0]), (target, sentence, match[1] if match.groups() else ""))
+    return tuple(found.values())
+
+
+def overruled(session: Session, patterns: dict[str, str], *, check: str, effect: str) -> tuple[Gate, ...]:
+    """Return a failed ``check`` for each different decision that the reader took against the files, with ``effect`` as its cause."""
+    return tuple(
+        Gate(check, False, sentence, effect, target, float(number) if number else float("nan"))
+        for target, sentence, number in decided(session, patterns)
+    )
+
+
+def _plate(sentence: str) -> str:
+    match = re.match(r"Plate (\d+)", sentence)
+    return f"plate{match[1]}" if match else ""

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.moved import carried_by, neutral_turn
-from biodance.effects._base.moved_matter import MovedMatter, centres, moved_matter, wrench_of
+from biodance.body.changes import carried_by, neutral_turn
+from biodance.effects._base.moved_matter import MovedMatter, centres_of, moved_matter, wrench_of
 from biodance.effects._base.posture_answer import PostureAnswer
 from biodance.lab.filters import LowPass, motion_filter
-from biodance.motion.kinematics import Poses, SegmentMotion
-from biodance.motion.marker_jacobian import below, chains, jacobian, skew
+from biodance.motion.kinematics import Poses, SegmentMotion, below, chains, jacobian, skew
 from biodance.records import Array, Index
 
 if TYPE_CHECKING:
@@ -127,7 +126,7 @@ def geometry(case: "Case") -> Geometry:
     weight = seen * body.markers.weight[columns]
     apart = weight[..., None] * np.where(seen[..., None] > 0, markers - measured, 0.0)
     answer = PostureAnswer(body, pose, case.motion.q[every, body.nq - len(body.joints) :], segment, markers, apart, weight)
-    com = pose.points(list(range(len(body.segments))), centres(case.phi))
+    com = pose.points(list(range(len(body.segments))), centres_of(case.phi))
     place, turn = jacobian(body, pose, list(range(len(body.segments))), com)
     shape = (len(com), len(body.segments), 3, body.nv)
     speed = (place @ _tangent_speed(case, pose, every)[..., None]).reshape(shape[:3])

@@ -12,13 +12,13 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from biodance.body.body import Body
-from biodance.body.inertia import Lump, parameters
-from biodance.body.segment_data import read_segment_table
+from biodance.body.inertia import RigidInertia, inertial_parameters
+from biodance.body.tables.segment_data import read_segment_table
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect
 from biodance.errors import TrialRefused
 from biodance.lab.filters import LowPass, low_pass, motion_filter
-from biodance.motion.inverse_kinematics import solve_ik
+from biodance.motion.ik.inverse_kinematics import solve_ik
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import regressor
 from biodance.motion.smoothing import smooth
@@ -180,7 +180,7 @@ def share_of_body(body: Body, segment: str, *, top: Array, bottom: Array) -> Arr
     fraction, place, sagittal, transverse, along = np.mean(rows, axis=0)
     mass, length = fraction * float(body.sip.mass.sum()), float(np.linalg.norm(top - bottom))
     inertia = mass * length**2 * np.diag([sagittal**2, along**2, transverse**2])
-    return parameters(Lump(mass, top + place * (bottom - top), inertia))
+    return inertial_parameters(RigidInertia(mass, top + place * (bottom - top), inertia))
 
 
 def shoulders(body: Body) -> Array | None:

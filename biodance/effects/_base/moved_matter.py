@@ -16,8 +16,7 @@ from scipy.interpolate import make_interp_spline
 
 from biodance.body.inertia import TENSOR
 from biodance.lab.filters import LowPass, low_pass
-from biodance.motion.kinematics import SegmentMotion
-from biodance.motion.marker_jacobian import skew
+from biodance.motion.kinematics import SegmentMotion, skew
 from biodance.records import Array
 
 DEGREE = 5
@@ -35,7 +34,7 @@ def moved_matter(move: SegmentMotion, phi: Array, speed: Array) -> MovedMatter:
     """Return the map of segments that move as ``move`` with the parameters ``phi`` (10N,); ``speed`` (F, N, 3) m/s of their CoM."""
     table = phi.reshape(-1, 10)
     mass = table[:, 0]
-    arm = (move.rotation @ centres(phi)[..., None])[..., 0]
+    arm = (move.rotation @ centres_of(phi)[..., None])[..., 0]
     tensor = np.empty((len(table), 3, 3))
     for column, (i, j) in enumerate(TENSOR, start=4):
         tensor[:, i, j] = tensor[:, j, i] = table[:, column]
@@ -50,7 +49,7 @@ def moved_matter(move: SegmentMotion, phi: Array, speed: Array) -> MovedMatter:
     return MovedMatter(*(np.moveaxis(part, 2, 3).reshape(len(part), 9, len(table), 3) for part in (place, turn)))
 
 
-def centres(phi: Array) -> Array:
+def centres_of(phi: Array) -> Array:
     """Return the centres of mass (N, 3) m in the segment frames; the origin for a segment without mass."""
     table = phi.reshape(-1, 10)
     return np.asarray(table[:, 1:4] / np.where(table[:, :1] != 0, table[:, :1], np.inf))

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.motion.kinematics import Poses
-from biodance.motion.marker_jacobian import below, jacobian, skew
+from biodance.motion.kinematics import Poses, below, jacobian, skew
 from biodance.records import Array
 
 AT_LIMIT = 5e-3

@@ -21,7 +21,7 @@ def sniff(head: bytes) -> bool:
 
 
 def read(path: Path, *, role: Role, subject: str | None = None) -> Trial:
-    """Return the trial of a text export (`biodance.lab.amti`)."""
-    from biodance.lab.amti import read_amti_ascii
+    """Return the trial of a text export (`biodance.lab.amti.read`)."""
+    from biodance.lab.amti.read import read_amti_ascii
 
     return read_amti_ascii(path, role=role)

@@ -17,7 +17,7 @@ def sniff(head: bytes) -> bool:
 
 
 def read(path: Path, *, role: Role, subject: str | None = None) -> Trial:
-    """Return the trial of a .bsf file (`biodance.lab.amti`)."""
-    from biodance.lab.amti import read_bsf
+    """Return the trial of a .bsf file (`biodance.lab.amti.read`)."""
+    from biodance.lab.amti.read import read_bsf
 
     return read_bsf(path, role=role)

@@ -17,7 +17,7 @@ def sniff(head: bytes) -> bool:
 
 
 def read(path: Path, *, role: Role, subject: str | None = None) -> Trial:
-    """Return the trial of a C3D file (`biodance.lab.c3d`)."""
-    from biodance.lab.c3d import read_c3d
+    """Return the trial of a C3D file (`biodance.lab.c3d.read`)."""
+    from biodance.lab.c3d.read import read_c3d
 
     return read_c3d(path, role=role, subject=subject)

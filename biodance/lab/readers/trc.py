@@ -4,12 +4,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from biodance.errors import FileRefused
-from biodance.lab.ground_forces import has_plates, plates_of
-from biodance.lab.mot import Table, columns_of, read_mot
+from biodance.lab.opensim.ground_forces import has_plates, plates_of
+from biodance.lab.opensim.mot import TimeTable, columns_of, read_mot
+from biodance.lab.opensim.trc import read_trc
 from biodance.lab.plain_text import read_bytes, sha256
 from biodance.lab.readers import head_text
-from biodance.lab.readers.mot import rate_of
-from biodance.lab.trc import read_trc
+from biodance.lab.readers.mot import plates_rate
 from biodance.records import Role, Trial
 
 NAME = "markers of OpenSim"
@@ -53,13 +53,13 @@ def _with_forces(trial: Trial, path: Path) -> Trial:
     return replace(
         trial,
         plates=plates,
-        source=replace(trial.source, format="TRC + MOT", sha256=digest, analog_rate=rate_of(plates)),
+        source=replace(trial.source, format="TRC + MOT", sha256=digest, analog_rate=plates_rate(plates)),
         history=(*trial.history, f"Forces were read from {path.name} beside it.", *said),
         warnings=(*trial.warnings, *table.warnings, *_out_of_step(trial, table)),
     )
 
 
-def _out_of_step(trial: Trial, table: Table) -> list[str]:
+def _out_of_step(trial: Trial, table: TimeTable) -> list[str]:
     """Return a warning if markers and forces do not cover the same time."""
     assert trial.markers is not None  # a .trc file always holds markers
     time = trial.markers.time

@@ -1,0 +1,170 @@
+"""The same body with one thing elsewhere: a joint, a length, a marker, or a segment cut in two by another joint."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from biodance.body.body import Body, Joint, JointLimits, SegmentMarkers
+from biodance.body.inertia import PSEUDO_INERTIA, RigidInertia, inertial_parameters
+from biodance.records import Array, Sip
+
+
+def move_joint(body: Body, joint: int, shift: Array) -> Body:
+    """Return the body with the origin of ``joint`` (an index) moved by ``shift`` (3,) m in its parent's frame; all that hangs on it goes
+    along.
+    """
+    joints = list(body.joints)
+    joints[joint] = replace(joints[joint], translation=joints[joint].translation + np.asarray(shift))
+    return replace(body, joints=tuple(joints))
+
+
+def recentre_joint(body: Body, joint: int, shift: Array) -> Body:
+    """Return the body whose ``joint`` turns about a point ``shift`` (3,) m away (in its parent's frame), while in the neutral posture
+    matter, markers and all other joints stay where they are.
+    """
+    segment, back = carried_by(body, joint), -neutral_turn(body, joint) @ np.asarray(shift)
+    moved = move_joint(body, joint, shift)
+    last = body.segment_joint[segment]
+    joints = tuple(replace(j, translation=j.translation + back) if j.parent == last else j for j in moved.joints)
+    on = np.array(body.markers.segment) == segment
+    markers = replace(body.markers, position=body.markers.position + np.where(on[:, None], back, 0.0))
+    ten, table = slice(10 * segment, 10 * segment + 10), np.eye(body.sip.phi.size)
+    table[ten, ten] = shift_matter(back)
+    sip = Sip(body.segments, table @ body.sip.phi, table @ body.sip.covariance @ table.T)
+    here = (np.arange(len(body.segments)) == segment)[:, None, None]
+    boxes, com_boxes = (np.where(here, box + back, box) for box in (body.boxes, body.com_boxes))
+    feet = {side: replace(foot, outline=foot.outline + back) if foot.segment == segment else foot for side, foot in body.feet.items()}
+    return replace(moved, joints=joints, markers=markers, sip=sip, boxes=boxes, com_boxes=com_boxes, feet=feet)
+
+
+def move_marker(body: Body, name: str, shift: Array) -> Body:
+    """Return the body with the marker ``name`` moved by ``shift`` (3,) m in the axes of its segment."""
+    place = np.array(body.markers.position)
+    place[body.markers.names.index(name)] += shift
+    return replace(body, markers=SegmentMarkers(body.markers.names, body.markers.segment, place, body.markers.weight))
+
+
+def carried_by(body: Body, joint: int) -> int:
+    """Return the segment that the compound joint beginning with ``joint`` carries."""
+    while body.joints[joint].segment < 0:
+        joint = next(i for i, other in enumerate(body.joints) if other.parent == joint)
+    return body.joints[joint].segment
+
+
+def neutral_turn(body: Body, joint: int) -> Array:
+    """Return child_R_parent (3, 3) of the compound joint beginning with ``joint``, at zero angles."""
+    turn, last = body.joints[joint].rotation, body.segment_joint[carried_by(body, joint)]
+    while joint != last:
+        joint = next(i for i, other in enumerate(body.joints) if other.parent == joint)
+        turn = turn @ body.joints[joint].rotation
+    return np.asarray(turn.T)
+
+
+def shift_matter(shift: Array) -> Array:
+    """Return the map (10, 10) of the ten parameters when all matter moves by ``shift`` (3,) m in the segment's frame."""
+    move = np.eye(4)
+    move[:3, 3] = shift
+    return np.asarray(np.linalg.lstsq(PSEUDO_INERTIA, np.kron(move, move) @ PSEUDO_INERTIA, rcond=None)[0])
+
+
+RANGE, SPEED, TORQUE = 1.2, 10.0, 100.0
+"""rad either way, rad/s, N·m: wide enough for any joint that is put in to follow markers."""
+SPLIT = 0.2
+"""Relative standard deviation of the lighter part: how well is known what a cut leaves on which side (assumed; a vertebra up or down)."""
+GRAM, GYRATION = 1e-3, 0.03
+"""kg and m: mass and radius of gyration of a part to which nothing is assigned, so that it has a centre of mass."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """Where ``segment`` is cut.
+
+    The new segment ``name`` turns about ``axes`` (name -> (3,) unit vector), one after the other, through ``place`` (3,) m; it takes the
+    ten parameters ``phi`` (10,), the ``markers`` and the ``joints`` (indices of first axes) named. All in the frame of the cut segment.
+    A segment that takes no matter (``phi`` zero) is given a gram at ``place``, so that it has a centre of mass.
+    """
+
+    segment: str
+    name: str
+    axes: dict[str, Array]
+    place: Array
+    phi: Array
+    markers: tuple[str, ...]
+    joints: tuple[int, ...] = field(default=())
+
+
+def branch_off(body: Body, cut: Cut) -> Body:
+    """Return the body with the cut's joint, at zero angle the same as before; the new segment keeps the frame of the old one.
+
+    The new joints follow the segment's own in ``Body.joints``; the new segment is the last one.
+    """
+    if not cut.phi.any():
+        cut = replace(cut, phi=GRAM * inertial_parameters(RigidInertia(1.0, cut.place, GYRATION**2 * np.eye(3))))
+    old = body.segment_index(cut.segment)
+    first, count = body.segment_joint[old] + 1, len(cut.axes)
+    new = []
+    for k, (name, axis) in enumerate(cut.axes.items()):
+        place = cut.place if k == 0 else np.zeros(3)
+        new.append(Joint(name, first - 1 + k, axis, np.eye(3), place, len(body.segments) if k == count - 1 else -1))
+    shifted = [j if j.parent < first else replace(j, parent=j.parent + count) for j in body.joints]
+    for index in cut.joints:
+        moved = body.joints[index]
+        shifted[index] = replace(moved, parent=first + count - 1, translation=moved.translation - cut.place)
+    names, limits = (*body.segments, cut.name), body.limits
+    extended = replace(
+        body,
+        segments=names,
+        joints=(*shifted[:first], *new, *shifted[first:]),
+        sip=_sip(body, cut, names),
+        limits=JointLimits(
+            **{
+                key: np.insert(getattr(limits, key), first, np.full(count, value))
+                for key, value in (
+                    ("lower", -RANGE), ("upper", RANGE), ("velocity", SPEED), ("torque_lower", -TORQUE), ("torque_upper", TORQUE)
+                )
+            }
+        ),
+        markers=_markers(body, cut),
+        boxes=np.concatenate([body.boxes, body.boxes[[old]] - cut.place]),
+        com_boxes=_com_boxes(body, cut),
+        notes=(*body.notes, f"{cut.name} moves on {cut.segment}."),
+    )  # fmt: skip
+    return extended
+
+
+def _sip(body: Body, cut: Cut, names: tuple[str, ...]) -> Sip:
+    """Return the parameters of both parts.
+
+    If the whole is heavier than thought, both are in proportion; what else it may be off by they share by mass; and what one has more at
+    the cut, the other has less. Nothing of this for a gram.
+    """
+    old = slice(10 * body.segment_index(cut.segment), 10 * body.segment_index(cut.segment) + 10)
+    whole, moved = body.sip.phi[old], shift_matter(-cut.place)
+    rest, part, split = whole - cut.phi, np.zeros((10, 10)), np.zeros(10)
+    if cut.phi[0] > GRAM:
+        share = cut.phi[0] / whole[0]
+        part = share * np.eye(10) + np.outer(cut.phi - share * whole, np.eye(10)[0]) / whole[0]
+        split = SPLIT * (cut.phi if cut.phi[0] < rest[0] else rest)
+    spread = np.eye(body.sip.phi.size + 10, body.sip.phi.size)
+    spread[old, old], spread[-10:, old] = np.eye(10) - part, moved @ part
+    across = np.zeros(len(spread))
+    across[old], across[-10:] = -split, moved @ split
+    phi = np.concatenate([body.sip.phi, moved @ cut.phi])
+    phi[old] = rest
+    return Sip(names, phi, spread @ body.sip.covariance @ spread.T + np.outer(across, across))
+
+
+def _com_boxes(body: Body, cut: Cut) -> Array:
+    """Return (N + 1, 2, 3) m: each part has the room of the whole about its own centre of mass."""
+    old = body.segment_index(cut.segment)
+    whole = body.sip.phi[10 * old : 10 * old + 10]
+    kept, gone = (part[1:4] / part[0] - whole[1:4] / whole[0] for part in (whole - cut.phi, cut.phi))
+    boxes = np.concatenate([body.com_boxes, body.com_boxes[[old]] + gone - cut.place])
+    boxes[old] += kept
+    return boxes
+
+
+def _markers(body: Body, cut: Cut):  # type: ignore[no-untyped-def]
+    on = np.array([name in cut.markers for name in body.markers.names])
+    segment = tuple(len(body.segments) if moved else s for moved, s in zip(on, body.markers.segment, strict=True))
+    return replace(body.markers, segment=segment, position=body.markers.position - np.where(on[:, None], cut.place, 0.0))

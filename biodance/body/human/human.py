@@ -1,0 +1,164 @@
+"""The 12-segment, 23-degree-of-freedom human: from stature, mass and sex alone, and the assembly of a Body on any skeleton."""
+
+import numpy as np
+
+from biodance.body.body import Body, Foot, SegmentMarkers
+from biodance.body.human.limits import joint_limits
+from biodance.body.human.skeleton import SEGMENTS, SIDES, Skeleton, generic_skeleton, joint_tree, kind_of, side_of
+from biodance.body.tables.anthropometry import read_table, row_numbers
+from biodance.body.tables.choice import measured_whole, reference, studies, trunk_joint
+from biodance.body.tables.prior import com_sd, prior
+from biodance.body.tables.reference import proportion
+from biodance.lab.markers.sets import MarkerSet, read_marker_set
+from biodance.records import Array, Sip, Subject
+from biodance.settings import STANDARD_GRAVITY, Settings
+
+COM_SIGMAS = 3.0
+"""Half width of a CoM box in prior standard deviations."""
+
+
+LUMBAR_HEIGHT = 0.112 / 1.755
+"""Stature: height over the hip centres of the lumbar joint from which ``boxes.csv`` measures the trunk (ANSUR II man of 1.755 m)."""
+
+
+def shape_boxes(skeleton: Skeleton) -> Array:
+    """Return the boxes (12, 2, 3) m of ``boxes.csv`` at the person's stature: lower and upper corners in the segment frames.
+
+    The trunk's box ends at the vertex wherever this skeleton has its trunk joint.
+    """
+    table = read_table("human", "boxes")
+    columns = "x_min y_min z_min x_max y_max z_max"
+    corners = np.array([row_numbers(table.row(segment=kind_of(s)), columns) for s in SEGMENTS])
+    boxes = corners.reshape(-1, 2, 3) * skeleton.stature
+    boxes[SEGMENTS.index("trunk_head"), 1, 1] -= skeleton.origins["trunk"][1] - LUMBAR_HEIGHT * skeleton.stature
+    return boxes
+
+
+def com_boxes(sip: Sip, skeleton: Skeleton, boxes: Array) -> Array:
+    """Return where the CoM may be, (12, 2, 3) m: three prior standard deviations around the prior CoM, inside the shape box."""
+    half = COM_SIGMAS * np.array([com_sd(segment, skeleton) for segment in SEGMENTS])
+    around = np.stack([sip.com - half, sip.com + half], axis=1)
+    return np.clip(around, boxes[:, :1], boxes[:, 1:])
+
+
+def sole(skeleton: Skeleton, subject: Subject, side: str) -> Foot:
+    """Return the sole under one foot: a hexagon of heel, ball and toe corners, m, counter-clockwise seen from above."""
+    segment = f"{side}_foot"
+    length, heel = skeleton.lengths[segment], -skeleton.heel_behind_ankle[side]
+    ball, toe = heel + proportion("ball_from_heel", subject.sex) * length, heel + length
+    wide, narrow = (proportion(size, subject.sex) * length / 2 for size in ("foot_breadth", "heel_breadth"))
+    corners = [(heel, narrow), (ball, wide), (toe, narrow), (toe, -narrow), (ball, -wide), (heel, -narrow)]
+    return Foot(SEGMENTS.index(segment), np.array([[x, -skeleton.ankle_height[side], z] for x, z in corners]))
+
+
+ADULT = (18.0, 65.0)
+"""years: the ages that the usual table speaks for."""
+
+
+def human(subject: Subject, *, table: str = Settings.table, markers: str = "plug_in_gait", gravity: float = STANDARD_GRAVITY) -> Body:
+    """Return a generic person of the subject's stature, mass and sex, with the markers of a marker set at their usual places.
+
+    For a person who was measured use `scale`: generic lengths miss by centimetres, and the wand markers have no usual place.
+
+    Parameters
+    ----------
+    subject : Subject
+        Mass kg, stature m, sex; the age where strength matters.
+    table : str
+        Table of segment inertial parameters, which also gives the lengths.
+    markers : str
+        Name of a marker set, or the path of its file.
+    gravity : float
+        Of the laboratory, m/s² along -z.
+
+    Returns
+    -------
+    Body
+        12 segments, 23 joint angles, inertial parameters with covariance.
+
+    Raises
+    ------
+    UnknownName
+        There is no such table for this sex, or no such marker set.
+    SessionRefused
+        The mass or the stature is not known.
+
+    See Also
+    --------
+    scale : The body of a person with a static trial.
+
+    References
+    ----------
+    The usual table: de Leva 1996, doi:10.1016/0021-9290(95)00178-6.
+
+    Examples
+    --------
+    >>> biodance.human(biodance.Subject(62.0, 1.70, "F", name="S01"))
+    Body('S01', 12 segments, 23 joint angles, 62.0 kg)
+    """
+    subject.require("mass", "stature")
+    skeleton = generic_skeleton(reference(table, subject), subject)
+    note = f"Segment lengths: table {table} at stature {subject.stature:.3f} m; nobody was measured. Markers: usual places of {markers}."
+    worn = generic_markers(skeleton, read_marker_set(markers))
+    return assemble(subject, skeleton, table=table, markers=worn, notes=(note,), gravity=gravity)
+
+
+def assemble(
+    subject: Subject,
+    skeleton: Skeleton,
+    *,
+    table: str,
+    markers: SegmentMarkers,
+    notes: tuple[str, ...],
+    gravity: float = STANDARD_GRAVITY,
+) -> Body:
+    """Return the Body of a skeleton: joint tree, prior SIP, limits, boxes and soles."""
+    sip, boxes = prior(reference(table, subject), skeleton, subject), shape_boxes(skeleton)
+    return Body(
+        name=subject.name or "human",
+        segments=SEGMENTS,
+        joints=joint_tree(skeleton),
+        sip=sip,
+        limits=joint_limits(subject),
+        markers=markers,
+        boxes=boxes,
+        com_boxes=com_boxes(sip, skeleton, boxes),
+        feet={side: sole(skeleton, subject, side) for side in SIDES},
+        notes=(*notes, *_prior_notes(subject, table)),
+        gravity=np.array([0.0, 0.0, -gravity]),
+    )
+
+
+def _prior_notes(subject: Subject, table: str) -> tuple[str, ...]:
+    joint = trunk_joint(table)
+    sex = {"F": "woman", "M": "man"}[subject.sex]
+    notes = [
+        f"Prior SIP: {table} for a {sex} of {subject.mass:.2f} kg, standard deviations from the spread of tables; trunk joint at {joint}."
+    ]
+    if table in measured_whole() and not (np.isnan(subject.age) or ADULT[0] <= subject.age <= ADULT[1]):
+        groups = {study for sex in ("F", "M") for study, group in studies(sex).items() if group in ("child", "older")}
+        notes.append(f"Table {table} is of young adults, the subject is {subject.age:.0f} years old; consider {', '.join(sorted(groups))}.")
+    return tuple(notes)
+
+
+def generic_markers(skeleton: Skeleton, marker_set: MarkerSet) -> SegmentMarkers:
+    """Return the markers of a set at their usual places (offset times normaliser); markers without a usual place are left out."""
+    shoulders = np.mean([skeleton.origins["right_shoulder"], skeleton.origins["left_shoulder"]], axis=0)
+    labels, segments, positions, weights = [], [], [], []
+    for marker in marker_set.markers:
+        if marker.offset is not None:
+            base = shoulders if marker.origin == "mid_shoulder" else np.zeros(3)
+            labels.append(marker.label)
+            segments.append(SEGMENTS.index(marker.segment))
+            positions.append(base + np.array(marker.offset) * normaliser(skeleton, marker.normaliser, marker.segment))
+            weights.append(marker.weight)
+    return SegmentMarkers(tuple(labels), tuple(segments), np.array(positions).reshape(-1, 3), np.array(weights))
+
+
+def normaliser(skeleton: Skeleton, name: str, segment: str) -> float:
+    """Return a normaliser of the marker sets, m, on the marker's own side."""
+    sizes = {"asis_width": skeleton.asis_width, "stature": skeleton.stature, "trunk_length": skeleton.lengths["trunk_head"]}
+    if name in sizes:
+        return sizes[name]
+    kind = name.removesuffix("_length").replace("forearm", "forearm_hand")
+    return skeleton.lengths[f"{'left' if side_of(segment) < 0 else 'right'}_{kind}"]

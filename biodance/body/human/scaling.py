@@ -1,0 +1,244 @@
+"""The human of one subject: joint centres, segment lengths, constant joint tilts and every marker from the static trial.
+
+The static posture is reached exactly by the body: whatever the joints cannot do (a knee has no varus, an ankle no torsion, an elbow no
+carrying angle) becomes a constant tilt of that joint, so that in the static trial every marker and joint centre has residual zero.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from biodance.body.body import Body, Joint, SegmentMarkers
+from biodance.body.human.human import assemble
+from biodance.body.human.limits import widen_limits
+from biodance.body.human.measures import Measures, measures
+from biodance.body.human.skeleton import JOINTS, SEGMENTS, SIDES, Skeleton, kind_of
+from biodance.body.human.standing import StaticPosture, standing
+from biodance.body.human.static_centres import Centres, SegmentFrames, segment_frames, static_centres, turn
+from biodance.body.tables.choice import reference
+from biodance.body.tables.reference import proportion
+from biodance.records import Array, Subject, Trial
+from biodance.settings import STANDARD_GRAVITY, Hip
+
+ANKLE_HEIGHT = (0.04, 0.12)
+"""m: an ankle centre so high over z = 0 of the lab is taken to stand on that floor."""
+TILT = {"knee": 15.0, "elbow": 25.0, "ankle": 40.0}
+"""deg: larger constant tilts of a joint point to a misplaced marker."""
+LENGTH_RATIO = {
+    "thigh": (0.19, 0.29),
+    "shank": (0.19, 0.29),
+    "upper_arm": (0.12, 0.22),
+    "forearm_hand": (0.10, 0.20),
+    "trunk_head": (0.2, 0.36),
+}
+"""of stature: the lengths that adults and children have."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scaling:
+    """All that a scaled body is made of: the standing posture, its measures, the joint centres, the ``table`` of masses,
+    ``gravity`` m/s². With other ``centres`` (``dataclasses.replace``) it makes the body of the same person with joints elsewhere.
+    """
+
+    subject: Subject
+    table: str
+    posture: StaticPosture
+    sizes: Measures
+    centres: Centres
+    notes: tuple[str, ...]
+    gravity: float = STANDARD_GRAVITY
+
+    def body(self) -> tuple[Body, Array]:
+        """Return the scaled body and its posture q (30,) in the static trial, at which all calibrated markers are met exactly."""
+        frames = segment_frames(self.centres)
+        skeleton = static_skeleton(frames, self.posture, self.sizes, self.subject)
+        doubts = _doubts(skeleton, self.subject)
+        markers = calibrated_markers(frames, self.posture)
+        notes = (*self.notes, *doubts)
+        body = assemble(self.subject, skeleton, table=self.table, markers=markers, notes=notes, gravity=self.gravity)
+        q = static_posture(body, frames)
+        limits, widened = widen_limits(body, q)
+        return replace(body, limits=limits, notes=(*body.notes, *widened), joint_errors=self.centres.errors), q
+
+
+def measure_static(subject: Subject, static: Trial, *, hip: Hip | None = None, table: str | None = None) -> Scaling:
+    """Return what the static trial says about the body of a subject; what is None is as ``static.settings`` have it.
+
+    ``hip``: "harrington" (regressions on the pelvis markers) or "davis" (plug-in gait). ``table`` gives masses, CoM, inertias and where the
+    trunk joint lies between mid hip and mid shoulder. ``notes`` of the body say what was measured, assumed, contradicted and warned about.
+
+    Raises
+    ------
+    TrialRefused
+        The static trial has no markers, no known marker set, or misses a landmark; all missing ones are named.
+    UnknownName
+        There is no such table.
+    SessionRefused
+        The mass or the stature of the subject is not known.
+    """
+    subject.require("mass", "stature")
+    hip, table = hip or static.settings.hip, table or static.settings.table
+    posture = standing(static)
+    sizes = measures(posture, static, subject)
+    lengths = reference(table, subject).lengths
+    centres = static_centres(posture.landmarks, sizes, hip=hip, trunk_fraction=lengths["pelvis"] / lengths["trunk_head"])
+    notes = (f"Scaled on static trial {static.name}; hip centres: {hip}.", *posture.notes, *sizes.notes, *centres.notes)
+    return Scaling(subject, table, posture, sizes, centres, notes, static.settings.gravity)
+
+
+def scale(subject: Subject, static: Trial, *, hip: Hip | None = None, table: str | None = None) -> Body:
+    """Return the body of a subject, scaled on the static trial alone, with every marker calibrated in its segment.
+
+    Parameters
+    ----------
+    subject : Subject
+        Mass kg, stature m, sex.
+    static : Trial
+        Standing still, with markers of a known set.
+    hip : {"harrington", "davis"}, optional
+        Regression of the hip joint centres; by default as ``static.settings`` say.
+    table : str, optional
+        Table of segment inertial parameters; by default as ``static.settings`` say.
+
+    Returns
+    -------
+    Body
+        In the static posture every marker and joint centre has residual zero.
+
+    Raises
+    ------
+    TrialRefused
+        The static trial has no markers, no known marker set, or misses a landmark; all missing ones are named.
+    UnknownName
+        There is no such table.
+    SessionRefused
+        The mass or the stature of the subject is not known.
+
+    References
+    ----------
+    Harrington et al. 2007, doi:10.1016/j.jbiomech.2006.02.003; Davis et al. 1991, doi:10.1016/0167-9457(91)90046-Z.
+
+    Examples
+    --------
+    >>> biodance.scale(session.subject, session["static"])
+    Body('visit', 12 segments, 23 joint angles, 61.9 kg)
+    """
+    return measure_static(subject, static, hip=hip, table=table).body()[0]
+
+
+def calibrated_markers(frames: SegmentFrames, posture: StaticPosture) -> SegmentMarkers:
+    """Return every marker of the set that was seen, at its place in its segment."""
+    worn = [marker for marker in posture.marker_set.markers if marker.label in posture.points]
+    local = [frames.rotation[m.segment].T @ (posture.points[m.label] - frames.origin[m.segment]) for m in worn]
+    return SegmentMarkers(
+        tuple(m.label for m in worn), tuple(SEGMENTS.index(m.segment) for m in worn), np.array(local), np.array([m.weight for m in worn])
+    )
+
+
+def static_skeleton(frames: SegmentFrames, posture: StaticPosture, sizes: Measures, subject: Subject) -> Skeleton:
+    """Return the sizes of the skeleton in the static trial."""
+
+    def local(segment: str, point: Array) -> Array:
+        return np.asarray(frames.rotation[segment].T @ (point - frames.origin[segment]))
+
+    shoulders = (frames.origin["right_upper_arm"] + frames.origin["left_upper_arm"]) / 2
+    origins = {"trunk": local("pelvis", frames.origin["trunk_head"])}
+    cut = {segment: local(segment, frames.cut) for segment in ("pelvis", "trunk_head")}
+    lengths = {"pelvis": float(np.linalg.norm(cut["pelvis"])), "trunk_head": float(np.linalg.norm(shoulders - frames.origin["pelvis"]))}
+    turns: dict[str, Array] = {}
+    height: dict[str, float] = {}
+    behind: dict[str, float] = {}
+    for side in SIDES:
+        thigh, shank, foot, arm, forearm = (f"{side}_{kind}" for kind in ("thigh", "shank", "foot", "upper_arm", "forearm_hand"))
+        for joint, parent, child in (("hip", "pelvis", thigh), ("knee", thigh, shank), ("ankle", shank, foot), ("elbow", arm, forearm)):
+            origins[f"{side}_{joint}"] = local(parent, frames.origin[child])
+        origins[f"{side}_shoulder"] = local("trunk_head", frames.origin[arm])
+        for segment, end in ((thigh, "knee"), (shank, "ankle"), (arm, "elbow")):
+            lengths[segment] = float(np.linalg.norm(origins[f"{side}_{end}"]))
+        lengths[forearm] = float(np.linalg.norm(local(forearm, frames.ends[f"{side}_wrist"])))
+        lengths[foot], height[side], behind[side] = _foot(frames, posture, sizes, subject, side)
+        for joint, pair in (("knee", (thigh, shank)), ("ankle", (shank, foot)), ("elbow", (arm, forearm))):
+            turns[f"{side}_{joint}"] = _turn(frames, *pair)
+    return Skeleton(lengths, origins, height, behind, sizes.pelvis_width, subject.stature, turns, cut)
+
+
+def _turn(frames: SegmentFrames, parent: str, child: str) -> Array:
+    """Return the constant part of parent_R_child: a hinge's varus about x, an ankle's torsion about y."""
+    relative = frames.rotation[parent].T @ frames.rotation[child]
+    if kind_of(child) == "foot":
+        return turn(1, np.arctan2(-relative[2, 0], relative[0, 0]))
+    return turn(0, np.arcsin(relative[2, 1]))
+
+
+def _foot(frames: SegmentFrames, posture: StaticPosture, sizes: Measures, subject: Subject, side: str) -> tuple[float, float, float]:
+    """Return foot length, height of the ankle over the sole, and how far the heel lies behind the ankle, m."""
+    place, ankle = posture.landmarks, frames.origin[f"{side}_foot"]
+    heel, toe = (frames.rotation[f"{side}_foot"].T @ (place[f"{side}_{end}"] - ankle) for end in ("heel", "toe"))
+    length = float(toe[0] - heel[0]) / proportion("heel_to_toe_marker", subject.sex)
+    standing_on_zero = ANKLE_HEIGHT[0] < ankle[2] < ANKLE_HEIGHT[1]
+    height = float(ankle[2]) if standing_on_zero else proportion("ankle_height", subject.sex) * subject.stature
+    return length, height, float(-heel[0]) - sizes.marker_radius
+
+
+def static_posture(body: Body, frames: SegmentFrames) -> Array:
+    """Return q (30,) of the body in the static trial."""
+    from scipy.spatial.transform import Rotation
+
+    angles: dict[str, list[Joint]] = {}
+    for joint in body.joints:
+        group = joint.name.rsplit("_", 1)[0]
+        angles.setdefault(group, []).append(joint)
+    q = np.concatenate([frames.origin["pelvis"], Rotation.from_matrix(frames.rotation["pelvis"]).as_quat(), np.zeros(len(body.joints))])
+    for group in JOINTS:
+        chain = angles[group]
+        child = body.segments[chain[-1].segment]
+        relative = chain[0].rotation.T @ frames.rotation[_parent(child)].T @ frames.rotation[child]
+        for joint, angle in zip(chain, chain_angles(relative, np.array([joint.axis for joint in chain])), strict=True):
+            q[7 + body.joints.index(joint)] = angle
+    return q
+
+
+def _parent(segment: str) -> str:
+    side = segment.split("_")[0]
+    return {
+        "shank": f"{side}_thigh",
+        "foot": f"{side}_shank",
+        "forearm_hand": f"{side}_upper_arm",
+        "upper_arm": "trunk_head",
+    }.get(kind_of(segment), "pelvis")
+
+
+def chain_angles(relative: Array, axes: Array) -> Array:
+    """Return the angles, rad, about the signed axes (n, 3) of a joint whose product of rotations is ``relative`` (3, 3).
+
+    One axis: any. Two: z then x. Three: z then x then y.
+    """
+    if len(axes) == 1:
+        spin = np.array([relative[2, 1] - relative[1, 2], relative[0, 2] - relative[2, 0], relative[1, 0] - relative[0, 1]]) / 2
+        return np.array([np.arctan2(axes[0] @ spin, (np.trace(relative) - 1) / 2)])
+    if len(axes) == 2:
+        angles = [np.arctan2(relative[1, 0], relative[0, 0]), np.arctan2(relative[2, 1], relative[2, 2])]
+    else:
+        angles = [np.arctan2(-relative[0, 1], relative[1, 1]), np.arcsin(relative[2, 1]), np.arctan2(-relative[2, 0], relative[2, 2])]
+    return axes.sum(axis=1) * np.array(angles)
+
+
+def _doubts(skeleton: Skeleton, subject: Subject) -> list[str]:
+    """Return warnings about lengths, sides and tilts that no person has."""
+    notes = []
+    for segment in SEGMENTS:
+        low, high = (ratio * subject.stature for ratio in LENGTH_RATIO.get(kind_of(segment), (0.0, 1.0)))
+        if not low < skeleton.lengths[segment] < high:
+            notes.append(
+                f"Warning: {segment} is {skeleton.lengths[segment]:.3f} m long, {low:.2f} to {high:.2f} m would be usual at "
+                f"{subject.stature:.2f} m: check its markers, and the stature."
+            )
+        other = segment.replace("right_", "left_")
+        if other != segment and abs(skeleton.lengths[segment] - skeleton.lengths[other]) > 0.02:
+            more = 1e3 * (skeleton.lengths[segment] - skeleton.lengths[other])
+            notes.append(f"Warning: {segment} is {more:+.0f} mm longer than {other}: check the markers.")
+    for joint, rotation in skeleton.turns.items():
+        tilt = np.degrees(np.arccos((np.trace(rotation) - 1) / 2))
+        if tilt > TILT[joint.split("_")[1]]:
+            notes.append(f"Warning: {joint} stands {tilt:.0f} deg away from its axes: check the markers beside it and the wand above it.")
+    return notes

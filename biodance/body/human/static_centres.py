@@ -1,0 +1,218 @@
+"""Joint centres and segment frames of a standing person: the answer of the static trial alone."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance.body.body import JointError
+from biodance.body.human.joint_centres import chord, davis_hip, elbow, harrington_hip, pelvis_frame, shoulder, unit, wrist
+from biodance.body.human.measures import Measures
+from biodance.body.tables.error_sizes import error_size
+from biodance.records import Array
+from biodance.settings import Hip
+
+SIGN = {"right": 1.0, "left": -1.0}
+UP = np.array([0.0, 0.0, 1.0])
+WRIST_BAR = 0.03
+"""m: wrist markers this much farther apart than markers on the styloids would be sit on a bar."""
+AXIS_TOLERANCE = 30.0
+"""deg: a thigh marker that turns the knee's axis further, seen from above, is not believed."""
+Places = Mapping[str, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Centres:
+    """Where the joints of a standing person are, lab frame.
+
+    ``place`` joint -> (3,) m: hips, knees, ankles, trunk, shoulders, elbows, and the wrists, where the forearms end. ``right`` of knees and
+    elbows -> (3,) m, along the flexion axis to the person's right; ``axis_sd`` -> rad, how far that axis may be turned about the bone;
+    ``lateral`` -> (3,) m, the lateral marker. ``pelvis`` (3, 3) lab_R_pelvis; ``across`` side -> (3,) m, horizontal, to the right of the
+    foot; ``cut``: at which fraction of the way from mid hip to mid shoulder the table cuts pelvis from trunk; ``notes`` what was assumed;
+    ``errors`` of the joints that a movement placed.
+    """
+
+    place: Places
+    right: Places
+    axis_sd: Mapping[str, float]
+    lateral: Places
+    pelvis: Array
+    across: Places
+    cut: float
+    notes: tuple[str, ...]
+    errors: tuple[JointError, ...] = ()
+
+
+def static_centres(mark: Places, sizes: Measures, *, hip: Hip, trunk_fraction: float) -> Centres:
+    """Return the joint centres from the landmarks ``mark`` name -> (3,) m.
+
+    Hip: regressions. Knee, ankle, elbow: middle of lateral and medial marker, or the constructions of plug-in gait. Trunk: on the line from
+    mid hip to mid shoulder, at ``trunk_fraction`` of it, where the table cuts the trunk.
+    """
+    pelvis, hips = hip_centres(mark, sizes, hip=hip)
+    middle = (hips["right"] + hips["left"]) / 2
+    shoulders = shoulder_centres(mark, sizes, middle)
+    place = {"trunk": middle + trunk_fraction * ((shoulders["right"] + shoulders["left"]) / 2 - middle)}
+    right, axis_sd, lateral, across = {}, {}, {}, {}
+    notes: list[str] = []
+    for side, sign in SIGN.items():
+        knee, note = knee_centre(mark, sizes, hips[side], pelvis[:, 2], side)
+        notes += [note] if note else []
+        place |= {f"{side}_hip": hips[side], f"{side}_knee": knee, f"{side}_ankle": ankle_centre(mark, sizes, knee, side)}
+        place[f"{side}_shoulder"] = shoulders[side]
+        place[f"{side}_elbow"], place[f"{side}_wrist"] = arm_centres(mark, sizes, shoulders[side], side)
+        for joint, otherwise in (("knee", "line of march" if note else "thigh marker"), ("elbow", "straight arm")):
+            name = f"{side}_{joint}"
+            lateral[name] = mark[f"{name}_lateral"]
+            right[name] = sign * (lateral[name] - place[name])
+            way = "medial marker" if f"{name}_medial" in mark else otherwise
+            axis_sd[name] = error_size("axis_turn", f"{joint} {way}", state="before")
+        across[side] = np.cross(mark[f"{side}_toe"] - mark[f"{side}_heel"], UP)
+    return Centres(place, right, axis_sd, lateral, pelvis, across, trunk_fraction, tuple(notes))
+
+
+def hip_centres(place: Places, sizes: Measures, *, hip: Hip) -> tuple[Array, dict[str, Array]]:
+    """Return lab_R_pelvis (3, 3) and the hip centres by side, m."""
+    rotation, middle = pelvis_frame(place["right_asis"], place["left_asis"], place["mid_psis"])
+    legs = float(np.mean(list(sizes.leg_length.values())))
+    centres = {}
+    for side, sign in SIGN.items():
+        local = (
+            harrington_hip(sizes.pelvis_width, sizes.pelvis_depth)
+            if hip == "harrington"
+            else davis_hip(sizes.pelvis_width, legs, sizes.asis_to_trochanter[side], sizes.marker_radius)
+        )
+        centres[side] = middle + rotation @ (local * [1.0, 1.0, sign])
+    return rotation, centres
+
+
+def shoulder_centres(place: Places, sizes: Measures, mid_hip: Array) -> dict[str, Array]:
+    """Return the shoulder centres by side, m: chord from the jugular notch, or straight under the acromion where that has no marker."""
+    right, left = place["right_acromion"], place["left_acromion"]
+    if all(name in place for name in ("c7", "t10", "jugular_notch", "xiphoid")):
+        up = (place["c7"] + place["jugular_notch"]) - (place["t10"] + place["xiphoid"])
+        ahead = (place["jugular_notch"] + place["xiphoid"]) - (place["c7"] + place["t10"])
+        forward = unit(np.cross(np.cross(up, ahead), up))
+    else:
+        up = (right + left) / 2 - mid_hip
+        forward = unit(np.cross(up, right - left))
+    offset = {side: sizes.shoulder_offset[side] + sizes.marker_radius for side in SIGN}
+    if "jugular_notch" not in place:
+        return {side: place[f"{side}_acromion"] - offset[side] * unit(up) for side in SIGN}
+    base = place["jugular_notch"] - sizes.marker_radius * forward
+    return {side: shoulder(base, forward, place[f"{side}_acromion"], offset[side], side=SIGN[side]) for side in SIGN}
+
+
+def knee_centre(place: Places, sizes: Measures, hip: Array, pelvis_right: Array, side: str) -> tuple[Array, str]:
+    """Return the knee centre, m, and what had to be assumed: the middle of the epicondyles, or a chord with the thigh marker.
+
+    A thigh marker that would turn the knee's axis further than ``AXIS_TOLERANCE`` from square to the line of march (mean of pelvis and
+    foot) was not placed for plug-in gait: the axis is then taken square to that line.
+    """
+    lateral = place[f"{side}_knee_lateral"]
+    if f"{side}_knee_medial" in place:
+        return (lateral + place[f"{side}_knee_medial"]) / 2, ""
+    distance = sizes.widths[f"{side}_knee"] / 2 + sizes.marker_radius
+    foot_right = unit(np.cross(place[f"{side}_toe"] - place[f"{side}_heel"], UP))
+    across = unit(pelvis_right + foot_right)
+    usual = chord(hip, lateral, distance, lateral + 0.1 * SIGN[side] * across)
+    if f"{side}_thigh_wand" not in place:
+        return usual, f"{side.capitalize()} knee: no medial or thigh marker, axis taken square to the line of march."
+    centre = chord(hip, lateral, distance, place[f"{side}_thigh_wand"])
+    axis = SIGN[side] * (lateral - centre)
+    angle = float(np.degrees(np.arctan2(UP @ np.cross(across, axis), across @ axis - (across @ UP) * (axis @ UP))))
+    if abs(angle) <= AXIS_TOLERANCE:
+        return centre, ""
+    return usual, (
+        f"Warning: the {side} thigh marker would turn the knee's axis {abs(angle):.0f} deg from square to the line of march, "
+        "so the axis is taken as square. Place the marker in the frontal plane of the thigh, or add a medial knee marker."
+    )
+
+
+def ankle_centre(place: Places, sizes: Measures, knee: Array, side: str) -> Array:
+    """Return the ankle centre, m: middle of the malleoli, or chord with the shank marker, or with the knee's axis without either."""
+    lateral = place[f"{side}_ankle_lateral"]
+    if f"{side}_ankle_medial" in place:
+        return np.asarray((lateral + place[f"{side}_ankle_medial"]) / 2)
+    outside = place.get(f"{side}_shank_wand", lateral + place[f"{side}_knee_lateral"] - knee)
+    return chord(knee, lateral, sizes.widths[f"{side}_ankle"] / 2 + sizes.marker_radius, outside)
+
+
+def arm_centres(place: Places, sizes: Measures, shoulder_at: Array, side: str) -> tuple[Array, Array]:
+    """Return elbow and wrist centre, m: the elbow in the middle of its epicondyle markers, or by the plug-in-gait construction.
+
+    The wrist is the middle of its two markers, unless they are so much farther apart than the wrist is wide that they sit on a bar behind
+    it; then the plug-in-gait construction. (Mean plug-in-gait static of 9 adults: with a bar, the finger marker would be 5 cm behind the
+    hand; with markers on the styloids, 2 cm, as thick as a hand is.)
+    """
+    lateral, radial, ulnar = (place[f"{side}_{name}"] for name in ("elbow_lateral", "wrist_radial", "wrist_ulnar"))
+    middle = (radial + ulnar) / 2
+    if f"{side}_elbow_medial" in place:
+        return (lateral + place[f"{side}_elbow_medial"]) / 2, middle
+    at = elbow(shoulder_at, lateral, middle, sizes.widths[f"{side}_elbow"] / 2 + sizes.marker_radius, side=SIGN[side])
+    reach = sizes.widths[f"{side}_wrist"] / 2 + sizes.marker_radius
+    if np.linalg.norm(radial - ulnar) < 2 * reach + WRIST_BAR:
+        return at, middle
+    return at, wrist(at, radial, ulnar, reach, side=SIGN[side])
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentFrames:
+    """Segment frames in the lab: ``rotation`` segment -> (3, 3) lab_R_segment, ``origin`` segment -> (3,) m (the proximal joint centre);
+    ``ends`` side_wrist -> (3,) m; ``cut`` (3,) m where the table cuts pelvis from trunk.
+    """
+
+    rotation: Places
+    origin: Places
+    ends: Places
+    cut: Array
+
+
+def segment_frames(centres: Centres) -> SegmentFrames:
+    """Return the 12 segment frames.
+
+    Pelvis: ISB axes, origin in the middle of the hip centres. trunk_head: y along the line from mid hip to mid shoulder. Thigh, upper
+    arm: y to the proximal joint, z in the plane of the flexion axis. Shank, forearm: y to the proximal joint, flexed about the parent's
+    z and tilted by a constant varus. Foot: flat on the ground, x from heel to toe.
+    """
+    at = centres.place
+    hips, shoulders = ((at[f"right_{joint}"] + at[f"left_{joint}"]) / 2 for joint in ("hip", "shoulder"))
+    axis = shoulders - hips
+    rotation = {"pelvis": centres.pelvis, "trunk_head": frame_yz(axis, at["right_shoulder"] - at["left_shoulder"])}
+    origin = {"pelvis": hips, "trunk_head": at["trunk"]}
+    for side in SIGN:
+        for names, joints in (
+            (("thigh", "shank"), ("hip", "knee", "ankle")),
+            (("upper_arm", "forearm_hand"), ("shoulder", "elbow", "wrist")),
+        ):
+            limb = (f"{side}_{names[0]}", f"{side}_{names[1]}")
+            _chain(rotation, origin, limb, tuple(at[f"{side}_{joint}"] for joint in joints), centres.right[f"{side}_{joints[1]}"])
+        origin[f"{side}_foot"] = at[f"{side}_ankle"]
+        rotation[f"{side}_foot"] = frame_yz(UP, centres.across[side])
+    ends = {f"{side}_wrist": at[f"{side}_wrist"] for side in SIGN}
+    return SegmentFrames(rotation, origin, ends, hips + centres.cut * axis)
+
+
+def frame_yz(up: Array, right: Array) -> Array:
+    """Return (3, 3) with y along ``up``, z as near to ``right`` as it can be, x forwards."""
+    y = unit(up)
+    x = unit(np.cross(y, right))
+    return np.stack([x, y, np.cross(x, y)], axis=1)
+
+
+def _chain(rotation: dict[str, Array], origin: dict[str, Array], names: tuple[str, str], centres: tuple[Array, ...], right: Array) -> None:
+    """Fill in the two segments of a limb: the second flexes about z of the first and is tilted about its own x (varus)."""
+    (upper, lower), (top, middle, end) = names, centres
+    rotation[upper], origin[upper], origin[lower] = frame_yz(top - middle, right), top, middle
+    direction = rotation[upper].T @ unit(middle - end)
+    flexion, varus = np.arctan2(-direction[0], direction[1]), np.arcsin(direction[2])
+    rotation[lower] = rotation[upper] @ turn(2, flexion) @ turn(0, varus)
+
+
+def turn(axis: int, angle: float) -> Array:
+    """Return the rotation (3, 3) about x, y or z (0, 1, 2) by ``angle`` rad."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    out = np.eye(3)
+    out[i, i] = out[j, j] = np.cos(angle)
+    out[j, i], out[i, j] = np.sin(angle), -np.sin(angle)
+    return out

@@ -1,0 +1,1 @@
+"""Robots: HOAP-3 of the paper, any humanoid from its URDF file."""

@@ -1,0 +1,220 @@
+"""A robot from its URDF file: links to segments, fixed joints merged, limits from the file, soles under the links that are named as feet.
+
+The root's frame is turned to x forwards, y up, z right (as the human pelvis) where the file has z up (ROS REP 103) or x backwards. All
+other segments keep the frames of their links, so that a file that biodance wrote comes back as it was.
+"""
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from biodance.body.body import NO_SEGMENT, Body, Foot, Joint, JointLimits, SegmentMarkers
+from biodance.body.export import refuse_impossible
+from biodance.body.inertia import RigidInertia, combine_inertias, inertial_parameters
+from biodance.body.robot.prior import com_deviation, extended, is_point, robot_covariance
+from biodance.body.robot.sole import match_faces, sole_outline
+from biodance.body.robot.standing_frames import reframed
+from biodance.body.robot.urdf_file import Connection, UrdfFile, read_urdf_file
+from biodance.errors import BiodanceError, FileRefused, UnknownName
+from biodance.records import Array, Sip
+
+
+@dataclass
+class _Carrier:
+    """A link that moves, while all that is fixed to it is gathered: its ``joint`` index, ``lumps``, ``shapes`` and ``hulls`` in its frame,
+    and why meshes could not be read.
+    """
+
+    link: str
+    joint: int
+    lumps: list[RigidInertia]
+    shapes: list[Array] = field(default_factory=list)
+    hulls: list[Array] = field(default_factory=list)
+    unread: list[str] = field(default_factory=list)
+
+    @property
+    def corners(self) -> Array:
+        """(K, 3) m, corners of all shapes; empty without any."""
+        return np.concatenate([np.empty((0, 3)), *self.shapes, *self.hulls])
+
+
+def read_urdf(path: str | Path, *, feet: tuple[str, str]) -> Body:
+    """Return the robot of a URDF file as a Body with a free root; ``feet`` the links of its right and its left foot.
+
+    Links without mass carry no segment. Prior standard deviations: those of a data sheet (`robot_prior`). Speeds, ranges and efforts are
+    the file's. No markers.
+
+    Raises
+    ------
+    UnknownName
+        A foot is no link of the file.
+    FileRefused
+        The file says something that a body cannot be, or lacks something; the message names the link or joint and what would be legal.
+    """
+    file = read_urdf_file(path)
+    for foot in feet:
+        if foot not in file.links:
+            raise UnknownName.of(f"link of {file.path}", foot, tuple(file.links))
+    joints, limits, carriers, owner = _tree(file)
+    heavy = [carrier for carrier in carriers if carrier.lumps]
+    if not carriers[0].lumps:
+        raise FileRefused(f"{file.path}: the root link {carriers[0].link} has no mass, nor has what is fixed to it. Give it an <inertial>.")
+    for foot in feet:
+        if owner[foot] not in heavy or owner[foot] is carriers[0]:
+            raise FileRefused(f"{file.path}: the foot {foot} has no mass or belongs to the root. Name the links that stand on the ground.")
+    body = _body(file, joints, limits, heavy)
+    return _standing(file, body, {side: owner[foot] for side, foot in zip(("right", "left"), feet, strict=True)})
+
+
+def _body(file: UrdfFile, joints: list[Joint], limits: JointLimits, heavy: list[_Carrier]) -> Body:
+    """Return the body without soles, its root as in the file; ``heavy`` the links that move and have mass."""
+    segments, lumps = (
+        tuple(carrier.link for carrier in heavy),
+        [combine_inertias(*c.lumps) if len(c.lumps) > 1 else c.lumps[0] for c in heavy],
+    )
+    carried = {carrier.joint: i for i, carrier in enumerate(heavy)}
+    boxes = np.array([_box(carrier, lump) for carrier, lump in zip(heavy, lumps, strict=True)])
+    com = np.array([lump.com for lump in lumps])[:, None]
+    phi = np.concatenate([inertial_parameters(lump) for lump in lumps])
+    body = Body(
+        file.name,
+        segments,
+        tuple(replace(joint, segment=carried.get(j, NO_SEGMENT)) for j, joint in enumerate(joints)),
+        Sip(segments, phi, np.zeros((phi.size, phi.size))),
+        limits,
+        SegmentMarkers((), (), np.empty((0, 3)), np.empty(0)),
+        boxes,
+        np.concatenate([np.minimum(boxes[:, :1], com), np.maximum(boxes[:, 1:], com)], axis=1),
+        notes=_notes(file, heavy, [carrier.link for carrier, lump in zip(heavy, lumps, strict=True) if is_point(lump)]),
+    )
+    try:
+        refuse_impossible(body)
+    except BiodanceError as error:
+        raise FileRefused(f"{file.path}: {error}") from error
+    spread = [extended(lump, box) for lump, box in zip(lumps, boxes, strict=True)]
+    return replace(body, sip=Sip(segments, phi, robot_covariance(spread, [com_deviation(lump) for lump in spread])))
+
+
+def _tree(file: UrdfFile) -> tuple[list[Joint], JointLimits, list[_Carrier], dict[str, _Carrier]]:
+    """Return joints, limits, the links that move and, of every link, the one that carries it.
+
+    A joint is followed by all that hangs on it, as pinocchio's algorithms need it; joints on one link keep the order of the file.
+    """
+    first = _Carrier(_root(file), -1, [])
+    owner, frame = {first.link: first}, {first.link: (np.eye(3), np.zeros(3))}
+    joints, rows, carriers, waiting = list[Joint](), list[Connection](), [first], _on(file, first.link)
+    while waiting:
+        c = waiting.pop(0)
+        (turn, place), above = frame[c.parent], owner[c.parent]
+        turn, place = turn @ c.rotation, place + turn @ c.translation
+        if c.kind == "fixed":
+            owner[c.child], frame[c.child] = above, (turn, place)
+        else:
+            joints.append(Joint(c.name, above.joint, c.axis, turn, place))
+            rows.append(c)
+            owner[c.child], frame[c.child] = _Carrier(c.child, len(joints) - 1, []), (np.eye(3), np.zeros(3))
+            carriers.append(owner[c.child])
+        waiting = [*_on(file, c.child), *waiting]
+    lost = [name for name in file.links if name not in owner]
+    if lost:
+        raise FileRefused(f"{file.path}: the link {lost[0]} does not hang on the root {first.link}. Correct the joints above it.")
+    for name, link in file.links.items():
+        (turn, place), carrier = frame[name], owner[name]
+        if link.lump is not None:
+            carrier.lumps.append(RigidInertia(link.lump.mass, turn @ link.lump.com + place, turn @ link.lump.inertia @ turn.T))
+        carrier.shapes += [corners @ turn.T + place for corners in link.shapes]
+        carrier.hulls += [corners @ turn.T + place for corners in link.hulls]
+        carrier.unread += link.unread
+    table = np.array([[c.lower, c.upper, c.velocity, c.effort] for c in rows]).reshape(-1, 4)
+    return joints, JointLimits(table[:, 0], table[:, 1], table[:, 2], -table[:, 3], table[:, 3]), carriers, owner
+
+
+def _root(file: UrdfFile) -> str:
+    """Return the link that hangs on no other."""
+    children = {connection.child for connection in file.connections}
+    roots = [name for name in file.links if name not in children]
+    if len(roots) != 1:
+        raise FileRefused(f"{file.path}: {len(roots)} links have no parent ({', '.join(roots) or 'a ring'}); a robot has exactly one root.")
+    if len(children) < len(file.connections):
+        raise FileRefused(f"{file.path}: a link is the child of two joints; a body is a tree without rings.")
+    return roots[0]
+
+
+def _on(file: UrdfFile, link: str) -> list[Connection]:
+    return [connection for connection in file.connections if connection.parent == link]
+
+
+def _box(carrier: _Carrier, lump: RigidInertia) -> Array:
+    """Return the box (2, 3) m around the shapes of a segment; without any, a box with its moments of inertia about its axes."""
+    corners = carrier.corners
+    if corners.size:
+        return np.stack([corners.min(axis=0), corners.max(axis=0)])
+    moments = np.diag(lump.inertia)
+    half = np.sqrt(np.maximum(1.5 * (moments.sum() - 2 * moments) / lump.mass, 1e-6))
+    return np.stack([lump.com - half, lump.com + half])
+
+
+def _notes(file: UrdfFile, heavy: list[_Carrier], points: list[str]) -> tuple[str, ...]:
+    guessed = [carrier.link for carrier in heavy if not carrier.corners.size]
+    turning = [c.name for c in file.connections if c.kind == "continuous"]
+    notes = [f"No boxes in the file, taken from the inertia instead: {', '.join(guessed)}."] if guessed else []
+    notes += [f"Continuous joints are used within half a turn to either side: {', '.join(turning)}."] if turning else []
+    notes += [f"Point masses in the file, of which the boxes say how sure they are: {', '.join(points)}."] if points else []
+    return tuple(notes)
+
+
+def _standing(file: UrdfFile, body: Body, feet: dict[str, _Carrier]) -> Body:
+    """Return the body with its soles, its root in ISB axes."""
+    place = {side: _at_zero(body, carrier.joint) for side, carrier in feet.items()}
+    below = np.mean([position for _, position in place.values()], axis=0)
+    axis = int(np.argmax(np.abs(below)))
+    if axis == 0 or below[axis] > 0:
+        raise FileRefused(
+            f"{file.path}: at zero joint angles the feet are at {np.round(below, 3)} m from the root; the root must have x forwards and "
+            "y or z up, and the robot must stand upright at zero angles."
+        )
+    up, ahead = np.eye(3)[axis], np.eye(3)[0]
+    if _backwards(feet, place, np.cross(ahead, up)):
+        ahead = -ahead
+    soles = _soles(file, feet, place, up, ahead)
+    sideways = np.cross(ahead, up)
+    right, left = (float(place[side][1] @ sideways) for side in ("right", "left"))
+    if not right > left:
+        raise FileRefused(
+            f"{file.path}: {feet['right'].link} stands left of {feet['left'].link}; name the right foot first, then the left one."
+        )
+    standing = replace(body, feet={side: Foot(body.segment_index(feet[side].link), soles[side]) for side in feet})
+    turn = np.stack([ahead, up, sideways], axis=1)
+    return standing if np.array_equal(turn, np.eye(3)) else reframed(standing, 0, turn, np.zeros(3))
+
+
+def _backwards(feet: dict[str, _Carrier], place: dict[str, tuple[Array, Array]], sideways: Array) -> bool:
+    """Whether the root's x axis points backwards (iCub): seen along it the right foot is on the left, and the names say right and left."""
+    crossed = float((place["right"][1] - place["left"][1]) @ sideways) < 0
+    right, left = (feet[side].link.lower() for side in ("right", "left"))
+    pairs = (("right", "left"), ("r_", "l_"), ("_r", "_l"))
+    return crossed and any(one in right and right.replace(one, other) == left for one, other in pairs)
+
+
+def _soles(file: UrdfFile, feet: dict[str, _Carrier], place: dict[str, tuple[Array, Array]], up: Array, ahead: Array) -> dict[str, Array]:
+    """Return the outlines (P, 3) m of both soles in the frames of the feet."""
+    soles = {}
+    for side, carrier in feet.items():
+        if not carrier.corners.size:
+            why = f"of its meshes {carrier.unread[0]}" if carrier.unread else "it has no shape"
+            raise FileRefused(f"{file.path}: the {side} foot {carrier.link} shows no sole, since {why}. Give it a collision <box>.")
+        turn, _ = place[side]
+        axes = np.stack([ahead, up, np.cross(ahead, up)]) @ turn
+        soles[side] = sole_outline(f"{file.path}: the foot {carrier.link}", carrier.shapes, carrier.hulls, axes)
+    soles["right"], soles["left"] = match_faces(soles["right"], soles["left"])
+    return soles
+
+
+def _at_zero(body: Body, joint: int) -> tuple[Array, Array]:
+    """Return turn (3, 3) and place (3,) m of a joint's frame in the root's at zero angles."""
+    turn, place = np.eye(3), np.zeros(3)
+    while joint >= 0:
+        one = body.joints[joint]
+        turn, place, joint = one.rotation @ turn, one.translation + one.rotation @ place, one.parent
+    return turn, place

@@ -1,0 +1,247 @@
+"""What a URDF file says: links and joints, checked and in SI units, with nothing left out in silence.
+
+Read are <link> (inertial, collision and visual boxes, cylinders, spheres and meshes) and <joint> (revolute, continuous, fixed) with their
+placements and limits. Transmissions, sensors and colours do not matter here. Format: wiki.ros.org/urdf/XML.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree.ElementTree import Element, ParseError, fromstring
+
+import numpy as np
+
+from biodance.body.inertia import RigidInertia
+from biodance.body.robot.sole import mesh_file, mesh_hull
+from biodance.errors import FileRefused
+from biodance.records import Array
+
+KINDS = ("revolute", "continuous", "fixed")
+"""Types of joints that a body can have."""
+TURN = np.pi
+"""rad: range of a continuous joint to either side."""
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """One link: ``lump`` in the link's frame, None without mass; of its collision (else visual) shapes, in the link's frame: ``shapes``
+    corners (8, 3) m of the boxes around those that are no meshes, ``hulls`` corners (K, 3) m of the convex hulls of those that are;
+    ``unread`` why a mesh could not be read.
+    """
+
+    name: str
+    lump: RigidInertia | None
+    shapes: tuple[Array, ...]
+    hulls: tuple[Array, ...] = ()
+    unread: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Connection:
+    """One joint: ``rotation`` (3, 3) and ``translation`` (3,) m of the child's frame in the parent's; ``axis`` (3,) unit vector in the
+    child's; ``lower``, ``upper`` rad, ``velocity`` rad/s, ``effort`` N·m (all 0 for a fixed one).
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    rotation: Array
+    translation: Array
+    axis: Array
+    lower: float
+    upper: float
+    velocity: float
+    effort: float
+
+
+@dataclass(frozen=True, eq=False)
+class UrdfFile:
+    """A robot as its file says it: ``links`` by name, ``connections`` in the order of the file."""
+
+    path: Path
+    name: str
+    links: dict[str, Link]
+    connections: tuple[Connection, ...]
+
+
+def read_urdf_file(path: str | Path) -> UrdfFile:
+    """Return what a URDF file says.
+
+    Raises
+    ------
+    FileRefused
+        The file cannot be read, is no URDF, or a link or joint lacks a value or has one that is not legal; the message names it.
+    """
+    path = Path(path)
+    try:
+        text = path.read_bytes()
+    except OSError as error:
+        raise FileRefused(f"{path}: cannot be read ({error.strerror or error}). Give the path of a URDF file.") from error
+    if b"<!DOCTYPE" in text or b"<!ENTITY" in text:
+        raise FileRefused(f"{path}: declares XML entities, which a robot does not need and which can do harm. Remove the DOCTYPE.")
+    try:
+        root = fromstring(text)
+    except ParseError as error:
+        raise FileRefused(f"{path}: is not XML ({error}). Give a URDF file; xacro files must be expanded first.") from error
+    if root.tag != "robot":
+        raise FileRefused(f"{path}: its first element is <{root.tag}>, expected <robot>. Give a URDF file.")
+    links = [_link(path, element) for element in root.findall("link")]
+    names = [link.name for link in links]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice or not links:
+        raise FileRefused(
+            f"{path}: {f'the link {twice[0]} occurs twice' if twice else 'has no <link>'}; every link needs a name of its own."
+        )
+    joints = tuple(_connection(path, element, set(names)) for element in root.findall("joint"))
+    return UrdfFile(path, root.get("name") or path.stem, dict(zip(names, links, strict=True)), joints)
+
+
+def placement(path: Path, element: Element, what: str) -> tuple[Array, Array]:
+    """Return rotation (3, 3) and translation (3,) m of the <origin> of ``element``; without one: no turn, no shift."""
+    origin = element.find("origin")
+    if origin is None:
+        return np.eye(3), np.zeros(3)
+    roll, pitch, yaw = _row(path, origin, "rpy", what, "0 0 0")
+    (sr, sp, sy), (cr, cp, cy) = np.sin([roll, pitch, yaw]), np.cos([roll, pitch, yaw])
+    about_z, about_y, about_x = (
+        np.array(rows)
+        for rows in (
+            [[cy, -sy, 0.0], [sy, cy, 0.0], [0.0, 0.0, 1.0]],
+            [[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]],
+            [[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]],
+        )
+    )
+    return about_z @ about_y @ about_x, _row(path, origin, "xyz", what, "0 0 0")
+
+
+def _link(path: Path, element: Element) -> Link:
+    name = element.get("name") or ""
+    what = f"link {name!r}"
+    lump, unread = _lump(path, element.find("inertial"), what), list[str]()
+    for kind in ("collision", "visual"):
+        elements = element.findall(kind)
+        shapes, hulls = _shapes(path, elements, what), mesh_hulls(path, elements, what, unread)
+        if shapes or hulls:
+            return Link(name, lump, shapes, hulls)
+    return Link(name, lump, (), (), tuple(unread))
+
+
+def _lump(path: Path, inertial: Element | None, what: str) -> RigidInertia | None:
+    if inertial is None:
+        return None
+    mass, tensor = inertial.find("mass"), inertial.find("inertia")
+    if mass is None or tensor is None:
+        raise FileRefused(
+            f"{path}: the inertial of {what} lacks <{'mass' if mass is None else 'inertia'}>. Complete it, or remove <inertial>."
+        )
+    value = _number(path, mass, "value", what)
+    if value < 0:
+        raise FileRefused(f"{path}: {what} has a mass of {value:g} kg; it must not be negative.")
+    xx, xy, xz, yy, yz, zz = (_number(path, tensor, key, what) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
+    turn, com = placement(path, inertial, what)
+    inertia = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
+    return RigidInertia(value, com, inertia) if value > 0 else None
+
+
+def _shapes(path: Path, elements: list[Element], what: str) -> tuple[Array, ...]:
+    """Return the corners (8, 3) of the boxes around all shapes that are not meshes."""
+    found = []
+    for element in elements:
+        geometry = element.find("geometry")
+        shape = next(iter(geometry), None) if geometry is not None else None
+        if shape is None or shape.tag == "mesh":
+            continue
+        if shape.tag == "box":
+            half = _row(path, shape, "size", what) / 2
+        elif shape.tag in ("cylinder", "sphere"):
+            radius = _number(path, shape, "radius", what)
+            half = np.array([radius, radius, radius if shape.tag == "sphere" else _number(path, shape, "length", what) / 2])
+        else:
+            raise FileRefused(f"{path}: {what} has the shape <{shape.tag}>; legal are box, cylinder, sphere and mesh.")
+        turn, place = placement(path, element, what)
+        signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
+        found.append(signs * half @ turn.T + place)
+    return tuple(found)
+
+
+def mesh_hulls(path: Path, elements: list[Element], what: str, unread: list[str]) -> tuple[Array, ...]:
+    """Return the corners (K, 3) m of the convex hulls of all shapes that are meshes; what cannot be read is said in ``unread``."""
+    found = []
+    for element in elements:
+        mesh = element.find("geometry/mesh")
+        if mesh is None:
+            continue
+        scale = _row(path, mesh, "scale", what, "1 1 1")
+        turn, place = placement(path, element, what)
+        try:
+            found.append(mesh_hull(mesh_file(path, mesh.get("filename", "")), tuple(scale)) @ turn.T + place)
+        except FileRefused as error:
+            unread.append(str(error))
+    return tuple(found)
+
+
+def _connection(path: Path, element: Element, links: set[str]) -> Connection:
+    name, kind = element.get("name") or "", element.get("type") or ""
+    what = f"joint {name!r}"
+    if kind not in KINDS:
+        raise FileRefused(
+            f"{path}: {what} is of type {kind!r}; a body has revolute, continuous and fixed joints. Make it fixed, or remove it."
+        )
+    if element.find("mimic") is not None:
+        raise FileRefused(f"{path}: {what} mimics another joint, which a body cannot. Make it fixed.")
+    ends = []
+    for tag in ("parent", "child"):
+        end = element.find(tag)
+        link = end.get("link") if end is not None else None
+        if link not in links:
+            raise FileRefused(f"{path}: the {tag} of {what} is {link!r}, which is no link of the file. Correct it.")
+        ends.append(link)
+    rotation, translation = placement(path, element, what)
+    if kind == "fixed":
+        return Connection(name, kind, ends[0], ends[1], rotation, translation, np.array([1.0, 0.0, 0.0]), 0.0, 0.0, 0.0, 0.0)
+    given = element.find("axis")
+    axis = _row(path, given, "xyz", what) if given is not None else np.array([1.0, 0.0, 0.0])
+    length = float(np.linalg.norm(axis))
+    if length < 1e-6:
+        raise FileRefused(f"{path}: the axis of {what} has no direction ({axis}). Give xyz of an axis.")
+    axis = axis if abs(length - 1) < 1e-12 else axis / length
+    return Connection(name, kind, ends[0], ends[1], rotation, translation, axis, *_limits(path, element, kind, what))
+
+
+def _limits(path: Path, element: Element, kind: str, what: str) -> tuple[float, float, float, float]:
+    """Return lower, upper, velocity and effort of a joint that moves."""
+    limit = element.find("limit")
+    if limit is None:
+        raise FileRefused(f"{path}: {what} has no <limit>; give lower and upper (rad), velocity (rad/s) and effort (N·m).")
+    lower, upper = (-TURN, TURN) if kind == "continuous" else (_number(path, limit, key, what) for key in ("lower", "upper"))
+    velocity, effort = (_number(path, limit, key, what) for key in ("velocity", "effort"))
+    if not lower <= upper:
+        raise FileRefused(f"{path}: the range of {what} is {lower:g} to {upper:g} rad; lower must not exceed upper.")
+    for key, value, unit in (("velocity", velocity, "rad/s"), ("effort", effort, "N·m")):
+        if not value > 0:
+            raise FileRefused(f"{path}: the {key} of {what} is {value:g} {unit}, with which it cannot move; give what its motor can do.")
+    return lower, upper, velocity, effort
+
+
+def _number(path: Path, element: Element, key: str, what: str) -> float:
+    text = element.get(key)
+    if text is None:
+        raise FileRefused(f"{path}: <{element.tag}> of {what} lacks {key}. Add it.")
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not np.isfinite(value):
+        raise FileRefused(f"{path}: {key} of <{element.tag}> of {what} is {text!r}; expected a finite number.")
+    return value
+
+
+def _row(path: Path, element: Element, key: str, what: str, default: str = "") -> Array:
+    text = element.get(key, default)
+    try:
+        values = np.array([float(word) for word in text.split()])
+    except ValueError:
+        values = np.empty(0)
+    if values.shape != (3,) or not np.isfinite(values).all():
+        raise FileRefused(f"{path}: {key} of <{element.tag}> of {what} is {text!r}; expected three finite numbers.")
+    return values

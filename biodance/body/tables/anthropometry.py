@@ -1,0 +1,71 @@
+"""Read one anthropometric table: a tidy CSV with the numbers and a TOML of the same name with their provenance."""
+
+import csv
+import functools
+import hashlib
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+from biodance.errors import BiodanceError, UnknownName
+from biodance.library import locate, read_toml
+
+TableRow = Mapping[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class AnthropometricTable:
+    """One table: ``rows`` as text by column name; ``provenance``: title, source, doi, page, population, n, sex, units, sd, sha256 ..."""
+
+    name: str
+    rows: tuple[TableRow, ...]
+    provenance: Mapping[str, Any]
+
+    def where(self, **wanted: str) -> tuple[TableRow, ...]:
+        """Return the rows whose columns equal the wanted texts, for example ``where(segment="foot", sex="F")``; may be empty."""
+        return tuple(row for row in self.rows if all(row[column] == text for column, text in wanted.items()))
+
+    def row(self, **wanted: str) -> TableRow:
+        """Return the one row that matches.
+
+        Raises
+        ------
+        UnknownName
+            No row, or more than one, matches.
+        """
+        found = self.where(**wanted)
+        if len(found) != 1:
+            column, text = next(iter(wanted.items()))
+            raise UnknownName.of(f"{column} of table {self.name} (with {wanted})", text, sorted({row[column] for row in self.rows}))
+        return found[0]
+
+
+def row_numbers(row: TableRow, columns: str) -> tuple[float, ...]:
+    """Return the columns named in a space-separated text as floats."""
+    return tuple(float(row[column]) for column in columns.split())
+
+
+@functools.cache
+def read_table(family: str, name: str) -> AnthropometricTable:
+    """Read ``anthropometry/<family>/<name>.csv`` and its provenance, for example ``read_table("segments", "de_leva_1996")``.
+
+    Raises
+    ------
+    UnknownName
+        There is no such table; the message lists all.
+    BiodanceError
+        The numbers are not those that the provenance describes (sha256).
+    """
+    path = locate(f"anthropometry/{family}", name, ".csv")
+    data = path.read_bytes()
+    provenance = read_toml(path.with_suffix(".toml"))
+    digest = hashlib.sha256(data).hexdigest()
+    if provenance.get("sha256") != digest:
+        raise BiodanceError(
+            f"{path}: the numbers were changed since {path.stem}.toml was written (sha256 {digest}). "
+            "Restore the file, or describe your change in the .toml and put this sha256 there."
+        )
+    rows = csv.DictReader(io.StringIO(data.decode()))
+    return AnthropometricTable(name, tuple(MappingProxyType(row) for row in rows), MappingProxyType(provenance))

@@ -1,0 +1,202 @@
+"""The prior segment inertial parameters of a person: a table scaled to the skeleton, with the spread between tables as a covariance."""
+
+import functools
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of, side_of
+from biodance.body.inertia import TENSOR, RigidInertia, inertial_parameters, mirror_inertia, turn_inertia
+from biodance.body.tables.choice import measured_whole, reference, studies
+from biodance.body.tables.choice import reference as reference_of
+from biodance.body.tables.de_leva import PARTS
+from biodance.body.tables.de_leva import lengths as reference_lengths
+from biodance.body.tables.error_sizes import error_size
+from biodance.body.tables.older import regression, study_masses
+from biodance.body.tables.reference import Reference
+from biodance.records import Array, Sip, Subject
+
+WOMAN, MAN = Subject(65.0, 1.70, "F"), Subject(75.0, 1.75, "M")
+LIVING = ("adult", "older")
+_AXES = ("sagittal", "longitudinal", "transverse")
+
+
+@dataclass(frozen=True, eq=False)
+class Spread:
+    """Standard deviations of one kind of segment.
+
+    ``mass`` relative; ``com`` (3,) in units of the length; ``radii`` (3,) relative, of the radii of gyration about x, y, z;
+    ``products`` (3,) of xy, xz, yz of the inertia per unit mass, in units of the length squared. The length is the segment's own; for
+    pelvis and trunk_head it is mid hip to mid shoulder.
+    """
+
+    mass: float
+    com: Array
+    radii: Array
+    products: Array
+
+
+@functools.cache
+def table_spread(kind: str) -> Spread:
+    """Return the standard deviations of one kind of segment (pelvis, thigh, shank, foot, trunk_head, upper_arm, forearm_hand)."""
+    tables = (*((name, who) for name in ("de_leva_1996", "dumas_2018") for who in (WOMAN, MAN)), ("winter_2009", MAN))
+    people = [reference(*table) for table in tables]
+    units = [_in_lengths(person, kind) for person in people]
+    masses = [person.segments[kind].mass for person in people]
+    masses += [study_masses(name, who)[kind] for who in (WOMAN, MAN) for name in _with_own(kind, who)]
+    inner = _within(kind)
+    tensor = np.array([unit.inertia for unit in units])
+    return Spread(
+        float(np.hypot(np.std(masses, ddof=1) / np.mean(masses), inner.mass)),
+        np.hypot(_sd(unit.com for unit in units), inner.com),
+        np.hypot(_sd(0.5 * np.log(np.diag(one)) for one in tensor), inner.radii),
+        _sd(one[(0, 0, 1), (1, 2, 2)] for one in tensor),
+    )
+
+
+def _sd(values: Iterable[Array]) -> Array:
+    return np.asarray(np.std(np.array(list(values)), axis=0, ddof=1))
+
+
+def _with_own(kind: str, who: Subject) -> list[str]:
+    """Return the studies of living adults; for the trunk only those that cut the pelvis themselves (Zatsiorsky's data are de Leva's)."""
+    living = [name for name, group in studies(who.sex).items() if group in LIVING and name != "zatsiorsky_seluyanov_1979"]
+    return [name for name in living if kind not in ("pelvis", "trunk_head") or name in ("chen_2011", "ma_2011", "pavol_2002")]
+
+
+def _in_lengths(person: Reference, kind: str) -> RigidInertia:
+    """Return the segment in units of its length, CoM of the trunk from the mid hip; ``inertia`` per unit mass."""
+    unit, length = person.segments[kind], person.lengths[kind]
+    base = np.zeros(3)
+    if kind in ("pelvis", "trunk_head"):
+        length = person.lengths["trunk_head"]
+        base[1] = person.lengths["pelvis"] if kind == "trunk_head" else 0.0
+    return RigidInertia(1.0, (unit.com + base) / length, unit.inertia / length**2)
+
+
+def _within(kind: str) -> Spread:
+    """Return the spread between men of one mass and stature; parts of a compound segment vary independently."""
+    parts = PARTS[kind]
+    mass, mass_sd = np.array([regression(part, "mass", "", MAN) for part in parts]).T
+    share = mass / mass.sum()
+    length = reference_lengths("M")["trunk_head" if kind == "pelvis" else kind]
+    com = np.linalg.norm(share * [regression(part, "com", "longitudinal", MAN)[1] for part in parts]) / length
+    along = np.array([com, 0.0, 0.0]) if kind == "foot" else np.array([0.0, com, 0.0])
+    names = ("longitudinal", "sagittal", "transverse") if kind == "foot" else _AXES
+    radii = np.array([share @ [_radius_sd(part, axis) for part in parts] for axis in names])
+    return Spread(float(np.linalg.norm(mass_sd) / mass.sum()), along, radii, np.zeros(3))
+
+
+def _radius_sd(part: str, axis: str) -> float:
+    (moment, moment_sd), (mass, mass_sd) = regression(part, "inertia", axis, MAN), regression(part, "mass", "", MAN)
+    return 0.5 * float(np.sqrt(max((moment_sd / moment) ** 2 - (mass_sd / mass) ** 2, 0.0)))
+
+
+TRUNK = ("pelvis", "trunk_head")
+MIRROR = np.array([1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0])
+"""Signs of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] under reflection at z = 0."""
+
+
+def prior(reference: Reference, skeleton: Skeleton, subject: Subject) -> Sip:
+    """Return the prior SIP of a person with covariance (120, 120); the masses sum to the subject's mass."""
+    lumps = scaled_lumps(reference, skeleton, subject)
+    jacobian = np.zeros((10 * len(lumps), 10 * len(lumps)))
+    for i, lump in enumerate(lumps):
+        jacobian[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] = parameter_jacobian(lump)
+    others = tuple(scaled_lumps(reference_of(name, subject), skeleton, subject) for name in measured_whole() if name != reference.table)
+    covariance = jacobian @ primitive_covariance(lumps, skeleton, others) @ jacobian.T
+    return Sip(SEGMENTS, np.concatenate([inertial_parameters(lump) for lump in lumps]), (covariance + covariance.T) / 2)
+
+
+def scaled_lumps(reference: Reference, skeleton: Skeleton, subject: Subject) -> tuple[RigidInertia, ...]:
+    """Return the 12 segments of the reference person at the subject's mass and segment lengths, each in its segment frame.
+
+    The pelvis of the table is upright; it is turned so that its long axis points from the mid hip to where the table cuts the trunk. The
+    trunk above the cut keeps its place in the person, also where the joint lies elsewhere.
+    """
+    lumps = []
+    for segment in SEGMENTS:
+        kind = kind_of(segment)
+        unit = reference.segments[kind]
+        scale, mass = skeleton.lengths[segment] / reference.lengths[kind], unit.mass * subject.mass
+        lump = RigidInertia(mass, scale * unit.com, mass * scale**2 * unit.inertia)
+        if segment == "pelvis":
+            lump = turn_inertia(lump, _upright_to(skeleton.cut.get("pelvis", skeleton.origins["trunk"])))
+        if segment == "trunk_head":
+            lump = replace(lump, com=lump.com + skeleton.cut.get("trunk_head", np.zeros(3)))
+        lumps.append(lump if side_of(segment) > 0 else mirror_inertia(lump))
+    return tuple(lumps)
+
+
+def _upright_to(point: Array) -> Array:
+    """Return the rotation (3, 3) about z that turns y towards a point in the sagittal plane."""
+    sine, cosine = point[:2] / np.linalg.norm(point[:2])
+    return np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+
+
+def disagreement(lumps: tuple[RigidInertia, ...], other: tuple[RigidInertia, ...]) -> Array:
+    """Return how the limbs of another table differ, (120,) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] (kg, m, m²): one standard deviation.
+
+    Zero for pelvis and trunk, which tables divide at different heights.
+    """
+    rows = [np.zeros(10) if s in TRUNK else _primitives(b) - _primitives(a) for s, a, b in zip(SEGMENTS, lumps, other, strict=True)]
+    return np.concatenate(rows)
+
+
+def _primitives(lump: RigidInertia) -> Array:
+    return np.array([lump.mass, *lump.com, *(lump.inertia[i, j] / lump.mass for i, j in TENSOR)])
+
+
+def primitive_covariance(lumps: tuple[RigidInertia, ...], skeleton: Skeleton, others: tuple[tuple[RigidInertia, ...], ...]) -> Array:
+    """Return the covariance (120, 120) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] of all segments (kg, m, m²); ``others`` other tables'.
+
+    The variance of ``primitive_sd`` is divided: what the disagreement of the tables explains moves together, the rest on its own.
+    """
+    ways = np.array([disagreement(lumps, other) for other in others]).reshape(-1, 10 * len(lumps))
+    variance = np.concatenate([primitive_sd(s, lump, skeleton) for s, lump in zip(SEGMENTS, lumps, strict=True)]) ** 2
+    own = np.sqrt(np.maximum(variance - np.sum(ways**2, axis=0), error_size("own_share", "variance") * variance))
+    together = np.eye(len(SEGMENTS))
+    for i, segment in enumerate(SEGMENTS):
+        if segment.startswith("right_"):
+            left = SEGMENTS.index(segment.replace("right_", "left_"))
+            together[i, left] = together[left, i] = error_size("left_right_correlation", "mass")
+    scale = own * np.concatenate([MIRROR if side_of(s) < 0 else np.ones(10) for s in SEGMENTS])
+    covariance = np.kron(together, np.eye(10)) * np.outer(scale, scale) + ways.T @ ways
+    total = np.tile(np.eye(10)[0], len(SEGMENTS))
+    gain = covariance @ total
+    return covariance - np.outer(gain, gain) / (total @ gain + error_size("scale", "mass") ** 2)
+
+
+def com_sd(segment: str, skeleton: Skeleton) -> Array:
+    """Return the standard deviations (3,) m of a segment's CoM in its joint frame: tables, people and misplaced joint centres."""
+    length = skeleton.lengths["trunk_head" if segment == "pelvis" else segment]
+    return np.hypot(table_spread(kind_of(segment)).com * length, error_size("joint_centre", "other", state="before"))
+
+
+def primitive_sd(segment: str, lump: RigidInertia, skeleton: Skeleton) -> Array:
+    """Return the standard deviations (10,) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] of one segment."""
+    kind, own = table_spread(kind_of(segment)), lump.inertia / lump.mass
+    length = skeleton.lengths["trunk_head" if segment == "pelvis" else segment]
+    products = dict(zip(((0, 1), (0, 2), (1, 2)), kind.products, strict=True))
+    tensor = [
+        2 * own[i, i] * kind.radii[i]
+        if i == j
+        else np.hypot(products[i, j] * length**2, error_size("product_floor", "inertia") * np.sqrt(own[i, i] * own[j, j]))
+        for i, j in TENSOR
+    ]
+    return np.array([kind.mass * lump.mass, *com_sd(segment, skeleton), *tensor])
+
+
+def parameter_jacobian(lump: RigidInertia) -> Array:
+    """Return d phi / d [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] (10, 10) at a lump."""
+    mass, com = lump.mass, lump.com
+    out = np.zeros((10, 10))
+    out[:, 0] = inertial_parameters(lump) / mass
+    out[1:4, 1:4] = mass * np.eye(3)
+    for row, (i, j) in enumerate(TENSOR, start=4):
+        for k in range(3):
+            shift = 2 * com[k] * (i == j) - com[i] * (j == k) - com[j] * (i == k)
+            out[row, 1 + k] = mass * shift
+    out[4:, 4:] = mass * np.eye(6)
+    return out

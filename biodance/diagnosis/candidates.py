@@ -1,0 +1,125 @@
+"""Every cause of the family at every target, as columns whose coefficients are unit normal before the data.
+
+A cause that is linear in its parameters has its own columns. One that is not (the place of a load matters only once it weighs something) is
+spanned by what it does at its typical size: the columns at zero, and the differences that the other parameters make there.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance.diagnosis.problem import Problem
+from biodance.discovery import Chosen
+from biodance.effects import Case, Effect, effects
+from biodance.records import Array
+
+SCALE = 3.0
+"""Standard deviation of a fault before the data, in typical sizes."""
+NOTHING = 1e-7
+"""Share of the largest column below which a column is zero."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One cause: ``basis`` (r, k) rows per unit-normal coefficient; ``silent`` (p,) True for parameters whose column vanishes at zero."""
+
+    effect: Effect
+    basis: Array
+    silent: tuple[bool, ...]
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Effect and target."""
+        return self.effect.name, self.effect.target
+
+    def start(self, coefficients: Array) -> Array:
+        """Return the parameters (p,) near which to begin fitting, from the coefficients (k,) of the basis."""
+        typical, silent = self.effect.typical, np.array(self.silent)
+        theta = np.zeros(typical.size)
+        loud = np.flatnonzero(~silent)
+        theta[loud] = SCALE * typical[loud] * coefficients[: loud.size]
+        if silent.any():
+            size = theta[loud[0]] / typical[loud[0]]
+            if abs(size) > 0.05:
+                slopes = SCALE * coefficients[loud.size : loud.size + silent.sum()]
+                theta[silent] = typical[silent] * np.clip(slopes / size, -3.0, 3.0)
+        return theta
+
+
+def candidates(problem: Problem, chosen: Chosen[Effect] = None) -> tuple[Candidate, ...]:
+    """Return all causes of the family (or those ``chosen``, see `effects`) at all their targets; those without any trace are left out."""
+    every = [one for effect in effects(chosen).values() for one in effect.everywhere(problem.cases[0])]
+    if not every:
+        return ()
+    found = [candidate(problem, effect, columns) for effect, columns in zip(every, problem.columns(every), strict=True)]
+    return tuple(one for one in found if one.basis.shape[1])
+
+
+def candidate(problem: Problem, effect: Effect, unit: Array) -> Candidate:
+    """Return one cause with its basis, from its columns (r, p) per ``unit`` of each parameter."""
+    columns = unit * effect.typical
+    length = np.linalg.norm(columns, axis=0)
+    silent = length <= NOTHING * length.max(initial=1e-300)
+    parts = list(columns[:, ~silent].T)
+    if silent.any() and not silent.all():
+        parts += _differences(problem, effect, silent)
+    basis = SCALE * np.array(parts).T if parts else np.empty((len(columns), 0))
+    return Candidate(effect, basis, tuple(bool(s) for s in silent))
+
+
+def _differences(problem: Problem, effect: Effect, silent: Array) -> list[Array]:
+    """Return what the silent parameters change at the typical size of the others: first differences, then second."""
+    loud = np.where(silent, 0.0, effect.typical)
+    middle = changes(problem, effect, loud)
+    first, second = [], []
+    for k in np.flatnonzero(silent):
+        step = effect.typical * (np.arange(len(silent)) == k)
+        up, down = changes(problem, effect, loud + step), changes(problem, effect, loud - step)
+        first.append(0.5 * (up - down))
+        second.append(0.5 * (up + down) - middle)
+    return first + [bend for bend in second if np.linalg.norm(bend) > NOTHING * np.linalg.norm(middle)]
+
+
+def local_basis(problem: Problem, effect: Effect) -> Array | None:
+    """Return (r, k): the columns of a cause that comes and goes, each trial its own; None where the cause has none."""
+    blocks = []
+    for index, case in enumerate(problem.cases):
+        samples = effect.local(case)
+        if samples is None:
+            return None
+        blocks.append(problem.spectrum.of_trial(index, samples))
+    width = np.cumsum([0, *(block.shape[2] for block in blocks)])
+    out = np.zeros((len(problem.target), int(width[-1])))
+    row = 0
+    for block, start in zip(blocks, width, strict=False):
+        rows = 6 * len(block)
+        out[row : row + rows, start : start + block.shape[2]] = block.reshape(rows, block.shape[2])
+        row += rows
+    return out
+
+
+def changes(problem: Problem, effect: Effect, theta: Array) -> Array:
+    """Return (r,): what the cause of size ``theta`` (p,) adds to the rows."""
+    return _in_rows(problem, effect, theta, effect.added)
+
+
+def removed(problem: Problem, effect: Effect, theta: Array) -> Array:
+    """Return (r,): what the cause of size ``theta`` (p,) has added to the rows, as far as it can be undone in what was measured."""
+    return _in_rows(problem, effect, theta, effect.removed)
+
+
+def _in_rows(problem: Problem, effect: Effect, theta: Array, wrench: Callable[[Case, Array], Array]) -> Array:
+    """Return (r,): the rows of ``wrench`` (T, 6) of every case, and of the markers."""
+    if effect.linear:
+        return np.asarray(problem.unit(effect) @ theta)
+    rows = problem.spectrum.rows(tuple(wrench(case, theta)[:, :, None] for case in problem.cases))
+    return np.concatenate([rows.ravel(), problem.marker_rows(effect) @ theta])
+
+
+def slopes(problem: Problem, effect: Effect, theta: Array, *, of: Callable[[Problem, Effect, Array], Array] = changes) -> Array:
+    """Return (r, p): derivative of `changes` or `removed` at ``theta``, of a cause that is not linear by central differences."""
+    if effect.linear:
+        return problem.unit(effect)
+    steps = 0.02 * np.diag(effect.typical)
+    return np.stack([(of(problem, effect, theta + s) - of(problem, effect, theta - s)) / (2 * s.max()) for s in steps], axis=1)

@@ -1,0 +1,97 @@
+"""A session's diagnosis: name causes, ask whether what is left is like a session without fault, and say what could not be seen."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.diagnosis.adequacy import STRAINED, adequacy, strain, verdict
+from biodance.diagnosis.diagnosis import Diagnosis, Estimate, Finding, Unobservable
+from biodance.diagnosis.model import NamedCause
+from biodance.diagnosis.naming import Naming, Round, name_causes, suspicious
+from biodance.diagnosis.observability import detection_limits, hidden, visibility
+from biodance.diagnosis.passing import with_passing
+from biodance.diagnosis.problem import Look, problem
+from biodance.discovery import Chosen
+from biodance.effects import DiscreteEffect, Effect, Gate
+from biodance.effects import effects as family
+from biodance.records import Sip
+from biodance.uncertainty.tolerances import Tolerances, key_of, shipped
+
+STRANGE = (
+    "What the plates measured fits only a body that is more unlike the table than people are. Something that looks like a body is wrong: "
+    "a load that nobody noted, a gain, or the declared mass or stature."
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Examined:
+    """A diagnosis with what it was made from: ``naming`` all rounds, with the problem and the named causes."""
+
+    diagnosis: Diagnosis
+    naming: Naming
+
+    @property
+    def named(self) -> tuple[NamedCause, ...]:
+        """The named causes with their sizes."""
+        return self.naming.found.named
+
+    @property
+    def suspicious(self) -> bool:
+        """Whether a cause passes the threshold before any is named."""
+        return suspicious(self.naming.screening, self.naming.first.tolerances)
+
+
+def diagnose_trials(
+    body: Body,
+    looks: tuple[Look, ...],
+    *,
+    gates: tuple[Gate, ...] = (),
+    tolerances: Tolerances | None = None,
+    prior: Sip | None = None,
+    effects: Chosen[Effect | DiscreteEffect] = None,
+    search: bool = True,
+) -> Examined:
+    """Return what the simulation of ``body`` (with the SIP known before, by default the table's) gets wrong in the trials ``looks``.
+
+    ``gates`` the checks made before; ``tolerances`` of everything that is no fault (those of virtual subjects by default);
+    ``prior`` of the parameters (an earlier session's; by default the table's); ``effects`` names limit the causes to these, objects
+    (``[MyEffect()]``) are looked for beside the family; without ``search`` nothing is named: only what is left is judged.
+
+    Raises
+    ------
+    TrialRefused
+        No trial has a second of believable, fully measured frames.
+    """
+    known = tolerances or shipped()
+    asked = family(effects)
+    put = problem(body, looks, prior=prior, chosen=asked)
+    naming = with_passing(name_causes(put, known, asked), asked) if search else name_causes(put, known, asked, rounds=0)
+    rows = detection_limits(visibility(naming.first, naming.first_causes), body, known.threshold)
+    left, strained = adequacy(naming.found), strain(naming.found) > STRAINED
+    findings = tuple(_finding(one, r, known) for one, r in zip(naming.found.named, naming.accepted, strict=True))
+    found = Diagnosis(
+        verdict=verdict(len(findings), left[0].z, gates, strained=strained),
+        findings=findings,
+        gates=gates,
+        adequacy=left,
+        unobservable=hidden(rows),
+        limits=tuple(sorted(rows, key=_relative)),
+        notes=(*put.notes, *([STRANGE] if strained else [])),
+        candidates=tuple(one.alias for one in naming.screening.suspects),
+    )
+    return Examined(found, naming)
+
+
+def _relative(row: Unobservable) -> float:
+    return row.limit / row.typical
+
+
+def _finding(one: NamedCause, found: Round, known: Tolerances) -> Finding:
+    """Return a named cause as a finding; no size is surer than sessions without fault are alike, nor than faults are like their models."""
+    alike = known.size(key_of(one.effect.name, one.effect.target)) * one.effect.typical / one.effect.typical[0]
+    units = np.array([parameter.unit for parameter in one.effect.parameters])
+    length = np.array([np.linalg.norm(one.theta[units == unit]) for unit in units])
+    sd = np.hypot(np.maximum(np.sqrt(np.diag(one.covariance)), alike), known.unlike(one.effect.name) * length)
+    parameters = tuple(Estimate(*row) for row in one.effect.reported(one.theta, sd))
+    return Finding(one.effect.name, one.effect.target, parameters, found.set, found.suspects[0].visible, advice=one.effect.advice)

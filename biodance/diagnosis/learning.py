@@ -1,0 +1,110 @@
+"""Learn from sessions without fault how large everything is that is no fault, all of them at once (`uncertainty/learning`).
+
+A coefficient of a nuisance is normal with the mean and the size of its key; a mean counts only where the sessions agree on it. What a joint
+may err before functional calibration is the literature's, and stays.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from biodance.diagnosis.candidates import Candidate
+from biodance.diagnosis.model import marker_keys, nuisances, shown_left_out
+from biodance.diagnosis.problem import Problem
+from biodance.records import Array
+from biodance.uncertainty.learning import Moments, maximise, moments_of, noise_of, sizes_of
+from biodance.uncertainty.tolerances import BEFORE, REFERENCE_PERSON, Tolerances, whitened
+
+
+@dataclass(frozen=True, eq=False)
+class Null:
+    """One session without fault: ``target`` (r,); ``columns`` (r, K) in unit size with their ``keys`` (K), "" for the parameters' prior
+    (unit normal), and ``mean_keys`` (K), "" for columns without a mean; ``band`` (m,) of the 6 m wrench rows; ``marker_keys`` of the rows
+    that follow; ``mass`` kg.
+    """
+
+    target: Array
+    columns: Array
+    keys: tuple[str, ...]
+    band: NDArray[np.intp]
+    marker_keys: tuple[str, ...]
+    mass: float
+    mean_keys: tuple[str, ...] = ()
+
+
+def null_of(problem: Problem, causes: tuple[Candidate, ...]) -> Null:
+    """Return a session without fault as `learn` wants it; ``causes`` all of the family."""
+    columns, keys, mean_keys = nuisances(problem, causes)
+    own = ("",) * problem.sip.shape[1]
+    mass = float(problem.cases[0].body.sip.mass.sum())
+    every: Array = np.concatenate([problem.sip, columns], axis=1).astype(np.float32)  # type: ignore[assignment]
+    return Null(problem.target, every, own + keys, problem.spectrum.band, marker_keys(problem), mass, own + mean_keys)
+
+
+def learn_tolerances(nulls: Iterable[Null], start: Tolerances, *, rounds: int = 10) -> Tolerances:
+    """Return the sizes, means and noise under which the null sessions are most probable after ``rounds`` of expectation maximisation, and
+    the energies that they leave. Only what has a size in ``start`` is learned.
+    """
+    sessions = tuple(nulls)
+    found = maximise(start, lambda known: _improved(sessions, known), lambda known: known.noise, rounds=rounds)
+    left = np.array([_energy(null, found) for null in sessions])
+    spread = left.std(axis=0, ddof=1) if len(sessions) > 1 else found.energy_sd
+    return replace(found, energy=left.mean(axis=0), energy_sd=spread)
+
+
+@dataclass(frozen=True, eq=False)
+class _Posterior:
+    """What one session says of its coefficients: ``value``, ``variance`` (K,) in their own units, NaN for those without a size; ``left``
+    (r,) what their means leave of the target; ``spread`` (r, k) a square root of the covariance of what they explain.
+    """
+
+    value: Array
+    variance: Array
+    left: Array
+    spread: Array
+
+
+def _posterior(null: Null, found: Tolerances) -> _Posterior:
+    """Return what one session says about all coefficients under the tolerances ``found``."""
+    size = np.array([1.0 if key == "" else found.size(key) for key in null.keys])
+    expected = np.array([found.mean(name) if name else 0.0 for name in null.mean_keys or null.keys])
+    known = np.flatnonzero(size > 0)
+    scaled = null.columns[:, known] * size[known].astype(null.columns.dtype)
+    target = null.target - shown_left_out(null.columns[:, known] @ expected[known], null.marker_keys)
+    X = whitened(scaled, null.band, null.marker_keys, null.mass, found)
+    y = whitened(target[:, None].astype(X.dtype), null.band, null.marker_keys, null.mass, found)[:, 0]
+    factor = cho_factor((X.T @ X).astype(float) + np.eye(known.size), lower=True)
+    mean, covariance = cho_solve(factor, (X.T @ y).astype(float)), cho_solve(factor, np.eye(known.size))
+    value, variance = np.full((2, size.size), np.nan)
+    value[known], variance[known] = expected[known] + size[known] * mean, size[known] ** 2 * np.diag(covariance)
+    return _Posterior(value, variance, target - scaled @ mean, scaled @ np.linalg.cholesky(covariance).astype(scaled.dtype))
+
+
+def _improved(sessions: tuple[Null, ...], found: Tolerances) -> Tolerances:
+    """Return the tolerances after one round."""
+    rows: list[tuple[str, str, float, float]] = []
+    bands = len(found.noise)
+    total = Moments(np.zeros_like(found.noise), np.zeros(bands))
+    for null in sessions:
+        some = _posterior(null, found)
+        names = null.mean_keys or ("",) * len(null.keys)
+        rows += [row for row in zip(null.keys, names, some.value, some.variance, strict=True) if row[0] and np.isfinite(row[2])]
+        wrench = 6 * null.band.size
+        seen = some.left[wrench:] ** 2 + (some.spread[wrench:] ** 2).sum(axis=1)
+        rows += [(key, "", float(np.sqrt(square)), 0.0) for key, square in zip(null.marker_keys, seen, strict=True)]
+        parts = np.concatenate([some.left[:wrench, None], some.spread[:wrench]], axis=1).reshape(null.band.size, 6, -1)
+        here = moments_of(parts, null.band, bands)
+        total = total + replace(here, residual=here.residual * (REFERENCE_PERSON / null.mass) ** 2)
+    means, sizes = sizes_of(rows)
+    learned = {key: size for key, size in sizes.items() if not key.endswith(BEFORE)}
+    return replace(found, sizes={**found.sizes, **learned}, noise=noise_of(total), means=means)
+
+
+def _energy(null: Null, found: Tolerances) -> Array:
+    """Return (B, 6): mean square of the whitened residual that a session leaves, per band and channel."""
+    left = _posterior(null, found).left[:, None]
+    square = whitened(left, null.band, null.marker_keys, null.mass, found)[: 6 * null.band.size].reshape(-1, 6) ** 2
+    return np.array([square[null.band == b].mean(axis=0) for b in range(len(found.noise))])

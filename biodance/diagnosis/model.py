@@ -1,0 +1,112 @@
+"""The problem under its tolerances: whitened rows, columns of all that is no fault, and the causes that were named so far."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from biodance.body.human.skeleton import kind_of
+from biodance.diagnosis.candidates import SCALE, Candidate, removed
+from biodance.diagnosis.evidence import Belief, believe
+from biodance.diagnosis.problem import Problem
+from biodance.effects import Effect
+from biodance.motion.kinematics import chains
+from biodance.records import Array
+from biodance.uncertainty.joints import joint_of
+from biodance.uncertainty.tolerances import Tolerances, in_state, key_of, mean_key, whitened
+
+
+@dataclass(frozen=True, eq=False)
+class NamedCause:
+    """A cause of size ``theta`` (p,) with ``covariance`` (p, p); for a cause that comes and goes the force while it
+    acts, and per trial the
+    ``course`` of its parameters, as in `Effect.local`.
+    """
+
+    effect: Effect
+    theta: Array
+    covariance: Array
+    course: Mapping[str, Array] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """``problem`` with the parameters in use, under ``tolerances``; ``belief`` about all that is no fault, the ``named`` causes and what is
+    ``expected`` (r,) of a session without fault taken off.
+
+    ``log_likelihood`` of the target under it, up to a constant of the session.
+    """
+
+    problem: Problem
+    tolerances: Tolerances
+    belief: Belief
+    expected: Array
+    named: tuple[NamedCause, ...] = ()
+
+    @property
+    def log_likelihood(self) -> float:
+        """-1/2 y' C^-1 y with C the covariance of the rows under everything that is no fault."""
+        return -0.5 * float(self.belief.y @ self.belief.left)
+
+    @property
+    def phi(self) -> Array:
+        """(10N,) posterior mean of the parameters."""
+        return self.problem.prior.phi + self.problem.factor @ self.belief.mean[: self.problem.factor.shape[1]]
+
+    def white(self, rows: Array) -> Array:
+        """Return whitened ``rows`` (r, n)."""
+        return white(self.problem, self.tolerances, rows)
+
+    def less(self, named: tuple[NamedCause, ...]) -> "Model":
+        """Return the model with the causes ``named`` taken off the target."""
+        y = self.problem.target - self.expected
+        for one in named:
+            y = y - removed(self.problem, one.effect, one.theta)
+        X, factor = self.belief.X, self.belief.factor
+        return replace(self, belief=Belief.known(X, factor, self.white(y[:, None])[:, 0]), named=named)
+
+
+def white(problem: Problem, tolerances: Tolerances, rows: Array) -> Array:
+    """Return ``rows`` (r, n) of the problem in units of their standard deviation."""
+    mass = float(problem.cases[0].body.sip.mass.sum())
+    return whitened(rows, problem.spectrum.band, marker_keys(problem), mass, tolerances)
+
+
+def marker_keys(problem: Problem) -> tuple[str, ...]:
+    """Return the keys of the rows that follow those of the plates."""
+    body = problem.cases[0].body
+    keys = tuple(f"marker {kind_of(body.segments[s])}" for s in body.markers.segment for _ in range(3))
+    return keys + tuple(f"shown {name}" for name, _ in problem.shown)
+
+
+def nuisances(problem: Problem, causes: tuple[Candidate, ...]) -> tuple[Array, tuple[str, ...], tuple[str, ...]]:
+    """Return columns (r, K) per unit of all that may be no fault, the keys of their sizes and of their means ("" for those that have none:
+    the signs of slides and tilts are mirrored between sides and persons).
+    """
+    body = problem.cases[0].body
+    joints = {joint_of(body, chain) for chain in chains(body)}
+    parts, keys = [problem.kinematics], list(problem.groups)
+    means = [group if group.startswith("sag ") else "" for group in problem.groups]
+    for one in causes:
+        parts.append(one.basis / (SCALE * one.effect.typical[0]))
+        key, width = key_of(*one.names), one.basis.shape[1]
+        own = in_state(key, one.effect.target if one.effect.target in joints else "", body)
+        loud = [p.name for p, silent in zip(one.effect.parameters, one.silent, strict=True) if not silent]
+        keys += [own] * width
+        means += [mean_key(*one.names, name) if own == key else "" for name in loud] + [""] * (width - len(loud))
+    return np.concatenate(parts, axis=1), tuple(keys), tuple(means)
+
+
+def shown_left_out(expected: Array, marker_keys: tuple[str, ...]) -> Array:
+    """Return ``expected`` (r,) with zero in the rows of sizes shown: what everybody shows is taken off there already."""
+    shown = [key.startswith("shown ") for key in marker_keys]
+    return np.concatenate([expected[: len(expected) - len(shown)], np.where(shown, 0.0, expected[len(expected) - len(shown) :])])
+
+
+def model(problem: Problem, causes: tuple[Candidate, ...], tolerances: Tolerances) -> Model:
+    """Return the model without any named cause; those of ``causes`` with a learned size are tolerances as well."""
+    columns, keys, mean_keys = nuisances(problem, tuple(one for one in causes if tolerances.size(key_of(*one.names)) > 0))
+    expected = shown_left_out(columns @ np.array([tolerances.mean(key) for key in mean_keys]), marker_keys(problem))
+    X = np.concatenate([problem.sip, columns * np.array([tolerances.size(key) for key in keys])], axis=1)
+    both = white(problem, tolerances, np.concatenate([X, (problem.target - expected)[:, None]], axis=1))
+    return Model(problem, tolerances, believe(both[:, :-1], both[:, -1]), expected)

@@ -1,0 +1,234 @@
+"""Name the causes one after the other: screen all, refine the best, take the most probable off, rebuild what depends on it, look again."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from biodance.diagnosis.adequacy import STRAINED, strain
+from biodance.diagnosis.candidates import SCALE, Candidate, candidates, removed, slopes
+from biodance.diagnosis.diagnosis import Alias
+from biodance.diagnosis.evidence import evidence
+from biodance.diagnosis.model import Model, NamedCause, model
+from biodance.diagnosis.problem import Problem
+from biodance.discovery import Chosen
+from biodance.effects import Effect, effects
+from biodance.records import Array
+from biodance.uncertainty.tolerances import Tolerances
+
+ROUNDS = 3
+"""Causes named at most."""
+REFINED = 6
+"""Causes of the screening that are fitted with all their curvature."""
+NEAR = 12.0
+"""Natural logarithm: causes this far behind the best one of the screening are refined."""
+TOGETHER = 3.0
+"""Natural logarithm: causes that are at most this much less probable than the best one are in its set."""
+HEAVIER = 0.3
+"""Share of a segment's mass by which it must look heavier before its kinematic errors are computed again."""
+STALE = 0.03
+"""Share of the predicted wrench that may change before causes are predicted again: their sizes are then right to this share."""
+STEPS = 5
+"""Gauss-Newton steps at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class ScoredCandidate:
+    """One cause in one round: its ``score`` is the log Bayes factor less the logarithm of its number of targets; ``start`` (p,) parameters;
+    ``visible`` share.
+    """
+
+    cause: Candidate
+    log_bayes_factor: float
+    score: float
+    start: Array
+    visible: float
+
+    @property
+    def alias(self) -> Alias:
+        """The cause with its evidence."""
+        return Alias(*self.cause.names, self.log_bayes_factor)
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """What one round found: the ``suspects``, most probable first; those of the first cannot be told from it are its ``set``."""
+
+    suspects: tuple[ScoredCandidate, ...]
+
+    @property
+    def set(self) -> tuple[Alias, ...]:
+        """The most probable cause and those that are nearly as probable, or would be if nobody had asked about so many targets."""
+        best = self.suspects[0]
+        near = [min(best.score - one.score, best.log_bayes_factor - one.log_bayes_factor) for one in self.suspects]
+        return tuple(one.alias for one, far in zip(self.suspects, near, strict=True) if far <= TOGETHER)
+
+
+@dataclass(frozen=True, eq=False)
+class Naming:
+    """All rounds: ``first`` the model before any was named, with the ``screening`` of ``first_causes``; ``found`` the last model, with the
+    named causes; ``bare`` the same parameters without them; ``accepted`` a round per named cause, in their order.
+    """
+
+    first: Model
+    found: Model
+    accepted: tuple[Round, ...]
+    screening: Round
+    first_causes: tuple[Candidate, ...]
+    bare: Model
+
+
+def name_causes(problem: Problem, tolerances: Tolerances, chosen: Chosen[Effect] = None, *, rounds: int = ROUNDS) -> Naming:
+    """Return the causes that the session shows, at most ``rounds``; ``chosen`` limits or extends the family (`effects`).
+
+    What a body predicts that is unlike people is not believed: causes are then not predicted again.
+    """
+    first, first_causes = built(problem, tolerances, chosen)
+    found, causes = first, first_causes
+    screening = Round(screen(found, causes))
+    accepted: list[Round] = []
+    ranking = screening
+    if rounds and suspicious(screening, tolerances) and heavier(found):
+        found = replace(found, problem=found.problem.with_matter(found.phi))
+        found, causes = rebuilt(found, tolerances, chosen)
+        ranking = Round(screen(found, causes))
+    bare = found
+    for _ in range(rounds):
+        if not suspicious(ranking, tolerances):
+            break
+        ranking, settled = refine(found, ranking)
+        if not suspicious(ranking, tolerances):
+            break
+        accepted.append(ranking)
+        again = stale(settled) and strain(settled) <= STRAINED
+        found, causes = rebuilt(settled, tolerances, chosen) if again else (settled, causes)
+        ranking = Round(tuple(one for one in screen(found, causes) if one.cause.names not in {named_of(n) for n in found.named}))
+    return Naming(first, found, tuple(accepted), screening, first_causes, bare)
+
+
+def suspicious(ranking: Round, tolerances: Tolerances) -> bool:
+    """Return whether the most probable cause passes the threshold."""
+    return bool(ranking.suspects) and ranking.suspects[0].score >= tolerances.threshold
+
+
+def heavier(found: Model) -> bool:
+    """Return whether the data make any segment so much heavier that its kinematic errors grow with it."""
+    before = found.problem.prior.mass
+    return bool(np.any(found.phi[::10] - before > HEAVIER * before))
+
+
+def rebuilt(found: Model, tolerances: Tolerances, chosen: Chosen[Effect]) -> tuple[Model, tuple[Candidate, ...]]:
+    """Return the model and all causes with columns predicted by the parameters that ``found`` believes in, its named causes settled again.
+
+    A load and a delay together show in the delay's columns only once the load is predicted, if only by a segment that is too heavy.
+    """
+    fresh, causes = built(found.problem.with_parameters(found.phi), tolerances, chosen)
+    return settle(fresh, found.named), causes
+
+
+def stale(found: Model) -> bool:
+    """Return whether the parameters that ``found`` believes in predict movements otherwise than those in use, by more than `STALE`."""
+    both = np.zeros(2)
+    for case in found.problem.cases:
+        wrench = case.regressor @ np.stack([found.phi - case.phi, case.phi], axis=1)
+        both += np.sum((wrench - wrench.mean(axis=0)) ** 2, axis=(0, 1))
+    return bool(both[0] > STALE**2 * both[1])
+
+
+def built(problem: Problem, tolerances: Tolerances, chosen: Chosen[Effect]) -> tuple[Model, tuple[Candidate, ...]]:
+    """Return the model without any name and the causes to look for; what is not looked for keeps its tolerance."""
+    family = effects(chosen)
+    every = candidates(problem, {n: one for n, one in {**effects(), **family}.items() if n in family or tolerances.knows(n)})
+    return model(problem, every, tolerances), tuple(one for one in every if one.names[0] in family)
+
+
+def named_of(one: NamedCause) -> tuple[str, str]:
+    """Return effect and target of a named cause."""
+    return one.effect.name, one.effect.target
+
+
+def screen(found: Model, causes: tuple[Candidate, ...]) -> tuple[ScoredCandidate, ...]:
+    """Return all causes with their evidence, most probable first."""
+    widths = [one.basis.shape[1] for one in causes]
+    named = taken(found)
+    Z = found.white(np.concatenate([one.basis for one in causes], axis=1))
+    s, G = found.belief.score(Z)
+    if named.shape[1]:
+        G = G - _shared(found, named, Z)
+    targets = {name: sum(1 for one in causes if one.names[0] == name) for name, _ in (c.names for c in causes)}
+    suspects, start = [], 0
+    for one, width in zip(causes, widths, strict=True):
+        cut = slice(start, start + width)
+        start += width
+        here = evidence(s[cut], G[cut, cut], float(np.sum(Z[:, cut] ** 2)))
+        score = here.log_bayes_factor - float(np.log(targets[one.names[0]]))
+        suspects.append(ScoredCandidate(one, here.log_bayes_factor, score, one.start(here.mean), here.visible))
+    return tuple(sorted(suspects, key=lambda suspect: -suspect.score))
+
+
+def taken(found: Model) -> Array:
+    """Return the whitened columns (r, k) of the named causes, per standard deviation of a fault."""
+    parts = [slopes(found.problem, one.effect, one.theta, of=removed) * SCALE * one.effect.typical for one in found.named]
+    return found.white(np.concatenate(parts, axis=1)) if parts else np.empty((found.belief.y.size, 0))
+
+
+def _shared(found: Model, named: Array, Z: Array) -> Array:
+    """Return (k, k): what of the information of ``Z`` (r, k) the sizes of the named causes may still absorb."""
+    both = np.concatenate([named, Z], axis=1)
+    _, G = found.belief.score(both)
+    n = named.shape[1]
+    return np.asarray(G[n:, :n] @ np.linalg.solve(np.eye(n) + G[:n, :n], G[:n, n:]))
+
+
+def refine(found: Model, ranking: Round) -> tuple[Round, Model]:
+    """Return the ranking with its first causes fitted with all their curvature, and the model with the most probable one named."""
+    best = ranking.suspects[0].score
+    near = [one for one in ranking.suspects[:REFINED] if best - one.score <= max(NEAR, 0.5 * best)]
+    refined = []
+    before = found.log_likelihood - _penalty(found)
+    for one in near:
+        start = NamedCause(one.cause.effect, one.start, np.empty((0, 0)))
+        settled = settle(found, (*found.named, start))
+        gain = settled.log_likelihood - _penalty(settled) - before
+        bayes = gain if settled.named[-1].effect.possible(settled.named[-1].theta) else -np.inf
+        refined.append((replace(one, log_bayes_factor=bayes, score=bayes + one.score - one.log_bayes_factor), settled))
+    refined.sort(key=lambda pair: -pair[0].score)
+    rest = ranking.suspects[len(near) :]
+    return Round((*(one for one, _ in refined), *rest)), refined[0][1]
+
+
+def settle(found: Model, named: tuple[NamedCause, ...]) -> Model:
+    """Return the model with the parameters of all ``named`` causes at their most probable values, by Gauss-Newton steps."""
+    current = found.less(named)
+    for _ in range(STEPS):
+        if not named:
+            return current
+        Z = taken(current)
+        s, G = current.belief.score(Z)
+        u = np.concatenate([one.theta / (SCALE * one.effect.typical) for one in named])
+        inner: Array = np.asarray(np.linalg.inv(np.eye(len(s)) + G), dtype=float)
+        step = inner @ (s - u)
+        named = _moved(named, u + step, inner)
+        current = current.less(named)
+        if np.abs(step).max() < 1e-3:
+            break
+    return current
+
+
+def _moved(named: tuple[NamedCause, ...], u: Array, inner: Array) -> tuple[NamedCause, ...]:
+    """Return the causes with new parameters ``u`` (in standard deviations of a fault) and their covariances."""
+    out, start = [], 0
+    for one in named:
+        width = one.effect.typical.size
+        cut, scale = slice(start, start + width), SCALE * one.effect.typical
+        out.append(NamedCause(one.effect, scale * u[cut], inner[cut, cut] * np.outer(scale, scale)))
+        start += width
+    return tuple(out)
+
+
+def _penalty(found: Model) -> float:
+    """Return what the parameters of the named causes cost: their prior, and the volume that the data leave of it (Laplace)."""
+    if not found.named:
+        return 0.0
+    _, G = found.belief.score(taken(found))
+    u = np.concatenate([one.theta / (SCALE * one.effect.typical) for one in found.named])
+    return 0.5 * float(u @ u) + 0.5 * float(np.linalg.slogdet(np.eye(len(u)) + G)[1])

@@ -1,0 +1,131 @@
+"""What a session can see and what it cannot: from the movement alone, before any force is looked at.
+
+With a cause of size a, the score is expected to be G a; all expected log Bayes factors are quadratic in a. So the size from which a cause
+is seen, the size from which it is told from every other cause, and the pairs that no size separates follow from G.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from biodance.body.body import Body, JointError
+from biodance.diagnosis.candidates import SCALE, Candidate
+from biodance.diagnosis.diagnosis import Unobservable
+from biodance.diagnosis.evidence import smallest
+from biodance.diagnosis.model import Model
+from biodance.diagnosis.naming import TOGETHER
+from biodance.motion.ik.functional_joints import fixed_point
+from biodance.motion.ik.joint_unknowns import centre_sd
+from biodance.records import Array
+
+LARGE = 4.0
+"""A cause that is not seen at this many typical sizes is listed as one that this session cannot see."""
+
+
+@dataclass(frozen=True, eq=False)
+class Visibility:
+    """``causes`` (C); ``G`` (k, k) information of all bases together, ``cuts`` where each cause's basis lies in it."""
+
+    causes: tuple[Candidate, ...]
+    G: Array
+    cuts: tuple[slice, ...]
+
+    def seen(self, index: int, threshold: float) -> float:
+        """Return the size, in units of the first parameter, from which cause ``index`` is expected to pass ``threshold``; each of several
+        forces or masses at once in the same size: the worst of them.
+        """
+        one, cut = self.causes[index], self.cuts[index]
+        return max(smallest(self.G[cut, cut], way, threshold) for way in unit_directions(one))
+
+    def separation(self, index: int) -> tuple[Array, Array]:
+        """Return ``fixed``, ``growth`` (C,): log Bayes factor of cause ``index`` less that of every other one at size a (first parameter,
+        its own unit) is expected to be fixed + growth a².
+        """
+        way, cut = unit_directions(self.causes[index])[0], self.cuts[index]
+        pull = self.G[:, cut] @ way
+        growth = np.array([0.5 * pull[c] @ inner @ pull[c] for c, inner in zip(self.cuts, self._inner, strict=True)])
+        return self._fixed[index] - self._fixed, growth[index] - growth
+
+    @cached_property
+    def _inner(self) -> tuple[Array, ...]:
+        """Posterior covariance of every cause's coefficients."""
+        return tuple(np.asarray(np.linalg.inv(np.eye(c.stop - c.start) + self.G[c, c]), dtype=float) for c in self.cuts)
+
+    @cached_property
+    def _fixed(self) -> Array:
+        """(C,) expected log Bayes factor of every cause at size zero."""
+        blocks = [self.G[c, c] for c in self.cuts]
+        return np.array(
+            [-0.5 * np.linalg.slogdet(np.eye(len(b)) + b)[1] + 0.5 * np.trace(i @ b) for b, i in zip(blocks, self._inner, strict=True)]
+        )
+
+    def told(self, index: int) -> float:
+        """Return the size from which cause ``index`` is told from every other cause; infinite if one of them looks the same."""
+        fixed, growth = self.separation(index)
+        others = np.arange(len(self.causes)) != index
+        need = TOGETHER - fixed[others]
+        if np.any((growth[others] <= 1e-9) & (need > 0)):
+            return float("inf")
+        size = np.sqrt(np.maximum(need, 0.0) / np.maximum(growth[others], 1e-9))
+        return float(size.max(initial=0.0))
+
+
+def unit_directions(one: Candidate) -> list[Array]:
+    """Return the coefficients (k,) of one unit of each parameter that is not silent."""
+    loud = np.flatnonzero(~np.array(one.silent))
+    same = [k for k in loud if one.effect.parameters[k].unit == one.effect.parameters[loud[0]].unit]
+    width = one.basis.shape[1]
+    return [np.eye(width)[i] / (SCALE * one.effect.typical[k]) for i, k in enumerate(loud) if k in same]
+
+
+def visibility(found: Model, causes: tuple[Candidate, ...]) -> Visibility:
+    """Return what ``found``, a model without named causes, lets every cause show."""
+    widths = np.cumsum([0, *(one.basis.shape[1] for one in causes)])
+    Z = found.white(np.concatenate([one.basis for one in causes], axis=1))
+    _, G = found.belief.score(Z)
+    return Visibility(causes, G, tuple(slice(a, b) for a, b in pairwise(widths.tolist())))
+
+
+def after_calibration(seen: Visibility, body: Body) -> Visibility:
+    """Return what is left to see after the joints of ``body`` were placed by movement (``body.joint_errors``).
+
+    Of a wrong centre the placing leaves the share (posterior / prior standard deviation)². So these centres may vary here, by as much as
+    makes that share of each visible: they take with them what looks like a wrong centre.
+    """
+    left = {error.joint: placing_leaves(error) for error in body.joint_errors}
+    at = {one.effect.target: cut for one, cut in zip(seen.causes, seen.cuts, strict=True) if one.names[0] == "joint_centre"}
+    picks = np.concatenate([np.arange(at[joint].start, at[joint].stop) for joint in left if joint in at] or [np.zeros(0, dtype=int)])
+    share = np.repeat([left[joint] for joint in left if joint in at], 3)
+    own = np.diag(seen.G)[picks]
+    size = np.sqrt((1 / share - 1) / np.maximum(own, 1e-12))
+    taken = seen.G[:, picks] * size
+    inner = np.eye(len(picks)) + size[:, None] * seen.G[np.ix_(picks, picks)] * size
+    return Visibility(seen.causes, seen.G - taken @ np.linalg.solve(inner, taken.T), seen.cuts)
+
+
+def placing_leaves(error: JointError) -> float:
+    """Return the share of a wrong joint centre that placing the joint by movement has left, 0..1."""
+    fixed = fixed_point(error.joint)
+    return float(np.clip((error.centre**2 - fixed**2) / centre_sd(error.joint) ** 2, 0.01, 1.0))
+
+
+def detection_limits(seen: Visibility, body: Body, threshold: float) -> tuple[Unobservable, ...]:
+    """Return from which size on every cause is seen and told from the others, by who looks at ``body`` with its joints where they are."""
+    targets: dict[str, int] = {}
+    for one in seen.causes:
+        targets[one.names[0]] = targets.get(one.names[0], 0) + 1
+    rows = []
+    after = after_calibration(seen, body)
+    for i, one in enumerate(seen.causes):
+        here = after if one.effect.placed else seen
+        limit = here.seen(i, threshold + float(np.log(targets[one.names[0]])))
+        first = one.effect.parameters[one.silent.index(False)]
+        rows.append(Unobservable(*one.names, limit, first.unit, max(limit, here.told(i)), first.typical))
+    return tuple(rows)
+
+
+def hidden(rows: tuple[Unobservable, ...]) -> tuple[Unobservable, ...]:
+    """Return the causes that stay unseen at `LARGE` times their typical size."""
+    return tuple(row for row in rows if row.limit > LARGE * row.typical)

@@ -1,0 +1,127 @@
+"""Causes that come and go: a touch of the rail, a helper's hand. Looked for only where nothing steady explains the session.
+
+Each trial has its own course of the force in time, so there are hundreds of columns; three of the six channels stay free, which is why such
+a force does not explain just anything.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from biodance.diagnosis.adequacy import LIMIT, adequacy
+from biodance.diagnosis.candidates import Candidate, local_basis
+from biodance.diagnosis.evidence import Evidence, believe, evidence
+from biodance.diagnosis.model import Model, NamedCause
+from biodance.diagnosis.naming import Naming, Round, ScoredCandidate
+from biodance.discovery import Chosen
+from biodance.effects import Effect, effects
+from biodance.records import Array
+
+SIZES = (2.0, 8.0, 30.0)
+"""Standard deviations of the course before the data (units of the parameter): the most probable one is taken."""
+OTHER_SIDE = 0.2
+"""Share of its squares that a touch may lie on the other side."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Passing:
+    """One cause that comes and goes: whitened unit columns ``white`` (r, k), the best ``size`` and its evidence."""
+
+    effect: Effect
+    white: Array
+    size: float
+    found: Evidence
+
+
+def with_passing(naming: Naming, chosen: Chosen[Effect] = None) -> Naming:
+    """Return the naming with a cause that comes and goes, if steady causes leave too much and it leaves less; else as it is.
+
+    It is tried instead of what was named, and beside it; what leaves less is kept.
+    """
+    if adequacy(naming.found)[0].z <= LIMIT:
+        return naming
+    best = naming
+    for base, accepted in ((naming.bare, ()), (naming.found, naming.accepted)):
+        tried = _with(naming, base, accepted, chosen)
+        if tried is not None and adequacy(tried.found)[0].z < adequacy(best.found)[0].z:
+            best = tried
+        if not naming.found.named:
+            break
+    return best
+
+
+def _with(naming: Naming, base: Model, accepted: tuple[Round, ...], chosen: Chosen[Effect]) -> Naming | None:
+    """Return the naming of ``base`` with the most probable cause that comes and goes; None without one above the threshold."""
+    kinds = [one for effect in effects(chosen).values() for one in effect.everywhere(base.problem.cases[0])]
+    found = [one for one in (_passing(base, effect) for effect in kinds) if one is not None]
+    if not found:
+        return None
+    order = sorted(found, key=lambda one: -one.found.log_bayes_factor)
+    score = float(np.log(len(found)))
+    if order[0].found.log_bayes_factor - score < base.tolerances.threshold:
+        return None
+    suspects = tuple(_suspect(one, score) for one in order)
+    best = _loose(base, order[0])
+    belief = believe(np.concatenate([base.belief.X, best.size * best.white], axis=1), base.belief.y)
+    course = belief.mean[-best.white.shape[1] :]
+    if not one_sided(order[0].found.mean.reshape(-1, len(best.effect.parameters))):
+        return None
+    named = (*base.named, _named(base, best, course, order[0]))
+    model = replace(base, belief=belief, named=named)
+    return Naming(naming.first, model, (*accepted, Round(suspects)), naming.screening, naming.first_causes, naming.bare)
+
+
+def one_sided(course: Array) -> bool:
+    """Return whether a force (n, 3) over time keeps to one side of its main direction, as what is touched does; a slow swell does not."""
+    _, _, directions = np.linalg.svd(course, full_matrices=False)
+    along = course @ directions[0]
+    sides = np.sum(np.maximum(along, 0) ** 2), np.sum(np.minimum(along, 0) ** 2)
+    return bool(min(sides) <= OTHER_SIDE * sum(sides))
+
+
+def _suspect(one: _Passing, penalty: float) -> ScoredCandidate:
+    value = one.found.log_bayes_factor
+    return ScoredCandidate(Candidate(one.effect, one.white[:, :0], ()), value, value - penalty, np.zeros(0), one.found.visible)
+
+
+def _passing(base: Model, effect: Effect) -> _Passing | None:
+    columns = local_basis(base.problem, effect)
+    if columns is None:
+        return None
+    white = base.white(columns)
+    s, G = base.belief.score(white)
+    size = max(SIZES, key=_bayes_factors(s, G).__getitem__)
+    return _Passing(effect, white, size, evidence(size * s, size**2 * G, size**2 * float(np.sum(white**2))))
+
+
+def _bayes_factors(s: Array, G: Array) -> dict[float, float]:
+    """Return the log Bayes factor (see `evidence`) of every size of the course, from one decomposition."""
+    value, vector = np.linalg.eigh(G)
+    along = (vector.T @ s) ** 2
+    spread = {size: 1 + size**2 * np.maximum(value, 0.0) for size in SIZES}
+    return {size: float(0.5 * np.sum(size**2 * along / d) - 0.5 * np.sum(np.log(d))) for size, d in spread.items()}
+
+
+def _loose(base: Model, one: _Passing) -> _Passing:
+    """Return the cause with the widest prior: the most probable one would shrink short peaks."""
+    s, G = base.belief.score(one.white)
+    size = SIZES[-1]
+    return replace(one, size=size, found=evidence(size * s, size**2 * G, size**2 * float(np.sum(one.white**2))))
+
+
+def _named(base: Model, one: _Passing, course: Array, sized: _Passing) -> NamedCause:
+    """Return the cause with its ``course`` (k,) of coefficients of ``one`` cut by trials; as its size, the force while it acts: half of the
+    squares, as ``sized`` sees them, belong to larger ones (the largest of hundreds of values would be mostly noise).
+    """
+    count, parts, start = len(one.effect.parameters), {}, 0
+    for case in base.problem.cases:
+        columns = one.effect.local(case)
+        width = 0 if columns is None else columns.shape[2]
+        parts[case.trial.name] = one.size * course[start : start + width]
+        start += width
+    steps = sized.size * sized.found.mean.reshape(-1, count)
+    spread = sized.size**2 * np.diag(sized.found.covariance).reshape(-1, count)
+    square = np.sum(steps**2, axis=1)
+    order = np.argsort(square)
+    k = int(order[np.searchsorted(np.cumsum(square[order]), 0.5 * square.sum())])
+    return NamedCause(one.effect, steps[k], np.diag(spread[k]), parts)

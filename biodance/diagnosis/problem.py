@@ -1,0 +1,199 @@
+"""A session as one linear problem: rows by frequency and rows of the markers, and all columns that are no fault.
+
+    y = W (phi - phi0) + K k + noise        W regressor, K elementary kinematic errors, both unit normal once scaled
+
+Columns of faults come from `candidates`; sizes of everything from `tolerances`.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.body.body import Body
+from biodance.diagnosis.spectrum import Spectrum, spectrum, thinned
+from biodance.discovery import Chosen
+from biodance.effects import Case, Effect, effects
+from biodance.identification.identification import usable
+from biodance.identification.posterior import prior_factor
+from biodance.identification.statistics import Fit
+from biodance.records import Array, Motion, Sip, Trial
+from biodance.uncertainty.caution import widened
+from biodance.uncertainty.sources import Errors, forward, of_clusters
+from biodance.uncertainty.tolerances import in_state
+
+LIGHTEST = 0.2
+"""Share of the table's mass below which an identified segment is not believed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """One trial to look at: ``trial`` prepared, its ``motion``, ``use`` (T,) frames whose wrench may be compared, ``start`` and ``end`` of
+    it as shares of the session's time.
+    """
+
+    trial: Trial
+    motion: Motion
+    use: NDArray[np.bool_]
+    start: float
+    end: float
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """The session in rows, not yet whitened.
+
+    ``cases`` thinned trials with the parameters in use; ``spectrum`` where rows come from; ``target`` (r,) measured minus what the prior's
+    mean predicts; ``prior`` of the parameters and ``factor`` S (p, k) of its covariance; ``sip`` (r, k) columns W S; ``kinematics``
+    (r, K) columns of unit errors of ``groups`` (K); ``markers`` number m of marker rows, near the end; the last s rows: sizes that the
+    markers alone show of the causes ``shown`` (s; effect, target); ``notes`` what was left out.
+    """
+
+    cases: tuple[Case, ...]
+    spectrum: Spectrum
+    target: Array
+    prior: Sip
+    factor: Array
+    sip: Array
+    kinematics: Array
+    groups: tuple[str, ...]
+    markers: int
+    notes: tuple[str, ...] = ()
+    shown: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def wrench_rows(self) -> int:
+        """Number of rows that come from the plates: six per coefficient."""
+        return 6 * self.spectrum.band.size
+
+    def columns(self, some: Sequence[Effect]) -> list[Array]:
+        """Return (r, p) for each of ``some`` effects: what one unit of each parameter adds to the rows."""
+        wrench = self.spectrum.rows(tuple(np.concatenate([one.columns(case) for one in some], axis=2) for case in self.cases))
+        ends = np.cumsum([len(one.parameters) for one in some])
+        parts = np.split(wrench.reshape(self.wrench_rows, -1), ends[:-1], axis=1)
+        return [np.concatenate([part, self.marker_rows(one)]) for part, one in zip(parts, some, strict=True)]
+
+    def unit(self, effect: Effect) -> Array:
+        """Return the columns (r, p) of one effect, computed once."""
+        if effect not in self._units:
+            self._units[effect] = self.columns([effect])[0]
+        return self._units[effect]
+
+    @cached_property
+    def _units(self) -> dict[Effect, Array]:
+        return {}
+
+    def marker_rows(self, effect: Effect) -> Array:
+        """Return (m + s, p): what one unit of each parameter of ``effect`` adds to the marker rows and to the sizes shown."""
+        found = [effect.marker_columns(case) for case in self.cases]
+        out = np.zeros((self.markers, len(effect.parameters)))
+        share = _shares(self.spectrum, len(self.cases))
+        for case, columns, weight in zip(self.cases, found, share, strict=True):
+            if columns is not None:
+                full = np.zeros((len(case.body.markers.names), 3, columns.shape[2]))
+                full[list(case.marker_columns)] = columns
+                out += weight * full.reshape(self.markers, -1)
+        sizes = np.zeros((len(self.shown), out.shape[1]))
+        sizes[[one == (effect.name, effect.target) for one in self.shown], 0] = 1.0
+        return np.concatenate([out, sizes])
+
+    def with_parameters(self, phi: Array) -> "Problem":
+        """Return the problem whose faults are predicted with the parameters ``phi`` (10N,); what is measured against stays the prior."""
+        return replace(self, cases=tuple(case.with_parameters(phi) for case in self.cases))
+
+    def with_matter(self, phi: Array) -> "Problem":
+        """Return the problem whose kinematic errors move the matter of ``phi`` (10N,): what is heavier than the table errs more."""
+        body = self.cases[0].body
+        table, own = phi.reshape(-1, 10).copy(), body.sip.phi.reshape(-1, 10)
+        absurd = table[:, 0] < LIGHTEST * own[:, 0]
+        table[absurd] = own[absurd]
+        heavier = replace(body, sip=Sip(body.sip.segments, table.ravel(), body.sip.covariance))
+        rows, markers = _kinematic_rows(self.spectrum, _errors(heavier, self.cases, self.spectrum))
+        return replace(self, kinematics=np.concatenate([rows, markers, np.zeros((len(self.shown), rows.shape[1]))]))
+
+
+def problem(body: Body, looks: tuple[Look, ...], *, prior: Sip | None = None, chosen: Chosen[Effect] = None) -> Problem:
+    """Return the problem of ``looks`` at a session of ``body``; ``prior`` of its parameters, by default the table's with widened sd.
+
+    What the markers show by themselves is read for the whole family and for the ``chosen`` effects (`effects`).
+
+    Raises
+    ------
+    TrialRefused
+        No trial has a second of believable, fully measured frames.
+    """
+    before = prior or widened(body.sip)
+    fits = tuple(Fit(look.trial.name, look.motion, look.trial.wrench, look.use) for look in looks)
+    used, about, notes = usable(body, fits)
+    kept = {fit.name: fit.use for fit in used}
+    pairs = []
+    for look in looks:
+        if look.trial.name in kept:
+            time = np.linspace(look.start, look.end, look.motion.time.size)
+            pairs.append(thinned(Case(body, look.trial, look.motion, before.phi, time), kept[look.trial.name]))
+    cases = tuple(case for case, _ in pairs)
+    where = spectrum(cases, tuple(use for _, use in pairs), about)
+    factor = prior_factor(before)
+    W = where.rows(tuple(case.regressor @ factor for case in cases))
+    errors = _errors(body, cases, where)
+    rows, markers = _kinematic_rows(where, errors)
+    shown = sizes_shown(cases, {**effects(), **effects(chosen)})
+    sip = np.concatenate([W.reshape(-1, W.shape[2]), np.zeros((len(markers) + len(shown), W.shape[2]))])
+    unit = next(one for some in errors for one in some)
+    groups = tuple(in_state(group, joint, body) for group, joint in zip(unit.groups, unit.joints, strict=True))
+    measured = where.rows(tuple(case.residual[:, :, None] for case in cases))
+    target = np.concatenate([measured.ravel(), _mean_markers(cases, where).ravel(), list(shown.values())])
+    rows = np.concatenate([rows, markers, np.zeros((len(shown), rows.shape[1]))])
+    return Problem(cases, where, target, before, factor, sip, rows, groups, len(markers), notes, tuple(shown))
+
+
+def sizes_shown(cases: tuple[Case, ...], causes: Mapping[str, Effect]) -> dict[tuple[str, str], float]:
+    """Return by effect and target the size of the first parameter that the markers of the session show by themselves."""
+    found = {}
+    for name, kind in causes.items():
+        for one in kind.everywhere(cases[0]) if type(kind).shown is not Effect.shown else ():
+            size = one.shown(*cases)
+            found[name, one.target] = 0.0 if size is None else float(size[0])
+    return found
+
+
+def _errors(body: Body, cases: tuple[Case, ...], where: Spectrum) -> list[list[Errors]]:
+    """Return the elementary errors of every run of every trial."""
+    return [
+        [forward(of_clusters(body), _part(case.motion, pick)) for pick in picks] for case, picks in zip(cases, where.picks, strict=True)
+    ]
+
+
+def _part(motion: Motion, pick: NDArray[np.intp]) -> Motion:
+    return Motion(motion.time[pick], motion.q[pick], motion.v[pick], motion.a[pick])
+
+
+def _kinematic_rows(where: Spectrum, errors: list[list[Errors]]) -> tuple[Array, Array]:
+    """Return the rows (6 m, K) of the errors' wrenches and (3M, K) of the mean marker residuals; signs as `forward` has them."""
+    wrench, frames = [], 0
+    markers = np.zeros_like(next(one for some in errors for one in some).markers)
+    for index, some in enumerate(errors):
+        bands = where.layout.bands.at(where.rates[index])
+        for pick, one in zip(where.picks[index], some, strict=True):
+            kept = bands.of(pick.size) >= 0
+            wrench.append(bands.coefficients(where.layout.shift @ one.wrench)[kept])
+            markers += pick.size * one.markers
+            frames += pick.size
+    rows = np.concatenate(wrench)
+    return rows.reshape(-1, rows.shape[2]), (markers / frames).reshape(-1, rows.shape[2])
+
+
+def _shares(where: Spectrum, count: int) -> Array:
+    """Return the share (count,) of the used time that belongs to each trial."""
+    seconds = np.array([sum(pick.size for pick in picks) for picks in where.picks[:count]], dtype=float)
+    return np.asarray(seconds / seconds.sum())
+
+
+def _mean_markers(cases: tuple[Case, ...], where: Spectrum) -> Array:
+    """Return (M, 3) m: mean residual of every marker of the body over the session; zero for a marker that was never seen."""
+    out = np.zeros((len(cases[0].body.markers.names), 3))
+    for case, weight in zip(cases, _shares(where, len(cases)), strict=True):
+        out[list(case.marker_columns)] += weight * case.marker_residual
+    return out

@@ -1,0 +1,90 @@
+"""From the samples of a session's trials to rows by frequency: orthonormal cosine transform per run of used frames, low bands only.
+
+A stationary error is nearly independent between coefficients; within a band its six channels share a covariance. Recordings are low-passed
+at 10 Hz; what lies above the last of `BANDS` is not looked at.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.effects import Case
+from biodance.errors import TrialRefused
+from biodance.records import Array, Markers, Motion, Wrench
+from biodance.uncertainty.bands import BANDS
+from biodance.uncertainty.noise import Noise
+
+RATE = 50.0
+"""Hz at which trials are looked at: derivatives of columns are still good to 7 % at the upper edge."""
+SHORTEST_RUN = 1.0
+"""s: shorter runs of used frames tell nothing about slow bands and are left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Where the rows of a session come from.
+
+    ``layout`` bands and the point (3,) m about which moments are taken; ``picks`` per trial the runs of frames (indices); ``rates`` Hz per
+    trial; ``band``, ``trial`` (m,) of every row; ``seconds`` of all runs together.
+    """
+
+    layout: Noise
+    picks: tuple[tuple[NDArray[np.intp], ...], ...]
+    rates: tuple[float, ...]
+    band: NDArray[np.intp]
+    trial: NDArray[np.intp]
+    seconds: float
+
+    def rows(self, samples: tuple[Array, ...]) -> Array:
+        """Return the coefficients (m, 6, n) of per-trial ``samples`` (T, 6, n) of wrenches about the lab origin."""
+        return np.concatenate([self.of_trial(i, one) for i, one in enumerate(samples)])
+
+    def of_trial(self, index: int, samples: Array) -> Array:
+        """Return the coefficients (m_i, 6, n) of one trial's ``samples`` (T, 6, n)."""
+        bands = self.layout.bands.at(self.rates[index])
+        parts = []
+        for pick in self.picks[index]:
+            kept = bands.of(pick.size) >= 0
+            parts.append(bands.coefficients(self.layout.shift @ samples[pick])[kept])
+        return np.concatenate(parts) if parts else np.empty((0, 6, samples.shape[2]))
+
+
+def spectrum(cases: tuple[Case, ...], uses: tuple[NDArray[np.bool_], ...], about: Array) -> Spectrum:
+    """Return the rows of ``cases`` whose frames ``uses`` (T,) may be compared, moments about ``about`` (3,) m.
+
+    Raises
+    ------
+    TrialRefused
+        No trial has a run of `SHORTEST` s.
+    """
+    picks, band, trial, seconds = [], [], [], 0.0
+    rates = tuple(case.motion.rate for case in cases)
+    for index, (rate, use) in enumerate(zip(rates, uses, strict=True)):
+        there = BANDS.at(rate)
+        runs = tuple(pick for pick in BANDS.runs(use, rate) if pick.size >= SHORTEST_RUN * there.rate)
+        picks.append(runs)
+        for pick in runs:
+            own = there.of(pick.size)
+            band.append(own[own >= 0])
+            trial.append(np.full(band[-1].size, index))
+            seconds += pick.size / there.rate
+    if not band:
+        names = ", ".join(case.trial.name for case in cases)
+        raise TrialRefused(f"No trial of {names} has {SHORTEST_RUN:g} s of fully measured ground contact, so there is nothing to diagnose.")
+    return Spectrum(Noise.unit(about, BANDS), tuple(picks), rates, np.concatenate(band), np.concatenate(trial), seconds)
+
+
+def thinned(case: Case, use: NDArray[np.bool_]) -> tuple[Case, NDArray[np.bool_]]:
+    """Return the case and its mask (T,) at about `RATE`."""
+    step = max(1, round(case.motion.rate / RATE))
+    if step == 1:
+        return case, use
+    old = case.motion
+    time, q, v, a, residual = (array[::step] for array in (old.time, old.q, old.v, old.a, old.residual))
+    motion = Motion(time, q, v, a, residual, old.marker_names, old.determined[::step], old.notes)
+    plates = tuple(replace(p, wrench=Wrench(p.wrench.time[::step], p.wrench.value[::step])) for p in case.trial.plates)
+    markers = case.trial.markers
+    seen = None if markers is None else Markers(markers.names, markers.time[::step], markers.xyz[::step])
+    trial = replace(case.trial, plates=plates, markers=seen)
+    return Case(case.body, trial, motion, case.phi, case.session_time[::step]), use[::step]

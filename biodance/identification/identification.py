@@ -1,0 +1,277 @@
+"""From the trials of a session to what the subject weighs, segment by segment, with an interval for every number.
+
+The steps: band-wise statistics of every trial, noise learned, what wrong kinematics and plates could do discounted (twins), the table as
+prior (maximum a posteriori: its standard deviations and the noise of the data decide, no weight is tuned), then the nearest body that
+can exist. A session that cannot tell a parameter leaves it at the table's value with the table's interval, and says so.
+"""
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from biodance import display
+from biodance.body.body import Body
+from biodance.errors import NotSolved, TrialRefused, UnknownName
+from biodance.identification.base_parameters import BaseEstimate, estimate_base, structural_base
+from biodance.identification.information import Information
+from biodance.identification.knowledge import QUANTITIES, Known, knowledge, mass_interval
+from biodance.identification.learning import learn_noise
+from biodance.identification.loads import may_carry
+from biodance.identification.mismatch import Mismatch, Sizes, evident_sizes, mismatch, temper
+from biodance.identification.physical import FailedFit, PhysicalFit, physical_fit
+from biodance.identification.posterior import Posterior, posterior
+from biodance.identification.statistics import Fit, Statistics, believable, empty, layout_for, statistics
+from biodance.records import Array, Sip
+from biodance.uncertainty.caution import about_true_centres, widened
+from biodance.uncertainty.noise import Noise
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+NOISE_ALONE = "The intervals count the noise alone, not soft tissue, joint centres and plates: they are several times too short."
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """What a session says about a body.
+
+    Parameters
+    ----------
+    body : Body
+        As given, with the table as its inertial parameters.
+    belief : Posterior
+        The Gaussian posterior before the consistency constraint.
+    data : Information
+        What the trials alone say: whitened, disturbances discounted.
+    base : BaseEstimate
+        Weighted least-squares estimate of the base parameters.
+    noise : Noise
+        As learned.
+    sizes : Sizes
+        Of the disturbances.
+    fit : PhysicalFit
+        The nearest body that can exist, its covariance about the true joint centres, or why there is none.
+    trials : tuple of str
+        Used.
+    frames : int
+        Coefficients counted.
+    known : tuple
+        Every quantity of every segment with interval and verdict; () where the fit failed.
+    notes : tuple of str
+        What a person should know.
+
+    References
+    ----------
+    Physical consistency: Traversaro et al. 2016, doi:10.1109/IROS.2016.7759801; Wensing et al. 2018, doi:10.1109/LRA.2017.2729659.
+
+    Examples
+    --------
+    >>> identified.identification
+    Identification(solved, 12 segments from dance_1)
+    """
+
+    body: Body
+    belief: Posterior
+    data: Information
+    base: BaseEstimate
+    noise: Noise
+    sizes: Sizes
+    fit: PhysicalFit | FailedFit
+    trials: tuple[str, ...]
+    frames: int
+    known: tuple[Known, ...]
+    notes: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        return f"Identification({self.status}, {len(self.sip.segments)} segments from {', '.join(self.trials)})"
+
+    def _repr_html_(self) -> str:
+        return display.card(repr(self), self.table(), self.notes)
+
+    def table(self, quantity: str = "mass") -> "pd.DataFrame":
+        """Return one row for each segment.
+
+        Parameters
+        ----------
+        quantity : str
+            "mass" (kg); "com x", "com y", "com z" (m, in the segment's joint frame); "Ixx" ... "Izz" (kg·m², about the centre of mass).
+
+        Returns
+        -------
+        pandas.DataFrame
+            Index segment; table, table sd, identified, sd, low and high of the 95 % interval, each with its unit; ``from data`` (share of
+            the table's variance that the data removed), verdict.
+
+        Raises
+        ------
+        UnknownName
+            There is no such quantity; the legal ones are listed.
+
+        Examples
+        --------
+        >>> bool(identified.identification.table("com y").loc["left_thigh", "identified (m)"] < 0)
+        True
+        """
+        import pandas as pd
+
+        if quantity not in QUANTITIES:
+            raise UnknownName.of("quantity of a segment", quantity, QUANTITIES)
+        rows = [k for k in self.known if k.quantity == quantity]
+        numbers = [(k.table, k.table_sd, k.value, k.sd, *k.interval) for k in rows]
+        columns = [f"{name} ({rows[0].unit})" for name in ("table", "table sd", "identified", "sd", "low", "high")]
+        out = pd.DataFrame(numbers, pd.Index([k.segment for k in rows], name="segment"), columns)
+        out["from data"] = [k.from_data for k in rows]
+        out["verdict"] = [k.verdict for k in rows]
+        return out
+
+    def plot_masses(self, *, axes: "Axes | None" = None) -> "Axes":
+        """Draw the mass of every segment, of the table and identified, with 95 % intervals.
+
+        Parameters
+        ----------
+        axes : matplotlib.axes.Axes, optional
+            Where to draw; by default a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            Kilograms; squares are the table's, circles identified: filled = known, pale = partly known, open = cannot be known.
+
+        Examples
+        --------
+        >>> identified.identification.plot_masses().get_xlabel()
+        'mass (kg), 95 % intervals'
+        """
+        drawn = display.intervals([mass_interval(known) for known in self.known if known.quantity == "mass"], axes=axes)
+        drawn.set_xlabel("mass (kg), 95 % intervals")
+        return drawn
+
+    @property
+    def status(self) -> Literal["solved", "failed"]:
+        """Whether a body that can exist was found; if it "failed", `cause` says why and what to do."""
+        return self.fit.status
+
+    @property
+    def cause(self) -> str:
+        """Cause and cure of a failure in words, "" if there is none."""
+        return self.fit.cause
+
+    @property
+    def sip(self) -> Sip:
+        """The identified parameters, physically consistent, with their covariance about the true joint centres.
+
+        Raises
+        ------
+        NotSolved
+            The fit failed, so there are none.
+        """
+        if self.fit.status == "failed":
+            raise NotSolved(f"Nothing was identified from {', '.join(self.trials)}. {self.fit.cause}")
+        return self.fit.sip
+
+    @property
+    def identified(self) -> Body:
+        """The body with the identified parameters; raises `NotSolved` like `sip`."""
+        return replace(self.body, sip=self.sip, notes=(*self.body.notes, f"SIP identified from {', '.join(self.trials)}."))
+
+    @property
+    def unknown(self) -> tuple[Known, ...]:
+        """The quantities that this session cannot know: the table's."""
+        return tuple(k for k in self.known if k.verdict == "cannot be known")
+
+
+def identify_body(body: Body, fits: tuple[Fit, ...], *, prior: Sip | None = None) -> Identification:
+    """Return the identified parameters of ``body`` from the trials ``fits``; ``prior`` is what is known before (by default the table
+    in ``body.sip``, its standard deviations widened for frames that marker placement turns).
+
+    Trials without a usable frame are left out and named in the notes.
+
+    Raises
+    ------
+    TrialRefused
+        There is no trial, or none has a usable frame.
+    """
+    used, about, notes = usable(body, fits)
+    layout = layout_for(about)
+    total: Statistics = empty(10 * len(body.segments), layout)
+    for fit in used:
+        total = total + statistics(body, fit, layout)
+    noise, _ = learn_noise(total, may_carry(body, prior or widened(body.sip)))
+    found = conclude(body, total, tuple(fit.name for fit in used), noise=noise, found=mismatch(body, used, noise), prior=prior)
+    return replace(found, notes=(*notes, *found.notes))
+
+
+def usable(body: Body, fits: tuple[Fit, ...]) -> tuple[tuple[Fit, ...], Array, tuple[str, ...]]:
+    """Return the trials with believable frames, the standing point (3,) m, and what was left out in words.
+
+    Raises
+    ------
+    TrialRefused
+        There is no trial, or none has a usable frame.
+    """
+    some = tuple(fit for fit in fits if fit.use.any())
+    if not some:
+        raise TrialRefused(
+            f"None of {len(fits)} trials has a frame to identify from: ground contact not measured or no motion. Record trials to fit."
+        )
+    blind = [fit.name for fit in fits if not fit.use.any()]
+    about = standing_point(some)
+    gated = tuple(believable(body, fit, about) for fit in some)
+    notes = [f"Left out, no usable frame: {', '.join(blind)}."] if blind else []
+    notes += [sentence for _, sentence in gated if sentence]
+    used = tuple(fit for fit, _ in gated if fit.use.any())
+    if not used:
+        raise TrialRefused(f"No frame is left to identify from. {' '.join(notes)}")
+    return used, about, tuple(notes)
+
+
+def conclude(
+    body: Body,
+    total: Statistics,
+    trials: tuple[str, ...],
+    *,
+    noise: Noise | None = None,
+    found: Mismatch | None = None,
+    prior: Sip | None = None,
+) -> Identification:
+    """Return the identification from statistics that were gathered already, of several trials or of a stream of frames.
+
+    ``noise`` as learned (learned here if None); ``found`` what twins and plates disturb: without it the intervals count noise alone, far
+    too short, and the notes say so.
+    """
+    before = prior or widened(body.sip)
+    noise = noise or learn_noise(total, may_carry(body, before))[0]
+    data, sizes = total.information(noise), Sizes(0.0, 1.0)
+    if found is not None:
+        sizes = evident_sizes(data, found, may_carry(body, before))
+        data = temper(data, found, sizes)
+    belief = posterior(data, before)
+    fit = physical_fit(belief, body)
+    base = estimate_base(data, structural_base(body))
+    known: tuple[Known, ...] = ()
+    words: tuple[str, ...] = () if found else (NOISE_ALONE,)
+    if fit.status == "solved":
+        fit = replace(fit, sip=about_true_centres(fit.sip, body.joint_errors))
+        known = knowledge(fit.sip, about_true_centres(before, body.joint_errors), belief)
+        words += _notes(known, fit)
+    return Identification(body, belief, data, base, noise, sizes, fit, trials, data.frames, known, words)
+
+
+def standing_point(fits: tuple[Fit, ...]) -> Array:
+    """Return the mean centre of pressure (3,) m of all used frames: the point about which the wrench's noise is described."""
+    points = np.concatenate([fit.wrench.cop()[fit.use] for fit in fits])
+    loaded = points[np.isfinite(points).all(axis=1)]
+    return loaded.mean(axis=0) if len(loaded) else np.zeros(3)
+
+
+def _notes(known: tuple[Known, ...], fit: PhysicalFit) -> tuple[str, ...]:
+    notes = []
+    lost = [f"{k.segment} {k.quantity}" for k in known if k.verdict == "cannot be known" and not k.quantity.startswith("I")]
+    if lost:
+        notes.append(f"Cannot be known from this session (the table's value stands): {', '.join(lost)}.")
+    moved = [name for name, acts in zip(fit.sip.segments, fit.moved, strict=True) if acts]
+    if moved:
+        notes.append(f"At the edge of what a body can be: {', '.join(moved)}.")
+    return tuple(notes)

@@ -1,0 +1,30 @@
+"""The noise of a session, learned from its own residuals together with the parameters (`uncertainty/learning`)."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from biodance.identification.posterior import Posterior, posterior
+from biodance.identification.statistics import Statistics
+from biodance.records import Sip
+from biodance.uncertainty.learning import maximise, noise_of
+from biodance.uncertainty.noise import Noise
+
+START = np.diag([8.0**2] * 3 + [4.0**2] * 3)
+"""(6, 6) N², N²·m²: where learning starts, the paper's own residual (7.8 N, 4.3 N·m)."""
+WORTH = 6.0
+"""Coefficients' worth of the start that every band keeps."""
+
+
+def learn_noise(data: Statistics, prior: Sip, *, rounds: int = 12, tolerance: float = 1e-3) -> tuple[Noise, Posterior]:
+    """Return the noise of the session and the posterior under it, after at most ``rounds`` or once nothing changes
+    beyond ``tolerance``.
+    """
+
+    def improved(noise: Noise) -> Noise:
+        belief = posterior(data.information(noise), prior)
+        return replace(noise, covariance=noise_of(data.moments(belief.mean, belief.covariance), start=START, worth=WORTH))
+
+    first = Noise(np.tile(START, (len(data.count), 1, 1)), data.layout.about, data.layout.bands)
+    noise = maximise(first, improved, lambda one: one.covariance, rounds=rounds, tolerance=tolerance)
+    return noise, posterior(data.information(noise), prior)

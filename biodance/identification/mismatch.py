@@ -1,0 +1,152 @@
+"""What disturbs a session beyond the noise: kinematics that are wrong coherently, plates within their tolerances; how
+large by evidence.
+
+The errors of independent sources, each of one standard deviation, enter the equations b = W' S^-1 y as scores W' S^-1
+e; with the scores as columns of F the covariance is F F', exact over all sources (`uncertainty/sources`). The model
+is b ~ N(H phi, noise H + kinematics² F_kinematics F_kinematics' + F_plates F_plates'),  and the two sizes are those
+under which the session's own b is most probable given the table (evidence), never smaller than drawn. What is left
+for the parameters is H (...)^-1 H in place of H.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.identification.information import Information
+from biodance.identification.statistics import Fit
+from biodance.motion.kinematics import segment_motion
+from biodance.motion.regressor import regressor_of
+from biodance.records import Array, Motion, Sip
+from biodance.uncertainty.deviations import deviations
+from biodance.uncertainty.noise import Noise
+from biodance.uncertainty.plates import PLATE_SOURCES, plate_errors, plate_sources
+from biodance.uncertainty.response import Response
+from biodance.uncertainty.source import ErrorSource
+from biodance.uncertainty.sources import of_markers, transpose
+
+EVERY = 8
+"""Frames: one of so many is enough to predict the size of the marker residuals from."""
+SHORTEST = 8
+"""Frames: shorter runs have no accelerations worth the name."""
+KINEMATICS = (1.0, 1.4, 2.0, 2.8)
+NOISE = (1.7, 2.2, 3.0, 4.5, 7.0, 10.0, 15.0, 22.0)
+"""Sizes among which the evidence chooses: of the kinematic errors (never smaller than drawn), and variance factor of
+the noise (never below 1.7: the parameters absorb part of what is noise)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mismatch:
+    """``kinematics`` (p, n), ``plates`` (p, m): scores W' S^-1 e over all trials of n and m independent sources of
+    errors e, each of one standard deviation.
+    """
+
+    kinematics: Array
+    plates: Array
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How large the disturbances are: ``kinematics`` (1 = as drawn), ``noise`` variance factor (1 = as learned)."""
+
+    kinematics: float
+    noise: float
+
+
+def mismatch(body: Body, fits: tuple[Fit, ...], noise: Noise) -> Mismatch:
+    """Return the scores of kinematics and plates over all trials.
+
+    Skin and flesh slide as much as the table says, or more where the markers' residuals are larger than that predicts.
+    """
+    found, sources, plates = nothing(body), of_markers(body), plate_sources()
+    sd, scores, plate_scores = deviations(body, sources), np.array(found.kinematics), np.array(found.plates)
+    predicted, observed = 0.0, 0.0
+    for fit in fits:
+        white = noise.at(fit.motion.rate)
+        for pick in noise.bands.runs(fit.use, fit.motion.rate):
+            if pick.size < SHORTEST:
+                continue
+            motion = Motion(fit.motion.time[pick], fit.motion.q[pick], fit.motion.v[pick], fit.motion.a[pick])
+            W = regressor_of(segment_motion(body, motion), gravity=body.gravity)
+            weight = white.weighted(W)
+            scores += transpose(sources, Response.of(body, motion), weight).T
+            wrong = plate_errors(W @ body.sip.phi, motion.rate, noise, plates)
+            plate_scores += np.tensordot(weight, wrong, axes=((0, 1), (0, 1)))
+            if fit.motion.residual.shape[1] and np.isfinite(fit.motion.residual[pick]).any():
+                predicted += float(sd**2 @ _marker_squares(body, motion, sources)) * pick.size
+                observed += float(np.nanmean(fit.motion.residual[pick] ** 2)) * pick.size
+    soft = np.array([not joint for source in sources for joint in source.joints])
+    more = np.sqrt(max(1.0, observed / predicted)) if predicted > 0 else 1.0
+    return Mismatch(scores * np.where(soft, more, 1.0) * sd, plate_scores)
+
+
+def nothing(body: Body) -> Mismatch:
+    """Return the scores of no frames."""
+    size, sources = 10 * len(body.segments), sum(len(source.groups) for source in of_markers(body))
+    return Mismatch(np.zeros((size, sources)), np.zeros((size, PLATE_SOURCES)))
+
+
+def _marker_squares(body: Body, motion: Motion, sources: tuple[ErrorSource, ...]) -> Array:
+    """Return (K,) mean square distance (m²) between markers and model that every error of unit size leaves, over one
+    of `EVERY` frames.
+    """
+    few = Response.of(body, Motion(motion.time[::EVERY], motion.q[::EVERY], motion.v[::EVERY], motion.a[::EVERY]))
+    return np.concatenate([source.squares(few) for source in sources])
+
+
+def covariance(H: Array, found: Mismatch, sizes: Sizes) -> Array:
+    """Return the covariance (p, p) of b = W' S^-1 y at given parameters."""
+    M, P = (x @ x.T for x in (found.kinematics, found.plates))
+    return np.asarray(sizes.noise * H + sizes.kinematics**2 * M + P)
+
+
+def evident_sizes(data: Information, found: Mismatch, prior: Sip) -> Sizes:
+    """Return the sizes of the disturbances under which the session's data are most probable, given the table."""
+    H = data.triangle.T @ data.triangle
+    scale = np.sqrt(np.maximum(np.diag(H), 1e-300))
+    value, vector = np.linalg.eigh(H / np.outer(scale, scale))
+    keep = value > 1e-9 * value.max()
+    basis = (vector[:, keep] / np.sqrt(value[keep])).T / scale
+    e = basis @ (data.triangle.T @ (data.target - data.triangle @ prior.phi))
+    spread = basis @ H @ prior.covariance @ H @ basis.T
+    parts = [basis @ covariance(H, found, Sizes(k, 0.0)) @ basis.T for k in KINEMATICS]
+    best, chosen = -np.inf, Sizes(1.0, 1.0)
+    for part, kinematics in zip(parts, KINEMATICS, strict=True):
+        value, vector = np.linalg.eigh(spread + part)
+        turned = (vector.T @ e) ** 2
+        for noise in NOISE:
+            likely = -0.5 * float(np.sum(np.log(value + noise) + turned / (value + noise)))
+            if likely > best:
+                best, chosen = likely, Sizes(kinematics, noise)
+    return chosen
+
+
+def temper(data: Information, found: Mismatch, sizes: Sizes) -> Information:
+    """Return the information that is left for the parameters: H C^+ H, with C the covariance of b at given
+    parameters.
+    """
+    R = data.triangle
+    H = R.T @ R
+    C = covariance(H, found, sizes)
+    scale = np.sqrt(np.maximum(np.diag(C), 1e-300))
+    value, vector = np.linalg.eigh(C / np.outer(scale, scale))
+    keep = value > 1e-13 * value.max()
+    half = (vector[:, keep] / np.sqrt(value[keep])).T / scale
+    rows = np.linalg.qr(np.column_stack([half @ H, half @ (R.T @ data.target)]), mode="r")
+    triangle = np.zeros_like(data.R)
+    triangle[: len(rows)] = rows
+    triangle[-1, -1] = np.hypot(triangle[-1, -1], data.R[-1, -1])
+    return Information(triangle, data.frames)
+
+
+def evidence_of_scale(data: Information, prior: Sip, scales: Array) -> Array:
+    """Return the log evidence (n,) of whitened ``data`` when the prior's standard deviations are multiplied by each
+    of ``scales`` (n,).
+
+    The rule that chooses the prior's weight is maximum a posteriori: scale 1. This curve shows whether the data agree.
+    """
+    A = data.triangle @ prior.covariance @ data.triangle.T
+    value, vector = np.linalg.eigh(0.5 * (A + A.T))
+    turned = (vector.T @ (data.target - data.triangle @ prior.phi)) ** 2
+    spread = 1.0 + np.outer(np.asarray(scales) ** 2, np.maximum(value, 0.0))
+    return np.asarray(-0.5 * (np.log(spread) + turned / spread).sum(axis=1))

@@ -1,0 +1,181 @@
+"""Convex programmes: solved, or a word why not; an answer that the solver itself calls inaccurate is none."""
+
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.body.inertia import PSEUDO_INERTIA, pseudo_inertia, smallest_eigenvalues
+from biodance.errors import NotSolved
+from biodance.identification.posterior import Posterior
+from biodance.records import Array, Sip
+
+if TYPE_CHECKING:
+    import cvxpy as cp
+
+    from biodance.body.body import Body
+
+
+def solve_convex(problem: "cp.Problem") -> str:
+    """Solve ``problem`` in place and return "optimal", or the solver's word for what it ran into: then no value is to be used."""
+    import cvxpy as cp
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # that an answer is inaccurate is said by the word
+            problem.solve(solver=cp.CLARABEL, ignore_dpp=True)
+    except cp.error.SolverError as error:
+        return str(error).split(". ")[0]
+    return str(problem.status)
+
+
+RELATIVE_FLOOR = 1e-3
+"""Smallest eigenvalue allowed, as a share of the prior segment's own smallest eigenvalue (an absolute floor contradicts the tables)."""
+
+TOLERANCE = 1e-7
+"""How far outside its limits a segment may lie by rounding, in its own units (CoM in m): ten times the solver's tolerance."""
+GAP = 1e-6
+"""How far inside the cone of possible bodies the programme stays, so that what it returns is inside for everybody."""
+NOTHING = 1e-9
+"""Relative size of what rounding leaves of a zero."""
+THIN = 1e-2
+"""Least second moment of a segment about an axis, relative to its largest, in the units: a rod has none."""
+
+
+@dataclass(frozen=True, eq=False)
+class PhysicalFit:
+    """A physically consistent estimate.
+
+    ``sip`` with the posterior's covariance; ``moved`` (N,) True for the segments that a constraint holds at the edge of what can be;
+    ``distance`` from the unconstrained mean in posterior standard deviations.
+    """
+
+    sip: Sip
+    moved: NDArray[np.bool_]
+    distance: float
+    status: Literal["solved"] = "solved"
+    cause: Literal[""] = ""
+
+
+@dataclass(frozen=True, eq=False)
+class FailedFit:
+    """No consistent estimate was found: ``cause`` and cure in words. There are no parameters in it, so nobody can use them by mistake."""
+
+    cause: str
+    status: Literal["failed"] = "failed"
+
+    @property
+    def sip(self) -> None:  # None, so that the type checker refuses whoever has not looked at the status
+        """Raise `NotSolved`."""
+        raise NotSolved(self.cause)
+
+    phi = sip
+    """Likewise."""
+
+
+def physical_fit(belief: Posterior, body: "Body") -> PhysicalFit | FailedFit:
+    """Return the physically consistent parameters nearest to the posterior mean, CoM inside ``body.com_boxes``; look at ``status``.
+
+    Only segments that violate are constrained, until none does: what a constraint that is not listed would not change is already nearest.
+    When the mean is consistent it is returned as it is.
+    """
+    prior, limits = belief.prior, _limits(belief.prior, body)
+    bound = np.zeros(len(prior.segments), dtype=bool)
+    phi, distance = belief.mean, 0.0
+    while (outside := limits.room(phi) < -TOLERANCE).any():
+        bound = bound | outside
+        x, word = _nearest(belief, limits, np.flatnonzero(bound))
+        if x is None:
+            return FailedFit(_cause(word, [name for name, acts in zip(prior.segments, bound, strict=True) if acts]))
+        phi, distance = belief.mean + belief.factor @ x, float(np.linalg.norm(x))
+    return PhysicalFit(Sip(prior.segments, phi, belief.covariance), bound & (limits.room(phi) < 10 * GAP), distance)
+
+
+def _cause(word: str, segments: list[str]) -> str:
+    return (
+        f"No possible body was found near what the data say (solver: {word}; segments {', '.join(segments)}): the data contradict every "
+        "body that fits the boxes. Check the scaling, the declared mass and the force plates."
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Limits:
+    """What N segments may be, in units of each: ``cone`` (N, 16, 10) maps ten parameters to a matrix of at least ``floor`` (N, 4, 4);
+    ``sides`` (N, 6, 10) to distances inside the CoM's box, m.
+    """
+
+    cone: Array
+    floor: Array
+    sides: Array
+
+    def room(self, phi: Array) -> Array:
+        """Return how far (N,) every segment of ``phi`` (10N,) is inside its limits; negative: no possible body, or CoM outside."""
+        ten = phi.reshape(-1, 10, 1)
+        inside = np.linalg.eigvalsh((self.cone @ ten).reshape(-1, 4, 4) - self.floor)[:, 0]
+        return np.asarray(np.minimum(inside, (self.sides @ ten)[..., 0].min(axis=1)))
+
+
+def _limits(prior: Sip, body: "Body") -> _Limits:
+    """Return the limits of ``body`` with the units and the floors of ``prior``."""
+    size = np.abs(np.diagonal(pseudo_inertia(prior.phi), axis1=1, axis2=2))
+    second = np.maximum(size[:, :3], THIN * size[:, :3].max(axis=1, keepdims=True))
+    unit = 1 / np.sqrt(np.maximum(np.column_stack([second, size[:, 3]]), 1e-9))
+    weight = unit[:, :, None] * unit[:, None, :]
+    least = RELATIVE_FLOOR * np.maximum(smallest_eigenvalues(prior.phi), 0.0)
+    pick = np.eye(10)[1:4]
+    low, high = (pick - side[:, :, None] * np.eye(10)[0] for side in (body.com_boxes[:, 0], body.com_boxes[:, 1]))
+    sides = np.concatenate([low, -high], axis=1) * unit[:, 3, None, None] ** 2
+    return _Limits(weight.reshape(-1, 16, 1) * PSEUDO_INERTIA, least[:, None, None] * np.eye(4) * weight, sides)
+
+
+def _nearest(belief: Posterior, limits: _Limits, bound: NDArray[np.intp]) -> tuple[Array | None, str]:
+    """Solve min |x|² s.t. the segments ``bound`` of mean + factor x are inside their limits; return x (k,) and the solver's word.
+
+    x lies in the span of those segments' rows of the factor, so that the programme has ten unknowns per segment. If the solver stops, it
+    is asked again in units of the distance to the prior.
+    """
+    rows = (10 * bound[:, None] + np.arange(10)).ravel()
+    span = np.linalg.qr(belief.factor[rows].T)[0]
+    local, mean = belief.factor[rows] @ span, belief.mean[rows]
+    far = float(np.linalg.norm(np.linalg.lstsq(local, belief.prior.phi[rows] - mean)[0]))
+    words = []
+    for unit in (1.0, 0.1 * far, far):
+        z, word = _solve(local * unit, mean, limits, bound)
+        if z is not None:
+            x = span @ z * unit
+            if limits.room(belief.mean + belief.factor @ x)[bound].min() >= -TOLERANCE:
+                return x, word
+            word = "outside the limits"
+        words.append(word)
+    return None, ", then ".join(dict.fromkeys(words))
+
+
+def _solve(local: Array, mean: Array, limits: _Limits, bound: NDArray[np.intp]) -> tuple[Array | None, str]:
+    """Return the smallest z for which mean + local z of the segments ``bound`` is inside the limits, and the solver's word."""
+    import cvxpy as cp
+
+    z = cp.Variable(local.shape[1])
+    constraints, sides, levels = [], [], []
+    for k, i in enumerate(bound):
+        slope, level = local[10 * k : 10 * k + 10], mean[10 * k : 10 * k + 10]
+        free = _free_axes(limits.cone[i] @ np.column_stack([slope, level]))
+        axes, count = np.kron(free, free), len(free)
+        least = axes @ limits.floor[i].ravel() + GAP * np.eye(count).ravel()
+        matrix = (axes @ limits.cone[i] @ slope) @ z + (axes @ limits.cone[i] @ level - least)
+        constraints.append(cp.reshape(matrix, (count, count), order="C") >> 0)
+        sides.append(limits.sides[i] @ slope)
+        levels.append(limits.sides[i] @ level)
+    constraints.append(np.concatenate(sides) @ z + np.concatenate(levels) >= 0)
+    word = solve_convex(cp.Problem(cp.Minimize(cp.sum_squares(z)), constraints))
+    return (np.asarray(z.value) if word == "optimal" else None), word
+
+
+def _free_axes(matrices: Array) -> Array:
+    """Return the axes (r, 4) along which any of the pseudo-inertias ``matrices`` (16, k) has something.
+
+    Along the others a segment is as thin as the prior fixes it (a plate, a rod): there it has no room for a gap, and needs no limit.
+    """
+    _, size, axes = np.linalg.svd(matrices.T.reshape(-1, 4))
+    return np.asarray(axes[size > NOTHING * size.max()])

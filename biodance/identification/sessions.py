@@ -1,0 +1,98 @@
+"""Two sessions of one person: which quantities differ, and how sure that is (a limb after a cast, a prosthesis, weight lost)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm
+
+from biodance.errors import BiodanceError, NotSolved
+from biodance.identification.added_mass import added_mass
+from biodance.identification.identification import Identification
+from biodance.identification.knowledge import QUANTITIES, SIGMAS, UNITS, segment_quantities
+from biodance.identification.loads import may_carry
+from biodance.identification.physical import physical_fit
+from biodance.identification.posterior import Posterior, posterior
+from biodance.records import Array
+
+
+@dataclass(frozen=True)
+class Difference:
+    """``later`` minus ``earlier`` of one quantity of one segment: ``value`` with ``sd`` in ``unit``; ``p`` of a difference at least as
+    large if nothing had changed; ``known`` False where neither session's data say anything about it (both values are the table's).
+    """
+
+    segment: str
+    quantity: str
+    unit: str
+    value: float
+    sd: float
+    p: float
+    known: bool
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval of the difference."""
+        return self.value - SIGMAS * self.sd, self.value + SIGMAS * self.sd
+
+
+def differences(earlier: Identification, later: Identification) -> tuple[Difference, ...]:
+    """Return all differences, later minus earlier, each session with room for what it carries beyond the other.
+
+    The declared masses pin both totals, so a load that was not declared would be spread over the body. Every segment therefore gets room
+    D for a load, in proportion to the probability that one sits there (`added_mass`, in both directions: a load, a loss); values may
+    differ from those of the two tables of results. The two posteriors share the table P: what both still owe to it is common and
+    cancels. With the covariances C under the prior P + D and A = C (P + D)^-1, Var = C1 + C2 - A1 P A2' - A2 P A1'.
+
+    Raises
+    ------
+    BiodanceError
+        The sessions have different segments.
+    NotSolved
+        No possible body is near what one of the sessions says, with or without that room.
+    """
+    if earlier.sip.segments != later.sip.segments:
+        raise BiodanceError("The two sessions have different segments and cannot be compared. Use the same kind of body in both.")
+    first, second = _with_room(earlier, later), _with_room(later, earlier)
+    mutual = _owed(first) @ earlier.belief.prior.covariance @ _owed(second).T
+    spread = first.covariance + second.covariance - mutual - mutual.T
+    values = [_possible(belief, one) for belief, one in ((first, earlier), (second, later))]
+    rows = []
+    for i, segment in enumerate(earlier.sip.segments):
+        cut = slice(10 * i, 10 * i + 10)
+        before, after = (segment_quantities(phi[cut]) for phi in values)
+        slope = 0.5 * (before[1] + after[1])
+        sd = np.sqrt(np.maximum(np.diag(slope @ spread[cut, cut] @ slope.T), 0.0))
+        for k, (quantity, unit) in enumerate(zip(QUANTITIES, UNITS, strict=True)):
+            value = float(after[0][k] - before[0][k])
+            p = float(2 * norm.sf(abs(value) / sd[k])) if sd[k] > 0 else 1.0
+            informed = any(one.known[10 * i + k].verdict != "cannot be known" for one in (earlier, later))
+            rows.append(Difference(segment, quantity, unit, value, float(sd[k]), p, informed))
+    return tuple(rows)
+
+
+def _owed(belief: Posterior) -> Array:
+    """Return A (p, p) = C P^-1 of a belief with covariance C: what of a step of the prior's mean is still in its mean.
+
+    In the units of each parameter's own standard deviation, where the inverse hangs on no rounding.
+    """
+    scale = np.sqrt(np.diag(belief.prior.covariance))
+    unit = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0)
+    inverse = np.linalg.pinv(belief.prior.covariance * np.outer(unit, unit), rcond=1e-12, hermitian=True)
+    return belief.covariance @ (unit[:, None] * inverse * unit)
+
+
+def _possible(belief: Posterior, one: Identification) -> Array:
+    """Return the parameters (10N,) of the possible body nearest to ``belief`` of session ``one``."""
+    fit = physical_fit(belief, one.body)
+    if fit.status == "failed":
+        raise NotSolved(f"The sessions cannot be compared: {', '.join(one.trials)}, with room for a load: {fit.cause}")
+    return fit.sip.phi
+
+
+def _with_room(one: Identification, other: Identification) -> Posterior:
+    """Return the belief of session ``one`` with room for the loads that it carries beyond ``other``.
+
+    A load is positive: its probability counts as far as its mass is above zero, by degrees, so that rounding opens and closes no room.
+    """
+    chance = {found.segment: found.probability * norm.cdf(found.mass / found.sd) for found in added_mass(one, reference=other).suspects}
+    return posterior(one.data, may_carry(one.body, one.belief.prior, share=np.array([chance[s] for s in one.body.segments])))

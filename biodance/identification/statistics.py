@@ -1,0 +1,148 @@
+"""Sufficient statistics of a session: all that any noise, prior or programme needs from the data, in constant memory."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
+
+from biodance.body.body import Body
+from biodance.errors import BiodanceError, TrialRefused
+from biodance.identification.information import Information
+from biodance.motion.kinematics import segment_motion
+from biodance.motion.regressor import predict_wrench, regressor_of
+from biodance.records import Array, Motion, Wrench
+from biodance.settings import Settings
+from biodance.uncertainty.bands import BANDS, Bands
+from biodance.uncertainty.learning import Moments
+from biodance.uncertainty.noise import Noise
+
+STILL, POSTURE_BANDS = 0.03, 2
+"""A run whose segments all stay within this RMS displacement (m) is standing: soft tissue and marker noise are as large as its sway, and
+regressors that are themselves wrong pull masses towards smaller sway. Its posture tells of CoM, so that only the slowest bands count."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """One trial to identify from: ``motion`` and ``wrench`` (about the lab origin) at the same times, ``use`` (T,) True where both hold;
+    ``outlier`` the share of body weight by which a frame may differ from the table's prediction (`Settings.outlier`).
+    """
+
+    name: str
+    motion: Motion
+    wrench: Wrench
+    use: NDArray[np.bool_]
+    outlier: float = Settings.outlier
+
+    def __post_init__(self) -> None:
+        frames = self.motion.time.size
+        if self.wrench.time.size != frames or self.use.shape != (frames,):
+            raise TrialRefused(
+                f"Trial {self.name}: motion has {frames} frames, wrench {self.wrench.time.size}, mask {self.use.size}; prepare it first."
+            )
+        if np.isnan(self.wrench.value[self.use]).any():
+            raise TrialRefused(f"Trial {self.name}: the wrench is NaN in a frame that is to be used; mask the frame.")
+
+
+@dataclass(frozen=True, eq=False)
+class Statistics:
+    """``gram`` (B, 6, p + 1, 6, p + 1) second moments of [W y] per band, wrench about ``layout.about``; ``count`` (B,) coefficients.
+
+    ``layout`` carries bands, rate and point; its covariance is the identity (nothing is whitened yet).
+    """
+
+    gram: Array
+    count: NDArray[np.intp]
+    layout: Noise
+
+    def __add__(self, other: "Statistics") -> "Statistics":
+        """Return the statistics of both; they must have the same layout."""
+        if self.layout.bands.edges != other.layout.bands.edges or not np.array_equal(self.layout.about, other.layout.about):
+            raise BiodanceError("Statistics with different bands or points cannot be added; use one layout for all trials of a session.")
+        return Statistics(self.gram + other.gram, self.count + other.count, self.layout)
+
+    def information(self, noise: Noise) -> Information:
+        """Return the R factor of the data whitened by ``noise`` (same bands)."""
+        weight = np.linalg.inv(noise.covariance)
+        H = np.einsum("bcd,bcidj->ij", weight, self.gram)
+        scale = np.sqrt(np.maximum(np.diag(H), 1e-300))
+        value, vector = np.linalg.eigh(H / np.outer(scale, scale))
+        rows = np.sqrt(np.maximum(value, 0.0))[:, None] * vector.T * scale
+        return Information(np.asarray(np.linalg.qr(rows, mode="r")), int(self.count.sum()))
+
+    def moments(self, phi: Array, covariance: Array) -> Moments:
+        """Return the summed squares of y - W phi per band, plus what the ``covariance`` (p, p) of phi adds (expectation step)."""
+        z = np.append(-phi, 1.0)
+        square = np.einsum("i,bcidj,j->bcd", z, self.gram, z, optimize=True)
+        spread = np.einsum("bcidj,ij->bcd", self.gram[:, :, :-1, :, :-1], covariance, optimize=True)
+        return Moments(square + spread, self.count.astype(float))
+
+
+def layout_for(about: Array, bands: Bands = BANDS) -> Noise:
+    """Return the layout of bands about a point: the noise of unit covariance that Statistics are built on."""
+    return Noise.unit(about, bands)
+
+
+def empty(parameters: int, layout: Noise) -> Statistics:
+    """Return the statistics of no data for ``parameters`` unknowns."""
+    bands, size = len(layout.bands), parameters + 1
+    return Statistics(np.zeros((bands, 6, size, 6, size)), np.zeros(bands, dtype=np.intp), layout)
+
+
+def statistics(body: Body, fit: Fit, layout: Noise) -> Statistics:
+    """Return the statistics of one trial; memory does not grow with its length. Of standing only the posture counts (``STILL``).
+
+    Raises
+    ------
+    TrialRefused
+        No frame of the trial may be used.
+    """
+    if not fit.use.any():
+        raise TrialRefused(f"Trial {fit.name}: no frame may be used (ground contact not measured, or markers hidden in all frames).")
+    total = empty(10 * len(body.segments), layout)
+    gram, count = total.gram.copy(), total.count.copy()
+    size = gram.shape[2]
+    for pick in layout.bands.runs(fit.use, fit.motion.rate):
+        part = Motion(fit.motion.time[pick], fit.motion.q[pick], fit.motion.v[pick], fit.motion.a[pick])
+        moved = segment_motion(body, part)
+        W = regressor_of(moved, gravity=body.gravity)
+        rows = np.concatenate([W, fit.wrench.value[pick][:, :, None]], axis=2)
+        X = layout.bands.coefficients(layout.shift @ rows)
+        band = layout.bands.at(fit.motion.rate).of(len(X))
+        last = POSTURE_BANDS if _is_standing(moved.position) and not layout.bands.white else len(gram)
+        for b in np.unique(band[(band >= 0) & (band < last)]):
+            flat = X[band == b].reshape(-1, 6 * size)
+            gram[b] += (flat.T @ flat).reshape(6, size, 6, size)
+            count[b] += len(flat)
+    return Statistics(gram, count, layout)
+
+
+def _is_standing(position: Array) -> bool:
+    """Return whether all segments at ``position`` (T, N, 3) m stay where they are."""
+    away = position - position.mean(axis=0)
+    return bool(np.sqrt(np.max(np.mean(np.sum(away**2, axis=-1), axis=0))) < STILL)
+
+
+LEVER = 0.5
+"""m: the same limit for moments about the standing point."""
+AROUND = 0.5
+"""s before and after such a frame that are masked too."""
+
+
+def believable(body: Body, fit: Fit, about: Array) -> tuple[Fit, str]:
+    """Return the trial without frames in which table and plates differ by more than ``fit.outlier``, and a sentence or ""."""
+    limit = -fit.outlier * body.gravity[2] * body.sip.mass.sum()
+    difference = fit.wrench.value - predict_wrench(body, fit.motion).value
+    moment = difference[:, 3:] - np.cross(about, difference[:, :3])
+    size = np.maximum(np.linalg.norm(difference[:, :3], axis=1), np.linalg.norm(moment, axis=1) / LEVER)
+    wrong = fit.use & (size > limit)
+    if not wrong.any():
+        return fit, ""
+    wide = binary_dilation(wrong, iterations=max(1, round(AROUND * fit.motion.rate)))
+    left = fit.use & ~wide
+    where = fit.motion.time[int(np.argmax(np.where(fit.use, size, -1.0)))]
+    return replace(fit, use=left), (
+        f"{fit.name}: {int((fit.use & ~left).sum())} of {int(fit.use.sum())} frames left out, the motion needs up to "
+        f"{size[fit.use].max():.0f} N more than the plates show (at {where:.2f} s, limit {limit:.0f} N): look for a posture that jumps or "
+        "a contact beside the plates."
+    )

@@ -1,0 +1,83 @@
+"""Joint torques with the uncertainty that the inertial parameters leave in them.
+
+The torque about a joint axis a through o is what the segments beyond it need less what the ground gives them,
+
+    torque = sum over segments beyond of  a . (M - o x F),      [F, M] = W_segment phi - ground wrench, about the lab origin,
+
+linear in the parameters: torque = Y phi - c, hence the covariance Y C Y'. It holds at the tracked motion and the measured wrenches: errors
+of skin and plates in this very trial are not counted, those that went into the parameters are.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.body.body import Body
+from biodance.identification.identification import Identification
+from biodance.identification.knowledge import SIGMAS
+from biodance.motion.kinematics import below, poses
+from biodance.motion.regressor import regressor
+from biodance.records import Array, Motion, Wrench
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueBands:
+    """Torques of the ``joints`` (n) of ``trial`` at ``time`` (T,) s: ``torque`` with ``sd`` and ``table`` (T, n) N·m along the positive
+    sense of each joint, with the identified and with the table's parameters; ``use`` (T,) True where the ground is fully measured.
+    """
+
+    trial: str
+    joints: tuple[str, ...]
+    time: Array
+    torque: Array
+    sd: Array
+    table: Array
+    use: NDArray[np.bool_]
+
+    @property
+    def half_width(self) -> Array:
+        """(T, n) half of the 95 % intervals, N·m."""
+        return SIGMAS * self.sd
+
+
+def torque_bands(found: Identification, motion: Motion, ground: Mapping[str, Wrench], *, trial: str, use: NDArray[np.bool_]) -> TorqueBands:
+    """Return the torques of ``motion`` under the ``ground`` wrenches (segment name -> wrench on it about the lab origin).
+
+    Raises
+    ------
+    UnknownName
+        A segment is not of this body.
+    """
+    body = found.body
+    Y = torque_regressor(body, motion)
+    given = ground_torques(body, motion, ground)
+    variance = np.einsum("tjp,pq,tjq->tj", Y, found.belief.covariance, Y, optimize=True)
+    torque, table = (Y @ phi - given for phi in (found.sip.phi, body.sip.phi))
+    joints = tuple(joint.name for joint in body.joints)
+    return TorqueBands(trial, joints, motion.time, torque, np.sqrt(np.maximum(variance, 0.0)), table, use)
+
+
+def torque_regressor(body: Body, motion: Motion) -> Array:
+    """Return Y (T, n, 10N): what each parameter needs about each joint's axis, N·m per unit."""
+    W = regressor(body, motion)
+    beyond = np.repeat(below(body), 10, axis=1)
+    return np.asarray(_about_axes(body, motion, W) * beyond)
+
+
+def ground_torques(body: Body, motion: Motion, ground: Mapping[str, Wrench]) -> Array:
+    """Return (T, n) N·m: what the ground's wrenches give about each joint's axis."""
+    total = np.zeros((motion.time.size, len(body.joints)))
+    for segment, wrench in ground.items():
+        beyond = below(body)[:, body.segment_index(segment)]
+        total += beyond * _about_axes(body, motion, wrench.value[..., None])[..., 0]
+    return total
+
+
+def _about_axes(body: Body, motion: Motion, wrench: Array) -> Array:
+    """Return the moments (T, n, k) about the joint axes of wrenches (T, 6, k) about the lab origin: a . (M - o x F)."""
+    pose = poses(body, motion.q)
+    axis = np.stack([pose.joint_rotation[:, j] @ joint.axis for j, joint in enumerate(body.joints)], axis=1)
+    arm = np.cross(axis, pose.joint_position)
+    return np.asarray(axis @ wrench[:, 3:] - arm @ wrench[:, :3])

@@ -1,0 +1,1 @@
+"""AMTI's native recordings: NetForce's .bsf and its text exports."""

@@ -1,0 +1,180 @@
+"""Text exports of an AMTI plate: columns of numbers, explained by a header line or a TOML file beside them, never by a guess."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from biodance.errors import BiodanceError, FileRefused
+from biodance.lab.plain_text import read_text
+from biodance.lab.plates.corners import LONGEST_SIDE, SHORTEST_SIDE
+from biodance.lab.plates.parameters import FORCE, MOMENT, plain_unit
+from biodance.lab.plates.signs import DEEPEST
+from biodance.library import read_toml
+from biodance.records import CHANNELS, Array
+
+KEYS = ("columns", "force_unit", "moment_unit", "rate_hz", "plate_size_m", "sensor_depth_m", "acts_on")
+EVEN = 0.02  # share by which a time step may differ from the others (times are often rounded to ms)
+
+
+@dataclass(frozen=True, eq=False)
+class AmtiText:
+    """``load`` (S, 6) N, N·m as written, plate axes; ``rate`` Hz; ``size`` (x, y) m; ``sensor_depth`` m below the surface."""
+
+    load: Array
+    rate: float
+    size: tuple[float, float]
+    sensor_depth: float
+    load_on_plate: bool
+    said: tuple[str, ...]
+
+
+def parse_amti_text(path: Path) -> AmtiText:
+    """Return the content of a text export; see `biodance.lab.amti.read.read_amti_ascii`.
+
+    Raises
+    ------
+    FileRefused
+        The text is no table of numbers, or something needed is said neither in it nor in the TOML file beside it.
+    """
+    header, values = _table(read_text(path), path)
+    beside = path.with_suffix(".toml")
+    given = _given(beside) if beside.is_file() else {}
+    columns, units = _header_columns(header)
+    columns = given.get("columns", columns)
+    if not isinstance(columns, list):
+        raise FileRefused(f"{beside}: columns must name the columns, such as {list(CHANNELS)}; it is {columns!r}. Correct it.")
+    force_unit = given.get("force_unit", units.get("Fz"))
+    moment_unit = given.get("moment_unit", units.get("Mz"))
+    rate = given.get("rate_hz", _rate(values, columns))
+    size = given.get("plate_size_m")
+    found = {"columns": columns or None, "force_unit": force_unit, "moment_unit": moment_unit, "rate_hz": rate, "plate_size_m": size}
+    lacking = [key for key, value in found.items() if value is None]
+    if lacking:
+        raise FileRefused(
+            f"{path}: does not say {', '.join(lacking)}. Write the file {beside.name} beside it and correct what is not "
+            f"so:\n{_example(values, found)}"
+        )
+    _refuse_nonsense(found, given, values, beside if given else path)
+    order = [columns.index(channel) for channel in CHANNELS]
+    factor = np.array([FORCE[plain_unit(str(force_unit))]] * 3 + [MOMENT[plain_unit(str(moment_unit))]] * 3)
+    told = f"Columns, units and size as in {beside.name}: " if given else "Columns and units as in the header line: "
+    said = (f"{told}{', '.join(columns)}; {force_unit}, {moment_unit}; {float(rate or 0):g} Hz.",)
+    assert size is not None
+    return AmtiText(
+        load=values[:, order] * factor,
+        rate=float(rate or 0),
+        size=(float(size[0]), float(size[1])),
+        sensor_depth=float(given.get("sensor_depth_m", 0.0)),
+        load_on_plate=given.get("acts_on", "plate") == "plate",
+        said=said,
+    )
+
+
+def _table(text: str, path: Path) -> tuple[list[str], Array]:
+    """Return the cells of the last line before the numbers (header, maybe empty) and the numbers (S, C)."""
+    header: list[str] = []
+    rows: list[list[float]] = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        cells = [c.strip() for c in re.split(r"[,;\t]" if re.search(r"[,;\t]", line) else r"\s+", line.strip())]
+        cells = cells[:-1] if cells and not cells[-1] else cells
+        if not cells:
+            continue
+        row = _numbers(cells)
+        if row is None and not rows:
+            header = cells
+        elif row is None or (rows and len(row) != len(rows[0])):
+            expected = f"{len(rows[0])} numbers" if rows else "numbers"
+            raise FileRefused(f"{path}, line {number}: {line.strip()[:60]!r} is not a row of {expected}. Correct or export the file again.")
+        else:
+            rows.append(row)
+    if len(rows) < 2 or len(rows[0]) < 6:
+        raise FileRefused(
+            f"{path}: holds {len(rows)} rows of {len(rows[0]) if rows else 0} numbers; a plate needs at least 2 rows of 6. Check the file."
+        )
+    return header, np.array(rows)
+
+
+def _numbers(cells: list[str]) -> list[float] | None:
+    """Return the cells as finite numbers, None if one is none."""
+    try:
+        row = [float(cell) for cell in cells]
+    except ValueError:
+        return None
+    return row if np.isfinite(row).all() else None
+
+
+def _header_columns(header: list[str]) -> tuple[list[str], dict[str, str]]:
+    """Return column names and units from a header such as ``Time (s), Fx (N), ...``; nothing unless all six channels are named."""
+    columns, units = [], {}
+    for cell in header:
+        match = re.match(r"\s*\"?([A-Za-z]+)[^\[(]*(?:[\[(]\s*([^\])]+)[\])])?", cell)
+        name, unit = (match[1], (match[2] or "").strip()) if match else ("", "")
+        name = {"t": "time_s", "time": "time_s"}.get(name.lower(), name[:1].upper() + name[1:].lower())
+        columns.append(name if name in CHANNELS or name == "time_s" else "skip")
+        if unit:
+            units[name] = unit
+    return (columns, units) if set(CHANNELS) <= set(columns) else ([], {})
+
+
+def _rate(values: Array, columns: list[str]) -> float | None:
+    """Return the rate in Hz from the time column, None without one or where its steps differ."""
+    if "time_s" not in columns or columns.index("time_s") >= values.shape[1]:
+        return None
+    time = values[:, columns.index("time_s")]
+    step = (time[-1] - time[0]) / (time.size - 1)
+    even = step > 0 and np.abs(time - time[0] - step * np.arange(time.size)).max() <= max(EVEN * step, 0.0005)
+    return round(1 / step, 3) if even else None
+
+
+def _given(beside: Path) -> dict[str, Any]:
+    """Return the TOML beside the text; unknown keys are refused."""
+    try:
+        given = read_toml(beside)
+    except BiodanceError as error:
+        raise FileRefused(str(error)) from error
+    if strange := sorted(set(given) - set(KEYS)):
+        raise FileRefused(f"{beside}: {', '.join(strange)} is no key of this file. Legal are {', '.join(KEYS)}.")
+    return given
+
+
+def _refuse_nonsense(found: dict[str, Any], given: dict[str, Any], values: Array, where: Path) -> None:
+    """Refuse settings of the wrong kind or range, naming key, value and what is legal."""
+    columns, size = found["columns"], found["plate_size_m"]
+    numbers = [found["rate_hz"], given.get("sensor_depth_m", 0.0), *(size if isinstance(size, list) else [None])]
+    is_number = [isinstance(n, int | float) and not isinstance(n, bool) for n in numbers]
+    faults = {
+        f"columns must name {values.shape[1]} columns, with each of {', '.join(CHANNELS)} once (others: time_s, skip)": len(columns)
+        != values.shape[1]
+        or any(columns.count(c) != 1 for c in CHANNELS),
+        f"force_unit must be one of {', '.join(FORCE)}": plain_unit(str(found["force_unit"])) not in FORCE,
+        "moment_unit must be a force times a length, such as Nm, Nmm, inlbf": plain_unit(str(found["moment_unit"])) not in MOMENT,
+        "rate_hz must be a positive number": not is_number[0] or not 0 < numbers[0] <= 100_000,
+        f"sensor_depth_m must be from 0 to {DEEPEST:g}": not is_number[1] or not 0 <= numbers[1] <= DEEPEST,
+        f"plate_size_m must be two sides (x, y) of {SHORTEST_SIDE:g} to {LONGEST_SIDE:g}": len(numbers) != 4
+        or not all(is_number[2:])
+        or not all(SHORTEST_SIDE <= side <= LONGEST_SIDE for side in numbers[2:]),
+        'acts_on must be "plate" or "subject"': given.get("acts_on", "plate") not in ("plate", "subject"),
+    }
+    for fault, is_so in faults.items():
+        if is_so:
+            raise FileRefused(f"{where}: {fault}; it is {given.get(fault.split()[0], found.get(fault.split()[0]))!r}. Correct it.")
+
+
+def _example(values: Array, found: dict[str, Any]) -> str:
+    """Return the TOML to write, filled with what the file says and AMTI's usual settings for the rest."""
+    rest = values.shape[1] - 6
+    columns = found["columns"] or ["time_s"] * min(rest, 1) + list(CHANNELS) + ["skip"] * max(rest - 1, 0)
+    rate = found["rate_hz"] or _rate(values, columns) or 1000
+    listed = ", ".join(f'"{c}"' for c in columns)
+    return (
+        f"columns = [{listed}]\n"
+        f'force_unit = "{found["force_unit"] or "N"}"\n'
+        f'moment_unit = "{found["moment_unit"] or "Nm"}"\n'
+        f"rate_hz = {rate:g}\n"
+        f"plate_size_m = {found['plate_size_m'] or [0.464, 0.508]}  # along the plate's x, y\n"
+        "sensor_depth_m = 0.0  # depth of the point about which the moments are, below the surface\n"
+        'acts_on = "plate"  # "plate": load on the plate, as AMTI records it; "subject": reaction\n'
+    )

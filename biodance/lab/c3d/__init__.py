@@ -1,0 +1,1 @@
+"""C3D files: bytes, parameters, points and channels; read and written."""

@@ -1,0 +1,234 @@
+"""Decide how many points, channels, samples and frames the data section of a C3D file holds.
+
+The numbers stand in the header, in the parameters and, as the last witness, in the length of the file. Where they contradict each
+other, only a reading that fills the file to its last block is believed; if there is none, or more than one, the file is refused.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.errors import FileRefused
+from biodance.lab.c3d.parameters import C3D_BLOCK, RESAVE, Header, Parameters, Value
+
+CLIPPED = 65535
+"""What the 16-bit frame numbers hold in a recording that is longer; the full number then stands in the TRIAL group or LONG_FRAMES."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Data section: byte ``start``, counts of points, channels, analog samples per frame and frames, rates in Hz (NaN = none).
+
+    ``scale`` turns integer points into file units; ``gain`` (C,) and ``offset`` (C,) turn analog numbers into units:
+    ``(number - offset) * gain``; ``notes`` say in sentences what was decided.
+    """
+
+    processor: int
+    start: int
+    points: int
+    channels: int
+    samples: int
+    frames: int
+    first_frame: int
+    floating: bool
+    unsigned: bool
+    scale: float
+    rate: float
+    analog_rate: float
+    gain: NDArray[Any]
+    offset: NDArray[Any]
+    notes: tuple[str, ...]
+
+
+def parameter_numbers(parameters: Parameters, group: str, name: str) -> NDArray[Any]:
+    """Return a numeric parameter flattened to (n,), continued in NAME2, NAME3 ... beyond 255 entries; empty if missing or text."""
+    found = parameters.get(group, {})
+    family = [found[name + tail] for tail in ("", *map(str, range(2, 100))) if name + tail in found]
+    arrays = [np.ravel(value, order="F") for value in family if isinstance(value, np.ndarray)]
+    return np.concatenate(arrays) if arrays else np.empty(0)
+
+
+def texts(parameters: Parameters, group: str, name: str) -> list[str]:
+    """Return a text parameter, continued in NAME2, NAME3 ... beyond 255 entries; empty if missing or numeric."""
+    found = parameters.get(group, {})
+    family: list[Value] = [found[name + tail] for tail in ("", *map(str, range(2, 100))) if name + tail in found]
+    return [text for value in family if isinstance(value, list) for text in value]
+
+
+def scalar(parameters: Parameters, group: str, name: str) -> float:
+    """Return the first number of a parameter; NaN if it is missing, empty or not finite."""
+    values = parameter_numbers(parameters, group, name)
+    return float(values[0]) if values.size and np.isfinite(values[0]) else math.nan
+
+
+def read_layout(size: int, header: Header, parameters: Parameters, where: str) -> Layout:
+    """Return the layout of the data section of a file of ``size`` bytes.
+
+    Raises
+    ------
+    FileRefused
+        The file is cut off, holds no data, or its header, parameters and length contradict each other without a decision.
+    """
+    notes: list[str] = []
+    scale = _agreed_scale(header, parameters, where)
+    floating = scale < 0
+    start, points, channels, samples, frames = _counts(size, header, parameters, 4 if floating else 2, where, notes)
+    rate, analog_rate = _rates(header, parameters, samples if channels else 0, notes)
+    unsigned = "UNSIGNED" in (text.upper() for text in texts(parameters, "ANALOG", "FORMAT"))
+    gain, offset = _analog_transform(parameters, channels, unsigned, where)
+    first = _first_frame(header, parameters, frames, notes)
+    kind = (floating, unsigned, abs(scale), rate, analog_rate, gain, offset)
+    return Layout(header.processor, start, points, channels, samples, frames, first, *kind, tuple(notes))
+
+
+def _agreed_scale(header: Header, parameters: Parameters, where: str) -> float:
+    """Return the header's scale; its sign tells floats (< 0) from integers, where its size counts too."""
+    written = parameter_numbers(parameters, "POINT", "SCALE")
+    scale = float(written[0]) if written.size else header.scale
+    if not (math.isclose(scale, header.scale, rel_tol=1e-6) or (scale < 0 and header.scale < 0)):
+        raise FileRefused(
+            f"{where}: the header's scale is {header.scale:g}, POINT:SCALE is {scale:g}: the points' size is not known. {RESAVE}"
+        )
+    return header.scale
+
+
+def _distinct(values: Iterable[float]) -> list[int]:
+    """Return the distinct finite values >= 0 as integers, in order."""
+    return list(dict.fromkeys(int(v) for v in values if math.isfinite(v) and v >= 0))
+
+
+def _unsigned(value: float) -> float:
+    """Return a frame number that was stored in 16 bits without its sign."""
+    return value + 65536 if -32768 <= value < 0 else value
+
+
+def _frame_counts(header: Header, parameters: Parameters) -> list[int]:
+    """Return all frame counts that the file declares: header, TRIAL fields, POINT:FRAMES, POINT:LONG_FRAMES."""
+    declared = [float(header.last_frame - header.first_frame + 1) if header.last_frame < CLIPPED else math.nan]
+    first, last = (_field(parameters, name) for name in ("ACTUAL_START_FIELD", "ACTUAL_END_FIELD"))
+    declared.append(last - first + 1)
+    declared += [_unsigned(scalar(parameters, "POINT", name)) for name in ("FRAMES", "LONG_FRAMES")]
+    counts = [count for count in _distinct(declared) if count > 0]
+    return [count for count in counts if count != CLIPPED] or counts
+
+
+def _field(parameters: Parameters, name: str) -> float:
+    """Return a frame number stored as two 16-bit words (low, high) in the TRIAL group; NaN if it is missing."""
+    words = parameter_numbers(parameters, "TRIAL", name)
+    if words.size == 0 or not np.all(np.isfinite(words)):
+        return math.nan
+    return _unsigned(float(words[0])) + 65536 * (_unsigned(float(words[1])) if words.size > 1 else 0)
+
+
+def _analog_counts(header: Header, parameters: Parameters) -> list[tuple[int, int]]:
+    """Return the believable pairs (channels, samples per frame): those that at most one of the file's statements contradicts."""
+    used, values, samples = scalar(parameters, "ANALOG", "USED"), header.analog_values, header.analog_samples
+    ratio = scalar(parameters, "ANALOG", "RATE") / (scalar(parameters, "POINT", "RATE") or math.nan)
+    ratio = round(ratio) if math.isfinite(ratio) and ratio > 0.5 else math.nan
+    if not (used > 0 or values > 0):
+        return [(0, 0)]
+    if values == 0 and samples == 0:  # a header that is silent on analog data
+        return [(0, 0), (int(used), int(ratio))] if math.isfinite(ratio) else [(0, 0)]
+    channels = _distinct([used, *(values / s for s in (samples, ratio) if s > 0 and values % s == 0)])
+    rows = _distinct([samples, ratio, *(values / c for c in channels if c and values % c == 0)])
+    votes = {
+        (c, s): sum(w for w in (c != used and not math.isnan(used), s != samples, s != ratio and not math.isnan(ratio), c * s != values))
+        for c, s in product(channels, rows)
+        if c * s > 0
+    }
+    least = min(votes.values(), default=0)
+    none = [(0, 0)] if used == 0 or values == 0 else []  # one statement says that there are no analog data
+    return none + [pair for pair, against in votes.items() if against == least and against <= 1]
+
+
+def _counts(size: int, header: Header, parameters: Parameters, word: int, where: str, notes: list[str]) -> tuple[int, int, int, int, int]:
+    """Return (start byte, points, channels, samples per frame, frames); says in ``notes`` when statements had to be overruled."""
+    starts = _distinct([header.data_start, (scalar(parameters, "POINT", "DATA_START") or math.nan) * C3D_BLOCK - C3D_BLOCK])
+    points = _distinct([header.points, scalar(parameters, "POINT", "USED")])
+    analog, frames = _analog_counts(header, parameters), _frame_counts(header, parameters)
+    readings = [(s, p, c, n, f) for s, p, (c, n), f in product(starts, points, analog, frames)]
+
+    def rest(reading: tuple[int, int, int, int, int]) -> int:
+        start, p, c, n, f = reading
+        return size - start - f * word * (4 * p + c * n)
+
+    readings = [reading for reading in readings if 4 * reading[1] + reading[2] * reading[3] > 0]
+    if not readings:
+        raise FileRefused(
+            f"{where}: the file declares no frame, or neither points nor analog channels, or analog counts that contradict. {RESAVE}"
+        )
+    fitting = [reading for reading in readings if rest(reading) >= 0]
+    if not fitting:
+        start, p, c, n, f = readings[0]
+        held = max(0, size - start) // (word * (4 * p + c * n))
+        raise FileRefused(f"{where}: the file is cut off: it declares {f} frames and holds {held}. {RESAVE}")
+    full = [reading for reading in fitting if rest(reading) < C3D_BLOCK]
+    if len(readings) == 1 and (full or _all_told_twice(header, parameters)):
+        return fitting[0]
+    if len(full) != 1:
+        raise FileRefused(
+            f"{where}: header and parameters contradict each other (points {points}, channels and samples per frame {analog}, "
+            f"frames {frames}, data from byte {starts}) and the file's length does not decide. {RESAVE}"
+        )
+    start, p, c, n, f = full[0]
+    notes.append(f"Header and parameters disagree; the file's length decides: {p} points, {c} channels x {n} samples, {f} frames.")
+    return full[0]
+
+
+def _all_told_twice(header: Header, parameters: Parameters) -> bool:
+    """Return whether header and parameters both tell every count, without contradiction: then bytes behind the data are padding."""
+    points = not header.points or "USED" in parameters.get("POINT", {})
+    channels = scalar(parameters, "ANALOG", "USED")
+    analog = (header.analog_values > 0) == (channels > 0)
+    return points and analog and {"FRAMES", "DATA_START"} <= parameters.get("POINT", {}).keys()
+
+
+def _rates(header: Header, parameters: Parameters, samples: int, notes: list[str]) -> tuple[float, float]:
+    """Return point and analog rate in Hz; the value that two of header, POINT:RATE and ANALOG:RATE / samples tell, NaN if none is > 0."""
+    analog = scalar(parameters, "ANALOG", "RATE")
+    witnesses = {"POINT:RATE": scalar(parameters, "POINT", "RATE"), "the header": header.rate}
+    witnesses["ANALOG:RATE / samples per frame"] = analog / samples if samples else math.nan
+    told = {name: rate for name, rate in witnesses.items() if math.isfinite(rate) and rate > 0}
+    if not told:
+        return math.nan, math.nan
+    agreeing = {name: sum(math.isclose(rate, other, rel_tol=1e-3) for other in told.values()) for name, rate in told.items()}
+    best = max(told, key=lambda name: agreeing[name])
+    if min(agreeing.values()) < len(told) or len(told) < 2:
+        heard = ", ".join(f"{name} {rate:g}" for name, rate in witnesses.items() if not math.isnan(rate))
+        notes.append(f"Rates in Hz: {heard}; {told[best]:g} Hz taken, from {best}.")
+    return told[best], told[best] * samples if samples else math.nan
+
+
+def _analog_transform(parameters: Parameters, channels: int, unsigned: bool, where: str) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return gain (C,) and offset (C,) of the analog channels."""
+    general, gain, offset = (parameter_numbers(parameters, "ANALOG", name) for name in ("GEN_SCALE", "SCALE", "OFFSET"))
+    needed = {"GEN_SCALE": (general, min(1, channels)), "SCALE": (gain, channels), "OFFSET": (offset, channels)}
+    for name, (values, count) in needed.items():
+        if values.size < count or not np.all(np.isfinite(values[:count])):
+            raise FileRefused(
+                f"{where}: ANALOG:{name} has {values.size} usable values for {channels} channels: the numbers have no scale. {RESAVE}"
+            )
+    gain = gain[:channels] * (general[0] if channels else 1.0)
+    offset = np.array(offset[:channels], dtype=float)
+    return gain, np.where((offset < 0) & unsigned, offset + 65536, offset)
+
+
+def _first_frame(header: Header, parameters: Parameters, frames: int, notes: list[str]) -> int:
+    """Return the number of the first frame."""
+    first = _field(parameters, "ACTUAL_START_FIELD")
+    spans = header.last_frame - header.first_frame + 1 == frames or header.last_frame == CLIPPED
+    if int(first) == header.first_frame if math.isfinite(first) else spans:
+        return header.first_frame
+    if not math.isfinite(first):
+        notes.append(f"The first frame's number, {header.first_frame} in the header, does not fit its last one, {header.last_frame}.")
+        return header.first_frame
+    last = _field(parameters, "ACTUAL_END_FIELD")
+    if last - first + 1 == frames and header.last_frame - header.first_frame + 1 != frames:
+        return int(first)
+    notes.append(f"The first frame is {header.first_frame} in the header and {first:g} in TRIAL:ACTUAL_START_FIELD; the header's is taken.")
+    return header.first_frame

@@ -1,0 +1,195 @@
+"""Walk through the header and the parameter section of a C3D file, byte by byte, trusting nothing.
+
+Layout: header of 512 bytes; parameter section of groups and parameters, each ``name length, group id, name, offset to the next record``;
+data section. Three byte orders: Intel (84), DEC (85) and SGI/MIPS (86). Source: C3D user guide (www.c3d.org/docs), "parameter format".
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.errors import FileRefused
+
+C3D_BLOCK = 512
+INTEL, DEC, MIPS = 84, 85, 86
+PROCESSORS = {INTEL: "Intel", DEC: "DEC", MIPS: "SGI/MIPS"}
+SCALES, RATES = (1e-9, 1e6), (1e-3, 1e6)
+"""Believable magnitudes of the header's scale and rate (Hz): numbers of the wrong processor type are outside by far."""
+
+RESAVE = "Export the trial again from the recording software, or copy the file again from its source."
+
+Value = NDArray[Any] | list[str]
+Parameters = Mapping[str, Mapping[str, Value]]
+
+
+@dataclass(frozen=True)
+class Header:
+    """The counts of the first 512 bytes of a C3D file; ``parameter_start`` and ``data_start`` are byte positions."""
+
+    processor: int
+    points: int
+    analog_values: int
+    first_frame: int
+    last_frame: int
+    scale: float
+    analog_samples: int
+    rate: float
+    parameter_start: int
+    data_start: int
+
+
+def integers(content: bytes | memoryview, processor: int, kind: str = "u2") -> NDArray[Any]:
+    """Return the bytes as integers of ``kind`` (``u2`` or ``i2``) in the byte order of the processor."""
+    return np.frombuffer(content, dtype=(">" if processor == MIPS else "<") + kind)
+
+
+def floats(content: bytes | memoryview, processor: int) -> NDArray[Any]:
+    """Return the bytes as 32-bit floats (n,) from the number format of the processor; DEC (VAX F) values are converted to IEEE."""
+    if processor != DEC:
+        return np.frombuffer(content, dtype=">f4" if processor == MIPS else "<f4")
+    words = np.frombuffer(content, dtype="<u2").reshape(-1, 2).astype(np.uint32)
+    exponent = (words[:, 0] >> 7) & 0xFF  # 0: the value zero, or with a sign no number
+    ieee = ((words[:, 0] << 16) | words[:, 1]).view(np.float32)
+    with np.errstate(invalid="ignore"):
+        reserved = np.where(words[:, 0] >> 15, np.float32(np.nan), np.float32(0))
+        return np.where(exponent == 0, reserved, ieee * np.float32(0.25))
+
+
+def doubles(values: NDArray[Any]) -> NDArray[np.float64]:
+    """Return the values as 64-bit floats; bits that are no number become NaN without a warning."""
+    with np.errstate(invalid="ignore"):
+        return values.astype(np.float64)
+
+
+def read_header(content: bytes, where: str) -> Header:
+    """Return the counts of the header.
+
+    Raises
+    ------
+    FileRefused
+        The bytes are no C3D header, or point outside the file.
+    """
+    if not content:
+        raise FileRefused(f"{where}: the file is empty (0 bytes). {RESAVE}")
+    if len(content) < 2 * C3D_BLOCK or content[1] != 0x50:
+        raise FileRefused(
+            f"{where}: this is not a C3D file: of its {len(content)} bytes the second is not 80 (80, and at least 1024 bytes, expected). "
+            "Check that the file is a C3D export and not another format with that name."
+        )
+    start = (content[0] - 1) * C3D_BLOCK
+    if start < C3D_BLOCK or start + 4 > len(content):
+        raise FileRefused(f"{where}: the header puts the parameter section into block {content[0]}, outside the file. {RESAVE}")
+    processor = content[start + 3]
+    if processor not in PROCESSORS:
+        raise FileRefused(f"{where}: processor type {processor} is unknown (84 Intel, 85 DEC and 86 SGI/MIPS are legal). {RESAVE}")
+    words = [int(w) for w in integers(content[:24], processor)]
+    scale, rate = (float(floats(content[at : at + 4], processor)[0]) for at in (12, 20))
+    data_start = (words[8] - 1) * C3D_BLOCK
+    if not start < data_start <= len(content):
+        raise FileRefused(
+            f"{where}: the header puts the data into block {words[8]}, but the file has only {len(content) // C3D_BLOCK} blocks: "
+            f"it is damaged or was cut off. {RESAVE}"
+        )
+    if not (SCALES[0] < abs(scale) < SCALES[1] and (rate == 0 or RATES[0] < rate < RATES[1])):
+        raise FileRefused(
+            f"{where}: read as {PROCESSORS[processor]} numbers, the header has a scale of {scale:g} and a rate of {rate:g} Hz, "
+            f"which no lab has: it is damaged or its processor type is wrong. {RESAVE}"
+        )
+    return Header(processor, words[1], words[2], words[3], words[4], scale, words[9], rate, start, data_start)
+
+
+def read_parameters(content: bytes, header: Header, where: str) -> Parameters:
+    """Return all parameters as ``parameters[GROUP][NAME]``, names in upper case as the standard asks.
+
+    Text is a list of stripped strings; numbers are arrays with the dimensions of the file, first dimension fastest (so that
+    ``CORNERS[i, j, plate]`` is coordinate i of corner j), a scalar has shape (1,).
+
+    Raises
+    ------
+    FileRefused
+        A record reaches beyond the section, overlaps the next one or skips bytes: a damaged section cannot be trusted.
+    """
+    names: dict[int, str] = {}
+    records: list[tuple[int, str, Value]] = []
+    at = header.parameter_start + 4
+    while at + 2 <= header.data_start and content[at] != 0 and content[at + 1] != 0:
+        at, group, name, value = _record(content[: header.data_start], at, header.processor, where)
+        if value is None:
+            names[group] = name
+        else:
+            records.append((group, name, value))
+        if at == 0:
+            break
+    groups: dict[str, dict[str, Value]] = {name: {} for name in names.values()}
+    for group, name, value in records:
+        if group not in names:
+            raise FileRefused(f"{where}: parameter {name} belongs to group number {group}, which the file does not define. {RESAVE}")
+        if name in groups[names[group]]:
+            raise FileRefused(f"{where}: parameter {names[group]}:{name} is there twice. {RESAVE}")
+        groups[names[group]][name] = value
+    return MappingProxyType({name: MappingProxyType(group) for name, group in groups.items()})
+
+
+def _record(section: bytes, at: int, processor: int, where: str) -> tuple[int, int, str, Value | None]:
+    """Return position of the next record (0 = none), group number, name and value (None = a group) of the record at ``at``."""
+    length, group = (int(byte) for byte in np.frombuffer(section[at : at + 2], dtype=np.int8))
+    body = at + 2 + abs(length)
+    name = section[at + 2 : body].decode("utf-8", "replace").strip().upper()
+    damaged = FileRefused(f"{where}: the parameter section is damaged at byte {at} (record {name!r}). {RESAVE}")
+    if body + 3 > len(section):
+        raise damaged
+    offset = int(integers(section[body : body + 2], processor)[0])
+    value: Value | None = None
+    end = body + 2
+    if group > 0:
+        value, end = _value(section, body + 2, processor, damaged)
+    if end >= len(section):
+        raise damaged
+    end += 1 + section[end]
+    following = body + offset if offset else 0
+    if end > len(section) or (following and not (end <= following <= len(section) and not any(section[end:following]))):
+        raise damaged
+    return following, abs(group), name, value
+
+
+def _value(section: bytes, at: int, processor: int, damaged: FileRefused) -> tuple[Value, int]:
+    """Return the value of the parameter whose type byte is at ``at``, and the position after it."""
+    kind = int(np.frombuffer(section[at : at + 1], dtype=np.int8)[0])
+    first = at + 2 + (section[at + 1] if at + 1 < len(section) else 255)
+    shape = tuple(section[at + 2 : first])
+    count = math.prod(shape)
+    end = first + count * abs(kind)
+    if kind not in (-1, 1, 2, 4) or len(shape) > 7 or end > len(section):
+        raise damaged
+    raw = section[first:end]
+    if kind == -1:
+        return _texts(raw, shape), end
+    if kind == 1:
+        numbers: NDArray[Any] = np.frombuffer(raw, dtype=np.int8).astype(np.int64)
+    elif kind == 2:
+        numbers = integers(raw, processor, "i2").astype(np.int64)
+    else:
+        numbers = doubles(floats(raw, processor))
+    numbers = numbers.reshape(shape or (1,), order="F")
+    numbers.setflags(write=False)
+    return numbers, end
+
+
+def _texts(raw: bytes, shape: tuple[int, ...]) -> list[str]:
+    """Return the strings of a character array whose first dimension is the length of each."""
+    width = shape[0] if shape else 1
+    rows = [raw[i : i + width] for i in range(0, len(raw), width)] if width else []
+    return [_text(row) for row in rows]
+
+
+def _text(row: bytes) -> str:
+    row = row.split(b"\0")[0]
+    try:
+        return row.decode("utf-8").strip()
+    except UnicodeDecodeError:
+        return row.decode("latin-1").strip()

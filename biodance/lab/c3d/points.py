@@ -1,0 +1,93 @@
+"""Which points of a C3D file are markers on the subject: not model outputs, not unlabelled points, not another person's."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance.errors import FileRefused
+from biodance.lab.c3d.layout import texts
+from biodance.lab.c3d.raw import RawC3d, model_outputs, split_label, unlabelled
+
+
+@dataclass(frozen=True)
+class MarkerLabels:
+    """The chosen points: ``columns`` in the file, their ``names``, what was decided (``history``), what is suspicious (``warnings``)."""
+
+    columns: tuple[int, ...]
+    names: tuple[str, ...]
+    history: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+def subjects_of(raw: RawC3d) -> tuple[str, ...]:
+    """Return the names of the subjects in a file: label prefixes, or SUBJECTS:NAMES where labels have none."""
+    prefixes = dict.fromkeys(prefix for label in raw.labels if (prefix := split_label(label)[0]))
+    return tuple(prefixes) or tuple(name for name in texts(raw.parameters, "SUBJECTS", "NAMES") if name)
+
+
+def marker_labels(raw: RawC3d, *, subject: str | None) -> MarkerLabels:
+    """Return the points that are markers of ``subject`` (None = the only one).
+
+    Raises
+    ------
+    FileRefused
+        Labels of several subjects and none chosen, or the chosen one is not among them; the message lists the subjects.
+    """
+    history: list[str] = []
+    warnings: list[str] = []
+    outputs = model_outputs(raw.labels, raw.parameters)
+    columns = [i for i in range(len(raw.labels)) if i not in set(outputs)]
+    if outputs:
+        shown = ", ".join(raw.labels[i] for i in outputs[:3])
+        history.append(f"{len(outputs)} points are results of a model in the recording software, not markers: {shown} ...")
+    nameless = set(columns) & set(unlabelled(raw.labels))
+    if nameless:
+        history.append(f"{len(nameless)} unlabelled points are left out.")
+    columns = _of_subject(raw, [i for i in columns if i not in nameless], subject, history)
+    columns, names = _without_repeats(raw, columns, history, warnings)
+    return MarkerLabels(tuple(columns), tuple(names), tuple(history), tuple(warnings))
+
+
+def _of_subject(raw: RawC3d, columns: list[int], subject: str | None, history: list[str]) -> list[int]:
+    """Return the columns whose label belongs to the chosen subject."""
+    prefixes = tuple(dict.fromkeys(prefix for i in columns if (prefix := split_label(raw.labels[i])[0])))
+    if subject is None and len(prefixes) > 1:
+        raise FileRefused(
+            f"{raw.path}: holds markers of {len(prefixes)} subjects ({', '.join(prefixes)}) and none was chosen. "
+            "Name one of them as the subject."
+        )
+    known = subjects_of(raw)
+    chosen = subject if subject is not None else (prefixes[0] if prefixes else None)
+    if chosen is None:
+        return columns
+    match = next((name for name in known if name.casefold() == chosen.casefold()), None)
+    if match is None and known:
+        raise FileRefused(f"{raw.path}: has no subject {chosen!r}. Its subjects are {', '.join(known)}. Name one of them.")
+    if not prefixes:
+        return columns
+    own = [i for i in columns if split_label(raw.labels[i])[0] in ("" if len(prefixes) == 1 else match, match)]
+    history.append(f"Markers of subject {match!r} taken, the prefix removed; {len(columns) - len(own)} points of others left out.")
+    return own
+
+
+def _without_repeats(raw: RawC3d, columns: list[int], history: list[str], warnings: list[str]) -> tuple[list[int], list[str]]:
+    """Return columns and names without repeated names: an unseen or equal repetition goes, a different one keeps both apart by number."""
+    places: dict[str, list[int]] = {}
+    for column in columns:
+        places.setdefault(split_label(raw.labels[column])[1], []).append(column)
+    kept: dict[int, str] = {}
+    for name, same in places.items():
+        different: list[int] = []
+        for column in sorted(same, key=lambda c: -int(np.isfinite(raw.points[:, c, 0]).sum())):
+            unseen = not np.isfinite(raw.points[:, column]).any()
+            if not different or not (unseen or np.array_equal(raw.points[:, column], raw.points[:, different[0]], equal_nan=True)):
+                different.append(column)
+        if len(same) > len(different):
+            history.append(f"Label {name} occurs {len(same)} times; repetitions that are empty or equal are left out.")
+        if len(different) > 1:
+            warnings.append(
+                f"Label {name} is given to {len(different)} different points, so neither is taken for {name}: they are called {name}#1, "
+                f"{name}#2 ... Correct the labels in the recording software."
+            )
+        kept |= {column: name if len(different) == 1 else f"{name}#{n}" for n, column in enumerate(sorted(different), start=1)}
+    return sorted(kept), [kept[column] for column in sorted(kept)]

@@ -1,0 +1,120 @@
+"""Read a C3D file into a Trial: metres, z up, markers of one subject, plates as wrenches, every decision said."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from biodance.errors import FileRefused
+from biodance.lab.c3d.measurements import measurements_of
+from biodance.lab.c3d.points import MarkerLabels, marker_labels
+from biodance.lab.c3d.raw import RawC3d, read_raw
+from biodance.lab.c3d.units import metres_per_unit
+from biodance.lab.markers.sets import recognise
+from biodance.lab.vertical import turn_to_z_up
+from biodance.records import Array, Markers, Plate, Role, Source, Trial
+
+
+def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None) -> Trial:
+    """Read one C3D file: markers in m with z up (time starts at 0), force plates as ground-on-subject wrenches about the lab origin.
+
+    Parameters
+    ----------
+    path : str or pathlib.Path
+        The file.
+    role : {"fit", "static", "validate", "check", "skip"}
+        What it is for.
+    subject : str, optional
+        Chooses the person by the prefix of the labels, needed only where a file holds several.
+
+    Returns
+    -------
+    Trial
+        ``history`` and ``warnings`` say what was decided: reader, units, axes, labels, gaps, plates.
+
+    Raises
+    ------
+    FileRefused
+        The file is missing, damaged or contradicts itself; holds several subjects and none was chosen; its unit of length or its rate is
+        not known.
+
+    References
+    ----------
+    The C3D file format user guide, c3d.org.
+
+    Examples
+    --------
+    >>> biodance.read_c3d("visit/static.c3d", role="static").markers
+    Markers(39 markers, 301 frames at 100 Hz, 3.00 s)
+    """
+    raw = read_raw(path)
+    labels = marker_labels(raw, subject=subject)
+    points = raw.points[:, list(labels.columns)]
+    metres, unit_history, unit_warnings = metres_per_unit(raw.parameters, points, where=str(raw.path))
+    in_file_axes = _markers(raw, labels, points)
+    turn, turn_history, turn_warnings = turn_to_z_up(raw, in_file_axes)
+    markers = None if in_file_axes is None else replace(in_file_axes, xyz=metres * in_file_axes.xyz @ turn.T)
+    measures, measure_history, measure_warnings = measurements_of(raw)
+    plates, plate_warnings = _plates(raw, metres, turn, markers, measures.get("Bodymass"))
+    marker_set = recognise(markers.names) if markers is not None else None
+    warnings = (*raw.warnings, *labels.warnings, *unit_warnings, *turn_warnings, *measure_warnings, *plate_warnings)
+    return Trial(
+        name=raw.path.stem,
+        role=role,
+        markers=markers,
+        plates=plates,
+        source=Source(raw.path, raw.sha256, "C3D", raw.rate if markers is not None else math.nan, raw.analog_rate, raw.first_frame),
+        marker_set=marker_set.name if marker_set is not None else "",
+        measurements=measures,
+        history=(*_read(raw), *labels.history, *unit_history, *turn_history, *_gaps(markers), *measure_history),
+        warnings=warnings,
+    )
+
+
+def file_frame(raw: RawC3d, *, subject: str | None = None) -> tuple[float, Array]:
+    """Return the file's unit of length in m and lab_R_file (3, 3), as `read_c3d` takes them.
+
+    Raises
+    ------
+    FileRefused
+        As `read_c3d`.
+    """
+    labels = marker_labels(raw, subject=subject)
+    points = raw.points[:, list(labels.columns)]
+    metres, _, _ = metres_per_unit(raw.parameters, points, where=str(raw.path))
+    return metres, turn_to_z_up(raw, _markers(raw, labels, points))[0]
+
+
+def _read(raw: RawC3d) -> tuple[str, ...]:
+    rate = f" at {raw.rate:g} Hz" if math.isfinite(raw.rate) else ""
+    analog = f", {raw.analog.shape[1]} analog channels at {raw.analog_rate:g} Hz" if raw.analog.size else ", no analog channels"
+    frames = f"{len(raw.points)} frames{rate} from frame {raw.first_frame} on"
+    return (f"Read {frames}, {raw.points.shape[1]} points{analog}.",)
+
+
+def _markers(raw: RawC3d, labels: MarkerLabels, points: Array) -> Markers | None:
+    """Return the markers in file units and axes; None if the file has none that was ever seen."""
+    if not labels.columns or not np.isfinite(points).any():
+        return None
+    if not math.isfinite(raw.rate) and len(points) > 1:
+        raise FileRefused(f"{raw.path}: the frame rate is 0, so its {len(points)} frames have no time. Write POINT:RATE and read it again.")
+    return Markers(labels.names, np.arange(len(points)) / (raw.rate if math.isfinite(raw.rate) else 1.0), points)
+
+
+def _plates(
+    raw: RawC3d, metres: float, turn: Array, markers: Markers | None, body_mass: float | None
+) -> tuple[tuple[Plate, ...], tuple[str, ...]]:
+    from biodance.lab.plates.read import read_plates
+
+    return read_plates(raw, metres=metres, turn=turn, markers=markers, body_mass=body_mass)
+
+
+def _gaps(markers: Markers | None) -> tuple[str, ...]:
+    """Say how much of the markers was not seen, and which never were."""
+    if markers is None:
+        return ("No markers.",)
+    share = 1.0 - markers.seen.mean()
+    never = [name for name, seen in zip(markers.names, np.any(markers.seen, axis=0), strict=True) if not seen]
+    missing = f"; never seen: {', '.join(never)}" if never else ""
+    return (f"{len(markers.names)} markers, {100 * share:.2g} % of their samples not seen{missing}.",)

@@ -1,0 +1,237 @@
+"""Results inside a copy of the recording they come from, so that the software of the laboratory shows them beside the markers.
+
+The copy is written by ezc3d, in a child process: it keeps every group of the original, which biodance's own writer does not know. Our
+own reader then has to find the original numbers in it, else nothing is written. Run as a program this file is that child.
+"""
+
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from biodance.errors import BiodanceError, FileRefused
+from biodance.lab.c3d.layout import texts
+from biodance.lab.c3d.raw import RawC3d, read_raw
+from biodance.lab.c3d.read import file_frame
+from biodance.lab.c3d.write import FileValue
+from biodance.records import Array, frozen_array
+
+PATIENCE = 300.0
+"""s after which the child is given up."""
+NEAR = 0.1
+"""s: an event that the file has already within this time is not written again."""
+Kind = Literal["ANGLES", "FORCES", "MOMENTS", "MODELED_MARKERS"]
+UNITS = {"ANGLES": ("ANGLE_UNITS", "deg"), "FORCES": ("FORCE_UNITS", "N"), "MOMENTS": ("MOMENT_UNITS", "Nm")}
+PER_SI = {"deg": 180 / np.pi, "rad": 1.0, "N": 1.0, "Nm": 1.0, "Nmm": 1000.0}
+"""How many of a file's unit one SI unit is."""
+
+
+@dataclass(frozen=True, eq=False)
+class Output:
+    """One result over the frames of the trial, as C3D stores it: a point with three components.
+
+    ``label`` of the point; ``kind`` the parameter of POINT that lists it; ``value`` (T, 3) rad, N, N·m or m, NaN = none; ``about`` what the
+    three components are. ``turns`` True for vectors of the lab frame, which are written in the file's axes.
+    """
+
+    label: str
+    kind: Kind
+    value: Array
+    about: str
+    turns: bool = True
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "value", frozen_array(self.value, (None, 3), f"Output {self.label}"))
+
+
+@dataclass(frozen=True)
+class Event:
+    """One event: ``time`` s from the first frame of the recording, ``context`` "Right", "Left" or "General", ``label`` "Foot Strike" ..."""
+
+    time: float
+    context: str
+    label: str
+
+
+def write_results_c3d(
+    path: str | Path,
+    original: str | Path,
+    *,
+    outputs: Sequence[Output],
+    events: Sequence[Event] = (),
+    parameters: Mapping[str, FileValue] | None = None,
+    subject: str | None = None,
+) -> Path:
+    """Write a copy of the C3D file ``original`` that holds ``outputs`` and ``events`` besides, and return its path.
+
+    Points, analog values and parameters of the original stay as they are. Positions are in the file's unit of length, angles, forces and
+    moments in the units that POINT declares (without any: deg, N, N·m); ``BIODANCE:LABELS``, ``UNITS`` and ``COMPONENTS`` say of every
+    output what it is, and ``parameters`` are added to that group. ``subject`` names the person where the file holds several.
+
+    Raises
+    ------
+    FileRefused
+        The original cannot be read, has other frames or has such labels already; ezc3d cannot copy it; or ``path`` exists.
+    """
+    path, original = Path(path), Path(original)
+    if path.exists():
+        raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.")
+    raw = read_raw(original)
+    _refuse_unfitting(raw, outputs)
+    metres, turn = file_frame(raw, subject=subject)
+    units = [_unit(raw, output) for output in outputs]
+    scaled = [_in_file(o, unit, metres, turn) for o, unit in zip(outputs, units, strict=True)]
+    said: dict[str, FileValue] = {
+        "LABELS": [o.label for o in outputs],
+        "UNITS": units,
+        "COMPONENTS": [o.about for o in outputs],
+        **(parameters or {}),
+    }
+    first = (raw.first_frame - 1) / raw.rate
+    question = {
+        "labels": said["LABELS"],
+        "kinds": [o.kind for o in outputs],
+        "units": dict(v for kind, v in UNITS.items() if kind in {o.kind for o in outputs} and not texts(raw.parameters, "POINT", v[0])),
+        "events": [[event.time + first, event.context, event.label] for event in events],
+        "parameters": {name: np.asarray(value).tolist() for name, value in said.items()},
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        made = Path(folder) / "results.c3d"
+        np.save(Path(folder) / "values.npy", np.stack(scaled, axis=1) if scaled else np.empty((len(raw.points), 0, 3)))
+        _run(original, made, question)
+        _refuse_changed(raw, made)
+        return _placed(made.read_bytes(), path)
+
+
+def _refuse_unfitting(raw: RawC3d, outputs: Sequence[Output]) -> None:
+    for output in outputs:
+        if len(output.value) != len(raw.points):
+            raise FileRefused(
+                f"{raw.path}: has {len(raw.points)} frames, {output.label} has {len(output.value)}. Give the trial's own file."
+            )
+        if output.label in raw.labels:
+            raise FileRefused(f"{raw.path}: has a point {output.label} already. Give the recording as it was before results were written.")
+    if not raw.rate > 0:
+        raise FileRefused(f"{raw.path}: has no frame rate, so results have no place in it. Export the trial with its markers.")
+
+
+def _unit(raw: RawC3d, output: Output) -> str:
+    """Return the unit that the file declares for such results, if it is one we know, else our own."""
+    if output.kind == "MODELED_MARKERS":
+        return next(iter(texts(raw.parameters, "POINT", "UNITS")), "mm")
+    name, own = UNITS[output.kind]
+    declared = next(iter(texts(raw.parameters, "POINT", name)), own).replace(".", "").replace(" ", "")
+    return declared if declared in PER_SI else own
+
+
+def _in_file(output: Output, unit: str, metres: float, turn: Array) -> Array:
+    """Return the values (T, 3) in the file's axes and unit."""
+    value = output.value @ turn if output.turns else output.value
+    return np.asarray(value / metres if output.kind == "MODELED_MARKERS" else value * PER_SI[unit])
+
+
+def _run(original: Path, made: Path, question: Mapping[str, Any]) -> None:
+    """Have the child write the copy; whatever goes wrong in it refuses the file."""
+    words = [sys.executable, "-m", "biodance.lab.c3d.results", str(original), str(made)]
+    try:
+        child = subprocess.run(words, input=json.dumps(question).encode(), capture_output=True, timeout=PATIENCE, check=False)
+    except (subprocess.TimeoutExpired, OSError) as error:
+        raise FileRefused(
+            f"{original}: ezc3d gives no copy of it ({error}). Export the trial again from the recording software."
+        ) from error
+    if child.returncode:
+        lines = child.stderr.decode(errors="replace").strip().splitlines()
+        why = lines[-1] if child.returncode > 0 and lines else f"it crashes, code {child.returncode}"
+        raise FileRefused(f"{original}: ezc3d cannot copy it ({why}). Export the trial again from the recording software.")
+
+
+def _refuse_changed(raw: RawC3d, made: Path) -> None:
+    """Refuse a copy in which our reader does not find the numbers of the original."""
+    copy = read_raw(made)
+    count = raw.points.shape[1]
+    same = (
+        np.array_equal(copy.points[:, :count].astype("f4"), raw.points.astype("f4"), equal_nan=True)
+        and np.array_equal(copy.analog.astype("f4"), raw.analog.astype("f4"), equal_nan=True)
+        and (copy.labels[:count], copy.analog_labels, copy.rate, copy.first_frame)
+        == (raw.labels, raw.analog_labels, raw.rate, raw.first_frame)
+    )
+    if not same:
+        raise FileRefused(f"{raw.path}: the copy that ezc3d wrote holds other numbers, so it was thrown away. Export csv or mot instead.")
+
+
+def _placed(content: bytes, path: Path) -> Path:
+    try:
+        with open(path, "xb") as stream:
+            stream.write(content)
+    except FileExistsError:
+        raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.") from None
+    except OSError as error:
+        raise FileRefused(f"{path}: cannot be written ({error.strerror or error}). Choose a place where you may write.") from error
+    return path
+
+
+def _copy(original: str, made: str, question: dict[str, Any]) -> None:
+    """Write the copy: the child's part."""
+    import ezc3d
+
+    file = ezc3d.c3d(original)
+    point = file["parameters"]["POINT"]
+    labels = _gathered(point, "LABELS")
+    point["LABELS"]["value"] = [*labels, *question["labels"]]
+    for name in ("UNITS", "DESCRIPTIONS"):
+        for tail in range(2, 100):
+            point.pop(f"{name}{tail}", None)
+    _add_points(file, np.load(Path(made).with_name("values.npy")))
+    for kind in dict.fromkeys(question["kinds"]):
+        new = [label for label, own in zip(question["labels"], question["kinds"], strict=True) if own == kind]
+        file.add_parameter("POINT", kind, [*(point[kind]["value"] if kind in point else []), *new])
+    for name, unit in question["units"].items():
+        file.add_parameter("POINT", name, [unit])
+    for name, value in question["parameters"].items():
+        file.add_parameter("BIODANCE", name, value)
+    _add_events(file, question["events"])
+    file.write(made)
+
+
+def _gathered(group: dict[str, Any], name: str) -> list[str]:
+    """Return a list of texts with its continuations NAME2, NAME3 ..., which are taken out of the group: ezc3d writes them anew."""
+    rest = [text for tail in range(2, 100) for text in group.pop(f"{name}{tail}", {"value": []})["value"]]
+    return [*group[name]["value"], *rest]
+
+
+def _add_points(file: Any, values: Array) -> None:
+    """Append results (T, K, 3) as points; where there is none the residual is -1."""
+    data, seen = file["data"], np.isfinite(values).all(axis=2).T
+    added = np.ones((4, *seen.shape))
+    added[:3] = np.where(seen, np.moveaxis(values, (2, 1, 0), (0, 1, 2)), 0.0)
+    meta = data["meta_points"]
+    data["points"] = np.concatenate([data["points"], added], axis=1)
+    meta["residuals"] = np.concatenate([meta["residuals"], np.where(seen, 0.0, -1.0)[None]], axis=1)
+    meta["camera_masks"] = np.concatenate([meta["camera_masks"], np.zeros((7, *seen.shape), dtype=bool)], axis=1)
+
+
+def _add_events(file: Any, events: list[Any]) -> None:
+    """Add the events that the file does not have yet."""
+    group = file["parameters"].get("EVENT", {})
+    known = []
+    if "TIMES" in group and np.size(group["TIMES"]["value"]):
+        minutes, seconds = np.reshape(group["TIMES"]["value"], (2, -1))
+        known = list(zip(60 * minutes + seconds, group["CONTEXTS"]["value"], group["LABELS"]["value"], strict=False))
+    elif events and group:
+        del file["parameters"]["EVENT"]  # a group without any event, often without the parameters that events need
+    for time, context, label in events:
+        if not any(abs(time - when) < NEAR and (context, label) == (side, name) for when, side, name in known):
+            file.add_event([float(time // 60), float(time % 60)], context=context, label=label, description="biodance")
+
+
+if __name__ == "__main__":
+    try:
+        _copy(sys.argv[1], sys.argv[2], json.load(sys.stdin))
+    except (BiodanceError, ArithmeticError, LookupError, TypeError, ValueError, RuntimeError, OSError) as error:
+        sys.exit(" ".join(str(error).split())[:200] or type(error).__name__)

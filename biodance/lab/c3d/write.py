@@ -1,0 +1,279 @@
+"""Write a recording as a C3D file: Intel byte order, floats, mm, N, N·mm, V."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from biodance.errors import BiodanceError
+from biodance.lab.c3d.parameters import C3D_BLOCK, INTEL
+from biodance.records import Array, Markers, frozen_array
+
+FileValue = str | Sequence[str] | ArrayLike
+FileParameters = Mapping[str, Mapping[str, FileValue]]
+
+MOST = 255
+"""The longest dimension of a parameter: one byte tells it."""
+
+
+def parameter_section(groups: FileParameters) -> bytes:
+    """Return the section: 4 bytes of header, every group with its parameters, padded to whole blocks.
+
+    Text becomes a character array, whole numbers within 16 bits become integers, other numbers 32-bit floats; arrays keep their
+    dimensions, first one fastest. Lists of more than 255 strings or numbers continue in NAME2, NAME3 ...
+
+    Raises
+    ------
+    BiodanceError
+        A value has a form that C3D cannot store, or the section grows beyond 255 blocks.
+    """
+    records = []
+    for number, (group, values) in enumerate(groups.items(), start=1):
+        records.append(_record(group, -number, b""))
+        for name, value in values.items():
+            for part, (tail, piece) in enumerate(_pieces(value, f"{group}:{name}")):
+                records.append(_record(f"{name}{part + 1}" if part else name, number, tail + piece))
+    body = b"".join(records) + b"\0\0"
+    blocks = -(-(len(body) + 4) // C3D_BLOCK)
+    if blocks > MOST:
+        raise BiodanceError(f"The parameters need {blocks} blocks of 512 bytes, a C3D file has room for {MOST}. Store fewer parameters.")
+    return (bytes([1, 0x50, blocks, INTEL]) + body).ljust(blocks * C3D_BLOCK, b"\0")
+
+
+def _record(name: str, group: int, data: bytes) -> bytes:
+    """Return one record without a description; ``group`` < 0 defines a group, > 0 puts a parameter into it."""
+    raw = name.encode("ascii")
+    return bytes([len(raw), group & 0xFF]) + raw + (len(data) + 3).to_bytes(2, "little") + data + b"\0"
+
+
+def _pieces(value: FileValue, what: str) -> list[tuple[bytes, bytes]]:
+    """Return (type and dimensions, data) of a value, in pieces of at most 255 entries."""
+    if isinstance(value, str):
+        raw = value.encode()[:MOST]
+        return [(bytes([0xFF, 1, len(raw)]), raw)]
+    if isinstance(value, Sequence) and all(isinstance(entry, str) for entry in value):
+        rows = [str(entry).encode()[:MOST] for entry in value]
+        width = max((len(row) for row in rows), default=0)
+        parts = [rows[i : i + MOST] for i in range(0, len(rows), MOST)] or [[]]
+        return [(bytes([0xFF, 2, width, len(part)]), b"".join(row.ljust(width) for row in part)) for part in parts]
+    array = np.asarray(value)
+    if array.dtype.kind not in "iuf" or array.ndim > 7 or (array.ndim > 1 and max(array.shape) > MOST):
+        raise BiodanceError(f"Parameter {what} has values of type {array.dtype} and shape {array.shape}; text or numbers are legal.")
+    if array.ndim <= 1:
+        flat = np.atleast_1d(array)
+        return [_number_piece(flat[i : i + MOST]) for i in range(0, flat.size, MOST)] or [_number_piece(flat)]
+    return [_number_piece(array)]
+
+
+def _number_piece(array: np.ndarray[Any, Any]) -> tuple[bytes, bytes]:
+    whole = array.dtype.kind in "iu" and (array.size == 0 or -32768 <= array.min() <= array.max() <= 32767)
+    shape = b"" if array.shape == (1,) else bytes(array.shape)
+    data = array.astype("<i2" if whole else "<f4").tobytes(order="F")
+    return bytes([2 if whole else 4, len(shape)]) + shape, data
+
+
+MM = 1000.0
+CHANNEL_KINDS = {1: "FFFLLM", 2: "FFFMMM", 3: "FFFFFFFF", 4: "VVVVVV"}
+"""What each channel of a plate TYPE holds: force N, length m, moment N·m or volt."""
+NAMES = {
+    1: ("Fx", "Fy", "Fz", "Px", "Py", "Mz"),
+    2: ("Fx", "Fy", "Fz", "Mx", "My", "Mz"),
+    3: ("Fx12", "Fx34", "Fy14", "Fy23", "Fz1", "Fz2", "Fz3", "Fz4"),
+    4: ("V1", "V2", "V3", "V4", "V5", "V6"),
+}
+DISK = {"F": (1.0, "N"), "L": (MM, "mm"), "M": (MM, "Nmm"), "V": (1.0, "V")}
+
+
+@dataclass(frozen=True, eq=False)
+class PlateRecording:
+    """What one force plate recorded, as its amplifier gives it.
+
+    ``type`` 1, 2, 3 or 4 (C3D force platform TYPE); ``corners`` (4, 3) m in the lab frame, in the order of the standard (+x+y, -x+y, -x-y,
+    +x-y of the plate frame); ``origin`` (3,) m in the plate frame: TYPE 1, 2, 4 from the sensor's origin to the centre of the surface,
+    TYPE 3 half the sensor distances and the depth; ``channels`` (S, C): TYPE 1 Fx Fy Fz N, Px Py m, Mz N·m; TYPE 2 Fx Fy Fz N, Mx My Mz
+    N·m; TYPE 3 Fx12 Fx34 Fy14 Fy23 Fz1..4 N; TYPE 4 six V. Signs are stored as given. ``calibration`` (6, 6), TYPE 4 only: F =
+    calibration @ V, three rows of N/V and three of N·m/V. ``labels`` of the channels; without any, ``Fx1`` and so on.
+    """
+
+    type: int
+    corners: Array
+    origin: Array
+    channels: Array
+    labels: tuple[str, ...] = ()
+    calibration: Array | None = None
+
+    def __post_init__(self) -> None:
+        if self.type not in CHANNEL_KINDS:
+            raise BiodanceError(f"A plate of TYPE {self.type} cannot be written; legal are 1, 2, 3 and 4.")
+        count = len(CHANNEL_KINDS[self.type])
+        values = {
+            "corners": frozen_array(self.corners, (4, 3), "PlateRecording.corners"),
+            "origin": frozen_array(self.origin, (3,), "PlateRecording.origin"),
+            "channels": frozen_array(self.channels, (None, count), f"PlateRecording.channels of TYPE {self.type}"),
+            "labels": tuple(self.labels),
+        }
+        if (self.type == 4) != (self.calibration is not None):
+            raise BiodanceError(f"A plate of TYPE {self.type} has calibration {self.calibration}; TYPE 4 needs one, no other may have one.")
+        if self.calibration is not None:
+            values["calibration"] = frozen_array(self.calibration, (6, 6), "PlateRecording.calibration")
+        if self.labels and len(self.labels) != count:
+            raise BiodanceError(f"A plate of TYPE {self.type} has {len(self.labels)} channel labels, expected {count}.")
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+
+def write_c3d(
+    path: str | Path,
+    *,
+    markers: Markers | None,
+    plates: Sequence[PlateRecording] = (),
+    analog_rate: float = 0.0,
+    parameters: FileParameters | None = None,
+    first_frame: int = 1,
+    prefix: str = "",
+) -> None:
+    """Write markers (lab frame, m, NaN = not seen) and plates as a C3D file that all readers give back to float32 precision.
+
+    ``analog_rate`` Hz is a whole multiple of the markers' rate; ``markers=None`` writes plates alone. A single frame has no rate of its
+    own: it takes ``analog_rate`` over its samples. ``prefix`` is put before every label
+    (``Subject:``). ``parameters[GROUP][NAME]`` are added as they stand, in the units of the file (PROCESSING: Bodymass kg, Height mm), and
+    overrule what this function would write, for example ``{"FORCE_PLATFORM": {"ZERO": [1, 100]}}``.
+
+    Raises
+    ------
+    BiodanceError
+        The file exists already, the rates or lengths do not fit each other, or a channel is not finite.
+    """
+    path = Path(path)
+    samples = _samples(path, markers, plates, analog_rate)
+    points = _points(markers, len(plates[0].channels) if markers is None and plates else 0)
+    analog = np.concatenate([_on_disk(plate) for plate in plates], axis=1) if plates else np.empty((len(points) * samples, 0))
+    if not np.isfinite(analog).all():
+        row, column = np.argwhere(~np.isfinite(analog))[0]
+        raise BiodanceError(f"{path}: analog channel {column + 1} is not finite at sample {row}; a C3D file holds finite numbers only.")
+    rate = markers.rate if markers is not None and markers.time.size > 1 else analog_rate / max(samples, 1)
+    if not (np.isfinite(rate) and rate > 0):
+        raise BiodanceError(f"{path}: the rate would be {rate:g} Hz; give analog_rate > 0.")
+    groups: dict[str, dict[str, FileValue]] = {
+        "POINT": _point_group(markers, prefix, rate, len(points)),
+        "ANALOG": _analog_group(plates, rate * samples),
+        "FORCE_PLATFORM": _plate_group(plates),
+        "TRIAL": {"ACTUAL_START_FIELD": _words(first_frame), "ACTUAL_END_FIELD": _words(first_frame + len(points) - 1)},
+        "MANUFACTURER": {"COMPANY": "biodance", "SOFTWARE": "biodance"},
+    }
+    for group, values in (parameters or {}).items():
+        groups.setdefault(group, {}).update(values)
+    groups["POINT"]["DATA_START"] = 2 + len(parameter_section(groups)) // C3D_BLOCK
+    section = parameter_section(groups)
+    header = _header(points, analog, samples, first_frame, rate, 2 + len(section) // C3D_BLOCK)
+    data = np.concatenate([points.reshape(len(points), -1), analog.reshape(len(points), -1)], axis=1).astype("<f4").tobytes()
+    try:
+        with open(path, "xb") as stream:
+            stream.write(header + section + data + bytes(-len(data) % C3D_BLOCK))
+    except FileExistsError as error:
+        raise BiodanceError(f"{path}: the file exists already and is not overwritten. Choose another name.") from error
+    except OSError as error:
+        raise BiodanceError(f"{path}: the file cannot be written ({error.strerror}). Check the folder.") from error
+
+
+def _samples(path: Path, markers: Markers | None, plates: Sequence[PlateRecording], analog_rate: float) -> int:
+    """Return the analog samples per frame after checking that rates and lengths fit."""
+    if markers is None and not plates:
+        raise BiodanceError(f"{path}: there is nothing to write, neither markers nor plates.")
+    if not plates:
+        return 0
+    lengths = {len(plate.channels) for plate in plates}
+    frames = markers.time.size if markers is not None else min(lengths)
+    samples = round(min(lengths) / frames) if frames else 0
+    if len(lengths) > 1 or samples < 1 or lengths != {samples * frames}:
+        raise BiodanceError(f"{path}: plates have {sorted(lengths)} samples for {frames} frames; a whole number per frame is needed.")
+    if markers is not None and markers.time.size > 1 and not np.isclose(analog_rate, samples * markers.rate, rtol=1e-4):
+        raise BiodanceError(
+            f"{path}: analog rate {analog_rate:g} Hz and {samples} samples per frame do not fit the markers' rate {markers.rate:g} Hz."
+        )
+    return samples
+
+
+def _points(markers: Markers | None, frames: int) -> Array:
+    """Return (T, K, 4): x y z mm and residual 0, or 0 0 0 -1 where the marker was not seen."""
+    if markers is None:
+        return np.empty((frames, 0, 4))
+    points = np.zeros((*markers.seen.shape, 4))
+    points[..., :3] = np.where(markers.seen[..., None], MM * markers.xyz, 0.0)
+    points[..., 3] = np.where(markers.seen, 0.0, -1.0)
+    return points
+
+
+def _on_disk(plate: PlateRecording) -> Array:
+    return plate.channels * [DISK[kind][0] for kind in CHANNEL_KINDS[plate.type]]
+
+
+def _words(number: int) -> Array:
+    """Return a frame number as two 16-bit words, low and high."""
+    return np.array([number % 65536, number // 65536]).astype(np.uint16).astype(np.int16)  # type: ignore[return-value]
+
+
+def _point_group(markers: Markers | None, prefix: str, rate: float, frames: int) -> dict[str, FileValue]:
+    labels = [prefix + name for name in markers.names] if markers is not None else []
+    return {
+        "USED": len(labels),
+        "SCALE": -0.1,
+        "RATE": float(rate),
+        "DATA_START": 0,
+        "FRAMES": int(np.uint16(min(frames, 65535)).astype(np.int16)),
+        "LABELS": labels,
+        "DESCRIPTIONS": [""] * len(labels),
+        "UNITS": ["mm"],
+        "X_SCREEN": ["+X"],
+        "Y_SCREEN": ["+Z"],
+    }
+
+
+def _analog_group(plates: Sequence[PlateRecording], rate: float) -> dict[str, FileValue]:
+    labels = [
+        label for number, plate in enumerate(plates, start=1) for label in plate.labels or [f"{name}{number}" for name in NAMES[plate.type]]
+    ]
+    count = len(labels)
+    return {
+        "USED": count,
+        "LABELS": labels,
+        "DESCRIPTIONS": [""] * count,
+        "GEN_SCALE": 1.0,
+        "SCALE": np.ones(count),
+        "OFFSET": np.zeros(count, dtype=int),
+        "UNITS": [DISK[kind][1] for plate in plates for kind in CHANNEL_KINDS[plate.type]],
+        "RATE": float(rate),
+    }
+
+
+def _plate_group(plates: Sequence[PlateRecording]) -> dict[str, FileValue]:
+    count = len(plates)
+    width = max((len(CHANNEL_KINDS[plate.type]) for plate in plates), default=6)
+    channel, matrix, first = np.zeros((width, count), dtype=int), np.zeros((6, 6, count)), 1
+    for index, plate in enumerate(plates):
+        size = len(CHANNEL_KINDS[plate.type])
+        channel[:size, index] = np.arange(first, first + size)
+        first += size
+        if plate.calibration is not None:
+            matrix[:, :, index] = plate.calibration * np.repeat([1.0, MM], 3)[:, None]
+    group: dict[str, FileValue] = {
+        "USED": count,
+        "TYPE": np.array([plate.type for plate in plates], dtype=int),
+        "ZERO": np.array([1, 0]),
+        "CORNERS": np.reshape([MM * plate.corners.T for plate in plates], (count, 3, 4)).transpose(1, 2, 0),
+        "ORIGIN": np.reshape([MM * plate.origin for plate in plates], (count, 3)).T,
+        "CHANNEL": channel,
+    }
+    return group | ({"CAL_MATRIX": matrix} if any(plate.calibration is not None for plate in plates) else {})
+
+
+def _header(points: Array, analog: Array, samples: int, first_frame: int, rate: float, data_block: int) -> bytes:
+    """Return the first 512 bytes; frame numbers beyond 16 bits are clipped here and stand in the TRIAL group."""
+    last = min(first_frame + len(points) - 1, 65535)
+    words = [points.shape[1], samples * analog.shape[1], min(first_frame, 65535), last, 10]
+    head = bytes([2, 0x50]) + np.array(words, dtype="<u2").tobytes() + np.array([-0.1], dtype="<f4").tobytes()
+    tail = np.array([data_block, samples], dtype="<u2").tobytes() + np.array([rate], dtype="<f4").tobytes()
+    return (head + tail).ljust(C3D_BLOCK, b"\0")

@@ -1,0 +1,1 @@
+"""Marker sets, and gaps in trajectories."""

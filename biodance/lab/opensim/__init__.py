@@ -1,0 +1,1 @@
+"""OpenSim's text files: .trc markers, .mot and .sto tables, ground forces."""

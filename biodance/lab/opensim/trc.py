@@ -1,0 +1,211 @@
+"""Marker trajectories as text: the .trc file of OpenSim, OpenCap and Motion Analysis.
+
+Five header rows (PathFileType; two rows of names and values; marker labels, one every three columns; X1 Y1 Z1 ...), then one row per
+frame with number, time and coordinates, separated by tabs; an empty cell means that the marker was not seen. OpenSim holds the files
+with y up; the recording itself is asked (see ``vertical.py``) because Motion Analysis writes the same file with z up.
+"""
+
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.errors import FileRefused, TrialRefused
+from biodance.lab.markers.sets import recognise
+from biodance.lab.plain_text import cells, decode, parse_number, read_bytes, sha256
+from biodance.lab.vertical import Y_UP_TO_Z_UP, body_is_tall_along_z
+from biodance.records import Array, Markers, Role, Source, Trial
+
+METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+HEADER_ROWS = 4
+WIDEST = 50.0  # m, between the markers of one frame
+TIME_COLUMN_ROUNDING = 1e-3  # s, some programs write three decimals
+
+
+def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:
+    """Return the trial of a .trc file: markers in metres, z up, NaN where a marker was not seen; no plates.
+
+    Frames that are left out in the file are given back as unseen, so that the time steps are equal.
+
+    Raises
+    ------
+    FileRefused
+        Not a .trc file, a header without rate, unit or labels, a cell that is no number, rows of the wrong length, time running back.
+    """
+    path = Path(path)
+    content = read_bytes(path)
+    rows = decode(content, path).splitlines()
+    header = _header(rows, path)
+    names, warnings = _labels(rows, path)
+    numbers, raw_time, values = _table(rows, len(names), path)
+    unit = _unit(header, path)
+    if (announced := header.get("NumFrames", "")).isdigit() and int(announced) != numbers.size:
+        warnings.append(f"The header announces {announced} frames, the file holds {numbers.size}.")
+    if (spread := _spread(values) * METRES[unit]) > WIDEST:
+        raise FileRefused(
+            f"{path}: the markers of one frame lie {spread:.0f} m apart in the unit {unit!r} of the header. Correct the unit."
+        )
+    time, xyz, timing = _equal_steps(numbers, raw_time, values * METRES[unit], _rate(header, path), path)
+    warnings += timing
+    history = [f"Coordinates were read in {unit} and turned into m."]
+    xyz[(xyz == 0).all(axis=2)] = np.nan
+    if body_is_tall_along_z(xyz):
+        warnings.append("The markers are tallest along z: the file was taken as z up, although .trc files are y up by convention.")
+    else:
+        xyz = xyz @ Y_UP_TO_Z_UP.T
+        history.append("The file is y up (OpenSim): turned by 90 degrees about x to z up.")
+    known = recognise(names)
+    return Trial(
+        name=path.stem,
+        role=role,
+        markers=(markers := Markers(tuple(names), time, xyz)),
+        plates=(),
+        source=Source(path, sha256(content), "TRC", rate=markers.rate, first_frame=int(numbers[0])),
+        marker_set=known.name if known else "",
+        history=tuple(history),
+        warnings=tuple(warnings),
+    )
+
+
+def write_trc(path: str | Path, markers: Markers) -> Path:
+    """Write markers as OpenSim expects them: millimetres, y up, an empty cell where a marker was not seen; return the path.
+
+    Raises
+    ------
+    FileRefused
+        The file exists (nothing is overwritten).
+    TrialRefused
+        The markers hold no frame or no marker, or their time steps are not equal (the format holds one rate).
+    """
+    path = Path(path)
+    if not markers.names or not markers.time.size:
+        raise TrialRefused(f"{path}: there is no marker to write. Give at least one frame of one marker.")
+    rate = markers.rate if markers.time.size > 1 else 100.0
+    steps = np.diff(markers.time)
+    if steps.size and np.ptp(steps) > 1e-3 / rate:
+        raise TrialRefused(
+            f"{path}: the time steps vary from {steps.min():g} to {steps.max():g} s, a .trc file holds one rate. Resample first."
+        )
+    xyz = markers.xyz @ Y_UP_TO_Z_UP / METRES["mm"]
+    count, frames = len(markers.names), markers.time.size
+    header = [
+        f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
+        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
+        f"{rate:.10g}\t{rate:.10g}\t{frames}\t{count}\tmm\t{rate:.10g}\t1\t{frames}",
+        "Frame#\tTime\t" + "\t\t\t".join(markers.names) + "\t\t",
+        "\t\t" + "\t".join(f"{axis}{i}" for i in range(1, count + 1) for axis in "XYZ"),
+        "",
+    ]
+    lines = (
+        "\t".join([str(i), f"{t:.9g}", *("" if np.isnan(v) else f"{v:.6f}" for v in frame.ravel())])
+        for i, (t, frame) in enumerate(zip(markers.time, xyz, strict=True), start=1)
+    )
+    try:
+        with open(path, "x", encoding="utf-8", newline="\n") as stream:
+            stream.write("\n".join([*header, *lines]) + "\n")
+    except FileExistsError:
+        raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.") from None
+    return path
+
+
+def _header(rows: list[str], path: Path) -> dict[str, str]:
+    """Return the names and values of the second and third row."""
+    if not rows or not rows[0].lstrip().startswith("PathFileType"):
+        raise FileRefused(f"{path}: does not begin with 'PathFileType', so it is not a .trc file. Export the markers again.")
+    if len(rows) <= HEADER_ROWS:
+        raise FileRefused(f"{path}: ends after {len(rows)} rows; a .trc file has five header rows and the frames. Export it again.")
+    names, values = ([cell for cell in cells(row) if cell] for row in rows[1:3])  # some writers put two tabs between values
+    return dict(zip(names, values, strict=False))
+
+
+def _rate(header: dict[str, str], path: Path) -> float:
+    rate = parse_number(header.get("DataRate", ""), f"{path}: DataRate")
+    if not rate > 0 or not np.isfinite(rate):
+        raise FileRefused(f"{path}: DataRate is {header.get('DataRate')!r}; it must be the frames per second, above 0. Correct the header.")
+    return rate
+
+
+def _unit(header: dict[str, str], path: Path) -> str:
+    unit = header.get("Units", "").lower()
+    unit = {"meters": "m", "metres": "m", "millimeters": "mm", "millimetres": "mm"}.get(unit, unit)
+    if unit not in METRES:
+        raise FileRefused(f"{path}: Units is {header.get('Units')!r}; legal are {', '.join(METRES)}. Correct the third row.")
+    return unit
+
+
+def _labels(rows: list[str], path: Path) -> tuple[list[str], list[str]]:
+    """Return the marker labels, the second of two equal ones with a number, and the warnings of that."""
+    found = [cell for cell in cells(rows[3])[2:] if cell]
+    if not found:
+        raise FileRefused(f"{path}: the fourth row names no marker. Export the markers with their labels.")
+    names: list[str] = []
+    warnings: list[str] = []
+    for label in found:
+        name, turn = label, 1
+        while name in names:
+            turn += 1
+            name = f"{label}_{turn}"
+        if turn > 1:
+            warnings.append(f"Marker label {label} occurs {turn} times; the last one is called {name} here.")
+        names.append(name)
+    return names, warnings
+
+
+def _table(rows: list[str], count: int, path: Path) -> tuple[NDArray[np.int64], Array, Array]:
+    """Return frame numbers (T,), times (T,) s and coordinates (T, K, 3) in file units."""
+    width = 2 + 3 * count
+    table: list[list[float]] = []
+    for line_number, line in enumerate(rows[HEADER_ROWS:], start=HEADER_ROWS + 1):
+        found = cells(line)
+        if not any(found) or not re.fullmatch(r"\d+(\.0*)?", found[0]):
+            if any(found) and (table or line_number > HEADER_ROWS + 2):
+                raise FileRefused(f"{path}: row {line_number} does not begin with a frame number ({found[0]!r}). Export the file again.")
+            continue
+        if len(found) > width and not any(found[width:]):
+            found = found[:width]
+        if len(found) > width or ("\t" not in line and len(found) < width):
+            raise FileRefused(
+                f"{path}: row {line_number} holds {len(found)} cells, {width} are expected for {count} markers. Export it again."
+            )
+        found += [""] * (width - len(found))
+        table.append([parse_number(cell, f"{path}, row {line_number}") for cell in found])
+    if not table:
+        raise FileRefused(f"{path}: holds a header but no frame. Export the recording again.")
+    array = np.array(table)
+    return array[:, 0].astype(int), array[:, 1], array[:, 2:].reshape(len(table), count, 3)
+
+
+def _spread(values: Array) -> float:
+    """Return the median over the frames of the largest extent of the marker cloud (T, K, 3), in its own unit; 0 if nothing is seen."""
+    seen = values[np.logical_not(np.isnan(values).all(axis=(1, 2)))]
+    return float(np.median(np.max(np.nanmax(seen, axis=1) - np.nanmin(seen, axis=1), axis=1))) if len(seen) else 0.0
+
+
+def _equal_steps(number_of: NDArray[np.int64], raw: Array, xyz: Array, declared: float, path: Path) -> tuple[Array, Array, list[str]]:
+    """Return time (T,) with equal steps and the coordinates on it, NaN where the file leaves a frame out, and the warnings."""
+    if np.isnan(raw).any() or np.any(np.diff(raw) <= 0):
+        frame = int(np.argmax(np.isnan(raw))) if np.isnan(raw).any() else int(np.argmax(np.diff(raw) <= 0)) + 1
+        raise FileRefused(f"{path}: the time column does not increase at frame {frame + 1} ({raw[frame]:g} s). Export the file again.")
+    if raw.size == 1:
+        return raw, xyz, []
+    duration = raw[-1] - raw[0]
+    for place in (number_of - number_of[0], np.rint((raw - raw[0]) * declared).astype(int)):
+        step = duration / place[-1] if place[-1] > 0 else np.inf
+        if np.all(np.diff(place) > 0) and np.all(np.abs(raw - raw[0] - step * place) < 0.25 * step + TIME_COLUMN_ROUNDING):
+            break
+    else:
+        raise FileRefused(
+            f"{path}: the time column has no equal steps and does not fit the DataRate of {declared:g} Hz. Correct the rate in the header "
+            "or export the file again."
+        )
+    warnings = []
+    rate = declared
+    if abs(1 / (step * declared) - 1) > TIME_COLUMN_ROUNDING / duration + 1e-6:
+        rate = 1 / step
+        warnings.append(f"DataRate says {declared:g} Hz, the time column {rate:.6g} Hz; the time column was used.")
+    full = np.full((int(place[-1]) + 1, *xyz.shape[1:]), np.nan)
+    full[place] = xyz
+    if len(full) > raw.size:
+        warnings.append(f"{len(full) - raw.size} frames are left out in the file; they count as not seen.")
+    return raw[0] + np.arange(len(full)) / rate, full, warnings

@@ -1,0 +1,175 @@
+"""Turn a plate's reading into the lab frame: side of the sensor, axes, load or reaction; feet and weight are the witnesses."""
+
+import numpy as np
+
+from biodance.errors import TrialRefused
+from biodance.lab.plates.corners import half_sides, plate_axes
+from biodance.lab.plates.signals import PlateReading
+from biodance.lab.plates.signs import gravity_sign, sway_sign
+from biodance.lab.plates.wrench import centre_of_pressure
+from biodance.records import Array, Markers, Plate, Wrench
+
+LOW = 0.15  # m above the surface: markers of a standing foot, ankle included
+BESIDE = 0.15  # m beyond the edge
+FRAMES = 200
+
+
+def distance_to_feet(cop: Array, time: Array, corners: Array, markers: Markers) -> float | None:
+    """Return the median distance in m between the centre of pressure and the feet on the plate; None if no foot is seen on it.
+
+    ``cop`` (S, 2) m in the lab frame at ``time`` (S,) s, NaN while unloaded; ``corners`` (4, 3) m. The feet are all markers within 0.15 m
+    over the surface and 0.15 m around the plate; the distance is to the nearest straight line between two of them, so it is near 0
+    between two feet.
+    """
+    if markers.time.size == 0 or not np.isfinite(cop).any():
+        return None
+    frames = np.unique(np.linspace(0, markers.time.size - 1, FRAMES).round().astype(int))
+    at = np.clip(np.searchsorted(time, markers.time[frames]), 0, time.size - 1)
+    centre, reach = corners.mean(axis=0), float(np.linalg.norm(half_sides(corners))) + BESIDE
+    distances = []
+    for frame, sample in zip(frames, at, strict=True):
+        xyz = markers.xyz[frame]
+        near = (np.abs(xyz[:, 2] - centre[2]) <= LOW) & (np.linalg.norm(xyz[:, :2] - centre[:2], axis=1) <= reach)
+        if np.isfinite(cop[sample]).all() and near.sum() >= 2:
+            distances.append(_distance_between(cop[sample], xyz[near, :2]))
+    return float(np.median(distances)) if len(distances) >= min(5, markers.time.size) else None
+
+
+def _distance_between(point: Array, feet: Array) -> float:
+    """Return the distance of a point (2,) to the nearest segment between any two of ``feet`` (n, 2)."""
+    i, j = np.triu_indices(len(feet), 1)
+    start, along = feet[i], feet[j] - feet[i]
+    length = np.maximum((along**2).sum(axis=1), 1e-12)
+    share = np.clip(((point - start) * along).sum(axis=1) / length, 0, 1)
+    return float(np.linalg.norm(start + share[:, None] * along - point, axis=1).min())
+
+
+UNDER_THE_FOOT, NOT_UNDER = 0.06, 0.15  # m from the feet: believed; contradicted
+Said = tuple[str, ...]
+
+
+def oriented(reading: PlateReading, time: Array, *, markers: Markers | None, alone: bool, otherwise: int) -> tuple[Plate, Said]:
+    """Return the plate with the ground's wrench ON the subject about the lab origin, and warnings.
+
+    ``time`` (S,) s; ``markers`` are asked where the feet are; ``alone`` says that no other plate is loaded, so that the sway of a
+    standing person can be used; ``otherwise`` (+1 or -1) is the sign for a plate that never carries anything.
+
+    Raises
+    ------
+    TrialRefused
+        The corners contradict the recorded forces and the markers do not decide between the two possible corrections.
+    """
+    axes = plate_axes(reading.corners)
+    wrench, said = reading.at_surface(axes)
+    sign = gravity_sign(wrench, axes, reading.rate)
+    sway = sway_sign(wrench, reading.rate) if alone and sign else 0
+    warnings: Said = ()
+    if sway and sway != sign and axes[2, 2] > 0:
+        axes, turned = _unmirrored(reading, time, axes, markers)
+        wrench, said = reading.at_surface(axes)
+        sign, said, warnings = sway, (*said, turned), (f"Plate {reading.plate.number}: {turned}",)
+    elif sway:
+        seen, warnings = _sway_said(reading, sway == sign)
+        said = (*said, seen)
+    elif sign and axes[2, 2] > 0:
+        seen, warnings = _upwards_said(reading)
+        said = (*said, seen)
+    if markers is not None and sign:
+        axes, checked, warned = _under_feet(reading, wrench, time, axes, markers)
+        said, warnings = (*said, *checked), (*warnings, *warned)
+    value = _in_lab(wrench, axes, sign or otherwise, reading.corners.mean(axis=0))
+    decisions = (*reading.decisions, *said, _sign_said(sign, otherwise))
+    zero = (sign or otherwise) * axes @ reading.empty
+    plate = Plate(reading.plate.name, reading.plate.type, reading.corners, Wrench(time, value), decisions, zero)
+    return plate, (*reading.warnings, *warnings)
+
+
+def _in_lab(wrench: Array, axes: Array, sign: int, centre: Array) -> Array:
+    """Return the wrench about the lab origin; a mirrored ``axes`` (determinant -1) turns moments the other way round than forces."""
+    force = sign * wrench[:, :3] @ axes.T
+    moment = sign * np.linalg.det(axes) * wrench[:, 3:] @ axes.T
+    return np.hstack([force, moment + np.cross(centre, force)])
+
+
+def _unmirrored(reading: PlateReading, time: Array, axes: Array, markers: Markers | None) -> tuple[Array, str]:
+    """Return the axes of a plate whose corners run the wrong way round: its z points down, so x or y must be turned too.
+
+    The markers say which; without markers both stay as the corners have them, so the lab frame of such a file is a mirror image, in which
+    forces, centre of pressure and weight still fit together.
+    """
+    why = (
+        "CORNERS make the plate's z point up, but the sway of the standing person shows that its z points down: the corners "
+        "run the wrong way round"
+    )
+    choices = {"y": axes * [1, -1, -1], "x": axes * [-1, 1, -1]}
+    if markers is not None:
+        found = {name: _distance(reading, time, choice, markers) for name, choice in choices.items()}
+        good = [name for name, distance in found.items() if distance is not None and distance <= UNDER_THE_FOOT]
+        if len(good) == 1:
+            return choices[good[0]], f"{why}; {good[0]} was turned, which puts the load under the feet."
+        raise TrialRefused(f"{why}, and the foot markers do not tell which axis to turn. Correct FORCE_PLATFORM:CORNERS.")
+    return axes * [
+        1,
+        1,
+        -1,
+    ], f"{why}; x and y were kept as the corners have them. Check the corner order before joining this file with markers."
+
+
+def _under_feet(reading: PlateReading, wrench: Array, time: Array, axes: Array, markers: Markers) -> tuple[Array, Said, Said]:
+    """Return the axes after asking the foot markers: as they are, or by quarter turns where only that puts the load under them."""
+    distance = _distance(reading, time, axes, markers)
+    if distance is None:
+        return axes, (), ()
+    if distance <= NOT_UNDER:
+        return axes, (f"The centre of pressure lies {1000 * distance:.0f} mm (median) from the feet that the markers show.",), ()
+    turns = {90 * k: axes @ _quarter_turns(k) for k in (1, 2, 3)}
+    found = {angle: _distance(reading, time, turned, markers) for angle, turned in turns.items()}
+    good = [angle for angle, d in found.items() if d is not None and d <= UNDER_THE_FOOT]
+    number = reading.plate.number
+    if len(good) == 1 and all(d is None or d > NOT_UNDER for angle, d in found.items() if angle != good[0]):
+        said = (
+            f"The load lies {distance:.2f} m from the feet that the markers show, and under them when the corners are counted "
+            f"from another one: the plate "
+            f"axes were turned by {good[0]} degrees."
+        )
+        return turns[good[0]], (said,), (f"Plate {number}: {said} Correct the order of FORCE_PLATFORM:CORNERS.",)
+    said = f"The load lies {distance:.2f} m (median) from the feet that the markers show"
+    return axes, (f"{said}.",), (f"Plate {number}: {said}: check CORNERS, ORIGIN and whether a foot without markers stood there.",)
+
+
+def _distance(reading: PlateReading, time: Array, axes: Array, markers: Markers) -> float | None:
+    """Return the median distance in m of the load to the feet if the plate's axes were ``axes``."""
+    point = centre_of_pressure(reading.at_surface(axes)[0])
+    return distance_to_feet(reading.corners.mean(axis=0)[:2] + point @ axes[:2, :2].T, time, reading.corners, markers)
+
+
+def _quarter_turns(count: int) -> Array:
+    """Return the rotation about z by ``count`` times 90 degrees."""
+    c, s = ((1, 0), (0, 1), (-1, 0), (0, -1))[count]
+    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]], dtype=float)
+
+
+def _sway_said(reading: PlateReading, agrees: bool) -> tuple[str, Said]:
+    if agrees:
+        return "The sway of the standing person confirms the sign of the shear.", ()
+    said = "Weight and sway contradict each other: the shear channels seem to have the wrong sign"
+    return f"{said}.", (f"Plate {reading.plate.number}: {said}. Check the cabling and the corner order.",)
+
+
+def _upwards_said(reading: PlateReading) -> tuple[str, Said]:
+    """Return the sentence about a plate whose z points up, and a warning where the maker's own axes have z down (eight channels)."""
+    said = "CORNERS make the plate's z point up; the file's axes were used as they are"
+    if reading.plate.type not in (3, 7):
+        return f"{said}.", ()
+    doubt = f"{said}, but an eight-channel plate has z down: the shear may have the wrong sign. Check the corner order"
+    return f"{doubt}.", (f"Plate {reading.plate.number}: {doubt}.",)
+
+
+def _sign_said(sign: int, otherwise: int) -> str:
+    if not sign:
+        taken = "reaction" if otherwise > 0 else "load"
+        return f"Never loaded, so gravity cannot tell the sign; taken as the {taken}."
+    return (
+        f"Sign: the file holds the {'reaction on the subject; kept' if sign > 0 else 'load on the plate; turned round'} (the "
+        f"weight must point up)."
+    )

@@ -1,0 +1,103 @@
+"""The force plates of a C3D file: one wrench per plate, ground on subject, about the lab origin, in SI. Every decision is a sentence."""
+
+import numpy as np
+
+from biodance.errors import TrialRefused
+from biodance.lab.c3d.raw import RawC3d
+from biodance.lab.plates.corners import plate_axes
+from biodance.lab.plates.orientation import oriented
+from biodance.lab.plates.parameters import POUND, count_plates, plate_parameters
+from biodance.lab.plates.signals import PlateReading, read_plate_signals
+from biodance.lab.plates.signs import gravity_sign
+from biodance.lab.weight import movement, steady_mass
+from biodance.records import Array, Markers, Plate, Wrench
+from biodance.settings import StandingRules
+
+OFF_WEIGHT = 0.05  # share of the declared mass from which on the weight on the plates is worth a warning
+AS_POUNDS = 0.03
+
+ReadPlates = tuple[tuple[Plate, ...], tuple[str, ...]]
+
+
+def read_plates(
+    raw: RawC3d, *, metres: float, turn: Array | None = None, markers: Markers | None = None, body_mass: float | None = None
+) -> ReadPlates:
+    """Return the force plates of a C3D file and the warnings about them.
+
+    Each ``Plate.wrench`` is the ground's action ON the subject about the LAB origin at the analog rate, zero taken off, in N and N·m.
+
+    ``metres`` is the file's length unit in m (0.001 for mm); ``turn`` (3, 3) leads from the file's axes to the lab frame (z up; None =
+    they are the same); ``markers`` (m, lab frame) set the clock and say where the feet are; ``body_mass`` kg is compared with the weight
+    on the plates. A plate that cannot be trusted is left out with a warning that says why; nothing is raised. The method per TYPE is in
+    ``plate_types``.
+    """
+    count, warnings = count_plates(raw)
+    if not count:
+        return (), warnings
+    if raw.analog.shape[0] == 0 or not raw.analog_rate > 0:
+        lacks = "holds no analog samples" if raw.analog.shape[0] == 0 else f"has the analog rate {raw.analog_rate:g}"
+        return (), (*warnings, f"The file declares {count} force plates but {lacks}: no plate was read. Export it with the analog data.")
+    readings, refused = _readings(raw, count, metres, np.eye(3) if turn is None else turn)
+    plates, said = _oriented(readings, _time(raw, markers), markers)
+    return plates, (*warnings, *refused, *said, *_weight_said(plates, markers, body_mass))
+
+
+def total_wrench(plates: tuple[Plate, ...]) -> Wrench:
+    """Return the summed wrench of plates that share one time base; TrialRefused without plates or with different time bases."""
+    if not plates or any(not np.array_equal(p.wrench.time, plates[0].wrench.time) for p in plates):
+        raise TrialRefused("The total wrench needs at least one plate and one time base for all of them. Read the plates from one file.")
+    return Wrench(plates[0].wrench.time, np.sum([p.wrench.value for p in plates], axis=0))
+
+
+def _readings(raw: RawC3d, count: int, metres: float, turn: Array) -> tuple[list[PlateReading], list[str]]:
+    """Return the readings of the plates that make sense and a sentence for each of the others."""
+    readings, refused = [], []
+    for number in range(1, count + 1):
+        try:
+            readings.append(read_plate_signals(raw, plate_parameters(raw, number), metres=metres, turn=turn))
+        except TrialRefused as error:
+            refused.append(_left_out(number, error))
+    return readings, refused
+
+
+def _oriented(readings: list[PlateReading], time: Array, markers: Markers | None) -> ReadPlates:
+    """Return the plates in the lab frame; an unloaded plate takes the sign of the majority, +1 (reaction) if nobody stood on any."""
+    axes = [plate_axes(r.corners) for r in readings]
+    signs = [gravity_sign(r.at_surface(a)[0], a, r.rate) for r, a in zip(readings, axes, strict=True)]
+    # the sign belongs to the plate's z: a plate whose z points the other way has the other sign
+    votes = [sign * np.sign(a[2, 2]) for sign, a in zip(signs, axes, strict=True)]
+    plates, warnings = [], []
+    for reading, sign, a in zip(readings, signs, axes, strict=True):
+        otherwise = int(np.sign(sum(votes)) * np.sign(a[2, 2])) or 1
+        alone = bool(sign) and sum(map(abs, signs)) == 1
+        try:
+            plate, said = oriented(reading, time, markers=markers, alone=alone, otherwise=otherwise)
+        except TrialRefused as error:
+            warnings.append(_left_out(reading.plate.number, error))
+            continue
+        plates.append(plate)
+        warnings += said
+    return tuple(plates), tuple(warnings)
+
+
+def _left_out(number: int, error: TrialRefused) -> str:
+    return f"Plate {number} was left out, and what it carried is missing from the total: {error}"
+
+
+def _time(raw: RawC3d, markers: Markers | None) -> Array:
+    """Return the times (S,) s of the analog samples on the clock of the markers; from 0 without markers."""
+    start = float(markers.time[0]) if markers is not None and markers.time.size else 0.0
+    return start + np.arange(raw.analog.shape[0]) / raw.analog_rate
+
+
+def _weight_said(plates: tuple[Plate, ...], markers: Markers | None, body_mass: float | None) -> tuple[str, ...]:
+    """Return a warning if the weight in quiet standing contradicts the declared mass."""
+    walks = markers is not None and movement(markers) > StandingRules.still
+    mass = steady_mass(total_wrench(plates)) if plates and not walks else None
+    if mass is None or body_mass is None or not body_mass > 0 or abs(mass / body_mass - 1) <= OFF_WEIGHT:
+        return ()
+    said = f"The plates carry {mass:.2f} kg in quiet standing, {body_mass:.2f} kg are declared"
+    for factor, meaning in ((POUND, "newton declared as pounds"), (1 / POUND, "pounds declared as newton")):
+        if abs(mass / body_mass / factor - 1) <= AS_POUNDS:
+            return (f"{said}: the ratio is that of {meaning}. Check ANALOG:UNITS.",)
+    return (f"{said}: check the mass, the units, and whether a foot stood beside the plates.",)

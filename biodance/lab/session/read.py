@@ -1,0 +1,168 @@
+"""One visit of one person: point at the folder, get the subject, the trials with their roles, and what had to be refused or guessed."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from biodance.discovery import Chosen
+from biodance.errors import BiodanceError, SessionRefused
+from biodance.lab.markers.sets import read_marker_set
+from biodance.lab.read import read_trial
+from biodance.lab.readers import Reader, extensions
+from biodance.lab.session.file import SessionFile, read_session_file
+from biodance.lab.session.recordings import find_recordings, guess_static, recordings_in, role_by_eclipse, role_by_name, vicon_notes
+from biodance.lab.session.subject import identify_subject
+from biodance.lab.vicon import EclipseNotes
+from biodance.lab.weight import is_still, movement
+from biodance.records import Role, Session, Trial
+from biodance.settings import Settings
+
+
+def read_session(
+    folder: str | Path,
+    *,
+    subject_name: str | None = None,
+    settings: Settings | Mapping[str, object] | None = None,
+    readers: Chosen[Reader] = None,
+    markers: str | Path | None = None,
+    tell: Callable[[str], None] | None = None,
+) -> Session:
+    """Read the session in a folder: the subject and every trial that can be read.
+
+    Roles come from session.toml, else from the Eclipse notes (.enf), else from the names (static*, cal* = static; squat* = validate;
+    others = fit); without a static by these, the stillest trial is taken. The subject comes from session.toml, .mp, .vsk and the files' own
+    parameters, in this order. A file that cannot be read never stops the session: it stands in ``Session.refused`` with the reason. What
+    was followed, guessed or left aside stands in ``Session.notes``.
+
+    Parameters
+    ----------
+    folder : str or pathlib.Path
+        With the recordings of one visit, and session.toml where there is one.
+    subject_name : str, optional
+        Chooses the person in C3D files that hold several.
+    settings : Settings or mapping, optional
+        A record: these and no others. A mapping, ``{"filter.cutoff": 6}``: as session.toml says, with these changed.
+    readers : iterable, optional
+        As for `read_trial`.
+    markers : str or pathlib.Path, optional
+        The marker set that was worn, a name or the path of a file; before what session.toml says of it.
+    tell : callable, optional
+        Called with the name of each file before it is read.
+
+    Returns
+    -------
+    Session
+        ``session["squat_1"]`` is a trial.
+
+    Raises
+    ------
+    SessionRefused
+        Not a folder, no recording in it, none that can be read, or a session.toml with a mistake.
+    UnknownName
+        There is no such setting.
+    BiodanceError
+        A setting is not legal.
+
+    See Also
+    --------
+    examine : Take it through all stages.
+
+    Examples
+    --------
+    >>> session = biodance.read_session("visit", settings={"filter.cutoff": 6})
+    >>> session.settings
+    Settings(filter.cutoff=6.0)
+    """
+    folder = _checked(Path(folder))
+    file_says = read_session_file(folder)
+    chosen = settings if isinstance(settings, Settings) else file_says.settings.changed(settings or {})
+    worn = str(markers) if markers is not None else file_says.marker_set
+    marker_set = read_marker_set(worn) if worn else None
+    files, notes = find_recordings(folder, readers)
+    eclipse, measurements, refused = vicon_notes({folder, *(file.parent for file in files)})
+    trials: list[Trial] = []
+    reasons: dict[str, str] = {}
+    for file in files:
+        operator = eclipse.get(file.stem.lower())
+        role, reason = _role(file, folder, file_says, operator)
+        if role == "skip":
+            notes.append(f"{file.name} was left aside: {reason}.")
+            continue
+        if tell:
+            tell(file.name)
+        try:
+            trial = read_trial(file, role=role, subject=subject_name, readers=readers, markers=marker_set)
+            trial = _with_strikes(replace(trial, settings=chosen), operator)
+        except BiodanceError as error:
+            refused[file.name] = str(error)
+            continue
+        trials.append(replace(trial, name=f"{file.parent.name}_{trial.name}") if trial.name in reasons else trial)
+        reasons[trials[-1].name] = reason
+    if not trials:
+        raise SessionRefused(_nothing_left(folder, refused, readers))
+    trials = _settle_static(trials, file_says, reasons, notes)
+    subject, guesses = identify_subject(file_says.subject, measurements, trials, name=subject_name or folder.resolve().name)
+    read = [f"{path.name} in {path.parent.name} was followed." for path in file_says.read]
+    roles = [f"{trial.name} has the role {trial.role}: {reasons[trial.name]}." for trial in trials]
+    slips = file_says.unused([file.stem for file in files])
+    return Session(subject, tuple(trials), folder, refused, (*read, *slips, *roles, *notes, *guesses))
+
+
+def _checked(folder: Path) -> Path:
+    if not folder.exists():
+        raise SessionRefused(f"{folder}: there is no such folder. Check the path.")
+    if not folder.is_dir():
+        raise SessionRefused(f"{folder}: is a file; a session is a folder with a static trial and trials. Give the folder.")
+    return folder
+
+
+def _role(file: Path, folder: Path, settings: SessionFile, operator: EclipseNotes | None) -> tuple[Role, str]:
+    """Return the role of a recording and why it has it."""
+    if role := settings.role(file.stem):
+        return role, "session.toml says so"
+    if operator and (role := role_by_eclipse(operator)):
+        return role, "the Eclipse notes (.enf) say so"
+    if role := role_by_name(file.stem):
+        return role, "guessed from its name"
+    if file.parent != folder and (role := role_by_name(file.parent.name)):
+        return role, f"guessed from its folder {file.parent.name}"
+    return "fit", "its name says nothing else"
+
+
+def _with_strikes(trial: Trial, operator: EclipseNotes | None) -> Trial:
+    """Return the trial with a warning for every plate that the operator marked as invalid in Eclipse."""
+    invalid = [plate for plate, state in (operator.plates if operator else {}).items() if state.lower() == "invalid"]
+    said = tuple(
+        f"The operator marked {plate} as invalid in Eclipse: the foot may not have struck that plate cleanly." for plate in invalid
+    )
+    return replace(trial, warnings=(*trial.warnings, *said)) if said else trial
+
+
+def _settle_static(trials: list[Trial], settings: SessionFile, reasons: dict[str, str], notes: list[str]) -> list[Trial]:
+    """Return the trials with one of them as static where nobody told which; note a static that moves, or that there is none."""
+    for trial in trials:
+        if trial.role == "static" and trial.markers is not None and not is_still(trial):
+            notes.append(f"{trial.name} is the static trial, but its markers travel {movement(trial.markers):.2f} m. Is it the right file?")
+    if any(trial.role == "static" for trial in trials):
+        return trials
+    guess = guess_static([trial for trial in trials if settings.role(trial.source.path.stem) is None])
+    if guess is None or guess.markers is None:
+        notes.append(
+            "There is no static trial: none is called so, and in none do markers stand still. Record one, or name it in session.toml."
+        )
+        return trials
+    frames = guess.markers.time.size
+    why = "it has a single frame" if frames == 1 else f"its markers stay within {1000 * movement(guess.markers):.1f} mm"
+    reasons[guess.name] = f"guessed, no trial is called static and {why}; set its role in session.toml if this is wrong"
+    return [replace(trial, role="static") if trial is guess else trial for trial in trials]
+
+
+def _nothing_left(folder: Path, refused: Mapping[str, str], readers: Chosen[Reader]) -> str:
+    """Return the sentence for a folder of which no recording is left: nothing there, or nothing that can be read."""
+    if refused:
+        name, reason = next(iter(refused.items()))
+        return f"{folder}: none of its {len(refused)} files can be read. The first, {name}: {reason}"
+    inside = [part.name for part in sorted(folder.iterdir()) if part.is_dir() and recordings_in(part, readers)]
+    if inside:
+        return f"{folder}: holds no recording itself, but these folders do: {', '.join(inside[:8])}. Point at one of them."
+    return f"{folder}: holds no recording. Legal are files of the formats {', '.join(extensions(readers))}."

@@ -1,0 +1,128 @@
+"""Find the recordings in a folder, what belongs to them, and which role each trial plays."""
+
+import re
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from biodance.discovery import Chosen
+from biodance.errors import BiodanceError
+from biodance.lab.read import read_head, sniffed
+from biodance.lab.readers import Reader, extensions
+from biodance.lab.vicon import EclipseNotes, read_enf, read_mp, read_vsk
+from biodance.lab.weight import is_still, movement
+from biodance.records import Role, Trial
+
+STATIC_WORDS = ("static", "cal", "calib", "calibration", "tpose", "npose")
+VALIDATE_WORDS = ("squat", "squats")
+
+
+def role_by_name(name: str) -> Role | None:
+    """Return "static" for static* and cal*, "validate" for squat*, as a word anywhere in the name; None if the name says nothing.
+
+    Words end where letters end and where upper case begins: ``CB_Static0001``, ``WalkSquat2``; ``calf_raise`` is no calibration.
+    """
+    words = [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)]
+    if any(word in STATIC_WORDS or word.startswith("static") for word in words):
+        return "static"
+    if any(word in VALIDATE_WORDS for word in words):
+        return "validate"
+    return None
+
+
+def role_by_eclipse(notes: EclipseNotes) -> Role | None:
+    """Return the role that the operator's notes tell: TYPE Static, else the words of the description as in a name."""
+    return "static" if "static" in notes.type.lower() else role_by_name(notes.description)
+
+
+def guess_static(trials: Sequence[Trial]) -> Trial | None:
+    """Return the trial to take as static where nobody said which: of the still ones that with the most markers; None if all move.
+
+    A single frame counts as still: some laboratories keep one frame of the static only.
+    """
+    still = [trial for trial in trials if is_still(trial)]
+    return max(still, key=_static_quality, default=None)
+
+
+def _static_quality(trial: Trial) -> tuple[int, float]:
+    assert trial.markers is not None  # a still trial has markers
+    return int(trial.markers.seen.any(axis=0).sum()), -movement(trial.markers)
+
+
+TEXT = (".txt", ".csv")
+"""Extensions that notes and tables for people have, too: there the content decides."""
+PART_FOLDERS = re.compile(r"static|cal|dynamic|trials?|fit|validat|squat|walk|movement|recordings?", flags=re.IGNORECASE)
+
+
+def find_recordings(folder: Path, readers: Chosen[Reader] = None) -> tuple[list[Path], list[str]]:
+    """Return the recordings of a session, sorted by name, and notes on what was left aside.
+
+    They lie in the folder itself, else in its parts (folders such as ``static`` and ``dynamic``). A table of forces that belongs to a .trc
+    file is no recording of its own; of one trial in several formats the C3D file is taken; text that holds no table of numbers is none.
+    """
+    files, order = recordings_in(folder, readers), list(extensions(readers))
+    if not files:
+        parts = [part for part in sorted(folder.iterdir()) if part.is_dir() and PART_FOLDERS.match(part.name)]
+        files = [file for part in parts for file in recordings_in(part, readers)]
+    notes: list[str] = []
+    kept: dict[tuple[Path, str], Path] = {}
+    for file in sorted(_without_companions(files, readers), key=lambda f: (order.index(f.suffix.lower()), str(f))):
+        trial = (file.parent, file.stem.lower())
+        if trial in kept:
+            notes.append(f"{file.name} was left aside: it is the same trial as {kept[trial].name}.")
+        else:
+            kept[trial] = file
+    return sorted(kept.values()), notes
+
+
+def recordings_in(folder: Path, readers: Chosen[Reader] = None) -> list[Path]:
+    """Return the files directly in a folder whose extension or content says that they are recordings, sorted by name."""
+    legal = extensions(readers)
+    files = (path for path in sorted(folder.iterdir()) if not path.is_dir() and not path.name.startswith("."))
+    return [path for path in files if path.suffix.lower() in legal and _is_data(path, readers)]
+
+
+def recordings_below(folder: Path, readers: Chosen[Reader] = None) -> list[Path]:
+    """Return the recordings in a folder and all folders below it, sorted by path; tables that belong to a .trc file are left out."""
+    folders = [folder, *(path for path in sorted(folder.rglob("*")) if path.is_dir() and not path.name.startswith("."))]
+    return sorted(_without_companions([file for place in folders for file in recordings_in(place, readers)], readers))
+
+
+def vicon_notes(folders: Iterable[Path]) -> tuple[dict[str, EclipseNotes], dict[str, dict[str, float]], dict[str, str]]:
+    """Return the Eclipse notes by trial name (lower case), the measurements (m, kg) by file name, and the refused files with the reason."""
+    eclipse: dict[str, EclipseNotes] = {}
+    measurements: dict[str, dict[str, float]] = {}
+    refused: dict[str, str] = {}
+    for file in (path for folder in sorted(folders) for path in sorted(folder.iterdir()) if path.is_file()):
+        try:
+            if re.search(r"\.trial\d*\.enf$", file.name, flags=re.IGNORECASE):
+                notes = read_enf(file)
+                eclipse[notes.trial.lower()] = notes
+            elif file.suffix.lower() in (".mp", ".vsk"):
+                measurements[file.name] = read_mp(file) if file.suffix.lower() == ".mp" else read_vsk(file)
+        except BiodanceError as error:
+            refused[file.name] = str(error)
+    return eclipse, dict(sorted(measurements.items(), key=lambda item: not item[0].lower().endswith(".mp"))), refused
+
+
+def _without_companions(files: list[Path], readers: Chosen[Reader]) -> list[Path]:
+    companions = {other for file in files if (other := _beside(file, readers))}
+    return [file for file in files if file not in companions]
+
+
+def _is_data(file: Path, readers: Chosen[Reader]) -> bool:
+    """Return False for .txt and .csv files whose content is no recording: notes, exports for people."""
+    if file.suffix.lower() not in TEXT:
+        return True
+    try:
+        return sniffed(file, read_head(file), readers) is not None
+    except BiodanceError:
+        return False
+
+
+def _beside(file: Path, readers: Chosen[Reader]) -> Path | None:
+    """Return the file that the reader of ``file``, by its extension, reads together with it; None if there is none."""
+    beside = getattr(extensions(readers)[file.suffix.lower()], "beside", None)
+    try:
+        return beside(file) if beside else None
+    except BiodanceError:
+        return None

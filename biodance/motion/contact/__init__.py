@@ -1,0 +1,1 @@
+"""Which frames are fully measured: soles, plates, surfaces."""

@@ -1,0 +1,1 @@
+"""Inverse kinematics, functional calibration, closed legs; compiled where it runs frame by frame."""

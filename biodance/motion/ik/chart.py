@@ -1,0 +1,145 @@
+"""Ball joints as one rotation, and coordinates that change smoothly whenever the body does: for filters and interpolation."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance.body.body import NO_SEGMENT, Body
+from biodance.motion.quaternion import continuous, normalised
+from biodance.records import Array, Index
+
+
+@dataclass(frozen=True, eq=False)
+class Balls:
+    """G ball joints: ``first`` (G,) index of the first of the three joints, ``sign`` (G, 1) of their axes' handedness."""
+
+    first: np.ndarray
+    sign: Array
+
+    def angles_of(self, angles: Array) -> Array:
+        """Return (3, G, B) rad from the angles of all joints (n, B)."""
+        return np.stack([angles[self.first + k] for k in range(3)])
+
+
+def balls(body: Body) -> Balls:
+    """Return the ball joints of ``body``."""
+    first, sign = [], []
+    parents = [joint.parent for joint in body.joints]
+    for i in range(len(body.joints) - 2):
+        one, two, three = body.joints[i : i + 3]
+        axes = np.array([joint.axis for joint in (one, two, three)])
+        in_a_row = two.parent == i and three.parent == i + 1 and parents.count(i) == parents.count(i + 1) == 1
+        one_point = all(np.allclose(j.translation, 0) and np.allclose(j.rotation, np.eye(3)) for j in (two, three))
+        bare = one.segment == two.segment == NO_SEGMENT
+        if in_a_row and one_point and bare and np.allclose(axes @ axes.T, np.eye(3), atol=1e-9):
+            first.append(i)
+            sign.append(np.linalg.det(axes))
+    return Balls(np.array(first, dtype=np.intp), np.round(np.array(sign).reshape(-1, 1)))
+
+
+def ball_quaternion(angles: Array, sign: Array) -> Array:
+    """Return the quaternion (4, G, B) of Cardan angles (3, G, B) rad."""
+    half = 0.5 * sign * angles
+    (s1, s2, s3), (c1, c2, c3) = np.sin(half), np.cos(half)
+    c23, s23, sc, cs = c2 * c3, s2 * s3, s2 * c3, c2 * s3
+    return np.stack([s1 * c23 + c1 * s23, c1 * sc - s1 * cs, c1 * cs + s1 * sc, c1 * c23 - s1 * s23])
+
+
+def ball_angles(quaternion: Array, sign: Array, near: Array, lower: Array, upper: Array) -> Array:
+    """Return the Cardan angles (3, G, B) rad of unit quaternions (4, G, B).
+
+    Every rotation has two sets of Cardan angles (and any number of full turns). The one inside ``lower``, ``upper`` (3, G, 1) is taken,
+    if both or none are: the one closer to ``near`` (3, G, B).
+    """
+    x, y, z, w = quaternion
+    sine = np.clip(2 * (x * z + y * w), -1.0, 1.0)
+    one = np.stack(
+        [
+            np.arctan2(2 * (x * w - y * z), 1 - 2 * (x * x + y * y)),
+            np.arcsin(sine),
+            np.arctan2(2 * (z * w - x * y), 1 - 2 * (y * y + z * z)),
+        ]
+    )
+    narrow = upper - lower < 2 * np.pi
+    middle = np.where(narrow, 0.5 * (np.where(narrow, lower, 0.0) + np.where(narrow, upper, 0.0)), near)
+    first = _turned_near(sign * one, middle)
+    other = _turned_near(sign * (np.pi + np.array([1.0, -1.0, 1.0])[:, None, None] * one), middle)
+    outside = [np.maximum(np.maximum(lower - a, a - upper), 0.0).sum(axis=0) for a in (first, other)]
+    away = [np.abs(a - near).sum(axis=0) for a in (first, other)]
+    take_other = (outside[1] < outside[0]) | ((outside[1] == outside[0]) & (away[1] < away[0]))
+    return np.where(take_other, other, first)
+
+
+def _turned_near(angles: Array, middle: Array) -> Array:
+    """Return ``angles`` plus full turns, within half a turn of ``middle``."""
+    return middle + (angles - middle + np.pi) % (2 * np.pi) - np.pi
+
+
+@dataclass(frozen=True, eq=False)
+class Smooth:
+    """B postures: ``place`` (3, B) m and ``root`` (4, B) quaternion, (0, B) for a fixed root; ``ball`` (4, G, B); ``angle`` (m, B) rad."""
+
+    place: Array
+    root: Array
+    ball: Array
+    angle: Array
+
+    def stacked(self) -> Array:
+        """Return all numbers as one array (3 + 4 + 4 G + m, B)."""
+        return np.concatenate([self.place, self.root, self.ball.reshape(-1, self.angle.shape[1]), self.angle])
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """Maps q to smooth coordinates and back: ``joints`` the ball joints, ``single`` (m,) the others, limits (3, G, 1) rad of the balls."""
+
+    joints: Balls
+    single: Index
+    lower: Array
+    upper: Array
+    n_root: int
+
+    @property
+    def joint_count(self) -> int:
+        """Number of joints n."""
+        return len(self.single) + 3 * len(self.joints.first)
+
+    @property
+    def nq(self) -> int:
+        """Number of position coordinates."""
+        return self.joint_count + (7 if self.n_root else 0)
+
+    def smooth(self, q: Array) -> Smooth:
+        """Return the smooth coordinates of ``q`` (nq, B), B consecutive frames (signs and full turns are continued along them)."""
+        angles = q[7:] if self.n_root else q
+        root = continuous(q[3:7]) if self.n_root else q[:0]
+        ball = continuous(ball_quaternion(self.joints.angles_of(angles), self.joints.sign))
+        return Smooth(q[:3] if self.n_root else q[:0], root, ball, np.unwrap(angles[self.single], axis=-1))
+
+    def split(self, stacked: Array) -> Smooth:
+        """Return the parts of ``stacked`` (3 + 4 + 4 G + m, B), as they are."""
+        root, count = (3, 7) if self.n_root else (0, 0), 4 * self.joints.first.size
+        ball = stacked[root[1] : root[1] + count].reshape(4, count // 4, stacked.shape[1])
+        return Smooth(stacked[: root[0]], stacked[root[0] : root[1]], ball, stacked[root[1] + count :])
+
+    def posture(self, smooth: Smooth, near: Array) -> Array:
+        """Return q (nq, B); quaternions are normalised here; ``near`` (n, B) rad decides between equal sets of Cardan angles."""
+        angles = np.empty_like(near)
+        angles[self.single] = smooth.angle
+        ball = ball_angles(normalised(smooth.ball), self.joints.sign, self.joints.angles_of(near), self.lower, self.upper)
+        for k in range(3):
+            angles[self.joints.first + k] = ball[k]
+        return np.concatenate([smooth.place, normalised(smooth.root), angles]) if self.n_root else angles
+
+
+def chart_of(body: Body) -> Chart:
+    """Return the chart of ``body``."""
+    joints, limits = balls(body), body.limits
+    in_balls = np.concatenate([joints.first + k for k in range(3)])
+    return Chart(
+        joints,
+        np.setdiff1d(np.arange(len(body.joints)), in_balls),
+        joints.angles_of(limits.lower[:, None]),
+        joints.angles_of(limits.upper[:, None]),
+        body.n_root,
+    )

@@ -1,0 +1,125 @@
+"""The unknowns of a functional calibration: where joints are in the static posture, and how the axes of the hinges turn about the bone."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.body.human.skeleton import JOINTS
+from biodance.body.human.static_centres import Centres
+from biodance.body.tables.error_sizes import error_size, joint_size
+from biodance.motion.kinematics import Poses, axis_rotation, below, chains, poses, skew
+from biodance.records import Array
+
+HINGES = ("right_knee", "left_knee", "right_elbow", "left_elbow")
+ABOVE = {"knee": "hip", "elbow": "shoulder"}
+TURNS = 3 * len(JOINTS)
+SIZE = TURNS + len(HINGES)
+"""Unknowns: 3 m per joint of ``JOINTS`` (displacement, lab axes, in the static posture), then rad per hinge about the bone above it."""
+
+
+def centre_sd(joint: str) -> float:
+    """Return the standard deviation (m per axis) of a ``joint``'s centre as the static trial places it, before any movement; of a hinge
+    about the place that its lateral marker and its axis give it.
+    """
+    return hinge_sd() if joint in HINGES else joint_size("joint_centre", joint)
+
+
+def hinge_sd() -> float:
+    """Return the standard deviation (m per axis) of the centre of a knee or elbow about where lateral marker and axis place it."""
+    return error_size("hinge_centre", "hinge", state="before")
+
+
+@dataclass(frozen=True, eq=False)
+class JointUnknowns:
+    """The unknowns theta (37,) about the static trial's ``centres``, theta = 0."""
+
+    centres: Centres
+
+    def bone(self, hinge: str) -> Array:
+        """Return the unit vector (3,), lab, upwards along the bone above a hinge."""
+        side, joint = hinge.split("_")
+        along = self.centres.place[f"{side}_{ABOVE[joint]}"] - self.centres.place[hinge]
+        return np.asarray(along / np.linalg.norm(along))
+
+    def moved(self, theta: Array) -> Centres:
+        """Return the centres at ``theta``."""
+        shift = {joint: theta[own_centre(joint)] for joint in JOINTS}
+        place = {joint: at + shift.get(joint, 0.0) for joint, at in self.centres.place.items()}
+        right = {hinge: self._turn(hinge, theta) @ axis for hinge, axis in self.centres.right.items()}
+        return replace(self.centres, place=place, right=right)
+
+    def _turn(self, hinge: str, theta: Array) -> Array:
+        return np.asarray(axis_rotation(self.bone(hinge), theta[[own_turn(hinge)]])[0])
+
+    def prior(self, theta: Array) -> tuple[Array, Array]:
+        """Return residuals (37,) in standard deviations and their slope (37, 37): how far joints are from their static places, and knees
+        and elbows from where the lateral marker sees them when the axis turns.
+        """
+        residual, slope = np.empty(SIZE), np.zeros((SIZE, SIZE))
+        for joint in JOINTS:
+            rows, sd = own_centre(joint), centre_sd(joint)
+            residual[rows] = theta[rows] / sd
+            slope[rows, rows] = np.eye(3) / sd
+        for hinge in HINGES:
+            rows, k, sd = own_centre(hinge), own_turn(hinge), self.centres.axis_sd[hinge]
+            arm = self.centres.place[hinge] - self.centres.lateral[hinge]
+            swung = self._turn(hinge, theta) @ arm
+            residual[rows] -= (swung - arm) / hinge_sd()
+            slope[rows, k] = -np.cross(self.bone(hinge), swung) / hinge_sd()
+            residual[k], slope[k, k] = theta[k] / sd, 1 / sd
+        return residual, slope
+
+    def axis(self, hinge: str, theta: Array) -> tuple[Array, Array]:
+        """Return the unit flexion axis z (3,) of a hinge in the lab, static posture, and its slope (3, 37): square to the bone above, in
+        its plane with ``right``.
+        """
+        side, joint = hinge.split("_")
+        centres = self.moved(theta)
+        upper, lower = centres.place[f"{side}_{ABOVE[joint]}"], centres.place[hinge]
+        length, right = np.linalg.norm(upper - lower), centres.right[hinge]
+        y = (upper - lower) / length
+        across = right - (right @ y) * y
+        z = across / np.linalg.norm(across)
+        slope_y, slope_right = np.zeros((3, SIZE)), np.zeros((3, SIZE))
+        slope_y[:, own_centre(f"{side}_{ABOVE[joint]}")] = (np.eye(3) - np.outer(y, y)) / length
+        slope_y[:, own_centre(hinge)] = -(np.eye(3) - np.outer(y, y)) / length
+        slope_right[:, own_turn(hinge)] = np.cross(self.bone(hinge), right)
+        slope = slope_right - np.outer(y, y @ slope_right + right @ slope_y) - (right @ y) * slope_y
+        return z, (np.eye(3) - np.outer(z, z)) @ slope / np.linalg.norm(across)
+
+    def slope(self, body: Body, stand: Array, pose: Poses, points: Array, theta: Array) -> Array:
+        """Return (T, 3K, 37): how the markers (T, K, 3) m of the ``body`` at ``theta`` move with the unknowns while every joint keeps its
+        turn from the static posture ``stand`` (nq,), where the markers stay. ``pose`` is that of the T frames.
+
+        A centre that moves by d takes the markers beyond it along by (P - C) d, where P and C carry vectors of the static posture along
+        with the segments above and below; an axis that turns by r turns them about the centre by (P - C) r. That the two axes of the ankle
+        turn with the shank is left out.
+        """
+        rest = poses(body, stand[None]).rotation[0]
+        carried = pose.rotation @ np.swapaxes(rest, -1, -2)
+        hangs = below(body)[:, list(body.markers.segment)]
+        out = np.zeros((*points.shape, SIZE))
+        for chain in chains(body):
+            first, child = body.joints[chain[0]], body.joints[chain[-1]].segment
+            name = first.name.rsplit("_", 1)[0]
+            above = 0 if first.parent < 0 else body.joints[first.parent].segment
+            apart = (carried[:, above] - carried[:, child])[:, None]
+            on = np.flatnonzero(hangs[chain[0]])
+            out[:, on, :, own_centre(name)] += apart
+            if name in HINGES:
+                arm = points[:, on] - pose.joint_position[:, chain[0], None]
+                z, slope = self.axis(name, theta)
+                out[:, on] -= skew(arm) @ (apart @ (skew(z) @ slope))
+        return out.reshape(len(points), -1, SIZE)
+
+
+def own_centre(joint: str) -> slice:
+    """Return the unknowns of a joint's centre."""
+    i = 3 * JOINTS.index(joint)
+    return slice(i, i + 3)
+
+
+def own_turn(hinge: str) -> int:
+    """Return the unknown of a hinge's axis."""
+    return TURNS + HINGES.index(hinge)

@@ -1,0 +1,131 @@
+"""From which postures the frames of a trial descend: first guesses from the markers of one frame, then neighbours."""
+
+from functools import reduce
+
+import numpy as np
+from scipy.ndimage import median_filter
+from scipy.spatial.transform import Rotation
+
+from biodance.body.body import Body
+from biodance.motion.ik.compiled.interpolation import interpolate
+from biodance.motion.ik.marker_problem import MarkerProblem, Minimum, better, minimise_markers
+from biodance.motion.kinematics import poses
+from biodance.records import Array, Index
+
+OTHERS = 0.01
+"""Weight of the other segments' markers in the root's rigid fit: enough where the root's own markers are hidden."""
+
+
+def guess_postures(problem: MarkerProblem, frames: Index, *, share: float | None = None) -> Array:
+    """Return q (F, nq): the angles at a ``share`` of their range between the limits (None: zero), the root where its markers say."""
+    lower, upper = problem.chain.lower, problem.chain.upper
+    angles = np.clip(np.zeros(len(lower)), lower, upper)
+    if share is not None:
+        bounded = np.isfinite(lower) & np.isfinite(upper)
+        angles = np.where(bounded, (1 - share) * np.where(bounded, lower, 0) + share * np.where(bounded, upper, 0), angles)
+    return place_root(problem, frames, np.tile(angles, (len(frames), 1)))
+
+
+def place_root(problem: MarkerProblem, frames: Index, angles: Array) -> Array:
+    """Return q (F, nq) with the ``angles`` (F, n) rad and the root's pose that fits the body, rigid at them, best to its markers: the root
+    segment's before all others.
+    """
+    body, xyz = problem.body, problem.xyz[frames]
+    if not body.n_root:
+        return angles
+    model = _markers(body, problem, angles)
+    own = np.where(problem.chain.slot == 0, 1.0, OTHERS) * problem.weight[frames]
+    weight = (own / own.sum(axis=1, keepdims=True))[:, :, None]
+    middle, seen = (weight * model).sum(axis=1), (weight * xyz).sum(axis=1)
+    cross = np.swapaxes(weight * (model - middle[:, None]), 1, 2) @ (xyz - seen[:, None])
+    left, _, right = np.linalg.svd(np.swapaxes(cross, 1, 2))
+    left[:, :, 2] *= np.linalg.det(left @ right)[:, None]
+    rotation = left @ right
+    place = seen - np.einsum("fij,fj->fi", rotation, middle)
+    return np.concatenate([place, Rotation.from_matrix(rotation).as_quat(), angles], axis=1)
+
+
+def _markers(body: Body, problem: MarkerProblem, angles: Array) -> Array:
+    """Return the markers (F, K, 3) m of the body with its root at the origin, unturned."""
+    root = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (len(angles), 1))
+    pose = poses(body, np.concatenate([root, angles], axis=1))
+    return pose.points(problem.segment, problem.chain.local)
+
+
+STRIDES = (64, 16, 4, 1)
+"""Every 64th frame is solved from its own markers; then every 16th, 4th and each frame from those around it."""
+
+SHARES = (0.5, None)
+"""First guesses of the angles, as shares of their range (None: zero): a bent body finds straight limbs more often than the reverse."""
+
+MORE_SHARES = (0.25, 0.75)
+"""Further guesses for doubtful frames, and for all first frames of a short trial."""
+
+SHORT = 640
+"""Frames below which a trial is short: it has too few neighbours to correct a frame that started wrongly."""
+
+NEIGHBOURS = 11
+"""Frames whose median fit a frame is compared with."""
+
+DOUBT = (1.5, 0.001)
+"""A frame is doubtful where its RMS distance exceeds the neighbours' median times the first number plus the second (m)."""
+
+
+def search(problem: MarkerProblem, frames: Index) -> Minimum:
+    """Return the minima (F frames) of ``frames`` (F,), increasing, without any guess."""
+    count = len(frames)
+    out = Minimum(np.zeros((count, problem.chart.nq)), np.zeros(count), np.full(count, np.inf), np.zeros(count, dtype=np.intp))
+    known = np.zeros(0, dtype=np.intp)
+    for stride in STRIDES:
+        level = np.setdiff1d(np.append(np.arange(0, count, stride), count - 1), known, assume_unique=True)
+        if not known.size:
+            found = from_markers(problem, frames[level], SHARES if count > SHORT else (*SHARES, *MORE_SHARES))
+        elif level.size:
+            found = minimise_markers(problem, frames[level], interpolate_postures(problem, frames[known], out.q[known], frames[level]))
+        else:
+            continue
+        out.put(level, found)
+        known = np.union1d(known, level)
+        if stride in (STRIDES[0], STRIDES[-1]):
+            out.put(known, retry(problem, frames[known], out.part(known)))
+    return out
+
+
+def from_markers(problem: MarkerProblem, frames: Index, shares: tuple[float | None, ...]) -> Minimum:
+    """Return the best of the minima reached from the first guesses at the given ``shares`` of the joint ranges."""
+    return reduce(better, [minimise_markers(problem, frames, guess_postures(problem, frames, share=share)) for share in shares])
+
+
+def from_guess(problem: MarkerProblem, frames: Index, guess: Array) -> Minimum:
+    """Return the minima reached from the postures ``guess`` (F, nq), each root first put where the markers say if that is nearer."""
+    moved = place_root(problem, frames, guess[:, guess.shape[1] - len(problem.chain.lower) :])
+    own, other = (minimise_markers(problem, frames, q, steps=0) for q in (guess, moved))
+    return retry(problem, frames, minimise_markers(problem, frames, better(own, other).q))
+
+
+def retry(problem: MarkerProblem, frames: Index, found: Minimum) -> Minimum:
+    """Return ``found`` with the doubtful frames tried again: from their markers, and from the nearest sound frames on both sides."""
+    rms = np.sqrt(np.maximum(2 * found.cost, 0.0) / problem.weight[frames].sum(axis=1))
+    doubtful = rms > DOUBT[0] * median_filter(rms, min(NEIGHBOURS, len(rms)), mode="mirror") + DOUBT[1]
+    sound, bad = np.flatnonzero(~doubtful), np.flatnonzero(doubtful)
+    if not (bad.size and sound.size):
+        return found
+    best = better(found.part(bad), from_markers(problem, frames[bad], (*SHARES, *MORE_SHARES)))
+    after = np.searchsorted(sound, bad)
+    for neighbour in (sound[np.maximum(after - 1, 0)], sound[np.minimum(after, len(sound) - 1)]):
+        best = better(best, minimise_markers(problem, frames[bad], found.q[neighbour]))
+    out = found.part(np.arange(len(frames)))
+    out.put(bad, best)
+    return out
+
+
+def interpolate_postures(problem: MarkerProblem, known: Index, q: Array, wanted: Index) -> Array:
+    """Return postures (F, nq) at the frames ``wanted`` (F,) between the postures ``q`` (M, nq) at the frames ``known`` (M,), increasing.
+
+    Monotone cubics in smooth coordinates; the first and the last posture are kept outside.
+    """
+    out = np.empty((len(wanted), q.shape[1]))
+    if wanted.size:
+        smooth = np.ascontiguousarray(problem.chart.smooth(q.T).stacked().T)
+        interpolate(problem.chain, known, smooth, q, problem.chart.single, wanted, out)
+    return out

@@ -1,0 +1,1 @@
+"""JSON documents: keys whose unit is their suffix."""

@@ -1,0 +1,90 @@
+"""What the diagnosis found, under keys whose unit is their suffix or stands beside them; channels in the order Fx Fy Fz Mx My Mz."""
+
+from typing import Any
+
+import numpy as np
+
+from biodance.diagnosis.diagnosis import Alias, Finding, Gain, Unobservable
+from biodance.diagnosis.foresight import Foresight
+from biodance.identification.identification import Identification
+from biodance.pipeline.diagnosis import SessionDiagnosis
+
+
+def _alias(one: Alias) -> dict[str, Any]:
+    return {"effect": one.effect, "target": one.target, "log_bayes_factor": one.log_bayes_factor}
+
+
+def _gain(found: Gain | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    return {
+        "rms_before": found.rms_before,
+        "rms_after": found.rms_after,
+        "ci95": found.ci95,
+        "trials": found.trials,
+        "log_density_per_s": found.score,
+        "log_density_se": found.score_se,
+    }
+
+
+def _finding(one: Finding) -> dict[str, Any]:
+    return {
+        "effect": one.effect,
+        "target": one.target,
+        "parameters": {p.name: {"value": p.value, "sd": p.sd, "unit": p.unit, "ci95": p.interval} for p in one.parameters},
+        "set": [_alias(a) for a in one.set],
+        "visible_fraction": one.visible_fraction,
+        "gain": _gain(one.gain),
+        "changes": one.changes,
+        "advice": one.advice,
+    }
+
+
+def _limit(row: Unobservable) -> dict[str, Any]:
+    return {
+        "effect": row.effect,
+        "target": row.target,
+        "limit": row.limit,
+        "unit": row.unit,
+        "told_from": row.told_from,
+        "typical": row.typical,
+    }
+
+
+def foresight_document(found: Foresight) -> dict[str, Any]:
+    """Return what a movement will be able to see; ``separation`` the smallest expected log Bayes factor between two causes it sees."""
+    pairs = [
+        {"cause": " ".join(p.cause).strip(), "other": " ".join(p.other).strip(), "log_bayes_factor": p.difference} for p in found.confusions
+    ]
+    return {
+        "limits": [_limit(row) for row in found.limits],
+        "unobservable": [_limit(row) for row in found.hidden],
+        "confusions": pairs,
+        "separation": found.separation,
+    }
+
+
+def _masses(found: Identification | None) -> list[dict[str, Any]] | None:
+    if found is None or found.status == "failed":
+        return None
+    sd = np.sqrt(np.diag(found.sip.covariance)[::10])
+    return [{"name": n, "mass_kg": m, "mass_sd_kg": s} for n, m, s in zip(found.sip.segments, found.sip.mass, sd, strict=True)]
+
+
+def diagnosis_document(found: SessionDiagnosis) -> dict[str, Any]:
+    """Return all that the diagnosis found; null where a number is not finite (a limit of null: never seen)."""
+    one = found.diagnosis
+    return {
+        "verdict": one.verdict,
+        "findings": [_finding(finding) for finding in one.findings],
+        "gates": [
+            {"check": g.check, "ok": g.ok, "text": g.text, "effect": g.effect, "target": g.target, "size": g.size} for g in one.gates
+        ],
+        "adequacy": [{"channel": a.channel, "band_hz": a.band_hz, "z": a.z, "trial": a.trial, "around_s": a.second} for a in one.adequacy],
+        "unobservable": [_limit(row) for row in one.unobservable],
+        "limits": [_limit(row) for row in one.limits],
+        "candidates": [_alias(a) for a in one.candidates],
+        "masses": {"before": _masses(found.before), "accepted": _masses(found.accepted)},
+        "failures": found.failures,
+        "notes": one.notes,
+    }

@@ -1,0 +1,170 @@
+"""What identification found, under keys whose unit is their suffix; channels in the order Fx Fy Fz Mx My Mz."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from biodance.identification.added_mass import LoadSearch
+from biodance.identification.identification import Identification
+from biodance.identification.knowledge import Known
+from biodance.identification.sessions import Difference
+from biodance.identification.torques import TorqueBands
+from biodance.identification.validation import ResidualRatio, TrialValidation
+from biodance.motion.comparison import Agreement
+from biodance.pipeline.identification import SessionIdentification
+
+TENSOR = ("xx", "xy", "yy", "xz", "yz", "zz")
+ASKED = ("mass", "com x", "com y", "com z")
+"""Quantities whose shares from the data are averaged into a segment's ``information``."""
+
+
+def agreement(found: Agreement) -> dict[str, Any]:
+    """Return RMS and correlation of six channels; null where a correlation is not defined."""
+    return {"rms": found.rms, "cc": found.correlation, "frames": found.frames}
+
+
+def segment_rows(found: Identification, name: str) -> tuple[Known, ...]:
+    """Return the ten quantities of one segment in order."""
+    return tuple(known for known in found.known if known.segment == name)
+
+
+def information_share(rows: Sequence[Known]) -> float:
+    """Return the share of a segment's mass and centre of mass that comes from the data, 0 to 1."""
+    return float(np.mean([row.from_data for row in rows if row.quantity in ASKED]))
+
+
+def _segment(found: Identification, name: str) -> dict[str, Any]:
+    rows = segment_rows(found, name)
+    mass, com, inertia = rows[0], rows[1:4], rows[4:]
+    return {
+        "name": name,
+        "mass_kg": mass.value,
+        "mass_sd_kg": mass.sd,
+        "mass_prior_kg": mass.table,
+        "mass_prior_sd_kg": mass.table_sd,
+        "com_m": [row.value for row in com],
+        "com_sd_m": [row.sd for row in com],
+        "com_prior_m": [row.table for row in com],
+        "inertia_kgm2": [row.value for row in inertia],
+        "inertia_sd_kgm2": [row.sd for row in inertia],
+        "inertia_prior_kgm2": [row.table for row in inertia],
+        "information": information_share(rows),
+        "from_data": {row.quantity: row.from_data for row in rows},
+        "verdict": {row.quantity: row.verdict for row in rows},
+    }
+
+
+def _validation(trial: TrialValidation) -> dict[str, Any]:
+    return {
+        "trial": trial.name,
+        "about_m": trial.about,
+        "table": agreement(trial.table_agreement),
+        "identified": agreement(trial.identified_agreement),
+    }
+
+
+def _gain(found: ResidualRatio | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    return {"force": found.force, "force_ci95": found.force_interval, "moment": found.moment, "moment_ci95": found.moment_interval}
+
+
+def added_mass_document(search: LoadSearch) -> dict[str, Any] | None:
+    """Return the load that is announced; None where none is."""
+    if not search.found:
+        return None
+    best = search.best
+    return {
+        "segment": best.segment,
+        "kg": best.mass,
+        "sd_kg": best.sd,
+        "ci95_kg": best.interval,
+        "place_m": best.place,
+        "place_sd_m": best.place_sd,
+        "p_none": search.p_no_load,
+        "smallest_detectable_kg": best.smallest,
+        "reference": search.reference,
+        "set": search.set,
+    }
+
+
+def _search(search: LoadSearch) -> dict[str, Any]:
+    rows = [
+        {
+            "segment": suspect.segment,
+            "kg": suspect.mass,
+            "sd_kg": suspect.sd,
+            "probability": suspect.probability,
+            "log_bayes_factor": suspect.log_bayes_factor,
+            "smallest_detectable_kg": suspect.smallest,
+        }
+        for suspect in search.suspects
+    ]
+    return {"reference": search.reference, "p_none": search.p_no_load, "announced": search.found, "segments": rows}
+
+
+def _difference(row: Difference) -> dict[str, Any]:
+    return {
+        "segment": row.segment,
+        "quantity": row.quantity,
+        "unit": row.unit,
+        "later_minus_earlier": row.value,
+        "sd": row.sd,
+        "ci95": row.interval,
+        "p": row.p,
+        "known": row.known,
+    }
+
+
+def torques_document(bands: TorqueBands | None) -> dict[str, Any] | None:
+    """Return every joint's largest torque with its interval, over the fully measured frames; None where the feet's wrenches are unknown."""
+    if bands is None:
+        return None
+    rows = []
+    for j, name in enumerate(bands.joints):
+        torque, half, table = (column[bands.use, j] for column in (bands.torque, bands.half_width, bands.table))
+        peak = int(np.argmax(np.abs(torque)))
+        rows.append(
+            {
+                "joint": name,
+                "peak_time_s": bands.time[bands.use][peak],
+                "peak_Nm": torque[peak],
+                "peak_ci95_Nm": (torque[peak] - half[peak], torque[peak] + half[peak]),
+                "peak_table_Nm": table[peak],
+                "sd_rms_Nm": np.sqrt(np.mean(bands.sd[bands.use, j] ** 2)),
+                "change_rms_Nm": np.sqrt(np.mean((torque - table) ** 2)),
+            }
+        )
+    return {"trial": bands.trial, "joints": rows}
+
+
+def identification_document(found: SessionIdentification) -> dict[str, Any]:
+    """Return all that identification found.
+
+    CoM in the segment's axes from its proximal joint centre; inertia about the CoM, order xx xy yy xz yz zz; validation moments about
+    ``about_m``, the mean centre of pressure. ``added_mass`` null: no load is announced; ``added_mass_search`` says what was looked for;
+    ``joint_torques`` of one trial with what the
+    parameters leave uncertain (not this trial's own skin and plates); ``differences`` to the reference session, empty without one.
+    ``failures`` what could not be computed, with cause and cure; after a failed fit (``status``) there are no segments.
+    """
+    one = found.identification
+    return {
+        "status": one.status,
+        "cause": one.cause,
+        "failures": found.failures,
+        "trials": one.trials,
+        "frames": one.frames,
+        "segments": [_segment(one, name) for name in one.sip.segments] if one.status == "solved" else [],
+        "inertia_order": TENSOR,
+        "base_parameters": {"count": one.base.base.count, "well_known": len(one.base.well_known), "rank": one.base.rank},
+        "disturbances": {"kinematics": one.sizes.kinematics, "noise_variance": one.sizes.noise},
+        "validation": [_validation(trial) for trial in found.validations],
+        "fitted": [_validation(trial) for trial in found.fitted],
+        "gain": _gain(found.gain),
+        "added_mass": added_mass_document(found.search),
+        "added_mass_search": _search(found.search),
+        "joint_torques": torques_document(found.torques),
+        "differences": [_difference(row) for row in found.changes],
+        "notes": found.notes,
+    }

@@ -1,0 +1,128 @@
+"""results.json: what the pipeline found, under keys whose unit is their suffix. NaN becomes null."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from biodance.motion.comparison import Agreement
+from biodance.pipeline.provenance import Provenance
+from biodance.pipeline.results import QuietStanding, SessionResult, TrialResult, WrenchComparison
+from biodance.records import CHANNELS, Plate
+from biodance.report.documents.identification import added_mass_document, agreement, identification_document
+
+
+def plain_values(value: object) -> Any:
+    """Return ``value`` made of dict, list, str, int, float, bool and None only; a number that is not finite becomes None."""
+    if isinstance(value, Mapping):
+        return {str(key): plain_values(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain_values(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain_values(item) for item in value]
+    if isinstance(value, np.generic):
+        return plain_values(value.item())
+    if isinstance(value, float):
+        return value if np.isfinite(value) else None
+    return value if value is None or isinstance(value, str | int | bool) else str(value)
+
+
+def to_text(document: object) -> str:
+    """Return one JSON document as text (indented, keys in their order, newline at the end)."""
+    return json.dumps(plain_values(document), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _plate(plate: Plate) -> dict[str, Any]:
+    return {"name": plate.name, "type": plate.type, "corners_m": plate.corners, "decisions": plate.decisions}
+
+
+def _wrench(comparison: WrenchComparison, identified: Agreement | None) -> dict[str, Any]:
+    return {
+        "channels": CHANNELS,
+        "frames_used": int(comparison.used.sum()),
+        "frames": comparison.used.size,
+        "table": {"rms": comparison.rms, "cc": comparison.correlation},
+        "identified": None if identified is None else agreement(identified),
+        "notes": comparison.notes,
+    }
+
+
+def _standing(standing: QuietStanding) -> dict[str, Any]:
+    return {
+        "trial": standing.trial,
+        "start_s": standing.start,
+        "end_s": standing.end,
+        "mass_kg": standing.mass,
+        "mass_sd_kg": standing.mass_sd,
+        "com_ahead_of_cop_m": standing.com_ahead,
+        "com_left_of_cop_m": standing.com_left,
+    }
+
+
+def _trial(result: TrialResult, identified: Agreement | None) -> dict[str, Any]:
+    trial, fit = result.trial, result.fit
+    return {
+        "name": trial.name,
+        "role": trial.role,
+        "status": result.status,
+        "reason": result.reason,
+        "file": trial.source.path.name,
+        "marker_set": trial.marker_set,
+        "frames": 0 if trial.markers is None else trial.markers.time.size,
+        "rate_hz": None if trial.markers is None else trial.markers.rate,
+        "gaps_percent": result.gaps_percent,
+        "gaps": [{"marker": g.label, "percent": g.percent, "longest_s": g.longest} for g in result.gaps if g.percent > 0],
+        "marker_rms_m": None if fit is None else fit.total_rms,
+        "marker_max_m": None if fit is None else fit.total_max,
+        "markers": []
+        if fit is None
+        else [{"name": n, "rms_m": r, "max_m": m} for n, r, m in zip(fit.names, fit.rms, fit.max, strict=True)],
+        "wrench": None if result.comparison is None else _wrench(result.comparison, identified),
+        "standing": None if result.standing is None else _standing(result.standing),
+        "plates": [_plate(plate) for plate in trial.plates],
+        "steps": [{"step": s.name, "status": s.status, "reason": s.text} for s in result.steps],
+        "history": trial.history,
+        "warnings": trial.warnings,
+    }
+
+
+def _mass_check(result: SessionResult) -> dict[str, Any]:
+    standing = result.standing
+    return {
+        "trial": standing.trial if standing else None,
+        "mass_on_plates_kg": standing.mass if standing else None,
+        "mass_on_plates_sd_kg": standing.mass_sd if standing else None,
+        "declared_mass_kg": result.declared_mass,
+        "difference_percent": result.mass_difference,
+    }
+
+
+def results_document(result: SessionResult, provenance: Provenance) -> dict[str, Any]:
+    """Return all of ``result`` as one JSON document; null where a step was refused or does not exist in this version."""
+    subject, found = result.subject, result.identification
+    return {
+        "session": result.session.folder.name,
+        "subject": {
+            "name": subject.name,
+            "mass_kg": subject.mass,
+            "height_m": subject.stature,
+            "sex": subject.sex,
+            "age": subject.age,
+            "guessed": subject.guessed,
+        },
+        "trials": [_trial(trial, found.agreements.get(trial.trial.name) if found else None) for trial in result.trials],
+        "refused": dict(result.session.refused),
+        "notes": result.session.notes,
+        "body": {"source": result.body_source, "notes": result.body.notes if result.body else ()},
+        "steps": [{"step": s.name, "status": s.status, "reason": s.text} for s in result.steps],
+        "checks": [
+            {"what": c.what, "where": c.where, "value": c.value, "limit": c.limit, "inside": c.inside, "advice": c.advice}
+            for c in result.all_checks
+        ],
+        "mass_check": _mass_check(result),
+        "identification": None if found is None else identification_document(found),
+        "added_mass": None if found is None else added_mass_document(found.search),
+        "diagnosis": None,
+        "provenance": provenance.as_dict(),
+    }

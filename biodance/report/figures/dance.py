@@ -1,0 +1,150 @@
+"""Figures of a dance: postures as stick figures (paper Fig. 3), criterion by transition (Fig. 5), ZMP (Fig. 6), expected accuracy."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.display import BLACK, BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY
+from biodance.motion.kinematics import poses
+from biodance.records import Array
+from biodance.report.figures.style import FIGURE_WIDTH, SIDE_COLOURS, figure, look
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from biodance.dance.expectation import Expectation
+    from biodance.dance.metrics import ZmpPath
+
+COLUMNS = 10
+VIEW = np.array([[0.80, -0.60, 0.0], [0.18, 0.24, 0.95]])
+"""(2, 3) oblique view from the front, right: lab x, y, z to the page's right and up."""
+
+
+def stick_lines(body: Body, q: Array) -> tuple[Array, tuple[str, ...]]:
+    """Return the line of each bone (P, B, 2, 3) m in postures ``q`` (P, nq), and its side ("right", "left", "middle")."""
+    pose = poses(body, q)
+    lines, sides = [], []
+    carrier = body.segment_joint
+    for i, name in enumerate(body.segments):
+        joint = carrier[i]
+        children = [k for k, other in enumerate(body.segments) if k != i and _parent(body, k) == i]
+        ends = [pose.position[:, k] for k in children] or [_tip(body, pose.rotation[:, i], pose.position[:, i], i)]
+        if joint >= 0 and children and name.startswith("trunk"):
+            ends.append(_tip(body, pose.rotation[:, i], pose.position[:, i], i))
+        for end in ends:
+            lines.append(np.stack([pose.position[:, i], end], axis=1))
+            sides.append(next((side for side in ("right", "left") if name.startswith(side)), "middle"))
+    return np.stack(lines, axis=1), tuple(sides)
+
+
+def _parent(body: Body, segment: int) -> int:
+    """Return the segment that carries this one, -1 for the root's."""
+    joint = body.segment_joint[segment]
+    while joint >= 0:
+        joint = body.joints[joint].parent
+        if joint < 0:
+            return 0
+        if body.joints[joint].segment >= 0:
+            return body.joints[joint].segment
+    return -1
+
+
+def _tip(body: Body, rotation: Array, position: Array, segment: int) -> Array:
+    """Return the far end (P, 3) of a segment without children: along its box from the joint, toes for a foot, crown for the trunk."""
+    low, high = body.boxes[segment]
+    reach = np.where(np.abs(high) > np.abs(low), high, low)
+    axis = int(np.argmax(np.abs(reach[:2])))
+    local = np.zeros(3)
+    local[axis] = reach[axis]
+    return np.asarray(rotation @ local + position)
+
+
+def postures_figure(body: Body, q: Array, titles: tuple[str, ...]) -> "Figure":
+    """Draw the postures ``q`` (P, nq) in rows of ten, each with its title, all to one scale; right is blue, left red and dashed."""
+    lines, sides = stick_lines(body, q)
+    flat = lines @ VIEW.T
+    flat = flat - np.stack([flat[..., 0].mean(axis=(1, 2)), np.zeros(len(flat))], axis=1)[:, None, None]
+    low, high = flat.min(axis=(0, 1, 2)), flat.max(axis=(0, 1, 2))
+    rows = -(-len(q) // COLUMNS)
+    with look():
+        drawn = figure(rows * FIGURE_WIDTH / COLUMNS * 1.15 * max(1.0, (high[1] - low[1]) / (high[0] - low[0])))
+        panels = drawn.subplots(rows, COLUMNS, squeeze=False).ravel()
+        for panel in panels:
+            panel.set_axis_off()
+        for panel, posture, title in zip(panels, flat, titles, strict=False):
+            for line, side in zip(posture, sides, strict=True):
+                colour, style = SIDE_COLOURS[side]
+                panel.plot(*line.T, color=colour, linestyle=style, linewidth=1.3, solid_capstyle="round")
+            panel.set(xlim=(low[0] - 0.05, high[0] + 0.05), ylim=(low[1] - 0.05, high[1] + 0.05), aspect="equal")
+            panel.set_title(title, fontsize=6, pad=1)
+    return drawn
+
+
+def criterion_figure(values: Array, bound: float, *, what: str = "sum of M cond(W_bi), kg") -> "Figure":
+    """Draw the criterion (K,) after each transition, above the smallest value that it can have."""
+    from matplotlib.ticker import MaxNLocator
+
+    with look():
+        drawn = figure(2.6)
+        axes = drawn.subplots()
+        axes.semilogy(np.arange(1, len(values) + 1), values, color=BLUE, marker="o", markersize=3, label="after the transition")
+        axes.axhline(bound, color=GREEN, linestyle="--", label=f"bound {bound:.3g}")
+        axes.set(xlabel="transition", ylabel=what)
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        axes.legend()
+    return drawn
+
+
+def zmp_figure(paths: "Sequence[ZmpPath]") -> "Figure":
+    """Draw the zero-moment point of every move, below on the straight way between the postures, above in the dance; a column a stance."""
+    names = list(dict.fromkeys(path.stance.name for path in paths))
+    with look():
+        drawn = figure(4.0)
+        panels = drawn.subplots(2, len(names), sharex=True, sharey=True, squeeze=False)
+        for column, name in enumerate(names):
+            mine = [path for path in paths if path.stance.name == name]
+            feet = mine[0].stance
+            usable = feet.centre + feet.share * (feet.support - feet.centre)
+            for axes, colour, what in zip(panels[:, column], (BLUE, ORANGE), ("designed", "straight"), strict=True):
+                _outline(axes, feet.support, BLACK, "-", "base of support")
+                _outline(axes, usable, GREY, "--", "part that may be used")
+                for k, path in enumerate(mine):
+                    label = f"zero-moment point, {what} way" if k == 0 else None
+                    axes.plot(*getattr(path, what).T, color=colour, linewidth=0.7, label=label)
+                axes.set_aspect("equal")
+            panels[0, column].set_title(name.replace("_", " "))
+            panels[1, column].set_xlabel("lab x, m")
+        low, high = (edge(np.concatenate([path.stance.support for path in paths]), axis=0) for edge in (np.min, np.max))
+        panels[0, 0].set(xlim=(low[0] - 0.1, high[0] + 0.1), ylim=(low[1] - 0.1, high[1] + 0.1))
+        for axes in panels[:, 0]:
+            axes.set_ylabel("lab y, m")
+        handles = {label: handle for axes in panels[:, 0] for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+        drawn.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=2)
+    return drawn
+
+
+def expectation_figure(expectation: "Expectation") -> "Figure":
+    """Draw the standard deviations of mass and centre of mass that are expected after each duration, as shares of the table's."""
+    kinds = [name.removeprefix("right_") for name in expectation.segments if not name.startswith("left_")]
+    colours = (BLACK, ORANGE, SKY, GREEN, BLUE, RED, PINK, GREY)
+    with look():
+        drawn = figure(2.9)
+        left, right = drawn.subplots(1, 2, sharex=True, sharey=True)
+        for axes, values, title in ((left, expectation.mass, "mass"), (right, expectation.com, "centre of mass")):
+            for number, kind in enumerate(kinds):
+                mine = [i for i, name in enumerate(expectation.segments) if name.removeprefix("right_").removeprefix("left_") == kind]
+                share = 100 * (values[:, mine] / values[0, mine]).mean(axis=1)
+                style = ("-", "--", ":")[number // len(colours) % 3]
+                axes.plot(expectation.duration, share, style, color=colours[number % len(colours)], label=kind.replace("_", " "))
+            axes.set(title=title, xlabel="duration of the dance, s", ylim=(0, 105))
+        left.set_ylabel("expected sd, % of the table's")
+        drawn.legend(*right.get_legend_handles_labels(), loc="outside lower center", ncols=min(len(kinds), 4))
+    return drawn
+
+
+def _outline(axes: "Axes", corners: Array, colour: str, style: str, label: str) -> None:
+    axes.plot(*np.vstack([corners, corners[:1]]).T, color=colour, linestyle=style, linewidth=0.9, label=label)

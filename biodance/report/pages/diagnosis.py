@@ -1,0 +1,147 @@
+"""The page of a diagnosis for the analyst: what is wrong, how we know, how big, how sure, what else, what to do, what changes."""
+
+import sys
+from dataclasses import dataclass
+from importlib.resources import files
+
+from biodance.diagnosis.diagnosis import Diagnosis, Estimate
+from biodance.effects import discrete_effects, effects
+from biodance.pipeline.diagnosis import SessionDiagnosis
+from biodance.pipeline.provenance import Provenance
+from biodance.pipeline.results import SessionResult
+from biodance.records import CHANNELS
+from biodance.report.figures.diagnosis import adequacy_figure, left_figure, limits_figure
+from biodance.report.figures.style import svg_address
+from biodance.report.wording import format_number
+
+SHOWN = {"m": (1000.0, "mm", 0), "rad": (57.29578, "°", 1), "s": (1000.0, "ms", 1), "1": (100.0, "%", 1)}
+"""Unit of a parameter: factor, unit and digits that are shown."""
+
+
+@dataclass(frozen=True)
+class Words:
+    """What a cause is, its signature, its look-alikes and what separates them, each a few sentences."""
+
+    what: str
+    signature: str
+    alike: str
+    separated: str
+
+
+def words_of(effect: str) -> Words:
+    """Return the words of an effect; empty ones for a cause that has no file (any more)."""
+    kind = {**effects(), **discrete_effects()}.get(effect)
+    text = " ".join(((sys.modules[kind.__module__].__doc__ if kind else "") or "").split())
+    what, _, rest = text.partition("Signature:")
+    signature, _, rest = rest.partition("Look-alikes:")
+    alike, _, separated = rest.partition("Separated by")
+    return Words(what.strip(), first_upper(signature.strip()), first_upper(alike.strip()), first_upper(separated.strip()))
+
+
+def first_upper(text: str) -> str:
+    """Return ``text`` with a capital first letter and nothing else changed."""
+    return text[:1].upper() + text[1:]
+
+
+def named(effect: str, target: str) -> str:
+    """Return a cause with its place as words: ``added mass, left forearm hand``."""
+    plain = effect.replace("_", " ")
+    return f"{plain}, {target.replace('_', ' ').replace('->', ' into ')}" if target else plain
+
+
+def sized(value: float, unit: str) -> str:
+    """Return a number with its unit as a person says it: 0.02 m is 20 mm."""
+    factor, name, digits = SHOWN.get(unit, (1.0, unit, 2))
+    if value == float("inf"):
+        return "no size"
+    return f"{format_number(factor * value, digits)} {name}".strip()
+
+
+def estimated(one: Estimate) -> str:
+    """Return a parameter with its 95 % interval."""
+    if one.sd != one.sd:
+        return sized(one.value, one.unit)
+    low, high = one.interval
+    return f"{sized(one.value, one.unit)} (95 % interval {sized(low, one.unit)} to {sized(high, one.unit)})"
+
+
+CERTAIN = 14.0
+"""Natural logarithm of a million: above it odds are no longer printed."""
+
+
+def answer(one: Diagnosis) -> str:
+    """Return the verdict as one or two plain sentences."""
+    what = " and ".join(named(finding.effect, finding.target) for finding in one.findings)
+    worst = one.adequacy[0] if one.adequacy else None
+    where = ""
+    if worst:
+        low, high = worst.band_hz
+        where = f"{worst.channel}, movement of {low:g} to {high:g} Hz, most in trial {worst.trial} around {worst.second:.1f} s"
+    return {
+        "nothing wrong": "Nothing wrong was found: what the simulation misses is what it misses in any session without a fault. "
+        "Faults below the sizes at the end of this page would not have been seen.",
+        "named, complete": f"Found: {what}. With it accepted, what is left is no more than in any session without a fault.",
+        "named, incomplete": f"Found: {what}. Something more is wrong that no known cause explains" + (f" ({where})." if where else "."),
+        "unexplained": f"Something is wrong that no known cause explains. It shows most in {where}."
+        + (f" Part of it looks like {what}, which is not enough." if what else ""),
+    }[one.verdict]
+
+
+def odds(log_bayes_factor: float) -> str:
+    """Return evidence against "nothing wrong" as odds in words."""
+    if log_bayes_factor != log_bayes_factor or log_bayes_factor == float("inf"):
+        return "a check of the recording shows it"
+    if log_bayes_factor > CERTAIN:
+        return "more than a million times as probable as nothing wrong"
+    return f"{format_number(2.718281828**log_bayes_factor, 0)} times as probable as nothing wrong"
+
+
+def diagnosis_section(found: SessionDiagnosis) -> str:
+    """Return the section of the session's report on what the simulation gets wrong, as HTML text."""
+    from markupsafe import Markup
+
+    one = found.diagnosis
+    failures = Markup("").join(
+        Markup("<p class='look'><strong>Not solved, {}:</strong> {}</p>").format(what, cause) for what, cause in found.failures.items()
+    )
+    rows = Markup("").join(
+        Markup("<tr><th scope='row'>{}</th><td>{}</td><td>{}</td></tr>").format(
+            named(f.effect, f.target), "; ".join(f"{p.name.replace('_', ' ')} {estimated(p)}" for p in f.parameters), f.advice
+        )
+        for f in one.findings
+    )
+    table = Markup("<table><tbody>{}</tbody></table>").format(rows) if one.findings else Markup("")
+    return Markup(
+        "<section><h2>What the simulation gets wrong</h2><p class='look'><strong>{}</strong></p>{}{}"
+        "<p class='small'>biodance diagnose says how we know, what else it could be and what accepting it changes.</p></section>"
+    ).format(answer(one), failures, table)
+
+
+def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: Provenance) -> str:
+    """Return the page as HTML text; the same arguments give the same characters."""
+    from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
+
+    one = found.diagnosis
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters.update(number=format_number, sized=sized, estimated=estimated, odds=odds, first_upper=first_upper)
+    environment.globals.update(named=named, words_of=words_of)
+    folder = files("biodance.report") / "templates"
+    masses = []
+    if found.before and found.accepted:
+        then, now = (dict(zip(one.sip.segments, one.sip.mass.tolist(), strict=True)) for one in (found.before, found.accepted))
+        masses = [(name.replace("_", " "), then.get(name, float("nan")), mass) for name, mass in now.items()]
+    return environment.from_string((folder / "diagnosis.html.j2").read_text(encoding="utf-8")).render(
+        style=Markup((folder / "page.css").read_text(encoding="utf-8")),
+        result=result,
+        one=one,
+        answer=answer(one),
+        failures={**result.failures, **found.failures},
+        provenance=provenance,
+        channels=list(zip(CHANNELS, ("N",) * 3 + ("N·m",) * 3, strict=True)),
+        masses=masses,
+        left=svg_address(left_figure(found.left)) if found.left else "",
+        adequacy=svg_address(adequacy_figure(one.adequacy)) if one.adequacy else "",
+        limits=svg_address(limits_figure(one.limits)) if one.limits else "",
+        gain=one.findings[0].gain if one.findings else None,
+    )

@@ -1,0 +1,153 @@
+"""The groups of settings, and the numbers that are no choice."""
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from biodance.settings.group import Group, number_field, word_field
+
+STANDARD_GRAVITY = 9.80665
+"""m/s² (CGPM 1901); 1 kilogram-force is so many newtons."""
+COP_FORCE = 20.0
+"""N: with less vertical force on a plate its centre of pressure has no meaning."""
+TOUCH_FORCE = 30.0
+"""N: a plate that carries less over 0.1 s is only trembling; its readings decide nothing about its sign or zero."""
+
+Hip: TypeAlias = Literal["harrington", "davis"]
+FilterKind: TypeAlias = Literal["butterworth", "critically_damped"]
+
+
+@dataclass(frozen=True)
+class FilterSettings(Group):
+    """The low-pass of joint coordinates and forces, forwards and backwards (no delay).
+
+    Parameters
+    ----------
+    kind : {"butterworth", "critically_damped"}
+        The critically damped filter does not overshoot (Robertson & Dowling 2003, doi:10.1016/S1050-6411(03)00080-4).
+    order : int
+        Order of one of the two passes.
+    cutoff : float
+        Hz at which both passes together are 3 dB down.
+    force_cutoff : float or "same"
+        Hz for the forces; "same" as the joint coordinates, or the difference of the two appears in the residual.
+    """
+
+    name = "filter"
+    kind: FilterKind = word_field("butterworth", ("butterworth", "critically_damped"), "low-pass of joint coordinates and forces")
+    order: int = number_field(5, 1, 10, "", "order of one of its two passes")
+    cutoff: float = number_field(10.0, 1.0, 100.0, "Hz", "frequency at which both passes together are 3 dB down")
+    force_cutoff: float | Literal["same"] = number_field(0.0, 1.0, 500.0, "Hz", "the same for the forces of the plates", word="same")
+
+
+@dataclass(frozen=True)
+class GapSettings(Group):
+    """Markers that were not seen for a while.
+
+    Parameters
+    ----------
+    bridged : float
+        s: a gap up to this long is bridged by a spline; a longer one only where its segment's other markers tell.
+    often : float
+        % of the frames from which on an unseen marker is a warning.
+    """
+
+    name = "gaps"
+    bridged: float = number_field(0.2, 0.0, 2.0, "s", "longest gap of a marker that a spline bridges")
+    often: float = number_field(10.0, 0.0, 100.0, "%", "share of frames from which on an unseen marker is warned of")
+
+
+@dataclass(frozen=True)
+class ContactRules(Group):
+    """When a foot may touch the ground, and when a plate is loaded.
+
+    Parameters
+    ----------
+    height : float
+        m: a point of the sole lower than this over a surface may touch it.
+    speed : float
+        m/s: ... where it is also slower than this.
+    around : float
+        s before and after that in which it may touch, too.
+    still : float
+        m/s: a foot rests where all points of its sole are slower ...
+    lasting : float
+        s: ... for this long.
+    force : float
+        N: a plate that carries less is not loaded.
+    loaded : float
+        Share of the trial's largest vertical force from which a plate is loaded.
+    pressed : float
+        The same, from which its centre of pressure is held against the soles on it.
+    outside : float
+        m: a median distance of the centre of pressure from the soles larger than this is said.
+    """
+
+    name = "contact"
+    height: float = number_field(0.04, 0.005, 0.2, "m", "a point of the sole lower than this over a surface may touch it ...")
+    speed: float = number_field(0.8, 0.05, 3.0, "m/s", "... where it is also slower than this")
+    around: float = number_field(0.05, 0.0, 0.5, "s", "time before and after that in which it may touch, too")
+    still: float = number_field(0.15, 0.01, 1.0, "m/s", "a foot rests where its whole sole is slower than this ...")
+    lasting: float = number_field(0.1, 0.02, 2.0, "s", "... for this long")
+    force: float = number_field(20.0, 1.0, 200.0, "N", "a plate that carries less vertical force is not loaded")
+    loaded: float = number_field(0.05, 0.0, 0.5, "", "share of the trial's largest vertical force from which a plate is loaded")
+    pressed: float = number_field(0.2, 0.0, 0.9, "", "the same, from which its centre of pressure is held against the soles")
+    outside: float = number_field(0.02, 0.0, 0.2, "m", "distance of the centre of pressure from the soles that is said")
+
+
+@dataclass(frozen=True)
+class StandingRules(Group):
+    """What counts as quiet standing on the plates.
+
+    Parameters
+    ----------
+    force : float
+        N: nobody stands on plates that carry less.
+    sway : float
+        Share of its median within which the vertical force stays.
+    shortest : float
+        s that it must last.
+    still : float
+        m within which the typical marker stays.
+    """
+
+    name = "standing"
+    force: float = number_field(100.0, 20.0, 500.0, "N", "nobody stands on plates that carry less vertical force")
+    sway: float = number_field(0.03, 0.005, 0.2, "", "share of its median within which the vertical force stays")
+    shortest: float = number_field(0.4, 0.1, 30.0, "s", "quiet standing lasts at least this long")
+    still: float = number_field(0.03, 0.002, 0.2, "m", "the typical marker stays within this")
+
+
+@dataclass(frozen=True)
+class CheckLimits(Group):
+    """The limits of the quality table; what is outside needs a person, nothing is left out for it.
+
+    The RMS marker distance follows OpenSim's user guide, the force Hicks et al. 2015 (doi:10.1115/1.4029304); the largest distance is a
+    hand's breadth, the mass shoes, clothes and a meal; the others are the project's own.
+
+    Parameters
+    ----------
+    mass : float
+        % between the mass on the plates and the declared mass.
+    marker_rms, marker_largest : float
+        m, distance of the markers to the model.
+    gaps : float
+        % of marker samples not seen.
+    open : float
+        % of frames in which the markers seen do not fix the posture.
+    seconds : float
+        s of a trial in which the plates measure all ground contact.
+    force : float
+        % of body weight, RMS difference of measured and simulated force, worst axis.
+    standing : float
+        m between mean centre of mass and mean centre of pressure in quiet standing.
+    """
+
+    name = "checks"
+    mass: float = number_field(2.0, 0.1, 50.0, "%", "mass on the plates against the declared mass")
+    marker_rms: float = number_field(0.020, 0.001, 0.2, "m", "distance of the markers to the model, RMS")
+    marker_largest: float = number_field(0.080, 0.002, 1.0, "m", "distance of the markers to the model, largest")
+    gaps: float = number_field(5.0, 0.0, 100.0, "%", "marker samples not seen")
+    open: float = number_field(1.0, 0.0, 100.0, "%", "frames in which the markers seen do not fix the posture")
+    seconds: float = number_field(0.5, 0.0, 60.0, "s", "least time of a trial in which the plates measure all ground contact")
+    force: float = number_field(5.0, 0.1, 100.0, "%", "RMS difference of measured and simulated force, of body weight")
+    standing: float = number_field(0.050, 0.001, 0.5, "m", "mean centre of mass against mean centre of pressure, standing")
