@@ -43,7 +43,7 @@ def on_files(files: Files, *, config: MkDocsConfig) -> Files:
 
 def page() -> str:
     """Return the page as Markdown."""
-    found = {name: biodance.front_door(name) for name in sorted(biodance.__all__, key=str.lower)}
+    found = {name: getattr(biodance, name) for name in sorted(biodance.__all__, key=str.lower)}
     functions = [entry(name, thing) for name, thing in found.items() if not inspect.isclass(thing)]
     errors = {name: thing for name, thing in found.items() if inspect.isclass(thing) and issubclass(thing, Exception)}
     records = [entry(name, thing) for name, thing in found.items() if inspect.isclass(thing) and name not in errors]
