@@ -31,8 +31,7 @@ class ShakingFloor(Effect):
 
     def columns(self, case: Case) -> np.ndarray:
         """Return the wrench (T, 6, 1) N, N·m that one m/s² adds: gravity seems to change."""
-        wave = np.sin(2 * np.pi * FREQUENCY * case.motion.time)
-        return (case.predicted / 9.80665 * wave[:, None])[:, :, None]
+        return (case.predicted / 9.80665 * np.sin(2 * np.pi * FREQUENCY * case.motion.time)[:, None])[:, :, None]
 
 
 def main(picture: Path) -> None:
