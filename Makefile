@@ -19,7 +19,7 @@ lint: $(STAMP)
 	PYTHONPATH=tests $(BIN)/python tests/docstrings.py
 
 docs: $(STAMP)
-	PYTHONPATH=. NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	PYTHONPATH=. NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict # not --quiet: that would swallow the warnings that must stop it
 
 tutorials: $(STAMP) # runs every example, and keeps what it prints and draws for the documentation
 	$(BIN)/python docs/hooks/tutorials.py
