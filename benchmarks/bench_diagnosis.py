@@ -1,6 +1,6 @@
-"""Hide everything, diagnose, judge: writes docs/diagnosis.md.
+"""Hide everything, diagnose, judge: writes docs/benchmarks/diagnosis.md.
 
-    python benchmarks/bench_diagnosis.py [--run NAME] [--minutes 30] [--out docs/diagnosis.md] [--prepare]
+    python benchmarks/bench_diagnosis.py [--run NAME] [--minutes 30] [--out docs/benchmarks/diagnosis.md] [--prepare]
                                         [--group null]
 
 Sessions are simulated and tracked once and kept on disk (`hidden_sessions.CACHE`); scores are kept per ``--run``, so that a run that was
@@ -40,7 +40,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--run", default="now")
     parser.add_argument("--minutes", type=float, default=1e9)
-    parser.add_argument("--out", type=Path, default=Path("docs/diagnosis.md"))
+    parser.add_argument("--out", type=Path, default=Path("docs/benchmarks/diagnosis.md"))
     parser.add_argument("--prepare", action="store_true")
     parser.add_argument("--group", default="")
     chosen = parser.parse_args()
@@ -60,9 +60,9 @@ def main() -> None:
             print(f"{time.monotonic() - start:6.0f} s  {found.key} {found.hidden}: {found.verdict} {found.names} {found.note}", flush=True)
         scores += [found] if found else []
     if not chosen.prepare and scores:
-        figure = chosen.out.parent / "figures" / "diagnosis_confusion.png"
+        figure = chosen.out.parents[1] / "figures" / "diagnosis_confusion.png"
         draw(scores, figure)
-        lines = page(scores, run=chosen.run, figure="figures/diagnosis_confusion.png", total=len(jobs))
+        lines = page(scores, run=chosen.run, figure="../figures/diagnosis_confusion.png", total=len(jobs))
         chosen.out.write_text("\n".join(lines) + "\n")
         print(f"wrote {chosen.out}")
 

@@ -1,6 +1,6 @@
-"""What identification achieves on virtual subjects, with all that goes wrong in a laboratory; writes docs/identification.md.
+"""What identification achieves on virtual subjects, with all that goes wrong in a laboratory; writes docs/benchmarks/identification.md.
 
-    python benchmarks/bench_identification.py [--subjects 20] [--tuned] [--out docs/identification.md]
+    python benchmarks/bench_identification.py [--subjects 20] [--tuned] [--out docs/benchmarks/identification.md]
 
 Sections: accuracy beside the table and the paper's programme, coverage, squats that were not fitted, joint torques, prior scale, quiet
 standing, added mass, time (of the processor). Constants were tuned on the catalogue of ``--tuned``; the page is about the fresh one.
@@ -223,7 +223,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--subjects", type=int, default=20)
     parser.add_argument("--tuned", dest="catalogue", action="store_const", const=TUNED, default=FRESH)
-    parser.add_argument("--out", type=Path, default=Path("docs/identification.md"))
+    parser.add_argument("--out", type=Path, default=Path("docs/benchmarks/identification.md"))
     chosen = parser.parse_args()
     start = time.perf_counter()
     lines = run(chosen.subjects, chosen.catalogue, lambda text: print(f"{time.perf_counter() - start:6.0f} s  {text}", flush=True))

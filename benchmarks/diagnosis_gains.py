@@ -1,4 +1,4 @@
-"""The part of docs/diagnosis.md on what accepting a named cause gains: forces and moments of kept trials, and the identified masses."""
+"""The part of docs/benchmarks/diagnosis.md on what accepting a cause gains: forces, moments of kept trials, and masses."""
 
 import numpy as np
 from diagnosis_scores import Score, share

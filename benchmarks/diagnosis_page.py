@@ -1,4 +1,4 @@
-"""The page docs/diagnosis.md and its figure from the scores of a run: every number with how many sessions it rests on."""
+"""The page docs/benchmarks/diagnosis.md and its figure from the scores of a run: every number with how many sessions it rests on."""
 
 from collections import Counter
 from collections.abc import Callable

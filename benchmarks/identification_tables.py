@@ -1,4 +1,4 @@
-"""Tables of docs/identification.md, from what bench_identification.py measured; computes nothing but means, medians and shares."""
+"""Tables of docs/benchmarks/identification.md, from what bench_identification.py measured; means, medians and shares only."""
 
 from dataclasses import dataclass
 

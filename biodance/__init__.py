@@ -77,7 +77,7 @@ HOMES = {
     "pipeline.dance": ("DanceResult",),
     "pipeline.diagnosis": ("SessionDiagnosis",),
     "pipeline.export": ("export",),
-    "pipeline.front": ("SessionComparison", "compare_sessions", "diagnosis", "identification"),
+    "pipeline.front": ("SessionComparison", "compare_sessions", "diagnose", "identify"),
     "pipeline.front_dance": ("design_dance", "simulate", "verify_dance"),
     "pipeline.identification": ("SessionIdentification",),
     "pipeline.results": ("SessionResult",),

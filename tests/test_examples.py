@@ -12,7 +12,7 @@ SHORTEST, LONGEST = 5, 60
 
 
 def test_there_are_examples_and_they_are_short() -> None:
-    assert len(EXAMPLES) >= 6
+    assert len(EXAMPLES) >= 10
     for path in EXAMPLES:
         assert SHORTEST < len(path.read_text().splitlines()) <= LONGEST, path.name
 

@@ -29,7 +29,7 @@ from biodance.uncertainty.noise import Noise
 RATE = 12.5
 """Hz at which a plan is judged: moves of 2 s from rest to rest have nothing to say above 6 Hz."""
 STILL = 1.5
-"""s of every hold that count: the noise is so slow that longer standing tells next to nothing (docs/dance.md), and it
+"""s of every hold that count: the noise is so slow that longer standing tells next to nothing (docs/benchmarks/dance.md), and it
 would cost time.
 """
 

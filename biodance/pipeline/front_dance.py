@@ -9,6 +9,7 @@ from biodance.records import Subject
 
 if TYPE_CHECKING:
     from biodance.dance.dance import Dance
+    from biodance.dance.limits import Limit
     from biodance.dance.verify import Margin
     from biodance.pipeline.dance import DanceResult
 
@@ -18,6 +19,7 @@ def design_dance(
     protocol: str | Path = "full",
     *,
     limits: str | Path | None = None,
+    own_limits: "Iterable[Limit | type[Limit]]" = (),
     seed: int = 0,
     tell: Callable[[str, int, int], None] = lambda *_: None,
 ) -> "DanceResult":
@@ -31,6 +33,8 @@ def design_dance(
         "full", "short", "chair", "one_segment", or a TOML file.
     limits : str or pathlib.Path, optional
         TOML file with what this person can and may do.
+    own_limits : iterable of Limit, optional
+        Limits of your own, kept beside those of the protocol or in place of one of the same name (`biodance.dance.limits`).
     seed : int
         The same seed gives the same dance.
     tell : callable, optional
@@ -70,7 +74,8 @@ def design_dance(
     from biodance.pipeline.dance import dancer, make_dance
 
     plan = read_plan(protocol)
-    return make_dance(dancer(subject, plan), plan, read_person(Path(limits)) if limits else HEALTHY, seed=seed, tell=tell)
+    person = read_person(Path(limits)) if limits else HEALTHY
+    return make_dance(dancer(subject, plan), plan, person, limits=own_limits, seed=seed, tell=tell)
 
 
 def verify_dance(

@@ -60,7 +60,7 @@ def write_dance(result: DanceResult, folder: Path) -> dict[str, Any]:
 
 
 def dance_document(result: DanceResult) -> dict[str, Any]:
-    """Return what `biodance dance` promises as results.json (see docs/dance.md); SI units by suffix."""
+    """Return what `biodance dance` promises as results.json (see docs/guide/dance.md); SI units by suffix."""
     dance, account, expectation = result.dance, result.account, result.expectation
     limits = [{"limit": m.limit, "worst": m.worst, "where_s": m.where_s, "unit": m.unit, "what": m.what} for m in result.margins]
     criterion = None

@@ -1,6 +1,6 @@
 """Diagnose a simulated visit in which the plate reads 6 % too much, and say it with other settings again.
 
-python examples/07_diagnose.py [FIGURE.png]
+python examples/13_other_settings.py [FIGURE.png]
 """
 
 import sys
@@ -25,4 +25,4 @@ def main(picture: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "07_diagnose.png"))
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "13_other_settings.png"))

@@ -1,0 +1,61 @@
+"""The documentation: decisions are dated records in one form, tutorials are the examples, built pages need no network."""
+
+import importlib.util
+import re
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+DOCS = Path(__file__).parents[1] / "docs"
+RECORDS = sorted((DOCS / "decisions").glob("2*.md"))
+FORM = re.compile(
+    r"# [^\n]+[^.\n]\n\nDate: (\d{4}-\d{2}-\d{2})( \(commit [0-9a-f]{7}\))? *\nTopic: [A-Z][^\n]+\n\n"
+    r"## Context\n\n.+\n\n## Decision\n\n.+\n\n## Measurement\n\n.+\n\n## Consequences\n\n.+\n\Z",
+    re.DOTALL,
+)
+LONGEST = 120
+
+
+def hook(name: str) -> ModuleType:
+    """Return a hook of the site; skips where mkdocs, which hooks import, is not installed."""
+    pytest.importorskip("mkdocs", reason="mkdocs is not installed: pip install '.[docs]'")
+    spec = importlib.util.spec_from_file_location(name, DOCS / "hooks" / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("path", RECORDS, ids=lambda path: path.stem)
+def test_a_decision_is_a_dated_record(path: Path) -> None:
+    text = path.read_text()
+    form = FORM.fullmatch(text)
+    assert form is not None, "context, decision, measurement, consequences: see docs/decisions/README.md"
+    assert path.name.startswith(form[1])
+    assert max(len(line) for line in text.splitlines()) <= LONGEST
+
+
+def test_every_decision_stands_in_the_list() -> None:
+    page = hook("decisions").contents(DOCS / "decisions")
+    assert len(RECORDS) >= 75
+    assert all(f"({path.name})" in page for path in RECORDS)
+
+
+def test_every_example_is_a_tutorial() -> None:
+    tutorials = hook("tutorials")
+    contents = tutorials.contents()
+    for script in tutorials.scripts():
+        assert f"({script.stem}.md)" in contents
+        code = tutorials.parts(script)[1]
+        assert script.read_text().rstrip().endswith(code)
+        assert code in tutorials.page(script)
+
+
+def test_what_a_browser_would_fetch_is_seen() -> None:
+    fetched = hook("offline").fetched
+    assert fetched('<script src="https://cdn.example.org/a.js"></script>') == ["https://cdn.example.org/a.js"]
+    assert fetched('<link rel="stylesheet" href="//fonts.example.org/css">') == ["//fonts.example.org/css"]
+    assert fetched("a { background: url(http://example.org/a.png) }") == ["http://example.org/a.png"]
+    assert fetched('<a href="https://doi.org/10.1109/TRO.2016.2583062">paper</a> <img src="a.png"> <link rel="icon" href="b.png">') == []
