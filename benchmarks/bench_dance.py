@@ -1,9 +1,11 @@
-"""Whole dances for bodies of both sexes and all sizes: whether all limits hold, how exciting, how long it takes, what stays up.
+"""Whole dances for bodies of both sexes and all sizes: whether all limits hold, how exciting, how long it takes, what
+stays up.
 
     OMP_NUM_THREADS=1 python benchmarks/bench_dance.py FOLDER [name of a body ...]
 
-Everything found is kept in FOLDER (dances, margins, times), so that nothing is computed twice: an interrupted run goes on, a finished body
-is only told again. Times are wall time and processor time of the two processes together; what was taken from FOLDER is not in them.
+Everything found is kept in FOLDER (dances, margins, times), so that nothing is computed twice: an interrupted run goes
+on, a finished body is only told again. Times are wall time and processor time of the two processes together; what was
+taken from FOLDER is not in them.
 """
 
 import json
@@ -28,7 +30,8 @@ from biodance.errors import BiodanceError
 from biodance.records import Subject
 
 STIFF = PersonLimits(
-    range_shares=(("left_shoulder", 0.5), ("left_elbow", 0.6), ("left_hip", 0.7), ("left_knee", 0.7)), reason="left side stiff"
+    range_shares=(("left_shoulder", 0.5), ("left_elbow", 0.6), ("left_hip", 0.7), ("left_knee", 0.7)),
+    reason="left side stiff",
 )
 CAREFUL = PersonLimits(stand_alone_on=(), reason="no standing on one leg")
 BODIES: dict[str, tuple[Subject, PersonLimits]] = {
@@ -56,7 +59,9 @@ def made(body: Body, plan: Plan, folder: Path, name: str) -> tuple[Dance, dict[s
     path, times = folder / f"{name}.npz", folder / f"{name}.json"
     if not path.exists():
         before, start = _spent(), time.time()
-        dance, _ = design(body, plan, seed=1, resume=folder / "parts", tell=lambda *what: print(name, *what, file=sys.stderr))
+        dance, _ = design(
+            body, plan, seed=1, resume=folder / "parts", tell=lambda *what: print(name, *what, file=sys.stderr)
+        )
         dance.save(path)
         times.write_text(json.dumps({"wall_s": time.time() - start, "cpu_s": _spent() - before}), encoding="utf-8")
     return Dance.load(path), json.loads(times.read_text(encoding="utf-8"))
@@ -77,14 +82,18 @@ def told(name: str, folder: Path) -> str:
     except BiodanceError as error:
         return f"{who} | refused: {error} |"
     margins, numbers = verify(body, dance, plan.limits), dance_metrics(dance, plan)
-    numbers = dance_metrics(dance, replace(plan, weights=tuple((name, 0.0) for name in numbers.hardly)))  # feet that never leave the ground
+    numbers = dance_metrics(
+        dance, replace(plan, weights=tuple((name, 0.0) for name in numbers.hardly))
+    )  # feet that never leave the ground
     worst = min((m for m in margins if m.limit not in ROUNDING), key=lambda m: m.worst)
     slow, stops = int(np.sum(dance.move > plan.move + 1e-9)), int(np.sum(dance.hold == 0))
     holds = sum(m.worst >= 0 for m in margins)
     (folder / f"{name}.margins.txt").write_text("\n".join(map(str, margins)) + "\n", encoding="utf-8")
     return (
-        f"{who} | {int(dance.counted.sum())} + {len(dance.hold) - int(dance.counted.sum())} | {len(dance.move)} ({slow}, {stops}) "
-        f"| {holds} of {len(margins)} | {worst.limit} {worst.worst:.2g} {worst.unit} | {numbers.static / numbers.static_bound:.3f} "
+        f"{who} | {int(dance.counted.sum())} + {len(dance.hold) - int(dance.counted.sum())} | {len(dance.move)} "
+        f"({slow}, {stops}) "
+        f"| {holds} of {len(margins)} | {worst.limit} {worst.worst:.2g} {worst.unit} | "
+        f"{numbers.static / numbers.static_bound:.3f} "
         f"| {numbers.dynamic[-1] / numbers.dynamic_bound:.2f} | {spent['wall_s']:.0f} | {spent['cpu_s']:.0f} |"
     )
 
@@ -94,7 +103,8 @@ def main() -> None:
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
     print(
-        "| body | postures + between | moves (slower, with a stop) | limits that hold | least margin | static | dynamic | wall s | CPU s |"
+        "| body | postures + between | moves (slower, with a stop) | limits that hold | least margin | static | "
+        "dynamic | wall s | CPU s |"
     )
     print("|---|---|---|---|---|---|---|---|---|")
     names = sys.argv[2:] or list(BODIES)

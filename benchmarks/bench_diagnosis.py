@@ -3,10 +3,11 @@
     python benchmarks/bench_diagnosis.py [--run NAME] [--minutes 30] [--out docs/benchmarks/diagnosis.md] [--prepare]
                                         [--group null]
 
-Sessions are simulated and tracked once and kept on disk (`hidden_sessions.CACHE`); scores are kept per ``--run``, so that a run that was
-stopped goes on, and the same command may run twice at once: every session is claimed by one of them. ``--minutes`` ends the run early (0:
-only the page is written): the sessions come in an order in which every beginning is a sample of the whole, and the page says how many
-there were. ``--prepare`` only simulates and tracks; ``--group`` only makes the scores of one group.
+Sessions are simulated and tracked once and kept on disk (`hidden_sessions.CACHE`); scores are kept per ``--run``, so
+that a run that was stopped goes on, and the same command may run twice at once: every session is claimed by one of
+them. ``--minutes`` ends the run early (0: only the page is written): the sessions come in an order in which every
+beginning is a sample of the whole, and the page says how many there were. ``--prepare`` only simulates and tracks;
+``--group`` only makes the scores of one group.
 """
 
 import argparse
@@ -21,12 +22,16 @@ from hidden_sessions import Scenario, examined
 
 
 def without_culprit(scenarios: list[Scenario]) -> list[Scenario]:
-    """Return the sessions that are diagnosed again with the hidden cause taken out of the family: large ones of the first person."""
+    """Return the sessions that are diagnosed again with the hidden cause taken out of the family: large ones of the
+    first person.
+    """
     return [one for one in scenarios if one.group == "issue"]
 
 
 def prepared(scenario: Scenario) -> None:
-    """Simulate and track a session, and the same one without fault where masses are compared; what fails is told when it is judged."""
+    """Simulate and track a session, and the same one without fault where masses are compared; what fails is told
+    when it is judged.
+    """
     try:
         examined(scenario)
         if scenario.judged:
@@ -45,7 +50,11 @@ def main() -> None:
     parser.add_argument("--group", default="")
     chosen = parser.parse_args()
     start, scenarios = time.monotonic(), everything()
-    jobs = [(one, absent) for one in scenarios for absent in ((False, True) if one in without_culprit(scenarios) else (False,))]
+    jobs = [
+        (one, absent)
+        for one in scenarios
+        for absent in ((False, True) if one in without_culprit(scenarios) else (False,))
+    ]
     scores: list[Score] = []
     for scenario, absent in jobs:
         found = stored(scenario, chosen.run, absent=absent)
@@ -57,7 +66,11 @@ def main() -> None:
             found = judged(scenario, chosen.run, absent=absent)
             if found is None:
                 continue
-            print(f"{time.monotonic() - start:6.0f} s  {found.key} {found.hidden}: {found.verdict} {found.names} {found.note}", flush=True)
+            print(
+                f"{time.monotonic() - start:6.0f} s  {found.key} {found.hidden}: {found.verdict} {found.names} "
+                f"{found.note}",
+                flush=True,
+            )
         scores += [found] if found else []
     if not chosen.prepare and scores:
         figure = chosen.out.parents[1] / "figures" / "diagnosis_confusion.png"

@@ -1,11 +1,13 @@
 """The designed dance beside its rivals at equal duration: squats and random motion, full against short protocol.
 
-    OMP_NUM_THREADS=1 python benchmarks/bench_excitation.py [subjects, default 5] [rivals, separated by commas; default: all]
+    OMP_NUM_THREADS=1 python benchmarks/bench_excitation.py [subjects, default 5] [rivals, separated by commas; default:
+    all]
 
-Every virtual subject (true body, soft tissue, cameras, plate) performs all of them imperfectly - seven degrees off in every joint, a fifth
-slower than shown - through the front door: simulate, read, prepare, scale, track, identify. All are shown the same dances,
-designed for one person (`SHOWN_TO`). Judged are the paper's criterion on what was really done and the error of the identified segments.
-Dances and visits are cached in BIODANCE_CACHE, so that a run can be continued.
+Every virtual subject (true body, soft tissue, cameras, plate) performs all of them imperfectly - seven degrees off in
+every joint, a fifth slower than shown - through the front door: simulate, read, prepare, scale, track, identify. All
+are shown the same dances, designed for one person (`SHOWN_TO`). Judged are the paper's criterion on what was really
+done and the error of the identified segments. Dances and visits are cached in BIODANCE_CACHE, so that a run can be
+continued.
 """
 
 import hashlib
@@ -23,7 +25,7 @@ import numpy as np
 from virtual_visits import subjects
 
 from biodance.dance.dance import Dance
-from biodance.dance.design import SHORT, design
+from biodance.dance.design import _SHORT, design
 from biodance.dance.metrics import criterion_of
 from biodance.dance.postures.ordering import support_sequence
 from biodance.dance.postures.posture import KEPT, Near, initial_guess, intermediate_posture, solve
@@ -43,14 +45,21 @@ from biodance.virtual_lab.truth import sip_in_frames
 CACHE = Path(os.environ.get("BIODANCE_CACHE", Path(tempfile.gettempdir()) / "biodance_excitation"))
 THIRDS = np.array([[0.20987654], [0.79012346]])
 SHOWN_TO = Subject(65.0, 1.75, "F")
-ORDER = ("short", "squats as long as short", "random as long as short", "full", "squats as long as full", "random as long as full")
+ORDER = (
+    "short",
+    "squats as long as short",
+    "random as long as short",
+    "full",
+    "squats as long as full",
+    "random as long as full",
+)
 
 
 @dataclass(frozen=True)
 class Row:
-    """What one subject's session gave: ``duration`` s of the fit trials, criterion ``static`` and ``dynamic`` kg, error of ``mass`` kg and
-    ``com`` m (12,) of the identified segments and of the table, relative error of the moments of ``inertia`` (12,), ``squats`` N and N·m of
-    the kept trials, table and identified.
+    """What one subject's session gave: ``duration`` s of the fit trials, criterion ``static`` and ``dynamic`` kg, error
+    of ``mass`` kg and ``com`` m (12,) of the identified segments and of the table, relative error of the moments of
+    ``inertia`` (12,), ``squats`` N and N·m of the kept trials, table and identified.
     """
 
     subject: int
@@ -88,7 +97,9 @@ def designed(protocol: str) -> Dance:
         return dance, time.perf_counter() - began
 
     dance, seconds = cached(f"dance {SHOWN_TO} {protocol}", make)
-    print(f"  {protocol}: {dance.counted.sum()} postures, {dance.duration:.0f} s, designed in {seconds:.0f} s", flush=True)
+    print(
+        f"  {protocol}: {dance.counted.sum()} postures, {dance.duration:.0f} s, designed in {seconds:.0f} s", flush=True
+    )
     return dance
 
 
@@ -97,7 +108,9 @@ def random_dance(like: Dance, plan: Plan) -> Dance:
     body = dancer(SHOWN_TO, plan)
     chain, rng = Chain(body), np.random.default_rng(7)
     count = {name: sum(s.over is None and s.name == name for s in like.stances) for name, _ in plan.blocks}
-    stances = support_sequence(body, replace(plan, budget=float("inf"), blocks=tuple((name, n) for name, n in count.items() if n)))
+    stances = support_sequence(
+        body, replace(plan, budget=float("inf"), blocks=tuple((name, n) for name, n in count.items() if n))
+    )
     x = np.full((len(stances), chain.size), np.nan)
     for k, stance in enumerate(stances):
         while stance.over is None and np.isnan(x[k, 0]):
@@ -108,7 +121,7 @@ def random_dance(like: Dance, plan: Plan) -> Dance:
     for k in np.flatnonzero(np.isnan(x[:, 0])):
         near = x[[max(k - 1, 0)]] if k and not np.isnan(x[k - 1, 0]) else x[:1]
         x[k] = intermediate_posture(chain, stances[k], near, plan.limits, seed=[3, int(k)]).x
-    hold = np.array([plan.hold if s.over is None else min(SHORT, plan.hold) for s in stances])
+    hold = np.array([plan.hold if s.over is None else min(_SHORT, plan.hold) for s in stances])
     move = np.full(len(x) - 1, (like.duration - hold.sum()) / (len(x) - 1))
     feet = tuple(under(a, b) for a, b in pairwise(stances))
     return Dance("random", body, x, stances, hold, x[:-1, None] + THIRDS * np.diff(x, axis=0)[:, None], move, feet, 7)
@@ -121,7 +134,9 @@ def squats(seconds: float) -> Protocol:
     step = fit.steps[0]
     count = max(1, round(seconds / 30.0))
     cycles = max(2, round((seconds / count - step.hold - 2 * fit.lead) / step.period) - 1)
-    trials = [TrialPlan(f"squats_{k}", "fit", fit.stance, (replace(step, cycles=cycles),), fit.lead) for k in range(count)]
+    trials = [
+        TrialPlan(f"squats_{k}", "fit", fit.stance, (replace(step, cycles=cycles),), fit.lead) for k in range(count)
+    ]
     return replace(plain, trials=(*(t for t in plain.trials if t.role != "fit"), *trials))
 
 
@@ -156,7 +171,9 @@ def joined(motions: list[Motion]) -> Motion:
 
 
 def errors(phi: Array, true: Array) -> tuple[Array, Array, Array]:
-    """Return the errors of mass kg, CoM m (distance) and the relative error of the inertia tensors about the joint, of every segment."""
+    """Return the errors of mass kg, CoM m (distance) and the relative error of the inertia tensors about the joint,
+    of every segment.
+    """
     a, b = phi.reshape(-1, 10), true.reshape(-1, 10)
     com = np.linalg.norm(a[:, 1:4] / a[:, :1] - b[:, 1:4] / b[:, :1], axis=1)
     return a[:, 0] - b[:, 0], com, np.linalg.norm(a[:, 4:] - b[:, 4:], axis=1) / np.linalg.norm(b[:, 4:], axis=1)
@@ -188,21 +205,29 @@ def table(rows: list[Row]) -> str:
         return float(np.sqrt(np.mean(np.square(values))))
 
     lines = [
-        "| motion | s | static, kg | dynamic, kg | mass RMS, kg | CoM RMS, mm | inertia, % (median) | squats, N | squats, N·m |",
+        "| motion | s | static, kg | dynamic, kg | mass RMS, kg | CoM RMS, mm | inertia, % (median) | squats, N | "
+        "squats, N·m |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
     some = [row for row in rows if row.rival == "short"]
     force, moment = np.mean([row.squats[0] for row in some], axis=0)
     lines.append(
-        f"| table, nothing danced | 0 | | | {rms([r.table_mass for r in some]):.3f} | {1000 * rms([r.table_com for r in some]):.1f} "
+        f"| table, nothing danced | 0 | | | {rms([r.table_mass for r in some]):.3f} | "
+        f"{1000 * rms([r.table_com for r in some]):.1f} "
         f"| {100 * np.median([r.table_inertia for r in some]):.0f} | {force:.1f} | {moment:.1f} |"
     )
     for rival in ORDER:
         mine = [row for row in rows if row.rival == rival]
         if mine:
             force, moment = np.mean([row.squats[1] for row in mine], axis=0)
-            seconds, static, dynamic = (np.mean([getattr(row, name) for row in mine]) for name in ("duration", "static", "dynamic"))
-            mass, com, inertia = rms([r.mass for r in mine]), 1000 * rms([r.com for r in mine]), 100 * np.median([r.inertia for r in mine])
+            seconds, static, dynamic = (
+                np.mean([getattr(row, name) for row in mine]) for name in ("duration", "static", "dynamic")
+            )
+            mass, com, inertia = (
+                rms([r.mass for r in mine]),
+                1000 * rms([r.com for r in mine]),
+                100 * np.median([r.inertia for r in mine]),
+            )
             known = f"{mass:.3f} | {com:.1f} | {inertia:.0f} | {force:.1f} | {moment:.1f}"
             lines.append(f"| {rival} | {seconds:.0f} | {static:.0f} | {dynamic:.0f} | {known} |")
     return "\n".join(lines)

@@ -1,9 +1,11 @@
-"""What identification achieves on virtual subjects, with all that goes wrong in a laboratory; writes docs/benchmarks/identification.md.
+"""What identification achieves on virtual subjects, with all that goes wrong in a laboratory; writes
+docs/benchmarks/identification.md.
 
     python benchmarks/bench_identification.py [--subjects 20] [--tuned] [--out docs/benchmarks/identification.md]
 
-Sections: accuracy beside the table and the paper's programme, coverage, squats that were not fitted, joint torques, prior scale, quiet
-standing, added mass, time (of the processor). Constants were tuned on the catalogue of ``--tuned``; the page is about the fresh one.
+Sections: accuracy beside the table and the paper's programme, coverage, squats that were not fitted, joint torques,
+prior scale, quiet standing, added mass, time (of the processor). Constants were tuned on the catalogue of ``--tuned``;
+the page is about the fresh one.
 """
 
 import argparse
@@ -51,13 +53,21 @@ STILL = 4
 
 
 def errors(phi: Array, true: Array) -> Array:
-    """Return (12, 3): mass error kg, CoM error mm, inertia error (Frobenius norm about the CoM over the true one's) of every segment."""
+    """Return (12, 3): mass error kg, CoM error mm, inertia error (Frobenius norm about the CoM over the true one's)
+    of every segment.
+    """
     out = []
     for a, b in zip(phi.reshape(-1, 10), true.reshape(-1, 10), strict=True):
         x, y = segment_quantities(a)[0], segment_quantities(b)[0]
         weight = np.array([1, 2, 1, 2, 2, 1])
         size = np.sqrt(np.sum(weight * y[4:] ** 2))
-        out.append([abs(x[0] - y[0]), 1e3 * np.linalg.norm(x[1:4] - y[1:4]), 100 * np.sqrt(np.sum(weight * (x[4:] - y[4:]) ** 2)) / size])
+        out.append(
+            [
+                abs(x[0] - y[0]),
+                1e3 * np.linalg.norm(x[1:4] - y[1:4]),
+                100 * np.sqrt(np.sum(weight * (x[4:] - y[4:]) ** 2)) / size,
+            ]
+        )
     return np.array(out)
 
 
@@ -83,7 +93,9 @@ def own_truth(one: TrackedVisit) -> Array:
 
     return np.concatenate(
         [
-            parameters_of_inertia(place_inertia(of_parameters(phi), _orthogonal(f[:, :3]), f[:, 3] if k == 0 else np.zeros(3)))
+            parameters_of_inertia(
+                place_inertia(of_parameters(phi), _orthogonal(f[:, :3]), f[:, 3] if k == 0 else np.zeros(3))
+            )
             for k, (phi, f) in enumerate(zip(one.true_own.reshape(-1, 10), one.frames, strict=True))
         ]
     )
@@ -96,7 +108,9 @@ def examine(subject: Subject, seed: int) -> tuple[Row, Identification, Gathered]
     paper = paper_programme(got.total.information(got.total.layout), one.body)
     estimates = {"table": one.body.sip.phi, "identified": found.sip.phi, "paper": paper.phi}
     about = standing_point(one.fits)
-    squat = {name: rms(one.body, one.validations, about, phi) for name, phi in (*estimates.items(), ("floor", one.true))}
+    squat = {
+        name: rms(one.body, one.validations, about, phi) for name, phi in (*estimates.items(), ("floor", one.true))
+    }
     before = found.belief.prior
     held = []
     for scale in SCALES:
@@ -119,7 +133,9 @@ def examine(subject: Subject, seed: int) -> tuple[Row, Identification, Gathered]
 
 
 def torques(one: TrackedVisit, found: Identification) -> dict:
-    """Return how far the joint torques in the kept trials are from those of the true parameters, and how often the bands hold them."""
+    """Return how far the joint torques in the kept trials are from those of the true parameters, and how often the
+    bands hold them.
+    """
     error: dict[str, list] = {"table": [], "identified": []}
     inside = []
     for fit in one.validations:
@@ -136,7 +152,9 @@ def torques(one: TrackedVisit, found: Identification) -> dict:
 
 
 def timing(found: Identification, one: TrackedVisit) -> dict[str, float]:
-    """Return seconds for 42,000 frames (7 minutes at 100 Hz) from motion and wrench to the R factor, and for the programme after it."""
+    """Return seconds for 42,000 frames (7 minutes at 100 Hz) from motion and wrench to the R factor, and for the
+    programme after it.
+    """
     fit = one.fits[0]
     repeat = int(np.ceil(42000 / fit.motion.time.size))
     many = [np.tile(x, (repeat, 1))[:42000] for x in (fit.motion.q, fit.motion.v, fit.motion.a, fit.wrench.value)]
@@ -160,8 +178,12 @@ def timing(found: Identification, one: TrackedVisit) -> dict[str, float]:
     }
 
 
-def pairs(subject: Subject, seed: int, reference: Identification, *, full: bool) -> tuple[list[LoadSearch], Load, list[Load]]:
-    """Return what unloaded pairs of three sessions find, both ways round, and what is found of loads in the second session."""
+def pairs(
+    subject: Subject, seed: int, reference: Identification, *, full: bool
+) -> tuple[list[LoadSearch], Load, list[Load]]:
+    """Return what unloaded pairs of three sessions find, both ways round, and what is found of loads in the second
+    session.
+    """
     later = [gather(subject, "dance", seed, session=session) for session in (1, 2)]
     found = [reference, *(one.identified() for one in later)]
     nulls = [added_mass(b, reference=a) for a in found for b in found if a is not b]
@@ -171,7 +193,9 @@ def pairs(subject: Subject, seed: int, reference: Identification, *, full: bool)
 def subject_of(index: int, catalogue: tuple[int, int], *, tell) -> tuple[Row, list[LoadSearch], Load, list[Load]]:
     """Return all about one subject, from the cache while the code of identify/ is unchanged."""
     house = Path(biodance.identify.__file__).parent.parent
-    code = b"".join(path.read_bytes() for room in ("identify", "uncertainty") for path in sorted((house / room).glob("*.py")))
+    code = b"".join(
+        path.read_bytes() for room in ("identify", "uncertainty") for path in sorted((house / room).glob("*.py"))
+    )
     path = CACHE / f"subject-{hashlib.sha256(f'{catalogue}-{index}'.encode() + code).hexdigest()[:20]}.pickle"
     if not path.is_file():
         person, seed = subjects(index + 1, catalogue)[index], catalogue[1] + index
@@ -182,7 +206,10 @@ def subject_of(index: int, catalogue: tuple[int, int], *, tell) -> tuple[Row, li
     with open(path, "rb") as stream:
         row, nulls, arm, loads = pickle.load(stream)
     p = [f"{n.p_no_load:.3f}" for n in nulls]
-    tell(f"subject {index + 1}: coverage {100 * row.cover.mean():.0f} %, p without load {' '.join(p)}, with {arm[2].p_no_load:.0e}")
+    tell(
+        f"subject {index + 1}: coverage {100 * row.cover.mean():.0f} %, p without load {' '.join(p)}, with "
+        f"{arm[2].p_no_load:.0e}"
+    )
     return row, nulls, arm, loads
 
 
@@ -210,10 +237,14 @@ def run(count: int, catalogue: tuple[int, int], tell) -> list[str]:
     head = [
         "# Identification on virtual subjects",
         "",
-        f"{count} subjects (both sexes, 45-110 kg, 1.50-1.95 m), protocol dance, realistic tolerances, through the front door: simulate, "
-        "read, prepare, scale, place joints by movement, track, contact, identify. Made by `benchmarks/bench_identification.py`.",
-        "The subjects are not those on whom constants were chosen (`--tuned`). Every subject has three sessions on three days (markers, "
-        "skin, plates and performance anew); a load's own wrench, of its true motion, is added to the second day's plates.",
+        f"{count} subjects (both sexes, 45-110 kg, 1.50-1.95 m), protocol dance, realistic tolerances, through the "
+        f"front door: simulate, "
+        "read, prepare, scale, place joints by movement, track, contact, identify. Made by "
+        "`benchmarks/bench_identification.py`.",
+        "The subjects are not those on whom constants were chosen (`--tuned`). Every subject has three sessions on "
+        "three days (markers, "
+        "skin, plates and performance anew); a load's own wrench, of its true motion, is added to the second day's "
+        "plates.",
     ]
     return [*head, *(line for title, lines in sections.items() for line in ("", f"## {title}", *lines))]
 
@@ -226,7 +257,11 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("docs/benchmarks/identification.md"))
     chosen = parser.parse_args()
     start = time.perf_counter()
-    lines = run(chosen.subjects, chosen.catalogue, lambda text: print(f"{time.perf_counter() - start:6.0f} s  {text}", flush=True))
+    lines = run(
+        chosen.subjects,
+        chosen.catalogue,
+        lambda text: print(f"{time.perf_counter() - start:6.0f} s  {text}", flush=True),
+    )
     chosen.out.write_text("\n".join(lines) + "\n")
     print(f"wrote {chosen.out}")
 

@@ -1,10 +1,12 @@
-"""figaroh 1.0.2, the paper's quadratic programme and biodance on the same synthetic wrench, default settings: error and time.
+"""figaroh 1.0.2, the paper's quadratic programme and biodance on the same synthetic wrench, default settings: error and
+time.
 
     python benchmarks/bench_identification_peers.py --figaroh /path/to/venv/bin/python [--subjects 4]
 
-The venv holds ``pip install figaroh==1.0.2``. Every subject: 12 segments whose true parameters differ from the table (masses 15 %, centres
-and shapes 10 % of the body's size), a smooth whole-body motion of 60 s, plate noise of 5 N and 2 N·m; once with exact kinematics, once with
-joint angles as a gait laboratory has them (2 deg of offset, 3 % of the angle from moving skin). Prints two tables.
+The venv holds ``pip install figaroh==1.0.2``. Every subject: 12 segments whose true parameters differ from the table
+(masses 15 %, centres and shapes 10 % of the body's size), a smooth whole-body motion of 60 s, plate noise of 5 N and 2
+N·m; once with exact kinematics, once with joint angles as a gait laboratory has them (2 deg of offset, 3 % of the angle
+from moving skin). Prints two tables.
 """
 
 import argparse
@@ -39,7 +41,9 @@ THINNED = 4
 
 @dataclass(frozen=True)
 class Score:
-    """Errors: mass, RMS and largest kg; CoM and inertia about it, median mm and %; wrench N, N·m; segments that cannot exist."""
+    """Errors: mass, RMS and largest kg; CoM and inertia about it, median mm and %; wrench N, N·m; segments that
+    cannot exist.
+    """
 
     mass: float
     largest: float
@@ -52,7 +56,9 @@ class Score:
 
 
 def true_parameters(body: Body, rng: np.random.Generator) -> Array:
-    """Return a person of the same mass whose segments are stretched, shifted and heavier or lighter than the table's."""
+    """Return a person of the same mass whose segments are stretched, shifted and heavier or lighter than the
+    table's.
+    """
     bodies = []
     for phi in body.sip.phi.reshape(-1, 10):
         J = of_parameters(phi)
@@ -60,7 +66,9 @@ def true_parameters(body: Body, rng: np.random.Generator) -> Array:
         centred = place_inertia(J, np.eye(3), -com)
         size = np.sqrt(np.abs(np.diag(centred)[:3]) / J[3, 3])
         shift = com + 0.1 * size * rng.normal(size=3)
-        bodies.append(np.exp(0.15 * rng.normal()) * place_inertia(centred, np.eye(3) + 0.1 * rng.normal(size=(3, 3)), shift))
+        bodies.append(
+            np.exp(0.15 * rng.normal()) * place_inertia(centred, np.eye(3) + 0.1 * rng.normal(size=(3, 3)), shift)
+        )
     total = sum(J[3, 3] for J in bodies)
     return np.concatenate([parameters_of_inertia(J * body.sip.mass.sum() / total) for J in bodies])
 
@@ -80,7 +88,9 @@ def dance(body: Body, rng: np.random.Generator) -> Motion:
 
 
 def measured(motion: Motion, rng: np.random.Generator) -> Motion:
-    """Return the motion as a laboratory finds it: every joint angle with a constant offset and a gain that is a little wrong."""
+    """Return the motion as a laboratory finds it: every joint angle with a constant offset and a gain that is a
+    little wrong.
+    """
     q, v, a = np.array(motion.q), np.array(motion.v), np.array(motion.a)
     gain = 1 + 0.03 * rng.normal(size=v.shape[1] - 6)
     q[:, 7:] = q[:, 7:] * gain + np.radians(2.0) * rng.normal(size=gain.size)
@@ -116,22 +126,43 @@ def ours_and_the_papers(body: Body, motion: Motion, wrench: Wrench, truth: Array
     start = time.perf_counter()
     paper = paper_programme(information(body, motion, wrench, Noise.of_sd(1.0, 1.0, np.zeros(3))), body)
     papers = score(paper.phi, truth, W, time.perf_counter() - start)
-    return {"table, nothing identified": score(body.sip.phi, truth, W, 0.0), "paper's programme": papers, "biodance": ours}
+    return {
+        "table, nothing identified": score(body.sip.phi, truth, W, 0.0),
+        "paper's programme": papers,
+        "biodance": ours,
+    }
 
 
-def figaroh(python: str, body: Body, motion: Motion, wrench: Wrench, truth: Array, W: Array) -> tuple[dict[str, Score | str], str]:
-    """Return figaroh's scores (or its word where it gives no answer) and what its own regressor says about a free-flyer."""
+def figaroh(
+    python: str, body: Body, motion: Motion, wrench: Wrench, truth: Array, W: Array
+) -> tuple[dict[str, Score | str], str]:
+    """Return figaroh's scores (or its word where it gives no answer) and what its own regressor says about a
+    free-flyer.
+    """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         write_model(body, folder / "model.urdf", format="urdf")
         thin = slice(None, None, THINNED)
-        rows = {"W": regressor(body, motion)[thin].reshape(-1, W.shape[2]), "wrench": wrench.value[thin].ravel(), "prior": body.sip.phi}
-        np.savez(folder / "problem.npz", **rows, segments=np.array(body.segments), q=motion.q[:5], v=motion.v[:5], a=motion.a[:5])
+        rows = {
+            "W": regressor(body, motion)[thin].reshape(-1, W.shape[2]),
+            "wrench": wrench.value[thin].ravel(),
+            "prior": body.sip.phi,
+        }
+        np.savez(
+            folder / "problem.npz",
+            **rows,
+            segments=np.array(body.segments),
+            q=motion.q[:5],
+            v=motion.v[:5],
+            a=motion.a[:5],
+        )
         worker = Path(__file__).with_name("figaroh_worker.py")
         subprocess.run([python, str(worker), str(folder)], check=True, capture_output=True)
         answer = json.loads((folder / "answer.json").read_text(encoding="utf-8"))
     scores = {
-        f"figaroh 1.0.2, {label}": fit["status"] if fit["phi"] is None else score(np.array(fit["phi"]), truth, W, fit["seconds"])
+        f"figaroh 1.0.2, {label}": fit["status"]
+        if fit["phi"] is None
+        else score(np.array(fit["phi"]), truth, W, fit["seconds"])
         for label, fit in answer["fits"].items()
     }
     return scores, answer["workflow"]
@@ -140,7 +171,8 @@ def figaroh(python: str, body: Body, motion: Motion, wrench: Wrench, truth: Arra
 def table(rows: dict[str, list[Score | str]]) -> str:
     """Return the medians over the subjects as Markdown (largest mass error and impossible segments: the worst)."""
     lines = [
-        "| method | mass RMS (kg) | mass, largest (kg) | CoM (mm) | inertia (%) | residual (N) | residual (N·m) | impossible | time (s) |",
+        "| method | mass RMS (kg) | mass, largest (kg) | CoM (mm) | inertia (%) | residual (N) | residual (N·m) | "
+        "impossible | time (s) |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
     for label, all_scores in rows.items():
@@ -152,7 +184,11 @@ def table(rows: dict[str, list[Score | str]]) -> str:
         middle = [float(np.median(of[name])) for name in ("com", "inertia", "force", "moment")]
         mass, seconds = float(np.median(of["mass"])), float(np.median(of["seconds"]))
         numbers = f"{mass:.2f} | {of['largest'].max():.2f} | " + " | ".join(f"{x:.2f}" for x in middle)
-        answers = "" if len(scores) == len(all_scores) else f" ({len(all_scores) - len(scores)} of {len(all_scores)} without answer)"
+        answers = (
+            ""
+            if len(scores) == len(all_scores)
+            else f" ({len(all_scores) - len(scores)} of {len(all_scores)} without answer)"
+        )
         lines.append(f"| {label}{answers} | {numbers} | {int(of['impossible'].max())} of 12 | {seconds:.2f} |")
     return "\n".join(lines)
 

@@ -2,10 +2,10 @@
 
     OMP_NUM_THREADS=1 python benchmarks/bench_inverse_kinematics.py [frames for biodance] [frames for OpenSim]
 
-OpenSim's InverseKinematicsSolver starts every frame from the one before; its first frame is not timed. It runs with its coordinates
-clamped to their ranges and free, at the default accuracy of its tool and at a finer one; the tool itself runs with its defaults.
-Process CPU time counts; the solvers' reading of files does not. First the models are proven equal: the same marker places at the same
-postures.
+OpenSim's InverseKinematicsSolver starts every frame from the one before; its first frame is not timed. It runs with its
+coordinates clamped to their ranges and free, at the default accuracy of its tool and at a finer one; the tool itself
+runs with its defaults. Process CPU time counts; the solvers' reading of files does not. First the models are proven
+equal: the same marker places at the same postures.
 """
 
 import sys
@@ -39,7 +39,9 @@ CAMERA = 0.0003
 
 
 def dance(body: Body, frames: int, *, seed: int = 0) -> Array:
-    """Return q (frames, nq): postures held for a second and moved between in a second, the pelvis turning and travelling."""
+    """Return q (frames, nq): postures held for a second and moved between in a second, the pelvis turning and
+    travelling.
+    """
     rng, at = np.random.default_rng(seed), np.arange(frames) / RATE
     knots = np.arange(0.0, at[-1] + 2.0)
     lower, upper = body.limits.lower, body.limits.upper
@@ -56,7 +58,9 @@ def record(body: Body, q: Array, *, seed: int = 0) -> Markers:
     xyz = poses(body, q).points(body.markers.segment, body.markers.position)
     soft = sosfiltfilt(butter(2, SOFT_TISSUE[1], fs=RATE, output="sos"), rng.normal(size=xyz.shape), axis=0)
     return Markers(
-        body.markers.names, np.arange(len(q)) / RATE, xyz + soft * SOFT_TISSUE[0] / soft.std() + rng.normal(0, CAMERA, xyz.shape)
+        body.markers.names,
+        np.arange(len(q)) / RATE,
+        xyz + soft * SOFT_TISSUE[0] / soft.std() + rng.normal(0, CAMERA, xyz.shape),
     )
 
 
@@ -77,7 +81,9 @@ def without_limits(body: Body) -> Body:
 def opensim_points(model: opensim.Model, body: Body, q: Array) -> Array:
     """Return OpenSim's marker places (T, K, 3) m in the lab frame at our postures."""
     state = model.initSystem()
-    table = opensim_coordinates(body, Motion(np.arange(len(q)) / RATE, q, np.zeros((len(q), body.nv)), np.zeros((len(q), body.nv))))
+    table = opensim_coordinates(
+        body, Motion(np.arange(len(q)) / RATE, q, np.zeros((len(q), body.nv)), np.zeros((len(q), body.nv)))
+    )
     out = np.empty((len(q), len(body.markers.names), 3))
     for t, values in enumerate(table.values):
         for name, value in zip(table.columns, values, strict=True):
@@ -110,7 +116,9 @@ def opensim_track(model: opensim.Model, body: Body, trc: Path, frames: int, accu
 
 
 def opensim_tool(folder: Path, body: Body, trc: Path, frames: int) -> float:
-    """Return CPU seconds per frame of OpenSim's InverseKinematicsTool with its defaults, model and files read included."""
+    """Return CPU seconds per frame of OpenSim's InverseKinematicsTool with its defaults, model and files read
+    included.
+    """
     tool = opensim.InverseKinematicsTool()
     tool.set_model_file(str(folder / "body.osim"))
     tool.setMarkerDataFileName(str(trc))
@@ -158,7 +166,10 @@ def main(ours: int = 6000, theirs: int = 300) -> None:
         first = Markers(markers.names, markers.time[:theirs], markers.xyz[:theirs])
         trc = write_trc(folder / "trial.trc", first)
         for held, best in costs.items():
-            print(f"{held} coordinates: biodance {weighted_rms(body, best):.5f} mm weighted RMS over the first {theirs} frames")
+            print(
+                f"{held} coordinates: biodance {weighted_rms(body, best):.5f} mm weighted RMS over the first {theirs} "
+                f"frames"
+            )
             for accuracy in ACCURACIES:
                 places, each = opensim_track(opensim_model(body, path, held=held), body, trc, theirs, accuracy)
                 other = ((places - first.xyz) ** 2).sum(axis=2) @ weight

@@ -1,4 +1,5 @@
-"""How far joint centres and hinge axes are from the truth of virtual persons: by landmarks alone, and placed by the dance.
+"""How far joint centres and hinge axes are from the truth of virtual persons: by landmarks alone, and placed by the
+dance.
 
     python benchmarks/bench_joints.py [--subjects 12] [--protocol dance]
 
@@ -22,7 +23,14 @@ from biodance.motion.ik.joint_unknowns import HINGES
 from biodance.motion.kinematics import poses
 from biodance.virtual_lab.simulate import simulate_session
 
-JOINTS = {"thigh": "hip", "shank": "knee", "foot": "ankle", "trunk_head": "trunk", "upper_arm": "shoulder", "forearm_hand": "elbow"}
+JOINTS = {
+    "thigh": "hip",
+    "shank": "knee",
+    "foot": "ankle",
+    "trunk_head": "trunk",
+    "upper_arm": "shoulder",
+    "forearm_hand": "elbow",
+}
 
 
 def errors(scaling: Scaling, truth: dict) -> dict[str, float]:
@@ -61,7 +69,9 @@ def main() -> None:
         seconds.append(time.process_time() - start)
         before.append(errors(scaling, truth))
         after.append(errors(found.scaling, truth))
-    print(f"{chosen.subjects} subjects, protocol {chosen.protocol}, {np.median(seconds):.1f} s of processor time (median)")
+    print(
+        f"{chosen.subjects} subjects, protocol {chosen.protocol}, {np.median(seconds):.1f} s of processor time (median)"
+    )
     for name in before[0]:
         old, new = (np.sqrt(np.mean([row[name] ** 2 for row in rows])) for rows in (before, after))
         print(f"{name:16s} landmarks {old:5.1f}   movement {new:5.1f}")

@@ -2,9 +2,10 @@
 
     BIODANCE_DATA=folder python benchmarks/bench_real_faults.py [--out FILE.md]
 
-The table is kept where bench_diagnosis.py finds it for its page. The folder holds sessions of plug-in-gait (``biomechzoo/HC030A``: static
-trial and walk) and ``adl_gait``. The fault is in every file of the copy, as in a laboratory. HC030A has the labels LWRA and LWRB exchanged
-in both files, which the check of labels says; it is left out here.
+The table is kept where bench_diagnosis.py finds it for its page. The folder holds sessions of plug-in-gait
+(``biomechzoo/HC030A``: static trial and walk) and ``adl_gait``. The fault is in every file of the copy, as in a
+laboratory. HC030A has the labels LWRA and LWRB exchanged in both files, which the check of labels says; it is left out
+here.
 """
 
 import argparse
@@ -28,7 +29,8 @@ from biodance.virtual_lab.inject import inject
 
 SESSIONS = ("biomechzoo/HC030A", "biomechzoo/HC032A", "adl_gait")
 FAULTS = (
-    "", "plate_gain:target=plate1:Fz,gain=0.08", "plate_offset:target=plate1:Fz,offset=30", "plate_offset:target=plate1:Fx,offset=30",
+    "", "plate_gain:target=plate1:Fz,gain=0.08", "plate_offset:target=plate1:Fz,offset=30",
+    "plate_offset:target=plate1:Fx,offset=30",
     "plate_position:target=plate1:x,shift=0.02", "plate_position:target=plate1:y,shift=0.02", "time_delay:delay=0.03",
 )  # fmt: skip
 
@@ -59,7 +61,9 @@ def row(session: str, text: str, found: Diagnosis | str) -> str:
     """Return one line of the table: what was written, what was found, and the place of the truth among the causes."""
     if isinstance(found, str):
         return f"| {session} | {text or 'nothing'} | refused: {found} | | |"
-    true = tuple(text.partition(",")[0].partition(":target=")[::2]) if ":target=" in text else (text.partition(":")[0], "")
+    true = (
+        tuple(text.partition(",")[0].partition(":target=")[::2]) if ":target=" in text else (text.partition(":")[0], "")
+    )
     sets = [[(alias.effect, alias.target) for alias in finding.set] for finding in found.findings]
     place = "-"
     for number, names in enumerate(sets, start=1):
@@ -68,7 +72,10 @@ def row(session: str, text: str, found: Diagnosis | str) -> str:
     own = [one for one in found.limits if text and (one.effect, one.target) == true]
     limit = f"{own[0].limit:.3g} {_unit(own[0].unit, own[0].target)}" if own else ""
     named = "; ".join(f"{one.effect} {one.target} {_sizes(one)}" for one in found.findings)
-    return f"| {session} | {text or 'nothing'} | {found.verdict}{': ' + named if named else ''} | {place if text else ''} | {limit} |"
+    return (
+        f"| {session} | {text or 'nothing'} | {found.verdict}{': ' + named if named else ''} | "
+        f"{place if text else ''} | {limit} |"
+    )
 
 
 def _sizes(one: Finding) -> str:
@@ -88,7 +95,10 @@ def main() -> None:
     data = os.environ.get("BIODANCE_DATA")
     if not data:
         parser.error("BIODANCE_DATA does not name the folder with real recordings.")
-    lines = ["| recording | written into the copy | verdict and names | place of the truth | computed limit |", "|---|---|---|---|---|"]
+    lines = [
+        "| recording | written into the copy | verdict and names | place of the truth | computed limit |",
+        "|---|---|---|---|---|",
+    ]
     with tempfile.TemporaryDirectory() as place:
         for session in SESSIONS:
             for number, text in enumerate(FAULTS):

@@ -2,8 +2,9 @@
 
     python benchmarks/bench_sqp.py [--starts 24]
 
-Each start is solved by `nlp.minimise` (quadratic steps by non-negative least squares) and by SciPy's SLSQP with the same objective, margins
-and slopes, and the quadratic programme of a first step by `nlp.quadratic_step` and by clarabel. Processor times, one process.
+Each start is solved by `nlp.minimise` (quadratic steps by non-negative least squares) and by SciPy's SLSQP with the
+same objective, margins and slopes, and the quadratic programme of a first step by `nlp.quadratic_step` and by clarabel.
+Processor times, one process.
 """
 
 import argparse
@@ -34,7 +35,9 @@ def problem_at(chain: Chain, seed: int) -> tuple[NonlinearProgramme, Array]:
     begin, free = initial_guess(chain, feet, rng), free_coordinates(chain, feet)
     up = rng.normal(size=(9, len(chain.body.segments), 3))
     parts = excitation_blocks(chain.body)
-    objective = Exciting(parts, static_grams(up / np.linalg.norm(up, axis=2, keepdims=True)), 0.01 * parts.weight.sum(), 8)
+    objective = Exciting(
+        parts, static_grams(up / np.linalg.norm(up, axis=2, keepdims=True)), 0.01 * parts.weight.sum(), 8
+    )
     base = np.zeros((3, 1, chain.size))
     base[0, 0] = begin
     base[0, 0, free] = 0.0
@@ -70,12 +73,19 @@ def by_clarabel(gradient: Array, jacobian: Array, margins: Array) -> Array:
     """Return the step of the same quadratic programme as `quadratic_step` with the identity as Hessian."""
     n = gradient.size
     P, q = csc_matrix(np.eye(n + 1)), np.append(gradient, 1.0)
-    rows = [np.column_stack([-jacobian, np.full(len(jacobian), -1 / WEIGHT)]), np.eye(n, n + 1), -np.eye(n, n + 1), -np.eye(n + 1)[-1:]]
+    rows = [
+        np.column_stack([-jacobian, np.full(len(jacobian), -1 / WEIGHT)]),
+        np.eye(n, n + 1),
+        -np.eye(n, n + 1),
+        -np.eye(n + 1)[-1:],
+    ]
     bounds = np.concatenate([margins, np.full(2 * n, RADIUS), [0.0]])
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     A = csc_matrix(np.vstack(rows))
-    return np.array(clarabel.DefaultSolver(P, q, A, bounds, [clarabel.NonnegativeConeT(len(bounds))], settings).solve().x)[:n]
+    return np.array(
+        clarabel.DefaultSolver(P, q, A, bounds, [clarabel.NonnegativeConeT(len(bounds))], settings).solve().x
+    )[:n]
 
 
 def main() -> None:
@@ -93,7 +103,9 @@ def main() -> None:
         y, asked = by_scipy(problem, start)
         after = time.process_time()
         theirs = problem.evaluate(y)
-        rows.append((between - began, ours.violation, ours.value, after - between, -theirs.margins.min(), theirs.value, asked))
+        rows.append(
+            (between - began, ours.violation, ours.value, after - between, -theirs.margins.min(), theirs.value, asked)
+        )
         point = problem.evaluate(start)
         near = np.flatnonzero(point.margins < 1.5)
         gradient, jacobian = point.slopes(near)
@@ -105,9 +117,15 @@ def main() -> None:
     table = np.array(rows)
     for name, (seconds, violation, value) in (("own SQP", table[:, :3].T), ("SLSQP", table[:, 3:6].T)):
         kept = violation <= KEPT
-        print(f"{name}: {1e3 * np.mean(seconds):.0f} ms a start, {kept.sum()} of {len(kept)} feasible, median {np.median(value[kept]):.4f}")
+        print(
+            f"{name}: {1e3 * np.mean(seconds):.0f} ms a start, {kept.sum()} of {len(kept)} feasible, median "
+            f"{np.median(value[kept]):.4f}"
+        )
     both = (table[:, 1] <= KEPT) & (table[:, 4] <= KEPT)
-    print(f"objective where both are feasible ({both.sum()}): {np.mean(table[both, 2]):.4f} and {np.mean(table[both, 5]):.4f}")
+    print(
+        f"objective where both are feasible ({both.sum()}): {np.mean(table[both, 2]):.4f} and "
+        f"{np.mean(table[both, 5]):.4f}"
+    )
     gaps = [float(np.abs(a - b).max()) for a, b in zip(steps[::2], steps[1::2], strict=True)]
     print(f"one quadratic step, largest difference to clarabel: median {np.median(gaps):.1e}, worst {max(gaps):.1e}")
     timed(chain)
@@ -126,7 +144,10 @@ def timed(chain: Chain) -> None:
         began = time.process_time()
         for _ in range(50):
             solve()
-        print(f"one quadratic step of {len(gradient)} unknowns, {len(near)} margins, {name}: {20 * (time.process_time() - began):.2f} ms")
+        print(
+            f"one quadratic step of {len(gradient)} unknowns, {len(near)} margins, {name}: "
+            f"{20 * (time.process_time() - began):.2f} ms"
+        )
 
 
 if __name__ == "__main__":

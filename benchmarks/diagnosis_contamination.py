@@ -1,4 +1,6 @@
-"""What a hidden fault does to the body that is identified from the session, and what is left of that once the named cause is accepted."""
+"""What a hidden fault does to the body that is identified from the session, and what is left of that once the named
+cause is accepted.
+"""
 
 import json
 from dataclasses import replace
@@ -21,9 +23,9 @@ def fault_free(scenario: Scenario) -> Scenario:
 
 
 def contamination(scenario: Scenario, result: SessionResult, found: SessionDiagnosis) -> dict[str, Any]:
-    """Return ``masses`` (12) kg: ``true``, of the ``table``, identified with the fault in the data (``sip_alone``), with the findings
-    ``accepted``, and in the same person's session without fault (``fault_free``); and ``table`` (6) N, N·m, what the table's body leaves of
-    the kept trials.
+    """Return ``masses`` (12) kg: ``true``, of the ``table``, identified with the fault in the data (``sip_alone``),
+    with the findings ``accepted``, and in the same person's session without fault (``fault_free``); and ``table`` (6)
+    N, N·m, what the table's body leaves of the kept trials.
     """
     clean = examined(fault_free(scenario)).identification
     bodies = {

@@ -1,4 +1,6 @@
-"""The part of docs/benchmarks/diagnosis.md on what accepting a cause gains: forces, moments of kept trials, and masses."""
+"""The part of docs/benchmarks/diagnosis.md on what accepting a cause gains: forces, moments of kept trials, and
+masses.
+"""
 
 import numpy as np
 from diagnosis_scores import Score, share
@@ -15,13 +17,23 @@ def gain_demands(issue: list[Score]) -> list[tuple[str, str, str]]:
     return [
         ("faults of the issue: named, so that a gain is measured", "", share("ci95" in one.gain for one in issue)),
         ("... interval of the gain excludes zero", "all", share(proven)),
-        (f"... error of the masses (kg) within {CLEAN:g} x of fault-free", "all", share(kg <= CLEAN for kg, _ in pairs) + back),
-        (f"... relative error of the masses within {CLEAN:g} x of fault-free", "all", share(part <= CLEAN for _, part in pairs)),
+        (
+            f"... error of the masses (kg) within {CLEAN:g} x of fault-free",
+            "all",
+            share(kg <= CLEAN for kg, _ in pairs) + back,
+        ),
+        (
+            f"... relative error of the masses within {CLEAN:g} x of fault-free",
+            "all",
+            share(part <= CLEAN for _, part in pairs),
+        ),
     ]
 
 
 def errors(one: Score, body: str) -> tuple[float, float]:
-    """Return the mean error of the twelve segment masses of a ``body``, kg, and relative to each segment's own; NaN where unknown."""
+    """Return the mean error of the twelve segment masses of a ``body``, kg, and relative to each segment's own; NaN
+    where unknown.
+    """
     masses = one.gain.get("masses", {})
     if body not in masses:
         return float("nan"), float("nan")
@@ -41,7 +53,8 @@ def gain_lines(issue: list[Score]) -> list[str]:
     if not judged:
         return []
     out = [
-        "Root mean square over the squats, mean of three channels: left by the table's body, by the body identified with the fault in the "
+        "Root mean square over the squats, mean of three channels: left by the table's body, by the body identified "
+        "with the fault in the "
         "data, and once the cause is accepted; 95 % interval of the share that accepting removes of the second.",
         "",
         "| hidden | person | verdict | force, N | moment, N·m | removed |",
@@ -51,7 +64,10 @@ def gain_lines(issue: list[Score]) -> list[str]:
         three = [np.array(one.gain[key]) for key in ("table", "before", "after") if one.gain.get(key)]
         force, moment = (" -> ".join(f"{_mean(rms[part]):.2f}" for rms in three) for part in (slice(0, 3), slice(3, 6)))
         low, high = one.gain["ci95"]
-        out.append(f"| {one.hidden[0]} | {one.subject} | {one.verdict} | {force} | {moment} | {100 * low:.0f} to {100 * high:.0f} % |")
+        out.append(
+            f"| {one.hidden[0]} | {one.subject} | {one.verdict} | {force} | {moment} | {100 * low:.0f} to "
+            f"{100 * high:.0f} % |"
+        )
     return out
 
 
@@ -61,8 +77,10 @@ def mass_lines(issue: list[Score]) -> list[str]:
     if not known:
         return []
     out = [
-        "Mean error of the twelve segment masses, in kg and relative to each segment's mass (the feet of 0.7 kg rule the latter); the last "
-        "column is the error with the cause accepted over that of the same person, movement and instruments without fault.",
+        "Mean error of the twelve segment masses, in kg and relative to each segment's mass (the feet of 0.7 kg rule "
+        "the latter); the last "
+        "column is the error with the cause accepted over that of the same person, movement and instruments without "
+        "fault.",
         "",
         "| hidden | person | table | with the fault | cause accepted | without fault | ratio kg, relative |",
         "|---|---|---|---|---|---|---|",

@@ -1,4 +1,6 @@
-"""The page docs/benchmarks/diagnosis.md and its figure from the scores of a run: every number with how many sessions it rests on."""
+"""The page docs/benchmarks/diagnosis.md and its figure from the scores of a run: every number with how many sessions
+it rests on.
+"""
 
 from collections import Counter
 from collections.abc import Callable
@@ -16,7 +18,9 @@ BAR = 10.0
 
 
 def page(scores: list[Score], *, run: str, figure: str, total: int) -> list[str]:
-    """Return the page as lines; ``run`` names the version that was measured, ``total`` is the number of sessions in the full list."""
+    """Return the page as lines; ``run`` names the version that was measured, ``total`` is the number of sessions in
+    the full list.
+    """
     groups: dict[str, list[Score]] = {}
     for one in scores:
         groups.setdefault(one.group, []).append(one)
@@ -40,17 +44,26 @@ def page(scores: list[Score], *, run: str, figure: str, total: int) -> list[str]
     head = [
         "# Diagnosis of hidden effects",
         "",
-        f"Protocol diagnosis (eight trials of ten seconds), {len(scores)} of the {total} sessions of the full list, virtual subjects, each "
-        f"written as C3D files, read, prepared, scaled, tracked and diagnosed through the public pipeline. Version {run}. Made by "
+        f"Protocol diagnosis (eight trials of ten seconds), {len(scores)} of the {total} sessions of the full list, "
+        f"virtual subjects, each "
+        f"written as C3D files, read, prepared, scaled, tracked and diagnosed through the public pipeline. Version "
+        f"{run}. Made by "
         "`benchmarks/bench_diagnosis.py`.",
-        f"Diagnosis of a session after reading and tracking: median {np.median(seconds):.1f} s of one processor, largest "
-        f"{np.max(seconds):.1f} s. Of that, what the movement alone decides (regressors, columns of all causes, limits) takes "
-        f"{np.median(seconds - after):.1f} s; what follows once forces are looked at: median {np.median(after):.1f} s, largest "
-        f"{np.max(after):.1f} s, at most {BAR:g} s in {share(after <= BAR)}. Two sessions were diagnosed at a time on two processors: a "
+        f"Diagnosis of a session after reading and tracking: median {np.median(seconds):.1f} s of one processor, "
+        f"largest "
+        f"{np.max(seconds):.1f} s. Of that, what the movement alone decides (regressors, columns of all causes, "
+        f"limits) takes "
+        f"{np.median(seconds - after):.1f} s; what follows once forces are looked at: median {np.median(after):.1f} "
+        f"s, largest "
+        f"{np.max(after):.1f} s, at most {BAR:g} s in {share(after <= BAR)}. Two sessions were diagnosed at a time on "
+        f"two processors: a "
         "session then takes half of these times on average.",
-        "What is hidden is made by `biodance/virtual_lab`, which cannot import the effects: raw samples, corners and labels for "
-        "instruments, a richer body (16 segments, soft tissue) for the person. The limit of a cause is what the diagnosis computes for "
-        "that very session: for joint centres and markers with what placing the joints by movement has repaired or taken up before; for a "
+        "What is hidden is made by `biodance/virtual_lab`, which cannot import the effects: raw samples, corners and "
+        "labels for "
+        "instruments, a richer body (16 segments, soft tissue) for the person. The limit of a cause is what the "
+        "diagnosis computes for "
+        "that very session: for joint centres and markers with what placing the joints by movement has repaired or "
+        "taken up before; for a "
         "longer thigh that of the knee's centre, because the static trial has measured the leg as a whole.",
     ]
     return [*head, *(line for title, lines in sections.items() if lines for line in ("", f"## {title}", *lines))]
@@ -74,7 +87,11 @@ def alone(one: Score) -> bool:
 
 def demands(groups: dict[str, list[Score]], singles: list[Score]) -> list[str]:
     """Return the table of demands."""
-    high, low, nulls, unknown, pairs = above(singles), below(singles), *(groups.get(g, []) for g in ("null", "unknown", "pair"))
+    high, low, nulls, unknown, pairs = (
+        above(singles),
+        below(singles),
+        *(groups.get(g, []) for g in ("null", "unknown", "pair")),
+    )
     told = [one for one in high if one.told >= TWICE]
     after = [one.seconds - one.planned for some in groups.values() for one in some if one.verdict != "crashed"]
     sizes = [one.size_error for one in high if np.isfinite(one.size_error)]
@@ -88,10 +105,18 @@ def demands(groups: dict[str, list[Score]], singles: list[Score]) -> list[str]:
             "",
             share(o.exact[0] and o.verdict[:5] == "named" for o in high),
         ),
-        ("... exact name, where also twice the size from which it is told from all others", "", share(one.exact[0] for one in told)),
+        (
+            "... exact name, where also twice the size from which it is told from all others",
+            "",
+            share(one.exact[0] for one in told),
+        ),
         ("... truth in the named set", ">= 95 %", share(one.within[0] for one in high)),
         ("... and nothing else named beside it", "", share(alone(one) for one in high)),
-        ("... error of the size, median", "<= 10 %", f"{100 * np.median(sizes):.0f} % of {len(sizes)}" if sizes else "none measured"),
+        (
+            "... error of the size, median",
+            "<= 10 %",
+            f"{100 * np.median(sizes):.0f} % of {len(sizes)}" if sizes else "none measured",
+        ),
         ("... 95 % interval covers", ">= 90 %", share(covered)),
         ("below the limit: wrong name", "<= 5 %", share(one.wrong for one in low)),
         ("no describing file: unexplained", ">= 90 %", share(one.verdict == "unexplained" for one in unknown)),
@@ -100,7 +125,11 @@ def demands(groups: dict[str, list[Score]], singles: list[Score]) -> list[str]:
         ("two causes: both in the sets", "", share(all(one.within) for one in pairs)),
         ("two causes: both named and nothing else", "", share(all(one.exact) and alone(one) for one in pairs)),
         *gain_demands(groups.get("issue", [])),
-        ("diagnosis within 10 s of one processor, after what the movement alone decides", "all", share(s <= BAR for s in after)),
+        (
+            "diagnosis within 10 s of one processor, after what the movement alone decides",
+            "all",
+            share(s <= BAR for s in after),
+        ),
         ("... time per session, two at a time on two processors", "all", share(s / 2 <= BAR for s in after)),
         (
             "sessions that gave no answer",
@@ -120,10 +149,14 @@ def cause_lines(singles: list[Score]) -> list[str]:
         cells = []
         for low, high in ((0.0, 1.0), (1.0, TWICE), (TWICE, np.inf)):
             some = [one for one in own if low <= one.ratio < high]
-            cells.append(f"{sum(o.exact[0] for o in some)} ({sum(o.within[0] for o in some)}) of {len(some)}" if some else "-")
+            cells.append(
+                f"{sum(o.exact[0] for o in some)} ({sum(o.within[0] for o in some)}) of {len(some)}" if some else "-"
+            )
         rest = [one for one in own if not np.isfinite(one.ratio)]
         if rest:
-            cells[2] += f"; without a limit {sum(o.exact[0] for o in rest)} ({sum(o.within[0] for o in rest)}) of {len(rest)}"
+            cells[2] += (
+                f"; without a limit {sum(o.exact[0] for o in rest)} ({sum(o.within[0] for o in rest)}) of {len(rest)}"
+            )
         out.append(f"| {' '.join(name).strip()} | {' | '.join(cells)} |")
     return out
 
@@ -177,7 +210,10 @@ def pair_lines(pairs: list[Score]) -> list[str]:
 
 def check_lines(discrete: list[Score]) -> list[str]:
     """Return what the checks named."""
-    return [f"- {one.hidden[0]}: {_said(one)}" + ("" if any(one.exact) or any(one.within) else " (not found)") for one in discrete]
+    return [
+        f"- {one.hidden[0]}: {_said(one)}" + ("" if any(one.exact) or any(one.within) else " (not found)")
+        for one in discrete
+    ]
 
 
 def real_lines(table: Path) -> list[str]:
@@ -185,9 +221,12 @@ def real_lines(table: Path) -> list[str]:
     if not table.is_file():
         return []
     return [
-        "Two persons who stand still for 3 s, one who walks over the plates with 1.7 s of measured contact; the fault is in every file of "
-        "the copy. Standing shows weights and places, no time; a fault below the limit that is computed for the recording stays unseen, as "
-        "it must. The walk's markers lie 2.5 times as far from the body as where tolerances were learned, so nothing is named from it. "
+        "Two persons who stand still for 3 s, one who walks over the plates with 1.7 s of measured contact; the fault "
+        "is in every file of "
+        "the copy. Standing shows weights and places, no time; a fault below the limit that is computed for the "
+        "recording stays unseen, as "
+        "it must. The walk's markers lie 2.5 times as far from the body as where tolerances were learned, so nothing "
+        "is named from it. "
         "Made by `benchmarks/bench_real_faults.py`.",
         "",
         *table.read_text().splitlines(),
@@ -196,7 +235,11 @@ def real_lines(table: Path) -> list[str]:
 
 def crash_lines(scores: list[Score]) -> list[str]:
     """Return the sessions that gave no answer and why."""
-    return [f"- {one.key} ({' with '.join(one.hidden) or 'no fault'}): {one.note}" for one in scores if one.verdict == "crashed"]
+    return [
+        f"- {one.key} ({' with '.join(one.hidden) or 'no fault'}): {one.note}"
+        for one in scores
+        if one.verdict == "crashed"
+    ]
 
 
 def null_lines(nulls: list[Score]) -> list[str]:
@@ -204,9 +247,14 @@ def null_lines(nulls: list[Score]) -> list[str]:
     if not nulls:
         return []
     people = len({one.subject for one in nulls})
-    alarms = [f"- {one.key}: {_said(one)}, worst {one.worst[0]} z = {one.worst[1]:.1f}" for one in nulls if not one.silent]
+    alarms = [
+        f"- {one.key}: {_said(one)}, worst {one.worst[0]} z = {one.worst[1]:.1f}" for one in nulls if not one.silent
+    ]
     worst = np.array([one.worst[1] for one in nulls])
-    what = f"{len(nulls)} sessions of {people} persons; z of what is left: median {np.median(worst):.1f}, largest {worst.max():.1f}."
+    what = (
+        f"{len(nulls)} sessions of {people} persons; z of what is left: median {np.median(worst):.1f}, largest "
+        f"{worst.max():.1f}."
+    )
     return [what, "", *alarms] if alarms else [what]
 
 
@@ -233,7 +281,13 @@ def draw(scores: list[Score], path: Path) -> None:
     for (row, column), count in np.ndenumerate(table):
         if count:
             axes.text(
-                column, row, f"{count:.0f}", ha="center", va="center", color="white" if share_of[row, column] > 0.6 else "black", size=8
+                column,
+                row,
+                f"{count:.0f}",
+                ha="center",
+                va="center",
+                color="white" if share_of[row, column] > 0.6 else "black",
+                size=8,
             )
     axes.set_xticks(range(len(columns)), [c.replace("_", " ") for c in columns], rotation=60, ha="right", size=8)
     axes.set_yticks(range(len(rows)), [r.replace("_", " ") for r in rows], size=8)

@@ -1,4 +1,6 @@
-"""What a diagnosis is worth, given what was hidden: one `Score` a session, stored as JSON so that a run that was stopped goes on."""
+"""What a diagnosis is worth, given what was hidden: one `Score` a session, stored as JSON so that a run that was
+stopped goes on.
+"""
 
 import json
 import os
@@ -29,11 +31,12 @@ SIGMAS = 1.959964
 class Score:
     """One session judged.
 
-    ``names`` what was named, in order, ``sets`` the sets; ``exact``, ``within`` per hidden cause: named as such, in a set; ``ratio`` size
-    over the limit that this session computed for it, ``told`` over the size from which it is told from the others (NaN = not computed);
-    ``size_error`` relative, ``covered`` by the 95 % interval (NaN, None = no size to compare); ``gain`` as in the JSON, with the errors of
-    the masses; ``seconds`` of the processor, ``planned`` of them for what the movement alone decides, before any force is looked at;
-    ``verdict`` "crashed" where there is no answer, ``note`` says why.
+    ``names`` what was named, in order, ``sets`` the sets; ``exact``, ``within`` per hidden cause: named as such, in a
+    set; ``ratio`` size over the limit that this session computed for it, ``told`` over the size from which it is told
+    from the others (NaN = not computed); ``size_error`` relative, ``covered`` by the 95 % interval (NaN, None = no size
+    to compare); ``gain`` as in the JSON, with the errors of the masses; ``seconds`` of the processor, ``planned`` of
+    them for what the movement alone decides, before any force is looked at; ``verdict`` "crashed" where there is no
+    answer, ``note`` says why.
     """
 
     key: str
@@ -74,7 +77,9 @@ def share(hits: Iterable[bool]) -> str:
 
 
 def judge(scenario: Scenario, *, absent: bool = False) -> Score:
-    """Diagnose a session and judge the answer; ``absent`` takes the files of the hidden causes out of the family of effects first."""
+    """Diagnose a session and judge the answer; ``absent`` takes the files of the hidden causes out of the family of
+    effects first.
+    """
     result = examined(scenario)
     gone = {name for names in truth(scenario) for name, _ in names} if absent else set()
     left = {name: kind for name, kind in {**effects(), **discrete_effects()}.items() if name not in gone}
@@ -94,7 +99,9 @@ def judge(scenario: Scenario, *, absent: bool = False) -> Score:
 
 
 class Clock:
-    """Processor time of the first calls of some functions: what they make of the movement and the table could be made before a session."""
+    """Processor time of the first calls of some functions: what they make of the movement and the table could be
+    made before a session.
+    """
 
     def __init__(self) -> None:
         self.seconds = 0.0
@@ -126,8 +133,10 @@ def score(scenario: Scenario, found: Diagnosis, seconds: float, *, group: str, h
     error, covered = _size(scenario, found.findings, wanted[0]) if len(wanted) == 1 else (float("nan"), None)
     worst = found.adequacy[0] if found.adequacy else None
     return Score(
-        scenario.key, group, scenario.level, scenario.subject, scenario.hidden, found.verdict, names, sets, exact, within, ratio, told,
-        error, covered, (f"{worst.channel} {worst.band_hz[0]:g}-{worst.band_hz[1]:g} Hz", worst.z) if worst else ("", 0.0), seconds,
+        scenario.key, group, scenario.level, scenario.subject, scenario.hidden, found.verdict, names, sets, exact,
+        within, ratio, told,
+        error, covered, (f"{worst.channel} {worst.band_hz[0]:g}-{worst.band_hz[1]:g} Hz", worst.z) if worst else ("",
+        0.0), seconds,
         gain=harm | _gain(found.findings),
     )  # fmt: skip
 
@@ -138,7 +147,11 @@ def _ratio(scenario: Scenario, found: Diagnosis) -> tuple[float, float]:
         return float("nan"), float("nan")
     same, size = truth(scenario)[0], _hidden_size(scenario.hidden[0])
     counts = MEASURED.get(parse_cause(scenario.hidden[0]).name)
-    rows = [row for row in found.limits if _is_among((row.effect, row.target), same) and row.effect == (counts or row.effect)]
+    rows = [
+        row
+        for row in found.limits
+        if _is_among((row.effect, row.target), same) and row.effect == (counts or row.effect)
+    ]
     if not rows or size is None:
         return float("nan"), float("nan")
     return size[1] / min(row.limit for row in rows), size[1] / min(row.told_from for row in rows)
@@ -158,7 +171,9 @@ def _hidden_size(text: str) -> tuple[str, float] | None:
 
 
 def _size(scenario: Scenario, findings: tuple[Finding, ...], same: set[Name]) -> tuple[float, bool | None]:
-    """Return relative error of the size and whether the interval covers it, where the cause was named and has that parameter."""
+    """Return relative error of the size and whether the interval covers it, where the cause was named and has that
+    parameter.
+    """
     found = measured(scenario, findings, same)
     if found is None:
         return float("nan"), None
@@ -167,7 +182,9 @@ def _size(scenario: Scenario, findings: tuple[Finding, ...], same: set[Name]) ->
 
 
 def measured(scenario: Scenario, findings: tuple[Finding, ...], same: set[Name]) -> tuple[float, float, float] | None:
-    """Return size found, its standard deviation and the true size; None where the cause was not named or has no such parameter."""
+    """Return size found, its standard deviation and the true size; None where the cause was not named or has no such
+    parameter.
+    """
     size = _hidden_size(scenario.hidden[0])
     for finding in findings:
         if size is None or (finding.effect, finding.target) not in same or scenario.group == "discrete":
@@ -188,7 +205,11 @@ def _gain(findings: tuple[Finding, ...]) -> dict[str, Any]:
     if not findings or findings[0].gain is None:
         return {}
     one = findings[0].gain
-    return {"before": list(map(float, one.rms_before)), "after": list(map(float, one.rms_after)), "ci95": list(map(float, one.ci95))}
+    return {
+        "before": list(map(float, one.rms_before)),
+        "after": list(map(float, one.rms_after)),
+        "ci95": list(map(float, one.ci95)),
+    }
 
 
 def stored(scenario: Scenario, run: str, *, absent: bool = False) -> Score | None:
@@ -203,7 +224,8 @@ def stored(scenario: Scenario, run: str, *, absent: bool = False) -> Score | Non
 
 
 def judged(scenario: Scenario, run: str, *, absent: bool = False) -> Score | None:
-    """Return the score of a session in this ``run``, made now if it is not there; None where another process is making it.
+    """Return the score of a session in this ``run``, made now if it is not there; None where another process is making
+    it.
 
     An error of any kind is a score that says so: one session never stops the others.
     """
@@ -213,7 +235,9 @@ def judged(scenario: Scenario, run: str, *, absent: bool = False) -> Score | Non
     try:
         found = judge(scenario, absent=absent)
     except Exception as error:
-        found = crashed(scenario, f"{type(error).__name__}: {error}"[:300], group="absent" if absent else scenario.group)
+        found = crashed(
+            scenario, f"{type(error).__name__}: {error}"[:300], group="absent" if absent else scenario.group
+        )
     finally:
         if found is not None:
             part = path.with_suffix(f".{os.getpid()}")
@@ -227,13 +251,16 @@ def crashed(scenario: Scenario, why: str, *, group: str) -> Score:
     """Return the score of a session that gave no answer."""
     nan, none = float("nan"), tuple(False for _ in scenario.hidden)
     return Score(
-        scenario.key, group, scenario.level, scenario.subject, scenario.hidden, "crashed", (), (), none, none, nan, nan, nan, None,
+        scenario.key, group, scenario.level, scenario.subject, scenario.hidden, "crashed", (), (), none, none, nan,
+        nan, nan, None,
         ("", 0.0), 0.0, note=why,
     )  # fmt: skip
 
 
 def claimed(path: Path) -> bool:
-    """Return whether this process may make the score at ``path``: the first to write its number beside it may, or one after it ended."""
+    """Return whether this process may make the score at ``path``: the first to write its number beside it may, or
+    one after it ended.
+    """
     claim = path.with_suffix(".claim")
     claim.parent.mkdir(parents=True, exist_ok=True)
     try:

@@ -1,7 +1,8 @@
-"""Run by bench_identification_peers.py with the Python of a virtual environment that holds figaroh 1.0.2; imports nothing of biodance.
+"""Run by bench_identification_peers.py with the Python of a virtual environment that holds figaroh 1.0.2; imports
+nothing of biodance.
 
-Reads problem.npz (W (m, p) with rows in time, wrench (m,), prior (p,), segments; q, v, a of some frames) and model.urdf; writes
-answer.json.
+Reads problem.npz (W (m, p) with rows in time, wrench (m,), prior (p,), segments; q, v, a of some frames) and
+model.urdf; writes answer.json.
 """
 
 import json

@@ -1,4 +1,6 @@
-"""A visit with what identification needs of it, from the cache while the code of identify/ on which it depends is unchanged."""
+"""A visit with what identification needs of it, from the cache while the code of identify/ on which it depends is
+unchanged.
+"""
 
 import hashlib
 import pickle
@@ -42,8 +44,12 @@ SOURCES = ("statistics", "learning", "loads", "mismatch")
 """Modules of identify/ on which what is gathered depends, beside all of uncertainty/ and its table."""
 
 
-def gather(subject: Subject, protocol: str, seed: int, *, session: int = 0, load: tuple[str, float] | None = None) -> Gathered:
-    """Return the statistics, the noise and the disturbances of a visit, from the cache while their code is unchanged."""
+def gather(
+    subject: Subject, protocol: str, seed: int, *, session: int = 0, load: tuple[str, float] | None = None
+) -> Gathered:
+    """Return the statistics, the noise and the disturbances of a visit, from the cache while their code is
+    unchanged.
+    """
     folder = Path(biodance.identify.__file__).parent
     room, table = folder.parent / "uncertainty", locate("anthropometry/uncertainty", "sizes", ".csv")
     parts = [*(folder / f"{name}.py" for name in SOURCES), *sorted(room.glob("*.py")), table]

@@ -1,7 +1,9 @@
-"""What is hidden in which session: nulls, every cause at three sizes, pairs, discrete faults, effects that no file describes.
+"""What is hidden in which session: nulls, every cause at three sizes, pairs, discrete faults, effects that no file
+describes.
 
-``SINGLE`` gives every cause in words, with the size ``{a}`` near the limit that the diagnosis computes for this protocol; sessions hide
-0.45, 1 and 3 times that. Whether a session lies below or above its own limit is decided by the limit of that very session.
+``SINGLE`` gives every cause in words, with the size ``{a}`` near the limit that the diagnosis computes for this
+protocol; sessions hide 0.45, 1 and 3 times that. Whether a session lies below or above its own limit is decided by the
+limit of that very session.
 """
 
 from dataclasses import dataclass
@@ -14,7 +16,9 @@ Name = tuple[str, str]
 
 @dataclass(frozen=True)
 class Cause:
-    """One cause in words; ``limit`` the reference size; ``alike`` other names of the same thing, which count as the truth."""
+    """One cause in words; ``limit`` the reference size; ``alike`` other names of the same thing, which count as the
+    truth.
+    """
 
     words: str
     limit: float
@@ -63,7 +67,8 @@ SINGLE = (
     Cause("wobbling_mass:target=trunk_head,mass={a}", 1.5),
     Cause("joint_centre:target=right_hip,shift={a};0;0", 0.027),
     Cause("joint_centre:target=right_shoulder,shift=0;0;{a}", 0.018),
-    Cause("segment_length:target=right_thigh,error={a}", 0.0105, (("joint_centre", "right_knee"), ("segment_length", "right_shank"))),
+    Cause("segment_length:target=right_thigh,error={a}", 0.0105, (("joint_centre", "right_knee"), ("segment_length",
+    "right_shank"))),
     Cause("marker_misplaced:target=RKNE,shift={a};0;0", 0.02),
     Cause("marker_misplaced:target=LSHO,shift={a};0;0", 0.02),
     Cause("head_joint:angle={a}", 0.076),
@@ -73,7 +78,9 @@ SINGLE = (
 FILTERS = {"below": 8.5, "at": 7.5, "above": 4.0}
 """Hz; a lower cut-off is a larger fault."""
 MEASURED = {"segment_length": "joint_centre"}
-"""Cause whose limit counts instead: the static trial has measured the whole leg, so a longer thigh is a knee that lies elsewhere."""
+"""Cause whose limit counts instead: the static trial has measured the whole leg, so a longer thigh is a knee that
+lies elsewhere.
+"""
 SAME = {"dropped_frames": (("frame_rate", ""),)}
 """Names of the check that finds a fault which has no file of its own."""
 PAIRS = (
@@ -101,11 +108,13 @@ UNKNOWN = {
 DISCRETE = (
     "unit_error:factor=4.448", "axis_error:target=Fx", "axis_error:target=My", "clipping:target=Fz,limit=700",
     "mains_hum:target=Fz,amplitude=15",
-    "labels_swapped:target=LKNE/RKNE", "labels_swapped:target=RWRA/RWRB", "frame_rate:ratio=1.2", "dropped_frames:count=12",
+    "labels_swapped:target=LKNE/RKNE", "labels_swapped:target=RWRA/RWRB", "frame_rate:ratio=1.2",
+    "dropped_frames:count=12",
 )  # fmt: skip
 ISSUE = (
     "time_delay:delay=0.02", "plate_gain:target=Fz,gain=0.04", "plate_rotation:target=plate1:z,angle=0.0698132",
-    "plate_position:target=plate1:x,shift=0.02", "plate_offset:target=Fz,offset=20", "added_mass:target=left_forearm_hand,mass=2.4",
+    "plate_position:target=plate1:x,shift=0.02", "plate_offset:target=Fz,offset=20",
+    "added_mass:target=left_forearm_hand,mass=2.4",
 )  # fmt: skip
 """The faults whose gain the issue asks for."""
 
@@ -124,7 +133,9 @@ def singles(level: str, subjects: tuple[int, ...]) -> list[Scenario]:
     """Return every cause at one level."""
     out = []
     for i in subjects:
-        texts = [cause.text(LEVELS[level] * cause.limit) for cause in SINGLE] + [f"filter_mismatch:cutoff={FILTERS[level]:g}"]
+        texts = [cause.text(LEVELS[level] * cause.limit) for cause in SINGLE] + [
+            f"filter_mismatch:cutoff={FILTERS[level]:g}"
+        ]
         out += [Scenario("single", **person(i), hidden=(text,), level=level) for text in texts]
     return out
 
@@ -152,12 +163,18 @@ def mixed(*parts: list[Scenario]) -> list[Scenario]:
 
 
 def everything() -> list[Scenario]:
-    """Return the full set in waves, each a sample of the whole, so that a run that was stopped has seen of everything."""
+    """Return the full set in waves, each a sample of the whole, so that a run that was stopped has seen of
+    everything.
+    """
     waves = [
         mixed(nulls(visits=range(1)), singles("above", (0,)), others((0,))),
         mixed(nulls(visits=range(1, 3)), singles("above", (1,)), singles("below", (0,)), others((1,))),
-        mixed(nulls(visits=range(3, 5)), singles("above", (2,)), singles("below", (1,)), singles("at", (0,)), others((2,))),
-        mixed(nulls(visits=range(5, 6)), singles("above", (3,)), singles("below", (2,)), singles("at", (1,)), others((3,))),
+        mixed(
+            nulls(visits=range(3, 5)), singles("above", (2,)), singles("below", (1,)), singles("at", (0,)), others((2,))
+        ),
+        mixed(
+            nulls(visits=range(5, 6)), singles("above", (3,)), singles("below", (2,)), singles("at", (1,)), others((3,))
+        ),
         mixed(singles("at", (2, 3)), singles("below", (3,))),
     ]
     return [scenario for wave in waves for scenario in wave]

@@ -1,7 +1,8 @@
-"""Sessions with something hidden in them, cached on disk: simulate -> C3D -> read -> prepare -> scale -> track, each done once.
+"""Sessions with something hidden in them, cached on disk: simulate -> C3D -> read -> prepare -> scale -> track, each
+done once.
 
-Used by bench_diagnosis.py. The cache is a folder (BIODANCE_CACHE, or biodance_diagnosis in the temporary directory); what is there is not
-made again, so that a run that was stopped goes on where it stopped.
+Used by bench_diagnosis.py. The cache is a folder (BIODANCE_CACHE, or biodance_diagnosis in the temporary directory);
+what is there is not made again, so that a run that was stopped goes on where it stopped.
 """
 
 import copyreg
@@ -52,8 +53,9 @@ copyreg.pickle(MappingProxyType, lambda mapping: (read_only, (dict(mapping),)))
 
 @dataclass(frozen=True)
 class Scenario:
-    """One session: catalogue number of the ``subject``, ``seed`` of the person, number of the ``visit``, causes ``hidden`` in words, and
-    what for: ``group`` and ``level``. Only the group "issue" has the squats that gains are judged on.
+    """One session: catalogue number of the ``subject``, ``seed`` of the person, number of the ``visit``, causes
+    ``hidden`` in words, and what for: ``group`` and ``level``. Only the group "issue" has the squats that gains are
+    judged on.
     """
 
     group: str
@@ -69,7 +71,8 @@ class Scenario:
         if not self.hidden:
             return f"{self.group}-{self.subject:02d}-{self.visit}"
         said = f"{self.subject}-{self.seed}-{self.visit}-{self.judged}-{'+'.join(self.hidden)}"
-        return f"{'+'.join(text.partition(':')[0] for text in self.hidden)}-{hashlib.sha256(said.encode()).hexdigest()[:10]}"
+        names = "+".join(text.partition(":")[0] for text in self.hidden)
+        return f"{names}-{hashlib.sha256(said.encode()).hexdigest()[:10]}"
 
     @property
     def judged(self) -> bool:
@@ -119,7 +122,9 @@ def examined(scenario: Scenario) -> SessionResult:
 
 
 class Memory(dict[str, object]):
-    """What was computed in this process, forgotten as a whole when it grows too large: sessions of one person come one after another."""
+    """What was computed in this process, forgotten as a whole when it grows too large: sessions of one person come
+    one after another.
+    """
 
     def recall(self, said: object, make: Callable[[], object]) -> object:
         """Return what belongs to ``said``, made now if it is not there."""
@@ -143,7 +148,12 @@ def _placed(scaling: Scaling, read: tuple[Prepared, ...]) -> Scaling:
 
 def _tracked(body: Body, trial: Trial) -> Motion:
     assert trial.markers is not None
-    said = (trial.name, trial.markers.xyz.tobytes(), np.asarray(body.markers.position).tobytes(), body.sip.phi.tobytes())
+    said = (
+        trial.name,
+        trial.markers.xyz.tobytes(),
+        np.asarray(body.markers.position).tobytes(),
+        body.sip.phi.tobytes(),
+    )
     return MOTIONS.recall(said, lambda: track(body, trial))  # type: ignore[return-value]
 
 

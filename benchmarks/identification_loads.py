@@ -22,7 +22,9 @@ from biodance.virtual_lab.merge import MERGED
 
 
 def loads_table(reference: Identification, later: Gathered) -> list[Load]:
-    """Return for every segment and load what is found with the reference and without, at the noise of the unloaded session."""
+    """Return for every segment and load what is found with the reference and without, at the noise of the unloaded
+    session.
+    """
     extra = _with_loads(later)
     kinds = [(segment, mass) for segment in MERGED for mass in LOADS]
     return [_load(reference, later, _combined(later, extra, segment, mass), segment, mass) for segment, mass in kinds]
@@ -50,7 +52,9 @@ def _place_in_model(one: TrackedVisit, s: int) -> Array:
 
 
 def _place(one: TrackedVisit, s: int) -> Array:
-    """Return where a load sits, in the true joint frame: 6 cm outwards of the true CoM of a segment (trunk, pelvis: 10 cm behind)."""
+    """Return where a load sits, in the true joint frame: 6 cm outwards of the true CoM of a segment (trunk, pelvis:
+    10 cm behind).
+    """
     away = {"r": (0.0, 0.0, 0.06), "l": (0.0, 0.0, -0.06)}.get(tuple(MERGED)[s][0], (-0.10, 0.0, 0.0))
     own = one.true_own.reshape(-1, 10)[s]
     return own[1:4] / own[0] + away
@@ -66,7 +70,9 @@ def _with_loads(got: Gathered) -> Statistics:
         for pick in layout.bands.runs(fit.use, fit.motion.rate):
             part = Motion(fit.motion.time[pick], fit.motion.q[pick], fit.motion.v[pick], fit.motion.a[pick])
             W = regressor_of(segment_motion(one.body, part), gravity=one.body.gravity)
-            X = layout.bands.coefficients(layout.shift @ np.concatenate([W, unit[pick], fit.wrench.value[pick][:, :, None]], axis=2))
+            X = layout.bands.coefficients(
+                layout.shift @ np.concatenate([W, unit[pick], fit.wrench.value[pick][:, :, None]], axis=2)
+            )
             band = layout.bands.of(len(X))
             for b in np.unique(band[band >= 0]):
                 flat = X[band == b].reshape(-1, 6 * (p + 1))
@@ -86,7 +92,9 @@ def _unit_wrench(one: TrackedVisit, fit: Fit, s: int) -> Array:
 
 
 def _combined(later: Gathered, extra: Statistics, segment: str, mass: float) -> Statistics:
-    """Return the statistics with ``mass`` kg on ``segment``: y + mass times its unit wrench; ``extra`` from `_with_loads`."""
+    """Return the statistics with ``mass`` kg on ``segment``: y + mass times its unit wrench; ``extra`` from
+    `_with_loads`.
+    """
     count, s = len(later.visit.body.segments), later.visit.body.segment_index(segment)
     p = 10 * count
     turn = np.zeros((p + count + 1, p + 1))

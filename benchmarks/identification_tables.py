@@ -1,4 +1,6 @@
-"""Tables of docs/benchmarks/identification.md, from what bench_identification.py measured; means, medians and shares only."""
+"""Tables of docs/benchmarks/identification.md, from what bench_identification.py measured; means, medians and shares
+only.
+"""
 
 from dataclasses import dataclass
 
@@ -18,9 +20,9 @@ ARM = ("left_forearm_hand", 2.4)
 class Row:
     """Everything measured on one subject's dance.
 
-    ``error`` and ``squat`` by name of the estimate; ``cover`` (120,) in the model's frames, ``cover_own`` about the true joint centres;
-    ``known`` (120,) verdict other than "cannot be known"; ``torque`` by "table", "identified" RMS error (n,) N·m in the squats and
-    ``torque_cover`` (n,) share of frames whose band holds the true torque.
+    ``error`` and ``squat`` by name of the estimate; ``cover`` (120,) in the model's frames, ``cover_own`` about the
+    true joint centres; ``known`` (120,) verdict other than "cannot be known"; ``torque`` by "table", "identified" RMS
+    error (n,) N·m in the squats and ``torque_cover`` (n,) share of frames whose band holds the true torque.
     """
 
     error: dict[str, Array]
@@ -55,19 +57,25 @@ def accuracy_lines(rows: list[Row]) -> list[str]:
     for name in ("table", "identified", "paper"):
         e = np.array([r.error[name] for r in rows])
         bad = np.mean([r.unphysical[name] for r in rows])
-        out.append(f"| {name} | {e[..., 0].mean():.3f} | {e[..., 1].mean():.1f} | {np.median(e[..., 2]):.0f} (median) | {bad:.1f} of 12 |")
+        out.append(
+            f"| {name} | {e[..., 0].mean():.3f} | {e[..., 1].mean():.1f} | {np.median(e[..., 2]):.0f} (median) | "
+            f"{bad:.1f} of 12 |"
+        )
     ratio = np.array([r.error["paper"].mean(axis=0) / r.error["identified"].mean(axis=0) for r in rows])
     gain = np.array([r.error["table"].mean(axis=0) / r.error["identified"].mean(axis=0) for r in rows])
     out += [
         "",
-        f"Paper's programme over ours, median of subjects: mass {np.median(ratio[:, 0]):.1f} x, CoM {np.median(ratio[:, 1]):.1f} x, "
-        f"inertia {np.median(ratio[:, 2]):.1f} x. Table over ours: mass {np.median(gain[:, 0]):.2f} x, CoM {np.median(gain[:, 1]):.2f} x, "
+        f"Paper's programme over ours, median of subjects: mass {np.median(ratio[:, 0]):.1f} x, CoM "
+        f"{np.median(ratio[:, 1]):.1f} x, "
+        f"inertia {np.median(ratio[:, 2]):.1f} x. Table over ours: mass {np.median(gain[:, 0]):.2f} x, CoM "
+        f"{np.median(gain[:, 1]):.2f} x, "
         f"inertia {np.median(gain[:, 2]):.2f} x.",
     ]
     status = [r.status for r in rows]
     out.append(
         f"Solved: ours {sum(a == 'solved' for a, _ in status)} of {len(rows)}; the paper's programme "
-        f"{sum(b == 'solved' for _, b in status)} with its equalities, {sum(b == 'solved without equalities' for _, b in status)} without."
+        f"{sum(b == 'solved' for _, b in status)} with its equalities, "
+        f"{sum(b == 'solved without equalities' for _, b in status)} without."
     )
     out += ["", *SEGMENT_HEAD]
     for s, segment in enumerate(MERGED):
@@ -85,7 +93,10 @@ def accuracy_lines(rows: list[Row]) -> list[str]:
 def coverage_lines(rows: list[Row]) -> list[str]:
     """Return the table of coverage of the 95 % intervals."""
     out = ["| truth | all | masses | first moments | inertias |", "|---|---|---|---|---|"]
-    for words, cover in (("in the model's frames", [r.cover for r in rows]), ("about the true joint centres", [r.cover_own for r in rows])):
+    for words, cover in (
+        ("in the model's frames", [r.cover for r in rows]),
+        ("about the true joint centres", [r.cover_own for r in rows]),
+    ):
         c = np.array(cover).reshape(-1, 10)
         out.append(
             f"| {words} | {100 * c.mean():.1f} % "
@@ -93,7 +104,8 @@ def coverage_lines(rows: list[Row]) -> list[str]:
         )
     out += [
         "",
-        f"Share of the table's variance that the data remove, mean over parameters: {100 * np.mean([r.from_data for r in rows]):.0f} %.",
+        f"Share of the table's variance that the data remove, mean over parameters: "
+        f"{100 * np.mean([r.from_data for r in rows]):.0f} %.",
     ]
     return out
 
@@ -101,7 +113,8 @@ def coverage_lines(rows: list[Row]) -> list[str]:
 def squat_lines(rows: list[Row]) -> list[str]:
     """Return the table of the squats that were not fitted."""
     norm = {
-        n: np.array([[np.sqrt(np.mean(r.squat[n][:3] ** 2)), np.sqrt(np.mean(r.squat[n][3:] ** 2))] for r in rows]) for n in rows[0].squat
+        n: np.array([[np.sqrt(np.mean(r.squat[n][:3] ** 2)), np.sqrt(np.mean(r.squat[n][3:] ** 2))] for r in rows])
+        for n in rows[0].squat
     }
     out = ["| body | force, N (median) | moment, N·m (median) | Fx Fy Fz Mx My Mz (mean) |", "|---|---|---|---|"]
     for name, v in norm.items():
@@ -141,9 +154,11 @@ def pair_lines(nulls: list[LoadSearch], arms: list[Load]) -> list[str]:
     inside = [x.interval[0] <= ARM[1] <= x.interval[1] for x in own]
     place = np.array([1e3 * np.linalg.norm(x.place - a[4]) for x, a in zip(own, arms, strict=True)])
     return [
-        f"- Unloaded pairs: {alarms} false alarms in {len(nulls)}; p of no load: median {np.median(p):.3f}, smallest {p.min():.3f}.",
+        f"- Unloaded pairs: {alarms} false alarms in {len(nulls)}; p of no load: median {np.median(p):.3f}, smallest "
+        f"{p.min():.3f}.",
         f"- 2.4 kg on the left forearm: right segment in {sum(right)} of {len(arms)}; "
-        f"error of the mass: median {np.median(abs(error)):.3f} kg, mean {error.mean():+.3f}, largest {abs(error).max():.2f} kg; "
+        f"error of the mass: median {np.median(abs(error)):.3f} kg, mean {error.mean():+.3f}, largest "
+        f"{abs(error).max():.2f} kg; "
         f"the 95 % interval covers in {sum(inside)} of {len(inside)}; place: median {np.median(place):.0f} mm off.",
     ]
 
@@ -166,19 +181,28 @@ def load_lines(table: list[Load]) -> list[str]:
             alone, there = sum(t.found for _, t in those), sum(t.found and t.best.segment == segment for _, t in those)
             among = sum(segment in t.set for _, t in those)
             out.append(
-                f"| {segment} | {mass:g} | {found}/{n}, {hit}/{n}, {size:.2f}, {covers}/{n} | {alone}/{n}, {there}/{n}, {among}/{n} |"
+                f"| {segment} | {mass:g} | {found}/{n}, {hit}/{n}, {size:.2f}, {covers}/{n} | {alone}/{n}, "
+                f"{there}/{n}, {among}/{n} |"
             )
     return out
 
 
 def torque_lines(rows: list[Row]) -> list[str]:
-    """Return how far the torques of the kept squats are from those of the true parameters, and how often the bands hold them."""
+    """Return how far the torques of the kept squats are from those of the true parameters, and how often the bands
+    hold them.
+    """
     out = ["| joint | RMS error N·m: table, identified | band covers |", "|---|---|---|"]
     for j, name in enumerate(rows[0].joints):
         size = [np.sqrt(np.mean([r.torque[n][j] ** 2 for r in rows])) for n in ("table", "identified")]
-        out.append(f"| {name} | {size[0]:.2f} {size[1]:.2f} | {100 * np.mean([r.torque_cover[j] for r in rows]):.0f} % |")
+        out.append(
+            f"| {name} | {size[0]:.2f} {size[1]:.2f} | {100 * np.mean([r.torque_cover[j] for r in rows]):.0f} % |"
+        )
     cover = 100 * np.mean([r.torque_cover for r in rows])
-    return [*out, "", f"All joints: {cover:.1f} % of the true torques lie in their 95 % bands (same kinematics and ground wrenches)."]
+    return [
+        *out,
+        "",
+        f"All joints: {cover:.1f} % of the true torques lie in their 95 % bands (same kinematics and ground wrenches).",
+    ]
 
 
 def standing_lines(found: list[Identification]) -> list[str]:
@@ -189,6 +213,7 @@ def standing_lines(found: list[Identification]) -> list[str]:
     ratio = np.median([k.sd / k.table_sd for k in kept])
     return [
         "Of 120 quantities: "
-        f"{', '.join(f'{n:.0f} {w}' for n, w in zip(counts.mean(axis=0), words, strict=True))}; where it cannot know, the "
+        f"{', '.join(f'{n:.0f} {w}' for n, w in zip(counts.mean(axis=0), words, strict=True))}; where it cannot know, "
+        f"the "
         f"interval is {ratio:.2f} of the table's (median)."
     ]

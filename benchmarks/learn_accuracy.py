@@ -1,11 +1,13 @@
-"""Learn how far the sizes of named causes are from the truth: writes [accuracy] of anthropometry/uncertainty/null_sessions.toml anew.
+"""Learn how far the sizes of named causes are from the truth: writes [accuracy] of
+anthropometry/uncertainty/null_sessions.toml anew.
 
     python benchmarks/learn_accuracy.py [--minutes 30] [--out anthropometry/uncertainty/null_sessions.toml] [--prepare]
 
-Every cause at three times its limit is hidden in sessions of two persons whom no other benchmark uses. No real fault is quite like the
-model that is fitted to it (a joint's course, a rope's angle), so a size errs by a share of itself, beyond what noise explains. The share of
-an effect is that of its own sessions and, counted once, of all; widened as Student's t is, since there are few. What was measured is kept
-(`hidden_sessions.CACHE`, folder accuracy: remove it when the diagnosis changes), and two processes may run at once: the last writes.
+Every cause at three times its limit is hidden in sessions of two persons whom no other benchmark uses. No real fault is
+quite like the model that is fitted to it (a joint's course, a rope's angle), so a size errs by a share of itself,
+beyond what noise explains. The share of an effect is that of its own sessions and, counted once, of all; widened as
+Student's t is, since there are few. What was measured is kept (`hidden_sessions.CACHE`, folder accuracy: remove it when
+the diagnosis changes), and two processes may run at once: the last writes.
 """
 
 import argparse
@@ -21,7 +23,7 @@ from hidden_causes import LEVELS, SINGLE, truth
 from hidden_sessions import CACHE, Scenario, examined
 from scipy.stats import t as student
 
-from biodance.diagnosis.diagnosis import SIGMAS
+from biodance.diagnosis.diagnosis import _SIGMAS
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.uncertainty.tolerances import read_tolerances, shipped, to_toml
 
@@ -41,7 +43,9 @@ def kept(scenario: Scenario) -> Path:
 
 
 def measure(scenario: Scenario) -> None:
-    """Diagnose a session and keep effect, size found, its standard deviation without accuracy, and the true size; nulls if not named."""
+    """Diagnose a session and keep effect, size found, its standard deviation without accuracy, and the true size;
+    nulls if not named.
+    """
     path = kept(scenario)
     if path.is_file() or not claimed(path):
         return
@@ -57,13 +61,18 @@ def measure(scenario: Scenario) -> None:
 
 
 def shares(rows: list[tuple[str, float, float, float]]) -> dict[str, float]:
-    """Return the accuracy of every effect, and the median for "other" ones, from rows of effect, size found, its sd and true size."""
+    """Return the accuracy of every effect, and the median for "other" ones, from rows of effect, size found, its sd
+    and true size.
+    """
     excess = defaultdict(list)
     for effect, value, sd, true in rows:
         excess[effect].append(max(0.0, (value - true) ** 2 - sd**2) / value**2)
     pooled = float(np.median([np.mean(some) for some in excess.values()]))
-    wide = {effect: student.ppf(0.975, len(some) + 1) / SIGMAS for effect, some in excess.items()}
-    found = {effect: float(wide[effect] * np.sqrt((pooled + sum(some)) / (len(some) + 1))) for effect, some in sorted(excess.items())}
+    wide = {effect: student.ppf(0.975, len(some) + 1) / _SIGMAS for effect, some in excess.items()}
+    found = {
+        effect: float(wide[effect] * np.sqrt((pooled + sum(some)) / (len(some) + 1)))
+        for effect, some in sorted(excess.items())
+    }
     return {**found, "other": float(np.median(list(found.values())))}
 
 

@@ -1,9 +1,11 @@
-"""Learn what sessions without fault look like: writes the learned rows of anthropometry/uncertainty/sizes.csv and null_sessions.toml anew.
+"""Learn what sessions without fault look like: writes the learned rows of anthropometry/uncertainty/sizes.csv and
+null_sessions.toml anew.
 
     python benchmarks/learn_tolerances.py [--rounds 10]
 
-Thirty sessions of twenty virtual persons (seeds that no other benchmark uses) are simulated and tracked once and kept on disk
-(`hidden_sessions.CACHE`). Only what has a size in the tolerances in use is learned: what is not in there is no nuisance.
+Thirty sessions of twenty virtual persons (seeds that no other benchmark uses) are simulated and tracked once and kept
+on disk (`hidden_sessions.CACHE`). Only what has a size in the tolerances in use is learned: what is not in there is no
+nuisance.
 """
 
 import argparse
@@ -24,7 +26,9 @@ from biodance.pipeline.looked_at import looks
 from biodance.uncertainty.tolerances import Tolerances, shipped, to_toml
 
 TABLES = folder("anthropometry") / "uncertainty"
-SCENARIOS = [Scenario("learn", i, 500 + i, 0) for i in range(20)] + [Scenario("learn", i, 500 + i, 1) for i in range(10)]
+SCENARIOS = [Scenario("learn", i, 500 + i, 0) for i in range(20)] + [
+    Scenario("learn", i, 500 + i, 1) for i in range(10)
+]
 
 
 def nulls() -> Iterator[Null]:
@@ -52,7 +56,9 @@ def write_sizes(found: Tolerances) -> None:
         writer.writerows(rows)
     provenance = table.with_suffix(".toml")
     fresh = hashlib.sha256(table.read_bytes()).hexdigest()
-    provenance.write_text(re.sub('sha256 = "[0-9a-f]*"', f'sha256 = "{fresh}"', provenance.read_text()), encoding="utf-8")
+    provenance.write_text(
+        re.sub('sha256 = "[0-9a-f]*"', f'sha256 = "{fresh}"', provenance.read_text()), encoding="utf-8"
+    )
 
 
 def main() -> None:

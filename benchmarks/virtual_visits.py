@@ -1,6 +1,8 @@
-"""Virtual subjects through the front door, cached: simulate -> read -> prepare -> scale -> track -> contact, and what the truth was.
+"""Virtual subjects through the front door, cached: simulate -> read -> prepare -> scale -> track -> contact, and what
+the truth was.
 
-Used by bench_identification.py. A visit is what identification sees, in the frames of the model, with the true parameters beside it.
+Used by bench_identification.py. A visit is what identification sees, in the frames of the model, with the true
+parameters beside it.
 """
 
 import hashlib
@@ -35,9 +37,10 @@ CACHE = Path(os.environ.get("BIODANCE_CACHE", Path(tempfile.gettempdir()) / "bio
 class TrackedVisit:
     """One session of a virtual person after tracking.
 
-    ``fits`` are the fit trials, ``validations`` the kept ones; ``true`` (120,) the matter of every segment in the model's own frames
-    (mean rigid displacement between true and tracked frame over the fit trials), ``true_own`` (120,) in the true joint frames; both
-    WITHOUT loads. ``load`` (segment, kg, place (3,) m in the model's frame) or None; ``offset`` (12, 6) mean of turn (rad) and shift (m).
+    ``fits`` are the fit trials, ``validations`` the kept ones; ``true`` (120,) the matter of every segment in the
+    model's own frames (mean rigid displacement between true and tracked frame over the fit trials), ``true_own`` (120,)
+    in the true joint frames; both WITHOUT loads. ``load`` (segment, kg, place (3,) m in the model's frame) or None;
+    ``offset`` (12, 6) mean of turn (rad) and shift (m).
     """
 
     body: Body
@@ -51,7 +54,9 @@ class TrackedVisit:
 
 
 TUNED, FRESH = (2016, 100), (2026, 700)
-"""Catalogues: the subjects on which identification was tuned, and those on which it is published; (seed of subjects, first of sessions)."""
+"""Catalogues: the subjects on which identification was tuned, and those on which it is published; (seed of subjects,
+first of sessions).
+"""
 
 
 def subjects(count: int = 20, catalogue: tuple[int, int] = FRESH) -> tuple[Subject, ...]:
@@ -66,7 +71,9 @@ def subjects(count: int = 20, catalogue: tuple[int, int] = FRESH) -> tuple[Subje
     return tuple(out)
 
 
-def visit(subject: Subject, protocol: str, *, seed: int, session: int = 0, load: tuple[str, float] | None = None) -> TrackedVisit:
+def visit(
+    subject: Subject, protocol: str, *, seed: int, session: int = 0, load: tuple[str, float] | None = None
+) -> TrackedVisit:
     """Return one visit, from the cache if it was made before; ``load`` (one of the 12 segments, kg)."""
     key = f"{subject.mass}-{subject.stature}-{subject.sex}-{protocol}-{seed}-{session}-{load}"
     path = CACHE / f"{hashlib.sha256(key.encode()).hexdigest()[:20]}.pickle"

@@ -1,4 +1,5 @@
-"""biodance: segment inertial parameters of a person, measured from markers and force plates instead of read from a table.
+"""biodance: segment inertial parameters of a person, measured from markers and force plates instead of read from a
+table.
 
 A visit is diagnosed in a few lines::
 
@@ -9,9 +10,10 @@ A visit is diagnosed in a few lines::
     print(found.verdict)
     print(found.table())
 
-SI units (m, kg, s, N, N·m, rad); lab frame with z up; a wrench is the ground's action on the subject about the lab origin, force first.
-The examples of this package share a simulated visit: ``session = read_session("visit")``, ``result = examine(session)``,
-``identified = identify(result)``, ``found = diagnose(result)``, and a short ``dance``; what they print is checked by the tests.
+SI units (m, kg, s, N, N·m, rad); lab frame with z up; a wrench is the ground's action on the subject about the lab
+origin, force first. The examples of this package share a simulated visit: ``session = read_session("visit")``, ``result
+= examine(session)``, ``identified = identify(result)``, ``found = diagnose(result)``, and a short ``dance``; what they
+print is checked by the tests.
 """
 
 from importlib import import_module

@@ -1,7 +1,8 @@
-"""Find the members of a family: one file each in a folder of biodance, entry points of other packages, objects given as arguments.
+"""Find the members of a family: one file each in a folder of biodance, entry points of other packages, objects given as
+arguments.
 
-A family of code is a folder of modules (``Family``); a family of data is a folder of files (``DataFamily``). Another package joins by an
-entry point whose group is the name of the family, for example in its pyproject.toml::
+A family of code is a folder of modules (``Family``); a family of data is a folder of files (``DataFamily``). Another
+package joins by an entry point whose group is the name of the family, for example in its pyproject.toml::
 
     [project.entry-points."biodance.effects"]
     shaking_floor = "my_lab.shaking_floor:ShakingFloor"
@@ -31,7 +32,9 @@ Chosen: TypeAlias = Iterable[str | Member] | Mapping[str, Member] | None
 
 def missing_of(protocol: type) -> Callable[[object], tuple[str, ...]]:
     """Return a judge of members: which public names of ``protocol`` an object, class or module lacks."""
-    needed = tuple(n for n in dict.fromkeys((*inspect.get_annotations(protocol), *vars(protocol))) if not n.startswith("_"))
+    needed = tuple(
+        n for n in dict.fromkeys((*inspect.get_annotations(protocol), *vars(protocol))) if not n.startswith("_")
+    )
 
     def judge(candidate: object) -> tuple[str, ...]:
         return tuple(name for name in needed if not hasattr(candidate, name))
@@ -72,18 +75,23 @@ class Family(Generic[Member]):
         Raises
         ------
         BiodanceError
-            A file or an entry point cannot be imported or is no member, or two members have one name; the sentence says which, where, and
-            what to do.
+            A file or an entry point cannot be imported or is no member, or two members have one name; the sentence says
+            which, where, and what to do.
         """
         package = importlib.import_module(self.package)
-        found = (*_of_folder(self, tuple(package.__path__)), *_of_entry_points(self, tuple(sys.path)), *((m, _where(m)) for m in given))
+        found = (
+            *_of_folder(self, tuple(package.__path__)),
+            *_of_entry_points(self, tuple(sys.path)),
+            *((m, _where(m)) for m in given),
+        )
         return self._by_name(found)
 
     def choose(self, chosen: "Chosen[Member]" = None) -> Mapping[str, Member]:
-        """Return a selection: names choose from the family, objects join what is chosen (the whole family where no name is given).
+        """Return a selection: names choose from the family, objects join what is chosen (the whole family where no name
+        is given).
 
-        None is the whole family, an empty sequence nothing; a mapping is a selection that was made before, and returned as it is. The
-        members keep the family's order, objects follow.
+        None is the whole family, an empty sequence nothing; a mapping is a selection that was made before, and returned
+        as it is. The members keep the family's order, objects follow.
 
         Raises
         ------
@@ -97,7 +105,10 @@ class Family(Generic[Member]):
         if isinstance(chosen, Mapping):
             return chosen
         asked = tuple(chosen)
-        names, given = [item for item in asked if isinstance(item, str)], [item for item in asked if not isinstance(item, str)]
+        names, given = (
+            [item for item in asked if isinstance(item, str)],
+            [item for item in asked if not isinstance(item, str)],
+        )
         if given and not names:
             return self.members(given)
         family = self.members()
@@ -169,7 +180,8 @@ class DataFamily:
             path, place = _loaded(entry, self.kind), _place(entry, self.kind)
             if not isinstance(path, str | Path) or not str(path).endswith(self.suffix) or not Path(path).is_file():
                 raise BiodanceError(
-                    f"{_started(place)} points at {path!r}, expected the path of a {self.suffix} file. Correct or uninstall that package."
+                    f"{_started(place)} points at {path!r}, expected the path of a {self.suffix} file. Correct or "
+                    f"uninstall that package."
                 )
             if entry.name in found:
                 raise BiodanceError(_twice(self.kind, entry.name, str(found[entry.name]), place))
@@ -213,17 +225,22 @@ def _of_module(family: Family[Any], name: str) -> tuple[Any, str]:
     try:
         module = importlib.import_module(f"{family.package}.{name}")
     except Exception as error:
-        raise BiodanceError(f"{file}: cannot be imported ({_said(error)}). Correct the file or move it away.") from error
+        raise BiodanceError(
+            f"{file}: cannot be imported ({_said(error)}). Correct the file or move it away."
+        ) from error
     if family.provides and not hasattr(module, family.provides):
         raise BiodanceError(
-            f"{file}: defines no {family.provides}, so it is no {family.kind}. Define it, let the file's name start with '_' if it is a "
+            f"{file}: defines no {family.provides}, so it is no {family.kind}. Define it, let the file's name start "
+            f"with '_' if it is a "
             "helper, or move the file away."
         )
     return (getattr(module, family.provides) if family.provides else module), file
 
 
 def _of_entry_points(family: Family[Any], path: tuple[str, ...]) -> tuple[tuple[Any, str], ...]:
-    """Return the members that installed packages offer, each with who offers it; a module stands for what it ``provides``."""
+    """Return the members that installed packages offer, each with who offers it; a module stands for what it
+    ``provides``.
+    """
     found = []
     for entry in _offered(family.group, path):
         member = _loaded(entry, family.kind)

@@ -1,4 +1,5 @@
-"""How a record shows itself in a notebook: a small table as HTML, and curves on matplotlib axes. Draws what it is given, computes nothing.
+"""How a record shows itself in a notebook: a small table as HTML, and curves on matplotlib axes. Draws what it is
+given, computes nothing.
 
 Records are the lowest floor and may not ask the report to draw them, so what both draw lives below both.
 """
@@ -19,14 +20,23 @@ BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, RED, PINK = (
 )  # fmt: skip
 """The eight colours of Okabe & Ito (2008), told apart with every common colour vision."""
 GREY = "#767676"
-STYLES: tuple[tuple[str, Any], ...] = ((BLUE, "-"), (RED, (0, (4, 2))), (GREEN, (0, (1, 1))), (BLACK, "-."), (ORANGE, "-"), (PINK, "--"))
+STYLES: tuple[tuple[str, Any], ...] = (
+    (BLUE, "-"),
+    (RED, (0, (4, 2))),
+    (GREEN, (0, (1, 1))),
+    (BLACK, "-."),
+    (ORANGE, "-"),
+    (PINK, "--"),
+)
 """Colour and line style of curve after curve: never the colour alone."""
 ROWS = 12
 """Rows of a table that a notebook shows; the others are counted."""
 
 
 class Interval(NamedTuple):
-    """One row of `intervals`: ``before`` and ``after`` are (value, low, high); ``known`` says how much the data tell."""
+    """One row of `intervals`: ``before`` and ``after`` are (value, low, high); ``known`` says how much the data
+    tell.
+    """
 
     name: str
     before: tuple[float, float, float]
@@ -52,7 +62,9 @@ def axes_or_new(axes: "Axes | None") -> "Axes":
     return plt.subplots(layout="constrained")[1]
 
 
-def curves(time: NDArray[Any], values: NDArray[Any], labels: Sequence[str], unit: str, *, axes: "Axes | None" = None) -> "Axes":
+def curves(
+    time: NDArray[Any], values: NDArray[Any], labels: Sequence[str], unit: str, *, axes: "Axes | None" = None
+) -> "Axes":
     """Draw the columns of ``values`` (T, n) over ``time`` (T,) s, each with its label, and return the axes."""
     drawn = axes_or_new(axes)
     for k, label in enumerate(labels):
@@ -84,7 +96,9 @@ def side_by_side(
 
 
 def intervals(rows: Sequence[Interval], *, axes: "Axes | None" = None) -> "Axes":
-    """Draw value and interval of every row, before (square) and after (circle: filled = known, pale = partly, open = not known)."""
+    """Draw value and interval of every row, before (square) and after (circle: filled = known, pale = partly, open =
+    not known).
+    """
     drawn = axes_or_new(axes)
     place = np.arange(len(rows))[::-1]
     for y, row in zip(place, rows, strict=True):

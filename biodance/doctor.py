@@ -1,4 +1,6 @@
-"""What works on this machine, and how to mend what does not. Every risky library is tried in a child process: it may crash, not raise."""
+"""What works on this machine, and how to mend what does not. Every risky library is tried in a child process: it may
+crash, not raise.
+"""
 
 import platform
 import shutil
@@ -12,17 +14,22 @@ from pathlib import Path
 from biodance import library
 from biodance.errors import BiodanceError
 
-PATIENCE = 60.0
+_PATIENCE = 60.0
 """Seconds a probe in a child process may take."""
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 
-STILL = "import pyvista; p = pyvista.Plotter(off_screen=True); p.add_mesh(pyvista.Sphere()); p.screenshot(return_img=True); p.close()"
+_STILL = (
+    "import pyvista; p = pyvista.Plotter(off_screen=True); p.add_mesh(pyvista.Sphere()); "
+    "p.screenshot(return_img=True); p.close()"
+)
 
 
 @dataclass(frozen=True)
 class MachineFinding:
-    """One line of the doctor: ``needed`` False for what only some steps or tests use; ``text`` the version, or how to mend it."""
+    """One line of the doctor: ``needed`` False for what only some steps or tests use; ``text`` the version, or how
+    to mend it.
+    """
 
     name: str
     works: bool
@@ -32,7 +39,9 @@ class MachineFinding:
 
 @dataclass(frozen=True)
 class Probe:
-    """One thing to try: python ``code`` for a child process (its last printed line is the version), and how to ``mend`` its failure."""
+    """One thing to try: python ``code`` for a child process (its last printed line is the version), and how to
+    ``mend`` its failure.
+    """
 
     name: str
     code: str
@@ -45,25 +54,31 @@ def _importing(module: str) -> str:
 
 
 PROBES = (
-    Probe("pinocchio", _importing("pinocchio"), "It needs the system library libgomp: apt-get install libgomp1; then pip install pin."),
+    Probe("pinocchio", _importing("pinocchio"), "It needs the system library libgomp: apt-get install libgomp1; then "
+                                                "pip install pin."),
     Probe("ezc3d (judge and writer)", _importing("ezc3d"), "pip install ezc3d"),
     Probe("scipy", _importing("scipy"), "pip install scipy"),
     Probe("cvxpy with Clarabel", "import clarabel, cvxpy; print(cvxpy.__version__)", "pip install cvxpy clarabel"),
     Probe("pandas with pyarrow", "import pandas, pyarrow; print(pandas.__version__)", "pip install pandas pyarrow"),
     Probe("trimesh", _importing("trimesh"), "pip install trimesh"),
     Probe("matplotlib", _importing("matplotlib"), "pip install matplotlib"),
-    Probe("GL stills (pyvista)", STILL, "pip install pyvista; apt-get install libgl1 libegl1.", needed=False),
-    Probe("opensim (comparisons)", _importing("opensim"), "pip install opensim; only the tests and benchmarks use it.", needed=False),
+    Probe("GL stills (pyvista)", _STILL, "pip install pyvista; apt-get install libgl1 libegl1.", needed=False),
+    Probe("opensim (comparisons)", _importing("opensim"), "pip install opensim; only the tests and benchmarks use it.",
+    needed=False),
     Probe("mujoco (comparisons)", _importing("mujoco"), "pip install mujoco; only the tests use it.", needed=False),
 )  # fmt: skip
 
 
 def run_probe(probe: Probe) -> MachineFinding:
-    """Run ``probe`` in a child process; a crash, an exception or no answer within `PATIENCE` is a finding that says how to mend it."""
+    """Run ``probe`` in a child process; a crash, an exception or no answer within `PATIENCE` is a finding that says
+    how to mend it.
+    """
     try:
-        child = subprocess.run([sys.executable, "-c", probe.code], capture_output=True, text=True, timeout=PATIENCE, check=False)
+        child = subprocess.run(
+            [sys.executable, "-c", probe.code], capture_output=True, text=True, timeout=_PATIENCE, check=False
+        )
     except subprocess.TimeoutExpired:
-        return MachineFinding(probe.name, False, probe.needed, f"gives no answer within {PATIENCE:g} s. {probe.mend}")
+        return MachineFinding(probe.name, False, probe.needed, f"gives no answer within {_PATIENCE:g} s. {probe.mend}")
     if child.returncode == 0:
         return MachineFinding(probe.name, True, probe.needed, (child.stdout.strip().splitlines() or ["works"])[-1])
     lines = child.stderr.strip().splitlines()
@@ -73,7 +88,9 @@ def run_probe(probe: Probe) -> MachineFinding:
 
 def _python() -> MachineFinding:
     right = (3, 11) <= sys.version_info[:2] < (3, 14)
-    return MachineFinding("python", right, True, platform.python_version() + ("" if right else ": install Python 3.11, 3.12 or 3.13."))
+    return MachineFinding(
+        "python", right, True, platform.python_version() + ("" if right else ": install Python 3.11, 3.12 or 3.13.")
+    )
 
 
 def _folder(name: str) -> MachineFinding:
@@ -86,7 +103,10 @@ def _folder(name: str) -> MachineFinding:
 def _browser() -> MachineFinding:
     found = next(filter(None, map(shutil.which, BROWSERS)), None)
     return MachineFinding(
-        "chromium (page tests)", bool(found), False, found or "apt-get install chromium; only the tests of the pages use it."
+        "chromium (page tests)",
+        bool(found),
+        False,
+        found or "apt-get install chromium; only the tests of the pages use it.",
     )
 
 
@@ -96,7 +116,9 @@ def _writable() -> MachineFinding:
         with tempfile.TemporaryFile(dir=place):
             return MachineFinding("writable folder", True, True, str(place))
     except OSError as error:
-        return MachineFinding("writable folder", False, True, f"{place}: {error.strerror}. Give --out a folder that you may write to.")
+        return MachineFinding(
+            "writable folder", False, True, f"{place}: {error.strerror}. Give --out a folder that you may write to."
+        )
 
 
 def examine_machine(*, tell: Callable[[str], None] = lambda _: None) -> tuple[MachineFinding, ...]:

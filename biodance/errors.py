@@ -1,7 +1,7 @@
 """Errors of biodance: every message says what, where, the value, what would be legal, and what to do.
 
-Only wrong input raises. A computation that fails on correct input (a solver that stops, a parameter that cannot be known)
-is a status in its result, not an exception.
+Only wrong input raises. A computation that fails on correct input (a solver that stops, a parameter that cannot be
+known) is a status in its result, not an exception.
 """
 
 
@@ -39,7 +39,8 @@ class TrialRefused(BiodanceError):
     >>> replace(session["squat_1"], plates=()).wrench
     Traceback (most recent call last):
         ...
-    biodance.errors.TrialRefused: Trial squat_1: no force plate was recorded, so there is no wrench. Record with the plates on.
+    biodance.errors.TrialRefused: Trial squat_1: no force plate was recorded, so there is no wrench. Record with the
+    plates on.
     """
 
 
@@ -67,7 +68,8 @@ class UnknownName(BiodanceError):
     >>> session["squat"]
     Traceback (most recent call last):
         ...
-    biodance.errors.UnknownName: 'squat' is not a trial of session visit. Did you mean 'squat_1'? Legal: dance_1, squat_1, static.
+    biodance.errors.UnknownName: 'squat' is not a trial of session visit. Did you mean 'squat_1'? Legal: dance_1,
+    squat_1, static.
     """
 
     @classmethod

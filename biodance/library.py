@@ -1,6 +1,7 @@
 """Find the data that biodance ships: ``anthropometry/`` and ``protocols/``.
 
-The two folders lie at the top of a checkout and inside the package in an installed wheel; nothing else in biodance knows that.
+The two folders lie at the top of a checkout and inside the package in an installed wheel; nothing else in biodance
+knows that.
 """
 
 import tomllib
@@ -24,7 +25,8 @@ def folder(name: str) -> Path:
         if place.is_dir():
             return place
     raise BiodanceError(
-        f"The data folder {name!r} is neither in {PACKAGE} nor in {PACKAGE.parent}: the installation is damaged. Install biodance again."
+        f"The data folder {name!r} is neither in {PACKAGE} nor in {PACKAGE.parent}: the installation is damaged. "
+        f"Install biodance again."
     )
 
 

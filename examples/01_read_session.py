@@ -24,7 +24,10 @@ def main(folder: Path | None, picture: Path) -> None:
     axes = figure.subplots()
     for trial in session.trials:
         markers = len(trial.markers.names) if trial.markers else 0
-        print(f"{trial.name}: role {trial.role}, {markers} markers, {len(trial.plates)} plates; {'; '.join(trial.history[:2])}")
+        print(
+            f"{trial.name}: role {trial.role}, {markers} markers, {len(trial.plates)} plates; "
+            f"{'; '.join(trial.history[:2])}"
+        )
         if trial.plates:
             axes.plot(trial.wrench.time, trial.wrench.force[:, 2], label=f"{trial.name} ({trial.role})", linewidth=0.8)
     axes.axhline(9.80665 * session.subject.mass, color="black", linewidth=0.5)

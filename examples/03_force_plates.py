@@ -34,7 +34,12 @@ def main(picture: Path) -> None:
     close.plot(*(1000 * (total - np.nanmean(total, axis=0)))[:, :2].T, linewidth=0.8, color="black")
     print(f"mean vertical force {np.nanmean(trial.wrench.force[:, 2]):.1f} N")
     axes.set(xlabel="lab x, m", ylabel="lab y, m", aspect="equal", title="Slow squats from above")
-    close.set(xlabel="x from its mean, mm", ylabel="y from its mean, mm", aspect="equal", title="centre of pressure of all plates")
+    close.set(
+        xlabel="x from its mean, mm",
+        ylabel="y from its mean, mm",
+        aspect="equal",
+        title="centre of pressure of all plates",
+    )
     figure.legend(loc="outside lower center", frameon=False, fontsize=8)
     figure.savefig(picture, dpi=120)
 

@@ -19,7 +19,10 @@ def main(picture: Path) -> None:
         visit = biodance.read_session(folder)
     found = biodance.identify(visit).identification
     print(found.status, *found.notes, sep="\n")
-    print(f"{len(found.unknown)} of {len(found.known)} quantities cannot be known from these trials: they stay the table's.")
+    print(
+        f"{len(found.unknown)} of {len(found.known)} quantities cannot be known from these trials: they stay the "
+        f"table's."
+    )
     figure = Figure(figsize=(7, 4), layout="constrained")
     axes = found.plot_masses(axes=figure.subplots())
     axes.set_title("A minute of squats says little about single segments")

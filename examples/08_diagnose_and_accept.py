@@ -29,7 +29,10 @@ def main(picture: Path) -> None:
         print(finding.advice)
         if finding.gain is not None:
             before, after = finding.gain.rms_before[2], finding.gain.rms_after[2]
-            print(f"Fz of {', '.join(finding.gain.trials)}: {before:.1f} N RMS before, {after:.1f} N with the cause accepted.")
+            print(
+                f"Fz of {', '.join(finding.gain.trials)}: {before:.1f} N RMS before, {after:.1f} N with the cause "
+                f"accepted."
+            )
     figure = Figure(figsize=(7, 7), layout="constrained")
     found.diagnosis.plot_adequacy(axes=figure.subplots())
     figure.savefig(picture, dpi=120)

@@ -26,7 +26,9 @@ def main(picture: Path) -> None:
         print(f"{margin.limit:16s} {margin.worst:8.4f} {margin.unit:6s} left at {margin.where_s:5.1f} s")
     figure = Figure(figsize=(7, 4), layout="constrained")
     axes = figure.subplots()
-    made.dance.motion(25).plot_angles("left_shoulder_flexion", "left_shoulder_adduction", "left_elbow_flexion", axes=axes)
+    made.dance.motion(25).plot_angles(
+        "left_shoulder_flexion", "left_shoulder_adduction", "left_elbow_flexion", axes=axes
+    )
     figure.savefig(picture, dpi=120)
 
 

@@ -25,7 +25,9 @@ class ShakingFloor(Effect):
     """An ``acceleration`` (m/s²) amplitude of the floor, vertical, in phase with the start of the trial."""
 
     name = "shaking_floor"
-    parameters = (Parameter("acceleration", "m/s²", 0.05, "treadmill: up to 5.6 N on a person of 70 kg (arXiv 2303.14482)"),)
+    parameters = (
+        Parameter("acceleration", "m/s²", 0.05, "treadmill: up to 5.6 N on a person of 70 kg (arXiv 2303.14482)"),
+    )
     separated_by = "A recording of the empty plate."
     advice = "Switch the motor off, or move the plate to another floor."
 

@@ -22,7 +22,12 @@ def row(folder: Path) -> dict[str, object]:
         return {"visit": folder.name, "status": "refused", "reason": str(refused).replace(f"{folder.parent}/", "")}
     thigh = found.table().loc["right_thigh"]
     names = ["table (kg)", "identified (kg)", "sd (kg)"]
-    return {"visit": folder.name, "status": found.status, "mass (kg)": result.session.subject.mass, **thigh[names].to_dict()}
+    return {
+        "visit": folder.name,
+        "status": found.status,
+        "mass (kg)": result.session.subject.mass,
+        **thigh[names].to_dict(),
+    }
 
 
 def main(picture: Path) -> None:

@@ -38,7 +38,11 @@ def bad_session(folder: Path) -> Path:
     write(folder / "no_plates.c3d", person(seed=6))
     write(folder / "no_markers.c3d", None, recording())
     strange = person(seed=7)
-    write(folder / "unknown_set.c3d", Markers(tuple(f"P{i}" for i in range(len(strange.names))), strange.time, strange.xyz), recording())
+    write(
+        folder / "unknown_set.c3d",
+        Markers(tuple(f"P{i}" for i in range(len(strange.names))), strange.time, strange.xyz),
+        recording(),
+    )
     write(folder / "bow_tie.c3d", person(seed=8), recording(CORNERS[[0, 2, 1, 3]]))
     lines = ["[subject]", f"mass_kg = {MASS}", f"height_m = {STATURE}", 'sex = "F"', "age = 30"]
     (folder / "session.toml").write_text("\n".join(lines))

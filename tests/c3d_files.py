@@ -1,4 +1,6 @@
-"""Lay down C3D files byte by byte for the tests, in every byte order and storage, without any code of the reader under test."""
+"""Lay down C3D files byte by byte for the tests, in every byte order and storage, without any code of the reader
+under test.
+"""
 
 import struct
 from dataclasses import dataclass, field
@@ -24,7 +26,9 @@ def pack_floats(values, processor):
 
 def pack_words(values, processor):
     """Return integers as the bytes of a processor's 16-bit words."""
-    return (np.asarray(values).ravel().astype(np.int64) & 0xFFFF).astype(">u2" if processor == MIPS else "<u2").tobytes()
+    return (
+        (np.asarray(values).ravel().astype(np.int64) & 0xFFFF).astype(">u2" if processor == MIPS else "<u2").tobytes()
+    )
 
 
 def text(*rows):
@@ -54,7 +58,9 @@ class File:
     rate: float = 100.0
     first: int = 1
     header: dict = field(default_factory=dict)
-    parameters: dict = field(default_factory=dict)  # overrules: {"GROUP": {"NAME": text(...) | whole(...) | real(...) | None}}
+    parameters: dict = field(
+        default_factory=dict
+    )  # overrules: {"GROUP": {"NAME": text(...) | whole(...) | real(...) | None}}
 
     def bytes(self):
         frames, count = self.points.shape[:2]
@@ -97,7 +103,9 @@ class File:
         } | self.header
         words = [fields[k] for k in ("points", "values", "first", "last")] + [0]
         head = b"\x02\x50" + pack_words(words, self.processor) + pack_floats([fields["scale"]], self.processor)
-        head += pack_words([fields["start"], fields["samples"]], self.processor) + pack_floats([fields["rate"]], self.processor)
+        head += pack_words([fields["start"], fields["samples"]], self.processor) + pack_floats(
+            [fields["rate"]], self.processor
+        )
         rows = np.concatenate([self.points.reshape(frames, -1), self.analog.reshape(frames, -1)], axis=1)
         data = pack_floats(rows, self.processor) if self.scale < 0 else pack_words(np.round(rows), self.processor)
         return head.ljust(512, b"\0") + section + data + bytes(-len(data) % 512)

@@ -47,13 +47,19 @@ def transform(raw, channels):
 
 @st.composite
 def mutations(draw, content, start):
-    """Return the content with some bytes of header or parameters overwritten, or with a piece of the file missing, doubled or added."""
-    kind = draw(st.sampled_from(["header", "parameters", "parameters", "word", "cut", "add", "lose", "double", "anywhere"]))
+    """Return the content with some bytes of header or parameters overwritten, or with a piece of the file missing,
+    doubled or added.
+    """
+    kind = draw(
+        st.sampled_from(["header", "parameters", "parameters", "word", "cut", "add", "lose", "double", "anywhere"])
+    )
     raw = bytearray(content)
     if kind in ("header", "parameters", "anywhere"):
         low, high = {"header": (0, 24), "parameters": (512, start), "anywhere": (0, len(raw))}[kind]
         for _ in range(draw(st.integers(1, 3))):
-            raw[draw(st.integers(low, high - 1))] = draw(st.sampled_from([0, 1, 2, 127, 128, 255]) | st.integers(0, 255))
+            raw[draw(st.integers(low, high - 1))] = draw(
+                st.sampled_from([0, 1, 2, 127, 128, 255]) | st.integers(0, 255)
+            )
     elif kind == "word":
         at = draw(st.sampled_from(range(0, 24, 2)) | st.integers(512, start - 2))
         raw[at : at + 2] = draw(st.sampled_from([0, 1, 2, 255, 256, 32767, 32768, 65535])).to_bytes(2, "little")
@@ -68,7 +74,9 @@ def mutations(draw, content, start):
 
 
 def judge(first: Original, content: bytes, path: Path):
-    """Read ``content``; raise AssertionError if it is accepted with numbers other than its intact data and its parameters mean."""
+    """Read ``content``; raise AssertionError if it is accepted with numbers other than its intact data and its
+    parameters mean.
+    """
     path.write_bytes(content)
     try:
         raw, trial = read_raw(path), read_c3d(path)
@@ -81,8 +89,12 @@ def judge(first: Original, content: bytes, path: Path):
     said = " ".join((*raw.warnings, *trial.warnings))
     frames = len(first.raw.points)
     if "FRAMES" not in first.raw.parameters.get("POINT", {}) and len(raw.points) < frames:
-        frames = len(raw.points)  # the header alone tells the count, and the rest could be padding: the numbers must be right all the same
-    np.testing.assert_allclose(raw.points, first.raw.points[:frames], rtol=2e-6)  # the two scales of an integer file may differ that much
+        frames = len(
+            raw.points
+        )  # the header alone tells the count, and the rest could be padding: the numbers must be right all the same
+    np.testing.assert_allclose(
+        raw.points, first.raw.points[:frames], rtol=2e-6
+    )  # the two scales of an integer file may differ that much
     gain, offset = transform(raw, raw.analog.shape[1])
     expected = (first.stored[: len(first.stored) * frames // len(first.raw.points)] - offset) * gain
     assert raw.analog.shape == expected.shape
@@ -97,7 +109,9 @@ def judge(first: Original, content: bytes, path: Path):
 
 
 def judge_markers(first, trial, said):
-    """Markers that kept their label are where they were, unless the reader says that it decided about units, axes or labels."""
+    """Markers that kept their label are where they were, unless the reader says that it decided about units, axes or
+    labels.
+    """
     if first.markers is None or trial.markers is None or "Rates in Hz" in said:
         return
     for name in set(first.markers.names) & set(trial.markers.names):

@@ -55,7 +55,9 @@ def motion(seed: int) -> Motion:
 
 
 def noise(rng: np.random.Generator, frames: int) -> np.ndarray:
-    """Return (T, 6) noise whose coefficients have the standard deviations `NOISE` up to 10 Hz (25 Hz samples see it unaliased)."""
+    """Return (T, 6) noise whose coefficients have the standard deviations `NOISE` up to 10 Hz (25 Hz samples see it
+    unaliased).
+    """
     value = np.zeros((frames, 6))
     low = int(10.0 * 2 * frames / RATE)
     value[:low] = rng.normal(size=(low, 6)) * NOISE * np.sqrt(2.0)
@@ -63,7 +65,9 @@ def noise(rng: np.random.Generator, frames: int) -> np.ndarray:
 
 
 def looks(seed: int, *, trials: int = 4, hidden=lambda wrench, time, motion: wrench) -> tuple[Look, ...]:
-    """Return trials of a person whose parameters differ from the table by its own standard deviations; ``hidden`` changes the wrench."""
+    """Return trials of a person whose parameters differ from the table by its own standard deviations; ``hidden``
+    changes the wrench.
+    """
     from biodance.identification.posterior import prior_factor
     from biodance.uncertainty.caution import widened
 

@@ -32,7 +32,9 @@ def public() -> Iterator[tuple[str, object]]:
         if inspect.isclass(thing):
             own = [key for cls in thing.__mro__ if cls.__module__.startswith("biodance") for key in vars(cls)]
             fields = getattr(thing, "__dataclass_fields__", {})
-            yield from ((f"{home}.{key}", getattr(thing, key)) for key in own if not key.startswith("_") and key not in fields)
+            yield from (
+                (f"{home}.{key}", getattr(thing, key)) for key in own if not key.startswith("_") and key not in fields
+            )
 
 
 def faults() -> list[str]:

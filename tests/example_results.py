@@ -1,11 +1,22 @@
-"""Hand-made results of a session, for tests of the page and of results.json: every part present, and every part refused."""
+"""Hand-made results of a session, for tests of the page and of results.json: every part present, and every part
+refused.
+"""
 
 from pathlib import Path
 
 import numpy as np
 
 from biodance.lab.markers.gaps import MarkerGaps
-from biodance.pipeline.results import Check, MarkerFit, QuietStanding, SessionResult, Step, Still, TrialResult, WrenchComparison
+from biodance.pipeline.results import (
+    Check,
+    MarkerFit,
+    QuietStanding,
+    SessionResult,
+    Step,
+    Still,
+    TrialResult,
+    WrenchComparison,
+)
 from biodance.records import Markers, Plate, Session, Source, Subject, Trial, Wrench
 
 SQUARE = np.array([[0.3, 0.2, 0.0], [-0.3, 0.2, 0.0], [-0.3, -0.2, 0.0], [0.3, -0.2, 0.0]])
@@ -22,7 +33,13 @@ def comparison(rng: np.random.Generator) -> WrenchComparison:
     difference = (measured - simulated)[used]
     cc = [np.corrcoef(measured[used, i], simulated[used, i])[0, 1] for i in range(6)]
     return WrenchComparison(
-        time, measured, simulated, used, np.sqrt(np.mean(difference**2, axis=0)), np.array(cc), ("90 frames: a foot is beside the plates.",)
+        time,
+        measured,
+        simulated,
+        used,
+        np.sqrt(np.mean(difference**2, axis=0)),
+        np.array(cc),
+        ("90 frames: a foot is beside the plates.",),
     )
 
 
@@ -54,16 +71,33 @@ def still() -> Still:
     bones = np.array([[[0, 0, 0.9], [0, 0, 1.5]], [[0, 0.1, 0.9], [0, 0.1, 0.05]], [[0, -0.1, 0.9], [0, -0.1, 0.05]]])
     markers = np.concatenate([bones.reshape(-1, 3) + 0.05, [[np.nan] * 3]])
     com, force, cop = np.array([0, 0, 1.0]), np.array([0, 0, 640.0]), np.array([0.01, 0, 0])
-    return Still("static", 1.0, bones, ("middle", "left", "right"), markers, SQUARE[None], com, force, cop, np.array([1.0, 0.0]))
+    return Still(
+        "static", 1.0, bones, ("middle", "left", "right"), markers, SQUARE[None], com, force, cop, np.array([1.0, 0.0])
+    )
 
 
 def trial(name: str, *, warnings: tuple[str, ...] = ()) -> Trial:
     """Return a trial with markers at the origin and one plate that carries 640 N."""
     time = np.arange(300) / 100
-    plate = Plate("plate1", 2, SQUARE, Wrench(time, np.tile([0, 0, 640.0, 0, 0, 0], (300, 1))), ("sign turned: the raw force pulled down",))
+    plate = Plate(
+        "plate1",
+        2,
+        SQUARE,
+        Wrench(time, np.tile([0, 0, 640.0, 0, 0, 0], (300, 1))),
+        ("sign turned: the raw force pulled down",),
+    )
     source = Source(Path(f"/sessions/S01/{name}.c3d"), "ab" * 32, "C3D", 100.0, 1000.0)
     markers = Markers(NAMES, time, np.zeros((300, len(NAMES), 3)))
-    return Trial(name, "fit", markers, (plate,), source, "plug_in_gait_39", history=("low-pass: 5th order, 10 Hz",), warnings=warnings)
+    return Trial(
+        name,
+        "fit",
+        markers,
+        (plate,),
+        source,
+        "plug_in_gait_39",
+        history=("low-pass: 5th order, 10 Hz",),
+        warnings=warnings,
+    )
 
 
 def full_session() -> SessionResult:
@@ -72,7 +106,9 @@ def full_session() -> SessionResult:
     rms = np.sort(rng.uniform(0.003, 0.02, len(NAMES)))
     rms[5] = np.nan
     fit = MarkerFit(NAMES, rms, 2.2 * rms, 0.011, 0.044)
-    gaps = tuple(MarkerGaps(name, *{3: (2.5, 0.075), 5: (100.0, 3.0)}.get(i, (0.0, 0.0))) for i, name in enumerate(NAMES))
+    gaps = tuple(
+        MarkerGaps(name, *{3: (2.5, 0.075), 5: (100.0, 3.0)}.get(i, (0.0, 0.0))) for i, name in enumerate(NAMES)
+    )
     checks = (
         Check("marker distance, RMS", "walk <1>", "11.0 mm", "at most 20 mm", True),
         Check("gaps", "walk <1>", "3.1 %", "at most 2 %", False, "Fill."),
@@ -88,14 +124,27 @@ def full_session() -> SessionResult:
         checks,
     )
     mass = Check("mass on the plates against declared", "walk <1>", "0.3 %", "at most 2 %", True)
-    session = Session(Subject(65.0, 1.7, "F", 31.0, "S01"), (result.trial,), Path("/sessions/S01"), notes=("Sex guessed.",))
-    return SessionResult(session, session.subject, None, "Scaled on static.", (), (result,), (mass,), result.standing, still())
+    session = Session(
+        Subject(65.0, 1.7, "F", 31.0, "S01"), (result.trial,), Path("/sessions/S01"), notes=("Sex guessed.",)
+    )
+    return SessionResult(
+        session, session.subject, None, "Scaled on static.", (), (result,), (mass,), result.standing, still()
+    )
 
 
 def refused_session() -> SessionResult:
     """Return a session in which nothing after reading could be done, with one unreadable file."""
     why = "Trial walk: no marker is known. Name a marker set."
-    bare = Trial("walk", "fit", None, (), Source(Path("/sessions/S02/walk.c3d"), "cd" * 32, "C3D"), warnings=("No plates.",))
+    bare = Trial(
+        "walk", "fit", None, (), Source(Path("/sessions/S02/walk.c3d"), "cd" * 32, "C3D"), warnings=("No plates.",)
+    )
     result = TrialResult(bare, (Step("prepare", "refused", why),))
-    session = Session(Subject(float("nan"), float("nan"), "M"), (bare,), Path("/sessions/S02"), {"broken.c3d": "broken.c3d: is empty."})
-    return SessionResult(session, session.subject, None, "No body.", (Step("body", "refused", "No stature."),), (result,), (), None, None)
+    session = Session(
+        Subject(float("nan"), float("nan"), "M"),
+        (bare,),
+        Path("/sessions/S02"),
+        {"broken.c3d": "broken.c3d: is empty."},
+    )
+    return SessionResult(
+        session, session.subject, None, "No body.", (Step("body", "refused", "No stature."),), (result,), (), None, None
+    )

@@ -25,7 +25,9 @@ def moving(body: Body, frames: int, rng: np.random.Generator) -> Array:
     knots = np.arange(-1.4, time[-1] + 1.5, 0.7)
     middle = np.array([0.7 if joint.name.endswith(("knee_flexion", "elbow_flexion")) else 0.0 for joint in body.joints])
     angles = CubicSpline(knots, middle + 0.2 * rng.uniform(-1, 1, (len(knots), len(middle))))(time)
-    turn = Rotation.from_rotvec(CubicSpline(knots, rng.normal(0, 0.2, (len(knots), 3)))(time)) * Rotation.from_quat(body.neutral[3:7])
+    turn = Rotation.from_rotvec(CubicSpline(knots, rng.normal(0, 0.2, (len(knots), 3)))(time)) * Rotation.from_quat(
+        body.neutral[3:7]
+    )
     place = CubicSpline(knots, rng.normal([0.3, -0.2, 0.9], 0.05, (len(knots), 3)))(time)
     return np.hstack([place, turn.as_quat(), angles])
 

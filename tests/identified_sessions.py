@@ -1,4 +1,6 @@
-"""A session that obeys its model, with known true parameters, as the pipeline hands it to identification: no markers, no files."""
+"""A session that obeys its model, with known true parameters, as the pipeline hands it to identification: no
+markers, no files.
+"""
 
 from dataclasses import replace
 from functools import cache
@@ -31,7 +33,11 @@ def movement(moving, seed: int, *, seconds: float) -> Motion:
     knots = np.arange(0, seconds + 2, 0.8)
     half = 0.35 * (moving.limits.upper - moving.limits.lower)
     curve = CubicSpline(knots, rng.uniform(-1, 1, (knots.size, half.size)) * half)
-    q, v, a = np.tile(moving.neutral, (time.size, 1)), np.zeros((time.size, moving.nv)), np.zeros((time.size, moving.nv))
+    q, v, a = (
+        np.tile(moving.neutral, (time.size, 1)),
+        np.zeros((time.size, moving.nv)),
+        np.zeros((time.size, moving.nv)),
+    )
     q[:, 2] = 0.9
     q[:, 7:], v[:, 6:], a[:, 6:] = curve(time), curve(time, 1), curve(time, 2)
     return Motion(time, q, v, a)
@@ -56,7 +62,9 @@ def trial_result(name: str, role: str, seed: int, *, seconds: float = 15.0, load
     measured, table = predict_wrench(one, motion, truth(load=load)).value + noise, predict_wrench(one, motion)
     used = motion.time > 0.3
     found = compare(Wrench(motion.time, measured), table, used)
-    comparison = WrenchComparison(motion.time, measured, table.value, used, found.rms, np.array(found.correlation, dtype=float))
+    comparison = WrenchComparison(
+        motion.time, measured, table.value, used, found.rms, np.array(found.correlation, dtype=float)
+    )
     trial = Trial(name, role, None, (), Source(Path(f"/lab/S01/{name}.c3d"), "00" * 32, "C3D", RATE, 1000.0))
     return TrialResult(trial, (), motion=motion, comparison=comparison)
 

@@ -1,4 +1,6 @@
-"""Small session folders as text, for tests of the session room: somebody of known mass and stature who stands or walks."""
+"""Small session folders as text, for tests of the session room: somebody of known mass and stature who stands or
+walks.
+"""
 
 import numpy as np
 
@@ -9,7 +11,8 @@ from biodance.records import Markers, Plate, Wrench
 
 STATURE, MASS, GRAVITY = 1.70, 62.0, 9.80665
 PLUG_IN_GAIT = {
-    "LFHD": (0.08, 0.07, 0.945), "RFHD": (0.08, -0.07, 0.945), "LBHD": (-0.10, 0.07, 0.939), "RBHD": (-0.10, -0.07, 0.939),
+    "LFHD": (0.08, 0.07, 0.945), "RFHD": (0.08, -0.07, 0.945), "LBHD": (-0.10, 0.07, 0.939), "RBHD": (-0.10, -0.07,
+    0.939),
     "C7": (-0.06, 0.0, 0.840), "T10": (-0.09, 0.0, 0.72), "CLAV": (0.06, 0.0, 0.79), "STRN": (0.09, 0.0, 0.71),
     "LSHO": (0.0, 0.17, 0.82), "RSHO": (0.0, -0.17, 0.82), "LELB": (0.0, 0.28, 0.63), "RELB": (0.0, -0.28, 0.63),
     "LWRA": (0.03, 0.30, 0.49), "RWRA": (0.03, -0.30, 0.49), "LWRB": (-0.03, 0.30, 0.49), "RWRB": (-0.03, -0.30, 0.49),
@@ -40,7 +43,9 @@ def plate(*, frames=1000, rate=1000.0, mass=MASS, seed=2):
 
 
 def write_trial(folder, name, *, mass=MASS, **kind):
-    """Write one trial as .trc, with its forces as .mot beside it unless ``mass`` is None; return the path of the markers."""
+    """Write one trial as .trc, with its forces as .mot beside it unless ``mass`` is None; return the path of the
+    markers.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     path = write_trc(folder / f"{name}.trc", person(**kind))
     if mass is not None:

@@ -26,7 +26,17 @@ def feet() -> tuple[Stance, ...]:
     """Return all kinds of stances: two feet, steps, one foot, the weight over one, hands on a frame, a stool."""
     both, ahead = stance(BODY, "parallel", share=0.6), stance(BODY, "right_forward", right=0.2, share=0.6)
     held = holding(both, BODY, ("right", "left"))
-    return both, ahead, both.on(0), both.on(1), replace(ahead, over=0), replace(both, over=1), held, held.on(0), seat(BODY)
+    return (
+        both,
+        ahead,
+        both.on(0),
+        both.on(1),
+        replace(ahead, over=0),
+        replace(both, over=1),
+        held,
+        held.on(0),
+        seat(BODY),
+    )
 
 
 @cache

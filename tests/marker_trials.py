@@ -13,7 +13,9 @@ RATE = 100.0
 
 
 def dance(body: Body, frames: int, rng: np.random.Generator, *, reach: float = 0.9) -> Array:
-    """Return q (frames, nq): a new posture every 0.5 s anywhere in the middle ``reach`` of the joint ranges, the root turning about."""
+    """Return q (frames, nq): a new posture every 0.5 s anywhere in the middle ``reach`` of the joint ranges, the
+    root turning about.
+    """
     time = np.arange(frames) / RATE
     knots = np.arange(0.0, time[-1] + 1.0, 0.5)
     lower, upper = body.limits.lower, body.limits.upper

@@ -1,4 +1,6 @@
-"""A force plate run backwards: from a wrench that is known in the lab to the channels that a plate of each C3D TYPE would record."""
+"""A force plate run backwards: from a wrench that is known in the lab to the channels that a plate of each C3D TYPE
+would record.
+"""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,8 +14,9 @@ RATE = 500.0
 
 @dataclass
 class Emulated:
-    """One plate: pose (lab_R_plate, centre m), half sides m, sensor -> surface vector or (a, b, z) m, ``reaction`` False = load
-    recorded."""
+    """One plate: pose (lab_R_plate, centre m), half sides m, sensor -> surface vector or (a, b, z) m, ``reaction``
+    False = load recorded.
+    """
 
     type: int = 2
     rotation: np.ndarray = field(default_factory=lambda: np.diag([1.0, -1.0, -1.0]))
@@ -45,8 +48,9 @@ def random_pose(rng, *, z_up=False):
 
 
 def step(rng, plate, *, seconds=4.0, weight=700.0):
-    """A person steps on after 1 s and off before the end: wrench (S, 6) ground on subject about the lab origin, and its centre of
-    pressure."""
+    """A person steps on after 1 s and off before the end: wrench (S, 6) ground on subject about the lab origin, and its
+    centre of pressure.
+    """
     time = np.arange(0, seconds, 1 / RATE)
     ramp = np.clip((time - 1.0) / 0.2, 0, 1) * np.clip((seconds - 0.5 - time) / 0.2, 0, 1)
 
@@ -55,9 +59,13 @@ def step(rng, plate, *, seconds=4.0, weight=700.0):
 
     up = plate.rotation[:, 2] * np.sign(plate.rotation[2, 2])
     along, across = plate.rotation[:, 0], plate.rotation[:, 1]
-    force = ramp[:, None] * ((weight + wave(80))[:, None] * up + wave(60)[:, None] * along + (20 + wave(60))[:, None] * across)
+    force = ramp[:, None] * (
+        (weight + wave(80))[:, None] * up + wave(60)[:, None] * along + (20 + wave(60))[:, None] * across
+    )
     point = (
-        plate.centre + (wave(0.5) * plate.half[0])[:, None] * along + (0.3 * plate.half[1] + wave(0.4) * plate.half[1])[:, None] * across
+        plate.centre
+        + (wave(0.5) * plate.half[0])[:, None] * along
+        + (0.3 * plate.half[1] + wave(0.4) * plate.half[1])[:, None] * across
     )
     moment = np.cross(point, force) + (ramp * wave(8))[:, None] * up
     return np.hstack([force, moment]), point
@@ -73,7 +81,10 @@ def channels(plate, wrench):
     if plate.type in (3, 6, 7):
         signals = _sensors(plate, force, moment)
     elif plate.type == 1:
-        px, py = (np.divide(m, force[:, 2], out=np.zeros(len(m)), where=np.abs(force[:, 2]) > 1e-9) for m in (-moment[:, 1], moment[:, 0]))
+        px, py = (
+            np.divide(m, force[:, 2], out=np.zeros(len(m)), where=np.abs(force[:, 2]) > 1e-9)
+            for m in (-moment[:, 1], moment[:, 0])
+        )
         free = moment[:, 2] - px * force[:, 1] + py * force[:, 0]
         signals = np.column_stack([force, px + plate.origin[0], py + plate.origin[1], free])
     else:
@@ -97,7 +108,9 @@ def uncorrected(polynomial, force, moment):
 
 
 def _sensors(plate, force, moment):
-    """Signals of an eight- or twelve-channel plate: the share of the sums among the sensors is arbitrary and drawn here."""
+    """Signals of an eight- or twelve-channel plate: the share of the sums among the sensors is arbitrary and drawn
+    here.
+    """
     a, b, z = plate.origin
     f, m = force, moment - np.cross(force, [0, 0, z])
     # four sums that the moments fix, the rest is free
@@ -113,11 +126,15 @@ def _sensors(plate, force, moment):
     fy14, fy23 = (f[:, 1] + rest) / 2, (f[:, 1] - rest) / 2
     if plate.type != 6:
         return np.column_stack([fx12, fx34, fy14, fy23, z1, z2, z3, z4])
-    return np.column_stack([0.7 * fx12, 0.2 * fy14, z1, 0.3 * fx12, 0.6 * fy23, z2, 0.1 * fx34, 0.4 * fy23, z3, 0.9 * fx34, 0.8 * fy14, z4])
+    return np.column_stack(
+        [0.7 * fx12, 0.2 * fy14, z1, 0.3 * fx12, 0.6 * fy23, z2, 0.1 * fx34, 0.4 * fy23, z3, 0.9 * fx34, 0.8 * fy14, z4]
+    )
 
 
 def raw_file(plates, signals, *, units=None, metres=0.001, zero=(1, 0), offsets=None, spare=2, rate=RATE, **changes):
-    """A RawC3d with these plates; ``signals`` list of (S, C) SI; ``changes`` replace FORCE_PLATFORM entries; spare channels come first."""
+    """A RawC3d with these plates; ``signals`` list of (S, C) SI; ``changes`` replace FORCE_PLATFORM entries; spare
+    channels come first.
+    """
     count = max(s.shape[1] for s in signals)
     table, names, unit = [np.zeros((len(signals[0]), spare))], ["EMG"] * spare, ["V"] * spare
     channel = np.zeros((count, len(plates)))
@@ -146,13 +163,17 @@ def raw_file(plates, signals, *, units=None, metres=0.001, zero=(1, 0), offsets=
                 stored[: p.matrix.shape[0], : p.matrix.shape[1], k] = p.matrix * _row_units(p, metres)[:, None]
         group["CAL_MATRIX"] = stored
     if any(p.polynomial is not None for p in plates):
-        group["FPCOPPOLY"] = np.stack([np.zeros((2, 6)) if p.polynomial is None else p.polynomial for p in plates], axis=2)
+        group["FPCOPPOLY"] = np.stack(
+            [np.zeros((2, 6)) if p.polynomial is None else p.polynomial for p in plates], axis=2
+        )
     group |= changes
     group = {k: v for k, v in group.items() if v is not None}
     analog = np.hstack(table)
     return RawC3d(
-        path=Path("made.c3d"), sha256="0" * 64, reader="none", labels=(), points=np.empty((0, 0, 3)), rate=100.0, first_frame=1,
-        analog=analog, analog_labels=tuple(names), analog_units=tuple(unit), analog_rate=rate, parameters={"FORCE_PLATFORM": group},
+        path=Path("made.c3d"), sha256="0" * 64, reader="none", labels=(), points=np.empty((0, 0, 3)), rate=100.0,
+        first_frame=1,
+        analog=analog, analog_labels=tuple(names), analog_units=tuple(unit), analog_rate=rate,
+        parameters={"FORCE_PLATFORM": group},
     )  # fmt: skip
 
 
@@ -169,4 +190,8 @@ def _written_units(plate, metres):
 
 def _row_units(plate, metres):
     """What a CAL_MATRIX row is multiplied with, so that its output is in N and N times the file's length unit."""
-    return np.array([1, 1, 1, 1 / metres, 1 / metres, 1 / metres]) if plate.type in (4, 5) else np.ones(plate.matrix.shape[0])
+    return (
+        np.array([1, 1, 1, 1 / metres, 1 / metres, 1 / metres])
+        if plate.type in (4, 5)
+        else np.ones(plate.matrix.shape[0])
+    )

@@ -14,7 +14,9 @@ def random_sip(segments: tuple[str, ...], rng: np.random.Generator) -> Sip:
         points, weights = rng.normal(0, 0.1, (8, 3)), rng.uniform(0.1, 1.0, 8)
         first = weights @ points
         inertia = sum(w * (p @ p * np.eye(3) - np.outer(p, p)) for w, p in zip(weights, points, strict=True))
-        phi.append([weights.sum(), *first, *(inertia[i, j] for i, j in ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)))])
+        phi.append(
+            [weights.sum(), *first, *(inertia[i, j] for i, j in ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)))]
+        )
     flat = np.concatenate(phi)
     return Sip(segments, flat, np.diag((0.1 * np.abs(flat)) ** 2))
 
@@ -45,7 +47,10 @@ def random_body(rng: np.random.Generator, *, n_segments: int = 6, root: str = "f
         random_sip(segments, rng),
         JointLimits(-2 * one, 2 * one, 4 * one, -99 * one, 99 * one),
         SegmentMarkers(
-            tuple(f"m{i}" for i in range(count)), tuple(i // 3 for i in range(count)), rng.normal(0, 0.1, (count, 3)), np.ones(count)
+            tuple(f"m{i}" for i in range(count)),
+            tuple(i // 3 for i in range(count)),
+            rng.normal(0, 0.1, (count, 3)),
+            np.ones(count),
         ),
         np.tile([[-1.0] * 3, [1.0] * 3], (n_segments, 1, 1)),
         np.tile([[-1.0] * 3, [1.0] * 3], (n_segments, 1, 1)),

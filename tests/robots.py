@@ -1,4 +1,6 @@
-"""A made-up robot as URDF text: z up, a massless root link, hip axes that do not meet, arms of four joints, a mesh, names of its own."""
+"""A made-up robot as URDF text: z up, a massless root link, hip axes that do not meet, arms of four joints, a mesh,
+names of its own.
+"""
 
 LINK = (
     '<link name="{name}"><inertial><origin xyz="{com}" rpy="0.1 0 0.2"/><mass value="{mass}"/>'
@@ -6,23 +8,30 @@ LINK = (
 )
 BOX = '<collision><origin xyz="{place}" rpy="0 0 0"/><geometry><box size="{size}"/></geometry></collision>'
 JOINT = (
-    '<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/><origin xyz="{xyz}" rpy="0 0 0"/>'
+    '<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/><origin xyz="{xyz}" rpy="0 '
+    '0 0"/>'
     '<axis xyz="{axis}"/><limit lower="{low}" upper="{high}" velocity="3" effort="{effort}"/></joint>'
 )
 
 
 def link(name: str, mass: float, *, com: str = "0 0 0", place: str = "0 0 0", size: str = "") -> str:
     """Return a link with an inertia of 0.001 kg·m² per kilogram and, given a size, a box."""
-    return LINK.format(name=name, mass=mass, com=com, i=0.001 * mass, shape=BOX.format(place=place, size=size) if size else "")
+    return LINK.format(
+        name=name, mass=mass, com=com, i=0.001 * mass, shape=BOX.format(place=place, size=size) if size else ""
+    )
 
 
-def joint(name: str, parent: str, child: str, xyz: str, axis: str, low: float = -1.5, high: float = 1.5, effort: float = 120.0) -> str:
+def joint(
+    name: str, parent: str, child: str, xyz: str, axis: str, low: float = -1.5, high: float = 1.5, effort: float = 120.0
+) -> str:
     """Return a joint that turns."""
     return JOINT.format(name=name, parent=parent, child=child, xyz=xyz, axis=axis, low=low, high=high, effort=effort)
 
 
 def leg(side: str, sign: int, hip_offset: float) -> str:
-    """Yaw, roll and pitch of the hip ``hip_offset`` m apart, knee, pitch and roll of the ankle; the shanks' box is a mesh."""
+    """Yaw, roll and pitch of the hip ``hip_offset`` m apart, knee, pitch and roll of the ankle; the shanks' box is a
+    mesh.
+    """
     parts = [
         joint(f"{side}_yaw", "pelvis", f"{side}_hip1", f"0 {sign * 0.09} -0.05", "0 0 1"),
         link(f"{side}_hip1", 0.4),
@@ -71,7 +80,8 @@ def biped(*, hip_offset: float = 0.03) -> str:
     """Return the URDF of a robot of 1.1 m and 27 kg."""
     parts = [
         '<robot name="made up"><link name="base"/>',
-        '<joint name="base_joint" type="fixed"><parent link="base"/><child link="pelvis"/><origin xyz="0 0 0.02" rpy="0 0 0"/></joint>',
+        '<joint name="base_joint" type="fixed"><parent link="base"/><child link="pelvis"/><origin xyz="0 0 0.02" '
+        'rpy="0 0 0"/></joint>',
         link("pelvis", 4.0, com="0.01 0 0.02", size="0.16 0.2 0.1"),
         joint("waist", "pelvis", "chest", "0 0 0.08", "0 1 0", -0.3, 1.2),
         link("chest", 6.0, com="0.01 0 0.15", place="0 0 0.17", size="0.16 0.26 0.3"),

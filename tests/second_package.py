@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from biodance.lab.markers.sets import FAMILY as MARKER_SETS
+from biodance.lab.markers.sets import _FAMILY as MARKER_SETS
 from biodance.lab.markers.sets import read_marker_set
 
 RENAMED = {label: f"X{i:02d}" for i, label in enumerate(read_marker_set("plug_in_gait").labels)}
@@ -64,7 +64,8 @@ def read(path: Path, *, role, subject=None):
         raise FileRefused(f"{path}: {table.shape[1]} columns for {len(labels)} labels. Export it again.")
     found = recognise(labels)
     markers = Markers(labels, table[:, 0], table[:, 1:].reshape(len(table), -1, 3))
-    return Trial(path.stem, role, markers, (), Source(path, "", "TINY", rate=markers.rate), marker_set=found.name if found else "")
+    source = Source(path, "", "TINY", rate=markers.rate)
+    return Trial(path.stem, role, markers, (), source, marker_set=found.name if found else "")
 '''
 EXPORT = '''
 """One line a segment: its name and its mass."""
@@ -120,7 +121,14 @@ def install(place: Path, *, points: str = ENTRY_POINTS) -> Path:
     package, info = place / "tiny_lab", place / "tiny_lab-0.1.dist-info"
     package.mkdir(parents=True)
     info.mkdir()
-    modules = {"__init__": "", "cable": CABLE, "tiny_format": FORMAT, "tiny_export": EXPORT, "low_hands": LIMIT, "files": FILES}
+    modules = {
+        "__init__": "",
+        "cable": CABLE,
+        "tiny_format": FORMAT,
+        "tiny_export": EXPORT,
+        "low_hands": LIMIT,
+        "files": FILES,
+    }
     for name, code in modules.items():
         (package / f"{name}.py").write_text(code.lstrip())
     (package / "tiny_study.csv").write_text(TABLE)

@@ -1,4 +1,6 @@
-"""Exported models, judged by the programs they are for: OpenSim, MuJoCo and pinocchio must find our joint torques in them."""
+"""Exported models, judged by the programs they are for: OpenSim, MuJoCo and pinocchio must find our joint torques in
+them.
+"""
 
 from dataclasses import replace
 
@@ -40,7 +42,11 @@ def moved(body, seed: int, frames: int = 4) -> Motion:
 def test_pinocchio_reads_the_urdf_with_equal_regressor_and_torques(body, tmp_path) -> None:
     pin = pytest.importorskip("pinocchio")
     path = write_model(body, tmp_path / "m.urdf", format="urdf", source="table -- and data")
-    model = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer()) if body.n_root else pin.buildModelFromUrdf(str(path))
+    model = (
+        pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer())
+        if body.n_root
+        else pin.buildModelFromUrdf(str(path))
+    )
     model.gravity.linear = np.array([0, 0, -9.80665])
     data, motion = model.createData(), moved(body, 0)
     ours = joint_torques(body, motion, {})
@@ -50,8 +56,16 @@ def test_pinocchio_reads_the_urdf_with_equal_regressor_and_torques(body, tmp_pat
     root = range(6) if body.n_root else range(0)
     for t in range(motion.time.size):
         q, v, a = pin.neutral(model), np.zeros(model.nv), np.zeros(model.nv)
-        q[: body.nq - len(place)], v[root], a[root] = motion.q[t, : body.nq - len(place)], motion.v[t, root], motion.a[t, root]
-        q[place], v[speed], a[speed] = motion.q[t, body.nq - len(place) :], motion.v[t, body.n_root :], motion.a[t, body.n_root :]
+        q[: body.nq - len(place)], v[root], a[root] = (
+            motion.q[t, : body.nq - len(place)],
+            motion.v[t, root],
+            motion.a[t, root],
+        )
+        q[place], v[speed], a[speed] = (
+            motion.q[t, body.nq - len(place) :],
+            motion.v[t, body.n_root :],
+            motion.a[t, body.n_root :],
+        )
         tau = pin.rnea(model, data, q, v, a)
         assert tau[speed] == pytest.approx(ours.torque[t], abs=1e-8)
         if W is not None:
@@ -89,7 +103,9 @@ def test_mujoco_compiles_the_model_and_finds_the_same_torques(body, tmp_path) ->
 
 
 def euler_state(e: np.ndarray, de: np.ndarray, dde: np.ndarray) -> tuple[Rotation, np.ndarray, np.ndarray]:
-    """Return lab_R_root, body angular velocity and acceleration of root angles ZXY (tilt, list, rotation) and their rates."""
+    """Return lab_R_root, body angular velocity and acceleration of root angles ZXY (tilt, list, rotation) and their
+    rates.
+    """
 
     def slope(e: np.ndarray) -> np.ndarray:
         """Columns: body-frame axis of each of the three successive rotations."""

@@ -42,7 +42,8 @@ def test_a_robot_without_markers_reads_back(tmp_path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "word"), [("{", "not a body"), ("[]", "not a body"), ("{}", "version"), ('{"biodance_body": 1}', "not a body")]
+    ("text", "word"),
+    [("{", "not a body"), ("[]", "not a body"), ("{}", "version"), ('{"biodance_body": 1}', "not a body")],
 )
 def test_another_file_is_refused(text: str, word: str, tmp_path) -> None:
     path = tmp_path / "body.json"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from biodance.body.inertia import smallest_eigenvalues
-from biodance.body.robot.hoap3 import SEGMENTS, hoap3
+from biodance.body.robot.hoap3 import _SEGMENTS, hoap3
 from biodance.body.tables.anthropometry import read_table, row_numbers
 from biodance.identification.base_parameters import structural_base
 from biodance.motion.kinematics import poses
@@ -27,14 +27,14 @@ def test_it_weighs_what_the_paper_says_and_can_exist() -> None:
 
 def test_segment_origins_are_the_makers() -> None:
     pose = poses(BODY, standing()[None])
-    for name in SEGMENTS:
+    for name in _SEGMENTS:
         expected = row_numbers(read_table("robots", "hoap3_segments").row(segment=name), "origin_x origin_y origin_z")
         np.testing.assert_allclose(pose.position[0, BODY.segment_index(name)], expected, atol=1e-9, err_msg=name)
 
 
 def test_centre_of_mass_is_the_table_s() -> None:
     pose = poses(BODY, standing()[None])
-    for i, name in enumerate(SEGMENTS):
+    for i, name in enumerate(_SEGMENTS):
         row = read_table("robots", "hoap3_segments").row(segment=name)
         expected = np.add(row_numbers(row, "origin_x origin_y origin_z"), row_numbers(row, "com_x com_y com_z"))
         np.testing.assert_allclose(pose.points([i], BODY.sip.com[i : i + 1])[0, 0], expected, atol=1e-9, err_msg=name)
@@ -71,5 +71,6 @@ def test_soles_are_flat_and_0_305_m_under_the_pelvis() -> None:
 
 
 def test_its_base_parameters_are_counted_by_theory() -> None:
-    # 7 - 1 joints of two or three axes lose one parameter each (hips, ankles, shoulders), 5 hinges three each (knees, elbows, waist)
+    # 7 - 1 joints of two or three axes lose one parameter each (hips, ankles, shoulders), 5 hinges three each (knees,
+    # elbows, waist)
     assert structural_base(BODY).count == 120 - 6 - 15

@@ -55,7 +55,9 @@ ANATOMY = [
 
 
 @pytest.mark.parametrize(("joint", "segment", "point", "direction"), ANATOMY)
-def test_positive_is_the_anatomical_direction(joint: str, segment: str, point: tuple[float, float, float], direction: list[int]) -> None:
+def test_positive_is_the_anatomical_direction(
+    joint: str, segment: str, point: tuple[float, float, float], direction: list[int]
+) -> None:
     step = moved(joint, 0.1, segment, point)
     assert step @ np.array(direction) > 0.8 * np.linalg.norm(step)
 

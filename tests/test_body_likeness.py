@@ -1,4 +1,6 @@
-"""The same robot in other frames and in another size: wrenches and torques are those of physics, not of the description."""
+"""The same robot in other frames and in another size: wrenches and torques are those of physics, not of the
+description.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -30,8 +32,12 @@ def made_up(tmp_path: Path) -> Body:
 def test_standing_frames_change_the_description_only(tmp_path: Path) -> None:
     for body in (HOAP, made_up(tmp_path)):
         other, motion = standing_frames(body), random_motion(body, np.random.default_rng(2), frames=5)
-        np.testing.assert_allclose(predict_wrench(other, motion).value, predict_wrench(body, motion).value, rtol=0, atol=1e-9)
-        np.testing.assert_allclose(joint_torques(other, motion, {}).torque, joint_torques(body, motion, {}).torque, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(
+            predict_wrench(other, motion).value, predict_wrench(body, motion).value, rtol=0, atol=1e-9
+        )
+        np.testing.assert_allclose(
+            joint_torques(other, motion, {}).torque, joint_torques(body, motion, {}).torque, rtol=0, atol=1e-9
+        )
         before, after = poses(body, motion.q), poses(other, motion.q)
         for side in ("right", "left"):
             foot, new = body.feet[side], other.feet[side]

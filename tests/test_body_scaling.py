@@ -1,4 +1,6 @@
-"""Scaling on a static trial: joint centres against formulas and Vicon's own, bodies that stand under their markers, clear refusals."""
+"""Scaling on a static trial: joint centres against formulas and Vicon's own, bodies that stand under their markers,
+clear refusals.
+"""
 
 import os
 from dataclasses import replace
@@ -9,7 +11,16 @@ import pytest
 
 from biodance.body.body import Body
 from biodance.body.human.human import human
-from biodance.body.human.joint_centres import chord, davis_hip, elbow, harrington_hip, pelvis_frame, shoulder, unit, wrist
+from biodance.body.human.joint_centres import (
+    chord,
+    davis_hip,
+    elbow,
+    harrington_hip,
+    pelvis_frame,
+    shoulder,
+    unit,
+    wrist,
+)
 from biodance.body.human.limits import standing_tilt
 from biodance.body.human.measures import Measures
 from biodance.body.human.scaling import chain_angles, measure_static
@@ -26,21 +37,42 @@ from biodance.records import Markers, Source, Subject, Trial
 SUBJECT = Subject(65.0, 1.75, "F", 33.0)
 DATA = os.environ.get("BIODANCE_DATA")
 needs_data = pytest.mark.skipif(not DATA, reason="BIODANCE_DATA is not set: the folder of real recordings")
-STATICS = {"pycgm": "Static_trial", "biomechzoo/HC030A": "HC030A01", "biomechzoo/HC032A": "HC032A01", "biomechzoo/HC038A": "HC038A01"}
+STATICS = {
+    "pycgm": "Static_trial",
+    "biomechzoo/HC030A": "HC030A01",
+    "biomechzoo/HC032A": "HC032A01",
+    "biomechzoo/HC038A": "HC038A01",
+}
 
 
-def standing_trial(*, drop: tuple[str, ...] = (), measurements: dict[str, float] | None = None, frames: int = 60) -> Trial:
+def standing_trial(
+    *, drop: tuple[str, ...] = (), measurements: dict[str, float] | None = None, frames: int = 60
+) -> Trial:
     """Return a static trial of the generic person: every marker at its usual place, standing on the floor."""
     body = human(SUBJECT)
     q = np.tile(body.neutral, (frames, 1))
     q[:, 2] = 0.95
-    for joint, degrees in (("right_shoulder_adduction", -25), ("left_shoulder_adduction", -25), ("right_elbow_flexion", 25),
-                           ("left_elbow_flexion", 25), ("right_knee_flexion", 5), ("left_knee_flexion", 5)):  # fmt: skip
+    for joint, degrees in (
+        ("right_shoulder_adduction", -25),
+        ("left_shoulder_adduction", -25),
+        ("right_elbow_flexion", 25),
+        ("left_elbow_flexion", 25),
+        ("right_knee_flexion", 5),
+        ("left_knee_flexion", 5),
+    ):
         q[:, 7 + body.joint_index(joint)] = np.radians(degrees)
     keep = [i for i, name in enumerate(body.markers.names) if name not in drop]
     xyz = poses(body, q).points([body.markers.segment[i] for i in keep], body.markers.position[keep])
     markers = Markers(tuple(body.markers.names[i] for i in keep), np.arange(frames) / 100, xyz)
-    return Trial("static", "static", markers, (), Source(Path("static.c3d"), "", "test", 100.0), "plug_in_gait", measurements or {})
+    return Trial(
+        "static",
+        "static",
+        markers,
+        (),
+        Source(Path("static.c3d"), "", "test", 100.0),
+        "plug_in_gait",
+        measurements or {},
+    )
 
 
 def scaled(subject: Subject, static: Trial) -> tuple[Body, np.ndarray]:
@@ -61,12 +93,16 @@ def test_the_generic_person_is_found_again() -> None:
     generic = human(SUBJECT)
     for name in ("right_knee_flexion", "left_knee_flexion", "right_ankle_dorsiflexion", "right_elbow_flexion"):
         i = body.joint_index(name)
-        assert np.linalg.norm(body.joints[i].translation) == pytest.approx(np.linalg.norm(generic.joints[i].translation), rel=0.12), name
+        assert np.linalg.norm(body.joints[i].translation) == pytest.approx(
+            np.linalg.norm(generic.joints[i].translation), rel=0.12
+        ), name
     assert body.sip.mass.sum() == pytest.approx(65.0)
     assert smallest_eigenvalues(body.sip.phi).min() > 0
 
 
-@pytest.mark.parametrize("drop", [("LUPA", "RUPA", "LFRM", "RFRM"), ("LFHD", "RFHD", "LBHD", "RBHD", "RBAK"), ("T10", "STRN")])
+@pytest.mark.parametrize(
+    "drop", [("LUPA", "RUPA", "LFRM", "RFRM"), ("LFHD", "RFHD", "LBHD", "RBHD", "RBAK"), ("T10", "STRN")]
+)
 def test_fewer_markers_still_make_a_body(drop: tuple[str, ...]) -> None:
     body, _ = scaled(SUBJECT, standing_trial(drop=drop))
     assert not set(drop) & set(body.markers.names)
@@ -92,9 +128,15 @@ def test_a_thigh_marker_that_was_not_placed_for_the_set_is_not_believed() -> Non
     right, _ = scaled(SUBJECT, trial)
     names, xyz = trial.markers.names, trial.markers.xyz.copy()
     knee_marker, height = xyz[0, names.index("RKNE")], xyz[0, names.index("RTHI"), 2]
-    xyz[:, names.index("RTHI")] = [knee_marker[0] + 0.1, knee_marker[1] + 0.06, height]  # in front of the thigh instead of beside it
+    xyz[:, names.index("RTHI")] = [
+        knee_marker[0] + 0.1,
+        knee_marker[1] + 0.06,
+        height,
+    ]  # in front of the thigh instead of beside it
     wrong, _ = scaled(SUBJECT, replace(trial, markers=Markers(names, trial.markers.time, xyz)))
-    assert any("right thigh marker would turn the knee's axis" in note and note.startswith("Warning") for note in wrong.notes)
+    assert any(
+        "right thigh marker would turn the knee's axis" in note and note.startswith("Warning") for note in wrong.notes
+    )
     assert not any("thigh marker would turn" in note for note in right.notes)
     knee = right.joint_index("right_knee_flexion")
     assert np.linalg.norm(wrong.joints[knee].translation - right.joints[knee].translation) < 0.005
@@ -103,7 +145,11 @@ def test_a_thigh_marker_that_was_not_placed_for_the_set_is_not_believed() -> Non
 def test_wrist_markers_on_the_styloids_and_on_a_bar() -> None:
     centre = np.array([0.0, 0.0, 0.0])
     radial, ulnar, elbow_at = np.array([0.04, 0, 0]), np.array([-0.04, 0, 0]), np.array([0.0, 0, 0.25])
-    place = {"right_elbow_lateral": elbow_at + np.array([0.04, 0, 0]), "right_wrist_radial": radial, "right_wrist_ulnar": ulnar}
+    place = {
+        "right_elbow_lateral": elbow_at + np.array([0.04, 0, 0]),
+        "right_wrist_radial": radial,
+        "right_wrist_ulnar": ulnar,
+    }
     sizes = measures_of(wrist=0.06)
     _, middle = arm_centres(place, sizes, np.array([0.0, 0.01, 0.55]), "right")
     np.testing.assert_allclose(middle, centre, atol=1e-12)
@@ -113,7 +159,11 @@ def test_wrist_markers_on_the_styloids_and_on_a_bar() -> None:
 
 def measures_of(*, wrist: float) -> Measures:
     sides = {"right": 0.9, "left": 0.9}
-    widths = {f"{side}_{joint}": wrist if joint == "wrist" else 0.08 for side in sides for joint in ("knee", "ankle", "elbow", "wrist")}
+    widths = {
+        f"{side}_{joint}": wrist if joint == "wrist" else 0.08
+        for side in sides
+        for joint in ("knee", "ankle", "elbow", "wrist")
+    }
     return Measures(0.007, 0.25, 0.16, sides, sides, sides, widths, frozenset(widths), ())
 
 
@@ -186,12 +236,17 @@ def test_chord_gives_the_distance_and_lies_in_the_plane() -> None:
 
 
 def test_hip_formulas_at_round_numbers() -> None:
-    # Davis 1991 with LL 900, PW 240, AsisTroc 70, r 7 mm; Harrington 2007 with PW 240, PD 150 mm; ISB axes: x ahead, y up, z right
+    # Davis 1991 with LL 900, PW 240, AsisTroc 70, r 7 mm; Harrington 2007 with PW 240, PD 150 mm; ISB axes: x ahead, y
+    # up, z right
     c, theta, beta = 0.115 * 900 - 15.3, 0.5, 0.314
     ahead = c * np.cos(theta) * np.sin(beta) - 77 * np.cos(beta)
     up = -c * np.cos(theta) * np.cos(beta) - 77 * np.sin(beta)
-    np.testing.assert_allclose(1e3 * davis_hip(0.240, 0.900, 0.070, 0.007), [ahead, up, -(c * np.sin(theta) - 120)], atol=1e-6)
-    np.testing.assert_allclose(1e3 * harrington_hip(0.240, 0.150), [-0.24 * 150 - 9.9, -0.30 * 240 - 10.9, 0.33 * 240 + 7.3], atol=1e-6)
+    np.testing.assert_allclose(
+        1e3 * davis_hip(0.240, 0.900, 0.070, 0.007), [ahead, up, -(c * np.sin(theta) - 120)], atol=1e-6
+    )
+    np.testing.assert_allclose(
+        1e3 * harrington_hip(0.240, 0.150), [-0.24 * 150 - 9.9, -0.30 * 240 - 10.9, 0.33 * 240 + 7.3], atol=1e-6
+    )
 
 
 @needs_data
@@ -199,7 +254,11 @@ def test_hip_formulas_at_round_numbers() -> None:
 def test_davis_is_vicons_own_hip_centre(folder: str) -> None:
     """With the measures that Vicon used, our formula gives Vicon's hip centre (LFEP, RFEP) in its own static file."""
     raw = read_raw(Path(str(DATA)) / folder / f"{STATICS[folder]}.c3d")
-    typed = {name: float(np.ravel(value)[0]) / 1e3 for name, value in raw.parameters["PROCESSING"].items() if np.size(value) == 1}
+    typed = {
+        name: float(np.ravel(value)[0]) / 1e3
+        for name, value in raw.parameters["PROCESSING"].items()
+        if np.size(value) == 1
+    }
 
     def point(label: str) -> np.ndarray:
         return np.nanmean(raw.points[:, raw.labels.index(label)], axis=0) / 1e3
@@ -217,9 +276,15 @@ def test_davis_is_vicons_own_hip_centre(folder: str) -> None:
 @needs_data
 @pytest.mark.parametrize("folder", sorted(STATICS))
 def test_knee_ankle_shoulder_elbow_and_wrist_are_vicons_own(folder: str) -> None:
-    """Each construction, from Vicon's own proximal centre and typed widths, gives Vicon's centre in its own static file."""
+    """Each construction, from Vicon's own proximal centre and typed widths, gives Vicon's centre in its own static
+    file.
+    """
     raw = read_raw(Path(str(DATA)) / folder / f"{STATICS[folder]}.c3d")
-    typed = {name: float(np.ravel(value)[0]) / 1e3 for name, value in raw.parameters["PROCESSING"].items() if np.size(value) == 1}
+    typed = {
+        name: float(np.ravel(value)[0]) / 1e3
+        for name, value in raw.parameters["PROCESSING"].items()
+        if np.size(value) == 1
+    }
     at = {label: raw.points[raw.points.shape[0] // 2, i] / 1e3 for i, label in enumerate(raw.labels)}
     radius = typed.get("MARKERDIAMETER", 0.014) / 2
     up, ahead = at["CLAV"] + at["C7"] - at["STRN"] - at["T10"], at["CLAV"] + at["STRN"] - at["C7"] - at["T10"]

@@ -1,4 +1,6 @@
-"""Meshes of segments: what a closed mesh weighs is what its formula says; they reach GLB and OpenSim whole; hulls hold their points."""
+"""Meshes of segments: what a closed mesh weighs is what its formula says; they reach GLB and OpenSim whole; hulls
+hold their points.
+"""
 
 import io
 import json
@@ -38,7 +40,9 @@ def test_a_box_weighs_what_its_formula_says():
 
 
 def test_a_tetrahedron_weighs_what_its_formula_says():
-    """Corners at the origin and at a on each axis: volume a³/6, centre a/4, inertia about the origin m a²/5 and product m a²/20."""
+    """Corners at the origin and at a on each axis: volume a³/6, centre a/4, inertia about the origin m a²/5 and
+    product m a²/20.
+    """
     a = 0.3
     corners = np.vstack([np.zeros(3), a * np.eye(3)])
     mesh = trimesh.Trimesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
@@ -77,7 +81,9 @@ def test_the_solid_of_a_box_touches_its_six_faces_and_is_closed():
     solid = box_solid(box)
     np.testing.assert_allclose(solid.bounds, box, atol=1e-12)
     assert solid.is_watertight
-    assert 0.78 * np.prod(box[1] - box[0]) < solid.volume < np.prod(box[1] - box[0])  # the exact superellipsoid of exponent 4: 0.8097
+    assert (
+        0.78 * np.prod(box[1] - box[0]) < solid.volume < np.prod(box[1] - box[0])
+    )  # the exact superellipsoid of exponent 4: 0.8097
 
 
 def test_a_hull_holds_markers_and_joints():
@@ -141,7 +147,9 @@ def test_opensim_finds_the_meshes_beside_the_model(tmp_path):
     path = write_model(MAN, tmp_path / "man.osim", format="osim", solids=solids)
     files = sorted((tmp_path / "Geometry").iterdir())
     assert len(files) == len(MAN.segments)
-    np.testing.assert_allclose(read_mesh(files[0]).extents, solids[files[0].stem.removeprefix(f"{MAN.name}_")].extents, rtol=1e-5)
+    np.testing.assert_allclose(
+        read_mesh(files[0]).extents, solids[files[0].stem.removeprefix(f"{MAN.name}_")].extents, rtol=1e-5
+    )
     named = [f.name for f in files if f"<mesh_file>{f.name}</mesh_file>" in path.read_text()]
     assert len(named) == len(files)
     opensim = pytest.importorskip("opensim", reason="OpenSim is not installed")

@@ -24,7 +24,14 @@ from biodance.records import Subject
 
 FAMILIES = ("segments", "human", "robots", "uncertainty")
 TABLES = [(family, name) for family in FAMILIES for name in names(f"anthropometry/{family}", ".csv")]
-PEOPLE = [("F", 1.50, 45.0), ("F", 1.75, 65.0), ("F", 1.62, 90.0), ("M", 1.60, 55.0), ("M", 1.77, 75.0), ("M", 1.95, 110.0)]
+PEOPLE = [
+    ("F", 1.50, 45.0),
+    ("F", 1.75, 65.0),
+    ("F", 1.62, 90.0),
+    ("M", 1.60, 55.0),
+    ("M", 1.77, 75.0),
+    ("M", 1.95, 110.0),
+]
 
 
 @pytest.mark.parametrize(("family", "name"), TABLES)
@@ -44,7 +51,8 @@ def test_a_changed_table_is_refused(tmp_path) -> None:
         read_segment_table(path)
 
 
-# Numbers of each table, and sums of value, regression coefficients and sd by quantity, from the files of before the tidy schema.
+# Numbers of each table, and sums of value, regression coefficients and sd by quantity, from the files of before the
+# tidy schema.
 SUMS = {
     "de_leva_1996": (252, {"mass": 4.7773, "length": 12.2616, "com": 20.1507, "gyration": 39.818}),
     "dumas_2018": (220, {"mass": 1.533, "length": 4.746, "com": -5.447, "gyration": 23.91}),
@@ -60,12 +68,18 @@ def test_no_number_of_a_table_was_lost(name: str) -> None:
     assert len(table.numbers) == count
     for quantity, expected in sums.items():
         mine = [one for key, one in table.numbers.items() if key[3] == quantity]
-        assert sum(n.value + n.per_kg + n.per_m + np.nan_to_num(n.sd) for n in mine) == pytest.approx(expected, abs=1e-8), quantity
+        assert sum(n.value + n.per_kg + n.per_m + np.nan_to_num(n.sd) for n in mine) == pytest.approx(
+            expected, abs=1e-8
+        ), quantity
 
 
 def test_spot_values_as_printed() -> None:
-    """Copied by hand: de Leva 1996 Table 4; Dumas and Wojtusch 2018 (%); Winter 2009 Table 4.1; Zatsiorsky 2002 (stature in cm, kg cm2)."""
-    leva, dumas, winter, zats = (read_segment_table(n) for n in ("de_leva_1996", "dumas_2018", "winter_2009", "zatsiorsky_2002"))
+    """Copied by hand: de Leva 1996 Table 4; Dumas and Wojtusch 2018 (%); Winter 2009 Table 4.1; Zatsiorsky 2002
+    (stature in cm, kg cm2).
+    """
+    leva, dumas, winter, zats = (
+        read_segment_table(n) for n in ("de_leva_1996", "dumas_2018", "winter_2009", "zatsiorsky_2002")
+    )
     assert [leva.value("thigh", q, a, sex="F") for q, a in (("mass", ""), ("com", "longitudinal"))] == [0.1478, 0.3612]
     assert leva.values("thigh", "gyration", "sagittal transverse longitudinal", sex="M") == (0.329, 0.329, 0.149)
     assert dumas.values("thigh", "gyration", "xx yy zz xy xz yz", sex="M") == (0.29, 0.15, 0.30, 0.07, -0.02, -0.07)
@@ -76,7 +90,9 @@ def test_spot_values_as_printed() -> None:
         == 0.54
     )
     thigh = zats.number("thigh", "inertia", "sagittal", sex="M")
-    assert (thigh.value * 1e4, thigh.per_kg * 1e4, thigh.per_m * 1e2, thigh.sd * 1e4) == pytest.approx((-3557, 31.7, 18.61, 248))
+    assert (thigh.value * 1e4, thigh.per_kg * 1e4, thigh.per_m * 1e2, thigh.sd * 1e4) == pytest.approx(
+        (-3557, 31.7, 18.61, 248)
+    )
     assert read_segment_table("mass_studies").number("thigh", "mass", sex="F", study="pavol_2002").value == 0.11621
 
 
@@ -86,10 +102,16 @@ HEADER = "segment,sex,quantity,axis,value,unit\n"
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("segment,sex,value\n", r"lacks the column 'quantity'\. Legal are segment, sex, quantity, axis, value, unit, and optional study"),
+        (
+            "segment,sex,value\n",
+            r"lacks the column 'quantity'\. Legal are segment, sex, quantity, axis, value, unit, and optional study",
+        ),
         (HEADER.replace("unit", "unit,colour"), "unknown column 'colour'"),
         (HEADER, "has no row"),
-        (HEADER + "thigh,F,mas,,0.1,body_mass\n", r"row 2: the quantity is 'mas'\. Legal: mass, length, com, gyration, inertia"),
+        (
+            HEADER + "thigh,F,mas,,0.1,body_mass\n",
+            r"row 2: the quantity is 'mas'\. Legal: mass, length, com, gyration, inertia",
+        ),
         (HEADER + "thigh,W,mass,,0.1,body_mass\n", r"row 2: the sex is 'W'\. Legal: F, M, FM"),
         (HEADER + "thigh,F,mass,,0.1,percent\n", r"row 2: the unit of mass is 'percent'\. Legal: body_mass, kg"),
         (HEADER + "thigh,F,com,up,0.4,m\n", r"row 2: the axis of com is 'up'\. Legal: longitudinal, x, y, z"),
@@ -111,7 +133,10 @@ def test_a_users_table_with_a_mistake_is_refused(tmp_path, text: str, words: str
     [
         ("leg,F,mass,,7,kg\n", "'leg' is not a segment of the model. Legal: pelvis, thigh"),
         ("thigh,M,mass,,7,kg\n", "holds no row for sex F. Add rows, or write FM"),
-        ("thigh,F,mass,,34,kg\n", "the masses given are 104.6 % of the body .two of each limb., expected less than 100"),
+        (
+            "thigh,F,mass,,34,kg\n",
+            "the masses given are 104.6 % of the body .two of each limb., expected less than 100",
+        ),
         (
             "shank,F,gyration,x,0.2,m\nshank,F,gyration,z,0.01,m\nshank,F,gyration,y,0.01,m\n",
             "no body has the radii of gyration given for shank",
@@ -130,11 +155,14 @@ def test_the_example_of_contributing_is_a_table(tmp_path) -> None:
     page = (Path(__file__).parent.parent / "CONTRIBUTING.md").read_text(encoding="utf-8")
     (example,) = re.findall(r"```\n(segment,sex,.*?)```", page, flags=re.DOTALL)
     (tmp_path / "scan.csv").write_text(example)
-    assert human(Subject(64.0, 1.70, "F", 30.0), table=str(tmp_path / "scan.csv")).sip.of("left_thigh")[0] == pytest.approx(8.1, rel=0.01)
+    assert human(Subject(64.0, 1.70, "F", 30.0), table=str(tmp_path / "scan.csv")).sip.of("left_thigh")[
+        0
+    ] == pytest.approx(8.1, rel=0.01)
 
 
 def test_a_users_own_scan_becomes_the_body(tmp_path) -> None:
-    rows = "thigh,F,mass,,8,kg\nthigh,F,length,,0.4,m\nthigh,F,com,y,-0.17,m\nshank,F,com,x,0.05,length\nshank,F,gyration,x,0.11,m\n"
+    rows = "thigh,F,mass,,8,kg\nthigh,F,length,,0.4,m\nthigh,F,com,y,-0.17,m\n"
+    rows += "shank,F,com,x,0.05,length\nshank,F,gyration,x,0.11,m\n"
     (tmp_path / "scan.csv").write_text(HEADER + rows)
     subject = Subject(64.0, 1.70, "F", 30.0)
     found, base = reference(str(tmp_path / "scan.csv"), subject), reference("de_leva_1996", subject)
@@ -144,7 +172,9 @@ def test_a_users_own_scan_becomes_the_body(tmp_path) -> None:
     assert found.segments["shank"].com[0] == pytest.approx(0.05 * base.lengths["shank"] * 1.70 / base.stature)
     assert found.segments["shank"].inertia[0, 0] == pytest.approx(0.11**2)
     ratio = {kind: found.segments[kind].mass / base.segments[kind].mass for kind in KINDS if kind != "thigh"}
-    assert max(ratio.values()) == pytest.approx(min(ratio.values())), "what is not given keeps the other table's proportions"
+    assert max(ratio.values()) == pytest.approx(min(ratio.values())), (
+        "what is not given keeps the other table's proportions"
+    )
     assert sum(COUNT[kind] * found.segments[kind].mass for kind in KINDS) == pytest.approx(1.0)
     body = human(subject, table=str(tmp_path / "scan.csv"))
     assert body.sip.of("right_thigh")[0] == pytest.approx(8.0, rel=0.01)
@@ -177,7 +207,11 @@ def test_each_study_of_masses_adds_up() -> None:
     pairs = ("thigh", "shank", "foot", "upper_arm", "forearm", "hand", "shoulder")
     table = read_segment_table("mass_studies")
     for study, sex in table.groups:
-        mine = [(1 + (key[1] in pairs)) * one.value for key, one in table.numbers.items() if (key[0], key[2]) == (study, sex)]
+        mine = [
+            (1 + (key[1] in pairs)) * one.value
+            for key, one in table.numbers.items()
+            if (key[0], key[2]) == (study, sex)
+        ]
         assert sum(mine) == pytest.approx(1.0, abs=1e-3), study
 
 
@@ -195,7 +229,9 @@ def test_zatsiorsky_masses_add_up_to_the_body_before_any_renormalisation() -> No
 def test_strength_of_the_table_is_anderson() -> None:
     anderson = read_table("human", "anderson_2007")
     for sex, mass, stature, expected in (("M", 75.0, 1.77, 209.7), ("F", 65.0, 1.75, 202.0)):
-        assert peak_torque(anderson, Subject(mass, stature, sex), "hip", "extension") == pytest.approx(expected, abs=0.5)
+        assert peak_torque(anderson, Subject(mass, stature, sex), "hip", "extension") == pytest.approx(
+            expected, abs=0.5
+        )
 
 
 def test_the_covariance_is_the_spread_of_drawn_bodies() -> None:
@@ -221,7 +257,9 @@ def test_the_covariance_is_the_spread_of_drawn_bodies() -> None:
 
 @pytest.mark.parametrize("table", ["de_leva_1996", "dumas_2018"])
 @pytest.mark.parametrize(("sex", "stature", "mass"), PEOPLE)
-def test_a_person_from_a_table_weighs_the_body_mass_and_can_exist(table: str, sex: str, stature: float, mass: float) -> None:
+def test_a_person_from_a_table_weighs_the_body_mass_and_can_exist(
+    table: str, sex: str, stature: float, mass: float
+) -> None:
     body = human(Subject(mass, stature, sex, 30.0), table=table)
     assert body.segments == SEGMENTS
     assert body.sip.mass.sum() == pytest.approx(mass, rel=1e-9)
@@ -246,8 +284,22 @@ def test_the_covariance_is_one(sex: str, stature: float, mass: float) -> None:
 
 # Merged reference values: de Leva 1996, woman 1.75 m, 65 kg; man 1.77 m, 75 kg (kg)
 REFERENCE = {
-    "F": {"pelvis": 8.1055, "right_thigh": 9.607, "left_shank": 3.1265, "right_foot": 0.8385, "trunk_head": 23.907, "left_foot": 0.8385},
-    "M": {"pelvis": 8.3775, "right_thigh": 10.62, "left_shank": 3.2475, "right_foot": 1.0275, "trunk_head": 29.4225, "left_foot": 1.0275},
+    "F": {
+        "pelvis": 8.1055,
+        "right_thigh": 9.607,
+        "left_shank": 3.1265,
+        "right_foot": 0.8385,
+        "trunk_head": 23.907,
+        "left_foot": 0.8385,
+    },
+    "M": {
+        "pelvis": 8.3775,
+        "right_thigh": 10.62,
+        "left_shank": 3.2475,
+        "right_foot": 1.0275,
+        "trunk_head": 29.4225,
+        "left_foot": 1.0275,
+    },
 }
 
 
@@ -263,7 +315,9 @@ def test_left_mirrors_right() -> None:
     mirror = np.array([1, 1, 1, -1, 1, 1, 1, -1, -1, 1])
     for segment in SEGMENTS:
         if segment.startswith("right_"):
-            np.testing.assert_allclose(body.sip.of(segment.replace("right_", "left_")), mirror * body.sip.of(segment), atol=1e-12)
+            np.testing.assert_allclose(
+                body.sip.of(segment.replace("right_", "left_")), mirror * body.sip.of(segment), atol=1e-12
+            )
 
 
 def test_women_have_no_zatsiorsky_regressions_and_unknown_tables_are_refused() -> None:
@@ -295,7 +349,9 @@ def test_the_disagreement_of_tables_does_not_widen_a_limb(table: str) -> None:
     subject = Subject(70.0, 1.72, "F")
     skeleton = generic_skeleton(reference(table, subject), subject)
     lumps = scaled_lumps(reference(table, subject), skeleton, subject)
-    others = tuple(scaled_lumps(reference(name, subject), skeleton, subject) for name in measured_whole() if name != table)
+    others = tuple(
+        scaled_lumps(reference(name, subject), skeleton, subject) for name in measured_whole() if name != table
+    )
     alone, together = (primitive_covariance(lumps, skeleton, some) for some in ((), others))
     ways = np.sum([disagreement(lumps, other) ** 2 for other in others], axis=0)
     place = np.arange(120) % 10 > 0
@@ -305,7 +361,9 @@ def test_the_disagreement_of_tables_does_not_widen_a_limb(table: str) -> None:
 
 
 def test_left_and_right_vary_as_mirror_images() -> None:
-    """A point cloud and its reflection at z = 0: what makes the right number larger makes the reflected left one larger, all ten."""
+    """A point cloud and its reflection at z = 0: what makes the right number larger makes the reflected left one
+    larger, all ten.
+    """
     rng = np.random.default_rng(3)
     cloud, weight = rng.normal(size=(20, 3)), rng.uniform(0.1, 1.0, 20)
     other = cloud * [1.0, 1.0, -1.0]

@@ -1,4 +1,6 @@
-"""URDF files: what was written comes back as it was, what others wrote is what pinocchio reads, what is missing is said."""
+"""URDF files: what was written comes back as it was, what others wrote is what pinocchio reads, what is missing is
+said.
+"""
 
 from pathlib import Path
 
@@ -47,7 +49,9 @@ def test_what_was_written_comes_back(pair: tuple[Body, Body]) -> None:
     np.testing.assert_allclose(back.boxes, body.boxes, rtol=0, atol=1e-12)
     for name in ("lower", "upper", "velocity"):
         np.testing.assert_array_equal(getattr(back.limits, name), getattr(body.limits, name))
-    np.testing.assert_array_equal(back.limits.torque_upper, np.maximum(body.limits.torque_upper, -body.limits.torque_lower))
+    np.testing.assert_array_equal(
+        back.limits.torque_upper, np.maximum(body.limits.torque_upper, -body.limits.torque_lower)
+    )
 
 
 def test_soles_are_under_the_feet_and_counter_clockwise(pair: tuple[Body, Body]) -> None:
@@ -72,7 +76,9 @@ def test_the_soles_of_hoap3_are_the_manuals(pair: tuple[Body, Body]) -> None:
         pytest.skip("the human's sole is a hexagon, its box a rectangle")
     for side in ("right", "left"):
         ours, theirs = (np.sort(one.feet[side].outline, axis=0) for one in (back, body))
-        np.testing.assert_allclose(ours, theirs, atol=6e-4)  # the manual's table of links and its drawing differ by half a millimetre
+        np.testing.assert_allclose(
+            ours, theirs, atol=6e-4
+        )  # the manual's table of links and its drawing differ by half a millimetre
 
 
 def test_a_file_with_z_up_is_the_same_robot_as_pinocchio_reads(tmp_path: Path) -> None:
@@ -113,7 +119,8 @@ def test_what_is_guessed_is_said(tmp_path: Path) -> None:
         ('<robot name="made up">', "<sdf>", "<sdf>"),
         ('name="waist" type="revolute"', 'name="waist" type="prismatic"', "'waist' is of type 'prismatic'"),
         ('<link name="base"/>', '<link name="pelvis"/>', "pelvis occurs twice"),
-        ('<parent link="chest"/><child link="r_clavicle"/>', '<parent link="torso"/><child link="r_clavicle"/>', "'torso'"),
+        ('<parent link="chest"/><child link="r_clavicle"/>', '<parent link="torso"/><child link="r_clavicle"/>',
+        "'torso'"),
         ('<mass value="6.0"/>', "", "'chest' lacks <mass>"),
         ('<mass value="6.0"/>', '<mass value="-6.0"/>', "-6 kg"),
         ('<mass value="6.0"/>', '<mass value="six"/>', "'six'"),
@@ -125,7 +132,8 @@ def test_what_is_guessed_is_said(tmp_path: Path) -> None:
         ('xyz="0 0 0.08"', 'xyz="0 0"', "three finite numbers"),
         ('<parent link="base"/>', '<parent link="l_ulna"/>', "does not hang on the root"),
         ('<child link="r_clavicle"/>', '<child link="l_clavicle"/>', "2 links have no parent"),
-        ("<box size=\"0.22 0.1 0.02\"/>", '<mesh filename="sole.stl"/>', "since of its meshes the mesh 'sole.stl' is not where"),
+        ("<box size=\"0.22 0.1 0.02\"/>", '<mesh filename="sole.stl"/>', "since of its meshes the mesh 'sole.stl' is "
+                                                                         "not where"),
         ("<box size=\"0.22 0.1 0.02\"/>", "<capsule/>", "<capsule>"),
     ],
 )  # fmt: skip

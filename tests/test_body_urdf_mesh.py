@@ -1,4 +1,6 @@
-"""Feet that are meshes: the sole is the outline of their lowest layer, in every way in which a file may name the mesh."""
+"""Feet that are meshes: the sole is the outline of their lowest layer, in every way in which a file may name the
+mesh.
+"""
 
 import numpy as np
 import pytest
@@ -11,12 +13,17 @@ from biodance.errors import FileRefused
 from biodance.motion.kinematics import poses
 
 SOLE = BOX.format(place="0 0 0.01", size="0.22 0.1 0.02")
-MESH = '<collision><origin xyz="{xyz}" rpy="{rpy}"/><geometry><mesh filename="{file}" scale="{scale}"/></geometry></collision>'
+MESH = (
+    '<collision><origin xyz="{xyz}" rpy="{rpy}"/><geometry><mesh filename="{file}" '
+    'scale="{scale}"/></geometry></collision>'
+)
 FEET = ("r_sole", "l_sole")
 
 
 def shoe():
-    """Return a block of 0.22 x 0.1 m with a dome on top, its underside at z = 0; many corners, only four of them on the ground."""
+    """Return a block of 0.22 x 0.1 m with a dome on top, its underside at z = 0; many corners, only four of them on
+    the ground.
+    """
     dome = trimesh.creation.icosphere(subdivisions=2, radius=0.04)
     dome.apply_translation([0.02, 0, 0.05])
     block = trimesh.creation.box(extents=[0.22, 0.1, 0.02])
@@ -34,7 +41,10 @@ def robot(tmp_path, file="sole.stl", *, xyz="0 0 0", rpy="0 0 0", scale="1 1 1")
 def soles(body):
     """Return both outlines (P, 3) m at zero angles."""
     pose = poses(body, body.neutral[None])
-    return [pose.points([body.feet[s].segment] * len(body.feet[s].outline), body.feet[s].outline)[0] for s in ("right", "left")]
+    return [
+        pose.points([body.feet[s].segment] * len(body.feet[s].outline), body.feet[s].outline)[0]
+        for s in ("right", "left")
+    ]
 
 
 @pytest.fixture
@@ -66,7 +76,9 @@ def test_the_mesh_is_placed_turned_and_scaled(boxes, tmp_path):
         np.testing.assert_allclose(np.sort(ours, axis=0), np.sort(theirs, axis=0), atol=1e-6)
 
 
-@pytest.mark.parametrize("name", ["package://biped/meshes/sole.stl", "../meshes/sole.stl", "package://robots/biped/meshes/sole.stl"])
+@pytest.mark.parametrize(
+    "name", ["package://biped/meshes/sole.stl", "../meshes/sole.stl", "package://robots/biped/meshes/sole.stl"]
+)
 def test_files_are_found_as_ros_names_them(name, tmp_path):
     (tmp_path / "robots" / "biped" / "urdf").mkdir(parents=True)
     (tmp_path / "robots" / "biped" / "meshes").mkdir()
@@ -76,7 +88,9 @@ def test_files_are_found_as_ros_names_them(name, tmp_path):
 
 
 def test_a_mesh_that_is_missing_or_damaged_is_named(tmp_path):
-    with pytest.raises(FileRefused, match=r"r_pad shows no sole, since of its meshes the mesh 'sole\.stl' is not where"):
+    with pytest.raises(
+        FileRefused, match=r"r_pad shows no sole, since of its meshes the mesh 'sole\.stl' is not where"
+    ):
         read_urdf(robot(tmp_path), feet=FEET)
     (tmp_path / "sole.obj").write_text("not a mesh")
     with pytest.raises(FileRefused, match=r"r_pad shows no sole, since of its meshes .*sole\.obj"):
@@ -103,7 +117,10 @@ def test_a_round_sole_keeps_few_corners_and_all_on_its_rim():
 
 
 def test_two_soles_get_equally_many_points():
-    triangle, square = np.array([[0, 0, 0], [4, 0, 0], [0, 1, 0.0]]), np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
+    triangle, square = (
+        np.array([[0, 0, 0], [4, 0, 0], [0, 1, 0.0]]),
+        np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]]),
+    )
     one, other = match_faces(triangle, square)
     np.testing.assert_array_equal(other, square)
     np.testing.assert_array_equal(one, [[0, 0, 0], [4, 0, 0], [2, 0.5, 0], [0, 1, 0]])
@@ -129,7 +146,9 @@ def test_a_point_mass_is_not_known_exactly(tmp_path):
     text = biped()
     one = text.index("<inertia ixx")
     two = text.index("/>", one) + 2
-    (tmp_path / "robot.urdf").write_text(text[:one] + '<inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/>' + text[two:])
+    (tmp_path / "robot.urdf").write_text(
+        text[:one] + '<inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/>' + text[two:]
+    )
     body = read_urdf(tmp_path / "robot.urdf", feet=FEET)
     sd = np.sqrt(np.diag(body.sip.covariance)).reshape(-1, 10)
     assert np.isfinite(sd).all()

@@ -1,4 +1,6 @@
-"""The command line: exit codes, one sentence instead of a traceback, JSON alone on stdout, nothing overwritten, nothing heavy imported."""
+"""The command line: exit codes, one sentence instead of a traceback, JSON alone on stdout, nothing overwritten,
+nothing heavy imported.
+"""
 
 import json
 import shutil
@@ -14,7 +16,9 @@ from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED
 
 def biodance(*words):
     """Run the command in a process of its own."""
-    return subprocess.run([sys.executable, "-m", "biodance", *map(str, words)], capture_output=True, text=True, timeout=120, check=False)
+    return subprocess.run(
+        [sys.executable, "-m", "biodance", *map(str, words)], capture_output=True, text=True, timeout=120, check=False
+    )
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +93,9 @@ def test_inspect_prints_one_json_document(session, capsys):
     records = {record["file"].rpartition("/")[2]: record for record in json.loads(printed.out)}
     assert code == NEEDS_A_PERSON
     assert len(records) == 9
-    assert [name for name, record in sorted(records.items()) if record["status"] == "refused"] == sorted(f"{n}.c3d" for n in UNREADABLE)
+    assert [name for name, record in sorted(records.items()) if record["status"] == "refused"] == sorted(
+        f"{n}.c3d" for n in UNREADABLE
+    )
     assert run(["inspect", str(session / "static.c3d"), "--json"]) == DONE
 
 
@@ -134,7 +140,10 @@ def test_ctrl_c_keeps_the_trials_that_are_done_and_says_so(session, tmp_path, ca
     monkeypatch.setattr(room, "examine_trial", stopping)
     assert run(["report", str(session), "--out", str(tmp_path / "out")]) == STOPPED
     assert "holds the trials that were done" in capsys.readouterr().err
-    states = {trial["name"]: trial["status"] for trial in json.loads((tmp_path / "out" / "results.json").read_text())["trials"]}
+    states = {
+        trial["name"]: trial["status"]
+        for trial in json.loads((tmp_path / "out" / "results.json").read_text())["trials"]
+    }
     assert states["no_plates"] == "warning"
     assert states["unknown_set"] == states["walk"] == "refused"
 
@@ -157,8 +166,42 @@ def test_ctrl_c_before_anything_was_done_writes_nothing(tmp_path, capsys, monkey
         (["inspect", "no-such-file.c3d"], "no-such-file.c3d"),
         (["report", "no-such-folder", "--out", "x"], "no-such-folder"),
         (["report", "."], "--out"),
-        (["simulate", "--protocol", "short", "--sex", "F", "--height", "170", "--mass", "62", "--seed", "1", "--out", "x"], "stature"),
-        (["simulate", "--protocol", "waltz", "--sex", "F", "--height", "1.7", "--mass", "62", "--seed", "1", "--out", "x"], "waltz"),
+        (
+            [
+                "simulate",
+                "--protocol",
+                "short",
+                "--sex",
+                "F",
+                "--height",
+                "170",
+                "--mass",
+                "62",
+                "--seed",
+                "1",
+                "--out",
+                "x",
+            ],
+            "stature",
+        ),
+        (
+            [
+                "simulate",
+                "--protocol",
+                "waltz",
+                "--sex",
+                "F",
+                "--height",
+                "1.7",
+                "--mass",
+                "62",
+                "--seed",
+                "1",
+                "--out",
+                "x",
+            ],
+            "waltz",
+        ),
     ],
 )
 def test_a_wrong_call_is_one_sentence(words, says, tmp_path, capsys, monkeypatch):

@@ -1,4 +1,6 @@
-"""The commands identify and export: files, JSON, exit codes, nothing overwritten; the session comes from memory, not from disk."""
+"""The commands identify and export: files, JSON, exit codes, nothing overwritten; the session comes from memory, not
+from disk.
+"""
 
 import json
 from dataclasses import replace
@@ -21,7 +23,9 @@ def lab(monkeypatch, tmp_path):
     for name in results:
         (tmp_path / name).mkdir()
     for room in ("biodance.lab.session.read", "biodance.pipeline.export"):
-        monkeypatch.setattr(f"{room}.read_session", lambda folder, **_: replace(results[folder.name].session, folder=folder))
+        monkeypatch.setattr(
+            f"{room}.read_session", lambda folder, **_: replace(results[folder.name].session, folder=folder)
+        )
     for room in ("biodance.pipeline.session", "biodance.pipeline.export"):
         monkeypatch.setattr(f"{room}.examine", lambda session, **_: results[session.folder.name])
     return tmp_path
@@ -42,7 +46,10 @@ def test_identify_writes_page_numbers_and_body(lab, no_page, capsys):
     assert told["status"] == "solved"
     assert run(["identify", str(lab / "S01"), "--out", str(lab / "out")]) == NOT_DONE
     assert "--force" in capsys.readouterr().err
-    assert run(["identify", str(lab / "S01"), "--out", str(lab / "out"), "--force", "--reference", str(lab / "bare")]) == NEEDS_A_PERSON
+    assert (
+        run(["identify", str(lab / "S01"), "--out", str(lab / "out"), "--force", "--reference", str(lab / "bare")])
+        == NEEDS_A_PERSON
+    )
     assert "trunk_head" in capsys.readouterr().out
 
 
@@ -79,8 +86,13 @@ def test_motion_is_exported_by_trial(lab, capsys):
     assert "Legal: fit_0, validate_1" in capsys.readouterr().err
     assert run(["export", str(lab / "S01"), "--format", "mot", "--trial", "fit_0", "--out", str(out)]) == DONE
     swung = read_mot(out)["left_knee_flexion"]
-    assert swung == pytest.approx(session_result().trials[0].motion.q[:, 7 + body().joint_index("left_knee_flexion")], abs=1e-8)
-    assert run(["export", str(lab / "S01"), "--format", "trc", "--trial", "fit_0", "--out", str(lab / "a.trc")]) == NOT_DONE
+    assert swung == pytest.approx(
+        session_result().trials[0].motion.q[:, 7 + body().joint_index("left_knee_flexion")], abs=1e-8
+    )
+    assert (
+        run(["export", str(lab / "S01"), "--format", "trc", "--trial", "fit_0", "--out", str(lab / "a.trc")])
+        == NOT_DONE
+    )
     assert "no markers" in capsys.readouterr().err
 
 
@@ -99,6 +111,8 @@ def test_an_existing_file_is_replaced_only_by_force_and_only_by_a_whole_one(lab,
 def test_tables_lie_beside_the_page(lab, no_page, capsys):
     words = ["identify", str(lab / "S01"), "--out", str(lab / "out"), "--tables", str(lab / "tables")]
     assert run(words) in (DONE, NEEDS_A_PERSON)
-    assert {"segments.csv", "segments.parquet", "wrench.csv", "angles.parquet"} <= {path.name for path in (lab / "tables").iterdir()}
+    assert {"segments.csv", "segments.parquet", "wrench.csv", "angles.parquet"} <= {
+        path.name for path in (lab / "tables").iterdir()
+    }
     assert run([*words[:3], str(lab / "more"), *words[4:]]) == NOT_DONE
     assert "--force" in capsys.readouterr().err

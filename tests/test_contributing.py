@@ -1,4 +1,6 @@
-"""The worked example of CONTRIBUTING.md is an effect that works, found like any other by putting its file into the folder."""
+"""The worked example of CONTRIBUTING.md is an effect that works, found like any other by putting its file into the
+folder.
+"""
 
 import importlib
 import re

@@ -1,4 +1,6 @@
-"""The command dance: one tiny dance from the terminal to every file, read back by other code; refusals; folders that are respected."""
+"""The command dance: one tiny dance from the terminal to every file, read back by other code; refusals; folders that
+are respected.
+"""
 
 import json
 from pathlib import Path
@@ -43,7 +45,13 @@ def test_results_json_keeps_its_promise(made: tuple[Path, Path, int]) -> None:
     assert set(found["criterion"]) >= {"static", "static_bound", "dynamic"}
     assert len(found["criterion"]["dynamic"]) == 1
     assert found["criterion"]["static"] >= found["criterion"]["static_bound"] == pytest.approx(65.0, abs=0.01)
-    assert {m["limit"] for m in found["margins"]} >= {"joint_range", "joint_torque", "balance", "friction", "self_collision"}
+    assert {m["limit"] for m in found["margins"]} >= {
+        "joint_range",
+        "joint_torque",
+        "balance",
+        "friction",
+        "self_collision",
+    }
     assert all(m["worst"] >= 0 and {"where_s", "unit"} <= set(m) for m in found["margins"])
     assert len(found["expected_sd"]) == 12
     assert all(0 < row["mass_kg"] <= row["mass_table_kg"] for row in found["expected_sd"])
@@ -93,7 +101,9 @@ def test_an_earlier_dance_is_not_overwritten(made: tuple[Path, Path, int], capsy
     assert (folder / "results.json").read_bytes() == before
 
 
-def test_a_dance_that_cannot_exist_is_refused_with_what_forbids_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_dance_that_cannot_exist_is_refused_with_what_forbids_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "tiny.toml").write_text(PROTOCOL)
     (tmp_path / "person.toml").write_text("[range_deg]\nankle_dorsiflexion = [-35, -30]\n")
     arguments = ["--protocol", str(tmp_path / "tiny.toml"), "--limits", str(tmp_path / "person.toml"), "--json"]
@@ -115,7 +125,9 @@ def test_a_dance_that_cannot_exist_is_refused_with_what_forbids_it(tmp_path: Pat
         (["--limits", "nowhere.toml"], "nowhere.toml"),
     ],
 )
-def test_wrong_words_are_one_sentence(change: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_wrong_words_are_one_sentence(
+    change: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     words = dict(zip(WHO[::2], WHO[1::2], strict=True)) | {change[0]: change[1]}
     arguments = [word for pair in words.items() for word in pair]
     assert run(["dance", *arguments, "--out", str(tmp_path / "out")]) == 2

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from biodance.body.human.human import human
-from biodance.dance.cues import MOST, WORDS, calls, cue_sheet
+from biodance.dance.cues import _MOST, _WORDS, calls, cue_sheet
 from biodance.errors import BiodanceError
 from biodance.records import Array, Subject
 
@@ -21,7 +21,7 @@ def posture(**degrees: float) -> Array:
 
 def test_every_joint_of_the_human_has_words() -> None:
     movements = {joint.name.removeprefix("right_").removeprefix("left_") for joint in BODY.joints}
-    assert movements == set(WORDS)
+    assert movements == set(_WORDS)
 
 
 def test_direction_size_and_order() -> None:
@@ -30,7 +30,9 @@ def test_direction_size_and_order() -> None:
 
 
 def test_pairs_are_called_together_and_only_when_alike() -> None:
-    assert calls(BODY, REST, posture(right_elbow_flexion=60, left_elbow_flexion=64)) == ("bend both elbows by about 60°",)
+    assert calls(BODY, REST, posture(right_elbow_flexion=60, left_elbow_flexion=64)) == (
+        "bend both elbows by about 60°",
+    )
     assert len(calls(BODY, REST, posture(right_elbow_flexion=60, left_elbow_flexion=100))) == 2
 
 
@@ -53,14 +55,16 @@ def test_what_is_more_than_a_person_can_begin_at_once_is_said_after() -> None:
     moved = posture(**{joint.name: 20.0 + i for i, joint in enumerate(BODY.joints)})
     text = cue_sheet(BODY, np.radians([moved]), ("free",), ((),))
     first, rest = text.split("**1.** ")[1].split(" And also: ")
-    assert len(first.split(";")) == MOST
+    assert len(first.split(";")) == _MOST
     assert len(first.split(";")) + len(rest.split(";")) == len(calls(BODY, REST, moved)) >= 13
 
 
 def test_sheet_counts_postures_and_names_each_stance_once() -> None:
     angles = np.radians([posture(trunk_flexion=30), posture(trunk_flexion=30), posture(right_hip_flexion=45)])
     both = ("right", "left")
-    text = cue_sheet(BODY, angles, ("feet side by side", "feet side by side", "on the left foot"), (both, both, ("left",)))
+    text = cue_sheet(
+        BODY, angles, ("feet side by side", "feet side by side", "on the left foot"), (both, both, ("left",))
+    )
     assert text.count("## ") == 2
     assert "**2.** Stay as you are." in text
     assert "**3.** Lift the right thigh forward by about 45°; bring the trunk upright." in text

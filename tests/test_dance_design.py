@@ -1,4 +1,6 @@
-"""A whole small dance: continuous, allowed by independent code, the same when interrupted; what breaks a limit is seen."""
+"""A whole small dance: continuous, allowed by independent code, the same when interrupted; what breaks a limit is
+seen.
+"""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -53,7 +55,10 @@ def test_the_dance_has_its_postures_its_feet_and_its_time(dance):
 
 def test_every_limit_holds(dance):
     margins = verify(BODY, dance, PLAN.limits)
-    told = "balance continuity foot_placement friction ground_clearance joint_range joint_speed joint_torque self_collision"
+    told = (
+        "balance continuity foot_placement friction ground_clearance joint_range joint_speed joint_torque "
+        "self_collision"
+    )
     assert [m.limit for m in margins] == told.split()
     assert broken(margins) == ()
 
@@ -76,7 +81,11 @@ def test_a_margin_that_is_no_number_is_never_lost(dance, monkeypatch):
 
 def test_no_posture_comes_twice(dance):
     for name in ("parallel", "single_left"):
-        same = [x for x, stance in zip(dance.postures, dance.stances, strict=True) if stance.name == name and stance.over is None]
+        same = [
+            x
+            for x, stance in zip(dance.postures, dance.stances, strict=True)
+            if stance.name == name and stance.over is None
+        ]
         assert not np.triu(alike(np.array(same)), 1).any()
 
 

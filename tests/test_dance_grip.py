@@ -66,9 +66,13 @@ def test_a_posture_holds_the_frame_judged_by_other_code() -> None:
 
 def test_verification_sees_a_hand_that_lets_go() -> None:
     x = np.array([held(), held()])
-    away = posture_at(CHAIN, FRAME, np.where(np.arange(CHAIN.size) == ROOT + BODY.joint_index("right_shoulder_flexion"), 1.5, x[1])).x
+    away = posture_at(
+        CHAIN, FRAME, np.where(np.arange(CHAIN.size) == ROOT + BODY.joint_index("right_shoulder_flexion"), 1.5, x[1])
+    ).x
     for rows, kept in ((x, True), (np.array([x[0], away]), False)):
-        dance = Dance("t", BODY, rows, (FRAME, FRAME), np.ones(2), rows[None, [0, 1]], np.array([2.0]), (under(FRAME, FRAME),), 0)
+        dance = Dance(
+            "t", BODY, rows, (FRAME, FRAME), np.ones(2), rows[None, [0, 1]], np.array([2.0]), (under(FRAME, FRAME),), 0
+        )
         margin = next(m for m in verify(BODY, dance, family()) if m.limit == "grip")
         assert (margin.worst >= 0) == kept
         assert margin.what == "right_hand"

@@ -28,7 +28,15 @@ def upright(**angles: float) -> np.ndarray:
     return x
 
 
-def both(limit: Limit, x: np.ndarray, where: Stance, *, v: np.ndarray | None = None, a: np.ndarray | None = None, body: Body = BODY):
+def both(
+    limit: Limit,
+    x: np.ndarray,
+    where: Stance,
+    *,
+    v: np.ndarray | None = None,
+    a: np.ndarray | None = None,
+    body: Body = BODY,
+):
     """Return the least margin and the least of the check, of one sample that is taken as it is."""
     state = State(CHAIN, where, x, *(np.zeros_like(x) if part is None else part for part in (v, a)))
     motion = CHAIN.motion(np.zeros(1), state.x, state.v, state.a)
@@ -49,7 +57,9 @@ def test_balance_a_rod_balances_up_to_the_share_of_half_the_base(pelvis: float) 
     state = close_legs(CHAIN, feet()[0], x, *np.zeros((2, *x.shape)))
     place = poses(BODY, CHAIN.motion(np.zeros(1), state.x, state.v, state.a).q)
     parts = BODY.sip.phi.reshape(-1, 10)
-    middle = sum(part[0] * place.position[0, i] + place.rotation[0, i] @ part[1:4] for i, part in enumerate(parts)) / 65.0
+    middle = (
+        sum(part[0] * place.position[0, i] + place.rotation[0, i] @ part[1:4] for i, part in enumerate(parts)) / 65.0
+    )
     heel, toe = -0.07182, 0.19418
     expected = 0.6 * (toe - heel) / 2 - abs(middle[0] - (heel + toe) / 2)
     assert both(FAMILY["balance"], state.x, feet()[0]) == pytest.approx((expected, expected), abs=1e-6)
@@ -83,7 +93,9 @@ def test_joint_torque_a_forearm_held_out_weighs_m_g_l_on_the_elbow() -> None:
 def test_joint_range_and_speed_are_what_is_left_to_the_stops() -> None:
     knee = BODY.joint_index("right_knee_flexion")
     stop, fast = BODY.limits.upper[knee], BODY.limits.velocity[knee]
-    others = {f"{side}_knee_flexion": 0.5 for side in ("right", "left")} | {f"{side}_elbow_flexion": 0.5 for side in ("right", "left")}
+    others = {f"{side}_knee_flexion": 0.5 for side in ("right", "left")} | {
+        f"{side}_elbow_flexion": 0.5 for side in ("right", "left")
+    }
     x = upright(**others)
     roomy = both(FAMILY["joint_range"], x, feet()[0])[0]
     assert roomy > 0.05
@@ -131,7 +143,9 @@ def test_grip_is_how_much_further_the_palm_may_be() -> None:
     held = holding(stance(BODY, "parallel"), BODY, ("right",))
     motion = CHAIN.motion(np.zeros(1), x, *np.zeros((2, *x.shape)))
     fingertips = BODY.boxes[BODY.segment_index("right_forearm_hand")][0][1]
-    palm = poses(BODY, motion.q).points([BODY.segment_index("right_forearm_hand")], np.array([[0.0, 0.85 * fingertips, 0.0]]))[0, 0]
+    palm = poses(BODY, motion.q).points(
+        [BODY.segment_index("right_forearm_hand")], np.array([[0.0, 0.85 * fingertips, 0.0]])
+    )[0, 0]
     hands = np.array([palm + 0.03 * np.eye(3)[1], np.full(3, np.nan)])
     assert both(FAMILY["grip"], x, replace(held, hands=hands)) == pytest.approx((0.01, 0.01), abs=1e-9)
 

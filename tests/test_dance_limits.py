@@ -108,7 +108,9 @@ def problem(where, limits, objective, *, frames=5, still=False):
 
 
 def differences(evaluate, y, what):
-    return np.array([(what(evaluate(y + STEP * e)) - what(evaluate(y - STEP * e))) / (2 * STEP) for e in np.eye(len(y))]).T
+    return np.array(
+        [(what(evaluate(y + STEP * e)) - what(evaluate(y - STEP * e))) / (2 * STEP) for e in np.eye(len(y))]
+    ).T
 
 
 def nothing(state):

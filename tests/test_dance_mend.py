@@ -1,4 +1,6 @@
-"""A move that cannot be made: another posture in place of one end, then one posture less, and a refusal only at last."""
+"""A move that cannot be made: another posture in place of one end, then one posture less, and a refusal only at
+last.
+"""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -31,13 +33,18 @@ PLAN = Plan("small", "", (("parallel", 4),), hold=1.0)
 @pytest.fixture(scope="module")
 def course():
     rng, stances = np.random.default_rng(3), support_sequence(BODY, PLAN)
-    return Course(np.array([solve(CHAIN, s, initial_guess(CHAIN, s, rng), anyhow, family(), iterations=30).x for s in stances]), stances)
+    return Course(
+        np.array([solve(CHAIN, s, initial_guess(CHAIN, s, rng), anyhow, family(), iterations=30).x for s in stances]),
+        stances,
+    )
 
 
 @pytest.fixture
 def work():
     with ThreadPoolExecutor(1) as workers:
-        yield DesignContext(CHAIN, excitation_blocks(BODY), PLAN, 1, Checkpoint(None, BODY, PLAN, 1), workers, lambda *_: None)
+        yield DesignContext(
+            CHAIN, excitation_blocks(BODY), PLAN, 1, Checkpoint(None, BODY, PLAN, 1), workers, lambda *_: None
+        )
 
 
 def forbidding(monkeypatch, forbidden):
@@ -87,7 +94,10 @@ def test_the_posture_that_cannot_be_reached_or_left_is_exchanged_for_another_one
 
 def test_a_posture_that_no_exchange_helps_is_left_out(course, work, monkeypatch):
     last = course.x[3]
-    forbidding(monkeypatch, lambda first, second: np.array_equal(first, last) or (len(work_x) == 4 and np.array_equal(second, last)))
+    forbidding(
+        monkeypatch,
+        lambda first, second: np.array_equal(first, last) or (len(work_x) == 4 and np.array_equal(second, last)),
+    )
     work_x = course.x
     monkeypatch.setattr(schedule_module, "ENDS", (0,))
     found, between, notes = replan(work, course)

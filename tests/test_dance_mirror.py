@@ -1,4 +1,6 @@
-"""Mirror images of postures: as possible as the posture, of another set of feet, and only for bodies whose sides are alike."""
+"""Mirror images of postures: as possible as the posture, of another set of feet, and only for bodies whose sides are
+alike.
+"""
 
 from dataclasses import replace
 
@@ -25,7 +27,9 @@ FEET = tuple(s for s in support_sequence(BODY, Plan("all", "", tuple((name, 1) f
 @pytest.mark.parametrize("place", [0, 2, 3])
 def test_an_image_keeps_every_limit_as_well_as_its_posture(place):
     here, there = FEET[place], FEET[image_feet(FEET[place], FEET)]
-    posture = solve(CHAIN, here, initial_guess(CHAIN, here, np.random.default_rng(place)), anyhow, family(), iterations=8)
+    posture = solve(
+        CHAIN, here, initial_guess(CHAIN, here, np.random.default_rng(place)), anyhow, family(), iterations=8
+    )
     image = solve(CHAIN, there, mirror_posture(CHAIN, posture.x, here, there), anyhow, family(), iterations=0)
     assert image.violation == pytest.approx(posture.violation, abs=1e-9)
     np.testing.assert_allclose(image.up, mirror_vectors(BODY, posture.up), atol=1e-12)

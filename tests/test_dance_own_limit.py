@@ -86,7 +86,9 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 def danced(tmp_path: Path, height: float) -> tuple[int, dict[str, object], Path]:
     protocol, out = tmp_path / "tiny.toml", tmp_path / "out"
     protocol.write_text(f"{PROTOCOL}[limits.ceiling]\nheight = {height}\n")
-    code = run(["dance", "--sex", "F", "--height", "1.75", "--mass", "65", "--protocol", str(protocol), "--out", str(out)])
+    code = run(
+        ["dance", "--sex", "F", "--height", "1.75", "--mass", "65", "--protocol", str(protocol), "--out", str(out)]
+    )
     return code, json.loads((out / "results.json").read_text()), out
 
 
@@ -128,7 +130,9 @@ class Quiet(Limit):
     def margins(self, state):
         rate = state.v[:, 6:]
         slope = -np.sign(rate)[:, :, None] * np.eye(state.chain.size)[6:]
-        return limits.Margins(self.most - np.abs(rate), np.stack([0 * slope, slope])) if rate.any() else unconcerned(state)
+        return (
+            limits.Margins(self.most - np.abs(rate), np.stack([0 * slope, slope])) if rate.any() else unconcerned(state)
+        )
 
     def check(self, motion):
         rate = np.abs(motion.motion.v[:, 6:])
@@ -145,7 +149,9 @@ def test_an_object_is_kept_like_a_member_of_the_family() -> None:
     assert told["quiet"].what in {joint.name for joint in BODY.joints}
     asked = plan.with_limits([Quiet, Friction(mu=0.3)])
     assert broken(verify(BODY, dance, asked.limits)) == ()
-    assert {margin.limit for margin in broken(verify(BODY, free, plan.with_limits([Quiet(most=0.1)]).limits))} == {"quiet"}
+    assert {margin.limit for margin in broken(verify(BODY, free, plan.with_limits([Quiet(most=0.1)]).limits))} == {
+        "quiet"
+    }
 
 
 def test_a_protocol_gives_the_limits_their_numbers(tmp_path: Path) -> None:
@@ -175,7 +181,9 @@ def test_a_protocol_gives_the_limits_their_numbers(tmp_path: Path) -> None:
         ("[limits.balance]\nshare = 0.5\n", BiodanceError, "share_of_support and limits.balance.share say the same"),
     ],
 )
-def test_what_a_protocol_may_not_say_of_limits_is_one_sentence(text: str, error: type, said: str, tmp_path: Path) -> None:
+def test_what_a_protocol_may_not_say_of_limits_is_one_sentence(
+    text: str, error: type, said: str, tmp_path: Path
+) -> None:
     path = tmp_path / "p.toml"
     path.write_text(("share_of_support = 0.6\n" if "balance" in text else "") + f"[postures]\nparallel = 2\n{text}")
     with pytest.raises(error, match=said):

@@ -88,7 +88,8 @@ def test_keys_name_joints_from_coarse_to_fine() -> None:
 def test_a_person_only_takes_away(tmp_path: Path) -> None:
     path = write(
         tmp_path,
-        'reason = "stroke"\nmax_speed_deg_s = 90\nstand_alone_on = ["right"]\n[range_deg]\nleft_shoulder_flexion = [-10, 70]\n'
+        'reason = "stroke"\nmax_speed_deg_s = 90\nstand_alone_on = ["right"]\n[range_deg]\nleft_shoulder_flexion = '
+        "[-10, 70]\n"
         "[range_share]\nleft = 0.5\n[strength]\nall = 0.8\nleft_knee = 0.5\n",
     )
     person = read_person(path)

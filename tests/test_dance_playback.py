@@ -20,7 +20,9 @@ def plan(body: Body, degrees: dict[str, float], duration: float = 2.0) -> Motion
     """Return the motion from upright to a posture, root and other joints at rest, soles on z = 0 at the start."""
     first = body.neutral.copy()
     pose = poses(body, first)
-    first[2] = -min(pose.points([foot.segment] * len(foot.outline), foot.outline)[0, :, 2].min() for foot in body.feet.values())
+    first[2] = -min(
+        pose.points([foot.segment] * len(foot.outline), foot.outline)[0, :, 2].min() for foot in body.feet.values()
+    )
     change = np.zeros(len(body.joints))
     for name, angle in degrees.items():
         change[body.joint_index(name)] = np.radians(angle)
@@ -39,7 +41,8 @@ def test_the_simulator_has_the_same_mass_and_friction() -> None:
 
 
 @pytest.mark.parametrize(
-    "degrees", [{"right_shoulder_flexion": 90, "left_shoulder_adduction": -80}, {"trunk_flexion": 30, "right_elbow_flexion": 90}]
+    "degrees",
+    [{"right_shoulder_flexion": 90, "left_shoulder_adduction": -80}, {"trunk_flexion": 30, "right_elbow_flexion": 90}],
 )
 def test_a_balanced_motion_stays_up_and_near_its_plan(degrees: dict[str, float]) -> None:
     found: Playback = play(BODY, plan(BODY, degrees))

@@ -1,4 +1,6 @@
-"""Static postures: exchanged among all found, more exciting than any one search, the same for the same seed, refused by name."""
+"""Static postures: exchanged among all found, more exciting than any one search, the same for the same seed, refused
+by name.
+"""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -53,7 +55,9 @@ def test_postures_are_exchanged_until_none_of_all_found_helps():
 def test_no_posture_is_taken_twice():
     up = np.random.default_rng(2).normal(size=(12, 12, 3))
     up /= np.linalg.norm(up, axis=2, keepdims=True)
-    found = [Posture(np.full(1, (k // 3) + 0.01 * (k % 3)), u) for k, u in enumerate(up)]  # four postures, each three times
+    found = [
+        Posture(np.full(1, (k // 3) + 0.01 * (k % 3)), u) for k, u in enumerate(up)
+    ]  # four postures, each three times
     chosen = exchange(BLOCKS, (FEET,) * 4, [found[:3], found[:6], found[3:9], found])
     assert sorted(int(p.x[0]) for p in chosen) == [0, 1, 2, 3]
 
@@ -87,7 +91,9 @@ def test_a_search_lowers_the_criterion_and_the_same_seed_gives_the_same_postures
     anywhere = [posture_at(CHAIN, s, initial_guess(CHAIN, s, rng)) for s in stances]
     assert found.bound == pytest.approx(65.0, abs=1e-6)
     assert found.bound < found.criterion < 0.7 * criterion(anywhere)
-    assert found.criterion == pytest.approx(criterion([posture_at(CHAIN, s, x) for s, x in zip(stances, found.x, strict=True)]), rel=1e-3)
+    assert found.criterion == pytest.approx(
+        criterion([posture_at(CHAIN, s, x) for s, x in zip(stances, found.x, strict=True)]), rel=1e-3
+    )
 
 
 def test_a_seated_person_keeps_the_pelvis_still_and_the_knees_up():
@@ -100,7 +106,9 @@ def test_a_seated_person_keeps_the_pelvis_still_and_the_knees_up():
 def test_a_person_too_weak_to_stand_is_refused_by_the_name_of_the_limit(monkeypatch):
     monkeypatch.setattr(search, "ATTEMPTS", 2)
     limits = BODY.limits
-    weak = replace(BODY, limits=replace(limits, torque_lower=0.02 * limits.torque_lower, torque_upper=0.02 * limits.torque_upper))
+    weak = replace(
+        BODY, limits=replace(limits, torque_lower=0.02 * limits.torque_lower, torque_upper=0.02 * limits.torque_upper)
+    )
     with ThreadPoolExecutor(1) as workers, pytest.raises(BiodanceError, match="joint torque"):
         search.find_postures(Chain(weak), BLOCKS, (FEET,), family(), seed=0, workers=workers)
 

@@ -1,4 +1,6 @@
-"""Refusals: a healthy person is let through; whoever lacks one thing hears which one, and that it is enough to give it back."""
+"""Refusals: a healthy person is let through; whoever lacks one thing hears which one, and that it is enough to give
+it back.
+"""
 
 from dataclasses import replace
 
@@ -42,7 +44,10 @@ def test_a_healthy_person_can_stand_in_all_ways() -> None:
 
 
 def test_a_bent_leg_without_strength_does_not_bear_the_body() -> None:
-    weak = PersonLimits(strengths=(("right_knee", 0.02), ("right_hip", 0.02)), ranges=(("right_knee", np.radians(60.0), np.radians(90.0)),))
+    weak = PersonLimits(
+        strengths=(("right_knee", 0.02), ("right_hip", 0.02)),
+        ranges=(("right_knee", np.radians(60.0), np.radians(90.0)),),
+    )
     said = words(weak, FEET.on(0))
     assert "on the right leg alone" in said
     assert "joint torque of right" in said

@@ -1,4 +1,6 @@
-"""Robots dance: the closure and slopes of persons, plans of their own size, one small dance from a URDF file to every file, refusals."""
+"""Robots dance: the closure and slopes of persons, plans of their own size, one small dance from a URDF file to
+every file, refusals.
+"""
 
 import json
 from dataclasses import replace
@@ -22,9 +24,9 @@ from biodance.dance.problem.excitation import dynamic_grams, excitation_blocks
 from biodance.dance.problem.person import HEALTHY, fit_to_person
 from biodance.dance.problem.plan import read_plan
 from biodance.dance.problem.shapes import capsule_pairs, pairs_of, unchecked_pairs
-from biodance.dance.problem.stance import WIDTH, apart, hip_width, stance, stature_of
+from biodance.dance.problem.stance import _WIDTH, apart, hip_width, stance, stature_of
 from biodance.dance.problem.state import Closure, close_legs
-from biodance.dance.robot import ERROR, RATE, leg_length, person_sized, robot_plan, robot_rows
+from biodance.dance.robot import _RATE, ERROR, leg_length, person_sized, robot_plan, robot_rows
 from biodance.dance.transitions.move import Task, evaluate_move
 from biodance.dance.verify import broken, verify
 from biodance.errors import BiodanceError
@@ -70,7 +72,9 @@ def test_planted_feet_stay_and_slopes_are_exact() -> None:
             shifted.append(close_legs(chain, feet, moved, v, a))
         for k, name in enumerate(("x", "v", "a")):
             difference = (getattr(shifted[0], name) - getattr(shifted[1], name))[0] / (2 * step)
-            np.testing.assert_allclose(slopes[k][:, c], difference[legs], rtol=0, atol=2e-5 * max(1.0, float(np.abs(difference).max())))
+            np.testing.assert_allclose(
+                slopes[k][:, c], difference[legs], rtol=0, atol=2e-5 * max(1.0, float(np.abs(difference).max()))
+            )
     rest = Closure(close_legs(chain, feet, x, np.zeros_like(v), np.zeros_like(a)))
     np.testing.assert_allclose(rest.followed(picks, no_time), slopes[0], atol=1e-12)
     assert not rest.turned(picks, "ax", no_time).any()
@@ -107,7 +111,9 @@ def test_a_slow_move_is_judged_at_fewer_instants_and_tells_as_much() -> None:
     move, _ = evaluate_move(slow, slow.straight())
     time = np.linspace(0.0, 9.5, 2001)[1:-1]
     fine = slow.problem(slow.straight(), [], time, reserve=0.0, objective=anyhow).state(np.empty(0))
-    np.testing.assert_allclose(move.gram, dynamic_grams(fine, list(range(12))) * 9.5 / 2000, rtol=0, atol=1e-4 * np.abs(move.gram).max())
+    np.testing.assert_allclose(
+        move.gram, dynamic_grams(fine, list(range(12))) * 9.5 / 2000, rtol=0, atol=1e-4 * np.abs(move.gram).max()
+    )
 
 
 def test_feet_stand_apart_as_the_hips_do() -> None:
@@ -118,8 +124,11 @@ def test_feet_stand_apart_as_the_hips_do() -> None:
 
 def test_feet_stand_no_wider_than_weight_can_be_shifted() -> None:
     person = human(Subject(65.0, 1.75, "F", 33.0))
-    assert apart(person, 0.6) == WIDTH * stature_of(person)
-    joints = [replace(j, translation=j.translation * [1, 1, 4]) if j.name in ("right_hip_yaw", "left_hip_yaw") else j for j in HOAP.joints]
+    assert apart(person, 0.6) == _WIDTH * stature_of(person)
+    joints = [
+        replace(j, translation=j.translation * [1, 1, 4]) if j.name in ("right_hip_yaw", "left_hip_yaw") else j
+        for j in HOAP.joints
+    ]
     wide = replace(HOAP, joints=tuple(joints))
     assert hip_width(wide) == pytest.approx(4 * 0.078)
     assert apart(wide, 1.0) == pytest.approx(4 * 0.078)
@@ -138,7 +147,8 @@ def test_what_must_not_touch_follows_from_the_tree(tmp_path: Path) -> None:
     body = standing_frames(read_urdf(tmp_path / "robot.urdf", feet=("r_sole", "l_sole")))
     limbs, boxes = ({frozenset((body.segments[i], body.segments[j])) for i, j in pairs} for pairs in pairs_of(body))
     assert {
-        frozenset(pair) for pair in (("r_tibia", "l_tibia"), ("r_pad", "l_tibia"), ("r_ulna", "l_ulna"), ("r_ulna", "l_femur"))
+        frozenset(pair)
+        for pair in (("r_tibia", "l_tibia"), ("r_pad", "l_tibia"), ("r_ulna", "l_ulna"), ("r_ulna", "l_femur"))
     } <= limbs
     assert frozenset(("r_femur", "r_tibia")) not in limbs
     assert {frozenset(pair) for pair in (("r_ulna", "chest"), ("l_ulna", "base"))} <= boxes
@@ -159,7 +169,9 @@ def test_a_robot_dances_from_its_file(made: tuple[Path, int]) -> None:
     assert all(margin["worst"] >= 0 for margin in found["margins"])
     assert all(0 < row["mass_kg"] <= row["mass_table_kg"] for row in found["expected_sd"])
     drawn = {"postures.png", "criterion.png", "zmp.png", "expectation.png"}
-    names = {path.name for path in (place / "out").iterdir()} - {"postures_3d.png"}  # only where the machine can draw it
+    names = {path.name for path in (place / "out").iterdir()} - {
+        "postures_3d.png"
+    }  # only where the machine can draw it
     assert names == {"results.json", "dance.npz", "dance.csv", "cues.md", "margins.md", *drawn}
 
 
@@ -188,7 +200,7 @@ def test_the_table_of_angles_is_the_dance(made: tuple[Path, int]) -> None:
 def test_parameters_come_back_from_the_wrench_of_the_dance(made: tuple[Path, int]) -> None:
     place, _ = made
     dance, rng = Dance.load(place / "out" / "dance.npz"), np.random.default_rng(4)
-    body, motion = dance.body, dance.motion(RATE)
+    body, motion = dance.body, dance.motion(_RATE)
     truth = body.sip.phi * rng.uniform(0.8, 1.2, len(body.segments)).repeat(10)
     exact = regressor(body, motion) @ truth
     np.testing.assert_allclose(exact, predict_wrench(body, motion, truth).value, atol=1e-12)
@@ -204,7 +216,9 @@ def test_parameters_come_back_from_the_wrench_of_the_dance(made: tuple[Path, int
     assert np.abs((clean.value - base.regroup @ truth) / clean.sd)[known].max() < 1e-4
 
 
-def test_a_leg_that_does_not_carry_alone_is_refused_by_its_limit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_leg_that_does_not_carry_alone_is_refused_by_its_limit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     write_model(hoap3(), tmp_path / "hoap3.urdf", format="urdf")
     (tmp_path / "weak.toml").write_text("[strength]\nright_hip = 0.003\nright_knee = 0.003\nright_ankle = 0.003\n")
     (tmp_path / "one.toml").write_text('name = "one"\nhold_s = 1\n[postures]\nsingle_right = 1\n')
@@ -229,7 +243,9 @@ def test_a_leg_that_does_not_carry_alone_is_refused_by_its_limit(tmp_path: Path,
         (["--urdf", "robot.urdf", "--feet", "a"], "separated by a comma"),
     ],
 )
-def test_wrong_words_are_one_sentence(words: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_wrong_words_are_one_sentence(
+    words: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert run(["dance", *words, "--out", str(tmp_path / "out")]) == 2
     error = capsys.readouterr().err
     assert said in error

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from biodance.body.human.human import human
-from biodance.dance.postures.selection import FORCE, MOMENT, RATE, choose, learned
+from biodance.dance.postures.selection import _FORCE, _MOMENT, _RATE, choose, learned
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.splines import rest_to_rest
@@ -35,18 +35,20 @@ def x() -> Array:
 
 
 def information(x: Array, order: tuple[int, ...]) -> Array:
-    """Whitened rows of standing in each posture and of going there from the one before on the same feet (or from any, at first)."""
+    """Whitened rows of standing in each posture and of going there from the one before on the same feet (or from
+    any, at first).
+    """
     rows, last = [], {}
-    basis = rest_to_rest(PLAN.move, via=0, rate=RATE)
+    basis = rest_to_rest(PLAN.move, via=0, rate=_RATE)
     for p in order:
         origin = last.get(STANCES[p], next(q for q in range(12) if STANCES[q] == STANCES[p] and q != p))
         ends = x[[origin, p]]
         parts = [part[1:-1] @ ends for part in (basis.position, basis.velocity, basis.acceleration)]
         for q, v, a in (parts, (x[p][None], *np.zeros((2, 1, CHAIN.size)))):
-            rows.append(regressor(BODY, CHAIN.motion(np.arange(len(q)) / RATE, q, v, a)).reshape(-1, 120))
+            rows.append(regressor(BODY, CHAIN.motion(np.arange(len(q)) / _RATE, q, v, a)).reshape(-1, 120))
         last[STANCES[p]] = p
     rows = np.concatenate(rows)
-    return rows / np.tile(np.repeat([FORCE, MOMENT], 3), len(rows) // 6)[:, None]
+    return rows / np.tile(np.repeat([_FORCE, _MOMENT], 3), len(rows) // 6)[:, None]
 
 
 def test_what_is_left_unknown_is_the_posterior_of_the_textbook(x: Array) -> None:
@@ -57,7 +59,9 @@ def test_what_is_left_unknown_is_the_posterior_of_the_textbook(x: Array) -> None
     for count in (1, 5, 12):
         rows = information(x, found.picked[:count])
         after = table - table @ rows.T @ np.linalg.solve(np.eye(len(rows)) + rows @ table @ rows.T, rows @ table)
-        assert found.spread[count] == pytest.approx(np.sqrt(np.mean((np.diag(after) / np.diag(table))[loose])), rel=1e-6)
+        assert found.spread[count] == pytest.approx(
+            np.sqrt(np.mean((np.diag(after) / np.diag(table))[loose])), rel=1e-6
+        )
 
 
 def test_every_pick_is_the_best_there_was(x: Array) -> None:
@@ -105,4 +109,6 @@ def test_learned_is_the_textbook_update() -> None:
     rng = np.random.default_rng(0)
     belief, rows = np.diag(rng.uniform(0.5, 1.0, 5)), rng.normal(size=(3, 5))
     change = learned(belief, rows)
-    np.testing.assert_allclose(belief - change.T @ change, np.linalg.inv(np.linalg.inv(belief) + rows.T @ rows), atol=1e-12)
+    np.testing.assert_allclose(
+        belief - change.T @ change, np.linalg.inv(np.linalg.inv(belief) + rows.T @ rows), atol=1e-12
+    )

@@ -1,11 +1,13 @@
-"""Distances between solids: what the design uses equals what coal finds, and what is far is never said to be nearer than it is."""
+"""Distances between solids: what the design uses equals what coal finds, and what is far is never said to be nearer
+than it is.
+"""
 
 import numpy as np
 import pytest
 
 from biodance.body.human.human import human
 from biodance.dance.limits import self_collision
-from biodance.dance.limits.self_collision import ENOUGH, deepest, outside, solid_distances
+from biodance.dance.limits.self_collision import _ENOUGH, deepest, outside, solid_distances
 from biodance.dance.postures.posture import initial_guess
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.stance import stance
@@ -25,11 +27,11 @@ def test_two_codes_find_the_same_distances():
     motion = CHAIN.motion(np.arange(60.0), state.x, state.v, state.a)
     found, names = solid_distances(BODY, poses(BODY, motion.q))
     assert len(set(names)) == found.shape[1] == expected.shape[1]
-    apart = (found < ENOUGH) & (expected > 0)
+    apart = (found < _ENOUGH) & (expected > 0)
     assert apart.sum() > 50
     np.testing.assert_allclose(found[apart], expected[apart], atol=2e-6)
     assert ((found < 0) == (expected < 0)).all()
-    far = found >= ENOUGH
+    far = found >= _ENOUGH
     assert (found[far] <= expected[far] + 1e-9).all()
 
 

@@ -23,7 +23,9 @@ def test_derivatives_agree_with_finite_differences() -> None:
     here = basis_at(t, 2.0)
     before, after = basis_at(t - h, 2.0), basis_at(t + h, 2.0)
     np.testing.assert_allclose(here.velocity @ points, (after.position - before.position) @ points / (2 * h), atol=1e-5)
-    np.testing.assert_allclose(here.acceleration @ points, (after.velocity - before.velocity) @ points / (2 * h), atol=1e-4)
+    np.testing.assert_allclose(
+        here.acceleration @ points, (after.velocity - before.velocity) @ points / (2 * h), atol=1e-4
+    )
 
 
 def test_equal_points_do_not_move() -> None:

@@ -25,7 +25,9 @@ def test_chance_spreads_more_in_a_short_session() -> None:
 
 
 def test_a_body_as_people_are_is_no_strain_and_a_strange_one_is() -> None:
-    """Bodies drawn from the prior strain it as a standard normal number does; one with twice the deviations does not pass."""
+    """Bodies drawn from the prior strain it as a standard normal number does; one with twice the deviations does not
+    pass.
+    """
     found, _ = built(problem(body(), looks(3)), known(), ("plate_offset",))
     belief, k = found.belief, found.problem.factor.shape[1]
     rng = np.random.default_rng(7)

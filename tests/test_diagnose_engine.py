@@ -1,4 +1,6 @@
-"""The engine on sessions whose only fault is known: it names it, sizes it, stays silent without one, and says unexplained when it must."""
+"""The engine on sessions whose only fault is known: it names it, sizes it, stays silent without one, and says
+unexplained when it must.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -15,7 +17,16 @@ from biodance.identification.identification import standing_point
 from biodance.motion.kinematics import poses
 from biodance.records import Sip
 
-FAST = ("plate_gain", "plate_offset", "plate_position", "plate_rotation", "time_delay", "body_mass", "added_mass", "plate_drift")
+FAST = (
+    "plate_gain",
+    "plate_offset",
+    "plate_position",
+    "plate_rotation",
+    "time_delay",
+    "body_mass",
+    "added_mass",
+    "plate_drift",
+)
 
 
 def found(hidden, *, seed: int = 1, chosen=FAST):
@@ -38,7 +49,9 @@ def late(wrench, session, moving):
 
 @dataclass(frozen=True)
 class Cable(Effect):
-    """A cable pulls sideways in the beat of ``beat`` Hz, one metre over the lab's origin; an effect as a user writes it."""
+    """A cable pulls sideways in the beat of ``beat`` Hz, one metre over the lab's origin; an effect as a user writes
+    it.
+    """
 
     beat: float = 1.0
     name = "cable"
@@ -146,7 +159,9 @@ def test_a_hand_that_comes_and_goes_is_named_with_its_force() -> None:
     assert [(f.effect, f.target) for f in examined.diagnosis.findings] == [("external_contact", "left_forearm_hand")]
     assert examined.diagnosis.verdict in ("named, complete", "named, incomplete")
     size = [p.value for p in examined.diagnosis.findings[0].parameters]
-    middle = 0.5 ** (1 / 3)  # of a force that rises and falls in proportion to time, half of the squares lie above this share of its peak
+    middle = 0.5 ** (
+        1 / 3
+    )  # of a force that rises and falls in proportion to time, half of the squares lie above this share of its peak
     np.testing.assert_allclose(size, middle * np.array([0.0, 4.5, 15.0]), atol=1.5)
     look = looks(1, hidden=touched)[0]
     case = Case(one, look.trial, look.motion, one.sip.phi, np.linspace(0, 0.25, look.motion.time.size))
@@ -159,7 +174,8 @@ def test_accepting_a_fault_gains_on_trials_that_were_not_used() -> None:
     examined = diagnose_trials(body(), looked_at[:4], tolerances=known(), effects=FAST)
     kept = looked_at[4:]
     cases = [
-        Case(body(), look.trial, look.motion, body().sip.phi, np.linspace(look.start, look.end, look.motion.time.size)) for look in kept
+        Case(body(), look.trial, look.motion, body().sip.phi, np.linspace(look.start, look.end, look.motion.time.size))
+        for look in kept
     ]
     as_is = tuple(case_fit(case, look.use) for case, look in zip(cases, kept, strict=True))
     mended = tuple(case_fit(accept(case, examined.named), look.use) for case, look in zip(cases, kept, strict=True))

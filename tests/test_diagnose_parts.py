@@ -26,7 +26,9 @@ def test_evidence_is_the_ratio_of_two_gaussian_densities() -> None:
     s, G = belief.score(Z)
     found = evidence(s, G, float(np.sum(Z**2)))
     plain = np.eye(30) + X @ X.T
-    ratio = multivariate_normal(np.zeros(30), plain + Z @ Z.T).logpdf(y) - multivariate_normal(np.zeros(30), plain).logpdf(y)
+    ratio = multivariate_normal(np.zeros(30), plain + Z @ Z.T).logpdf(y) - multivariate_normal(
+        np.zeros(30), plain
+    ).logpdf(y)
     assert found.log_bayes_factor == pytest.approx(ratio)
     both = np.concatenate([X, Z], axis=1)
     mean = np.linalg.solve(both.T @ both + np.eye(7), both.T @ y)
@@ -120,7 +122,8 @@ def test_what_placing_has_repaired_needs_a_larger_fault_to_be_seen() -> None:
     Z = [rng.normal(size=(400, width)) for *_, width in kinds]
     Z[2] = 0.9 * Z[0] + 0.1 * Z[2]  # a marker beside the joint looks much like its centre
     causes = tuple(
-        Candidate(replace(effect(name), target=target), z, (False,) * z.shape[1]) for (name, target, _), z in zip(kinds, Z, strict=True)
+        Candidate(replace(effect(name), target=target), z, (False,) * z.shape[1])
+        for (name, target, _), z in zip(kinds, Z, strict=True)
     )
     cuts = (slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 10))
     whole = np.concatenate(Z, axis=1)
@@ -149,7 +152,13 @@ def test_learning_finds_the_sizes_that_made_the_nulls() -> None:
         keys = ("slide a",) * 5 + ("gain b",) * 3
         theta = np.array([truth[key] for key in keys]) * rng.normal(size=8)
         nulls.append(Null(columns @ theta + 1.5 * rng.normal(size=len(columns)), columns, keys, band, (), 70.0))
-    start = Tolerances({"slide a": 1.0, "gain b": 1.0}, np.tile(np.eye(6), (bands, 1, 1)), np.ones((bands, 6)), np.ones((bands, 6)), 10.0)
+    start = Tolerances(
+        {"slide a": 1.0, "gain b": 1.0},
+        np.tile(np.eye(6), (bands, 1, 1)),
+        np.ones((bands, 6)),
+        np.ones((bands, 6)),
+        10.0,
+    )
     found = learn_tolerances(nulls, start, rounds=8)
     assert found.size("slide a") == pytest.approx(0.5, rel=0.15)
     assert found.size("gain b") == pytest.approx(2.0, rel=0.15)

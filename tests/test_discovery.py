@@ -1,4 +1,6 @@
-"""Every family is found in its folder, in other packages and among arguments; whatever is no member is refused in a sentence."""
+"""Every family is found in its folder, in other packages and among arguments; whatever is no member is refused in a
+sentence.
+"""
 
 import importlib
 import sys
@@ -30,7 +32,9 @@ class Given:
         return 2.0
 
 
-SHAPES: "Family[Shape]" = Family("shape", "biodance.shapes", "shapes", "SHAPE", missing_of(Shape), lambda shape: shape.name)
+SHAPES: "Family[Shape]" = Family(
+    "shape", "biodance.shapes", "shapes", "SHAPE", missing_of(Shape), lambda shape: shape.name
+)
 SQUARE = "class Square:\n    name = 'square'\n    def area(self): return 1.0\nSHAPE = Square()\n"
 
 
@@ -49,7 +53,9 @@ def shapes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def install(place: Path, code: str, group: str, points: str) -> None:
-    """Write an installed package ``elsewhere`` 1.2 with one module and its entry points into ``place``, as pip leaves it."""
+    """Write an installed package ``elsewhere`` 1.2 with one module and its entry points into ``place``, as pip
+    leaves it.
+    """
     place.mkdir(exist_ok=True)
     (place / "elsewhere.py").write_text(code)
     info = place / "elsewhere_dist-1.2.dist-info"
@@ -59,7 +65,9 @@ def install(place: Path, code: str, group: str, points: str) -> None:
     importlib.invalidate_caches()
 
 
-def test_members_of_folder_other_packages_and_arguments(shapes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_members_of_folder_other_packages_and_arguments(
+    shapes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert list(SHAPES.members()) == ["square"]
     install(tmp_path / "other", SQUARE.replace("square", "circle"), "biodance.shapes", "circle = elsewhere\n")
     monkeypatch.syspath_prepend(str(tmp_path / "other"))
@@ -77,8 +85,14 @@ def test_members_of_folder_other_packages_and_arguments(shapes: Path, tmp_path: 
 @pytest.mark.parametrize(
     ("code", "words"),
     [
-        ("x = 1\n", r"shapes/notes\.py: defines no SHAPE, so it is no shape\. Define it, .*start with '_'.*move the file away"),
-        ("import nothing_like_this\n", r"shapes/notes\.py: cannot be imported \(ModuleNotFoundError.*\)\. Correct the file or move it"),
+        (
+            "x = 1\n",
+            r"shapes/notes\.py: defines no SHAPE, so it is no shape\. Define it, .*start with '_'.*move the file away",
+        ),
+        (
+            "import nothing_like_this\n",
+            r"shapes/notes\.py: cannot be imported \(ModuleNotFoundError.*\)\. Correct the file or move it",
+        ),
         ("this is a note\n", r"shapes/notes\.py: cannot be imported \(SyntaxError"),
         ("SHAPE = 3\n", r"shapes/notes\.py: lacks name, area, so it is no shape"),
         (SQUARE, r"the shape 'square' is shapes/notes\.py and again shapes/square\.py\. Rename one"),
@@ -104,7 +118,11 @@ def test_a_stray_file_is_refused(shapes: Path, code: str, words: str) -> None:
             r"elsewhere-dist 1\.2 \(elsewhere:Circle\) cannot be imported \(AttributeError.*Repair or uninstall",
         ),
         ("x = 1\n", "elsewhere:x", r"elsewhere-dist 1\.2 \(elsewhere:x\): lacks name, area, so it is no shape"),
-        (SQUARE, "elsewhere", r"'square' is shapes/square\.py and again the shape 'circle' of the installed package elsewhere-dist"),
+        (
+            SQUARE,
+            "elsewhere",
+            r"'square' is shapes/square\.py and again the shape 'circle' of the installed package elsewhere-dist",
+        ),
     ],
 )
 def test_a_broken_entry_point_is_refused(
@@ -120,7 +138,9 @@ def test_objects_that_are_no_members_or_have_one_name_are_refused(shapes: Path) 
     with pytest.raises(BiodanceError, match=r"The object given \(.*Path\): lacks area"):
         SHAPES.choose([Path("x")])  # type: ignore[list-item]
     assert list(SHAPES.judged([Given("own")])) == ["own"]
-    with pytest.raises(BiodanceError, match=r"the shape 'own' is the object given .*Given.* and again the object given"):
+    with pytest.raises(
+        BiodanceError, match=r"the shape 'own' is the object given .*Given.* and again the object given"
+    ):
         SHAPES.choose([Given("own"), Given("own")])
     with pytest.raises(BiodanceError, match=r"'square' is shapes/square\.py and again the object given"):
         SHAPES.members([Given("square")])
@@ -133,12 +153,16 @@ def test_a_family_of_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     own = tmp_path / "other" / "own.toml"
     install(tmp_path / "other", f"OWN = {str(own)!r}\n", "biodance.marker_sets", "own = elsewhere:OWN")
     monkeypatch.syspath_prepend(str(tmp_path / "other"))
-    with pytest.raises(BiodanceError, match=r"marker set 'own' of the installed package elsewhere-dist 1\.2 .* points at .*own\.toml"):
+    with pytest.raises(
+        BiodanceError, match=r"marker set 'own' of the installed package elsewhere-dist 1\.2 .* points at .*own\.toml"
+    ):
         sets.files()
     own.write_text("")
     assert list(sets.files()) == [*shipped, "own"]
     assert sets.locate("own") == own
     assert sets.locate("x/y.toml") == Path("x/y.toml")
-    with pytest.raises(UnknownName, match=r"'onw' is not a marker set\. Did you mean 'own'.*A file of your own is given by its path"):
+    with pytest.raises(
+        UnknownName, match=r"'onw' is not a marker set\. Did you mean 'own'.*A file of your own is given by its path"
+    ):
         sets.locate("onw")
     sys.modules.pop("elsewhere", None)

@@ -23,7 +23,12 @@ def names(tmp_path_factory):
     biodance.simulate(biodance.Subject(62.0, 1.70, "F", 31.0), "short", "visit", seed=1)
     session = biodance.read_session("visit")
     result = biodance.examine(session)
-    shared = {"session": session, "result": result, "identified": biodance.identify(result), "found": biodance.diagnose(result)}
+    shared = {
+        "session": session,
+        "result": result,
+        "identified": biodance.identify(result),
+        "found": biodance.diagnose(result),
+    }
     small_dance().save("dance.npz")
     yield {"biodance": biodance, "dance": small_dance(), **shared}
     plt.close("all")

@@ -1,4 +1,6 @@
-"""The documentation: decisions are dated records in one form, tutorials are the examples, built pages need no network."""
+"""The documentation: decisions are dated records in one form, tutorials are the examples, built pages need no
+network.
+"""
 
 import importlib.util
 import re
@@ -58,4 +60,10 @@ def test_what_a_browser_would_fetch_is_seen() -> None:
     assert fetched('<script src="https://cdn.example.org/a.js"></script>') == ["https://cdn.example.org/a.js"]
     assert fetched('<link rel="stylesheet" href="//fonts.example.org/css">') == ["//fonts.example.org/css"]
     assert fetched("a { background: url(http://example.org/a.png) }") == ["http://example.org/a.png"]
-    assert fetched('<a href="https://doi.org/10.1109/TRO.2016.2583062">paper</a> <img src="a.png"> <link rel="icon" href="b.png">') == []
+    assert (
+        fetched(
+            '<a href="https://doi.org/10.1109/TRO.2016.2583062">paper</a> <img src="a.png"> <link rel="icon" '
+            'href="b.png">'
+        )
+        == []
+    )

@@ -1,4 +1,6 @@
-"""One contract for every file in effects/: identity at zero, columns equal to differences, units, sources, signature and look-alikes."""
+"""One contract for every file in effects/: identity at zero, columns equal to differences, units, sources, signature
+and look-alikes.
+"""
 
 import importlib
 
@@ -31,7 +33,10 @@ def example(plates: int = 1) -> Case:
     value = predict_wrench(body, motion).value + rng.normal(0, 1.0, (120, 6))
     corners = np.array([[0.6, 0.5, 0], [0.2, 0.5, 0], [0.2, -0.1, 0], [0.6, -0.1, 0]])
     share = [1.0] if plates == 1 else [0.7, 0.3]
-    made = tuple(Plate(f"plate{i + 1}", 2, corners + np.array([0.5 * i, 0, 0]), Wrench(time, s * value)) for i, s in enumerate(share))
+    made = tuple(
+        Plate(f"plate{i + 1}", 2, corners + np.array([0.5 * i, 0, 0]), Wrench(time, s * value))
+        for i, s in enumerate(share)
+    )
     trial = Trial("t", "fit", None, made, Source(__file__, "", "test"))
     return Case(body, trial, motion, body.sip.phi, time / time[-1])
 
@@ -110,7 +115,10 @@ def test_added_mass_weighs_what_it_says() -> None:
     loaded = effect("added_mass").at("s2", case).transform(case, np.array([2.4, 0, 0, 0]))
     still = Motion(case.motion.time, case.motion.q, 0 * case.motion.v, 0 * case.motion.a)
     standing = Case(case.body, case.trial, still, case.phi, case.session_time)
-    change = effect("added_mass").at("s2", standing).transform(standing, np.array([2.4, 0, 0, 0])).residual - standing.residual
+    change = (
+        effect("added_mass").at("s2", standing).transform(standing, np.array([2.4, 0, 0, 0])).residual
+        - standing.residual
+    )
     np.testing.assert_allclose(change[:, 2], 2.4 * 9.80665, rtol=1e-9)
     assert np.abs((loaded.residual - case.residual)[:, 2]).max() > 2.4 * 9.8
 
@@ -121,9 +129,14 @@ def test_a_load_pulls_at_its_place_from_the_centre_of_mass() -> None:
     phi = case.phi[10 * index : 10 * index + 10]
     still = Motion(case.motion.time, case.motion.q, 0 * case.motion.v, 0 * case.motion.a)
     standing = Case(case.body, case.trial, still, case.phi, case.session_time)
-    change = effect("added_mass").at("s2", standing).transform(standing, np.array([2.4, *place])).residual - standing.residual
+    change = (
+        effect("added_mass").at("s2", standing).transform(standing, np.array([2.4, *place])).residual
+        - standing.residual
+    )
     lever = poses(case.body, case.motion.q).points([index], (phi[1:4] / phi[0] + place)[None])[:, 0]
-    assert np.linalg.norm(phi[1:4] / phi[0]) > 0.02, "the centre of mass must not lie at the joint, or this test sees nothing"
+    assert np.linalg.norm(phi[1:4] / phi[0]) > 0.02, (
+        "the centre of mass must not lie at the joint, or this test sees nothing"
+    )
     weight = np.array([0, 0, 2.4 * 9.80665])
     np.testing.assert_allclose(change[:, 3:], np.cross(lever, weight), atol=1e-9)
 

@@ -23,7 +23,9 @@ def test_riding_mass_follows_its_equation_of_motion() -> None:
     def slope(t: float, state: np.ndarray) -> list[float]:
         return [state[1], -2 * damping * w * state[1] - w * w * state[0] - np.interp(t, time, acceleration)]
 
-    truth = solve_ivp(slope, (0, time[-1]), [-acceleration[0] / w**2, 0.0], t_eval=time, rtol=1e-9, atol=1e-12, max_step=0.5 / rate)
+    truth = solve_ivp(
+        slope, (0, time[-1]), [-acceleration[0] / w**2, 0.0], t_eval=time, rtol=1e-9, atol=1e-12, max_step=0.5 / rate
+    )
     np.testing.assert_allclose(x[:, 0], truth.y[0], atol=1e-6)
     again = [slope(t, state)[1] for t, state in zip(time, truth.y.T, strict=True)]
     np.testing.assert_allclose(relative[:, 0], again, atol=1e-3)
@@ -36,7 +38,9 @@ def test_wobbling_mass_is_the_wrench_of_a_moved_point_mass() -> None:
     table = CASE.phi[10 * index : 10 * index + 10]
     place, a = point_motion(CASE, index, table[1:4] / table[0])
     step = 1 / CASE.motion.rate
-    np.testing.assert_allclose(a[5:-5], np.gradient(np.gradient(place, step, axis=0), step, axis=0)[5:-5], atol=0.05 * np.abs(a).max())
+    np.testing.assert_allclose(
+        a[5:-5], np.gradient(np.gradient(place, step, axis=0), step, axis=0)[5:-5], atol=0.05 * np.abs(a).max()
+    )
     x, relative = relative_motion(a, CASE.motion.rate, frequency=10.0, damping=0.3)
     mass = 1e-3
     moved, still = place + x, place

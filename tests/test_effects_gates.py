@@ -10,7 +10,18 @@ import pytest
 from human_cases import CORNERS, human_case
 
 import biodance.effects as family
-from biodance.effects import Case, DiscreteEffect, Gate, Recorded, at_origin, at_point, discrete_effects, effect, effects, gates
+from biodance.effects import (
+    Case,
+    DiscreteEffect,
+    Gate,
+    Recorded,
+    at_origin,
+    at_point,
+    discrete_effects,
+    effect,
+    effects,
+    gates,
+)
 from biodance.effects.frame_rate import clock_beside_body
 from biodance.effects.unit_error import FACTORS
 from biodance.errors import BiodanceError, UnknownName
@@ -23,15 +34,21 @@ SECTIONS = ("Signature:", "Look-alikes:", "Separated by")
 
 
 def standing(rng: np.random.Generator, *, seconds: float = 10.0, rate: float = 1000.0) -> Array:
-    """Return a wrench (S, 6) about the lab origin of somebody who sways on the plate, with the noise of an amplifier."""
+    """Return a wrench (S, 6) about the lab origin of somebody who sways on the plate, with the noise of an
+    amplifier.
+    """
     time = np.arange(int(seconds * rate)) / rate
     sway = 0.02 * np.stack([np.sin(2 * np.pi * 0.3 * time), np.cos(2 * np.pi * 0.4 * time)], axis=1)
-    force = np.stack([5 * np.sin(2 * time), 4 * np.cos(3 * time), MASS * 9.80665 + 40 * np.sin(2 * np.pi * 0.6 * time)], axis=1)
+    force = np.stack(
+        [5 * np.sin(2 * time), 4 * np.cos(3 * time), MASS * 9.80665 + 40 * np.sin(2 * np.pi * 0.6 * time)], axis=1
+    )
     point = np.hstack([CORNERS.mean(axis=0)[:2] + sway, np.zeros((time.size, 1))])
     return np.hstack([force, np.cross(point, force)]) + rng.normal(0, 0.3, (time.size, 6))
 
 
-def recorded(value: Array, *, rate: float = 1000.0, decisions: tuple[str, ...] = (), warnings: tuple[str, ...] = ()) -> Recorded:
+def recorded(
+    value: Array, *, rate: float = 1000.0, decisions: tuple[str, ...] = (), warnings: tuple[str, ...] = ()
+) -> Recorded:
     """Return a session of one trial on one plate."""
     time = np.arange(len(value)) / rate
     plate = Plate("plate1", 2, CORNERS, Wrench(time, value), decisions)
@@ -75,7 +92,12 @@ def test_nothing_is_found_where_nothing_is_wrong() -> None:
     moving = human_case(600)
     found = gates(session_of(moving).session, (moving, moving))
     assert failed(found) == []
-    assert {gate.check for gate in found} >= {"signs of the channels", "rate of the cameras", "lost frames", "labels of the markers"}
+    assert {gate.check for gate in found} >= {
+        "signs of the channels",
+        "rate of the cameras",
+        "lost frames",
+        "labels of the markers",
+    }
 
 
 @pytest.mark.parametrize("factor", FACTORS)
@@ -92,8 +114,10 @@ def test_a_foot_beside_the_plate_is_no_unit(share: float) -> None:
 
 def test_what_the_reader_overruled_is_told() -> None:
     said = (
-        "The moments put the load on the plate only when taken 1000 times as large as the file's units say; that was done.",
-        "The load lies 0.31 m from the feet that the markers show, and under them when the corners are counted from another one: "
+        "The moments put the load on the plate only when taken 1000 times as large as the file's units say; that was "
+        "done.",
+        "The load lies 0.31 m from the feet that the markers show, and under them when the corners are counted from "
+        "another one: "
         "the plate axes were turned by 90 degrees.",
     )
     unit = "POINT:UNITS is 'furlong'; a cloud of markers of 1723 can only be in mm, so lengths are in mm."
@@ -136,7 +160,9 @@ def test_hum_is_named_with_its_amplitude(frequency: float) -> None:
     assert failed(found) == [("mains_hum", "Fx")]
     assert found[0].size == pytest.approx(5, rel=0.05)
     once = recorded(value)
-    quiet = replace(once.session.trials[0], plates=recorded(standing(np.random.default_rng(8))).session.trials[0].plates)
+    quiet = replace(
+        once.session.trials[0], plates=recorded(standing(np.random.default_rng(8))).session.trials[0].plates
+    )
     single = Recorded(replace(once.session, trials=(once.session.trials[0], quiet, quiet)))
     assert failed(discrete_effects()["mains_hum"].look(single)) == [], "a glitch in one trial is no hum"
     slow = discrete_effects()["mains_hum"].look(recorded(value[::10], rate=100.0))
@@ -207,21 +233,33 @@ def test_a_turned_wrist_is_named_in_the_static_trial(side: str) -> None:
     xyz = poses(body, q).points(body.markers.segment, body.markers.position)
     other = {f"{side}WRA": f"{side}WRB", f"{side}WRB": f"{side}WRA"}
     names = body.markers.names
-    for labels, expected in ((names, []), (tuple(other.get(n, n) for n in names), [("labels_swapped", f"{side}WRA/{side}WRB")])):
+    for labels, expected in (
+        (names, []),
+        (tuple(other.get(n, n) for n in names), [("labels_swapped", f"{side}WRA/{side}WRB")]),
+    ):
         markers = Markers(labels, np.arange(20) / 100, xyz)
         static = Trial("static", "static", markers, (), Source(Path("static.c3d"), "", "C3D"))
-        found = discrete_effects()["labels_swapped"].look(Recorded(Session(Subject(MASS, 1.75, "M"), (static,), Path())))
+        found = discrete_effects()["labels_swapped"].look(
+            Recorded(Session(Subject(MASS, 1.75, "M"), (static,), Path()))
+        )
         assert failed(found) == expected
 
 
 @pytest.mark.parametrize(
     ("module", "base", "missing"),
-    [("gate", "DiscreteEffect", "look"), ("missing_joint", "MissingJoint", "loosened"), ("effect", "Effect", "columns or transform")],
+    [
+        ("gate", "DiscreteEffect", "look"),
+        ("missing_joint", "MissingJoint", "loosened"),
+        ("effect", "Effect", "columns or transform"),
+    ],
 )
 def test_a_file_that_leaves_out_what_its_author_must_write_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: str, base: str, missing: str
 ) -> None:
-    text = f"from biodance.effects._base.{module} import {base}\n\n\nclass Blind({base}):\n    name = 'blind'\n\n\nEFFECT = Blind\n"
+    text = (
+        f"from biodance.effects._base.{module} import {base}\n\n\nclass Blind({base}):\n    name = "
+        f"'blind'\n\n\nEFFECT = Blind\n"
+    )
     (tmp_path / "blind.py").write_text(text, encoding="utf-8")
     monkeypatch.setattr(family, "__path__", [*family.__path__, str(tmp_path)])
     importlib.invalidate_caches()
@@ -235,7 +273,9 @@ def test_the_library_can_lack_an_effect() -> None:
     assert "plate_gain" not in effects(names)
     assert list(effects(names)) == names
     assert list(discrete_effects(("clipping",))) == ["clipping"]
-    assert {gate.effect for gate in gates(recorded(standing(np.random.default_rng(7))).session, chosen=("mains_hum",))} <= {"", "mains_hum"}
+    assert {
+        gate.effect for gate in gates(recorded(standing(np.random.default_rng(7))).session, chosen=("mains_hum",))
+    } <= {"", "mains_hum"}
     with pytest.raises(UnknownName, match="plate_gain"):
         effects(("plate_gian",))
     with pytest.raises(UnknownName):

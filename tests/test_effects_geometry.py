@@ -34,7 +34,10 @@ def differences(name: str, target: str, component: int) -> tuple[Array, Array]:
     found = effect(name).at(target, CASE)
     step = 0.002 * np.eye(found.typical.size)[component]
     plus, minus = (found.corrected(CASE, sign * step) for sign in (1, -1))
-    wrench = predict_wrench(plus.body, plus.motion, plus.phi).value - predict_wrench(minus.body, minus.motion, minus.phi).value
+    wrench = (
+        predict_wrench(plus.body, plus.motion, plus.phi).value
+        - predict_wrench(minus.body, minus.motion, minus.phi).value
+    )
     return wrench / 0.004, -(plus.marker_residual - minus.marker_residual) / 0.004
 
 
@@ -116,7 +119,9 @@ def test_moved_joint_and_marker_move_only_what_they_should() -> None:
 
 
 def test_joint_at_its_limit_does_not_answer() -> None:
-    """A knee that its markers push beyond straight for most of the trial stays where it is; one that is pulled off the limit does not."""
+    """A knee that its markers push beyond straight for most of the trial stays where it is; one that is pulled off
+    the limit does not.
+    """
     names = [j.name for j in CASE.body.joints]
     knee = names.index("right_knee_flexion")
     answer = CASE.geometry.answer

@@ -39,7 +39,9 @@ def longer(body: Body, extended: Body, q: Array) -> Array:
 
 
 def person(name: str, size: float) -> tuple[Case, Array]:
-    """Return a trial of a person who moves the joint by ``size`` rad rms, tracked without it, and the wrench (T, 6) of that motion."""
+    """Return a trial of a person who moves the joint by ``size`` rad rms, tracked without it, and the wrench (T, 6)
+    of that motion.
+    """
     rng = np.random.default_rng(4)
     body = human(Subject(70, 1.75, "M", 30))
     extended = KINDS[name](human_case(120))
@@ -49,7 +51,9 @@ def person(name: str, size: float) -> tuple[Case, Array]:
     new = [i for i, joint in enumerate(extended.joints) if joint.name not in [j.name for j in body.joints]]
     for k, i in enumerate(new):
         q[:, 7 + i] = size * np.sqrt(2) * np.sin(2 * np.pi * (0.5 + 0.2 * k) * time + k)
-    markers = Markers(body.markers.names, time, poses(extended, q).points(extended.markers.segment, extended.markers.position))
+    markers = Markers(
+        body.markers.names, time, poses(extended, q).points(extended.markers.segment, extended.markers.position)
+    )
     true = predict_wrench(extended, smooth(extended, time, q))
     trial = Trial("t", "fit", markers, (Plate("plate1", 2, CORNERS, true),), Source(Path(__file__), "", "test"))
     case = Case(body, trial, track(body, trial), body.sip.phi, np.linspace(0, 1, 400))
@@ -63,7 +67,9 @@ def test_body_with_the_joint_is_the_same_body_at_zero(name: str) -> None:
     assert extended is not None
     motion = smooth(extended, case.motion.time, longer(case.body, extended, case.motion.q))
     plain = smooth(case.body, case.motion.time, case.motion.q)
-    np.testing.assert_allclose(predict_wrench(extended, motion).value, predict_wrench(case.body, plain).value, atol=1e-8)
+    np.testing.assert_allclose(
+        predict_wrench(extended, motion).value, predict_wrench(case.body, plain).value, atol=1e-8
+    )
     assert extended.sip.mass.sum() == pytest.approx(case.body.sip.mass.sum())
     assert (smallest_eigenvalues(extended.sip.phi) > 0).all()
     assert (extended.com_boxes[:, 0] < extended.sip.com).all()
@@ -116,7 +122,9 @@ def test_markers_show_the_joint_and_the_wrench_follows(name: str) -> None:
 def test_without_its_markers_there_is_no_target(name: str) -> None:
     case = human_case(120)
     assert case.trial.markers is not None
-    few = case.trial.markers.select(n for n in case.trial.markers.names if not n.endswith(("HD", "SHO")) and n not in ("C7", "CLAV"))
+    few = case.trial.markers.select(
+        n for n in case.trial.markers.names if not n.endswith(("HD", "SHO")) and n not in ("C7", "CLAV")
+    )
     blind = replace(case, trial=replace(case.trial, markers=few))
     assert effect(name).targets(blind) == ()
     assert not effect(name).columns(blind).any(), "a trial of a session in which others have the markers"

@@ -9,7 +9,7 @@ from human_cases import human_case
 from biodance.diagnosis.passing import one_sided
 from biodance.effects import Case, effect
 from biodance.effects.filter_mismatch import STRENGTH
-from biodance.effects.sloshing_load import FREQUENCY
+from biodance.effects.sloshing_load import _FREQUENCY
 from biodance.effects.time_delay import moved_in_time
 from biodance.records import Array, Wrench
 
@@ -59,13 +59,15 @@ def test_added_is_what_transform_adds(name: str) -> None:
     case = human_case(120)
     found = effect(name).at(effect(name).targets(case)[-1], case)
     theta = found.typical
-    np.testing.assert_allclose(found.added(case, theta), found.transform(case, theta).residual - case.residual, atol=1e-8)
+    np.testing.assert_allclose(
+        found.added(case, theta), found.transform(case, theta).residual - case.residual, atol=1e-8
+    )
 
 
 def test_a_load_sloshes_at_the_frequency_that_is_reported() -> None:
     found = replace(effect("sloshing_load"), target="trunk_head")
     rows = found.reported(np.array([2.0, 1.0, 0.5]), np.array([0.1, 0.1, 0.05]))
-    assert rows[2] == ("frequency", FREQUENCY + 0.5, 0.05, "Hz")
+    assert rows[2] == ("frequency", _FREQUENCY + 0.5, 0.05, "Hz")
     case = human_case(300)
     slow, quick = (found.added(case, np.array([0.0, 1.0, step])) for step in (-0.4, 0.4))
     assert np.linalg.norm(slow - quick) > 0.1 * np.linalg.norm(slow)

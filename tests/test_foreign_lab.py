@@ -1,4 +1,6 @@
-"""A session written by a laboratory whose code is not ours (BIODANCE_FOREIGN_LAB): other body, other markers, other motion, other noise."""
+"""A session written by a laboratory whose code is not ours (BIODANCE_FOREIGN_LAB): other body, other markers, other
+motion, other noise.
+"""
 
 import json
 import os
@@ -17,7 +19,15 @@ def test_a_session_of_another_laboratory_is_identified_and_gains_on_what_was_kep
     if not folder:
         pytest.skip("BIODANCE_FOREIGN_LAB is not set: no independent virtual laboratory here")
     person = ["--seed", "1", "--sex", "F", "--height", "1.68", "--mass", "61"]
-    command = [sys.executable, str(Path(folder) / "foreign_lab.py"), *person, "--trials", "1", "--out", str(tmp_path / "S01")]
+    command = [
+        sys.executable,
+        str(Path(folder) / "foreign_lab.py"),
+        *person,
+        "--trials",
+        "1",
+        "--out",
+        str(tmp_path / "S01"),
+    ]
     subprocess.run(command, check=True, capture_output=True, timeout=120)
     result = examine(read_session(tmp_path / "S01"))
     assert [trial.trial.name for trial in result.trials] == ["static", "dance01", "squat01", "squat02"]

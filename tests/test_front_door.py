@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import biodance
-from biodance.pipeline.provenance import UNKNOWN, blas, commit
+from biodance.pipeline.provenance import _UNKNOWN, blas, commit
 
 DOOR = Path(biodance.__file__)
 
@@ -17,7 +17,9 @@ DOOR = Path(biodance.__file__)
 def test_a_person_and_a_type_checker_see_the_same_names():
     tree = ast.parse(DOOR.read_text())
     typed = {}
-    for node in ast.walk(next(n for n in tree.body if isinstance(n, ast.If) and getattr(n.test, "id", "") == "TYPE_CHECKING")):
+    for node in ast.walk(
+        next(n for n in tree.body if isinstance(n, ast.If) and getattr(n.test, "id", "") == "TYPE_CHECKING")
+    ):
         if isinstance(node, ast.ImportFrom):
             typed |= {alias.asname: node.module for alias in node.names}
     said = {name: f"biodance.{module}" for module, names in biodance.HOMES.items() for name in names}
@@ -44,7 +46,10 @@ def test_it_opens_quickly_and_loads_nothing_heavy():
         "import sys, time; start = time.perf_counter(); import biodance; took = time.perf_counter() - start; "
         f"print(took, sorted({heavy} & set(sys.modules)), dir(biodance)[0])"
     )
-    said = [subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split() for _ in range(3)]
+    said = [
+        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+        for _ in range(3)
+    ]
     assert min(float(one[0]) for one in said) < 0.05
     assert said[0][1] == "[]"
     start = time.perf_counter()
@@ -52,11 +57,15 @@ def test_it_opens_quickly_and_loads_nothing_heavy():
     assert time.perf_counter() - start < 2.0  # 0.3 s on an idle machine
 
 
-@pytest.mark.parametrize("first", ["import biodance", "import biodance.identification.identification, biodance.diagnosis.engine"])
+@pytest.mark.parametrize(
+    "first", ["import biodance", "import biodance.identification.identification, biodance.diagnosis.engine"]
+)
 def test_a_verb_stays_a_verb_whatever_was_imported_before(first):
     code = (
-        f"{first}\nimport biodance\nfrom biodance import diagnose, identify\nimport biodance.identification.sessions as sessions\n"
-        "assert callable(biodance.identify) and callable(biodance.diagnose) and callable(identify) and callable(diagnose)\n"
+        f"{first}\nimport biodance\nfrom biodance import diagnose, identify\nimport biodance.identification.sessions "
+        f"as sessions\n"
+        "assert callable(biodance.identify) and callable(biodance.diagnose) and callable(identify) and "
+        "callable(diagnose)\n"
         "try:\n    biodance.identify('nowhere')\nexcept biodance.BiodanceError as error:\n    print(error)"
     )
     done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False)
@@ -114,7 +123,14 @@ def test_records_show_themselves_in_one_line_and_as_html(result):
     session = result.session
     found = biodance.identify(result)
     squat = result["squat_1"]
-    shown = [session, session["squat_1"], session["squat_1"].markers, squat.trial.wrench, squat.trial.plates[0], squat.motion]
+    shown = [
+        session,
+        session["squat_1"],
+        session["squat_1"].markers,
+        squat.trial.wrench,
+        squat.trial.plates[0],
+        squat.motion,
+    ]
     shown += [squat, result, result.body, result.body.sip, found, found.identification]
     for record in shown:
         assert "\n" not in repr(record), repr(record)
@@ -158,7 +174,7 @@ def test_the_commit_is_that_of_the_checkout_and_unknown_in_a_wheel(tmp_path):
     package = tmp_path / "biodance"
     package.mkdir()
     (package / "a.py").write_text("1")
-    assert commit(package) == UNKNOWN
+    assert commit(package) == _UNKNOWN
     for words in (["init", "-q"], ["add", "."], ["commit", "-qm", "one"]):
         subprocess.run([*git, *words], cwd=tmp_path, check=True)
     commit.cache_clear()

@@ -1,4 +1,5 @@
-"""Hide an effect in a session, write it as C3D files, and require that the public way finds it; full set: benchmarks/bench_diagnosis.py.
+"""Hide an effect in a session, write it as C3D files, and require that the public way finds it; full set:
+benchmarks/bench_diagnosis.py.
 
 The hiding side (`biodance.virtual_lab`) knows nothing of the effects; the finding side sees files only.
 """
@@ -58,7 +59,9 @@ def test_a_session_without_fault_is_left_alone(tmp_path: Path, monkeypatch: pyte
 def test_late_forces_are_named_by_the_command_also_where_no_body_can_be_identified(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("biodance.identification.identification.physical_fit", lambda *_: FailedFit("No possible body, by force."))
+    monkeypatch.setattr(
+        "biodance.identification.identification.physical_fit", lambda *_: FailedFit("No possible body, by force.")
+    )
     folder = hidden(tmp_path / "s", "time_delay:delay=0.025")
     assert run(["diagnose", str(folder), "--accept", "--out", str(tmp_path / "out"), "--json"]) == 1
     document = json.loads(capsys.readouterr().out)
@@ -73,8 +76,12 @@ def test_late_forces_are_named_by_the_command_also_where_no_body_can_be_identifi
     assert first["parameters"]["delay"]["value"] == pytest.approx(0.025, rel=0.25)
 
 
-def test_a_reference_session_shows_a_load_below_the_limit_of_one_session(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """0.6 kg on a forearm stay unseen against the table (limit 0.79 kg); an unloaded session of that person, another day, shows them."""
+def test_a_reference_session_shows_a_load_below_the_limit_of_one_session(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """0.6 kg on a forearm stay unseen against the table (limit 0.79 kg); an unloaded session of that person, another
+    day, shows them.
+    """
     reference = hidden(tmp_path / "unloaded")
     session = hidden(tmp_path / "loaded", "added_mass:target=left_forearm_hand,mass=0.6", visit=1)
     assert run(["diagnose", str(session), "--reference", str(reference), "--out", str(tmp_path / "out"), "--json"]) == 1
@@ -94,7 +101,9 @@ def test_a_reference_session_shows_a_load_below_the_limit_of_one_session(tmp_pat
         ("added_mass:target=left_forearm_hand,mass=2.4", "added_mass", "left_forearm_hand"),
     ],
 )
-def test_a_hidden_cause_is_in_the_named_set(text: str, effect: str, target: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_hidden_cause_is_in_the_named_set(
+    text: str, effect: str, target: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     diagnosis = found(hidden(tmp_path / "s", text), monkeypatch)
     assert diagnosis.verdict.startswith("named")
     assert (effect, target) in {(alias.effect, alias.target) for alias in diagnosis.findings[0].set}
@@ -106,7 +115,9 @@ def test_what_no_file_describes_is_unexplained(tmp_path: Path, monkeypatch: pyte
     assert diagnosis.adequacy[0].z > 4.5
 
 
-def test_without_the_culprit_nobody_else_is_called_the_whole_truth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_culprit_nobody_else_is_called_the_whole_truth(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     folder = hidden(tmp_path / "s", "plate_drift:target=Mx,drift=15")
     assert found(folder, monkeypatch, without=("plate_drift",)).verdict in ("unexplained", "named, incomplete")
 
@@ -131,13 +142,19 @@ def standing(data: Path, folder: Path, name: str, text: str = "") -> Path:
     """Write a session of a real person who stands on a plate, with a fault in the file if there is a ``text``."""
     source = data / "biomechzoo" / name / f"{name}01.c3d"
     folder.mkdir()
-    inject(source, folder / "static.c3d", fault_of(parse_cause(text), {source.stem: (0.0, 1.0)}) if text else lambda recording: recording)
+    inject(
+        source,
+        folder / "static.c3d",
+        fault_of(parse_cause(text), {source.stem: (0.0, 1.0)}) if text else lambda recording: recording,
+    )
     return folder
 
 
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", ["HC030A", "HC032A"])
-def test_real_standing_is_not_accused_of_a_plate_fault(name: str, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_real_standing_is_not_accused_of_a_plate_fault(
+    name: str, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     clean = found(standing(data, tmp_path / "clean", name), monkeypatch, without=("labels_swapped",))
     assert not clean.findings
     assert any("centre of mass lies" in note for note in clean.notes)
@@ -147,18 +164,25 @@ def test_real_standing_is_not_accused_of_a_plate_fault(name: str, data: Path, tm
 @pytest.mark.parametrize("name", ["HC030A", "HC032A"])
 @pytest.mark.parametrize(
     ("text", "effect"),
-    [("plate_gain:target=plate1:Fz,gain=0.08", "plate_gain"), ("plate_offset:target=plate1:Fz,offset=30", "plate_offset")],
+    [
+        ("plate_gain:target=plate1:Fz,gain=0.08", "plate_gain"),
+        ("plate_offset:target=plate1:Fz,offset=30", "plate_offset"),
+    ],
 )
 def test_a_fault_written_into_real_standing_is_in_the_set(
     name: str, text: str, effect: str, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Standing shows nothing but weights: what is asked is the set, not the name."""
     diagnosis = found(standing(data, tmp_path / "faulty", name, text), monkeypatch, without=("labels_swapped",))
-    assert (effect, "plate1:Fz") in {(alias.effect, alias.target) for finding in diagnosis.findings for alias in finding.set}
+    assert (effect, "plate1:Fz") in {
+        (alias.effect, alias.target) for finding in diagnosis.findings for alias in finding.set
+    }
 
 
 @pytest.mark.filterwarnings("ignore")
-def test_a_real_walk_gets_no_name_from_tolerances_that_do_not_hold_for_it(data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_real_walk_gets_no_name_from_tolerances_that_do_not_hold_for_it(
+    data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     diagnosis = found(data / "adl_gait", monkeypatch)
     assert diagnosis.verdict == "unexplained"
     assert not diagnosis.findings
@@ -166,8 +190,13 @@ def test_a_real_walk_gets_no_name_from_tolerances_that_do_not_hold_for_it(data: 
 
 
 @pytest.mark.filterwarnings("ignore")
-def test_exchanged_wrist_labels_of_a_real_recording_are_told(data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_exchanged_wrist_labels_of_a_real_recording_are_told(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """In the static trial and the walk of HC030A the left wrist's bar points the mirrored right one's opposite way."""
     diagnosis = found(standing(data, tmp_path / "s", "HC030A"), monkeypatch)
     assert [(finding.effect, finding.target) for finding in diagnosis.findings] == [("labels_swapped", "LWRA/LWRB")]
-    assert not any(finding.effect == "labels_swapped" for finding in found(standing(data, tmp_path / "t", "HC032A"), monkeypatch).findings)
+    assert not any(
+        finding.effect == "labels_swapped"
+        for finding in found(standing(data, tmp_path / "t", "HC032A"), monkeypatch).findings
+    )

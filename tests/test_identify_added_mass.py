@@ -16,14 +16,19 @@ from biodance.records import Sip
 PLACE = np.array([0.15, -0.2, 0.2])
 
 
-def visits(seed: int, *, segment: int | None = None, mass: float = 2.0, frames: int = 1200) -> tuple[Identification, Identification]:
+def visits(
+    seed: int, *, segment: int | None = None, mass: float = 2.0, frames: int = 1200
+) -> tuple[Identification, Identification]:
     """Return a session without and one with a load on a segment (None: both without)."""
     body, truth, rng = person(seed)
     body = replace(body, boxes=np.tile([[-0.3] * 3, [0.3] * 3], (4, 1, 1)))
     loaded = truth.copy()
     if segment is not None:
         loaded[10 * segment : 10 * segment + 10] += mass * point_mass(PLACE)
-    first, second = (identify_body(body, (noisy_fit(body, smooth_motion(body, rng, frames=frames), phi, rng),)) for phi in (truth, loaded))
+    first, second = (
+        identify_body(body, (noisy_fit(body, smooth_motion(body, rng, frames=frames), phi, rng),))
+        for phi in (truth, loaded)
+    )
     return first, second
 
 
@@ -83,6 +88,8 @@ def test_an_undeclared_load_is_not_learned_as_noise() -> None:
         loaded[10:20] += mass * point_mass(PLACE)
         fit = noisy_fit(body, motion, loaded, np.random.default_rng(1))
         data = statistics(body, fit, layout_for(standing_point((fit,))))
-        slow.append([learn_noise(data, prior)[0].covariance[0][2, 2] for prior in (may_carry(body, body.sip), body.sip)])
+        slow.append(
+            [learn_noise(data, prior)[0].covariance[0][2, 2] for prior in (may_carry(body, body.sip), body.sip)]
+        )
     assert slow[1][0] < 3 * slow[0][0]
     assert slow[1][1] > 3 * slow[1][0]

@@ -52,7 +52,9 @@ def test_estimate_recovers_the_base_parameters_and_states_its_error() -> None:
         error[:, 3:] += np.cross(about, error[:, :3])
         wrench = type(clean)(clean.time, clean.value + error)
         half = np.arange(400) < 200
-        data = merge_information([information(body, motion, wrench, noise, use=half), information(body, motion, wrench, noise, use=~half)])
+        data = merge_information(
+            [information(body, motion, wrench, noise, use=half), information(body, motion, wrench, noise, use=~half)]
+        )
         found = estimate_base(data, base)
         z.append((found.value - truth) / found.sd)
     assert np.std(z) == pytest.approx(1.0, abs=0.05)

@@ -10,7 +10,15 @@ from biodance.body.body import JointError
 from biodance.body.human.human import human
 from biodance.body.tables.error_sizes import error_size
 from biodance.identification.information import Information
-from biodance.identification.mismatch import Mismatch, Sizes, evidence_of_scale, evident_sizes, mismatch, nothing, temper
+from biodance.identification.mismatch import (
+    Mismatch,
+    Sizes,
+    evidence_of_scale,
+    evident_sizes,
+    mismatch,
+    nothing,
+    temper,
+)
 from biodance.identification.posterior import posterior
 from biodance.motion.kinematics import chains, jacobian, poses
 from biodance.records import CHANNELS, Subject
@@ -29,12 +37,16 @@ def test_jacobian_is_the_derivative_of_the_places() -> None:
     body, _, rng = person(0)
     motion = smooth_motion(body, rng, frames=5)
     segment = list(body.markers.segment)
-    place, _ = jacobian(body, poses(body, motion.q), segment, poses(body, motion.q).points(segment, body.markers.position))
+    place, _ = jacobian(
+        body, poses(body, motion.q), segment, poses(body, motion.q).points(segment, body.markers.position)
+    )
     step = 1e-6
     for j in range(len(body.joints)):
         q = motion.q.copy()
         q[:, 7 + j] += step
-        change = poses(body, q).points(segment, body.markers.position) - poses(body, motion.q).points(segment, body.markers.position)
+        change = poses(body, q).points(segment, body.markers.position) - poses(body, motion.q).points(
+            segment, body.markers.position
+        )
         np.testing.assert_allclose(place[:, :, 6 + j], change.reshape(5, -1) / step, atol=1e-5)
 
 
@@ -52,7 +64,9 @@ def test_without_disturbance_nothing_is_discounted() -> None:
     body, _, _ = person(5)
     for noise in (1.0, 4.0):
         mild = temper(data, none, Sizes(1.0, noise))
-        np.testing.assert_allclose(mild.triangle.T @ mild.triangle, data.triangle.T @ data.triangle / noise, rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(
+            mild.triangle.T @ mild.triangle, data.triangle.T @ data.triangle / noise, rtol=1e-6, atol=1e-9
+        )
         weaker = posterior(mild, body.sip)
         np.testing.assert_array_less(posterior(data, body.sip).covariance.trace() - 1e-12, weaker.covariance.trace())
 
@@ -66,7 +80,9 @@ def test_tempered_data_give_the_textbook_posterior() -> None:
     C = 2.0 * H + found.kinematics @ found.kinematics.T + found.plates @ found.plates.T
     W = H @ np.linalg.inv(C)
     precision = np.linalg.inv(body.sip.covariance) + W @ H
-    mean = np.linalg.solve(precision, np.linalg.inv(body.sip.covariance) @ body.sip.phi + W @ data.triangle.T @ data.target)
+    mean = np.linalg.solve(
+        precision, np.linalg.inv(body.sip.covariance) @ body.sip.phi + W @ data.triangle.T @ data.target
+    )
     got = posterior(temper(data, found, Sizes(1.0, 2.0)), body.sip)
     np.testing.assert_allclose(got.mean, mean, rtol=1e-6, atol=1e-8)
 
@@ -117,7 +133,9 @@ def test_weighted_rows_are_whitened_twice() -> None:
         Noise(factor[:1] @ np.swapaxes(factor[:1], 1, 2), np.array([0.2, 0.1, 0.0])),
     ):
         white = [noise.whiten(x).reshape(-1, 3) for x in (rows, other)]
-        np.testing.assert_allclose(np.einsum("tci,tcj->ij", other, noise.weighted(rows)), white[1].T @ white[0], rtol=1e-9)
+        np.testing.assert_allclose(
+            np.einsum("tci,tcj->ij", other, noise.weighted(rows)), white[1].T @ white[0], rtol=1e-9
+        )
 
 
 def test_no_frames_make_no_scores() -> None:
@@ -138,8 +156,12 @@ def test_plates_have_the_sizes_of_the_table() -> None:
     assert whole[2, 2] == pytest.approx(error_size("plate_gain", "Fz"))
     place, talk = error_size("plate_position", "z"), error_size("plate_crosstalk", "Fy->Mx")
     assert whole[3, 1] == pytest.approx(np.hypot(place, talk))
-    np.testing.assert_allclose(np.sqrt((plates.offset**2).sum(axis=0)), [around_zero(f"plate_offset {c}", "offset") for c in CHANNELS])
-    assert around_zero("plate_offset Fz", "offset") > error_size("plate_offset", "Fz"), "what all plates show counts as well"
+    np.testing.assert_allclose(
+        np.sqrt((plates.offset**2).sum(axis=0)), [around_zero(f"plate_offset {c}", "offset") for c in CHANNELS]
+    )
+    assert around_zero("plate_offset Fz", "offset") > error_size("plate_offset", "Fz"), (
+        "what all plates show counts as well"
+    )
     assert plates.delay.max() == pytest.approx(0.00106, abs=2e-5), "1.0 ms late in all sessions, 0.3 ms between them"
     faults = (plates.mixing != 0).any(axis=(1, 2)).astype(int) + (plates.offset != 0).any(axis=1) + (plates.delay != 0)
     np.testing.assert_array_equal(faults, 1)
@@ -157,12 +179,21 @@ def test_errors_have_the_sizes_of_the_table_or_of_the_calibrated_joint() -> None
     assert plain["slide thigh", ""] == error_size("slide", "marker")
     assert plain["flesh thigh", ""] == error_size("flesh", "thigh")
     changed = {pair: sd for pair, sd in now.items() if sd != plain[pair]}
-    knee, hinge, trunk = ("joint_centre knee", "right_knee"), ("tilt knee", "right_knee"), ("joint_centre trunk", "trunk")
+    knee, hinge, trunk = (
+        ("joint_centre knee", "right_knee"),
+        ("tilt knee", "right_knee"),
+        ("joint_centre trunk", "trunk"),
+    )
     assert changed == {knee: 0.003, hinge: 0.04, trunk: 0.013}
 
 
 def test_joints_of_other_bodies_have_the_size_of_others() -> None:
     body, _, _ = person(11)
     found = deviations(body, of_markers(body)[2:])
-    assert set(np.round(found, 6)) <= {error_size("joint_centre", "other", state="before"), error_size("tilt", "other", state="before")}
-    assert {joint_of(body, chain) for chain in chains(body)} == {joint for source in of_markers(body)[2:] for joint in source.joints}
+    assert set(np.round(found, 6)) <= {
+        error_size("joint_centre", "other", state="before"),
+        error_size("tilt", "other", state="before"),
+    }
+    assert {joint_of(body, chain) for chain in chains(body)} == {
+        joint for source in of_markers(body)[2:] for joint in source.joints
+    }

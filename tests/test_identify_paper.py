@@ -1,4 +1,6 @@
-"""The paper's programme: its constraints hold, its optimum is the optimum, and it does not guarantee a body that can exist."""
+"""The paper's programme: its constraints hold, its optimum is the optimum, and it does not guarantee a body that can
+exist.
+"""
 
 import numpy as np
 import pytest
@@ -48,7 +50,9 @@ def test_every_inequality_and_equality_holds(seed: int) -> None:
 
 
 def least_distance(data, body) -> np.ndarray:
-    """Solve eq. 8 without equalities as least distance programming (Lawson & Hanson 1974, ch. 23), an independent route."""
+    """Solve eq. 8 without equalities as least distance programming (Lawson & Hanson 1974, ch. 23), an independent
+    route.
+    """
     A, b = inequalities(body)
     p = A.shape[1]
     H = data.triangle.T @ data.triangle + np.eye(p)

@@ -1,4 +1,6 @@
-"""The nearest possible body hangs on no rounding: a hundred seeds, inputs moved by 1e-12, rows in another order, segments at their edge."""
+"""The nearest possible body hangs on no rounding: a hundred seeds, inputs moved by 1e-12, rows in another order,
+segments at their edge.
+"""
 
 from dataclasses import replace
 
@@ -25,7 +27,9 @@ CLOSE = 1e-3
 
 
 def rows_of(seed: int, *, sd: float = 1.0):
-    """Return a chain whose table is wrong by 10 % (every second one holds a segment that cannot exist) and whitened rows [W y] of it."""
+    """Return a chain whose table is wrong by 10 % (every second one holds a segment that cannot exist) and whitened
+    rows [W y] of it.
+    """
     body, truth, rng = person(seed, segments=3)
     motion = random_motion(body, rng, frames=40)
     clean = predict_wrench(body, motion, truth).value
@@ -34,7 +38,9 @@ def rows_of(seed: int, *, sd: float = 1.0):
 
 
 def flat(seed: int):
-    """Return a body whose every segment is flat: four point masses in one plane, so that its pseudo-inertia ends at zero."""
+    """Return a body whose every segment is flat: four point masses in one plane, so that its pseudo-inertia ends at
+    zero.
+    """
     rng = np.random.default_rng(seed)
     body = random_body(rng, n_segments=3)
     frames = np.linalg.qr(rng.normal(size=(3, 3, 3)))[0]
@@ -71,8 +77,14 @@ def test_the_posterior_of_a_session_as_prior_of_the_next() -> None:
     for seed in SEEDS:
         body, R, rng = rows_of(seed)
         before = posterior(Information(R, 40), body.sip)
-        expected = Sip(body.segments, before.mean + 0.5 * before.factor @ rng.normal(size=before.factor.shape[1]), before.covariance)
-        shaken = Sip(body.segments, expected.phi * (1 + MOVED * rng.normal(size=expected.phi.size)), expected.covariance)
+        expected = Sip(
+            body.segments,
+            before.mean + 0.5 * before.factor @ rng.normal(size=before.factor.shape[1]),
+            before.covariance,
+        )
+        shaken = Sip(
+            body.segments, expected.phi * (1 + MOVED * rng.normal(size=expected.phi.size)), expected.covariance
+        )
         assert_same(*(physical_fit(posterior(Information(R, 40), prior), body) for prior in (expected, shaken)))
 
 

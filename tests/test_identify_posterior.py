@@ -18,7 +18,9 @@ NOISE = Noise.of_sd(2.0, 0.5, np.zeros(3))
 
 
 def drawn(seed: int, frames: int = 300):
-    """Return a body whose prior is wrong by its own standard deviations, a motion, and the noisy wrench of the truth."""
+    """Return a body whose prior is wrong by its own standard deviations, a motion, and the noisy wrench of the
+    truth.
+    """
     rng = np.random.default_rng(seed)
     body = random_body(rng, n_segments=4)
     truth = body.sip.phi

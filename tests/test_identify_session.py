@@ -91,7 +91,12 @@ def test_quantities_and_their_slope() -> None:
     phi = np.array(body.sip.phi[:10])
     value, slope = segment_quantities(phi)
     step = 1e-6
-    numeric = np.array([(segment_quantities(phi + step * e)[0] - segment_quantities(phi - step * e)[0]) / (2 * step) for e in np.eye(10)]).T
+    numeric = np.array(
+        [
+            (segment_quantities(phi + step * e)[0] - segment_quantities(phi - step * e)[0]) / (2 * step)
+            for e in np.eye(10)
+        ]
+    ).T
     np.testing.assert_allclose(slope, numeric, rtol=1e-5, atol=1e-7)
     np.testing.assert_allclose(value[1:4], phi[1:4] / phi[0])
     rows = knowledge(body.sip, body.sip)
@@ -126,7 +131,8 @@ def test_a_turned_frame_and_a_shifted_centre_to_first_order() -> None:
     phi = np.array(person(6)[0].sip.phi[:10])
     J, step = of_parameters(phi), 1e-6
     turn = [
-        (parameters_of_inertia(place_inertia(J, Rotation.from_rotvec(step * e).as_matrix(), np.zeros(3))) - phi) / step for e in np.eye(3)
+        (parameters_of_inertia(place_inertia(J, Rotation.from_rotvec(step * e).as_matrix(), np.zeros(3))) - phi) / step
+        for e in np.eye(3)
     ]
     shift = [(parameters_of_inertia(place_inertia(J, np.eye(3), step * e)) - phi) / step for e in np.eye(3)]
     np.testing.assert_allclose(_turn_slope(phi), np.array(turn).T, atol=1e-4)
@@ -137,7 +143,9 @@ def test_a_turned_frame_and_a_shifted_centre_to_first_order() -> None:
 def test_equal_sessions_do_not_differ() -> None:
     body, truth, rng = person(7)
     body = replace(body, boxes=np.tile([[-0.3] * 3, [0.3] * 3], (4, 1, 1)))
-    first, second = (identify_body(body, (noisy_fit(body, smooth_motion(body, rng, frames=1000), truth, rng),)) for _ in range(2))
+    first, second = (
+        identify_body(body, (noisy_fit(body, smooth_motion(body, rng, frames=1000), truth, rng),)) for _ in range(2)
+    )
     rows = differences(first, second)
     assert len(rows) == 40
     z = np.array([row.value / row.sd for row in rows if row.quantity in ("mass", "com x", "com y", "com z")])
@@ -158,7 +166,10 @@ def test_equal_sessions_do_not_differ() -> None:
 def test_what_changed_hangs_on_no_rounding(seed: int) -> None:
     body, truth, rng = person(seed)
     fits = [noisy_fit(body, smooth_motion(body, rng, frames=500), truth, rng) for _ in range(2)]
-    moved = [replace(f, wrench=Wrench(f.wrench.time, f.wrench.value * (1 + 1e-12 * rng.normal(size=f.wrench.value.shape)))) for f in fits]
+    moved = [
+        replace(f, wrench=Wrench(f.wrench.time, f.wrench.value * (1 + 1e-12 * rng.normal(size=f.wrench.value.shape))))
+        for f in fits
+    ]
     sessions = [identify_body(body, (fit,)) for fit in (*fits, *moved)]
     for pair, shaken in ((sessions[:2], sessions[2:]), ((sessions[0], sessions[0]), (sessions[2], sessions[0]))):
         for one, other in zip(differences(*pair), differences(*shaken), strict=True):
@@ -181,14 +192,25 @@ def test_gain_has_the_known_ratio_in_its_interval() -> None:
     assert result.force_interval[0] <= 2.0 + 1e-9
     assert result.force_interval[1] >= 2.0 - 1e-9
     with pytest.raises(BiodanceError, match="blocks"):
-        residual_ratio((validate(body, true_body, noisy_fit(body, smooth_motion(body, rng, frames=120), truth, rng), about=np.zeros(3)),))
+        residual_ratio(
+            (
+                validate(
+                    body,
+                    true_body,
+                    noisy_fit(body, smooth_motion(body, rng, frames=120), truth, rng),
+                    about=np.zeros(3),
+                ),
+            )
+        )
 
 
 def test_learned_noise_is_used_when_given() -> None:
     body, _, fits = session(9, frames=600)
     total = statistics(body, fits[0], layout_for(standing_point(fits)))
     noise, _ = learn_noise(total, may_carry(body, widened(body.sip)))
-    np.testing.assert_allclose(conclude(body, total, ("t",), noise=noise).sip.phi, conclude(body, total, ("t",)).sip.phi)
+    np.testing.assert_allclose(
+        conclude(body, total, ("t",), noise=noise).sip.phi, conclude(body, total, ("t",)).sip.phi
+    )
 
 
 def test_a_posture_that_jumps_is_left_out_and_said() -> None:

@@ -17,7 +17,9 @@ from biodance.records import Motion, Sip, Wrench
 
 
 def recording(*, frames: int = 9000, rate: float = 100.0, seed: int = 0, holes: bool = True):
-    """Return a body and one long trial with holes in its mask (longer than two blocks, so that a block ends within a run)."""
+    """Return a body and one long trial with holes in its mask (longer than two blocks, so that a block ends within a
+    run).
+    """
     rng = np.random.default_rng(seed)
     body = random_body(rng, n_segments=3)
     time = np.arange(frames) / rate
@@ -39,7 +41,11 @@ def pieces(fit: Fit, cuts):
     for first, stop in pairwise(cuts):
         cut = slice(first, stop)
         m = fit.motion
-        yield Motion(m.time[cut], m.q[cut], m.v[cut], m.a[cut]), Wrench(m.time[cut], fit.wrench.value[cut]), fit.use[cut]
+        yield (
+            Motion(m.time[cut], m.q[cut], m.v[cut], m.a[cut]),
+            Wrench(m.time[cut], fit.wrench.value[cut]),
+            fit.use[cut],
+        )
 
 
 def streamed(body, fit: Fit, cuts):

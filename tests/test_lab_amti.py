@@ -1,4 +1,6 @@
-"""AMTI's native files, written byte by byte here with known truth: both versions of .bsf, and text with and without an explanation."""
+"""AMTI's native files, written byte by byte here with known truth: both versions of .bsf, and text with and without
+an explanation.
+"""
 
 import os
 from pathlib import Path
@@ -17,8 +19,9 @@ SENSITIVITY = np.array([0.67, 0.67, 0.17, 0.03, 0.03, 0.06])
 
 
 def load(seconds=3.0):
-    """A person of 600 N on the plate: load ON the plate (S, 6) N, N·m about the surface centre, plate axes (z down), and where it presses
-    (x, y)."""
+    """A person of 600 N on the plate: load ON the plate (S, 6) N, N·m about the surface centre, plate axes (z down),
+    and where it presses (x, y).
+    """
     time = np.arange(0, seconds, 1 / RATE)
     on = np.clip((time - 0.8) / 0.2, 0, 1)
     force = on[:, None] * np.column_stack([40 * np.sin(3 * time), 25 * np.cos(2 * time), 600 + 50 * np.sin(5 * time)])
@@ -32,7 +35,8 @@ def bsf(kind, loads, *, offset=(0, 0, 0), distance=(0, 0, 0), cut=None, **change
     """The bytes of a .bsf file with these plates (N, N·m); ``changes`` spoil fields of the main header."""
     main = np.zeros((), MAIN)
     for key, value in {
-        "version": kind, "size": MAIN.itemsize - 4, "plates": len(loads), "seconds": len(loads[0]) / RATE, "rate": RATE, "weight": 135.0,
+        "version": kind, "size": MAIN.itemsize - 4, "plates": len(loads), "seconds": len(loads[0]) / RATE,
+        "rate": RATE, "weight": 135.0,
     }.items():  # fmt: skip
         main[key] = value
     for key, value in changes.items():
@@ -92,7 +96,9 @@ def test_two_plates_lie_apart_and_that_is_said(tmp_path):
     trial = read_bsf(written(tmp_path, bsf(105, [truth, truth], distance=(20.0, 4.0, 0.0))))
     first, second = trial.plates
     np.testing.assert_allclose(second.centre - first.centre, [20 * INCH, -4 * INCH, 0], atol=1e-7)
-    np.testing.assert_allclose(second.wrench.moment - first.wrench.moment, np.cross(second.centre, second.wrench.force), atol=1e-6)
+    np.testing.assert_allclose(
+        second.wrench.moment - first.wrench.moment, np.cross(second.centre, second.wrench.force), atol=1e-6
+    )
     assert "Check that" in trial.warnings[0]
     assert "no distance" in read_bsf(written(tmp_path, bsf(105, [truth, truth]))).warnings[0]
 
@@ -125,7 +131,10 @@ def test_a_file_that_holds_the_reaction_is_recognised_by_gravity(tmp_path):
         (bsf(105, [load()[0]], seconds=-1.0), "lasts -1 s"),
         (bsf(105, [load()[0] * np.nan]), "is not a number"),
         (bsf(105, [load()[0]], offset=(0, 0, 40)), "correct its offset"),
-        (bsf(100, [load()[0]]).replace(np.float32(3276.8).tobytes(), np.float32(0).tobytes()), "a calibration value is 0"),
+        (
+            bsf(100, [load()[0]]).replace(np.float32(3276.8).tobytes(), np.float32(0).tobytes()),
+            "a calibration value is 0",
+        ),
         (bsf(105, [load()[0]]).replace(np.float32(20).tobytes(), np.float32(2000).tobytes(), 1), "legal are sides"),
     ],
 )
@@ -149,7 +158,9 @@ def table(values, *, header="", separator=",", time=True):
 def test_text_without_explanation_is_refused_and_the_message_is_the_cure(tmp_path):
     truth, _ = load()
     path = written(tmp_path, table(truth), "trial.asc")
-    with pytest.raises(FileRefused, match=r"does not say columns, force_unit, moment_unit, rate_hz, plate_size_m.*trial\.toml") as refused:
+    with pytest.raises(
+        FileRefused, match=r"does not say columns, force_unit, moment_unit, rate_hz, plate_size_m.*trial\.toml"
+    ) as refused:
         read_amti_ascii(path)
     path.with_suffix(".toml").write_text(str(refused.value).split("\n", 1)[1])
     trial = read_amti_ascii(path)
@@ -204,7 +215,8 @@ def test_a_header_line_says_order_and_units(tmp_path):
 def test_nonsense_in_the_toml_is_refused(tmp_path, toml, word):
     path = written(tmp_path, table(load()[0]), "trial.asc")
     whole = {
-        "columns": '["time_s", "Fx", "Fy", "Fz", "Mx", "My", "Mz"]', "force_unit": '"N"', "moment_unit": '"Nm"', "rate_hz": "200",
+        "columns": '["time_s", "Fx", "Fy", "Fz", "Mx", "My", "Mz"]', "force_unit": '"N"', "moment_unit": '"Nm"',
+        "rate_hz": "200",
         "plate_size_m": "[0.4, 0.6]",
     }  # fmt: skip
     whole.pop(toml.split(" =")[0], None)

@@ -1,4 +1,6 @@
-"""Damaged C3D files end in a refusal or in the right numbers: never in a hang, a crash, a foreign error or a wrong number."""
+"""Damaged C3D files end in a refusal or in the right numbers: never in a hang, a crash, a foreign error or a wrong
+number.
+"""
 
 import os
 from pathlib import Path
@@ -30,11 +32,20 @@ def written(tmp_path_factory):
     plate = PlateRecording(2, CORNERS, [0, 0, -0.04], wrench)
     markers = Markers(tuple(f"LAB{i}" for i in range(6)), np.arange(40) / 100, xyz)
     said = {"PROCESSING": {"Bodymass": 70.0, "Height": 1750.0}}
-    write_c3d(folder / "written.c3d", markers=markers, plates=[plate], analog_rate=1000.0, parameters=said, prefix="Anna:")
+    write_c3d(
+        folder / "written.c3d", markers=markers, plates=[plate], analog_rate=1000.0, parameters=said, prefix="Anna:"
+    )
     points = np.concatenate([np.round(1000 * xyz), np.zeros((40, 6, 1))], axis=2)
     transform = {"ANALOG": {"OFFSET": whole(*range(1, 7)), "SCALE": real(0.5, 2, 3, 1, 1, 1)}}
-    for name, processor, scale in (("dec", DEC, -0.1), ("mips", MIPS, -0.1), ("integers", MIPS, 0.5), ("whole", 84, 0.5)):
-        (folder / f"{name}.c3d").write_bytes(File(points, np.round(wrench), processor, scale, parameters=transform).bytes())
+    for name, processor, scale in (
+        ("dec", DEC, -0.1),
+        ("mips", MIPS, -0.1),
+        ("integers", MIPS, 0.5),
+        ("whole", 84, 0.5),
+    ):
+        (folder / f"{name}.c3d").write_bytes(
+            File(points, np.round(wrench), processor, scale, parameters=transform).bytes()
+        )
     return [original(path) for path in sorted(folder.iterdir())]
 
 

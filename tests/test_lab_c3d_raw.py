@@ -14,7 +14,9 @@ FRAMES, POINTS, CHANNELS, SAMPLES = 6, 3, 2, 5
 def numbers():
     """Smooth points (T, K, 4) mm and analog (S, C), all whole numbers that 16 bits hold."""
     time = np.arange(FRAMES)[:, None, None]
-    points = np.concatenate([100.0 * np.arange(1, 10).reshape(1, POINTS, 3) + 7 * time, np.zeros((FRAMES, POINTS, 1))], axis=2)
+    points = np.concatenate(
+        [100.0 * np.arange(1, 10).reshape(1, POINTS, 3) + 7 * time, np.zeros((FRAMES, POINTS, 1))], axis=2
+    )
     analog = np.arange(FRAMES * SAMPLES * CHANNELS).reshape(-1, CHANNELS) - 20.0
     return points, analog
 
@@ -43,7 +45,9 @@ def test_every_byte_order_and_storage_gives_the_numbers_written(tmp_path, number
 def test_gain_and_offset_are_applied_as_the_file_says(tmp_path, numbers, processor, scale):
     points, analog = numbers
     transform = {"GEN_SCALE": real(0.5), "SCALE": real(2.0, -3.0), "OFFSET": whole(4, -6)}
-    raw = read_raw(save(tmp_path, File(points, analog, processor=processor, scale=scale, parameters={"ANALOG": transform})))
+    raw = read_raw(
+        save(tmp_path, File(points, analog, processor=processor, scale=scale, parameters={"ANALOG": transform}))
+    )
     np.testing.assert_allclose(raw.analog, (analog - [4, -6]) * [1.0, -1.5], rtol=1e-6)
 
 
@@ -88,7 +92,9 @@ def test_more_than_255_analog_channels(tmp_path):
     analog = np.arange(600.0).reshape(2, 300)
     transform = {name: whole(*[value] * 255) for name, value in (("OFFSET", 0), ("SCALE", 2))}
     transform |= {name: whole(*[value] * 45) for name, value in (("OFFSET2", 0), ("SCALE2", 3))}
-    file = File(np.ones((2, 1, 4)), analog, parameters={"ANALOG": transform | {"LABELS": text("A"), "UNITS": text("V")}})
+    file = File(
+        np.ones((2, 1, 4)), analog, parameters={"ANALOG": transform | {"LABELS": text("A"), "UNITS": text("V")}}
+    )
     np.testing.assert_array_equal(read_raw(save(tmp_path, file)).analog, analog * np.repeat([2, 3], [255, 45]))
 
 
@@ -111,7 +117,13 @@ def test_points_without_analog_and_analog_without_points(tmp_path, numbers):
     points, analog = numbers
     alone = read_raw(save(tmp_path, File(points)))
     assert (alone.points.shape, alone.analog.shape, np.isnan(alone.analog_rate)) == ((FRAMES, POINTS, 3), (0, 0), True)
-    plate = File(np.empty((len(analog), 0, 4)), analog, rate=1000.0, header={"rate": 0.0}, parameters={"POINT": {"RATE": real(0.0)}})
+    plate = File(
+        np.empty((len(analog), 0, 4)),
+        analog,
+        rate=1000.0,
+        header={"rate": 0.0},
+        parameters={"POINT": {"RATE": real(0.0)}},
+    )
     other = read_raw(save(tmp_path, plate))
     assert (other.points.shape, other.analog_rate) == ((len(analog), 0, 3), 1000.0)
     np.testing.assert_array_equal(other.analog, analog)
@@ -137,7 +149,8 @@ def test_a_rate_that_one_place_tells_otherwise_is_outvoted_and_said(tmp_path, nu
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"samples": 3}, {"values": 9}, {"points": 4}, {"last": 4}, {"first": 3}, {"samples": 0}, {"start": 1 + 2 + 1}]
+    "wrong",
+    [{"samples": 3}, {"values": 9}, {"points": 4}, {"last": 4}, {"first": 3}, {"samples": 0}, {"start": 1 + 2 + 1}],
 )
 def test_one_wrong_count_in_the_header_is_outvoted_and_never_shifts_the_numbers(tmp_path, numbers, wrong):
     points = np.tile(numbers[0], (20, 1, 1))
@@ -168,7 +181,9 @@ def test_channels_that_are_declared_but_not_stored(tmp_path):
 
 def test_a_header_that_is_silent_on_analog_data(tmp_path, numbers):
     points, analog = numbers
-    raw = read_raw(save(tmp_path, File(np.tile(points, (9, 1, 1)), np.tile(analog, (9, 1)), header={"values": 0, "samples": 0})))
+    raw = read_raw(
+        save(tmp_path, File(np.tile(points, (9, 1, 1)), np.tile(analog, (9, 1)), header={"values": 0, "samples": 0}))
+    )
     np.testing.assert_array_equal(raw.analog, np.tile(analog, (9, 1)))
 
 
@@ -187,13 +202,18 @@ def damaged(numbers):
         "the file is empty": b"",
         "is not a C3D file: of its 2000": b"not a c3d file, just some text\n".ljust(2000, b"."),
         "is not a C3D file: of its 700": good[:700],
-        "damaged or was cut off": File(points, parameters={"POINT": {"DESCRIPTIONS": text(*["x" * 200] * 9)}}).bytes()[:1500],
+        "damaged or was cut off": File(points, parameters={"POINT": {"DESCRIPTIONS": text(*["x" * 200] * 9)}}).bytes()[
+            :1500
+        ],
         "cut off: it declares 6 frames and holds 4": good[: 1024 + 4 * 88],
         "outside the file": b"\xff" + good[1:],
         "processor type 99": good[:515] + b"\x63" + good[516:],
         "which no lab has": good[:515] + bytes([DEC]) + good[516:],
         "declares no frame": File(
-            points, analog, header={"points": 0, "values": 0}, parameters={"POINT": {"USED": whole(0)}, "ANALOG": {"USED": whole(0)}}
+            points,
+            analog,
+            header={"points": 0, "values": 0},
+            parameters={"POINT": {"USED": whole(0)}, "ANALOG": {"USED": whole(0)}},
         ).bytes(),
         "ANALOG:SCALE has 0 usable": File(points, analog, parameters={"ANALOG": {"SCALE": None}}).bytes(),
         "ANALOG:SCALE has 1 usable": File(points, analog, parameters={"ANALOG": {"SCALE": real(1.0)}}).bytes(),

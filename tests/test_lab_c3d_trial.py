@@ -8,8 +8,42 @@ from biodance.errors import FileRefused
 from biodance.lab.c3d.raw import model_outputs
 from biodance.lab.c3d.read import read_c3d
 
-LABELS = ("LASI", "RASI", "LPSI", "RPSI", "LHEE", "RHEE", "LTOE", "RTOE", "C7", "CLAV", "T10", "STRN", "LKNE", "RKNE", "LANK", "RANK")
-LABELS += ("LTHI", "RTHI", "LTIB", "RTIB", "LSHO", "RSHO", "LELB", "RELB", "LWRA", "RWRA", "LWRB", "RWRB", "LFHD", "RFHD", "LBHD", "RBHD")
+LABELS = (
+    "LASI",
+    "RASI",
+    "LPSI",
+    "RPSI",
+    "LHEE",
+    "RHEE",
+    "LTOE",
+    "RTOE",
+    "C7",
+    "CLAV",
+    "T10",
+    "STRN",
+    "LKNE",
+    "RKNE",
+    "LANK",
+    "RANK",
+)
+LABELS += (
+    "LTHI",
+    "RTHI",
+    "LTIB",
+    "RTIB",
+    "LSHO",
+    "RSHO",
+    "LELB",
+    "RELB",
+    "LWRA",
+    "RWRA",
+    "LWRB",
+    "RWRB",
+    "LFHD",
+    "RFHD",
+    "LBHD",
+    "RBHD",
+)
 HEIGHTS = dict.fromkeys(LABELS, 1.0) | dict.fromkeys(("LFHD", "RFHD", "LBHD", "RBHD"), 1.65)
 HEIGHTS |= dict.fromkeys(("LHEE", "RHEE", "LTOE", "RTOE"), 0.05) | dict.fromkeys(("C7", "LSHO", "RSHO"), 1.45)
 FRAMES = 4
@@ -25,7 +59,12 @@ def person():
     """(T, K, 3) m, z up: somebody who stands near the lab origin."""
     generator = np.random.default_rng(5)
     xyz = np.stack(
-        [generator.uniform(-0.2, 0.2, len(LABELS)), generator.uniform(0, 0.5, len(LABELS)), [HEIGHTS[n] for n in LABELS]], axis=1
+        [
+            generator.uniform(-0.2, 0.2, len(LABELS)),
+            generator.uniform(0, 0.5, len(LABELS)),
+            [HEIGHTS[n] for n in LABELS],
+        ],
+        axis=1,
     )
     return np.repeat(xyz[None], FRAMES, axis=0) + 0.001 * np.arange(FRAMES)[:, None, None]
 
@@ -72,7 +111,9 @@ def test_declared_units(read, unit, per_metre):
     assert any("POINT:UNITS" in line for line in trial.history)
 
 
-@pytest.mark.parametrize(("unit", "per_metre"), [(None, 1000), ("", 1), ("furlong", 100), ("m", 1000), ("mm", 1), ("cm", 1000)])
+@pytest.mark.parametrize(
+    ("unit", "per_metre"), [(None, 1000), ("", 1), ("furlong", 100), ("m", 1000), ("mm", 1), ("cm", 1000)]
+)
 def test_missing_odd_or_impossible_units_are_decided_by_the_size_of_the_person_and_said(read, unit, per_metre):
     trial = read(file(unit=unit, per_metre=per_metre))
     np.testing.assert_allclose(trial.markers.xyz, person(), atol=1e-6)
@@ -164,10 +205,17 @@ def test_repeated_labels(read):
 
 @pytest.mark.parametrize("per_metre", [1000.0, 100.0, 1.0])
 def test_measures_in_any_unit(read, per_metre):
-    group = {"Bodymass": real(65.0), "Height": real(1.75 * per_metre), "LLegLength": real(0.9 * per_metre), "RLegLength": real(0.0)}
+    group = {
+        "Bodymass": real(65.0),
+        "Height": real(1.75 * per_metre),
+        "LLegLength": real(0.9 * per_metre),
+        "RLegLength": real(0.0),
+    }
     group |= {"LKneeWidth": real(0.11 * per_metre), "LThighRotation": real(3.0), "Note": text("mm")}
     trial = read(file(more={"PROCESSING": group}))
-    assert trial.measurements == pytest.approx({"Bodymass": 65.0, "Height": 1.75, "LLegLength": 0.9, "LKneeWidth": 0.11}, rel=1e-6)
+    assert trial.measurements == pytest.approx(
+        {"Bodymass": 65.0, "Height": 1.75, "LLegLength": 0.9, "LKneeWidth": 0.11}, rel=1e-6
+    )
     assert trial.warnings == ()
 
 

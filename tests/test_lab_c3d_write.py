@@ -47,7 +47,12 @@ def test_numbers_come_back_in_three_readers(path, kind):
     np.testing.assert_allclose(raw.points / 1000, markers.xyz, rtol=2e-7)
     np.testing.assert_allclose(raw.analog, analog, rtol=2e-7)
     assert (raw.rate, raw.analog_rate, raw.warnings) == (RATE, 1000.0, ())
-    units = {1: ("N", "N", "N", "mm", "mm", "Nmm"), 2: ("N", "N", "N", "Nmm", "Nmm", "Nmm"), 3: ("N",) * 8, 4: ("V",) * 6}
+    units = {
+        1: ("N", "N", "N", "mm", "mm", "Nmm"),
+        2: ("N", "N", "N", "Nmm", "Nmm", "Nmm"),
+        3: ("N",) * 8,
+        4: ("V",) * 6,
+    }
     assert raw.analog_units == units[kind]
     one = ezc3d.c3d(str(path))["data"]
     np.testing.assert_allclose(one["points"][:3].transpose(2, 1, 0), raw.points)
@@ -78,8 +83,20 @@ def test_another_program_computes_the_same_plates(path, kind):
 
 def test_parameters_labels_prefix_and_first_frame(path):
     markers = cloud(300, 4)
-    said = {"PROCESSING": {"Bodymass": 65.0, "Height": 1750.0}, "SUBJECTS": {"NAMES": ["Anna"]}, "FORCE_PLATFORM": {"ZERO": [1, 20]}}
-    write_c3d(path, markers=markers, plates=[plate(2, 4)], analog_rate=1000.0, parameters=said, first_frame=695, prefix="Anna:")
+    said = {
+        "PROCESSING": {"Bodymass": 65.0, "Height": 1750.0},
+        "SUBJECTS": {"NAMES": ["Anna"]},
+        "FORCE_PLATFORM": {"ZERO": [1, 20]},
+    }
+    write_c3d(
+        path,
+        markers=markers,
+        plates=[plate(2, 4)],
+        analog_rate=1000.0,
+        parameters=said,
+        first_frame=695,
+        prefix="Anna:",
+    )
     raw = read_raw(path)
     assert raw.first_frame == 695
     assert raw.labels == tuple(f"Anna:POINT{i}" for i in range(300))
@@ -103,7 +120,11 @@ def test_short_and_very_long_recordings(path, frames, first):
 def test_plates_alone(path):
     write_c3d(path, markers=None, plates=[plate(3)], analog_rate=1000.0)
     raw = read_raw(path)
-    assert (raw.points.shape, raw.analog.shape, raw.analog_rate) == ((FRAMES * SAMPLES, 0, 3), (FRAMES * SAMPLES, 8), 1000.0)
+    assert (raw.points.shape, raw.analog.shape, raw.analog_rate) == (
+        (FRAMES * SAMPLES, 0, 3),
+        (FRAMES * SAMPLES, 8),
+        1000.0,
+    )
 
 
 def test_an_existing_file_is_never_overwritten(path):

@@ -29,7 +29,9 @@ def trial():
     plate = Plate("plate1", 2, DOWN, Wrench(fine, np.hstack([force, moment])))
     source = Source(Path("walk.c3d"), "0" * 64, "C3D", RATE, RATE * SAMPLES, 7)
     names = tuple(f"LAB{i}" for i in range(6))
-    return Trial("walk", "fit", Markers(names, time, xyz), (plate,), source, measurements={"Bodymass": 60.0, "LLegLength": 0.87})
+    return Trial(
+        "walk", "fit", Markers(names, time, xyz), (plate,), source, measurements={"Bodymass": 60.0, "LLegLength": 0.87}
+    )
 
 
 def test_a_trial_becomes_an_object_that_ezc3d_understands():

@@ -96,7 +96,9 @@ def test_a_line_of_neighbours_cannot_carry() -> None:
     truth = moving()
     line = np.array([[0.1, 0.0, 0.1], [0.0, 0.0, 0.0], [0.0, 0.0, 0.1], [0.0, 0.0, -0.1], [0, 0, 0]])
     xyz = truth.xyz[:, :1] - truth.xyz[:, :1] + line + 0.0
-    filled, gaps = fill_gaps(cut(Markers(truth.names, truth.time, np.broadcast_to(xyz, truth.xyz.shape)), ("A", 100, 150)), SEGMENTS)
+    filled, gaps = fill_gaps(
+        cut(Markers(truth.names, truth.time, np.broadcast_to(xyz, truth.xyz.shape)), ("A", 100, 150)), SEGMENTS
+    )
     assert np.isnan(filled["A"][100:150]).all()
     assert "fewer than three" in gaps[0].how
 

@@ -1,4 +1,6 @@
-"""What `inspect` says: all keys of the contract, plain JSON, the right numbers, on text files and on the real recordings."""
+"""What `inspect` says: all keys of the contract, plain JSON, the right numbers, on text files and on the real
+recordings.
+"""
 
 import json
 import os
@@ -16,7 +18,8 @@ from biodance.lab.opensim.trc import write_trc
 from biodance.lab.read import read_trial
 
 KEYS = {
-    "file", "status", "reason", "format", "frames", "rate_hz", "analog_rate_hz", "markers", "marker_set", "gaps_percent", "subjects",
+    "file", "status", "reason", "format", "frames", "rate_hz", "analog_rate_hz", "markers", "marker_set",
+    "gaps_percent", "subjects",
     "plates", "mean_vertical_n", "mass_on_plates_kg", "declared_mass_kg", "declared_height_m", "warnings",
 }  # fmt: skip
 PLATE_KEYS = {"type", "corners_m", "mean_force_n", "mean_vertical_n", "zero_n", "cop_m", "decisions"}
@@ -27,7 +30,11 @@ def test_standing_person_on_one_plate(tmp_path):
     assert record.keys() >= KEYS
     assert json.loads(json.dumps(record, allow_nan=False)) == record
     assert (record["status"], record["reason"], record["format"]) == ("ok", None, "TRC + MOT")
-    assert (record["frames"], record["rate_hz"], record["analog_rate_hz"]) == (100, pytest.approx(100), pytest.approx(1000))
+    assert (record["frames"], record["rate_hz"], record["analog_rate_hz"]) == (
+        100,
+        pytest.approx(100),
+        pytest.approx(1000),
+    )
     assert record["marker_set"] == "plug_in_gait"
     assert record["gaps_percent"] == 0
     assert record["mass_on_plates_kg"] == pytest.approx(MASS, rel=1e-3)
@@ -79,7 +86,8 @@ def test_folders_are_searched_through_and_nothing_is_read_twice(tmp_path):
         inspect_paths([])
 
 
-# --- the real recordings: the expected values are those measured by other means, see the README beside the data ----------------
+# --- the real recordings: the expected values are those measured by other means, see the README beside the data
+# ----------------
 
 
 @pytest.fixture(scope="module")

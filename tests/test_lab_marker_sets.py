@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from biodance.errors import BiodanceError, TrialRefused, UnknownName
-from biodance.lab.markers.set_file import LANDMARKS, SEGMENTS
+from biodance.lab.markers.set_file import _SEGMENTS, LANDMARKS
 from biodance.lab.markers.sets import FOLDER, canonical, landmark, read_marker_set, recognise
 from biodance.library import names
 from biodance.records import Markers
@@ -27,7 +27,7 @@ def some_markers(labels: tuple[str, ...], frames: int = 4) -> Markers:
 def test_every_shipped_set_is_sound(name: str) -> None:
     marker_set = read_marker_set(name)
     assert len(set(marker_set.labels)) == len(marker_set.labels) > 30
-    assert {m.segment for m in marker_set.markers} == set(SEGMENTS)
+    assert {m.segment for m in marker_set.markers} == set(_SEGMENTS)
     assert set(marker_set.landmarks) <= set(LANDMARKS)
     assert marker_set.source
     for marker in marker_set.markers:
@@ -88,7 +88,9 @@ def test_letter_case_is_forgiven_where_it_is_unambiguous() -> None:
     assert recognise(twice) is None
 
 
-@pytest.mark.parametrize("labels", [(), ("A", "B"), ("RACROM", "LACROM", "T2", "SACR", "RASI", "LASI", "RKNE", "LKNE", "RANK", "LANK")])
+@pytest.mark.parametrize(
+    "labels", [(), ("A", "B"), ("RACROM", "LACROM", "T2", "SACR", "RASI", "LASI", "RKNE", "LKNE", "RANK", "LANK")]
+)
 def test_unknown_sets_are_none(labels: tuple[str, ...]) -> None:
     assert recognise(labels) is None
 

@@ -1,5 +1,6 @@
-"""Every plate TYPE against a plate run backwards: the wrench that went in must come out, whatever pose, sign, unit, zero or corner
-order."""
+"""Every plate TYPE against a plate run backwards: the wrench that went in must come out, whatever pose, sign, unit,
+zero or corner order.
+"""
 
 import numpy as np
 import pytest
@@ -23,7 +24,9 @@ def made(kind, rng, *, reaction=True, z_up=False, polynomial=None):
     if kind in MATRICES:
         rows, columns = MATRICES[kind]
         matrix = 100 * (np.eye(rows, columns) + rng.uniform(-0.02, 0.02, (rows, columns)))
-    return Emulated(kind, random_pose(rng, z_up=z_up), rng.uniform(-2, 2, 3), half, origin, reaction, matrix, polynomial)
+    return Emulated(
+        kind, random_pose(rng, z_up=z_up), rng.uniform(-2, 2, 3), half, origin, reaction, matrix, polynomial
+    )
 
 
 def largest_error(plates, truth):

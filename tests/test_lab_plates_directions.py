@@ -1,4 +1,6 @@
-"""Directions that the file does not say: a standing person's sway and the foot markers find corners that are listed wrongly."""
+"""Directions that the file does not say: a standing person's sway and the foot markers find corners that are listed
+wrongly.
+"""
 
 import numpy as np
 import pytest
@@ -12,17 +14,22 @@ HEIGHT, MASS = 0.95, 70.0
 
 
 def standing(plate, *, seconds=8.0, seed=0):
-    """A standing person as an inverted pendulum: wrench (S, 6) about the lab origin, its centre of pressure, and the foot markers."""
+    """A standing person as an inverted pendulum: wrench (S, 6) about the lab origin, its centre of pressure, and the
+    foot markers.
+    """
     rng = np.random.default_rng(seed)
     time = np.arange(0, seconds, 1 / RATE)
     cop = np.array([0.04, -0.06]) + sum(
-        rng.uniform(0.001, 0.003, 2) * np.sin(2 * np.pi * f * time[:, None] + rng.uniform(0, 6, 2)) for f in (0.7, 1.1, 1.7, 2.3)
+        rng.uniform(0.001, 0.003, 2) * np.sin(2 * np.pi * f * time[:, None] + rng.uniform(0, 6, 2))
+        for f in (0.7, 1.1, 1.7, 2.3)
     )
     com = cop.mean(axis=0)
     shear = -MASS * 9.81 / HEIGHT * (cop - com)
     force = np.column_stack([shear, np.full(time.size, MASS * 9.81)])
     point = np.column_stack([cop, np.zeros(time.size)]) + plate.centre
-    feet = point.mean(axis=0) + np.array([[-0.09, -0.1, 0.03], [0.14, -0.1, 0.02], [0.14, 0.1, 0.02], [-0.09, 0.1, 0.03], [0, 0, 1.0]])
+    feet = point.mean(axis=0) + np.array(
+        [[-0.09, -0.1, 0.03], [0.14, -0.1, 0.02], [0.14, 0.1, 0.02], [-0.09, 0.1, 0.03], [0, 0, 1.0]]
+    )
     at = np.arange(0, seconds, 0.01)
     markers = Markers(("A", "B", "C", "D", "HEAD"), at, np.broadcast_to(feet, (at.size, 5, 3)))
     return np.hstack([force, np.cross(point, force)]), point, markers
@@ -65,7 +72,9 @@ def test_sway_confirms_a_sound_plate(reaction):
 @pytest.mark.parametrize("reaction", [True, False])
 @pytest.mark.parametrize(("order", "mirror"), [([3, 2, 1, 0], [1, -1, 1]), ([1, 0, 3, 2], [-1, 1, 1])])
 def test_corners_listed_the_wrong_way_round_without_markers_give_a_mirrored_lab(reaction, order, mirror):
-    plate = Emulated(3, centre=np.zeros(3), half=np.array([0.3, 0.45]), origin=np.array([0.21, 0.35, -0.058]), reaction=reaction)
+    plate = Emulated(
+        3, centre=np.zeros(3), half=np.array([0.3, 0.45]), origin=np.array([0.21, 0.35, -0.058]), reaction=reaction
+    )
     truth, point, _ = standing(plate)
     plates, warnings = read_plates(file_of(plate, truth, order), metres=0.001)
     assert "the corners run the wrong way round" in warnings[0]
@@ -76,7 +85,9 @@ def test_corners_listed_the_wrong_way_round_without_markers_give_a_mirrored_lab(
 
 @pytest.mark.parametrize("order", [[3, 2, 1, 0], [1, 0, 3, 2]])
 def test_the_foot_markers_say_which_axis_to_turn(order):
-    plate = Emulated(2, centre=np.array([1.0, 2.0, 0.0]), half=np.array([0.3, 0.45]), rotation=yaw(0.3) @ np.diag([1.0, -1.0, -1.0]))
+    plate = Emulated(
+        2, centre=np.array([1.0, 2.0, 0.0]), half=np.array([0.3, 0.45]), rotation=yaw(0.3) @ np.diag([1.0, -1.0, -1.0])
+    )
     plate.origin[:2] = 0
     truth, _, markers = standing(plate)
     truth[:, 3:] += np.cross([0.12, -0.2, 0], truth[:, :3])

@@ -32,13 +32,17 @@ def makers_text(path):
     return dict(zip(lines[start].split("\t"), rows.T, strict=True))
 
 
-@pytest.mark.parametrize(("name", "largest", "typical"), [("kistler_COP", 2e-4, 1e-4), ("kistler_CMJ_1plate", 7e-3, 6e-4)])
+@pytest.mark.parametrize(
+    ("name", "largest", "typical"), [("kistler_COP", 2e-4, 1e-4), ("kistler_CMJ_1plate", 7e-3, 6e-4)]
+)
 def test_an_eight_channel_plate_agrees_with_its_makers_export(data, name, largest, typical):
     """The jump is compared above 50 N; there the maker keeps a zero of half a newton that is taken off here."""
     truth = makers_text(data / "biomdp" / f"{name}.txt")
     plate = read_c3d(data / "biomdp" / f"{name}.c3d").plates[0]
     at = np.round(truth["abs time"] * plate.wrench.rate).astype(int)
-    along_plate = -(plate.wrench.cop(threshold=50)[at, :2] - plate.centre[:2])  # its x, y point along -x, -y of the file
+    along_plate = -(
+        plate.wrench.cop(threshold=50)[at, :2] - plate.centre[:2]
+    )  # its x, y point along -x, -y of the file
     error = along_plate - np.column_stack([truth["Ax"], truth["Ay"]])
     error = error[truth["Fz"] > 51]
     assert np.abs(error.mean(axis=0)).max() < 1e-3
@@ -48,7 +52,9 @@ def test_an_eight_channel_plate_agrees_with_its_makers_export(data, name, larges
 
 
 def test_stairs_are_zeroed_and_the_weight_of_whole_steps_is_the_persons(data):
-    """Over three whole steps of a climb the mean force is the weight: 833 N. As recorded it is 3.5 % more, which is the plates' offsets."""
+    """Over three whole steps of a climb the mean force is the weight: 833 N. As recorded it is 3.5 % more, which is
+    the plates' offsets.
+    """
     trial = read_c3d(data / "pycgm" / "Movement_trial.c3d")
     np.testing.assert_allclose([p.height for p in trial.plates], [0, 0.1955, 0.3889, 0.5838], atol=1e-3)
     vertical = trial.wrench.force[:, 2]
@@ -73,7 +79,9 @@ def test_plates_of_other_laboratories(data):
     assert read_c3d(data / "adl_gait" / "2014001_ST.c3d", role="static").plates == ()
 
 
-@pytest.mark.parametrize("pattern", ["biomechzoo/*/*.c3d", "adl_gait/*_C1_*.c3d", "c3d_parser/*/*.c3d", "pycgm/Movement*.c3d"])
+@pytest.mark.parametrize(
+    "pattern", ["biomechzoo/*/*.c3d", "adl_gait/*_C1_*.c3d", "c3d_parser/*/*.c3d", "pycgm/Movement*.c3d"]
+)
 def test_every_load_lies_under_a_foot(data, pattern):
     for path in sorted(data.glob(pattern)):
         for plate in read_c3d(path).plates:

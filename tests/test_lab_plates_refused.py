@@ -1,5 +1,6 @@
-"""Plates that contradict themselves: left out with a sentence, while the others go through; and garbage of every kind without a
-traceback."""
+"""Plates that contradict themselves: left out with a sentence, while the others go through; and garbage of every kind
+without a traceback.
+"""
 
 import numpy as np
 import pytest
@@ -57,7 +58,9 @@ def scaled(factor):
     return spoil
 
 
-@pytest.mark.parametrize(("order", "word"), [((2, 3), "3 and 4"), ((0, 1), "3 and 4"), ((1, 2), "2 and 3"), ((0, 3), "2 and 3")])
+@pytest.mark.parametrize(
+    ("order", "word"), [((2, 3), "3 and 4"), ((0, 1), "3 and 4"), ((1, 2), "2 and 3"), ((0, 3), "2 and 3")]
+)
 def test_a_bow_tie_is_refused_and_says_which_corners(order, word):
     assert word in warning_of_the_first(*two_plates(CORNERS=swap(*order)))
     assert "bow-tie" in read_plates(two_plates(CORNERS=swap(*order))[0], metres=0.001)[1][0]
@@ -114,7 +117,12 @@ def test_load_beside_the_plate_is_warned_about_and_refused_without_units():
     far = Emulated(centre=plate.centre + np.array([1.0, 0, 0]))
     truth, _ = step(np.random.default_rng(1), far)
     for text, left in (("N", 1), ("", 0)):
-        raw = raw_file([plate], [channels(plate, truth)], units=[([1, 1, 1, 1, 1, 1], [text] * 3 + [text and "Nm"] * 3)], metres=1.0)
+        raw = raw_file(
+            [plate],
+            [channels(plate, truth)],
+            units=[([1, 1, 1, 1, 1, 1], [text] * 3 + [text and "Nm"] * 3)],
+            metres=1.0,
+        )
         plates, warnings = read_plates(raw, metres=1.0)
         assert len(plates) == left
         assert "in only 0 % of the loaded samples" in warnings[0]
@@ -161,9 +169,15 @@ def test_slightly_crooked_corners_are_used_and_said():
     np.testing.assert_allclose(axes.T @ axes, np.eye(3), atol=1e-12)
 
 
-NUMBERS = st.floats(allow_nan=True, allow_infinity=True, width=32) | st.sampled_from([0.0, 1.0, 2.0, 3.0, 4.0, 1e30, -1.0])
-SHAPES = st.sampled_from([(0,), (1,), (2,), (3,), (3, 1), (6, 1), (3, 4), (3, 4, 1), (6, 6, 1), (8, 1), (12,), (1, 1, 1, 1)])
-VALUE = SHAPES.flatmap(lambda shape: arrays.arrays(np.float64, shape, elements=NUMBERS)) | st.lists(st.text(max_size=4), max_size=3)
+NUMBERS = st.floats(allow_nan=True, allow_infinity=True, width=32) | st.sampled_from(
+    [0.0, 1.0, 2.0, 3.0, 4.0, 1e30, -1.0]
+)
+SHAPES = st.sampled_from(
+    [(0,), (1,), (2,), (3,), (3, 1), (6, 1), (3, 4), (3, 4, 1), (6, 6, 1), (8, 1), (12,), (1, 1, 1, 1)]
+)
+VALUE = SHAPES.flatmap(lambda shape: arrays.arrays(np.float64, shape, elements=NUMBERS)) | st.lists(
+    st.text(max_size=4), max_size=3
+)
 NAMES = ("USED", "TYPE", "ZERO", "CORNERS", "ORIGIN", "CHANNEL", "CAL_MATRIX", "FPCOPPOLY", "MATRIX_STORE")
 
 
@@ -177,7 +191,9 @@ def test_garbage_parameters_never_pass_for_a_measurement(changes):
     for plate in plates:
         assert np.isfinite(plate.wrench.value).all()
     group = raw.parameters["FORCE_PLATFORM"]
-    used, kinds, listed = (np.size(group[name]) if isinstance(group[name], np.ndarray) else 0 for name in ("USED", "TYPE", "CHANNEL"))
+    used, kinds, listed = (
+        np.size(group[name]) if isinstance(group[name], np.ndarray) else 0 for name in ("USED", "TYPE", "CHANNEL")
+    )
     declares_none = (used and np.ravel(group["USED"])[0] == 0 and not kinds) or not (used or kinds or listed)
     assert plates or warnings or declares_none
 

@@ -11,7 +11,9 @@ OFFSET = np.array([3.0, -5.0, 40.0, 2.0, -1.0, 0.5])
 
 
 def recorded(*, zero, noise=1.0, offset=OFFSET, seed=0, **arguments):
-    """A plate that somebody steps on, with an offset (N, N·m) on every channel and noise; returns what was read, and the truth."""
+    """A plate that somebody steps on, with an offset (N, N·m) on every channel and noise; returns what was read, and
+    the truth.
+    """
     rng = np.random.default_rng(seed)
     plate = Emulated(**arguments)
     truth, _ = step(rng, plate)

@@ -13,7 +13,14 @@ from biodance.records import Markers, Plate, Source, Trial, Wrench
 from biodance.settings import Settings
 
 CORNERS = np.array([[0.4, 0.6, 0], [0, 0.6, 0], [0, 0, 0], [0.4, 0, 0]])
-LABELS = (*(label for label in read_marker_set("plug_in_gait").labels if label not in ("SACR", "LKNM", "RKNM", "LMED", "RMED")), "*115")
+LABELS = (
+    *(
+        label
+        for label in read_marker_set("plug_in_gait").labels
+        if label not in ("SACR", "LKNM", "RKNM", "LMED", "RMED")
+    ),
+    "*115",
+)
 
 
 def slow(time: np.ndarray) -> np.ndarray:
@@ -21,7 +28,9 @@ def slow(time: np.ndarray) -> np.ndarray:
     return np.stack([(k + 1) * 10 * np.sin(2 * np.pi * 0.7 * time + k) + 100 * k for k in range(6)], axis=1)
 
 
-def trial(*, rate: float = 100.0, analog: float = 1000.0, frames: int = 200, hum: float = 0.0, start: float = 0.0) -> Trial:
+def trial(
+    *, rate: float = 100.0, analog: float = 1000.0, frames: int = 200, hum: float = 0.0, start: float = 0.0
+) -> Trial:
     time = np.arange(frames) / rate
     fast = start + np.arange(round(frames * analog / rate)) / analog
     value = slow(fast) + hum * np.sin(2 * np.pi * 50 * fast)[:, None]
@@ -29,10 +38,20 @@ def trial(*, rate: float = 100.0, analog: float = 1000.0, frames: int = 200, hum
     xyz = rng.normal(size=(1, len(LABELS), 3)) + np.stack([time, 0 * time, 0 * time], axis=1)[:, None]
     markers = Markers(LABELS, time, xyz)
     plate = Plate("plate1", 2, CORNERS, Wrench(fast, value), ("Sign kept.",))
-    return Trial("walk", "fit", markers, (plate,), Source(Path("walk.c3d"), "0", "C3D", rate, analog), "plug_in_gait", history=("Read.",))
+    return Trial(
+        "walk",
+        "fit",
+        markers,
+        (plate,),
+        Source(Path("walk.c3d"), "0", "C3D", rate, analog),
+        "plug_in_gait",
+        history=("Read.",),
+    )
 
 
-@pytest.mark.parametrize(("rate", "analog"), [(100.0, 1000.0), (120.0, 1080.0), (100.0, 960.0), (60.0, 1000.0), (100.0, 100.0)])
+@pytest.mark.parametrize(
+    ("rate", "analog"), [(100.0, 1000.0), (120.0, 1080.0), (100.0, 960.0), (60.0, 1000.0), (100.0, 100.0)]
+)
 def test_forces_are_filtered_and_sampled_at_marker_times(rate: float, analog: float) -> None:
     given = trial(rate=rate, analog=analog, hum=20.0 if analog > 120 else 0.0)
     ready = prepare(given)

@@ -1,4 +1,6 @@
-"""Results inside a copy of the recording: two readers find them and all of the original; nothing is overwritten, no wrong copy stays."""
+"""Results inside a copy of the recording: two readers find them and all of the original; nothing is overwritten, no
+wrong copy stays.
+"""
 
 import ezc3d
 import numpy as np
@@ -59,13 +61,19 @@ def test_two_readers_find_the_results_in_their_units(tmp_path):
         column = theirs["parameters"]["POINT"]["LABELS"]["value"].index(output.label)
         np.testing.assert_allclose(np.delete(points[:, column], 4, axis=0), np.delete(expected, 4, axis=0), rtol=1e-6)
     assert ours.parameters["POINT"]["ANGLES"] == ["RightHipAngles"]
-    assert [ours.parameters["POINT"][f"{kind}_UNITS"] for kind in ("ANGLE", "FORCE", "MOMENT")] == [["deg"], ["N"], ["Nm"]]
+    assert [ours.parameters["POINT"][f"{kind}_UNITS"] for kind in ("ANGLE", "FORCE", "MOMENT")] == [
+        ["deg"],
+        ["N"],
+        ["Nm"],
+    ]
     group = ours.parameters["BIODANCE"]
     assert (group["UNITS"], group["SOURCE"]) == (["deg", "Nm", "N", "mm"], ["x"])
     np.testing.assert_allclose(group["MASS"], [61.5, 2.5])
     event = theirs["parameters"]["EVENT"]
     assert (event["CONTEXTS"]["value"], event["LABELS"]["value"]) == (["Right", "Left"], ["Foot Strike", "Foot Off"])
-    np.testing.assert_allclose(event["TIMES"]["value"], [[0, 0], [3.105, 3.4]], rtol=1e-6)  # frame 301 is 3 s after the lab's first
+    np.testing.assert_allclose(
+        event["TIMES"]["value"], [[0, 0], [3.105, 3.4]], rtol=1e-6
+    )  # frame 301 is 3 s after the lab's first
 
 
 def test_the_original_is_in_it_as_it_was(tmp_path):
@@ -99,7 +107,9 @@ def test_the_units_that_the_file_declares_are_kept(tmp_path):
 def test_an_event_that_is_there_is_not_written_twice(tmp_path):
     original = record(tmp_path / "walk.c3d")
     first = write_results_c3d(tmp_path / "first.c3d", original, outputs=[], events=EVENTS)
-    second = write_results_c3d(tmp_path / "second.c3d", first, outputs=outputs(), events=(*EVENTS, Event(0.45, "Right", "Foot Off")))
+    second = write_results_c3d(
+        tmp_path / "second.c3d", first, outputs=outputs(), events=(*EVENTS, Event(0.45, "Right", "Foot Off"))
+    )
     assert read_raw(second).parameters["EVENT"]["LABELS"] == ["Foot Strike", "Foot Off", "Foot Off"]
 
 

@@ -1,4 +1,6 @@
-"""Suspicious numbers are read again by ezc3d in a child process: agreement and disagreement are said, a crash or a hang costs nothing."""
+"""Suspicious numbers are read again by ezc3d in a child process: agreement and disagreement are said, a crash or a
+hang costs nothing.
+"""
 
 import numpy as np
 import pytest
@@ -12,7 +14,9 @@ from biodance.lab.c3d.raw import read_raw
 def jumping(processor=INTEL, scale=0.5, **parameters):
     """Return 20 frames of 4 points, one of which jumps by 3 m, and 3 analog channels."""
     generator = np.random.default_rng(0)
-    points = np.concatenate([np.round(generator.uniform(100, 1500, (1, 4, 3)) + np.zeros((20, 4, 3))), np.zeros((20, 4, 1))], axis=2)
+    points = np.concatenate(
+        [np.round(generator.uniform(100, 1500, (1, 4, 3)) + np.zeros((20, 4, 3))), np.zeros((20, 4, 1))], axis=2
+    )
     points[10:, 0, 0] += 3000
     analog = np.abs(np.round(generator.normal(0, 300, (200, 3)))) + 1
     return File(points, analog, processor, scale, parameters=parameters)
@@ -30,13 +34,19 @@ def read(tmp_path):
 @pytest.mark.parametrize("scale", [-1.0, 0.5], ids=["floats", "integers"])
 @pytest.mark.parametrize("processor", [INTEL, DEC])
 def test_the_same_numbers_are_confirmed(read, processor, scale):
-    raw = read(jumping(processor, scale, ANALOG={"OFFSET": whole(5, 6, 7), "SCALE": real(0.5, 2, 3), "GEN_SCALE": real(0.1)}))
+    raw = read(
+        jumping(processor, scale, ANALOG={"OFFSET": whole(5, 6, 7), "SCALE": real(0.5, 2, 3), "GEN_SCALE": real(0.1)})
+    )
     assert raw.reader == "biodance, ezc3d"
-    assert raw.warnings == ("Markers jump by more than 1 m between two frames in 1 places; ezc3d finds the same numbers.",)
+    assert raw.warnings == (
+        "Markers jump by more than 1 m between two frames in 1 places; ezc3d finds the same numbers.",
+    )
 
 
 @pytest.mark.parametrize(
-    "known", [{"OFFSET": whole(-5, 6, 7)}, {"FORMAT": text("UNSIGNED"), "OFFSET": whole(-30000, 0, 0)}], ids=["negative offset", "unsigned"]
+    "known",
+    [{"OFFSET": whole(-5, 6, 7)}, {"FORMAT": text("UNSIGNED"), "OFFSET": whole(-30000, 0, 0)}],
+    ids=["negative offset", "unsigned"],
 )
 def test_what_ezc3d_is_known_to_read_wrong_is_not_held_against_the_file(read, known):
     assert read(jumping(ANALOG=known)).reader == "biodance, ezc3d"
@@ -50,7 +60,9 @@ def test_what_ezc3d_does_not_read_stays_as_biodance_read_it(read):
 
 
 def test_a_file_on_which_ezc3d_crashes_is_read(read):
-    raw = read(jumping(EXTRA={"NOTE": ("text", (), b"x")}))  # a text without dimension: ezc3d 1.7.2 dies of it (signal 11)
+    raw = read(
+        jumping(EXTRA={"NOTE": ("text", (), b"x")})
+    )  # a text without dimension: ezc3d 1.7.2 dies of it (signal 11)
     assert raw.reader == "biodance"
     assert "ezc3d crashes on the file (signal" in raw.warnings[0]
 

@@ -1,4 +1,6 @@
-"""The session folder: which files, which roles, what comes out where; everything guessed is said and one bad file never stops the rest."""
+"""The session folder: which files, which roles, what comes out where; everything guessed is said and one bad file
+never stops the rest.
+"""
 
 import os
 from pathlib import Path
@@ -197,7 +199,12 @@ def test_results_never_lie_among_recordings_or_strangers(tmp_path, folder, force
     strange = tmp_path / "letters"
     strange.mkdir()
     (strange / "letter.odt").write_text("dear")
-    for place, sentence in ((folder, "among the recordings"), (folder.parent, "among"), (other, "recordings"), (strange, "holds files")):
+    for place, sentence in (
+        (folder, "among the recordings"),
+        (folder.parent, "among"),
+        (other, "recordings"),
+        (strange, "holds files"),
+    ):
         with pytest.raises(SessionRefused, match=sentence):
             results_folder(place, folder, force=force)
     with pytest.raises(SessionRefused, match="is a file"):

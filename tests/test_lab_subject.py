@@ -23,7 +23,12 @@ def test_subject_of_session_toml_comes_first(folder):
     )
     (folder / "Anna.mp").write_text("$Bodymass = 80\n$Height = 1650\n$LLegLength = 870\n")
     session = read_session(folder)
-    assert (session.subject.mass, session.subject.stature, session.subject.sex, session.subject.age) == (62, 1.7, "M", 40)
+    assert (session.subject.mass, session.subject.stature, session.subject.sex, session.subject.age) == (
+        62,
+        1.7,
+        "M",
+        40,
+    )
     assert session.subject.measurements["LLegLength"] == pytest.approx(0.87)
     assert roles(session)["squat_1"] == "check"
     assert "body mass is 62 kg in session.toml but 80 kg in Anna.mp" in said(session)
@@ -92,7 +97,9 @@ def test_movement_is_measured_in_metres():
 
 
 def test_subject_folder_fills_in_what_the_session_leaves_out(folder):
-    (folder.parent / "subject.toml").write_text('[subject]\nmass_kg = 60\nheight_m = 1.7\nsex = "F"\n[trials."squat*"]\nrole = "fit"\n')
+    (folder.parent / "subject.toml").write_text(
+        '[subject]\nmass_kg = 60\nheight_m = 1.7\nsex = "F"\n[trials."squat*"]\nrole = "fit"\n'
+    )
     (folder / "session.toml").write_text("[subject]\nmass_kg = 62.5\n")
     session = read_session(folder)
     assert (session.subject.mass, session.subject.stature, session.subject.sex) == (62.5, 1.7, "F")

@@ -77,7 +77,10 @@ def test_metres_windows_line_ends_and_trailing_tabs(tmp_path):
 def test_header_values_between_two_tabs(tmp_path):
     path = handmade(tmp_path, ["1\t0\t10\t20\t30\t40\t50\t60"])
     rows = path.read_text().split("\n")
-    rows[0], rows[2] = "PathFileType  4\t(X/Y/Z) C:\\data\\", "  100.0\t\t  100.0\t\t    1\t\t     2\t\t mm\t  100.0\t      1\t    1"
+    rows[0], rows[2] = (
+        "PathFileType  4\t(X/Y/Z) C:\\data\\",
+        "  100.0\t\t  100.0\t\t    1\t\t     2\t\t mm\t  100.0\t      1\t    1",
+    )
     path.write_text("\n".join(rows))
     trial = read_trc(path)
     np.testing.assert_allclose(trial.markers["A"][0], [0.01, -0.03, 0.02])

@@ -1,4 +1,6 @@
-"""The .mot/.sto table and the force plates in it: round trips, column names of real writers, refusals, OpenSim as the second reader."""
+"""The .mot/.sto table and the force plates in it: round trips, column names of real writers, refusals, OpenSim as
+the second reader.
+"""
 
 import numpy as np
 import pytest
@@ -18,10 +20,17 @@ def plates(frames=200, rate=1000.0):
     made = []
     for number, (part, x) in enumerate(((share, 0.2), (1 - share, 0.8)), start=1):
         force = np.stack([20 * np.sin(9 * time), 15 * np.cos(5 * time), 70 * G * part], axis=1)
-        cop = np.stack([x + 0.05 * np.sin(3 * time), 0.3 + 0.02 * np.cos(4 * time), np.full(frames, 0.1 * number)], axis=1)
+        cop = np.stack(
+            [x + 0.05 * np.sin(3 * time), 0.3 + 0.02 * np.cos(4 * time), np.full(frames, 0.1 * number)], axis=1
+        )
         moment = np.cross(cop, force) + np.stack([0 * time, 0 * time, 3 * np.sin(time)], axis=1)
         corners = np.array(
-            [[x + 0.2, 0.6, 0.1 * number], [x - 0.2, 0.6, 0.1 * number], [x - 0.2, 0, 0.1 * number], [x + 0.2, 0, 0.1 * number]]
+            [
+                [x + 0.2, 0.6, 0.1 * number],
+                [x - 0.2, 0.6, 0.1 * number],
+                [x - 0.2, 0, 0.1 * number],
+                [x + 0.2, 0, 0.1 * number],
+            ]
         )
         made.append(Plate(f"plate{number}", 2, corners, Wrench(time, np.hstack([force, moment]))))
     return tuple(made)
@@ -112,7 +121,8 @@ def test_z_up_table_is_taken_as_it_is():
 
 def test_nan_point_without_force_is_no_fault():
     (plate,), _ = plates_of(
-        TimeTable("t", LABELS, [0.0, 0.01], [[0, 700, 0, 0.4, 0, 0.1, 0, 0, 0], [0, 0, 0, *[np.nan] * 3, 0, 0, 0]]), where="f"
+        TimeTable("t", LABELS, [0.0, 0.01], [[0, 700, 0, 0.4, 0, 0.1, 0, 0, 0], [0, 0, 0, *[np.nan] * 3, 0, 0, 0]]),
+        where="f",
     )
     assert np.isfinite(plate.wrench.value).all()
     assert plate.wrench.value[1] == pytest.approx(0)
@@ -125,7 +135,9 @@ def test_plate_that_is_never_loaded_is_left_out_and_said():
 
 
 def test_unequal_steps_are_interpolated_and_said():
-    (plate,), said = plates_of(one_plate([0.0, 700.0, 0.0, 0.4, 0.0, 0.1, 0.0, 0.0, 0.0], time=(0.0, 0.01, 0.02, 0.05, 0.06)), where="f")
+    (plate,), said = plates_of(
+        one_plate([0.0, 700.0, 0.0, 0.4, 0.0, 0.1, 0.0, 0.0, 0.0], time=(0.0, 0.01, 0.02, 0.05, 0.06)), where="f"
+    )
     np.testing.assert_allclose(np.diff(plate.wrench.time), 0.01)
     assert plate.wrench.time[-1] == pytest.approx(0.06)
     assert any("not equal" in sentence for sentence in said)
@@ -163,7 +175,9 @@ def test_coordinates_are_no_plates():
 
 def test_old_header_and_blank_separated_columns(tmp_path):
     path = tmp_path / "old.sto"
-    path.write_text("old\ndatacolumns 3\ndatarows 3\notherdata 1\nrange 0 1\nendheader\ntime a b\n0 1 2\n0.5 3 4\n1 nan 6\n")
+    path.write_text(
+        "old\ndatacolumns 3\ndatarows 3\notherdata 1\nrange 0 1\nendheader\ntime a b\n0 1 2\n0.5 3 4\n1 nan 6\n"
+    )
     table = read_mot(path)
     np.testing.assert_array_equal(table["a"], [1, 3, np.nan])
     assert not table.in_degrees

@@ -1,4 +1,6 @@
-"""Vicon's files beside the recording: measurements, skeleton, Eclipse notes, in the encodings and line ends of Windows."""
+"""Vicon's files beside the recording: measurements, skeleton, Eclipse notes, in the encodings and line ends of
+Windows.
+"""
 
 import pytest
 
@@ -12,10 +14,15 @@ def write(tmp_path, name, text, encoding="utf-8", end="\r\n"):
     return path
 
 
-MP = "$Name = Anna\n$Bodymass = 66.2\n$Height = 1890\n$LLegLength=912.5\n$RTibialTorsion = 12\n$LSoleDelta = 0\n$MarkerDiameter = 14\n"
+MP = (
+    "$Name = Anna\n$Bodymass = 66.2\n$Height = 1890\n$LLegLength=912.5\n$RTibialTorsion = 12\n$LSoleDelta = "
+    "0\n$MarkerDiameter = 14\n"
+)
 
 
-@pytest.mark.parametrize(("encoding", "end"), [("utf-8", "\n"), ("utf-8-sig", "\r\n"), ("utf-16", "\r\n"), ("cp1252", "\r")])
+@pytest.mark.parametrize(
+    ("encoding", "end"), [("utf-8", "\n"), ("utf-8-sig", "\r\n"), ("utf-16", "\r\n"), ("cp1252", "\r")]
+)
 def test_mp_gives_metres_and_kilograms(tmp_path, encoding, end):
     measures = read_mp(write(tmp_path, "Anna.mp", MP, encoding, end))
     assert measures == pytest.approx({"Bodymass": 66.2, "Height": 1.89, "LLegLength": 0.9125, "MarkerDiameter": 0.014})
@@ -25,7 +32,9 @@ def test_mp_with_decimal_comma(tmp_path):
     assert read_mp(write(tmp_path, "a.mp", "$Bodymass = 66,2\n"))["Bodymass"] == pytest.approx(66.2)
 
 
-@pytest.mark.parametrize(("text", "sentence"), [("", "is empty"), ("hello\n", "no row such as"), ("$A = 1.2.3\n", "is not a number")])
+@pytest.mark.parametrize(
+    ("text", "sentence"), [("", "is empty"), ("hello\n", "no row such as"), ("$A = 1.2.3\n", "is not a number")]
+)
 def test_wrong_mp_is_refused(tmp_path, text, sentence):
     with pytest.raises(FileRefused, match=sentence):
         read_mp(write(tmp_path, "a.mp", text))

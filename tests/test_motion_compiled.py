@@ -1,4 +1,6 @@
-"""The machine code of inverse kinematics: cost, slopes, second derivatives and steps against plain markers and finite differences."""
+"""The machine code of inverse kinematics: cost, slopes, second derivatives and steps against plain markers and
+finite differences.
+"""
 
 import shutil
 import subprocess
@@ -16,7 +18,7 @@ import biodance.motion
 from biodance.body.human.human import human
 from biodance.motion.ik.compiled import ball_step, newton
 from biodance.motion.ik.compiled.chain import (
-    LENGTH,
+    _LENGTH,
     add_up,
     add_up_model,
     chain_of,
@@ -62,7 +64,9 @@ class Setting:
 
     def off(self, step: Array, turning: Array) -> Array:
         """Return the weighted marker differences after a step, by the plain kinematics."""
-        return (np.sqrt(self.weight)[:, None] * (points(self.body, self.moved(step, turning)[None])[0] - self.xyz)).ravel()
+        return (
+            np.sqrt(self.weight)[:, None] * (points(self.body, self.moved(step, turning)[None])[0] - self.xyz)
+        ).ravel()
 
     def matrix(self, *, newton_terms: bool) -> Array:
         """Return the full matrix that ``hessian`` packs along the paths."""
@@ -90,7 +94,9 @@ def differences(setting: Setting, turning: Array, h: float = 1e-6) -> Array:
 
 
 def test_cost_is_half_the_weighted_squares_of_the_markers_seen(setting):
-    assert setting.cost == pytest.approx(0.5 * (setting.off(np.zeros(setting.nv), setting.plain_angles) ** 2).sum(), rel=1e-12)
+    assert setting.cost == pytest.approx(
+        0.5 * (setting.off(np.zeros(setting.nv), setting.plain_angles) ** 2).sum(), rel=1e-12
+    )
 
 
 def test_gradient_and_gauss_newton_matrix(setting):
@@ -120,7 +126,10 @@ def test_newton_matrix_has_the_exact_second_derivatives(setting):
         return 0.5 * (setting.off(step, setting.plain_angles) ** 2).sum()
 
     wanted = np.array(
-        [[cost(i, j, 1, 1) - cost(i, j, 1, -1) - cost(i, j, -1, 1) + cost(i, j, -1, -1) for j in range(n)] for i in range(n)]
+        [
+            [cost(i, j, 1, 1) - cost(i, j, 1, -1) - cost(i, j, -1, 1) + cost(i, j, -1, -1) for j in range(n)]
+            for i in range(n)
+        ]
     ) / (4 * h * h)
     np.testing.assert_allclose(setting.matrix(newton_terms=True), wanted, atol=1e-5 * np.abs(wanted).max())
 
@@ -129,7 +138,7 @@ def test_the_step_solves_the_damped_equations_and_leaves_held_coordinates(settin
     matrix, slope, step = setting.matrix(newton_terms=False), np.empty(setting.nv), np.empty(setting.nv)
     gradient(setting.chain, setting.at, slope)
     weight = np.array([setting.at.below[max(i - setting.chain.roots + 1, 0), 0] for i in range(setting.nv)])
-    lever = np.where(np.arange(setting.nv) < min(setting.chain.roots, 3), 1.0, LENGTH)
+    lever = np.where(np.arange(setting.nv) < min(setting.chain.roots, 3), 1.0, _LENGTH)
     held = np.zeros(setting.nv, dtype=bool)
     held[-3] = True
     assert factorise(setting.chain, setting.at, held, 0.01)
@@ -160,13 +169,17 @@ def test_a_ball_joint_turns_by_the_rotation_vector(sign, size):
         ball_step.turned(angles, step, sign, -far, far, out)
         first = rotation_of(sign, [angles[0], 0.0, 0.0])
         wanted = first * Rotation.from_rotvec(sign * step) * first.inv() * rotation_of(sign, angles)
-        allowed = 1e-12 if size > 0.1 or np.cos(angles[1]) < ball_step.UPRIGHT else 3 * (step @ step) / np.cos(angles[1])
+        allowed = (
+            1e-12 if size > 0.1 or np.cos(angles[1]) < ball_step._UPRIGHT else 3 * (step @ step) / np.cos(angles[1])
+        )
         assert (rotation_of(sign, out) * wanted.inv()).magnitude() < allowed + 1e-9
 
 
 def test_a_ball_joint_stopped_by_a_limit_takes_the_nearest_rotation_within_it():
     rng, lower, upper, met = np.random.default_rng(2), np.array([-0.5, -0.6, -0.4]), np.array([0.6, 0.5, 0.5]), 0
-    grid = np.stack(np.meshgrid(*(np.linspace(a, b, 23) for a, b in zip(lower, upper, strict=True)), indexing="ij"), -1).reshape(-1, 3)
+    grid = np.stack(
+        np.meshgrid(*(np.linspace(a, b, 23) for a, b in zip(lower, upper, strict=True)), indexing="ij"), -1
+    ).reshape(-1, 3)
     every = rotation_of(1.0, grid)
     for _ in range(40):
         angles, out = rng.uniform(lower, upper), np.empty(3)
@@ -209,18 +222,26 @@ def test_machine_code_is_made_again_when_another_file_of_the_folder_changes(tmp_
     (folder / "entry.py").write_text(f"{imports}@compiled\ndef answer(x):\n    return twice(x)\n")
     answers = []
     for factor in ("2.0", "10.0"):
-        (folder / "inner.py").write_text(f"from machine_code_copy import compiled\n\n@compiled\ndef twice(x):\n    return {factor} * x\n")
-        done = subprocess.run([sys.executable, "-c", CHANGED.format(root=str(tmp_path))], capture_output=True, text=True, check=True)
+        (folder / "inner.py").write_text(
+            f"from machine_code_copy import compiled\n\n@compiled\ndef twice(x):\n    return {factor} * x\n"
+        )
+        done = subprocess.run(
+            [sys.executable, "-c", CHANGED.format(root=str(tmp_path))], capture_output=True, text=True, check=True
+        )
         answers.append(float(done.stdout))
     assert answers == [2.0, 10.0]
 
 
 def test_a_second_process_takes_the_kept_machine_code():
     chain = Setting("human").chain
-    newton.fill_distances(chain, np.zeros((1, len(chain.slot), 3)), WOMAN.neutral[None].copy(), np.empty((1, len(chain.slot))))
+    newton.fill_distances(
+        chain, np.zeros((1, len(chain.slot), 3)), WOMAN.neutral[None].copy(), np.empty((1, len(chain.slot)))
+    )
     code = (
-        "from biodance.motion.compiled import newton\nfrom biodance.body.human.human import human\nfrom biodance.records import Subject\n"
-        "from biodance.motion.ik.compiled.chain import chain_of\nimport numpy as np\nb = human(Subject(58.3, 1.64, 'F', 31.0))\n"
+        "from biodance.motion.compiled import newton\nfrom biodance.body.human.human import human\nfrom "
+        "biodance.records import Subject\n"
+        "from biodance.motion.ik.compiled.chain import chain_of\nimport numpy as np\nb = human(Subject(58.3, 1.64, "
+        "'F', 31.0))\n"
         "c = chain_of(b, list(b.markers.segment), b.markers.position)\n"
         "newton.distances(c, np.zeros((1, len(c.slot), 3)), b.neutral[None].copy(), np.empty((1, len(c.slot))))\n"
         "print(sum(newton.distances.stats.cache_hits.values()))"

@@ -182,7 +182,9 @@ def test_distance_to_a_hull() -> None:
 
 def test_soles_point_from_heel_to_toe() -> None:
     xyz = np.array([[[0, 0, 0.03], [0.2, 0, 0.04], [0, 1, 0.03], [0, 1.2, 0.04]]])
-    soles = soles_from_markers(Markers(("RHEE", "RTOE", "LHEE", "LTOE"), np.zeros(1), xyz), read_marker_set("plug_in_gait"))
+    soles = soles_from_markers(
+        Markers(("RHEE", "RTOE", "LHEE", "LTOE"), np.zeros(1), xyz), read_marker_set("plug_in_gait")
+    )
     right, left = soles.outline[0]
     assert right[:, 0].max() == pytest.approx(0.25)
     assert np.abs(right[:, 1]).max() == pytest.approx(0.046)

@@ -1,4 +1,6 @@
-"""Joint centres and axes from movement: found where the movement shows them, left alone where it does not, derivatives exact."""
+"""Joint centres and axes from movement: found where the movement shows them, left alone where it does not,
+derivatives exact.
+"""
 
 import json
 import os
@@ -39,7 +41,9 @@ def scaling() -> Scaling:
             q[7 + body.joint_index(f"{side}_{joint}")] = np.radians(degrees)
     xyz = poses(body, np.tile(q, (60, 1))).points(body.markers.segment, body.markers.position)
     markers = Markers(body.markers.names, np.arange(60) / 100, xyz)
-    return measure_static(SUBJECT, Trial("static", "static", markers, (), Source(Path("static.c3d"), "", "test", 100.0), "plug_in_gait"))
+    return measure_static(
+        SUBJECT, Trial("static", "static", markers, (), Source(Path("static.c3d"), "", "test", 100.0), "plug_in_gait")
+    )
 
 
 def displaced(theta: Array) -> Scaling:
@@ -60,7 +64,9 @@ def moving(true: Scaling, *, share: float = 0.8, seconds: float = 120.0, seed: i
 
 
 def hidden() -> Array:
-    """Return joints that a static trial does not show: elbows turned by 40 degrees, the trunk's joint 6 cm lower, a hip 15 mm off."""
+    """Return joints that a static trial does not show: elbows turned by 40 degrees, the trunk's joint 6 cm lower, a
+    hip 15 mm off.
+    """
     theta = np.zeros(SIZE)
     unknowns = JointUnknowns(scaling().centres)
     for elbow, angle in (("right_elbow", 0.7), ("left_elbow", -0.6)):
@@ -119,12 +125,16 @@ def test_what_the_movement_does_not_show_stays(share: float, seconds: float) -> 
 def test_the_gradient_is_that_of_the_cost() -> None:
     rng = np.random.default_rng(1)
     theta = np.concatenate([0.005 * rng.normal(size=SIZE - len(HINGES)), 0.1 * rng.normal(size=len(HINGES))])
-    postures = spread_postures([moving(displaced(hidden()), share=0.3, seconds=12.0)], scaling().body()[0].markers.names)
+    postures = spread_postures(
+        [moving(displaced(hidden()), share=0.3, seconds=12.0)], scaling().body()[0].markers.names
+    )
     at = evaluate_joints(scaling(), postures, theta, None, noise=0.008)
     left_out = [i for joint in JOINTS if joint.endswith(("knee", "ankle")) for i in range(SIZE)[own_centre(joint)]]
     for k in rng.choice(np.setdiff1d(np.arange(SIZE), left_out), 8, replace=False):
         step = 1e-5 * np.eye(SIZE)[k]
-        up, down = (evaluate_joints(scaling(), postures, theta + sign * step, at.q, noise=0.008).cost for sign in (1, -1))
+        up, down = (
+            evaluate_joints(scaling(), postures, theta + sign * step, at.q, noise=0.008).cost for sign in (1, -1)
+        )
         assert (up - down) / 2e-5 == pytest.approx(at.gradient[k], rel=1e-3, abs=0.05), k
 
 

@@ -1,4 +1,6 @@
-"""Legs closed numerically: the human's closed form comes out, feet stay where they are, and the same knee bends in every frame."""
+"""Legs closed numerically: the human's closed form comes out, feet stay where they are, and the same knee bends in
+every frame.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -93,7 +95,9 @@ def test_a_foot_out_of_reach_is_drawn_towards_the_hip() -> None:
     turn, pelvis, flat, ankle = stands(leg, frames=3, seed=2)
     far = (
         ankle
-        + 1.3 * (pelvis + turn @ leg.hip - ankle) * (leg.length(0.0) / np.linalg.norm(pelvis + turn @ leg.hip - ankle, axis=1))[:, None]
+        + 1.3
+        * (pelvis + turn @ leg.hip - ankle)
+        * (leg.length(0.0) / np.linalg.norm(pelvis + turn @ leg.hip - ankle, axis=1))[:, None]
     )
     lifted = (turn, far - turn @ leg.hip, flat, ankle)
     _, place = foot_of(HOAP, "left", leg, leg.solve(*lifted), lifted)
@@ -105,13 +109,18 @@ def test_a_foot_out_of_reach_is_drawn_towards_the_hip() -> None:
 def test_a_likeness_has_the_same_angles() -> None:
     leg, big = GeneralLeg.of(HOAP, "right"), GeneralLeg.of(likeness(HOAP, Likeness(3.6, 8.0)), "right")
     turn, pelvis, flat, ankle = stands(leg)
-    np.testing.assert_allclose(big.solve(turn, 3.6 * pelvis, flat, 3.6 * ankle), leg.solve(turn, pelvis, flat, ankle), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(
+        big.solve(turn, 3.6 * pelvis, flat, 3.6 * ankle), leg.solve(turn, pelvis, flat, ankle), rtol=0, atol=1e-9
+    )
 
 
 def test_other_legs_are_refused() -> None:
     foot = HOAP.feet["right"]
     with pytest.raises(BiodanceError, match=r"the right leg has 4 joints .*exactly six"):
-        GeneralLeg.of(replace(HOAP, feet={**HOAP.feet, "right": replace(foot, segment=HOAP.segment_index("right_shank"))}), "right")
+        GeneralLeg.of(
+            replace(HOAP, feet={**HOAP.feet, "right": replace(foot, segment=HOAP.segment_index("right_shank"))}),
+            "right",
+        )
     waist = [replace(j, axis=np.array([1.0, 0.0, 0.0])) if j.name == "left_knee_pitch" else j for j in HOAP.joints]
     with pytest.raises(BiodanceError, match=r"the left leg does not squat.*left_knee_pitch"):
         GeneralLeg.of(replace(HOAP, joints=tuple(waist)), "left")

@@ -1,4 +1,6 @@
-"""Inverse kinematics: known postures come back, noisy ones end where scipy's least squares end, and nothing unseen has a say."""
+"""Inverse kinematics: known postures come back, noisy ones end where scipy's least squares end, and nothing unseen
+has a say.
+"""
 
 from dataclasses import replace
 
@@ -36,7 +38,9 @@ def noisy_dance(frames: int, seed: int) -> tuple[Array, Markers]:
 
 
 def scipy_residual(body: Body, xyz: Array, start: Array) -> tuple[float, Array]:
-    """Return the optimal cost (m²) and the marker distances (K,) m that scipy reaches from ``start`` (nq,), limits as bounds."""
+    """Return the optimal cost (m²) and the marker distances (K,) m that scipy reaches from ``start`` (nq,), limits
+    as bounds.
+    """
     turn, root_weight = Rotation.from_quat(start[3:7]), np.sqrt(body.markers.weight)[:, None]
 
     def posture(x: Array) -> Array:
@@ -77,7 +81,9 @@ def test_a_joint_beyond_its_limit_stays_at_it_and_the_rest_is_optimal():
     q = dance(WOMAN, 6, rng, reach=0.6)
     beyond = np.zeros((6, len(WOMAN.joints)), dtype=bool)
     hinges = [
-        WOMAN.joint_index(f"{side}_{joint}") for side in ("left", "right") for joint in ("knee_flexion", "elbow_flexion", "ankle_inversion")
+        WOMAN.joint_index(f"{side}_{joint}")
+        for side in ("left", "right")
+        for joint in ("knee_flexion", "elbow_flexion", "ankle_inversion")
     ]
     for frame in range(6):
         beyond[frame, hinges[frame]] = True
@@ -100,7 +106,9 @@ def test_a_hidden_marker_has_no_influence():
     gone = [markers.names.index(name) for name in ("LKNE", "RELB", "C7")]
     xyz[:, gone] = np.nan
     hidden = solve_ik(WOMAN, replace(markers, xyz=xyz), tolerance=1e-11)
-    absent = solve_ik(WOMAN, markers.select(name for name in markers.names if name not in ("LKNE", "RELB", "C7")), tolerance=1e-11)
+    absent = solve_ik(
+        WOMAN, markers.select(name for name in markers.names if name not in ("LKNE", "RELB", "C7")), tolerance=1e-11
+    )
     np.testing.assert_allclose(hidden.q, absent.q, atol=1e-9)
     assert np.isnan(hidden.residual[:, gone]).all()
     assert np.isfinite(np.delete(hidden.residual, gone, axis=1)).all()
@@ -175,7 +183,9 @@ def test_a_frame_with_too_few_markers_leans_on_its_neighbours():
 
 def test_no_frame_with_enough_markers_names_what_is_missing():
     _, markers = noisy_dance(5, seed=13)
-    legs = tuple(name for name in markers.names if name[0] == "L" and name[1:] in ("KNE", "TIB", "ANK", "HEE", "TOE", "THI"))
+    legs = tuple(
+        name for name in markers.names if name[0] == "L" and name[1:] in ("KNE", "TIB", "ANK", "HEE", "TOE", "THI")
+    )
     few = markers.select(name for name in markers.names if name not in legs)
     with pytest.raises(TrialRefused, match=r"at best 33 of its 39 .*left_knee_flexion.*LKNE"):
         solve_ik(WOMAN, few)

@@ -1,4 +1,6 @@
-"""Smoothing: velocities and accelerations of known motions, in Pinocchio's convention, behind the same low-pass as the forces."""
+"""Smoothing: velocities and accelerations of known motions, in Pinocchio's convention, behind the same low-pass as
+the forces.
+"""
 
 import numpy as np
 import pytest
@@ -19,7 +21,9 @@ INNER = slice(100, -100)
 
 
 def pirouette(time: Array) -> tuple[Array, Array, Array]:
-    """Return q, v, a of a body that spins once a second, nods and sways while every joint swings, all in closed form."""
+    """Return q, v, a of a body that spins once a second, nods and sways while every joint swings, all in closed
+    form.
+    """
     spin, nod = 2 * np.pi * time, 0.6 * np.sin(3 * time)
     dspin, dnod, ddnod = 2 * np.pi, 1.8 * np.cos(3 * time), -5.4 * np.sin(3 * time)
     turn = Rotation.from_rotvec(np.outer(spin, [0.0, 0, 1])) * Rotation.from_rotvec(
@@ -108,7 +112,9 @@ def test_noise_above_the_cut_off_goes_and_a_slow_motion_stays():
     noisy[:, 3:7] = (Rotation.from_quat(q[:, 3:7]) * Rotation.from_rotvec(rng.normal(0, 0.01, (len(q), 3)))).as_quat()
     found = smooth(WOMAN, TIME, noisy)
     left = (Rotation.from_quat(found.q[:, 3:7]).inv() * Rotation.from_quat(q[:, 3:7])).as_rotvec()[INNER]
-    assert 0.001 < left.std() < 0.01 * np.sqrt(2 * 10.0 / RATE) * 1.3  # the share of white noise that passes 10 of 100 Hz
+    assert (
+        0.001 < left.std() < 0.01 * np.sqrt(2 * 10.0 / RATE) * 1.3
+    )  # the share of white noise that passes 10 of 100 Hz
     assert (found.v - v)[INNER, 3:6].std() < 0.3
 
 

@@ -40,7 +40,9 @@ def test_a_simulated_squat_is_followed(tmp_path):
     protocol = read_protocol("short")
     squat = next(plan for plan in protocol.trials if plan.role == "validate")
     static = next(plan for plan in protocol.trials if plan.role == "static")
-    session = read_session(simulate_session(subject, replace(protocol, trials=(static, squat)), tmp_path / "S", seed=3, visit=visit))
+    session = read_session(
+        simulate_session(subject, replace(protocol, trials=(static, squat)), tmp_path / "S", seed=3, visit=visit)
+    )
     trial = session.of_role("validate")[0]
     person = make_person(subject, 3, tolerances=visit.tolerances)
     truth = perform_in(set_up(person, visit), person, squat).motion(trial.markers.time)
@@ -57,7 +59,9 @@ def test_the_notes_say_how_well_the_markers_fit(markers):
     motion = track(WOMAN, trial_of(markers))
     assert motion.marker_names == WOMAN.markers.names
     rms = 1e3 * np.sqrt((motion.residual**2).mean())
-    assert motion.notes[0].startswith(f"Inverse kinematics: 120 frames, 39 markers, RMS distance {rms:.1f} mm, largest ")
+    assert motion.notes[0].startswith(
+        f"Inverse kinematics: 120 frames, 39 markers, RMS distance {rms:.1f} mm, largest "
+    )
     assert len(motion.notes) == 1
     assert 1.5 < rms < 3.5
 
@@ -68,7 +72,10 @@ def test_absent_markers_and_leaning_frames_are_named(markers):
     some = replace(markers, xyz=xyz).select(name for name in markers.names if name not in ("LFHD", "T10"))
     motion = track(WOMAN, trial_of(some))
     assert "Markers of the body that the trial does not have: T10, LFHD." in motion.notes
-    assert any(note.startswith("5 of 120 frames lean on their neighbours") and "first: frame 50" in note for note in motion.notes)
+    assert any(
+        note.startswith("5 of 120 frames lean on their neighbours") and "first: frame 50" in note
+        for note in motion.notes
+    )
     assert np.array_equal(np.flatnonzero(~motion.determined), np.arange(50, 55))
     assert np.isfinite(np.hstack([motion.q, motion.v, motion.a])).all()
     whole = track(WOMAN, trial_of(markers))
@@ -77,7 +84,8 @@ def test_absent_markers_and_leaning_frames_are_named(markers):
 
 def test_the_low_pass_is_the_one_asked_for(markers):
     soft, hard = (
-        track(WOMAN, replace(trial_of(markers), settings=Settings().changed({"filter.cutoff": cutoff}))) for cutoff in (10.0, 3.0)
+        track(WOMAN, replace(trial_of(markers), settings=Settings().changed({"filter.cutoff": cutoff})))
+        for cutoff in (10.0, 3.0)
     )
     assert np.array_equal(soft.residual, hard.residual)
     assert np.abs(hard.a[30:-30, :6]).mean() < 0.7 * np.abs(soft.a[30:-30, :6]).mean()

@@ -1,4 +1,6 @@
-"""A laboratory with labels of its own: plug-in gait under other names, read by a file or a map, from the command line to the page."""
+"""A laboratory with labels of its own: plug-in gait under other names, read by a file or a map, from the command
+line to the page.
+"""
 
 import json
 import re
@@ -12,8 +14,8 @@ from biodance.body.human.human import human
 from biodance.cli import run
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.write import PlateRecording, write_c3d
-from biodance.lab.markers.set_file import LANDMARKS, SEGMENTS, segment_of
-from biodance.lab.markers.sets import FAMILY, read_marker_set
+from biodance.lab.markers.set_file import _SEGMENTS, LANDMARKS, segment_of
+from biodance.lab.markers.sets import _FAMILY, read_marker_set
 from biodance.lab.session.read import read_session
 from biodance.pipeline.session import examine
 from biodance.records import Markers
@@ -25,16 +27,23 @@ RENAMED = {label: f"M{i:02d}" for i, label in enumerate(PLUG_IN_GAIT.labels)}
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Return a session whose markers carry the laboratory's own labels: a static and a movement of a body known exactly."""
+    """Return a session whose markers carry the laboratory's own labels: a static and a movement of a body known
+    exactly.
+    """
     session, body = tmp_path / "S01" / "visit", human(SUBJECT)
     session.mkdir(parents=True)
-    for name, motion in (("static", arm_swing(body, frames=100, angle=0.0)), ("swing", arm_swing(body, frames=200, angle=1.0))):
+    for name, motion in (
+        ("static", arm_swing(body, frames=100, angle=0.0)),
+        ("swing", arm_swing(body, frames=200, angle=1.0)),
+    ):
         trial = recorded(body, name, motion)
         names = tuple(RENAMED[label] for label in trial.markers.names)
         value = trial.plates[0].wrench.value
         value = np.concatenate([value, np.repeat(value[-1:], 10 * len(trial.markers.time) - len(value), axis=0)])
         down = np.diag([1.0, -1.0, -1.0])
-        plate = PlateRecording(2, PLATE[[1, 0, 3, 2]], np.zeros(3), np.hstack([value[:, :3] @ down, value[:, 3:] @ down]))
+        plate = PlateRecording(
+            2, PLATE[[1, 0, 3, 2]], np.zeros(3), np.hstack([value[:, :3] @ down, value[:, 3:] @ down])
+        )
         markers = Markers(names, trial.markers.time, trial.markers.xyz)
         write_c3d(session / f"{name}.c3d", markers=markers, plates=[plate], analog_rate=1000.0)
     (session / "session.toml").write_text(SUBJECT_TOML)
@@ -43,7 +52,7 @@ def folder(tmp_path: Path) -> Path:
 
 def own_file(place: Path) -> Path:
     """Write the set as a user would: plug-in gait with other labels."""
-    text = FAMILY.files()["plug_in_gait"].read_text()
+    text = _FAMILY.files()["plug_in_gait"].read_text()
     text = re.sub(r"^\[aliases\].*?(?=^\[)", "", text, flags=re.MULTILINE | re.DOTALL)
     for label, own in RENAMED.items():
         text = re.sub(rf"\b{label}\b", own, text)
@@ -61,7 +70,9 @@ def own_map() -> str:
 def test_without_a_word_the_set_is_unknown_and_the_advice_can_be_followed(folder: Path) -> None:
     result = examine(read_session(folder))
     assert result.body is None
-    assert all("--markers FILE, or say [markers] file or map in session.toml" in trial.reason for trial in result.trials)
+    assert all(
+        "--markers FILE, or say [markers] file or map in session.toml" in trial.reason for trial in result.trials
+    )
 
 
 @pytest.mark.parametrize("way", ["option", "file", "map"])
@@ -114,10 +125,14 @@ def test_the_option_reaches_every_command(
         ("[markers]\nmap = {}\n", r"\[markers\] has no map. Write map ="),
         (
             '[markers]\nfile = "absent.toml"\n',
-            "absent.toml: cannot be opened, there is no such marker set. Check the path; sets known by name are isb_landmarks",
+            "absent.toml: cannot be opened, there is no such marker set. Check the path; sets known by name are "
+            "isb_landmarks",
         ),
         ('[markers]\nfile = "plug_in_gate"\n', "Did you mean 'plug_in_gait'.*A file of your own is given by its path"),
-        ('[markers]\nfiles = "a.toml"\n', r"\[markers\] has the unknown key 'files'. Did you mean 'file'. Legal: file, map"),
+        (
+            '[markers]\nfiles = "a.toml"\n',
+            r"\[markers\] has the unknown key 'files'. Did you mean 'file'. Legal: file, map",
+        ),
     ],
 )
 def test_a_mistake_in_the_markers_is_refused(folder: Path, said: str, words: str) -> None:
@@ -128,13 +143,15 @@ def test_a_mistake_in_the_markers_is_refused(folder: Path, said: str, words: str
 
 def test_a_set_that_was_not_worn_is_said(folder: Path) -> None:
     session = read_session(folder, markers="plug_in_gait")
-    assert all("The markers are not of the chosen set plug_in_gait: " in " ".join(trial.warnings) for trial in session.trials)
+    assert all(
+        "The markers are not of the chosen set plug_in_gait: " in " ".join(trial.warnings) for trial in session.trials
+    )
 
 
 @pytest.mark.parametrize("landmark", LANDMARKS)
 def test_every_landmark_has_its_segment(landmark: str) -> None:
-    assert segment_of(landmark) in SEGMENTS
+    assert segment_of(landmark) in _SEGMENTS
     side = landmark.partition("_")[0]
-    assert not (side in ("left", "right") and any(limb in segment_of(landmark) for limb in ("thigh", "arm", "foot"))) or segment_of(
-        landmark
-    ).startswith(side)
+    assert not (
+        side in ("left", "right") and any(limb in segment_of(landmark) for limb in ("thigh", "arm", "foot"))
+    ) or segment_of(landmark).startswith(side)

@@ -84,7 +84,12 @@ def test_the_session_says_it_on_the_page_and_in_the_numbers(failing):
     numbers = plain_values(identification_document(found))
     assert (numbers["status"], numbers["cause"], numbers["segments"]) == ("failed", FORCED.cause, [])
     assert numbers["failures"] == {"segments": FORCED.cause}
-    assert (numbers["validation"], numbers["gain"], numbers["joint_torques"], numbers["differences"]) == ([], None, None, [])
+    assert (numbers["validation"], numbers["gain"], numbers["joint_torques"], numbers["differences"]) == (
+        [],
+        None,
+        None,
+        [],
+    )
     page = identification_section(found)
     assert "Not solved, segments:" in page
     assert FORCED.cause in page

@@ -44,7 +44,9 @@ def test_the_document_has_the_keys_that_programs_rely_on(numbers, found):
     assert numbers["status"] == "solved"
     assert [row["name"] for row in numbers["segments"]] == list(body().segments)
     for row in numbers["segments"]:
-        assert {"mass_kg", "mass_sd_kg", "mass_prior_kg", "com_m", "com_sd_m", "inertia_kgm2", "information"} <= set(row)
+        assert {"mass_kg", "mass_sd_kg", "mass_prior_kg", "com_m", "com_sd_m", "inertia_kgm2", "information"} <= set(
+            row
+        )
         assert [len(row[key]) for key in ("com_m", "com_sd_m", "inertia_kgm2")] == [3, 3, 6]
         assert 0 <= row["information"] <= 1
     assert set(numbers["base_parameters"]) == {"count", "well_known", "rank"}

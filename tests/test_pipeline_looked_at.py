@@ -22,7 +22,9 @@ def still(seconds: float) -> Motion:
     """Return somebody who does not move."""
     moving, frames = motion(3), int(seconds * RATE)
     q = np.repeat(moving.q[:1], frames, axis=0)
-    return Motion(np.arange(frames) / RATE, q, np.zeros((frames, moving.v.shape[1])), np.zeros((frames, moving.v.shape[1])))
+    return Motion(
+        np.arange(frames) / RATE, q, np.zeros((frames, moving.v.shape[1])), np.zeros((frames, moving.v.shape[1]))
+    )
 
 
 def standing(shaken: Array) -> Look:
@@ -30,14 +32,22 @@ def standing(shaken: Array) -> Look:
     still_one = still(len(shaken) / RATE)
     trial = looks(1, trials=1)[0].trial
     plate = replace(trial.plates[0], wrench=Wrench(still_one.time, predict_wrench(body(), still_one).value + shaken))
-    return Look(replace(trial, name="static", role="static", plates=(plate,)), still_one, np.ones(len(shaken), dtype=bool), 0.0, 0.1)
+    return Look(
+        replace(trial, name="static", role="static", plates=(plate,)),
+        still_one,
+        np.ones(len(shaken), dtype=bool),
+        0.0,
+        0.1,
+    )
 
 
 def result(look: Look, role: Role, use: Array | None = None) -> TrialResult:
     used = look.use if use is None else use
     value = look.trial.wrench.value
     compared = WrenchComparison(look.motion.time, value, value, used, np.zeros(6), np.ones(6))
-    return TrialResult(replace(look.trial, role=role), (Step("compare", "done"),), motion=look.motion, comparison=compared)
+    return TrialResult(
+        replace(look.trial, role=role), (Step("compare", "done"),), motion=look.motion, comparison=compared
+    )
 
 
 def test_standing_is_looked_at_where_movement_is_short() -> None:
@@ -47,7 +57,9 @@ def test_standing_is_looked_at_where_movement_is_short() -> None:
     assert [look.trial.name for look in looked_at((result(quiet, "static"), result(moving, "fit")))] == ["t0"]
     some = (result(quiet, "static"), result(moving, "fit", short))
     assert [look.trial.name for look in looked_at(some)] == ["static", "t0"]
-    assert left_out(some) == ("t0 was left out: no 1 s in which the plates measure all ground contact without a break.",)
+    assert left_out(some) == (
+        "t0 was left out: no 1 s in which the plates measure all ground contact without a break.",
+    )
     assert looked_at(some)[0].start == 0.0
     assert looked_at(some)[1].end == 1.0
 
@@ -79,7 +91,9 @@ def test_soft_tissue_grows_with_the_markers_distance(factor: float, grows: bool)
     far = replace(look, motion=Motion(moving.time, moving.q, moving.v, moving.a, residual, tuple("abcde")))
     assert soft_tissue((far,)) == pytest.approx(factor * MARKERS), "one marker that is wrong does not count"
     own = own_tolerances(body(), (far,))
-    assert own.tolerances.size("slide thigh") == pytest.approx(shipped().size("slide thigh") * (factor if grows else 1.0))
+    assert own.tolerances.size("slide thigh") == pytest.approx(
+        shipped().size("slide thigh") * (factor if grows else 1.0)
+    )
     assert own.tolerances.size("plate_gain Fz") == shipped().size("plate_gain Fz")
     assert own.believed != grows
     assert bool(own.notes) == grows

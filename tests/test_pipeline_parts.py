@@ -1,4 +1,6 @@
-"""The parts of the pipeline on data whose truth is known: steps, quiet standing, centre of mass, marker distances, checks, the still."""
+"""The parts of the pipeline on data whose truth is known: steps, quiet standing, centre of mass, marker distances,
+checks, the still.
+"""
 
 import numpy as np
 import pinocchio as pin
@@ -138,14 +140,28 @@ def test_every_segment_is_drawn_and_left_mirrors_right():
     height = lines[:, :, 2] - lines[:, :, 2].min()
     assert 1.55 < height.max() < 1.85
     mirrored = {tuple(np.round(line.ravel(), 6)) for line in lines * [1, -1, 1]}
-    assert {tuple(np.round(line.ravel(), 6)) for line, side in zip(lines, sides, strict=True) if side == "left"} <= mirrored
+    assert {
+        tuple(np.round(line.ravel(), 6)) for line, side in zip(lines, sides, strict=True) if side == "left"
+    } <= mirrored
     assert len(lines) == 12 + 4
 
 
 def standing(mass: float, ahead: float = 0.0) -> QuietStanding:
     nothing = np.empty((0, 2))
     return QuietStanding(
-        "s", 0, 1, mass, 0.1, np.zeros((5, 2)), np.ones((5, 2)), np.array([1.0, 0]), ahead, 0.0, nothing, (), np.empty((0, 4, 2))
+        "s",
+        0,
+        1,
+        mass,
+        0.1,
+        np.zeros((5, 2)),
+        np.ones((5, 2)),
+        np.array([1.0, 0]),
+        ahead,
+        0.0,
+        nothing,
+        (),
+        np.empty((0, 4, 2)),
     )
 
 
@@ -172,6 +188,9 @@ def test_the_checks_of_a_trial_name_what_is_outside():
     gaps = (MarkerGaps("A", 4.0, 0.1), MarkerGaps("B", 8.0, 0.1))
     result = TrialResult(trial("walk"), (Step("compare", "done"),), gaps, fit, None, comparison(rng))
     rows = {check.what: check for check in trial_checks(result, 60.0)}
-    assert [name for name, check in rows.items() if not check.inside] == ["marker distance, largest", "markers not seen"]
+    assert [name for name, check in rows.items() if not check.inside] == [
+        "marker distance, largest",
+        "markers not seen",
+    ]
     assert rows["markers not seen"].value == "6.0 %"
     assert rows["fully measured"].value == "2.09 s"

@@ -1,4 +1,6 @@
-"""What a session found for a trial stands in the copy of its recording: angles, moments, wrenches and centre of mass agree."""
+"""What a session found for a trial stands in the copy of its recording: angles, moments, wrenches and centre of mass
+agree.
+"""
 
 import numpy as np
 import pytest
@@ -22,7 +24,9 @@ from biodance.virtual_lab.simulate import simulate_session
 def session(tmp_path_factory):
     short = read_protocol("short")
     protocol = Protocol("shorter", "", (short.trials[0], short.trials[2]), short.postures)
-    return simulate_session(Subject(58.0, 1.66, "F", 28.0, "S07"), protocol, tmp_path_factory.mktemp("lab") / "S07", seed=11)
+    return simulate_session(
+        Subject(58.0, 1.66, "F", 28.0, "S07"), protocol, tmp_path_factory.mktemp("lab") / "S07", seed=11
+    )
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +37,9 @@ def result(session):
 @pytest.fixture(scope="module")
 def written(result, tmp_path_factory):
     squat = next(one for one in result.trials if one.trial.name == "squat_1")
-    path, sentence = results_into_c3d(squat, result.body, tmp_path_factory.mktemp("out") / "out.c3d", source="The table.")
+    path, sentence = results_into_c3d(
+        squat, result.body, tmp_path_factory.mktemp("out") / "out.c3d", source="The table."
+    )
     assert "squat_1 with 27 results" in sentence
     return squat, read_raw(path)
 

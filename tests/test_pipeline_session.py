@@ -34,7 +34,9 @@ def arm_swing(body, *, frames: int, angle: float) -> Motion:
 
 
 def recorded(body, name: str, motion: Motion) -> Trial:
-    """Return what a perfect laboratory records of ``motion``: the markers of the body and the wrench it needs, on one large plate."""
+    """Return what a perfect laboratory records of ``motion``: the markers of the body and the wrench it needs, on
+    one large plate.
+    """
     xyz = poses(body, motion.q).points(list(body.markers.segment), body.markers.position)
     wrench = predict_wrench(body, motion)
     fine = np.arange(10 * (motion.time.size - 1) + 1) / (10 * RATE)

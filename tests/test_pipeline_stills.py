@@ -47,7 +47,10 @@ def test_the_worst_frame_is_the_one_that_was_spoilt(result):
 
 
 def test_without_a_measured_frame_there_is_no_worst_one(result):
-    nothing = [replace(one, comparison=replace(one.comparison, used=np.zeros_like(one.comparison.used))) for one in result.trials]
+    nothing = [
+        replace(one, comparison=replace(one.comparison, used=np.zeros_like(one.comparison.used)))
+        for one in result.trials
+    ]
     assert worst_still(result.body, tuple(nothing)) is None
 
 
@@ -58,7 +61,10 @@ def test_a_load_is_drawn_where_it_sits(result):
     best = replace(search.best, segment="left_forearm_hand", place=place, mass=2.0, sd=0.1)
     still = load_still(result.body, result.trials, replace(search, suspects=(best, *search.suspects[1:])))
     one = result.trials[0]
-    pose, segment = poses(result.body, one.motion.q[one.motion.time.size // 2]), result.body.segment_index("left_forearm_hand")
+    pose, segment = (
+        poses(result.body, one.motion.q[one.motion.time.size // 2]),
+        result.body.segment_index("left_forearm_hand"),
+    )
     np.testing.assert_allclose(still.load, pose.points([segment], place[None])[0, 0], atol=1e-12)
     assert still.about == "The load that was found: 2.00 kg ± 0.10 kg on the left forearm hand (yellow)."
     unplaced = replace(best, place=np.full(3, np.nan))
@@ -108,7 +114,9 @@ def test_a_still_survives_the_way_to_the_child(result):
     assert (back.sides, back.box_sides, back.trial) == (still.sides, still.box_sides, "one")
 
 
-@pytest.mark.parametrize("code", ["import os; os.abort()", "print('[]')", "print('no json')", "import time; time.sleep(30)"])
+@pytest.mark.parametrize(
+    "code", ["import os; os.abort()", "print('[]')", "print('no json')", "import time; time.sleep(30)"]
+)
 def test_a_child_without_gl_is_no_crash_and_no_hang(result, monkeypatch, code):
     run = solid.subprocess.run
     monkeypatch.setattr(solid, "PATIENCE", 1.5)

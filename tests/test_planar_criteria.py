@@ -1,4 +1,6 @@
-"""One contract for every criterion file: a value, a symmetric gradient equal to finite differences, better with more data."""
+"""One contract for every criterion file: a value, a symmetric gradient equal to finite differences, better with more
+data.
+"""
 
 import numpy as np
 import pytest

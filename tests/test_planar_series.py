@@ -1,4 +1,6 @@
-"""The planar example: the printed base parameters, the paper's picture from its start, and better from starts that are not singular."""
+"""The planar example: the printed base parameters, the paper's picture from its start, and better from starts that
+are not singular.
+"""
 
 import numpy as np
 import pytest
@@ -37,7 +39,9 @@ def test_three_channels_carry_the_whole_wrench_of_a_planar_motion() -> None:
 
 def test_from_the_papers_start_only_the_sum_of_blocks_can_move() -> None:
     assert paper_series(planar_chain(), "condition", motions=1).condition[0] > 1e12
-    assert paper_series(planar_chain(), "mass_weighted", motions=1).condition[0] < 105  # printed: 62, and 105 for cond(W_b)
+    assert (
+        paper_series(planar_chain(), "mass_weighted", motions=1).condition[0] < 105
+    )  # printed: 62, and 105 for cond(W_b)
 
 
 @pytest.mark.parametrize("ranges", RANGES)

@@ -14,7 +14,9 @@ from biodance.motion.regressor import GRAVITY
 
 def problem(name: str) -> Excitation:
     body = random_body(np.random.default_rng(0), n_segments=2, root="fixed")
-    return Excitation(body, rest_to_rest(2.0, rate=20), tuple(range(6)), target(body, structural_base(body)), criterion(name), GRAVITY)
+    return Excitation(
+        body, rest_to_rest(2.0, rate=20), tuple(range(6)), target(body, structural_base(body)), criterion(name), GRAVITY
+    )
 
 
 @pytest.mark.parametrize("name", ["log_condition", "mass_weighted", "d_optimal"])

@@ -1,4 +1,6 @@
-"""The analyst's page: holds everything itself, reads well to a machine, is the same every time, and survives a session without results."""
+"""The analyst's page: holds everything itself, reads well to a machine, is the same every time, and survives a
+session without results.
+"""
 
 import base64
 import re
@@ -75,7 +77,9 @@ def test_the_page_asks_nothing_of_the_network(full):
     policy = next(a["content"] for t, a in elements if a.get("http-equiv") == "Content-Security-Policy")
     assert policy.startswith("default-src 'none'")
     assert not any(tag in ("script", "link", "iframe", "object") for tag, _ in elements)
-    assert all(attributes["src"].startswith("data:image/svg+xml;base64,") for tag, attributes in elements if tag == "img")
+    assert all(
+        attributes["src"].startswith("data:image/svg+xml;base64,") for tag, attributes in elements if tag == "img"
+    )
     assert not re.search(r"url\(|@import", full.split("<body>")[0])
 
 
@@ -90,7 +94,11 @@ def test_names_from_files_cannot_become_markup(full):
 
 
 def test_what_is_outside_its_limit_comes_first(full):
-    assert full.index("What needs a person") < full.index("<strong>gaps, walk &lt;1&gt;</strong>") < full.index("Quality checks")
+    assert (
+        full.index("What needs a person")
+        < full.index("<strong>gaps, walk &lt;1&gt;</strong>")
+        < full.index("Quality checks")
+    )
 
 
 def test_a_trial_without_a_check_has_a_gap_in_the_table_of_checks():
@@ -104,7 +112,12 @@ def test_a_trial_without_a_check_has_a_gap_in_the_table_of_checks():
 def test_a_session_without_results_still_has_a_page_with_every_reason():
     html = html_of(refused_session())
     outline(html)
-    for sentence in ("<strong>broken.c3d</strong>: is empty.", "No stature.", "no marker is known. Name a marker set.", "No plates."):
+    for sentence in (
+        "<strong>broken.c3d</strong>: is empty.",
+        "No stature.",
+        "no marker is known. Name a marker set.",
+        "No plates.",
+    ):
         assert sentence in html
     assert not re.search(r"\bnan\b", html, re.IGNORECASE)
     assert "<img" not in html
@@ -151,7 +164,9 @@ def test_figures_carry_no_date():
     assert "<dc:date>" not in svg
 
 
-@pytest.mark.parametrize(("value", "text"), [(1.25, "1.2"), (-0.04, "0.0"), (-3.0, "−3.0"), (float("nan"), "–"), (None, "–")])
+@pytest.mark.parametrize(
+    ("value", "text"), [(1.25, "1.2"), (-0.04, "0.0"), (-3.0, "−3.0"), (float("nan"), "–"), (None, "–")]
+)
 def test_numbers_read_like_numbers(value, text):
     assert format_number(value) == text
 
@@ -170,8 +185,21 @@ def test_a_browser_shows_the_page_without_a_complaint(full, tmp_path):
     if browser is None:
         pytest.skip("no chromium on this machine; biodance doctor says how to get it")
     (tmp_path / "page.html").write_text(full, encoding="utf-8")
-    flags = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--enable-logging=stderr", "--v=0"]
-    words = [browser, *flags, f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom", f"file://{tmp_path / 'page.html'}"]
+    flags = [
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--disable-background-networking",
+        "--enable-logging=stderr",
+        "--v=0",
+    ]
+    words = [
+        browser,
+        *flags,
+        f"--user-data-dir={tmp_path / 'profile'}",
+        "--dump-dom",
+        f"file://{tmp_path / 'page.html'}",
+    ]
     shown = subprocess.run(words, capture_output=True, text=True, timeout=60, check=True)
     assert shown.stdout.count("<img") == full.count("<img")
     assert "CONSOLE" not in shown.stderr

@@ -56,7 +56,8 @@ def test_the_wrench_stands_three_times_and_its_rms_is_the_records(result, tables
     for one in result.trials:
         mine = table[(table.trial == one.trial.name) & table.used]
         left = (
-            mine[[f"measured_{c}_N" for c in ("Fx", "Fy", "Fz")]].to_numpy() - mine[[f"table_{c}_N" for c in ("Fx", "Fy", "Fz")]].to_numpy()
+            mine[[f"measured_{c}_N" for c in ("Fx", "Fy", "Fz")]].to_numpy()
+            - mine[[f"table_{c}_N" for c in ("Fx", "Fy", "Fz")]].to_numpy()
         )
         np.testing.assert_allclose(np.sqrt(np.mean(left**2, axis=0)), one.comparison.rms[:3], rtol=1e-9)
     kept = result.identification.validations[0]
@@ -104,7 +105,11 @@ def test_markers_and_checks_of_a_full_session():
 
 def test_a_session_in_which_nothing_worked_has_tables_with_columns():
     session = full_session()
-    nothing = replace(session, trials=tuple(replace(t, fit=None, motion=None, comparison=None, gaps=()) for t in session.trials), checks=())
+    nothing = replace(
+        session,
+        trials=tuple(replace(t, fit=None, motion=None, comparison=None, gaps=()) for t in session.trials),
+        checks=(),
+    )
     tables = session_tables(replace(nothing, identification=None))
     assert len(tables["angles"]) == 0
     assert list(tables["markers"].columns) == ["trial", "marker", "rms_m", "max_m", "gaps_percent", "longest_gap_s"]

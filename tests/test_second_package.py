@@ -1,4 +1,6 @@
-"""A second package adds one effect, limit, reader, segment table, marker set and model format; nothing of biodance is changed."""
+"""A second package adds one effect, limit, reader, segment table, marker set and model format; nothing of biodance
+is changed.
+"""
 
 import importlib
 import json
@@ -42,11 +44,16 @@ def tiny_session(folder: Path) -> Path:
     """Write a session in the package's own format, under its own labels."""
     folder.mkdir()
     one = human(SUBJECT)
-    for name, motion in (("static", arm_swing(one, frames=60, angle=0.0)), ("swing", arm_swing(one, frames=60, angle=1.0))):
+    for name, motion in (
+        ("static", arm_swing(one, frames=60, angle=0.0)),
+        ("swing", arm_swing(one, frames=60, angle=1.0)),
+    ):
         markers = recorded(one, name, motion).markers
         rows = np.column_stack([markers.time, markers.xyz.reshape(len(markers.time), -1)])
         lines = [" ".join(f"{x:.6f}" for x in row) for row in rows]
-        (folder / f"{name}.tiny").write_text("\n".join([" ".join(["TINY", *(RENAMED[label] for label in markers.names)]), *lines]))
+        (folder / f"{name}.tiny").write_text(
+            "\n".join([" ".join(["TINY", *(RENAMED[label] for label in markers.names)]), *lines])
+        )
     (folder / "session.toml").write_text('[subject]\nmass_kg = 62.0\nheight_m = 1.70\nsex = "F"\nage = 30\n')
     return folder
 
@@ -58,7 +65,12 @@ def test_reader_marker_set_and_export_from_the_command_line(tmp_path: Path) -> N
 
     def biodance(*words: str) -> str:
         return subprocess.run(
-            [sys.executable, "-m", "biodance", *words], env=env, capture_output=True, text=True, check=False, cwd=tmp_path
+            [sys.executable, "-m", "biodance", *words],
+            env=env,
+            capture_output=True,
+            text=True,
+            check=False,
+            cwd=tmp_path,
         ).stdout
 
     records = json.loads(biodance("inspect", str(session), "--json"))
@@ -79,7 +91,10 @@ def test_effect_is_fitted_like_any_other(installed: Path) -> None:
 
     assert list(effects())[-1] == "cable"
     found = diagnose_trials(
-        body(), looks(1, hidden=pulled), tolerances=known(), effects=("cable", "plate_gain", "plate_offset", "time_delay")
+        body(),
+        looks(1, hidden=pulled),
+        tolerances=known(),
+        effects=("cable", "plate_gain", "plate_offset", "time_delay"),
     )
     (finding,) = found.diagnosis.findings
     assert (finding.effect, finding.advice) == ("cable", "Take the cable off the person.")
@@ -90,7 +105,9 @@ def test_segment_table_makes_a_body(installed: Path) -> None:
     assert "tiny_study" in table_names("F")
     one = human(Subject(64.0, 1.70, "F", 30.0), table="tiny_study")
     assert one.sip.of("right_thigh")[0] == pytest.approx(8.0, rel=0.01)
-    assert human(Subject(64.0, 1.70, "F", 30.0)).sip.covariance == pytest.approx(human_without(installed)), "it changes nobody else's prior"
+    assert human(Subject(64.0, 1.70, "F", 30.0)).sip.covariance == pytest.approx(human_without(installed)), (
+        "it changes nobody else's prior"
+    )
 
 
 def human_without(place: Path) -> np.ndarray:
@@ -101,7 +118,9 @@ def human_without(place: Path) -> np.ndarray:
         sys.path.insert(0, str(place))
 
 
-@pytest.mark.skipif(not hasattr(limits_room, "FAMILY"), reason="the family of limits is not open to other packages here")
+@pytest.mark.skipif(
+    not hasattr(limits_room, "FAMILY"), reason="the family of limits is not open to other packages here"
+)
 def test_limit_is_one_of_the_family(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(install(tmp_path / "site", points=LIMIT_POINT)))
     assert "low_hands" in [one.name for one in limits_room.family()]
@@ -125,15 +144,21 @@ def test_limit_is_one_of_the_family(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         ),
     ],
 )
-def test_a_package_that_is_broken_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, points: str, words: str) -> None:
+def test_a_package_that_is_broken_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, points: str, words: str
+) -> None:
     monkeypatch.syspath_prepend(str(install(tmp_path / "site", points=points)))
     with pytest.raises(BiodanceError, match=words):
         effects()
     forget()
 
 
-@pytest.mark.parametrize(("room", "family"), [("effects", "effect"), ("lab.readers", "reader"), ("body.export", "model format")])
-def test_a_stray_file_in_a_folder_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, room: str, family: str) -> None:
+@pytest.mark.parametrize(
+    ("room", "family"), [("effects", "effect"), ("lab.readers", "reader"), ("body.export", "model format")]
+)
+def test_a_stray_file_in_a_folder_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, room: str, family: str
+) -> None:
     package = importlib.import_module(f"biodance.{room}")
     (tmp_path / "notes.py").write_text("PAGES = 3\n")
     monkeypatch.setattr(package, "__path__", [*package.__path__, str(tmp_path)])
@@ -144,13 +169,19 @@ def test_a_stray_file_in_a_folder_is_refused(tmp_path: Path, monkeypatch: pytest
 
 def test_a_table_of_a_package_says_where_its_numbers_come_from(installed: Path) -> None:
     (installed / "tiny_lab" / "tiny_study.toml").unlink()
-    with pytest.raises(BiodanceError, match=r"tiny_study\.csv: has no tiny_study\.toml beside it, which says where its numbers come from"):
+    with pytest.raises(
+        BiodanceError,
+        match=r"tiny_study\.csv: has no tiny_study\.toml beside it, which says where its numbers come from",
+    ):
         table_names("F")
 
 
 def test_nothing_is_imported_before_a_family_is_asked(tmp_path: Path) -> None:
     place = install(tmp_path / "site")
-    code = "import sys, biodance, biodance.cli; print([m for m in sys.modules if m.startswith(('tiny_lab', 'biodance.effects', 'numpy'))])"
+    code = (
+        "import sys, biodance, biodance.cli; print([m for m in sys.modules if m.startswith(('tiny_lab', "
+        "'biodance.effects', 'numpy'))])"
+    )
     env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(place), str(Path(__file__).parent.parent)])}
     done = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

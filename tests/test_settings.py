@@ -21,13 +21,21 @@ from biodance.pipeline.provenance import provenance
 from biodance.settings import USUAL, ContactRules, Settings, assignments
 from biodance.virtual_lab.simulate import simulate_session
 
-OTHER = {"table": "dumas_2018", "hip": "davis", "joints": "static", "filter.kind": "critically_damped", "filter.force_cutoff": 20.0}
+OTHER = {
+    "table": "dumas_2018",
+    "hip": "davis",
+    "joints": "static",
+    "filter.kind": "critically_damped",
+    "filter.force_cutoff": 20.0,
+}
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Return a simulated visit."""
-    return simulate_session(biodance.Subject(62.0, 1.70, "F", 31.0), "short", tmp_path_factory.mktemp("lab") / "visit", seed=1)
+    return simulate_session(
+        biodance.Subject(62.0, 1.70, "F", 31.0), "short", tmp_path_factory.mktemp("lab") / "visit", seed=1
+    )
 
 
 @pytest.fixture(scope="module")
@@ -131,7 +139,9 @@ def test_trials_of_different_settings_are_no_session(folder):
 def test_every_setting_stands_in_the_provenance(key, usual):
     row = next(row for row in USUAL.all() if row.key == key)
     settings = USUAL.changed({key: other(row)})
-    again = replace(usual, session=replace(usual.session, trials=tuple(replace(t, settings=settings) for t in usual.session)))
+    again = replace(
+        usual, session=replace(usual.session, trials=tuple(replace(t, settings=settings) for t in usual.session))
+    )
     before, after = (provenance(one, created="now").as_dict()["settings"] for one in (usual, again))
     assert {name for name in before if before[name] != after[name]} == {key}
     assert set(before) == {row.key for row in USUAL.all()}
@@ -157,7 +167,9 @@ def test_a_choice_changes_the_simulated_wrench(changes, least, usual, folder):
 
 
 def test_joints_are_static_where_that_was_chosen(folder):
-    found = [biodance.examine(biodance.read_session(folder, settings={"joints": how})) for how in ("functional", "static")]
+    found = [
+        biodance.examine(biodance.read_session(folder, settings={"joints": how})) for how in ("functional", "static")
+    ]
     assert [bool(one.body.joint_errors) for one in found] == [True, False]
     assert moved(*found) > 0.5
 
@@ -170,7 +182,9 @@ def test_gravity_reaches_weight_and_mass_alike(usual, folder):
         before, after = (one[name].comparison.simulated[:, 2].mean() for one in (usual, heavy))
         assert after / before == pytest.approx(ratio, rel=1e-4)
     assert usual.standing.mass / heavy.standing.mass == pytest.approx(ratio, rel=1e-9)
-    assert standing_mass(usual.session["static"]) / standing_mass(heavy.session["static"]) == pytest.approx(ratio, rel=1e-9)
+    assert standing_mass(usual.session["static"]) / standing_mass(heavy.session["static"]) == pytest.approx(
+        ratio, rel=1e-9
+    )
 
 
 def test_forces_may_have_a_cutoff_of_their_own(squat):
@@ -180,7 +194,10 @@ def test_forces_may_have_a_cutoff_of_their_own(squat):
     plate = squat.plates[0]
     wave = np.sin(2 * np.pi * 12.0 * plate.wrench.time)[:, None] * np.ones(6)
     shaken = replace(squat, plates=(replace(plate, wrench=replace(plate.wrench, value=wave)),))
-    passed = [prepare(replace(shaken, settings=one)).wrench.value[100:-100].std() for one in (alone, USUAL.changed({"filter.cutoff": 6}))]
+    passed = [
+        prepare(replace(shaken, settings=one)).wrench.value[100:-100].std()
+        for one in (alone, USUAL.changed({"filter.cutoff": 6}))
+    ]
     assert passed[0] == pytest.approx(np.sqrt(0.5), rel=0.01)
     assert passed[1] < 0.05
 
@@ -209,7 +226,9 @@ def test_gaps_standing_contact_and_checks_reach_their_steps(squat, usual):
     assert not is_still(replace(calm, settings=USUAL.changed({"standing.still": 0.9 * far})))
     static = usual.session["static"]
     assert standing_mass(replace(static, settings=USUAL.changed({"standing.shortest": 30}))) is None
-    strict = replace(usual["squat_1"], trial=replace(usual["squat_1"].trial, settings=USUAL.changed({"checks.marker_rms": 0.001})))
+    strict = replace(
+        usual["squat_1"], trial=replace(usual["squat_1"].trial, settings=USUAL.changed({"checks.marker_rms": 0.001}))
+    )
     inside = {check.what: check.inside for check in trial_checks(strict, 62.0)}
     assert not inside["marker distance, RMS"]
     assert all(check.inside for check in usual["squat_1"].checks)

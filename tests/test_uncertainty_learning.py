@@ -46,7 +46,9 @@ def test_one_parameter_with_a_posterior_by_hand() -> None:
 
 def test_noise_keeps_the_start_where_few_coefficients_are() -> None:
     start = np.diag([4.0] * 6)
-    found = noise_of(Moments(np.stack([12 * np.eye(6), np.zeros((6, 6))]), np.array([12.0, 0.0])), start=start, worth=6.0)
+    found = noise_of(
+        Moments(np.stack([12 * np.eye(6), np.zeros((6, 6))]), np.array([12.0, 0.0])), start=start, worth=6.0
+    )
     np.testing.assert_allclose(found[0], (12 / 18 * 1 + 6 / 18 * 4) * np.eye(6) + floor())
     np.testing.assert_allclose(found[1], start + floor())
     np.testing.assert_allclose(np.sqrt(np.diag(floor())), [0.15] * 3 + [0.05] * 3)

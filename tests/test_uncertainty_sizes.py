@@ -23,7 +23,9 @@ from biodance.virtual_lab.tolerances import REALISTIC
 CALIBRATED = replace(body(), joint_errors=(JointError("right_knee", 0.006, 0.04), JointError("trunk", 0.013, 0.0)))
 TABLE = read_table("uncertainty", "sizes")
 ROOMS = ("body", "motion", "uncertainty", "identify", "diagnose", "virtual_lab", "dance", "pipeline", "effects")
-SAYS_A_SIZE = re.compile(r"(^|_)(SD|SIDES|SLIDE|HINGE|JOINT_CENTRE|ROOT_CENTRE|TILT|TURN|FLOOR|GAIN|OFFSET|SOFT_TISSUE|FIXED_POINT)(_|$)")
+SAYS_A_SIZE = re.compile(
+    r"(^|_)(SD|SIDES|SLIDE|HINGE|JOINT_CENTRE|ROOT_CENTRE|TILT|TURN|FLOOR|GAIN|OFFSET|SOFT_TISSUE|FIXED_POINT)(_|$)"
+)
 CAUSES = ("plate_gain", "time_delay", "body_mass", "lab_tilt", "plate_position", "clock_drift", "joint_centre")
 ELSEWHERE = {
     "body/human/scaling.py:TILT": "deg, a warning's threshold",
@@ -69,9 +71,13 @@ def constants(path: Path) -> list[str]:
     """Return the names in a module that are set to numbers: constants, and defaults of records."""
     tree, names = ast.parse(path.read_text(encoding="utf-8")), []
     for node in [*tree.body, *(inner for one in tree.body if isinstance(one, ast.ClassDef) for inner in one.body)]:
-        targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
+        targets = (
+            node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
+        )
         value = getattr(node, "value", None)
-        if value is None or not any(isinstance(x, ast.Constant) and isinstance(x.value, float) for x in ast.walk(value)):
+        if value is None or not any(
+            isinstance(x, ast.Constant) and isinstance(x.value, float) for x in ast.walk(value)
+        ):
             continue
         names += [name.id for target in targets for name in ast.walk(target) if isinstance(name, ast.Name)]
     return names
@@ -79,7 +85,14 @@ def constants(path: Path) -> list[str]:
 
 def test_no_size_is_written_a_second_time() -> None:
     house = Path(biodance.__file__).parent
-    quantities = {row["quantity"].upper() for row in TABLE.rows} - {"MARKER", "CAMERA", "SCALE", "SWAY", "COM", "PERFORMANCE"}
+    quantities = {row["quantity"].upper() for row in TABLE.rows} - {
+        "MARKER",
+        "CAMERA",
+        "SCALE",
+        "SWAY",
+        "COM",
+        "PERFORMANCE",
+    }
     found = set()
     for room in ROOMS:
         for path in sorted((house / room).rglob("*.py")):
@@ -129,5 +142,7 @@ def test_diagnosis_asks_the_body_whether_its_joints_were_calibrated() -> None:
     for one, expected in ((put, {BEFORE}), (there, {""})):
         _, keys, means = nuisances(one, candidates(one, ("plate_gain",)))
         assert {key.removeprefix("tilt knee") for key in keys if key.startswith("tilt knee")} == expected
-        assert {key for key in keys if key.startswith("plate")} == {key_of("plate_gain", c) for c in ("Fx", "Fy", "Fz", "Mx", "My", "Mz")}
+        assert {key for key in keys if key.startswith("plate")} == {
+            key_of("plate_gain", c) for c in ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+        }
         assert len(means) == len(keys)

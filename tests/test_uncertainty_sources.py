@@ -62,7 +62,9 @@ def needed(com: Array, turn: Array) -> Array:
     momentum = mass[:, None] * rate(com)
     angular = np.cross(com, momentum) + ((turn @ own @ np.swapaxes(turn, -1, -2)) @ spin[..., None])[..., 0]
     force = rate(momentum.sum(axis=1)) - mass.sum() * GRAVITY
-    return np.concatenate([force, rate(angular.sum(axis=1)) - np.cross(com, mass[:, None] * GRAVITY).sum(axis=1)], axis=1)
+    return np.concatenate(
+        [force, rate(angular.sum(axis=1)) - np.cross(com, mass[:, None] * GRAVITY).sum(axis=1)], axis=1
+    )
 
 
 def stepped(q: Array, k: int, size: float | Array) -> Array:
@@ -118,7 +120,10 @@ def disturbed(kind: str) -> tuple[ErrorSource, int, Array, Array, Array]:
     """
     one = body()
     true, worn = poses(one, moving().q), np.array(one.markers.segment)
-    marker, com = true.points(list(worn), one.markers.position), true.points(list(range(len(one.segments))), one.sip.com)
+    marker, com = (
+        true.points(list(worn), one.markers.position),
+        true.points(list(range(len(one.segments))), one.sip.com),
+    )
     moved, places, turns = np.zeros_like(marker), np.zeros_like(com), np.zeros_like(com)
     if kind in ("slide", "alone"):
         s = one.segment_index("right_thigh")
@@ -183,7 +188,9 @@ def test_squares_are_those_of_the_residuals() -> None:
     segment, angle = one.markers.segment[1], np.flatnonzero(neighbours(one)[:, one.markers.segment[1]])[0]
     source = of_markers(one)[0]
     rank = sum(s == segment for s in one.markers.segment[:1])
-    column = sum(pattern.shape[2] * int(neighbours(one)[:, s].sum()) for s, pattern in enumerate(source.patterns[:segment]))
+    column = sum(
+        pattern.shape[2] * int(neighbours(one)[:, s].sum()) for s, pattern in enumerate(source.patterns[:segment])
+    )
     column += 3 * rank * int(neighbours(one)[:, segment].sum())
     moved = np.zeros((40, len(one.markers.names), 3))
     moved[:, 1] = trial.pose.rotation[:, segment, :, 0] * trial.angles[:, angle, None]
@@ -199,8 +206,12 @@ def test_derivatives_of_a_wave() -> None:
     second, first = derivatives(200)
     wave = np.sin(2 * np.pi * 4.0 * time)
     inside = slice(10, -10)
-    np.testing.assert_allclose(25 * (first @ wave)[inside], 8 * np.pi * np.cos(8 * np.pi * time)[inside], atol=0.01 * 8 * np.pi)
-    np.testing.assert_allclose(25**2 * (second @ wave)[inside], -((8 * np.pi) ** 2) * wave[inside], atol=0.02 * (8 * np.pi) ** 2)
+    np.testing.assert_allclose(
+        25 * (first @ wave)[inside], 8 * np.pi * np.cos(8 * np.pi * time)[inside], atol=0.01 * 8 * np.pi
+    )
+    np.testing.assert_allclose(
+        25**2 * (second @ wave)[inside], -((8 * np.pi) ** 2) * wave[inside], atol=0.02 * (8 * np.pi) ** 2
+    )
 
 
 def test_the_brute_wrench_is_the_predicted_one() -> None:
@@ -211,5 +222,7 @@ def test_the_brute_wrench_is_the_predicted_one() -> None:
 
 
 def test_a_slide_needs_markers() -> None:
-    one = replace(body(), markers=replace(body().markers, names=(), segment=(), position=np.zeros((0, 3)), weight=np.zeros(0)))
+    one = replace(
+        body(), markers=replace(body().markers, names=(), segment=(), position=np.zeros((0, 3)), weight=np.zeros(0))
+    )
     assert not Slide(one, tuple(np.empty((0, 3, 0)) for _ in one.segments)).groups

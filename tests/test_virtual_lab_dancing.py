@@ -1,4 +1,6 @@
-"""A virtual person copies a dance: exactly when told to, degrees off and slower when not, always on feet that stay where they are."""
+"""A virtual person copies a dance: exactly when told to, degrees off and slower when not, always on feet that stay
+where they are.
+"""
 
 import json
 from dataclasses import replace
@@ -22,7 +24,7 @@ from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.pipeline.danced import simulate_dance, stretches
 from biodance.records import Subject
-from biodance.virtual_lab.dancing import JOINTS, Performer, copy_dance
+from biodance.virtual_lab.dancing import _JOINTS, Performer, copy_dance
 from biodance.virtual_lab.performance import true_wrench
 from biodance.virtual_lab.person import make_person
 from biodance.virtual_lab.tolerances import PERFECT
@@ -60,7 +62,7 @@ def copied(dance: Dance, performer: Performer = EXACT):
 def test_an_exact_copy_has_the_angles_of_the_plan_and_keeps_its_balance(dance: Dance) -> None:
     person, shown, done = copied(dance)
     motion = done.motion(shown.motion.time)
-    for name in (*JOINTS["right_arm"], *JOINTS["left_arm"]):
+    for name in (*_JOINTS["right_arm"], *_JOINTS["left_arm"]):
         planned = shown.motion.q[:, 7 + shown.body.joint_index(name)]
         np.testing.assert_allclose(motion.q[:, 7 + person.body.joint_index(name)], planned, atol=0.03)
     assert done.balance_error < 0.005
@@ -84,7 +86,7 @@ def test_the_usual_performer_is_five_to_ten_degrees_off_and_slower(dance: Dance)
     person, shown, done = copied(dance, Performer())
     assert done.plan.duration == pytest.approx(1.2 * (shown.motion.time[-1] - shown.motion.time[0]), abs=0.06)
     motion = done.motion(1.2 * shown.motion.time)
-    arms = [name for field in ("right_arm", "left_arm") for name in JOINTS[field]]
+    arms = [name for field in ("right_arm", "left_arm") for name in _JOINTS[field]]
     planned = shown.motion.q[:, [7 + shown.body.joint_index(name) for name in arms]]
     off = motion.q[:, [7 + person.body.joint_index(name) for name in arms]] - planned
     assert 4.0 < np.degrees(np.sqrt(np.mean(np.square(off)))) < 10.0

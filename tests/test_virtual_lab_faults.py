@@ -1,4 +1,6 @@
-"""Hidden faults arrive in the files as they were asked for: read back through the lab's own door and compared with the clean session."""
+"""Hidden faults arrive in the files as they were asked for: read back through the lab's own door and compared with
+the clean session.
+"""
 
 from pathlib import Path
 
@@ -39,7 +41,11 @@ def about_centre(trial: Trial, centre: np.ndarray) -> np.ndarray:
 def test_channel_faults_have_the_size_asked_for(clean: tuple[int, Trial], tmp_path: Path) -> None:
     kind, before = clean
     centre = before.plates[0].centre
-    texts = ("plate_gain:target=Fz,gain=0.04", "plate_crosstalk:target=Fz->My,ratio=0.01", "plate_offset:target=Mx,offset=8")
+    texts = (
+        "plate_gain:target=Fz,gain=0.04",
+        "plate_crosstalk:target=Fz->My,ratio=0.01",
+        "plate_offset:target=Mx,offset=8",
+    )
     after = recorded(tmp_path / "s", texts, plate_type=kind)
     x, y = about_centre(before, centre), about_centre(after, centre)
     tolerance = 0.2 if kind == 2 else 2.0  # TYPE 4 is stored in coarse volts
@@ -91,7 +97,11 @@ def test_words_are_read_and_wrong_ones_refused() -> None:
         "added_mass", "left_shank", {"mass": (1.0,), "place": (0.0, -0.1, 0.05)}
     )
     plan = read_protocol("standing")
-    for text, match in (("plate_gain:target=Fz,gian=0.1", "gain"), ("plate_gain:target=Fq,gain=0.1", "channel"), ("nothing", "Legal")):
+    for text, match in (
+        ("plate_gain:target=Fz,gian=0.1", "gain"),
+        ("plate_gain:target=Fq,gain=0.1", "channel"),
+        ("nothing", "Legal"),
+    ):
         with pytest.raises((BiodanceError, UnknownName), match=match):
             hide((parse_cause(text),), SUBJECT, plan, seed=1)
     with pytest.raises(BiodanceError, match="not a number"):

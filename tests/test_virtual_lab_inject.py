@@ -1,4 +1,6 @@
-"""Faults written into copies of recordings: the change is what was asked for, everything else is the original, byte by byte."""
+"""Faults written into copies of recordings: the change is what was asked for, everything else is the original, byte
+by byte.
+"""
 
 import os
 from pathlib import Path
@@ -61,7 +63,9 @@ def test_a_copy_with_a_fault_is_a_recording_with_that_fault(text: str, clean: tu
 
 def test_a_drift_runs_with_the_clock_given(clean: tuple[int, Path], tmp_path: Path) -> None:
     _, path = clean
-    change = written(path, tmp_path / "c.c3d", "plate_drift:target=Fx,drift=9").wrench.value - read_trial(path).wrench.value
+    change = (
+        written(path, tmp_path / "c.c3d", "plate_drift:target=Fx,drift=9").wrench.value - read_trial(path).wrench.value
+    )
     np.testing.assert_allclose(change[:, 0], 9 * (np.linspace(*CLOCK, len(change)) - 0.5), atol=2e-3)
 
 
@@ -86,10 +90,17 @@ def test_what_does_not_fit_into_a_copy_is_refused(clean: tuple[int, Path], tmp_p
 
 def about_centre(trial: Trial, plate: int) -> Array:
     found = trial.plates[plate]
-    return np.concatenate([found.wrench.force, found.wrench.moment - np.cross(found.centre, found.wrench.force)], axis=1)
+    return np.concatenate(
+        [found.wrench.force, found.wrench.moment - np.cross(found.centre, found.wrench.force)], axis=1
+    )
 
 
-REAL = ("biomechzoo/HC030A/HC030A05.c3d", "biomechzoo/HC032A/HC032A01.c3d", "pycgm/Movement_trial.c3d", "adl_gait/2014001_C1_01.c3d")
+REAL = (
+    "biomechzoo/HC030A/HC030A05.c3d",
+    "biomechzoo/HC032A/HC032A01.c3d",
+    "pycgm/Movement_trial.c3d",
+    "adl_gait/2014001_C1_01.c3d",
+)
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -106,6 +117,8 @@ def test_real_recordings_of_four_laboratories_take_faults(name: str, data: Path,
     late = about_centre(written(path, tmp_path / "late.c3d", "time_delay:delay=0.02"), 0)
     shift = 0.02 * before.plates[0].wrench.rate
     if shift == round(shift):
-        np.testing.assert_allclose(late[round(shift) :], x[: -round(shift)], atol=0.6)  # the empty plate's mean moves a little
+        np.testing.assert_allclose(
+            late[round(shift) :], x[: -round(shift)], atol=0.6
+        )  # the empty plate's mean moves a little
     raw = read_raw(path), read_raw(tmp_path / "late.c3d")
     np.testing.assert_array_equal(raw[0].points, raw[1].points)

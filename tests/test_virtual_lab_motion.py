@@ -1,4 +1,6 @@
-"""The true motion: feet stand still, the balance holds, and the wrench is the one that mechanics demands of the motion."""
+"""The true motion: feet stand still, the balance holds, and the wrench is the one that mechanics demands of the
+motion.
+"""
 
 import numpy as np
 import pytest
@@ -79,7 +81,10 @@ def test_the_centre_of_pressure_stays_under_the_feet_that_stand(performances):
         time = np.arange(0.0, act.plan.duration, 0.02)
         cop = act.wrench(time).cop()[:, :2]
         body = act.person.body
-        sole = {s: (act.stance.foot_turn[s] @ np.array(body.feet[s].outline).T).T[:, :2] + act.stance.ankle[s][:2] for s in SIDES}
+        sole = {
+            s: (act.stance.foot_turn[s] @ np.array(body.feet[s].outline).T).T[:, :2] + act.stance.ankle[s][:2]
+            for s in SIDES
+        }
         up = {s: np.interp(time, act.node_time, act.curves.raised(s)) > 0 for s in SIDES}
         for frames, sides in ((~up["right"] & ~up["left"], SIDES), (up["right"], ("left",)), (up["left"], ("right",))):
             corners = np.concatenate([sole[s] for s in sides])
@@ -132,7 +137,9 @@ def test_the_wrench_is_the_rate_of_momentum(performances):
 def test_the_true_wrench_equals_the_regressor_of_the_true_body(performances):
     act = performances[2]
     time = np.arange(1.0, 3.0, 0.05)
-    np.testing.assert_allclose(predict_wrench(act.person.loaded_body, act.motion(time)).value, act.wrench(time).value, atol=0.05)
+    np.testing.assert_allclose(
+        predict_wrench(act.person.loaded_body, act.motion(time)).value, act.wrench(time).value, atol=0.05
+    )
 
 
 def test_standing_still_weighs_the_person_and_the_load(performances):

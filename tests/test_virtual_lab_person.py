@@ -1,4 +1,6 @@
-"""The virtual person: physically possible, unlike the tables, the same on every day; loads and the merge to 12 segments keep all mass."""
+"""The virtual person: physically possible, unlike the tables, the same on every day; loads and the merge to 12
+segments keep all mass.
+"""
 
 import numpy as np
 import pytest
@@ -7,7 +9,7 @@ from biodance.errors import BiodanceError, UnknownName
 from biodance.motion.kinematics import poses
 from biodance.records import Subject
 from biodance.virtual_lab.cameras import reference_angles
-from biodance.virtual_lab.flesh import FEMALE, of_parameters, parameters_of_inertia, place_inertia, true_pseudo_inertia
+from biodance.virtual_lab.flesh import _FEMALE, of_parameters, parameters_of_inertia, place_inertia, true_pseudo_inertia
 from biodance.virtual_lab.merge import MERGED, load_on, merged_sip, place_in_12
 from biodance.virtual_lab.person import AddedLoad, make_person
 from biodance.virtual_lab.skeleton import TRUE_SEGMENTS, UPRIGHT_CHAIN
@@ -29,7 +31,9 @@ def test_a_person_is_physically_possible_and_adds_up(subject):
 
 def test_masses_scatter_around_the_mean_by_the_stated_tolerance():
     thighs = [make_person(SUBJECTS[1], seed).body.sip.of("right_thigh")[0] for seed in range(60)]
-    mean = FEMALE["thigh"][0] / sum(row[0] * (1 if kind in ("pelvis", "lumbar", "thorax", "head") else 2) for kind, row in FEMALE.items())
+    mean = _FEMALE["thigh"][0] / sum(
+        row[0] * (1 if kind in ("pelvis", "lumbar", "thorax", "head") else 2) for kind, row in _FEMALE.items()
+    )
     assert np.mean(thighs) == pytest.approx(65 * mean, rel=0.05)
     assert 0.07 < np.std(thighs) / np.mean(thighs) < 0.16
 
@@ -84,7 +88,10 @@ def test_the_merge_to_12_segments_keeps_mass_centre_and_kinetic_energy():
     q = body.neutral
     q[7:] = reference_angles(person)
     pose = poses(body, q)
-    fine = sum(place_inertia(of_parameters(body.sip.of(s)), pose.rotation[0, i], pose.position[0, i]) for i, s in enumerate(TRUE_SEGMENTS))
+    fine = sum(
+        place_inertia(of_parameters(body.sip.of(s)), pose.rotation[0, i], pose.position[0, i])
+        for i, s in enumerate(TRUE_SEGMENTS)
+    )
     coarse = np.zeros((4, 4))
     for segment, (joint, _) in MERGED.items():
         index = body.joint_index(joint) if joint else -1

@@ -1,4 +1,6 @@
-"""Protocol files: the shipped ones are sound, a wrong one is refused with a sentence that says what to write instead."""
+"""Protocol files: the shipped ones are sound, a wrong one is refused with a sentence that says what to write
+instead.
+"""
 
 import pytest
 
@@ -65,11 +67,18 @@ def test_the_weight_goes_to_the_foot_that_stands(tmp_path):
         (HEAD + "[[trials]]\nname = 'a'\nsteps = [{to = 'arms', move = 0.1}]\n", "at least 0.25 s"),
         (HEAD + "[[trials]]\nname = 'a'\nsteps = [{to = 'arms', move = 'slow'}]\n", "expected 1 finite number"),
         (HEAD + "[[trials]]\nname = 'a'\nsteps = [{to = 'arms', cycles = -1}]\n", "whole number"),
-        (HEAD + "[[trials]]\nname = 'a'\nsteps = [{to = 'up'}, {to = 'other'}]\n", "without putting the other one down"),
+        (
+            HEAD + "[[trials]]\nname = 'a'\nsteps = [{to = 'up'}, {to = 'other'}]\n",
+            "without putting the other one down",
+        ),
         (HEAD + "[[trials]]\nname = 'a'\nsteps = [{to = 'up', cycles = 3}]\n", "within a cycle"),
         (HEAD + "[[trials]]\nname = 'a'\nlead = 0.0\n", "lasts no time"),
         (HEAD + "[[trials]]\nname = 'a'\n[[trials]]\nname = 'a'\n", "occur twice"),
-        (HEAD + "[postures.fly]\nleft_leg = [0, 0, 0, 90, 0]\nright_leg = [0, 0, 0, 90, 0]\n[[trials]]\nname = 'a'\n", "both feet"),
+        (
+            HEAD
+            + "[postures.fly]\nleft_leg = [0, 0, 0, 90, 0]\nright_leg = [0, 0, 0, 90, 0]\n[[trials]]\nname = 'a'\n",
+            "both feet",
+        ),
         (HEAD + "[postures.b]\ndepth = 0.9\n[[trials]]\nname = 'a'\n", "depth in 0..0.6"),
         (HEAD + "[postures.b]\ntrunk = [1, 2]\n[[trials]]\nname = 'a'\n", "expected 3 finite numbers"),
         (HEAD + "[postures.b]\ntrunck = [1, 2, 3]\n[[trials]]\nname = 'a'\n", "Did you mean 'trunk'"),

@@ -73,7 +73,9 @@ def test_the_truth_can_be_told_in_another_model_s_frames(session):
     turn, place = np.array([s["rotation"] for s in own]), np.array([s["position_m"] for s in own])
     same = sip_in_frames(truth, turn, place)
     np.testing.assert_allclose(same.com, [s["com_m"] for s in truth["segments_12"]], atol=1e-12)
-    np.testing.assert_allclose(same.phi.reshape(-1, 10)[:, 4:], [s["inertia_kgm2"] for s in truth["segments_12"]], atol=1e-12)
+    np.testing.assert_allclose(
+        same.phi.reshape(-1, 10)[:, 4:], [s["inertia_kgm2"] for s in truth["segments_12"]], atol=1e-12
+    )
     rng = np.random.default_rng(0)
     other_turn = np.stack([small_rotation(r) for r in 0.2 * rng.normal(size=(12, 3))]) @ turn
     other_place = place + 0.03 * rng.normal(size=(12, 3))
@@ -96,7 +98,9 @@ def test_the_same_seed_writes_the_same_bytes_and_another_day_does_not(tmp_path, 
     assert one["markers"] != two["markers"]
 
 
-@pytest.mark.parametrize("laboratory", [Laboratory(bits=32), Laboratory(bits=32, plate_type=4, heading=1.2), Laboratory(bits=32, plates=2)])
+@pytest.mark.parametrize(
+    "laboratory", [Laboratory(bits=32), Laboratory(bits=32, plate_type=4, heading=1.2), Laboratory(bits=32, plates=2)]
+)
 def test_a_perfect_laboratory_gives_the_truth_back(tmp_path, protocol, laboratory):
     out = simulate_session(SUBJECT, protocol, tmp_path / "S", seed=3, visit=LabVisit(0, laboratory, FAITHFUL))
     person = make_person(SUBJECT, 3, tolerances=FAITHFUL)
@@ -176,7 +180,10 @@ def test_loads_weigh_on_the_plate_but_not_in_what_the_analyst_declares(tmp_path,
     static = read_c3d(out / "static.c3d")
     assert static.wrench.force[:, 2].mean() / 9.80665 == pytest.approx(60.4, rel=0.01)
     truth = json.loads((out / "truth" / "truth.json").read_text())
-    arm, loaded = (next(s for s in truth[key] if s["name"] == "left_forearm_hand") for key in ("segments_12", "segments_12_with_loads"))
+    arm, loaded = (
+        next(s for s in truth[key] if s["name"] == "left_forearm_hand")
+        for key in ("segments_12", "segments_12_with_loads")
+    )
     assert loaded["mass_kg"] - arm["mass_kg"] == pytest.approx(2.4)
 
 

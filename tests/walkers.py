@@ -1,4 +1,6 @@
-"""Feet that step over known ground, with force plates that measure what stands on them: trials whose contact is known."""
+"""Feet that step over known ground, with force plates that measure what stands on them: trials whose contact is
+known.
+"""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +19,9 @@ HEEL_TO_TOE = 0.20
 
 @dataclass(frozen=True)
 class Stand:
-    """A foot on the ground from ``start`` to ``stop`` s with its heel at ``place`` (3,) m, pointing along x turned by ``yaw`` rad."""
+    """A foot on the ground from ``start`` to ``stop`` s with its heel at ``place`` (3,) m, pointing along x turned
+    by ``yaw`` rad.
+    """
 
     start: float
     stop: float
@@ -52,9 +56,16 @@ def foot_path(stands: list[Stand], time: np.ndarray, lift: float = 0.1) -> tuple
 
 
 def walker(
-    right: list[Stand], left: list[Stand], plates: list[Plate], *, duration: float, air: tuple[str, ...] = (), noise: float = 2e-4
+    right: list[Stand],
+    left: list[Stand],
+    plates: list[Plate],
+    *,
+    duration: float,
+    air: tuple[str, ...] = (),
+    noise: float = 2e-4,
 ) -> tuple[Trial, Soles, np.ndarray, np.ndarray]:
-    """Return a prepared trial, its soles, the true contact (T, 2) and, per foot, whether a plate carried all of it (T, 2).
+    """Return a prepared trial, its soles, the true contact (T, 2) and, per foot, whether a plate carried all of it (T,
+    2).
 
     ``air`` names feet ("right", "left") whose stands are held in the air: they carry nothing.
     """
@@ -70,7 +81,11 @@ def walker(
         force = share[:, foot, None] * np.array([10.0, -5.0, WEIGHT])
         for index, one in enumerate(plates):
             low, high = one.corners[:, :2].min(axis=0), one.corners[:, :2].max(axis=0)
-            on = ((cop[:, :2] > low) & (cop[:, :2] < high)).all(axis=1) & (np.abs(cop[:, 2] - one.height) < 0.01) & true[:, foot]
+            on = (
+                ((cop[:, :2] > low) & (cop[:, :2] < high)).all(axis=1)
+                & (np.abs(cop[:, 2] - one.height) < 0.01)
+                & true[:, foot]
+            )
             forces[index] += np.where(on[:, None], np.concatenate([force, np.cross(cop, force)], axis=1), 0.0)
             carried[:, foot] |= on
     rng = np.random.default_rng(11)

@@ -1,8 +1,9 @@
 """The Body record: a tree of rigid segments on one-degree-of-freedom joints, with markers, prior SIP, limits and boxes.
 
-Segment frames follow ISB: x anterior, y up, z right (in the upright neutral posture), origin at the proximal joint centre; they are
-the joint frames in which the SIP are written. The lab frame has z up, so the neutral root is rotated by +90 deg about x.
-A joint with several degrees of freedom is a chain of one-dof joints whose intermediate links carry no segment.
+Segment frames follow ISB: x anterior, y up, z right (in the upright neutral posture), origin at the proximal joint
+centre; they are the joint frames in which the SIP are written. The lab frame has z up, so the neutral root is rotated
+by +90 deg about x. A joint with several degrees of freedom is a chain of one-dof joints whose intermediate links carry
+no segment.
 """
 
 from dataclasses import dataclass, field
@@ -30,9 +31,10 @@ UPRIGHT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 class Joint:
     """One revolute degree of freedom.
 
-    ``parent`` index of the parent joint in ``Body.joints`` (-1: the root); ``axis`` (3,) unit vector in the joint's frame, signed so that
-    the positive angle is the anatomical direction in ``positive``; ``rotation`` (3, 3) and ``translation`` (3,) m place the joint frame in
-    the parent joint's frame at zero angle; ``segment`` index of the segment that turns with this joint, -1 for an intermediate link.
+    ``parent`` index of the parent joint in ``Body.joints`` (-1: the root); ``axis`` (3,) unit vector in the joint's
+    frame, signed so that the positive angle is the anatomical direction in ``positive``; ``rotation`` (3, 3) and
+    ``translation`` (3,) m place the joint frame in the parent joint's frame at zero angle; ``segment`` index of the
+    segment that turns with this joint, -1 for an intermediate link.
     """
 
     name: str
@@ -52,7 +54,9 @@ class Joint:
 
 @dataclass(frozen=True, eq=False)
 class SegmentMarkers:
-    """Where each marker sits: ``names`` (K), ``segment`` (K,) index, ``position`` (K, 3) m in the segment frame, ``weight`` (K,) >= 0."""
+    """Where each marker sits: ``names`` (K), ``segment`` (K,) index, ``position`` (K, 3) m in the segment frame,
+    ``weight`` (K,) >= 0.
+    """
 
     names: tuple[str, ...]
     segment: tuple[int, ...]
@@ -68,8 +72,8 @@ class SegmentMarkers:
 
 
 class JointError(NamedTuple):
-    """How far the anatomical ``joint`` of a body may be from the person's, standard deviations: ``centre`` m per axis, ``axis`` rad of a
-    hinge's flexion axis (0 for other joints).
+    """How far the anatomical ``joint`` of a body may be from the person's, standard deviations: ``centre`` m per axis,
+    ``axis`` rad of a hinge's flexion axis (0 for other joints).
     """
 
     joint: str
@@ -99,7 +103,9 @@ class JointLimits:
 
 @dataclass(frozen=True, eq=False)
 class Foot:
-    """The sole: ``segment`` index of the foot, ``outline`` (P, 3) m corners in the foot's segment frame, counter-clockwise from above."""
+    """The sole: ``segment`` index of the foot, ``outline`` (P, 3) m corners in the foot's segment frame,
+    counter-clockwise from above.
+    """
 
     segment: int
     outline: Array
@@ -167,14 +173,19 @@ class Body:
         object.__setattr__(self, "gravity", frozen_array(self.gravity, (3,), f"{self.name}.gravity"))
         object.__setattr__(self, "com_boxes", frozen_array(self.com_boxes, (count, 2, 3), f"{self.name}.com_boxes"))
         if self.sip.segments != self.segments:
-            raise BiodanceError(f"{self.name}: the SIP name other segments ({self.sip.segments}) than the body ({self.segments}).")
+            raise BiodanceError(
+                f"{self.name}: the SIP name other segments ({self.sip.segments}) than the body ({self.segments})."
+            )
         if len(self.limits.lower) != len(self.joints):
             raise BiodanceError(f"{self.name}: {len(self.joints)} joints but limits for {len(self.limits.lower)}.")
         if any(joint.parent >= i for i, joint in enumerate(self.joints)):
             raise BiodanceError(f"{self.name}: a joint comes before its parent.")
 
     def __repr__(self) -> str:
-        return f"Body({self.name!r}, {len(self.segments)} segments, {len(self.joints)} joint angles, {self.sip.mass.sum():.1f} kg)"
+        return (
+            f"Body({self.name!r}, {len(self.segments)} segments, {len(self.joints)} joint angles, "
+            f"{self.sip.mass.sum():.1f} kg)"
+        )
 
     def _repr_html_(self) -> str:
         return display.card(repr(self), self.table(), self.notes)

@@ -11,12 +11,12 @@ from biodance.body.body import Body, Foot, Joint, JointError, JointLimits, Segme
 from biodance.errors import BiodanceError, FileRefused
 from biodance.records import Sip
 
-VERSION = 1
+_VERSION = 1
 
 
 def body_text(body: Body, source: str) -> str:
     """Return the file's text; ``source`` says in a sentence where the parameters come from."""
-    return json.dumps({"biodance_body": VERSION, "source": source, **asdict(body)}, default=np.ndarray.tolist) + "\n"
+    return json.dumps({"biodance_body": _VERSION, "source": source, **asdict(body)}, default=np.ndarray.tolist) + "\n"
 
 
 def read_body(path: str | Path) -> tuple[Body, str]:
@@ -44,13 +44,15 @@ def parse_body(text: str, where: str) -> tuple[Body, str]:
     """
     try:
         found: dict[str, Any] = json.loads(text)
-        if found.get("biodance_body") != VERSION:
-            raise FileRefused(f"{where}: is no body of version {VERSION}. Run biodance identify again.")
+        if found.get("biodance_body") != _VERSION:
+            raise FileRefused(f"{where}: is no body of version {_VERSION}. Run biodance identify again.")
         return _body(found), str(found["source"])
     except FileRefused:
         raise
     except (ValueError, KeyError, TypeError, AttributeError, BiodanceError) as error:
-        raise FileRefused(f"{where}: is not a body that biodance wrote ({error}). Run biodance identify again.") from error
+        raise FileRefused(
+            f"{where}: is not a body that biodance wrote ({error}). Run biodance identify again."
+        ) from error
 
 
 def _body(found: dict[str, Any]) -> Body:

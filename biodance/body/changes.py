@@ -10,8 +10,8 @@ from biodance.records import Array, Sip
 
 
 def move_joint(body: Body, joint: int, shift: Array) -> Body:
-    """Return the body with the origin of ``joint`` (an index) moved by ``shift`` (3,) m in its parent's frame; all that hangs on it goes
-    along.
+    """Return the body with the origin of ``joint`` (an index) moved by ``shift`` (3,) m in its parent's frame; all that
+    hangs on it goes along.
     """
     joints = list(body.joints)
     joints[joint] = replace(joints[joint], translation=joints[joint].translation + np.asarray(shift))
@@ -19,8 +19,8 @@ def move_joint(body: Body, joint: int, shift: Array) -> Body:
 
 
 def recentre_joint(body: Body, joint: int, shift: Array) -> Body:
-    """Return the body whose ``joint`` turns about a point ``shift`` (3,) m away (in its parent's frame), while in the neutral posture
-    matter, markers and all other joints stay where they are.
+    """Return the body whose ``joint`` turns about a point ``shift`` (3,) m away (in its parent's frame), while in the
+    neutral posture matter, markers and all other joints stay where they are.
     """
     segment, back = carried_by(body, joint), -neutral_turn(body, joint) @ np.asarray(shift)
     moved = move_joint(body, joint, shift)
@@ -33,7 +33,10 @@ def recentre_joint(body: Body, joint: int, shift: Array) -> Body:
     sip = Sip(body.segments, table @ body.sip.phi, table @ body.sip.covariance @ table.T)
     here = (np.arange(len(body.segments)) == segment)[:, None, None]
     boxes, com_boxes = (np.where(here, box + back, box) for box in (body.boxes, body.com_boxes))
-    feet = {side: replace(foot, outline=foot.outline + back) if foot.segment == segment else foot for side, foot in body.feet.items()}
+    feet = {
+        side: replace(foot, outline=foot.outline + back) if foot.segment == segment else foot
+        for side, foot in body.feet.items()
+    }
     return replace(moved, joints=joints, markers=markers, sip=sip, boxes=boxes, com_boxes=com_boxes, feet=feet)
 
 
@@ -61,16 +64,20 @@ def neutral_turn(body: Body, joint: int) -> Array:
 
 
 def shift_matter(shift: Array) -> Array:
-    """Return the map (10, 10) of the ten parameters when all matter moves by ``shift`` (3,) m in the segment's frame."""
+    """Return the map (10, 10) of the ten parameters when all matter moves by ``shift`` (3,) m in the segment's
+    frame.
+    """
     move = np.eye(4)
     move[:3, 3] = shift
     return np.asarray(np.linalg.lstsq(PSEUDO_INERTIA, np.kron(move, move) @ PSEUDO_INERTIA, rcond=None)[0])
 
 
-RANGE, SPEED, TORQUE = 1.2, 10.0, 100.0
+_RANGE, _SPEED, TORQUE = 1.2, 10.0, 100.0
 """rad either way, rad/s, N·m: wide enough for any joint that is put in to follow markers."""
 SPLIT = 0.2
-"""Relative standard deviation of the lighter part: how well is known what a cut leaves on which side (assumed; a vertebra up or down)."""
+"""Relative standard deviation of the lighter part: how well is known what a cut leaves on which side (assumed; a
+vertebra up or down).
+"""
 GRAM, GYRATION = 1e-3, 0.03
 """kg and m: mass and radius of gyration of a part to which nothing is assigned, so that it has a centre of mass."""
 
@@ -79,9 +86,10 @@ GRAM, GYRATION = 1e-3, 0.03
 class Cut:
     """Where ``segment`` is cut.
 
-    The new segment ``name`` turns about ``axes`` (name -> (3,) unit vector), one after the other, through ``place`` (3,) m; it takes the
-    ten parameters ``phi`` (10,), the ``markers`` and the ``joints`` (indices of first axes) named. All in the frame of the cut segment.
-    A segment that takes no matter (``phi`` zero) is given a gram at ``place``, so that it has a centre of mass.
+    The new segment ``name`` turns about ``axes`` (name -> (3,) unit vector), one after the other, through ``place``
+    (3,) m; it takes the ten parameters ``phi`` (10,), the ``markers`` and the ``joints`` (indices of first axes) named.
+    All in the frame of the cut segment. A segment that takes no matter (``phi`` zero) is given a gram at ``place``, so
+    that it has a centre of mass.
     """
 
     segment: str
@@ -94,7 +102,8 @@ class Cut:
 
 
 def branch_off(body: Body, cut: Cut) -> Body:
-    """Return the body with the cut's joint, at zero angle the same as before; the new segment keeps the frame of the old one.
+    """Return the body with the cut's joint, at zero angle the same as before; the new segment keeps the frame of the
+    old one.
 
     The new joints follow the segment's own in ``Body.joints``; the new segment is the last one.
     """
@@ -120,7 +129,8 @@ def branch_off(body: Body, cut: Cut) -> Body:
             **{
                 key: np.insert(getattr(limits, key), first, np.full(count, value))
                 for key, value in (
-                    ("lower", -RANGE), ("upper", RANGE), ("velocity", SPEED), ("torque_lower", -TORQUE), ("torque_upper", TORQUE)
+                    ("lower", -_RANGE), ("upper", _RANGE), ("velocity", _SPEED), ("torque_lower", -TORQUE),
+                    ("torque_upper", TORQUE)
                 )
             }
         ),
@@ -135,8 +145,8 @@ def branch_off(body: Body, cut: Cut) -> Body:
 def _sip(body: Body, cut: Cut, names: tuple[str, ...]) -> Sip:
     """Return the parameters of both parts.
 
-    If the whole is heavier than thought, both are in proportion; what else it may be off by they share by mass; and what one has more at
-    the cut, the other has less. Nothing of this for a gram.
+    If the whole is heavier than thought, both are in proportion; what else it may be off by they share by mass; and
+    what one has more at the cut, the other has less. Nothing of this for a gram.
     """
     old = slice(10 * body.segment_index(cut.segment), 10 * body.segment_index(cut.segment) + 10)
     whole, moved = body.sip.phi[old], shift_matter(-cut.place)
@@ -167,4 +177,6 @@ def _com_boxes(body: Body, cut: Cut) -> Array:
 def _markers(body: Body, cut: Cut):  # type: ignore[no-untyped-def]
     on = np.array([name in cut.markers for name in body.markers.names])
     segment = tuple(len(body.segments) if moved else s for moved, s in zip(on, body.markers.segment, strict=True))
-    return replace(body.markers, segment=segment, position=body.markers.position - np.where(on[:, None], cut.place, 0.0))
+    return replace(
+        body.markers, segment=segment, position=body.markers.position - np.where(on[:, None], cut.place, 0.0)
+    )

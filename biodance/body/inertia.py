@@ -1,7 +1,7 @@
 """Mass, centre of mass and inertia of lumps, and their ten parameters about a joint.
 
-Pseudo-inertia (Wensing, Kim and Slotine 2018, doi:10.1109/LRA.2017.2729659): P = [[0.5 tr(I) 1 - I, m c], [m c', m]] about the joint; a
-lump is made of real (positive) mass if and only if P is positive semi-definite.
+Pseudo-inertia (Wensing, Kim and Slotine 2018, doi:10.1109/LRA.2017.2729659): P = [[0.5 tr(I) 1 - I, m c], [m c', m]]
+about the joint; a lump is made of real (positive) mass if and only if P is positive semi-definite.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,9 @@ TENSOR = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
 
 @dataclass(frozen=True, eq=False)
 class RigidInertia:
-    """A rigid lump: ``mass`` kg, ``com`` (3,) m in some frame, ``inertia`` (3, 3) kg·m² about the CoM, axes of that frame."""
+    """A rigid lump: ``mass`` kg, ``com`` (3,) m in some frame, ``inertia`` (3, 3) kg·m² about the CoM, axes of that
+    frame.
+    """
 
     mass: float
     com: Array
@@ -71,12 +73,16 @@ PSEUDO_INERTIA = _pseudo_inertia_map()
 
 
 def pseudo_inertia(phi: Array) -> Array:
-    """Return the pseudo-inertia matrices (N, 4, 4) of ``phi`` (10N,): second moments kg·m², first moments kg·m, mass kg."""
+    """Return the pseudo-inertia matrices (N, 4, 4) of ``phi`` (10N,): second moments kg·m², first moments kg·m, mass
+    kg.
+    """
     return (phi.reshape(-1, 10) @ PSEUDO_INERTIA.T).reshape(-1, 4, 4)
 
 
 def smallest_eigenvalues(phi: Array) -> Array:
-    """Return the smallest eigenvalue (N,) of every segment's pseudo-inertia; negative means that no such body can exist."""
+    """Return the smallest eigenvalue (N,) of every segment's pseudo-inertia; negative means that no such body can
+    exist.
+    """
     return np.asarray(np.linalg.eigvalsh(pseudo_inertia(phi))[:, 0])
 
 

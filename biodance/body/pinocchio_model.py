@@ -23,7 +23,11 @@ def load_pinocchio() -> Any:
     try:
         import pinocchio
     except ImportError as error:
-        cure = "Install it: apt-get install libgomp1." if "libgomp" in str(error) else "Install biodance again with its constraints.txt."
+        cure = (
+            "Install it: apt-get install libgomp1."
+            if "libgomp" in str(error)
+            else "Install biodance again with its constraints.txt."
+        )
         raise MissingLibrary(f"pinocchio does not load ({error}). {cure}") from error
     return pinocchio
 

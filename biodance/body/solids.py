@@ -1,6 +1,7 @@
 """Closed meshes of segments: made of their boxes, of their markers, or read from a file; and what a mesh weighs.
 
-All meshes are `trimesh.Trimesh` in m, in the axes of their segment (x anterior, y up, z right; origin at the proximal joint).
+All meshes are `trimesh.Trimesh` in m, in the axes of their segment (x anterior, y up, z right; origin at the proximal
+joint).
 """
 
 from collections.abc import Mapping
@@ -23,7 +24,7 @@ MESHES = (".stl", ".obj", ".ply", ".off", ".glb", ".dae")
 """Mesh files that are read, by the ending of their name."""
 ROUNDNESS = 4.0
 """Exponent of the solid in a box, |x/a|^p + |y/b|^p + |z/c|^p = 1: 2 is an ellipsoid, infinity the box."""
-HEAD, SHOULDER = 0.7, 0.3
+_HEAD, _SHOULDER = 0.7, 0.3
 """Of the height over the shoulders: the head from the vertex down, and how far the trunk reaches up (they meet)."""
 HEAD_BREADTH, HEAD_DEPTH = 0.68, 0.85
 """Of the height of the head."""
@@ -41,9 +42,11 @@ def box_solid(box: Array) -> "Trimesh":
 
 
 def shape_parts(body: Body) -> list[tuple[int, Array]]:
-    """Return the boxes (2, 3) m that segments are drawn as, each with the index of its segment: one each, but trunk and head apart.
+    """Return the boxes (2, 3) m that segments are drawn as, each with the index of its segment: one each, but trunk and
+    head apart.
 
-    The head takes `HEAD` of what is above the shoulders, in the proportions of a person (Winter 2009); segments without a box have none.
+    The head takes `HEAD` of what is above the shoulders, in the proportions of a person (Winter 2009); segments without
+    a box have none.
     """
     parts = []
     for index, box in enumerate(body.boxes):
@@ -52,8 +55,8 @@ def shape_parts(body: Body) -> list[tuple[int, Array]]:
         arms = [joint.translation[1] for joint in body.joints if joint.parent == body.segment_joint[index]]
         if body.segments[index] == "trunk_head" and arms and box[0, 1] < np.mean(arms) < box[1, 1]:
             low, high = np.array(box), np.array(box)
-            low[1, 1] = np.mean(arms) + SHOULDER * (box[1, 1] - np.mean(arms))
-            height = HEAD * (box[1, 1] - np.mean(arms))
+            low[1, 1] = np.mean(arms) + _SHOULDER * (box[1, 1] - np.mean(arms))
+            height = _HEAD * (box[1, 1] - np.mean(arms))
             middle, half = (box[0] + box[1]) / 2, height * np.array([HEAD_DEPTH, 1.0, HEAD_BREADTH]) / 2
             high = np.stack([middle - half, middle + half])
             high[:, 1] = box[1, 1] - height, box[1, 1]
@@ -84,7 +87,9 @@ def marker_hull(body: Body, segment: str) -> "Trimesh":
     try:
         hull = convex_hull(points)
     except (QhullError, ValueError, IndexError) as error:
-        raise BiodanceError(f"Segment {segment}: its {on.sum()} markers and its joints enclose no volume. Put on more markers.") from error
+        raise BiodanceError(
+            f"Segment {segment}: its {on.sum()} markers and its joints enclose no volume. Put on more markers."
+        ) from error
     return hull
 
 
@@ -106,7 +111,9 @@ def read_mesh(path: str | Path, *, scale: float | Array = 1.0) -> "Trimesh":
     try:
         mesh = trimesh.load(path, force="mesh")
     except Exception as error:  # the parsers of six formats raise what they like
-        raise FileRefused(f"{path}: is damaged ({type(error).__name__}: {str(error)[:120]}). Export the mesh again.") from error
+        raise FileRefused(
+            f"{path}: is damaged ({type(error).__name__}: {str(error)[:120]}). Export the mesh again."
+        ) from error
     if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces) or not np.isfinite(mesh.vertices).all():
         raise FileRefused(f"{path}: holds no triangles with finite corners. Export a surface mesh.")
     mesh.apply_transform(np.diag([*np.broadcast_to(np.asarray(scale, dtype=float), 3), 1.0]))
@@ -114,7 +121,8 @@ def read_mesh(path: str | Path, *, scale: float | Array = 1.0) -> "Trimesh":
 
 
 def segment_solids(body: Body, folder: str | Path | None = None) -> dict[str, "Trimesh"]:
-    """Return a mesh of every segment: the file of its name in ``folder`` (``right_thigh.stl``), else the solids in its `shape_parts`.
+    """Return a mesh of every segment: the file of its name in ``folder`` (``right_thigh.stl``), else the solids in its
+    `shape_parts`.
 
     Segments whose box is empty have none.
 
@@ -131,12 +139,18 @@ def segment_solids(body: Body, folder: str | Path | None = None) -> dict[str, "T
     for index, box in shape_parts(body):
         parts.setdefault(body.segments[index], []).append(box_solid(box))
     made = {name: several[0] if len(several) == 1 else concatenate(several) for name, several in parts.items()}
-    return {name: read_mesh(given[name]) if name in given else made[name] for name in body.segments if name in given or name in made}
+    return {
+        name: read_mesh(given[name]) if name in given else made[name]
+        for name in body.segments
+        if name in given or name in made
+    }
 
 
 def _mesh_files(body: Body, folder: Path) -> dict[str, Path]:
     if not folder.is_dir():
-        raise FileRefused(f"{folder}: is no folder. Give the folder that holds one mesh a segment, named like right_thigh.stl.")
+        raise FileRefused(
+            f"{folder}: is no folder. Give the folder that holds one mesh a segment, named like right_thigh.stl."
+        )
     found: dict[str, Path] = {}
     for path in sorted(folder.iterdir()):
         if path.suffix.lower() not in MESHES:
@@ -152,7 +166,8 @@ def _mesh_files(body: Body, folder: Path) -> dict[str, Path]:
 def mesh_lump(mesh: "Trimesh", *, density: float) -> RigidInertia:
     """Return mass, centre of mass and inertia of a closed mesh that is filled evenly with ``density`` kg/m³.
 
-    Integrals over the enclosed volume by the divergence theorem, exact for the polyhedron (Eberly 2002, "Polyhedral mass properties").
+    Integrals over the enclosed volume by the divergence theorem, exact for the polyhedron (Eberly 2002, "Polyhedral
+    mass properties").
 
     Raises
     ------
@@ -162,11 +177,17 @@ def mesh_lump(mesh: "Trimesh", *, density: float) -> RigidInertia:
     if not (np.isfinite(density) and density > 0):
         raise BiodanceError(f"A density of {density:g} kg/m³ cannot be; a body's is near 1000.")
     if not mesh.is_watertight:
-        raise BiodanceError("The mesh is not closed, so it encloses no volume. Close its holes in the program that made it.")
+        raise BiodanceError(
+            "The mesh is not closed, so it encloses no volume. Close its holes in the program that made it."
+        )
     if not mesh.is_winding_consistent:
-        raise BiodanceError("The triangles of the mesh face different ways, so its inside is not known. Orient them alike.")
+        raise BiodanceError(
+            "The triangles of the mesh face different ways, so its inside is not known. Orient them alike."
+        )
     volume = abs(mesh.volume)
     if volume < 1e-12:
         raise BiodanceError("The mesh encloses no volume. Give a solid.")
     outward = np.sign(mesh.volume)
-    return RigidInertia(density * volume, np.array(mesh.center_mass), outward * density / mesh.density * np.array(mesh.moment_inertia))
+    return RigidInertia(
+        density * volume, np.array(mesh.center_mass), outward * density / mesh.density * np.array(mesh.moment_inertia)
+    )

@@ -1,6 +1,7 @@
 """The command ``biodance``: parse, call, print. Rooms are imported inside the commands, so that ``--help`` is quick.
 
-Exit codes: 0 done, 1 done but something was refused or needs a person, 2 could not be done (one sentence on stderr), 130 stopped by Ctrl-C.
+Exit codes: 0 done, 1 done but something was refused or needs a person, 2 could not be done (one sentence on stderr),
+130 stopped by Ctrl-C.
 """
 
 import os
@@ -29,7 +30,10 @@ def run(tokens: Sequence[str] | None = None) -> int:
     except Exception as error:
         if "BIODANCE_TRACEBACK" in os.environ:
             raise
-        say(f"biodance itself failed ({type(error).__name__}: {error}). Please report this; BIODANCE_TRACEBACK=1 shows where.")
+        say(
+            f"biodance itself failed ({type(error).__name__}: {error}). Please report this; BIODANCE_TRACEBACK=1 "
+            f"shows where."
+        )
     except KeyboardInterrupt:
         say("Stopped before the command was done; what was already written is complete.")
         return STOPPED

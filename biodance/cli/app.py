@@ -1,4 +1,6 @@
-"""What all commands share: the application, its exit codes, its common options, and how it talks to the person at the terminal."""
+"""What all commands share: the application, its exit codes, its common options, and how it talks to the person at
+the terminal.
+"""
 
 import sys
 from collections.abc import Iterator
@@ -18,21 +20,35 @@ DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED = 0, 1, 2, 130
 app = App(
     name="biodance",
     version=__version__,
-    help="Segment inertial parameters of a person, measured from markers and force plates. For research use, not a diagnosis.",
+    help="Segment inertial parameters of a person, measured from markers and force plates. For research use, not a "
+    "diagnosis.",
     suppress_keyboard_interrupt=False,
 )
 
-JsonOption = Annotated[bool, Parameter(name="--json", negative="", help="Print one JSON document on stdout and nothing else there.")]
-ForceOption = Annotated[bool, Parameter(name="--force", negative="", help="Write into a folder that already holds files.")]
-Tables = Annotated[Path | None, Parameter(name="--tables", help="Folder for the same numbers as tables, CSV and Parquet.")]
+JsonOption = Annotated[
+    bool, Parameter(name="--json", negative="", help="Print one JSON document on stdout and nothing else there.")
+]
+ForceOption = Annotated[
+    bool, Parameter(name="--force", negative="", help="Write into a folder that already holds files.")
+]
+Tables = Annotated[
+    Path | None, Parameter(name="--tables", help="Folder for the same numbers as tables, CSV and Parquet.")
+]
 OutOption = Annotated[Path, Parameter(name="--out", help="Folder for the results; it is made if it is missing.")]
 
 Set = Annotated[
     tuple[str, ...],
-    Parameter(name="--set", negative=(), help="Choose a setting: --set filter.cutoff=6; may be repeated. `biodance settings` prints all."),
+    Parameter(
+        name="--set",
+        negative=(),
+        help="Choose a setting: --set filter.cutoff=6; may be repeated. `biodance settings` prints all.",
+    ),
 ]
 MarkersFile = Annotated[
-    str | None, Parameter(name="--markers", help="The marker set that was worn: a TOML file of your own (see CONTRIBUTING.md), or a name.")
+    str | None,
+    Parameter(
+        name="--markers", help="The marker set that was worn: a TOML file of your own (see CONTRIBUTING.md), or a name."
+    ),
 ]
 
 

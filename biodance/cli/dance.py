@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from biodance.records import Subject
 
 
-@app.command
+@app.command(name="dance")
 def dance_command(
     *,
     sex: Literal["F", "M"] | None = None,
@@ -34,9 +34,9 @@ def dance_command(
 ) -> int:
     """Design a dance for one person or robot: safe, balanced, and telling much about every segment.
 
-    Writes dance.npz, dance.c3d (a person's virtual markers) or dance.csv (a robot's joint angles), cues.md, margins.md, figures and
-    results.json. Ctrl-C keeps what is finished, and the same command goes on from there. A dance that cannot exist is refused with the
-    constraint that forbids it (exit code 1).
+    Writes dance.npz, dance.c3d (a person's virtual markers) or dance.csv (a robot's joint angles), cues.md, margins.md,
+    figures and results.json. Ctrl-C keeps what is finished, and the same command goes on from there. A dance that
+    cannot exist is refused with the constraint that forbids it (exit code 1).
     """
     from biodance.dance.problem.person import HEALTHY, read_person
     from biodance.dance.problem.plan import read_plan
@@ -67,7 +67,12 @@ def dance_command(
 
 
 def _who(
-    sex: Literal["F", "M"] | None, height: float | None, mass: float | None, age: float, urdf: Path | None, feet: str | None
+    sex: Literal["F", "M"] | None,
+    height: float | None,
+    mass: float | None,
+    age: float,
+    urdf: Path | None,
+    feet: str | None,
 ) -> "Subject | tuple[Path, str]":
     """Return the person, or the robot's file and feet; BiodanceError if it is neither or both."""
     from biodance.records import Subject
@@ -77,12 +82,16 @@ def _who(
         return urdf, feet
     if sex is not None and height is not None and mass is not None and robot == (None, None):
         return Subject(mass, height, sex, age)
-    raise BiodanceError("Say who dances: a person with --sex, --height and --mass, or a robot with --urdf FILE and --feet RIGHT,LEFT.")
+    raise BiodanceError(
+        "Say who dances: a person with --sex, --height and --mass, or a robot with --urdf FILE and --feet RIGHT,LEFT."
+    )
 
 
 @contextmanager
 def counted_progress() -> Iterator[Callable[[str, int, int], None]]:
-    """Yield a function that shows on stderr what is being done, how much of it is finished, and of how much (0: not counted)."""
+    """Yield a function that shows on stderr what is being done, how much of it is finished, and of how much (0: not
+    counted).
+    """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 

@@ -6,13 +6,26 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, ForceOption, JsonOption, MarkersFile, OutOption, Set, Tables, app, print_json, progress
+from biodance.cli.app import (
+    DONE,
+    NEEDS_A_PERSON,
+    ForceOption,
+    JsonOption,
+    MarkersFile,
+    OutOption,
+    Set,
+    Tables,
+    app,
+    print_json,
+    progress,
+)
 from biodance.cli.session import Reading, examine_with_reference, ready, tabled
 
 
-@app.command
+@app.command(name="foresee")
 def foresee_command(dance: Path, *, json: JsonOption = False) -> int:
-    """Say before a recording what a designed dance will be able to see, from which size on, and which causes it will confuse.
+    """Say before a recording what a designed dance will be able to see, from which size on, and which causes it will
+    confuse.
 
     Parameters
     ----------
@@ -35,13 +48,15 @@ def foresee_command(dance: Path, *, json: JsonOption = False) -> int:
     return DONE
 
 
-@app.command
+@app.command(name="diagnose")
 def diagnose_command(
     session: Path,
     *,
     out: OutOption,
     reference: Path | None = None,
-    accept: Annotated[bool, Parameter(name="--accept", negative="", help="Also write the body with the findings accepted.")] = False,
+    accept: Annotated[
+        bool, Parameter(name="--accept", negative="", help="Also write the body with the findings accepted.")
+    ] = False,
     subject: str | None = None,
     chosen: Set = (),
     tables: Tables = None,
@@ -49,7 +64,8 @@ def diagnose_command(
     json: JsonOption = False,
     force: ForceOption = False,
 ) -> int:
-    """Say what the simulation of a session gets wrong: the cause, its size, how sure, what else it could be, and what naming it gains.
+    """Say what the simulation of a session gets wrong: the cause, its size, how sure, what else it could be, and what
+    naming it gains.
 
     Parameters
     ----------

@@ -3,7 +3,7 @@
 from biodance.cli.app import DONE, NEEDS_A_PERSON, JsonOption, app, print_json, progress
 
 
-@app.command
+@app.command(name="doctor")
 def doctor_command(*, json: JsonOption = False) -> int:
     """Say what works on this machine, and how to mend what does not."""
     from dataclasses import asdict

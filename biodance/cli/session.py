@@ -46,13 +46,17 @@ class Reading:
         from biodance.lab.session.read import read_session
         from biodance.settings import assignments
 
-        return read_session(folder, subject_name=self.subject, markers=self.markers, settings=assignments(self.chosen), tell=tell)
+        return read_session(
+            folder, subject_name=self.subject, markers=self.markers, settings=assignments(self.chosen), tell=tell
+        )
 
 
 def report_session(
     recording: "Session", folder: Path, tell: "Callable[[str], None]", *, tables: Path | None = None
 ) -> "tuple[SessionResult, dict[str, Any]]":
-    """Examine a session and report it into ``folder``, as tables into ``tables``; return the result and the content of results.json."""
+    """Examine a session and report it into ``folder``, as tables into ``tables``; return the result and the content
+    of results.json.
+    """
     from biodance.pipeline.diagnosis import diagnosed
     from biodance.pipeline.session import examine
     from biodance.report.write import write_report
@@ -106,7 +110,8 @@ def examine_with_reference(
     force: bool,
     tell: "Callable[[str], None]",
 ) -> "tuple[SessionResult, SessionIdentification | None, Path]":
-    """Examine a session beside an earlier one of the same person; return what was found, what that one said, and the results' folder.
+    """Examine a session beside an earlier one of the same person; return what was found, what that one said, and the
+    results' folder.
 
     What cannot be read or written is said before the long work starts.
     """
@@ -135,7 +140,7 @@ def _told_identified(result: "SessionResult", folder: Path, found: "dict[str, An
     return NEEDS_A_PERSON if result.needs_a_person else DONE
 
 
-@app.command
+@app.command(name="inspect")
 def inspect_command(*paths: Path, markers: MarkersFile = None, json: JsonOption = False) -> int:
     """Say what is in recordings: markers, gaps, plates, the weight on them, and every decision the readers take.
 
@@ -159,7 +164,7 @@ def inspect_command(*paths: Path, markers: MarkersFile = None, json: JsonOption 
     return NOT_DONE if states == {"refused"} else NEEDS_A_PERSON if states - {"ok"} else DONE
 
 
-@app.command
+@app.command(name="report")
 def report_command(
     session: Path,
     *,
@@ -178,7 +183,8 @@ def report_command(
     session
         Folder with the static trial and the other trials.
     subject
-        The person to report where C3D files hold several; without it a file with several persons is refused and names them.
+        The person to report where C3D files hold several; without it a file with several persons is refused and names
+        them.
     """
     from biodance.lab.session.results_folder import results_folder
 
@@ -189,7 +195,7 @@ def report_command(
     return print_reported(result, folder, found, json)
 
 
-@app.command
+@app.command(name="identify")
 def identify_command(
     session: Path,
     *,
@@ -247,7 +253,7 @@ def settings(session: Path | None = None, *, chosen: Set = (), json: JsonOption 
     return DONE
 
 
-@app.command
+@app.command(name="export")
 def export_command(
     source: Path,
     *,
@@ -255,7 +261,9 @@ def export_command(
     out: Annotated[Path, Parameter(help="The file to write.")],
     trial: Annotated[str | None, Parameter(help="Name of the trial for trc, mot and c3d.")] = None,
     subject: Annotated[str | None, Parameter(help="The person to export_command where C3D files hold several.")] = None,
-    meshes: Annotated[Path | None, Parameter(help="Folder with a closed mesh a segment (right_thigh.stl, m) for glb and osim.")] = None,
+    meshes: Annotated[
+        Path | None, Parameter(help="Folder with a closed mesh a segment (right_thigh.stl, m) for glb and osim.")
+    ] = None,
     markers: MarkersFile = None,
     force: Annotated[bool, Parameter(name="--force", negative="", help="Replace the file if it exists.")] = False,
 ) -> int:
@@ -270,7 +278,9 @@ def export_command(
     from biodance.pipeline.export import replaceable
 
     with progress() as tell, replaceable(out, force=force) as place:
-        _, sentence = write(source, place, format=format, trial=trial, subject=subject, markers=markers, meshes=meshes, tell=tell)
+        _, sentence = write(
+            source, place, format=format, trial=trial, subject=subject, markers=markers, meshes=meshes, tell=tell
+        )
     say(sentence)
     sys.stdout.write(f"{out}\n")
     return DONE

@@ -10,7 +10,7 @@ from biodance.cli.app import DONE, ForceOption, OutOption, app, progress
 from biodance.cli.session import print_reported, report_session
 
 
-@app.command
+@app.command(name="simulate")
 def simulate_command(
     *,
     protocol: str,
@@ -19,7 +19,9 @@ def simulate_command(
     mass: Annotated[float, Parameter(help="Body mass, kg.")],
     age: Annotated[float, Parameter(help="Age, years.")] = float("nan"),
     seed: Annotated[int, Parameter(help="The same seed gives the same person and the same files.")],
-    effect: Annotated[tuple[str, ...], Parameter(negative=(), help="Hide a cause: plate_gain:target=Fz,gain=0.04; may be repeated.")] = (),
+    effect: Annotated[
+        tuple[str, ...], Parameter(negative=(), help="Hide a cause: plate_gain:target=Fz,gain=0.04; may be repeated.")
+    ] = (),
     out: OutOption,
     force: ForceOption = False,
 ) -> int:
@@ -42,7 +44,7 @@ def simulate_command(
     return DONE
 
 
-@app.command
+@app.command(name="demo")
 def demo_command(*, out: OutOption = Path("demo"), force: ForceOption = False) -> int:
     """Simulate a short session of a person whose truth is known, and report it like a real one."""
     from biodance.lab.session.read import read_session

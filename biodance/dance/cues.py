@@ -13,15 +13,15 @@ from biodance.body.body import Body
 from biodance.errors import BiodanceError
 from biodance.records import Array
 
-SMALLEST = 12.0
+_SMALLEST = 12.0
 """degrees: a smaller change is not called."""
-STEP = 15.0
+_STEP = 15.0
 """degrees to which angles are rounded."""
-MOST = 4
+_MOST = 4
 """Things that a person can begin at once."""
-ALIKE = 12.0
+_ALIKE = 12.0
 """degrees within which right and left are called as a pair."""
-WORDS = {
+_WORDS = {
     "shoulder_flexion": ("arm", "raise {} forward", "take {} back", "let {} down to the front of the body"),
     "shoulder_adduction": ("arm", "bring {} across the body", "raise {} sideways", "bring {} in to the side"),
     "shoulder_rotation": ("upper arm", "turn {} inwards", "turn {} outwards", "turn {} back to the middle"),
@@ -31,7 +31,12 @@ WORDS = {
     "hip_rotation": ("leg", "turn {} inwards", "turn {} outwards", "turn {} to the front"),
     "knee_flexion": ("knee", "bend {}", "stretch {}", "straighten {}"),
     "ankle_dorsiflexion": ("foot", "pull {} up", "point {} down", "hold {} level"),
-    "ankle_inversion": ("foot", "turn the sole of {} inwards", "turn the sole of {} outwards", "hold {} level sideways"),
+    "ankle_inversion": (
+        "foot",
+        "turn the sole of {} inwards",
+        "turn the sole of {} outwards",
+        "hold {} level sideways",
+    ),
     "trunk_flexion": ("", "lean the trunk forward", "lean the trunk back", "bring the trunk upright"),
     "trunk_bending": ("", "lean the trunk to the right", "lean the trunk to the left", "bring the trunk to the middle"),
     "trunk_rotation": ("", "turn the trunk to the left", "turn the trunk to the right", "turn the trunk to the front"),
@@ -49,7 +54,13 @@ class _Call:
 
 
 def cue_sheet(
-    body: Body, angles: Array, stances: tuple[str, ...], planted: tuple[tuple[str, ...], ...], *, move: float = 2.0, hold: float = 2.0
+    body: Body,
+    angles: Array,
+    stances: tuple[str, ...],
+    planted: tuple[tuple[str, ...], ...],
+    *,
+    move: float = 2.0,
+    hold: float = 2.0,
 ) -> str:
     """Return the cue sheet (Markdown) of postures ``angles`` (P, n) rad of the joints of ``body``.
 
@@ -70,8 +81,10 @@ def cue_sheet(
     lines = [
         "# The dance, posture by posture",
         "",
-        f"Each posture: {move:g} s to get there, counted *{_counts(move)}*, then {hold:g} s of standing still. Only what moves",
-        "is said; everything else stays as it is. Stop whenever something hurts or you lose your balance; the posture can be repeated.",
+        f"Each posture: {move:g} s to get there, counted *{_counts(move)}*, then {hold:g} s of standing still. Only "
+        f"what moves",
+        "is said; everything else stays as it is. Stop whenever something hurts or you lose your balance; the posture "
+        "can be repeated.",
     ]
     for i, (stance, feet) in enumerate(zip(stances, planted, strict=True)):
         if i == 0 or stance != stances[i - 1]:
@@ -86,7 +99,7 @@ def calls(body: Body, before: Array, after: Array, planted: tuple[str, ...] = ()
     changes = {
         joint.name: (float(b), float(a))
         for joint, b, a in zip(body.joints, before, after, strict=True)
-        if abs(a - b) >= SMALLEST and _is_called(joint.name, planted)
+        if abs(a - b) >= _SMALLEST and _is_called(joint.name, planted)
     }
     found: list[_Call] = []
     while changes:
@@ -94,7 +107,7 @@ def calls(body: Body, before: Array, after: Array, planted: tuple[str, ...] = ()
         start, end = changes.pop(name)
         side, movement = _split(name)
         other = f"{'left' if side == 'right' else 'right'}_{movement}"
-        pair = side and other in changes and abs(changes[other][1] - end) <= ALIKE
+        pair = side and other in changes and abs(changes[other][1] - end) <= _ALIKE
         if pair:
             partner = changes.pop(other)
             start, end = (start + partner[0]) / 2, (end + partner[1]) / 2
@@ -110,7 +123,7 @@ def _split(name: str) -> tuple[str, str]:
 
 def _is_called(name: str, planted: tuple[str, ...]) -> bool:
     side, movement = _split(name)
-    return movement in WORDS and not (side in planted and _is_leg(movement) and movement not in PLANTED)
+    return movement in _WORDS and not (side in planted and _is_leg(movement) and movement not in PLANTED)
 
 
 def _is_leg(movement: str) -> bool:
@@ -118,9 +131,9 @@ def _is_leg(movement: str) -> bool:
 
 
 def _call(movement: str, side: str, angle: float) -> str:
-    part, positive, negative, none = WORDS[movement]
+    part, positive, negative, none = _WORDS[movement]
     whole = f"both {PLURAL.get(part, part + 's')}" if side == "both" else f"the {side} {part}"
-    rounded = STEP * round(abs(angle) / STEP)
+    rounded = _STEP * round(abs(angle) / _STEP)
     if rounded == 0:
         return none.format(whole)
     size = "to a right angle" if rounded == 90 else f"by about {rounded:.0f}°"
@@ -131,7 +144,7 @@ def _sentence(said: tuple[str, ...]) -> str:
     """Return the calls as text: the first ``MOST``, then the rest."""
     if not said:
         return "Stay as you are."
-    first, rest = "; ".join(said[:MOST]), "; ".join(said[MOST:])
+    first, rest = "; ".join(said[:_MOST]), "; ".join(said[_MOST:])
     return f"{first[:1].upper()}{first[1:]}." + (f" And also: {rest}." if rest else "")
 
 

@@ -26,7 +26,7 @@ from biodance.records import Array, Motion, frozen_array
 if TYPE_CHECKING:
     import pandas as pd
 
-VERSION = 1
+_VERSION = 1
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,8 @@ class Dance:
             object.__setattr__(self, name, frozen_array(getattr(self, name), shape, f"Dance.{name}"))
         if not (len(self.stances) == len(self.under) + 1 == count) or size != self.chain.size:
             raise BiodanceError(
-                f"Dance: {count} postures of {size} coordinates, {len(self.stances)} stances and {len(self.under)} moves do not fit "
+                f"Dance: {count} postures of {size} coordinates, {len(self.stances)} stances and {len(self.under)} "
+                f"moves do not fit "
                 f"together; expected as many stances as postures, one move less, and {self.chain.size} coordinates."
             )
 
@@ -124,7 +125,11 @@ class Dance:
         out = self.chain.motion(np.array([phase.start for phase in held]), x, *np.zeros((2, *x.shape))).table()
         out.insert(0, "start (s)", out.index.to_numpy())
         out.insert(1, "hold (s)", [phase.end - phase.start for phase in held])
-        out.insert(2, "feet", [" and ".join(("right", "left")[foot] for foot in phase.stance.planted) or "none" for phase in held])
+        out.insert(
+            2,
+            "feet",
+            [" and ".join(("right", "left")[foot] for foot in phase.stance.planted) or "none" for phase in held],
+        )
         return out.set_index(pd.Index([phase.posture for phase in held], name="posture"))
 
     @cached_property
@@ -139,7 +144,9 @@ class Dance:
 
     @property
     def counted(self) -> NDArray[np.bool_]:
-        """False for postures in between, (P,) bool: weight over one foot of two, and stops that are not held as long."""
+        """False for postures in between, (P,) bool: weight over one foot of two, and stops that are not held as
+        long.
+        """
         return np.array([stance.over is None for stance in self.stances]) & (self.hold == self.hold.max())
 
     @cached_property
@@ -180,7 +187,9 @@ class Dance:
         move = phase.posture - 1
         points = np.stack([self.postures[move], *self.via[move], self.postures[move + 1]])
         basis = basis_at(np.clip(time - phase.start, 0.0, phase.end - phase.start), phase.end - phase.start)
-        return close_legs(self.chain, phase.stance, basis.position @ points, basis.velocity @ points, basis.acceleration @ points)
+        return close_legs(
+            self.chain, phase.stance, basis.position @ points, basis.velocity @ points, basis.acceleration @ points
+        )
 
     def motion(self, rate: float) -> Motion:
         """Return the whole dance, holds included, from 0 to its end.
@@ -230,10 +239,12 @@ class Dance:
         --------
         >>> dance.save("again.npz")
         """
-        words = {"biodance_dance": VERSION, "protocol": self.protocol, "seed": self.seed, "notes": self.notes}
+        words = {"biodance_dance": _VERSION, "protocol": self.protocol, "seed": self.seed, "notes": self.notes}
         words |= {"stances": [_told(s) for s in self.stances], "under": [_told(s) for s in self.under]}
         arrays = {name: getattr(self, name) for name in ("postures", "hold", "via", "move")}
-        np.savez_compressed(path, allow_pickle=False, words=json.dumps(words), body=body_text(self.body, self.protocol), **arrays)
+        np.savez_compressed(
+            path, allow_pickle=False, words=json.dumps(words), body=body_text(self.body, self.protocol), **arrays
+        )
 
     @classmethod
     def load(cls, path: str | Path) -> "Dance":
@@ -262,18 +273,22 @@ class Dance:
         try:
             with np.load(path, allow_pickle=False) as found:
                 words: dict[str, Any] = json.loads(str(found["words"]))
-                if words.get("biodance_dance") != VERSION:
-                    raise FileRefused(f"{path}: is no dance of version {VERSION}. Run biodance dance again.")
+                if words.get("biodance_dance") != _VERSION:
+                    raise FileRefused(f"{path}: is no dance of version {_VERSION}. Run biodance dance again.")
                 arrays = {name: found[name] for name in ("postures", "hold", "via", "move")}
                 body, _ = parse_body(str(found["body"]), str(path))
             feet: dict[str, Any] = {name: tuple(Stance(**s) for s in words[name]) for name in ("stances", "under")}
-            return cls(words["protocol"], body, seed=words["seed"], notes=tuple(words.get("notes", ())), **feet, **arrays)
+            return cls(
+                words["protocol"], body, seed=words["seed"], notes=tuple(words.get("notes", ())), **feet, **arrays
+            )
         except OSError as error:
             raise FileRefused(f"{path}: cannot be read ({error.strerror or error}).") from error
         except FileRefused:
             raise
         except (ValueError, KeyError, TypeError, BiodanceError) as error:
-            raise FileRefused(f"{path}: is not a dance that biodance wrote ({error}). Run biodance dance again.") from error
+            raise FileRefused(
+                f"{path}: is not a dance that biodance wrote ({error}). Run biodance dance again."
+            ) from error
 
 
 def _told(stance: Stance) -> dict[str, Any]:

@@ -31,7 +31,7 @@ from biodance.dance.verify import Margin, broken, verify_with
 from biodance.errors import BiodanceError
 
 WORKERS = 2
-SHORT = 1.0
+_SHORT = 1.0
 """s that postures in between are held."""
 
 
@@ -63,14 +63,19 @@ def design(
     plan = plan.with_limits(limits)
     chain, parts = Chain(body), excitation_blocks(body)
     parts = replace(parts, weight=parts.weight * plan.emphasis(body.segments), simplicity=plan.simplicity)
-    work = DesignContext(chain, parts, plan, seed, Checkpoint(resume, body, plan, seed), workers, tell or (lambda what, done, of: None))
+    work = DesignContext(
+        chain, parts, plan, seed, Checkpoint(resume, body, plan, seed), workers, tell or (lambda what, done, of: None)
+    )
     dance = _joined(work, *replan(work, _postures(work)))
     work.tell("checking every limit", 0, 0)
     margins = verify_with(workers, body, dance, plan.limits)
     if wrong := broken(margins):
-        told = "; ".join(f"{m.limit.replace('_', ' ')} by {-m.worst:.3g} {m.unit} at {m.where_s:.2f} s {m.what}" for m in wrong)
+        told = "; ".join(
+            f"{m.limit.replace('_', ' ')} by {-m.worst:.3g} {m.unit} at {m.where_s:.2f} s {m.what}" for m in wrong
+        )
         raise BiodanceError(
-            f"The designed dance breaks limits when it is checked: {told}. Try another seed or a longer move in the protocol."
+            f"The designed dance breaks limits when it is checked: {told}. Try another seed or a longer move in the "
+            f"protocol."
         )
     return dance, margins
 
@@ -114,7 +119,9 @@ def _joined(work: DesignContext, course: Course, ways: list[Way], notes: tuple[s
         under_ += [ground] * len(way.via)
         rows += [*way.stops, x[k + 1]]
         feet += [*[ground] * len(way.stops), stances[k + 1]]
-        hold += [*[0.0] * len(way.stops), plan.hold if stances[k + 1].over is None else min(SHORT, plan.hold)]
+        hold += [*[0.0] * len(way.stops), plan.hold if stances[k + 1].over is None else min(_SHORT, plan.hold)]
     via, duration = (np.concatenate([getattr(way, name) for way in ways]) for name in ("via", "duration"))
     feet_, seed = tuple(feet), work.seed
-    return Dance(plan.name, work.chain.body, np.array(rows), feet_, np.array(hold), via, duration, tuple(under_), seed, notes)
+    return Dance(
+        plan.name, work.chain.body, np.array(rows), feet_, np.array(hold), via, duration, tuple(under_), seed, notes
+    )

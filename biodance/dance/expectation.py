@@ -26,11 +26,11 @@ from biodance.uncertainty.bands import BANDS, Bands
 from biodance.uncertainty.caution import widened
 from biodance.uncertainty.noise import Noise
 
-RATE = 12.5
+_RATE = 12.5
 """Hz at which a plan is judged: moves of 2 s from rest to rest have nothing to say above 6 Hz."""
-STILL = 1.5
-"""s of every hold that count: the noise is so slow that longer standing tells next to nothing (docs/benchmarks/dance.md), and it
-would cost time.
+_STILL = 1.5
+"""s of every hold that count: the noise is so slow that longer standing tells next to nothing
+(docs/benchmarks/dance.md), and it would cost time.
 """
 
 
@@ -52,10 +52,10 @@ class Expectation:
 
 def expect(dance: Dance, *, steps: int = 10) -> Expectation:
     """Return what is expected after ``steps`` durations of ``dance``, evenly spread over its postures."""
-    brief = replace(dance, hold=np.minimum(dance.hold, STILL))
+    brief = replace(dance, hold=np.minimum(dance.hold, _STILL))
     ends, durations = ([phase.end for phase in one.phases if phase.kind == "hold"] for one in (brief, dance))
     chosen = sorted({int(k) for k in np.linspace(0, len(ends) - 1, steps + 1).round()[1:]})
-    found = expected_spread(brief.body, brief.motion(RATE), np.array([ends[k] for k in chosen]))
+    found = expected_spread(brief.body, brief.motion(_RATE), np.array([ends[k] for k in chosen]))
     return replace(found, duration=np.array([0.0, *(durations[k] for k in chosen)]))
 
 
@@ -78,15 +78,22 @@ def expected_spread(body: Body, motion: Motion, ends: Array) -> Expectation:
         start = end
     sd = np.array([[_deviations(belief, 10 * i) for i in range(len(body.segments))] for belief in beliefs])
     before = np.diag(beliefs[0].prior.covariance).reshape(-1, 10)
-    share = np.array([[np.mean(row[known > 0]) for row, known in zip(b.information.reshape(-1, 10), before, strict=True)] for b in beliefs])
+    share = np.array(
+        [
+            [np.mean(row[known > 0]) for row, known in zip(b.information.reshape(-1, 10), before, strict=True)]
+            for b in beliefs
+        ]
+    )
     mass, com, inertia = np.moveaxis(sd, 2, 0)
     return Expectation(body.segments, np.concatenate([[0.0], ends]), mass, com, inertia, share)
 
 
 def typical_noise(about: Array) -> Noise:
-    """Return the noise of a typical session about the standing point ``about`` (3,) m; a coefficient's variance grows with the rate."""
-    covariance = RATE / BANDS.rate * np.array([np.diag(np.square(row)) for row in _danced()["noise"]])
-    return Noise(covariance, about, Bands(BANDS.edges, RATE))
+    """Return the noise of a typical session about the standing point ``about`` (3,) m; a coefficient's variance
+    grows with the rate.
+    """
+    covariance = _RATE / BANDS.rate * np.array([np.diag(np.square(row)) for row in _danced()["noise"]])
+    return Noise(covariance, about, Bands(BANDS.edges, _RATE))
 
 
 def typical_sizes() -> Sizes:

@@ -10,22 +10,30 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
-from biodance.dance.problem.excitation import condition, dynamic_grams, excitation_blocks, moments, static_grams, total, uprights
+from biodance.dance.problem.excitation import (
+    condition,
+    dynamic_grams,
+    excitation_blocks,
+    moments,
+    static_grams,
+    total,
+    uprights,
+)
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance
 from biodance.motion.kinematics import segment_motion
 from biodance.records import Array, Motion
 
-RATE = 50.0
+_RATE = 50.0
 """Hz, of the paper's transitions."""
-LITTLE = 0.01
+_LITTLE = 0.01
 """rad²/s³: information on every inertia that is supposed before the first move, so that no condition number is
 infinite.
 """
 POOR = 30.0
 """Condition number above which a segment was hardly tilted, so that gravity does not tell where along it the mass is.
 """
-THIRDS = np.array([[0.20987654], [0.79012346]])
+_THIRDS = np.array([[0.20987654], [0.79012346]])
 """Share of the way at one and two thirds of the time for least jerk: 10 s³ - 15 s⁴ + 6 s⁵."""
 
 
@@ -66,18 +74,30 @@ def dance_metrics(dance: Dance, plan: Plan) -> DanceMetrics:
     every = list(range(len(dance.body.segments)))
     grams = static_grams(ups)
     static, _ = total(weight, grams, parts.first)
-    poor = [i for i in every if parts.first[i] and weight[i] > 0 and condition(grams[i][np.ix_(parts.first[i], parts.first[i])])[0] > POOR]
-    gram = np.tile(LITTLE * np.eye(6), (len(every), 1, 1))
-    straight = replace(dance, via=dance.postures[:-1, None] + THIRDS * np.diff(dance.postures, axis=0)[:, None])
+    poor = [
+        i
+        for i in every
+        if parts.first[i] and weight[i] > 0 and condition(grams[i][np.ix_(parts.first[i], parts.first[i])])[0] > POOR
+    ]
+    gram = np.tile(_LITTLE * np.eye(6), (len(every), 1, 1))
+    straight = replace(dance, via=dance.postures[:-1, None] + _THIRDS * np.diff(dance.postures, axis=0)[:, None])
     dynamic, paths = [], []
     for phase in (phase for phase in dance.phases if phase.kind == "move"):
-        time = np.linspace(phase.start, phase.end, round((phase.end - phase.start) * RATE) + 1)
+        time = np.linspace(phase.start, phase.end, round((phase.end - phase.start) * _RATE) + 1)
         state = dance.state(phase, time)
-        gram = gram + dynamic_grams(state, every) / RATE
+        gram = gram + dynamic_grams(state, every) / _RATE
         dynamic.append(total(weight, gram, parts.second)[0])
-        paths.append(ZmpPath(phase.posture - 1, phase.stance, zmp_path(straight.state(phase, time).wrench), zmp_path(state.wrench)))
-    bounds = [float(sum(w for w, pick in zip(weight, picks, strict=True) if pick)) for picks in (parts.first, parts.second)]
-    return DanceMetrics(static, bounds[0], np.array(dynamic), bounds[1], tuple(dance.body.segments[i] for i in poor), tuple(paths))
+        paths.append(
+            ZmpPath(
+                phase.posture - 1, phase.stance, zmp_path(straight.state(phase, time).wrench), zmp_path(state.wrench)
+            )
+        )
+    bounds = [
+        float(sum(w for w, pick in zip(weight, picks, strict=True) if pick)) for picks in (parts.first, parts.second)
+    ]
+    return DanceMetrics(
+        static, bounds[0], np.array(dynamic), bounds[1], tuple(dance.body.segments[i] for i in poor), tuple(paths)
+    )
 
 
 def zmp_path(wrench: Array) -> Array:
@@ -92,7 +112,10 @@ def criterion_of(body: Body, motion: Motion) -> tuple[float, float]:
     """
     parts, segments = excitation_blocks(body), segment_motion(body, motion)
     turned = np.swapaxes(segments.rotation, -1, -2)
-    w, dw = (np.einsum("tnij,tnj->tni", turned, value) for value in (segments.angular_velocity, segments.angular_acceleration))
+    w, dw = (
+        np.einsum("tnij,tnj->tni", turned, value)
+        for value in (segments.angular_velocity, segments.angular_acceleration)
+    )
     K = moments(w, dw)
-    gram = np.einsum("tnik,tnil->nkl", K, K) / motion.rate + LITTLE * np.eye(6)
+    gram = np.einsum("tnik,tnil->nkl", K, K) / motion.rate + _LITTLE * np.eye(6)
     return total(parts.weight, static_grams(turned[..., 2]), parts.first)[0], total(parts.weight, gram, parts.second)[0]

@@ -22,7 +22,7 @@ from biodance.motion.kinematics import poses, quaternion_matrix
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion, Wrench
 
-STEP = 0.00025
+_STEP = 0.00025
 """s, of the simulation: at 1 and 0.5 ms the stiff legs ring on the floor and topple postures that stand at 0.25 and
 0.125 ms.
 """
@@ -30,7 +30,7 @@ STIFFNESS = {"hip": 4000.0, "knee": 4000.0, "ankle": 4000.0, "trunk": 3000.0, "s
 """N·m/rad of the joint springs: legs and trunk several times the m g h (about 600 N·m/rad) that would topple a standing
 person.
 """
-DAMPING = 0.05
+_DAMPING = 0.05
 """s: damper over spring."""
 ROTOR = 0.005
 """kg·m² added to every joint in the simulation: where two axes of a shoulder are nearly in line, nothing else resists
@@ -44,7 +44,7 @@ HARD = 0.002
 """s, time constant of the contacts: at 8 ms a foot under the whole body sinks by 0.6 mm, which tilts a person on one
 leg until he falls; 4, 2 and 1 ms keep the pelvis within 12, 5 and 2 mm of the plan.
 """
-RADIUS = 0.004
+_RADIUS = 0.004
 """m, of the contact points under the soles."""
 TOUCHING = 0.01
 """m over the floor up to which a planned sole counts as planted for the planned torques."""
@@ -81,7 +81,9 @@ def _mujoco() -> Any:
     try:
         import mujoco
     except ImportError as error:
-        raise MissingLibrary("Playing a dance needs MuJoCo, which is not installed: pip install 'biodance[peers]'.") from error
+        raise MissingLibrary(
+            "Playing a dance needs MuJoCo, which is not installed: pip install 'biodance[peers]'."
+        ) from error
     return mujoco
 
 
@@ -91,15 +93,23 @@ def floor_model(body: Body, *, friction: float = 0.5) -> Any:
     """
     mujoco = _mujoco()
     spec = mujoco.MjSpec.from_string(mjcf.text(body, "biodance playback"))
-    spec.option.timestep, spec.option.integrator = STEP, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.timestep, spec.option.integrator = _STEP, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     contact: dict[str, Any] = {"solref": [HARD, 1.0], "friction": [friction, 0.0, 0.0], "condim": 3}
     spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=1, conaffinity=2, **contact)
     for foot in body.feet.values():
         part = spec.body(body.segments[foot.segment])
         for corner in foot.outline:
-            place = corner + np.array([0.0, RADIUS, 0.0])
-            part.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[RADIUS, 0, 0], pos=place, mass=0.0, contype=2, conaffinity=1, **contact)
+            place = corner + np.array([0.0, _RADIUS, 0.0])
+            part.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_SPHERE,
+                size=[_RADIUS, 0, 0],
+                pos=place,
+                mass=0.0,
+                contype=2,
+                conaffinity=1,
+                **contact,
+            )
     return spec.compile()
 
 
@@ -118,7 +128,9 @@ def planned_torques(body: Body, motion: Motion, wrench: Wrench, down: NDArray[np
 
 def _both(body: Body) -> tuple[Any, Any]:
     if not body.n_root or set(body.feet) != {"right", "left"}:
-        raise BiodanceError(f"{body.name}: a playback needs a free root and a right and a left foot; this body has {sorted(body.feet)}.")
+        raise BiodanceError(
+            f"{body.name}: a playback needs a free root and a right and a left foot; this body has {sorted(body.feet)}."
+        )
     return body.feet["right"], body.feet["left"]
 
 
@@ -143,7 +155,7 @@ def play(body: Body, motion: Motion, *, friction: float = 0.5, down: NDArray[np.
     data = mujoco.MjData(model)
     driver = _Driver(body, model)
     driver.place(data, motion.q[0], motion.v[0])
-    for _ in range(round(SETTLE / STEP)):
+    for _ in range(round(SETTLE / _STEP)):
         driver.drive(data, motion.q[0, 7:], np.zeros(len(body.joints)), torque[0])
         mujoco.mj_step(model, data)
     rows, fell = [], np.nan
@@ -161,11 +173,14 @@ def play(body: Body, motion: Motion, *, friction: float = 0.5, down: NDArray[np.
 
 def _advance(mujoco: Any, driver: "_Driver", data: Any, motion: Motion, torque: Array, frame: int) -> None:
     """Simulate from the frame before to ``frame``; the plan is followed linearly in between."""
-    steps = max(1, round((motion.time[frame] - motion.time[frame - 1]) / STEP))
+    steps = max(1, round((motion.time[frame] - motion.time[frame - 1]) / _STEP))
     joints = len(driver.body.joints)
     for k in range(steps):
         share = k / steps
-        q, v, tau = ((1 - share) * x[frame - 1] + share * x[frame] for x in (motion.q[:, -joints:], motion.v[:, -joints:], torque))
+        q, v, tau = (
+            (1 - share) * x[frame - 1] + share * x[frame]
+            for x in (motion.q[:, -joints:], motion.v[:, -joints:], torque)
+        )
         driver.drive(data, q, v, tau)
         mujoco.mj_step(driver.model, data)
 
@@ -181,7 +196,7 @@ class _Driver:
         self.v_place = np.array([model.joint(joint.name).dofadr[0] for joint in body.joints])
         kinds = [next((kind for kind in STIFFNESS if kind in joint.name), "trunk") for joint in body.joints]
         self.stiffness = np.array([STIFFNESS[kind] for kind in kinds])
-        model.dof_damping[self.v_place] = DAMPING * self.stiffness
+        model.dof_damping[self.v_place] = _DAMPING * self.stiffness
         model.dof_armature[self.v_place] = ROTOR
 
     def place(self, data: Any, q: Array, v: Array) -> None:
@@ -196,7 +211,7 @@ class _Driver:
     def drive(self, data: Any, angle: Array, rate: Array, torque: Array) -> None:
         """Set the joint torques of a plan; the damper itself is in the model, where MuJoCo integrates it implicitly."""
         spring = self.stiffness * (angle - data.qpos[self.q_place])
-        data.qfrc_applied[self.v_place] = torque + spring + DAMPING * self.stiffness * rate
+        data.qfrc_applied[self.v_place] = torque + spring + _DAMPING * self.stiffness * rate
 
     def gap(self, data: Any, q: Array) -> tuple[Array, float, float]:
         """Return the distances from the plan: joint angles (n,) rad, root m, root's tilt rad."""
@@ -216,7 +231,7 @@ def _floor_wrench(mujoco: Any, model: Any, data: Any) -> Array:
     return total
 
 
-RATE = 100.0
+_RATE = 100.0
 """Hz at which plan and playback are compared."""
 
 
@@ -238,11 +253,20 @@ class Rehearsal:
         inside = 1e3 * self.inside[np.isfinite(self.inside)]
         rows = (
             ("fate", fate),
-            ("joint angles, RMS and worst gap to the plan", f"{np.sqrt(np.mean(angle**2)):.2f} and {np.abs(angle).max():.1f} deg"),
+            (
+                "joint angles, RMS and worst gap to the plan",
+                f"{np.sqrt(np.mean(angle**2)):.2f} and {np.abs(angle).max():.1f} deg",
+            ),
             ("tilt of the pelvis, worst gap", f"{np.degrees(p.tilt_error.max()):.1f} deg"),
             ("place of the pelvis, worst gap", f"{1e3 * p.root_error.max():.0f} mm"),
-            ("centre of pressure, RMS and 99 % gap", f"{np.sqrt(np.mean(gap**2)):.1f} and {np.quantile(gap, 0.99):.0f} mm"),
-            ("centre of pressure inside the soles, 1 % and least", f"{np.quantile(inside, 0.01):.0f} and {inside.min():.0f} mm"),
+            (
+                "centre of pressure, RMS and 99 % gap",
+                f"{np.sqrt(np.mean(gap**2)):.1f} and {np.quantile(gap, 0.99):.0f} mm",
+            ),
+            (
+                "centre of pressure inside the soles, 1 % and least",
+                f"{np.quantile(inside, 0.01):.0f} and {inside.min():.0f} mm",
+            ),
         )
         return "\n".join(["| what | found |", "|---|---|", *(f"| {what} | {found} |" for what, found in rows)])
 
@@ -257,7 +281,7 @@ def rehearse(dance: Dance, *, hold: float = 0.5, friction: float = 0.5) -> Rehea
         MuJoCo is not installed.
     """
     short = replace(dance, hold=np.minimum(dance.hold, hold))
-    motion = short.motion(RATE)
+    motion = short.motion(_RATE)
     played = play(dance.body, motion, friction=friction, down=bearing(short, motion.time))
     return Rehearsal(short, played, _inside(short, played))
 

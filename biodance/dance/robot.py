@@ -29,9 +29,9 @@ from biodance.identification.posterior import Posterior, posterior
 from biodance.motion.regressor import regressor
 from biodance.records import Array, Motion
 
-LEG, MASS = 0.9, 65.0
+_LEG, MASS = 0.9, 65.0
 """m from hip to sole, kg: the person whose size a robot is given."""
-FORWARD = 2.0
+_FORWARD = 2.0
 """1/m: the right foot stands ahead by this times the protocol's m times the leg's: 0.1 m for 0.2 m and legs of 0.25 m
 (paper III.D).
 """
@@ -39,9 +39,9 @@ UNHURRIED = 2.5
 """rad/s: a robot of slower joints (median) takes more time for its moves, in proportion: 5 s, not 2 s, at 1 rad/s
 (paper, Fig. 11).
 """
-LIGHTEST = 4.0
+_LIGHTEST = 4.0
 """kg: what lighter robots press on the ground cannot be told from noise (`motion.dynamics.zmp` needs 20 N)."""
-Tell = Callable[[str, int, int], None]
+_Tell = Callable[[str, int, int], None]
 
 
 def robot_plan(body: Body, plan: Plan) -> Plan:
@@ -54,12 +54,16 @@ def robot_plan(body: Body, plan: Plan) -> Plan:
         The plan is one for persons only (on a stool, with hands on a frame), or the robot is too light.
     """
     if plan.seated or plan.holds:
-        raise BiodanceError(f"Protocol {plan.name}: is danced on a stool or with hands on a frame; a robot dances standing and free.")
+        raise BiodanceError(
+            f"Protocol {plan.name}: is danced on a stool or with hands on a frame; a robot dances standing and free."
+        )
     weight = float(body.sip.mass.sum())
-    if weight < LIGHTEST:
-        raise BiodanceError(f"{body.name}: weighs {weight:.2f} kg; a dance is designed for robots of {LIGHTEST:g} kg and more.")
+    if weight < _LIGHTEST:
+        raise BiodanceError(
+            f"{body.name}: weighs {weight:.2f} kg; a dance is designed for robots of {_LIGHTEST:g} kg and more."
+        )
     usual = float(np.median(body.limits.velocity))
-    ahead = float(np.clip(plan.forward * FORWARD * leg_length(body), 0.05, 0.4))
+    ahead = float(np.clip(plan.forward * _FORWARD * leg_length(body), 0.05, 0.4))
     return replace(plan, move=plan.move * max(1.0, UNHURRIED / usual), forward=ahead)
 
 
@@ -70,7 +74,7 @@ def leg_length(body: Body) -> float:
 
 def person_sized(body: Body) -> Likeness:
     """Return the factors that make a robot as large and as heavy as a person."""
-    return Likeness(LEG / leg_length(body), MASS / float(body.sip.mass.sum()))
+    return Likeness(_LEG / leg_length(body), MASS / float(body.sip.mass.sum()))
 
 
 def design_robot(
@@ -79,7 +83,7 @@ def design_robot(
     *,
     limits: Iterable[Limit | type[Limit]] = (),
     seed: int = 0,
-    tell: Tell | None = None,
+    tell: _Tell | None = None,
     resume: Path | None = None,
 ) -> tuple[Dance, tuple[Margin, ...]]:
     """Return the dance of the robot ``body`` (in standing frames; its limits count) after ``plan`` (`robot_plan`), and
@@ -130,7 +134,7 @@ ERROR = np.array([1.1, 0.5, 0.9, 0.2, 0.7, 0.4])
 """N, N·m: error of one sample of the wrench; what Bonnet 2016 left unexplained of an unseen movement of HOAP-3 (table
 II).
 """
-RATE = 4.0
+_RATE = 4.0
 """Hz: independent samples of the wrench."""
 
 
@@ -146,7 +150,7 @@ def expect_robot(dance: Dance, *, steps: int = 10) -> Expectation:
     """Return what is expected after ``steps`` durations of ``dance``, evenly spread over its postures, if it is danced
     exactly.
     """
-    body, motion = dance.body, dance.motion(RATE)
+    body, motion = dance.body, dance.motion(_RATE)
     rows = robot_rows(body, motion, regressor(body, motion) @ body.sip.phi)
     ends = [phase.end for phase in dance.phases if phase.kind == "hold"]
     chosen = [ends[k] for k in sorted({int(k) for k in np.linspace(0, len(ends) - 1, steps + 1).round()[1:]})]

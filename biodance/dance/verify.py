@@ -36,7 +36,9 @@ class Margin:
     what: str = ""
 
 
-def verify(body: Body, dance: Dance, limits: tuple[Limit, ...], *, rate: float = 100.0, part: slice = slice(None)) -> tuple[Margin, ...]:
+def verify(
+    body: Body, dance: Dance, limits: tuple[Limit, ...], *, rate: float = 100.0, part: slice = slice(None)
+) -> tuple[Margin, ...]:
     """Return the margin of every limit over the whole dance, sampled at ``rate`` Hz, at the ends of all phases and
     close to them.
 

@@ -1,4 +1,6 @@
-"""Accept named causes: the trials as they would have been recorded, or the body that moves right, and what that gains elsewhere."""
+"""Accept named causes: the trials as they would have been recorded, or the body that moves right, and what that
+gains elsewhere.
+"""
 
 from dataclasses import dataclass
 
@@ -11,14 +13,14 @@ from biodance.diagnosis.model import NamedCause
 from biodance.effects import Case
 from biodance.errors import BiodanceError
 from biodance.identification.statistics import Fit
-from biodance.identification.validation import BLOCK_SECONDS, moved
+from biodance.identification.validation import BLOCK_SECONDS, about_point
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array
 from biodance.uncertainty.bands import BANDS
 
 DRAWS = 1000
 """Bootstrap samples of the interval."""
-TINY = 1e-6
+_TINY = 1e-6
 """N, N·m: least unit of a channel."""
 
 
@@ -45,7 +47,9 @@ def case_fit(case: Case, use: NDArray[np.bool_]) -> Fit:
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """What a body leaves of trials: per trial ``left`` (T, 6) N, N·m about the standing point, frames ``use`` (T,), ``rate`` Hz."""
+    """What a body leaves of trials: per trial ``left`` (T, 6) N, N·m about the standing point, frames ``use`` (T,),
+    ``rate`` Hz.
+    """
 
     names: tuple[str, ...]
     left: tuple[Array, ...]
@@ -55,38 +59,47 @@ class Residuals:
 
 def residuals_of(body: Body, fits: tuple[Fit, ...], about: Array) -> Residuals:
     """Return measured minus predicted wrench of ``body`` in every trial, about ``about`` (3,) m."""
-    left = tuple(moved(fit.wrench, about).value - moved(predict_wrench(body, fit.motion), about).value for fit in fits)
+    left = tuple(
+        about_point(fit.wrench, about).value - about_point(predict_wrench(body, fit.motion), about).value
+        for fit in fits
+    )
     return Residuals(tuple(f.name for f in fits), left, tuple(f.use for f in fits), tuple(f.motion.rate for f in fits))
 
 
 def gain_by_naming(before: Residuals, after: Residuals, *, fitted: tuple[Residuals, Residuals], seed: int = 0) -> Gain:
     """Return what naming the causes gains on trials that were not used: ``before`` and ``after`` hold the same trials.
 
-    ``fitted`` the same two bodies on the trials that were used: what the better one leaves there is the unit in which the channels are
-    added up, and their residual covariances per band are the two predictive densities.
+    ``fitted`` the same two bodies on the trials that were used: what the better one leaves there is the unit in which
+    the channels are added up, and their residual covariances per band are the two predictive densities.
 
     Raises
     ------
     BiodanceError
         There are fewer than three blocks of one second: no interval can be given.
     """
-    pairs = [(_blocks(left, use, rate), _blocks(right, use, rate)) for left, right, use, rate in _aligned(before, after)]
+    pairs = [
+        (_blocks(left, use, rate), _blocks(right, use, rate)) for left, right, use, rate in _aligned(before, after)
+    ]
     a, b = (np.concatenate([pair[i] for pair in pairs]) for i in (0, 1))
     if len(a) < 3:
-        raise BiodanceError(f"The kept trials hold {len(a)} blocks of {BLOCK_SECONDS:g} s; an interval of the gain needs 3.")
+        raise BiodanceError(
+            f"The kept trials hold {len(a)} blocks of {BLOCK_SECONDS:g} s; an interval of the gain needs 3."
+        )
     drawn = np.random.default_rng(seed).integers(0, len(a), (DRAWS, len(a)))
     first, second = a[drawn].sum(axis=1), b[drawn].sum(axis=1)
     channels = np.percentile(1 - np.sqrt(second / first), [2.5, 97.5], axis=0).T
-    unit = np.maximum(_rms(fitted[1]), TINY) ** 2
+    unit = np.maximum(_rms(fitted[1]), _TINY) ** 2
     low, high = np.percentile(1 - np.sqrt((second / unit).sum(axis=1) / (first / unit).sum(axis=1)), [2.5, 97.5])
     score, error = _density_gain(before, after, fitted)
     return Gain(_rms(before), _rms(after), (float(low), float(high)), before.names, score, error, channels)
 
 
 def _density_gain(before: Residuals, after: Residuals, fitted: tuple[Residuals, Residuals]) -> tuple[float, float]:
-    """Return the change of the log predictive density per second and its standard error over the coefficients of each band.
+    """Return the change of the log predictive density per second and its standard error over the coefficients of each
+    band.
 
-    The spread expected in a kept trial is what the same body leaves of all others, used and kept: in those that were used it is too good.
+    The spread expected in a kept trial is what the same body leaves of all others, used and kept: in those that were
+    used it is too good.
     """
     changes, bands, count = [], [], len(before.names)
     for k in range(count):
@@ -120,7 +133,9 @@ def _aligned(before: Residuals, after: Residuals) -> list[tuple[Array, Array, ND
 
 def _rms(found: Residuals) -> Array:
     """Return (6,) root mean square over the used frames of all trials."""
-    return np.sqrt(np.mean(np.concatenate([left[use] for left, use in zip(found.left, found.use, strict=True)]) ** 2, axis=0))
+    return np.sqrt(
+        np.mean(np.concatenate([left[use] for left, use in zip(found.left, found.use, strict=True)]) ** 2, axis=0)
+    )
 
 
 def _blocks(left: Array, use: NDArray[np.bool_], rate: float) -> Array:
@@ -143,8 +158,8 @@ def _coefficients(found: Residuals) -> tuple[Array, NDArray[np.intp]]:
 
 
 def _log_density(found: Residuals, fitted: Residuals) -> tuple[Array, NDArray[np.intp]]:
-    """Return the log predictive density (n,) of every coefficient, under the residual covariance per band of the trials used, and the
-    bands (n,).
+    """Return the log predictive density (n,) of every coefficient, under the residual covariance per band of the trials
+    used, and the bands (n,).
     """
     values, bands = _coefficients(found)
     known, known_bands = _coefficients(fitted)
@@ -152,5 +167,7 @@ def _log_density(found: Residuals, fitted: Residuals) -> tuple[Array, NDArray[np
     for b in np.unique(bands):
         here, there = values[bands == b], known[known_bands == b]
         spread = (there.T @ there + np.diag([1.0] * 3 + [0.25] * 3)) / (len(there) + 1)
-        out[bands == b] = -0.5 * np.sum(here * np.linalg.solve(spread, here.T).T, axis=1) - 0.5 * np.linalg.slogdet(spread)[1]
+        out[bands == b] = (
+            -0.5 * np.sum(here * np.linalg.solve(spread, here.T).T, axis=1) - 0.5 * np.linalg.slogdet(spread)[1]
+        )
     return out, bands

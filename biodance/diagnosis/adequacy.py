@@ -1,4 +1,6 @@
-"""Is what is left like what sessions without fault leave? The test that may say "unexplained", apart from the search for names."""
+"""Is what is left like what sessions without fault leave? The test that may say "unexplained", apart from the search
+for names.
+"""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -16,13 +18,17 @@ if TYPE_CHECKING:
 
 LIMIT = 4.5
 """Standard deviations of null sessions beyond which one band of one channel is not adequate."""
-BEYOND = 9.0
+_BEYOND = 9.0
 """Standard deviations beyond which a name does not tell the main part."""
 STRAINED = 3.5
-"""Standard deviations by which the body may be more unlike the table than people are (sessions without fault: 1.4 at most of 14)."""
+"""Standard deviations by which the body may be more unlike the table than people are (sessions without fault: 1.4 at
+most of 14).
+"""
 
-SECONDS = 70.0
-"""s of measured contact in the sessions from which the spread of null sessions was learned; in a shorter one chance alone spreads more."""
+_SECONDS = 70.0
+"""s of measured contact in the sessions from which the spread of null sessions was learned; in a shorter one chance
+alone spreads more.
+"""
 
 
 def energies(found: Model) -> Array:
@@ -33,14 +39,15 @@ def energies(found: Model) -> Array:
 
 
 def unlikely(found: Model) -> Array:
-    """Return (B, 6): how far `energies` are from sessions without fault that are as long as this one, in standard deviations.
+    """Return (B, 6): how far `energies` are from sessions without fault that are as long as this one, in standard
+    deviations.
 
-    The mean of n squares has the variance 2 energy² / n, of which the learned spread holds that of long sessions. Mean squares are skewed;
-    their cube root is nearly normal (Wilson and Hilferty 1931, doi:10.1073/pnas.17.12.684).
+    The mean of n squares has the variance 2 energy² / n, of which the learned spread holds that of long sessions. Mean
+    squares are skewed; their cube root is nearly normal (Wilson and Hilferty 1931, doi:10.1073/pnas.17.12.684).
     """
     where, known, mean = found.problem.spectrum, found.tolerances, energies(found)
     count = np.maximum(1, np.bincount(where.band, minlength=len(BANDS)))[:, None]
-    chance = 2 * known.energy**2 / count * max(0.0, 1 - where.seconds / SECONDS)
+    chance = 2 * known.energy**2 / count * max(0.0, 1 - where.seconds / _SECONDS)
     spread = np.sqrt(known.energy_sd**2 + chance)
     root = spread / known.energy / 3
     return np.asarray((np.cbrt(mean / known.energy) - 1 + root**2) / root)
@@ -56,7 +63,14 @@ def adequacy(found: Model) -> tuple[Adequacy, ...]:
         here = spectrum.band == b
         total = np.array([[square[here & (spectrum.trial == t), c].sum() for c in range(6)] for t in range(len(names))])
         for c in range(6):
-            rows.append(Adequacy(CHANNELS[c], (BANDS.edges[b], BANDS.edges[b + 1]), float(z[b, c]), names[int(np.argmax(total[:, c]))]))
+            rows.append(
+                Adequacy(
+                    CHANNELS[c],
+                    (BANDS.edges[b], BANDS.edges[b + 1]),
+                    float(z[b, c]),
+                    names[int(np.argmax(total[:, c]))],
+                )
+            )
     worst, *others = sorted(rows, key=lambda row: -row.z)
     return (replace(worst, second=_when(found, worst)), *others)
 
@@ -65,7 +79,9 @@ def _when(found: Model, row: Adequacy) -> float:
     """Return the second of the trial's recording around which what is left in ``row`` is largest."""
     spectrum = found.problem.spectrum
     index = [case.trial.name for case in found.problem.cases].index(row.trial)
-    left = found.belief.left[: 6 * spectrum.band.size].reshape(-1, 6)[spectrum.trial == index, CHANNELS.index(row.channel)]
+    left = found.belief.left[: 6 * spectrum.band.size].reshape(-1, 6)[
+        spectrum.trial == index, CHANNELS.index(row.channel)
+    ]
     bands, time = spectrum.layout.bands.at(spectrum.rates[index]), found.problem.cases[index].motion.time
     best, second, start = -1.0, float("nan"), 0
     for pick in spectrum.picks[index]:
@@ -83,8 +99,9 @@ def _when(found: Model, row: Adequacy) -> float:
 def strain(found: Model) -> float:
     """Return how much more unlike the prior the body had to become than people are, as a standard normal deviate.
 
-    Its unit-normal coefficients u are found as N(0, 1 - C) with C their posterior covariance, so |u|² is a sum of squares with the
-    eigenvalues of 1 - C as weights; its cube root is nearly normal. A fault that hides in the body leaves no residual, but a strange body.
+    Its unit-normal coefficients u are found as N(0, 1 - C) with C their posterior covariance, so |u|² is a sum of
+    squares with the eigenvalues of 1 - C as weights; its cube root is nearly normal. A fault that hides in the body
+    leaves no residual, but a strange body.
     """
     k = found.problem.factor.shape[1]
     u, unit = found.belief.mean[:k], np.eye(len(found.belief.mean))[:k]
@@ -96,10 +113,12 @@ def strain(found: Model) -> float:
 
 
 def verdict(named: int, worst: float, gates: "tuple[Gate, ...]", *, strained: bool = False) -> Verdict:
-    """Return the verdict from how many causes were named, the ``worst`` z that is left, the gates, and whether the body is ``strained``."""
+    """Return the verdict from how many causes were named, the ``worst`` z that is left, the gates, and whether the
+    body is ``strained``.
+    """
     failed = any(not gate.ok for gate in gates)
     if worst <= LIMIT and not strained:
         return "named, complete" if named or failed else "nothing wrong"
-    if (named or failed) and worst <= BEYOND:
+    if (named or failed) and worst <= _BEYOND:
         return "named, incomplete"
     return "unexplained"

@@ -1,7 +1,8 @@
 """Every cause of the family at every target, as columns whose coefficients are unit normal before the data.
 
-A cause that is linear in its parameters has its own columns. One that is not (the place of a load matters only once it weighs something) is
-spanned by what it does at its typical size: the columns at zero, and the differences that the other parameters make there.
+A cause that is linear in its parameters has its own columns. One that is not (the place of a load matters only once it
+weighs something) is spanned by what it does at its typical size: the columns at zero, and the differences that the
+other parameters make there.
 """
 
 from collections.abc import Callable
@@ -16,13 +17,15 @@ from biodance.records import Array
 
 SCALE = 3.0
 """Standard deviation of a fault before the data, in typical sizes."""
-NOTHING = 1e-7
+_NOTHING = 1e-7
 """Share of the largest column below which a column is zero."""
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """One cause: ``basis`` (r, k) rows per unit-normal coefficient; ``silent`` (p,) True for parameters whose column vanishes at zero."""
+    """One cause: ``basis`` (r, k) rows per unit-normal coefficient; ``silent`` (p,) True for parameters whose column
+    vanishes at zero.
+    """
 
     effect: Effect
     basis: Array
@@ -48,7 +51,9 @@ class Candidate:
 
 
 def candidates(problem: Problem, chosen: Chosen[Effect] = None) -> tuple[Candidate, ...]:
-    """Return all causes of the family (or those ``chosen``, see `effects`) at all their targets; those without any trace are left out."""
+    """Return all causes of the family (or those ``chosen``, see `effects`) at all their targets; those without any
+    trace are left out.
+    """
     every = [one for effect in effects(chosen).values() for one in effect.everywhere(problem.cases[0])]
     if not every:
         return ()
@@ -60,7 +65,7 @@ def candidate(problem: Problem, effect: Effect, unit: Array) -> Candidate:
     """Return one cause with its basis, from its columns (r, p) per ``unit`` of each parameter."""
     columns = unit * effect.typical
     length = np.linalg.norm(columns, axis=0)
-    silent = length <= NOTHING * length.max(initial=1e-300)
+    silent = length <= _NOTHING * length.max(initial=1e-300)
     parts = list(columns[:, ~silent].T)
     if silent.any() and not silent.all():
         parts += _differences(problem, effect, silent)
@@ -78,7 +83,7 @@ def _differences(problem: Problem, effect: Effect, silent: Array) -> list[Array]
         up, down = changes(problem, effect, loud + step), changes(problem, effect, loud - step)
         first.append(0.5 * (up - down))
         second.append(0.5 * (up + down) - middle)
-    return first + [bend for bend in second if np.linalg.norm(bend) > NOTHING * np.linalg.norm(middle)]
+    return first + [bend for bend in second if np.linalg.norm(bend) > _NOTHING * np.linalg.norm(middle)]
 
 
 def local_basis(problem: Problem, effect: Effect) -> Array | None:
@@ -105,7 +110,9 @@ def changes(problem: Problem, effect: Effect, theta: Array) -> Array:
 
 
 def removed(problem: Problem, effect: Effect, theta: Array) -> Array:
-    """Return (r,): what the cause of size ``theta`` (p,) has added to the rows, as far as it can be undone in what was measured."""
+    """Return (r,): what the cause of size ``theta`` (p,) has added to the rows, as far as it can be undone in what
+    was measured.
+    """
     return _in_rows(problem, effect, theta, effect.removed)
 
 
@@ -117,9 +124,15 @@ def _in_rows(problem: Problem, effect: Effect, theta: Array, wrench: Callable[[C
     return np.concatenate([rows.ravel(), problem.marker_rows(effect) @ theta])
 
 
-def slopes(problem: Problem, effect: Effect, theta: Array, *, of: Callable[[Problem, Effect, Array], Array] = changes) -> Array:
-    """Return (r, p): derivative of `changes` or `removed` at ``theta``, of a cause that is not linear by central differences."""
+def slopes(
+    problem: Problem, effect: Effect, theta: Array, *, of: Callable[[Problem, Effect, Array], Array] = changes
+) -> Array:
+    """Return (r, p): derivative of `changes` or `removed` at ``theta``, of a cause that is not linear by central
+    differences.
+    """
     if effect.linear:
         return problem.unit(effect)
     steps = 0.02 * np.diag(effect.typical)
-    return np.stack([(of(problem, effect, theta + s) - of(problem, effect, theta - s)) / (2 * s.max()) for s in steps], axis=1)
+    return np.stack(
+        [(of(problem, effect, theta + s) - of(problem, effect, theta - s)) / (2 * s.max()) for s in steps], axis=1
+    )

@@ -1,4 +1,5 @@
-"""The records of a diagnosis: what was found wrong, what it could be instead, what naming it gains, and what could not be seen.
+"""The records of a diagnosis: what was found wrong, what it could be instead, what naming it gains, and what could not
+be seen.
 
 SI units; six channels are Fx Fy Fz (N) and Mx My Mz (N·m) about the middle of where the person stands.
 """
@@ -19,13 +20,15 @@ if TYPE_CHECKING:
 
 
 Verdict = Literal["nothing wrong", "named, complete", "named, incomplete", "unexplained"]
-SIGMAS = 1.959964
+_SIGMAS = 1.959964
 """Half width of a 95 % interval in standard deviations."""
 
 
 @dataclass(frozen=True)
 class Alias:
-    """A cause that the data cannot tell from the one named; ``log_bayes_factor`` against "nothing wrong" (natural logarithm)."""
+    """A cause that the data cannot tell from the one named; ``log_bayes_factor`` against "nothing wrong" (natural
+    logarithm).
+    """
 
     effect: str
     target: str
@@ -44,17 +47,19 @@ class Estimate:
     @property
     def interval(self) -> tuple[float, float]:
         """95 % interval."""
-        return self.value - SIGMAS * self.sd, self.value + SIGMAS * self.sd
+        return self.value - _SIGMAS * self.sd, self.value + _SIGMAS * self.sd
 
 
 @dataclass(frozen=True, eq=False)
 class Gain:
-    """What a finding gains on trials that were not used to find it, against the model in use (identified body, nominal laboratory).
+    """What a finding gains on trials that were not used to find it, against the model in use (identified body, nominal
+    laboratory).
 
-    ``rms_before``, ``rms_after`` (6,) N, N·m, root mean square residual per channel; ``channels`` (6, 2) 95 % interval of the share of it
-    that the finding removes (0.2 = a fifth, negative = it adds); ``ci95`` (2,) the same for all channels together, each in units of what
-    the accepted model leaves of the trials that were used (excludes 0: a proven gain); ``score``, ``score_se`` change of the log
-    predictive density per second, natural logarithm, with standard error; ``trials`` judged on.
+    ``rms_before``, ``rms_after`` (6,) N, N·m, root mean square residual per channel; ``channels`` (6, 2) 95 % interval
+    of the share of it that the finding removes (0.2 = a fifth, negative = it adds); ``ci95`` (2,) the same for all
+    channels together, each in units of what the accepted model leaves of the trials that were used (excludes 0: a
+    proven gain); ``score``, ``score_se`` change of the log predictive density per second, natural logarithm, with
+    standard error; ``trials`` judged on.
     """
 
     rms_before: Array
@@ -89,7 +94,8 @@ class Finding:
     set : tuple
         All causes that the data cannot tell apart, the named one first.
     visible_fraction : float
-        Share of its effect that remains visible when the body's own parameters and tolerances may adapt (0 = hides in the body).
+        Share of its effect that remains visible when the body's own parameters and tolerances may adapt (0 = hides in
+        the body).
     gain : Gain or None
         On trials that were kept; None without one.
     advice : str
@@ -127,8 +133,9 @@ class Finding:
 
 @dataclass(frozen=True)
 class Adequacy:
-    """How far the residual that is left in one ``channel`` and band (Hz) is from what sessions without fault show, in their standard
-    deviations; ``trial`` where it is largest, and the ``second`` s of its recording around which (NaN: not looked for).
+    """How far the residual that is left in one ``channel`` and band (Hz) is from what sessions without fault show, in
+    their standard deviations; ``trial`` where it is largest, and the ``second`` s of its recording around which (NaN:
+    not looked for).
     """
 
     channel: str
@@ -142,7 +149,8 @@ class Adequacy:
 class Unobservable:
     """The smallest size ``limit`` (``unit``) of a cause that this session would see; infinite: it leaves no trace here.
 
-    ``told_from`` the size from which it is also told from every other cause, infinite if one looks the same; ``typical`` size.
+    ``told_from`` the size from which it is also told from every other cause, infinite if one looks the same;
+    ``typical`` size.
     """
 
     effect: str
@@ -209,7 +217,8 @@ class Diagnosis:
         Returns
         -------
         pandas.DataFrame
-            effect, target, parameter, value, sd, low and high of the 95 % interval, unit, visible fraction, log Bayes factor, advice.
+            effect, target, parameter, value, sd, low and high of the 95 % interval, unit, visible fraction, log Bayes
+            factor, advice.
 
         Examples
         --------
@@ -220,7 +229,18 @@ class Diagnosis:
 
         columns = "effect target parameter value sd low high unit"
         rows = [
-            (f.effect, f.target, p.name, p.value, p.sd, *p.interval, p.unit, f.visible_fraction, f.log_bayes_factor, f.advice)
+            (
+                f.effect,
+                f.target,
+                p.name,
+                p.value,
+                p.sd,
+                *p.interval,
+                p.unit,
+                f.visible_fraction,
+                f.log_bayes_factor,
+                f.advice,
+            )
             for f in self.findings
             for p in (f.parameters or (Estimate("", float("nan"), float("nan"), ""),))
         ]

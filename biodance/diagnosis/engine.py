@@ -1,4 +1,6 @@
-"""A session's diagnosis: name causes, ask whether what is left is like a session without fault, and say what could not be seen."""
+"""A session's diagnosis: name causes, ask whether what is left is like a session without fault, and say what could
+not be seen.
+"""
 
 from dataclasses import dataclass
 
@@ -19,7 +21,8 @@ from biodance.records import Sip
 from biodance.uncertainty.tolerances import Tolerances, key_of, shipped
 
 STRANGE = (
-    "What the plates measured fits only a body that is more unlike the table than people are. Something that looks like a body is wrong: "
+    "What the plates measured fits only a body that is more unlike the table than people are. Something that looks "
+    "like a body is wrong: "
     "a load that nobody noted, a gain, or the declared mass or stature."
 )
 
@@ -52,11 +55,13 @@ def diagnose_trials(
     effects: Chosen[Effect | DiscreteEffect] = None,
     search: bool = True,
 ) -> Examined:
-    """Return what the simulation of ``body`` (with the SIP known before, by default the table's) gets wrong in the trials ``looks``.
+    """Return what the simulation of ``body`` (with the SIP known before, by default the table's) gets wrong in the
+    trials ``looks``.
 
-    ``gates`` the checks made before; ``tolerances`` of everything that is no fault (those of virtual subjects by default);
-    ``prior`` of the parameters (an earlier session's; by default the table's); ``effects`` names limit the causes to these, objects
-    (``[MyEffect()]``) are looked for beside the family; without ``search`` nothing is named: only what is left is judged.
+    ``gates`` the checks made before; ``tolerances`` of everything that is no fault (those of virtual subjects by
+    default); ``prior`` of the parameters (an earlier session's; by default the table's); ``effects`` names limit the
+    causes to these, objects (``[MyEffect()]``) are looked for beside the family; without ``search`` nothing is named:
+    only what is left is judged.
 
     Raises
     ------
@@ -88,10 +93,14 @@ def _relative(row: Unobservable) -> float:
 
 
 def _finding(one: NamedCause, found: Round, known: Tolerances) -> Finding:
-    """Return a named cause as a finding; no size is surer than sessions without fault are alike, nor than faults are like their models."""
+    """Return a named cause as a finding; no size is surer than sessions without fault are alike, nor than faults are
+    like their models.
+    """
     alike = known.size(key_of(one.effect.name, one.effect.target)) * one.effect.typical / one.effect.typical[0]
     units = np.array([parameter.unit for parameter in one.effect.parameters])
     length = np.array([np.linalg.norm(one.theta[units == unit]) for unit in units])
     sd = np.hypot(np.maximum(np.sqrt(np.diag(one.covariance)), alike), known.unlike(one.effect.name) * length)
     parameters = tuple(Estimate(*row) for row in one.effect.reported(one.theta, sd))
-    return Finding(one.effect.name, one.effect.target, parameters, found.set, found.suspects[0].visible, advice=one.effect.advice)
+    return Finding(
+        one.effect.name, one.effect.target, parameters, found.set, found.suspects[0].visible, advice=one.effect.advice
+    )

@@ -1,11 +1,12 @@
 """Evidence for every cause at once: the generalised score test under one linear Gaussian model.
 
-With whitened rows y = X u + Z b + noise, u and b unit normal (X everything that is no fault, Z the basis of one cause): A = 1 + X'X,
-G = Z'Z - Z'X A^-1 X'Z, s = Z'y - Z'X A^-1 X'y, and
+With whitened rows y = X u + Z b + noise, u and b unit normal (X everything that is no fault, Z the basis of one cause):
+A = 1 + X'X, G = Z'Z - Z'X A^-1 X'Z, s = Z'y - Z'X A^-1 X'y, and
 
     log Bayes factor = -1/2 log |1 + G| + 1/2 s' (1 + G)^-1 s,      b ~ N((1 + G)^-1 s, (1 + G)^-1).
 
-One factorisation of A serves all causes. What hides in the body's own parameters or in a tolerance leaves no trace in G.
+One factorisation of A serves all causes. What hides in the body's own parameters or in a tolerance leaves no trace in
+G.
 """
 
 from dataclasses import dataclass
@@ -20,8 +21,8 @@ from biodance.records import Array
 class Belief:
     """What the data say about everything that is no fault.
 
-    ``X`` (r, K) whitened columns of unit-normal coefficients, ``y`` (r,) whitened target; ``factor`` Cholesky factor of A; ``mean`` (K,)
-    posterior mean of the coefficients.
+    ``X`` (r, K) whitened columns of unit-normal coefficients, ``y`` (r,) whitened target; ``factor`` Cholesky factor of
+    A; ``mean`` (K,) posterior mean of the coefficients.
     """
 
     X: Array
@@ -57,8 +58,9 @@ def believe(X: Array, y: Array) -> Belief:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """One cause under the score test: ``log_bayes_factor`` against nothing wrong; posterior ``mean`` (k,) and ``covariance`` (k, k) of its
-    coefficients; ``visible`` share of its size that is left when all that is no fault may adapt.
+    """One cause under the score test: ``log_bayes_factor`` against nothing wrong; posterior ``mean`` (k,) and
+    ``covariance`` (k, k) of its coefficients; ``visible`` share of its size that is left when all that is no fault may
+    adapt.
     """
 
     log_bayes_factor: float
@@ -68,7 +70,9 @@ class Evidence:
 
 
 def evidence(s: Array, G: Array, length: float) -> Evidence:
-    """Return the evidence from the score ``s`` (k,), its information ``G`` (k, k) and the squared length of the whitened columns."""
+    """Return the evidence from the score ``s`` (k,), its information ``G`` (k, k) and the squared length of the
+    whitened columns.
+    """
     inner: Array = np.asarray(np.linalg.inv(np.eye(len(s)) + G), dtype=float)
     mean = inner @ s
     value = -0.5 * float(np.linalg.slogdet(np.eye(len(s)) + G)[1]) + 0.5 * float(s @ mean)
@@ -76,7 +80,9 @@ def evidence(s: Array, G: Array, length: float) -> Evidence:
 
 
 def smallest(G: Array, direction: Array, threshold: float) -> float:
-    """Return the multiple of ``direction`` (k,) at which the expected log Bayes factor reaches ``threshold``; infinite if it never does."""
+    """Return the multiple of ``direction`` (k,) at which the expected log Bayes factor reaches ``threshold``;
+    infinite if it never does.
+    """
     inner = np.linalg.inv(np.eye(len(G)) + G)
     pull = G @ direction
     growth = 0.5 * float(pull @ inner @ pull)

@@ -1,7 +1,7 @@
 """Before the recording: what a planned movement will be able to see, at which size, and which causes it will confuse.
 
-Everything follows from the movement and the body alone: the planned trial is given the table's wrench and the model's own markers, so that
-columns, tolerances and information are those of a session without fault.
+Everything follows from the movement and the body alone: the planned trial is given the table's wrench and the model's
+own markers, so that columns, tolerances and information are those of a session without fault.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from biodance.motion.regressor import predict_wrench
 from biodance.records import Markers, Motion, Plate, Source, Trial
 from biodance.uncertainty.tolerances import Tolerances, shipped
 
-HALF = 0.3
+_HALF = 0.3
 """m: half the side of the plate that is put under the movement."""
 CLOSEST = 12
 """Pairs of causes that are listed."""
@@ -29,8 +29,8 @@ CLOSEST = 12
 
 @dataclass(frozen=True)
 class Confusion:
-    """Two causes that look alike: ``cause`` at its typical size is expected to be told from ``other`` by ``difference`` (log Bayes factor;
-    3 is twenty to one).
+    """Two causes that look alike: ``cause`` at its typical size is expected to be told from ``other`` by ``difference``
+    (log Bayes factor; 3 is twenty to one).
     """
 
     cause: tuple[str, str]
@@ -40,8 +40,8 @@ class Confusion:
 
 @dataclass(frozen=True, eq=False)
 class Foresight:
-    """``limits`` of all causes, easiest first; ``hidden`` those that will stay unseen; ``confusions`` the closest pairs among the causes
-    that will be seen at their typical size, worst first.
+    """``limits`` of all causes, easiest first; ``hidden`` those that will stay unseen; ``confusions`` the closest pairs
+    among the causes that will be seen at their typical size, worst first.
     """
 
     limits: tuple[Unobservable, ...]
@@ -50,12 +50,17 @@ class Foresight:
 
     @property
     def separation(self) -> float:
-        """The smallest difference of all pairs: a movement with a larger one tells causes apart better (T-optimality); 0 without a pair."""
+        """The smallest difference of all pairs: a movement with a larger one tells causes apart better
+        (T-optimality); 0 without a pair.
+        """
         return self.confusions[0].difference if self.confusions else 0.0
 
 
-def foresee(body: Body, motions: tuple[Motion, ...], *, tolerances: Tolerances | None = None, effects: Chosen[Effect] = None) -> Foresight:
-    """Return what ``motions`` (the planned trials, in order) of ``body`` will be able to see; ``effects`` as for `diagnose`.
+def foresee(
+    body: Body, motions: tuple[Motion, ...], *, tolerances: Tolerances | None = None, effects: Chosen[Effect] = None
+) -> Foresight:
+    """Return what ``motions`` (the planned trials, in order) of ``body`` will be able to see; ``effects`` as for
+    `diagnose`.
 
     Raises
     ------
@@ -66,7 +71,9 @@ def foresee(body: Body, motions: tuple[Motion, ...], *, tolerances: Tolerances |
     ends = np.cumsum([float(one.time[-1] - one.time[0]) for one in motions])
     starts = np.concatenate([[0.0], ends[:-1]])
     looks = tuple(
-        Look(planned(body, one, f"planned_{i + 1}"), one, np.ones(one.time.size, dtype=bool), a / ends[-1], b / ends[-1])
+        Look(
+            planned(body, one, f"planned_{i + 1}"), one, np.ones(one.time.size, dtype=bool), a / ends[-1], b / ends[-1]
+        )
         for i, (one, a, b) in enumerate(zip(motions, starts, ends, strict=True))
     )
     put = problem(body, looks, chosen=effects)
@@ -77,13 +84,24 @@ def foresee(body: Body, motions: tuple[Motion, ...], *, tolerances: Tolerances |
 
 
 def planned(body: Body, motion: Motion, name: str) -> Trial:
-    """Return the trial that a laboratory without any error would record of ``motion``: one plate under its mean centre of pressure."""
+    """Return the trial that a laboratory without any error would record of ``motion``: one plate under its mean
+    centre of pressure.
+    """
     wrench = predict_wrench(body, motion)
     x, y = np.nanmean(wrench.cop()[:, :2], axis=0)
-    corners = np.array([[x + HALF, y + HALF, 0.0], [x - HALF, y + HALF, 0.0], [x - HALF, y - HALF, 0.0], [x + HALF, y - HALF, 0.0]])
+    corners = np.array(
+        [
+            [x + _HALF, y + _HALF, 0.0],
+            [x - _HALF, y + _HALF, 0.0],
+            [x - _HALF, y - _HALF, 0.0],
+            [x + _HALF, y - _HALF, 0.0],
+        ]
+    )
     places = poses(body, motion.q).points(list(body.markers.segment), body.markers.position)
     markers = Markers(body.markers.names, motion.time, places)
-    return Trial(name, "fit", markers, (Plate("plate1", 0, corners, wrench),), Source(Path(name), "", "planned", motion.rate))
+    return Trial(
+        name, "fit", markers, (Plate("plate1", 0, corners, wrench),), Source(Path(name), "", "planned", motion.rate)
+    )
 
 
 def _confusions(seen: Visibility, rows: tuple[Unobservable, ...]) -> tuple[Confusion, ...]:

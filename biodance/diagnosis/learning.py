@@ -1,7 +1,8 @@
-"""Learn from sessions without fault how large everything is that is no fault, all of them at once (`uncertainty/learning`).
+"""Learn from sessions without fault how large everything is that is no fault, all of them at once
+(`uncertainty/learning`).
 
-A coefficient of a nuisance is normal with the mean and the size of its key; a mean counts only where the sessions agree on it. What a joint
-may err before functional calibration is the literature's, and stays.
+A coefficient of a nuisance is normal with the mean and the size of its key; a mean counts only where the sessions agree
+on it. What a joint may err before functional calibration is the literature's, and stays.
 """
 
 from collections.abc import Iterable
@@ -21,9 +22,9 @@ from biodance.uncertainty.tolerances import BEFORE, REFERENCE_PERSON, Tolerances
 
 @dataclass(frozen=True, eq=False)
 class Null:
-    """One session without fault: ``target`` (r,); ``columns`` (r, K) in unit size with their ``keys`` (K), "" for the parameters' prior
-    (unit normal), and ``mean_keys`` (K), "" for columns without a mean; ``band`` (m,) of the 6 m wrench rows; ``marker_keys`` of the rows
-    that follow; ``mass`` kg.
+    """One session without fault: ``target`` (r,); ``columns`` (r, K) in unit size with their ``keys`` (K), "" for the
+    parameters' prior (unit normal), and ``mean_keys`` (K), "" for columns without a mean; ``band`` (m,) of the 6 m
+    wrench rows; ``marker_keys`` of the rows that follow; ``mass`` kg.
     """
 
     target: Array
@@ -45,8 +46,8 @@ def null_of(problem: Problem, causes: tuple[Candidate, ...]) -> Null:
 
 
 def learn_tolerances(nulls: Iterable[Null], start: Tolerances, *, rounds: int = 10) -> Tolerances:
-    """Return the sizes, means and noise under which the null sessions are most probable after ``rounds`` of expectation maximisation, and
-    the energies that they leave. Only what has a size in ``start`` is learned.
+    """Return the sizes, means and noise under which the null sessions are most probable after ``rounds`` of expectation
+    maximisation, and the energies that they leave. Only what has a size in ``start`` is learned.
     """
     sessions = tuple(nulls)
     found = maximise(start, lambda known: _improved(sessions, known), lambda known: known.noise, rounds=rounds)
@@ -57,8 +58,9 @@ def learn_tolerances(nulls: Iterable[Null], start: Tolerances, *, rounds: int = 
 
 @dataclass(frozen=True, eq=False)
 class _Posterior:
-    """What one session says of its coefficients: ``value``, ``variance`` (K,) in their own units, NaN for those without a size; ``left``
-    (r,) what their means leave of the target; ``spread`` (r, k) a square root of the covariance of what they explain.
+    """What one session says of its coefficients: ``value``, ``variance`` (K,) in their own units, NaN for those without
+    a size; ``left`` (r,) what their means leave of the target; ``spread`` (r, k) a square root of the covariance of
+    what they explain.
     """
 
     value: Array
@@ -80,7 +82,9 @@ def _posterior(null: Null, found: Tolerances) -> _Posterior:
     mean, covariance = cho_solve(factor, (X.T @ y).astype(float)), cho_solve(factor, np.eye(known.size))
     value, variance = np.full((2, size.size), np.nan)
     value[known], variance[known] = expected[known] + size[known] * mean, size[known] ** 2 * np.diag(covariance)
-    return _Posterior(value, variance, target - scaled @ mean, scaled @ np.linalg.cholesky(covariance).astype(scaled.dtype))
+    return _Posterior(
+        value, variance, target - scaled @ mean, scaled @ np.linalg.cholesky(covariance).astype(scaled.dtype)
+    )
 
 
 def _improved(sessions: tuple[Null, ...], found: Tolerances) -> Tolerances:
@@ -91,7 +95,11 @@ def _improved(sessions: tuple[Null, ...], found: Tolerances) -> Tolerances:
     for null in sessions:
         some = _posterior(null, found)
         names = null.mean_keys or ("",) * len(null.keys)
-        rows += [row for row in zip(null.keys, names, some.value, some.variance, strict=True) if row[0] and np.isfinite(row[2])]
+        rows += [
+            row
+            for row in zip(null.keys, names, some.value, some.variance, strict=True)
+            if row[0] and np.isfinite(row[2])
+        ]
         wrench = 6 * null.band.size
         seen = some.left[wrench:] ** 2 + (some.spread[wrench:] ** 2).sum(axis=1)
         rows += [(key, "", float(np.sqrt(square)), 0.0) for key, square in zip(null.marker_keys, seen, strict=True)]

@@ -1,4 +1,6 @@
-"""The problem under its tolerances: whitened rows, columns of all that is no fault, and the causes that were named so far."""
+"""The problem under its tolerances: whitened rows, columns of all that is no fault, and the causes that were named
+so far.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -31,8 +33,8 @@ class NamedCause:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """``problem`` with the parameters in use, under ``tolerances``; ``belief`` about all that is no fault, the ``named`` causes and what is
-    ``expected`` (r,) of a session without fault taken off.
+    """``problem`` with the parameters in use, under ``tolerances``; ``belief`` about all that is no fault, the
+    ``named`` causes and what is ``expected`` (r,) of a session without fault taken off.
 
     ``log_likelihood`` of the target under it, up to a constant of the session.
     """
@@ -80,8 +82,8 @@ def marker_keys(problem: Problem) -> tuple[str, ...]:
 
 
 def nuisances(problem: Problem, causes: tuple[Candidate, ...]) -> tuple[Array, tuple[str, ...], tuple[str, ...]]:
-    """Return columns (r, K) per unit of all that may be no fault, the keys of their sizes and of their means ("" for those that have none:
-    the signs of slides and tilts are mirrored between sides and persons).
+    """Return columns (r, K) per unit of all that may be no fault, the keys of their sizes and of their means ("" for
+    those that have none: the signs of slides and tilts are mirrored between sides and persons).
     """
     body = problem.cases[0].body
     joints = {joint_of(body, chain) for chain in chains(body)}
@@ -98,14 +100,20 @@ def nuisances(problem: Problem, causes: tuple[Candidate, ...]) -> tuple[Array, t
 
 
 def shown_left_out(expected: Array, marker_keys: tuple[str, ...]) -> Array:
-    """Return ``expected`` (r,) with zero in the rows of sizes shown: what everybody shows is taken off there already."""
+    """Return ``expected`` (r,) with zero in the rows of sizes shown: what everybody shows is taken off there
+    already.
+    """
     shown = [key.startswith("shown ") for key in marker_keys]
-    return np.concatenate([expected[: len(expected) - len(shown)], np.where(shown, 0.0, expected[len(expected) - len(shown) :])])
+    return np.concatenate(
+        [expected[: len(expected) - len(shown)], np.where(shown, 0.0, expected[len(expected) - len(shown) :])]
+    )
 
 
 def model(problem: Problem, causes: tuple[Candidate, ...], tolerances: Tolerances) -> Model:
     """Return the model without any named cause; those of ``causes`` with a learned size are tolerances as well."""
-    columns, keys, mean_keys = nuisances(problem, tuple(one for one in causes if tolerances.size(key_of(*one.names)) > 0))
+    columns, keys, mean_keys = nuisances(
+        problem, tuple(one for one in causes if tolerances.size(key_of(*one.names)) > 0)
+    )
     expected = shown_left_out(columns @ np.array([tolerances.mean(key) for key in mean_keys]), marker_keys(problem))
     X = np.concatenate([problem.sip, columns * np.array([tolerances.size(key) for key in keys])], axis=1)
     both = white(problem, tolerances, np.concatenate([X, (problem.target - expected)[:, None]], axis=1))

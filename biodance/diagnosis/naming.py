@@ -1,4 +1,6 @@
-"""Name the causes one after the other: screen all, refine the best, take the most probable off, rebuild what depends on it, look again."""
+"""Name the causes one after the other: screen all, refine the best, take the most probable off, rebuild what depends
+on it, look again.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -15,26 +17,28 @@ from biodance.effects import Effect, effects
 from biodance.records import Array
 from biodance.uncertainty.tolerances import Tolerances
 
-ROUNDS = 3
+_ROUNDS = 3
 """Causes named at most."""
 REFINED = 6
 """Causes of the screening that are fitted with all their curvature."""
-NEAR = 12.0
+_NEAR = 12.0
 """Natural logarithm: causes this far behind the best one of the screening are refined."""
 TOGETHER = 3.0
 """Natural logarithm: causes that are at most this much less probable than the best one are in its set."""
 HEAVIER = 0.3
 """Share of a segment's mass by which it must look heavier before its kinematic errors are computed again."""
 STALE = 0.03
-"""Share of the predicted wrench that may change before causes are predicted again: their sizes are then right to this share."""
-STEPS = 5
+"""Share of the predicted wrench that may change before causes are predicted again: their sizes are then right to
+this share.
+"""
+_STEPS = 5
 """Gauss-Newton steps at most."""
 
 
 @dataclass(frozen=True, eq=False)
 class ScoredCandidate:
-    """One cause in one round: its ``score`` is the log Bayes factor less the logarithm of its number of targets; ``start`` (p,) parameters;
-    ``visible`` share.
+    """One cause in one round: its ``score`` is the log Bayes factor less the logarithm of its number of targets;
+    ``start`` (p,) parameters; ``visible`` share.
     """
 
     cause: Candidate
@@ -51,13 +55,17 @@ class ScoredCandidate:
 
 @dataclass(frozen=True, eq=False)
 class Round:
-    """What one round found: the ``suspects``, most probable first; those of the first cannot be told from it are its ``set``."""
+    """What one round found: the ``suspects``, most probable first; those of the first cannot be told from it are its
+    ``set``.
+    """
 
     suspects: tuple[ScoredCandidate, ...]
 
     @property
     def set(self) -> tuple[Alias, ...]:
-        """The most probable cause and those that are nearly as probable, or would be if nobody had asked about so many targets."""
+        """The most probable cause and those that are nearly as probable, or would be if nobody had asked about so
+        many targets.
+        """
         best = self.suspects[0]
         near = [min(best.score - one.score, best.log_bayes_factor - one.log_bayes_factor) for one in self.suspects]
         return tuple(one.alias for one, far in zip(self.suspects, near, strict=True) if far <= TOGETHER)
@@ -65,8 +73,9 @@ class Round:
 
 @dataclass(frozen=True, eq=False)
 class Naming:
-    """All rounds: ``first`` the model before any was named, with the ``screening`` of ``first_causes``; ``found`` the last model, with the
-    named causes; ``bare`` the same parameters without them; ``accepted`` a round per named cause, in their order.
+    """All rounds: ``first`` the model before any was named, with the ``screening`` of ``first_causes``; ``found`` the
+    last model, with the named causes; ``bare`` the same parameters without them; ``accepted`` a round per named cause,
+    in their order.
     """
 
     first: Model
@@ -77,8 +86,11 @@ class Naming:
     bare: Model
 
 
-def name_causes(problem: Problem, tolerances: Tolerances, chosen: Chosen[Effect] = None, *, rounds: int = ROUNDS) -> Naming:
-    """Return the causes that the session shows, at most ``rounds``; ``chosen`` limits or extends the family (`effects`).
+def name_causes(
+    problem: Problem, tolerances: Tolerances, chosen: Chosen[Effect] = None, *, rounds: int = _ROUNDS
+) -> Naming:
+    """Return the causes that the session shows, at most ``rounds``; ``chosen`` limits or extends the family
+    (`effects`).
 
     What a body predicts that is unlike people is not believed: causes are then not predicted again.
     """
@@ -101,7 +113,9 @@ def name_causes(problem: Problem, tolerances: Tolerances, chosen: Chosen[Effect]
         accepted.append(ranking)
         again = stale(settled) and strain(settled) <= STRAINED
         found, causes = rebuilt(settled, tolerances, chosen) if again else (settled, causes)
-        ranking = Round(tuple(one for one in screen(found, causes) if one.cause.names not in {named_of(n) for n in found.named}))
+        ranking = Round(
+            tuple(one for one in screen(found, causes) if one.cause.names not in {named_of(n) for n in found.named})
+        )
     return Naming(first, found, tuple(accepted), screening, first_causes, bare)
 
 
@@ -117,16 +131,20 @@ def heavier(found: Model) -> bool:
 
 
 def rebuilt(found: Model, tolerances: Tolerances, chosen: Chosen[Effect]) -> tuple[Model, tuple[Candidate, ...]]:
-    """Return the model and all causes with columns predicted by the parameters that ``found`` believes in, its named causes settled again.
+    """Return the model and all causes with columns predicted by the parameters that ``found`` believes in, its named
+    causes settled again.
 
-    A load and a delay together show in the delay's columns only once the load is predicted, if only by a segment that is too heavy.
+    A load and a delay together show in the delay's columns only once the load is predicted, if only by a segment that
+    is too heavy.
     """
     fresh, causes = built(found.problem.with_parameters(found.phi), tolerances, chosen)
     return settle(fresh, found.named), causes
 
 
 def stale(found: Model) -> bool:
-    """Return whether the parameters that ``found`` believes in predict movements otherwise than those in use, by more than `STALE`."""
+    """Return whether the parameters that ``found`` believes in predict movements otherwise than those in use, by
+    more than `STALE`.
+    """
     both = np.zeros(2)
     for case in found.problem.cases:
         wrench = case.regressor @ np.stack([found.phi - case.phi, case.phi], axis=1)
@@ -137,7 +155,9 @@ def stale(found: Model) -> bool:
 def built(problem: Problem, tolerances: Tolerances, chosen: Chosen[Effect]) -> tuple[Model, tuple[Candidate, ...]]:
     """Return the model without any name and the causes to look for; what is not looked for keeps its tolerance."""
     family = effects(chosen)
-    every = candidates(problem, {n: one for n, one in {**effects(), **family}.items() if n in family or tolerances.knows(n)})
+    every = candidates(
+        problem, {n: one for n, one in {**effects(), **family}.items() if n in family or tolerances.knows(n)}
+    )
     return model(problem, every, tolerances), tuple(one for one in every if one.names[0] in family)
 
 
@@ -167,7 +187,9 @@ def screen(found: Model, causes: tuple[Candidate, ...]) -> tuple[ScoredCandidate
 
 def taken(found: Model) -> Array:
     """Return the whitened columns (r, k) of the named causes, per standard deviation of a fault."""
-    parts = [slopes(found.problem, one.effect, one.theta, of=removed) * SCALE * one.effect.typical for one in found.named]
+    parts = [
+        slopes(found.problem, one.effect, one.theta, of=removed) * SCALE * one.effect.typical for one in found.named
+    ]
     return found.white(np.concatenate(parts, axis=1)) if parts else np.empty((found.belief.y.size, 0))
 
 
@@ -180,9 +202,11 @@ def _shared(found: Model, named: Array, Z: Array) -> Array:
 
 
 def refine(found: Model, ranking: Round) -> tuple[Round, Model]:
-    """Return the ranking with its first causes fitted with all their curvature, and the model with the most probable one named."""
+    """Return the ranking with its first causes fitted with all their curvature, and the model with the most probable
+    one named.
+    """
     best = ranking.suspects[0].score
-    near = [one for one in ranking.suspects[:REFINED] if best - one.score <= max(NEAR, 0.5 * best)]
+    near = [one for one in ranking.suspects[:REFINED] if best - one.score <= max(_NEAR, 0.5 * best)]
     refined = []
     before = found.log_likelihood - _penalty(found)
     for one in near:
@@ -197,9 +221,11 @@ def refine(found: Model, ranking: Round) -> tuple[Round, Model]:
 
 
 def settle(found: Model, named: tuple[NamedCause, ...]) -> Model:
-    """Return the model with the parameters of all ``named`` causes at their most probable values, by Gauss-Newton steps."""
+    """Return the model with the parameters of all ``named`` causes at their most probable values, by Gauss-Newton
+    steps.
+    """
     current = found.less(named)
-    for _ in range(STEPS):
+    for _ in range(_STEPS):
         if not named:
             return current
         Z = taken(current)
@@ -226,7 +252,9 @@ def _moved(named: tuple[NamedCause, ...], u: Array, inner: Array) -> tuple[Named
 
 
 def _penalty(found: Model) -> float:
-    """Return what the parameters of the named causes cost: their prior, and the volume that the data leave of it (Laplace)."""
+    """Return what the parameters of the named causes cost: their prior, and the volume that the data leave of it
+    (Laplace).
+    """
     if not found.named:
         return 0.0
     _, G = found.belief.score(taken(found))

@@ -1,7 +1,8 @@
 """What a session can see and what it cannot: from the movement alone, before any force is looked at.
 
-With a cause of size a, the score is expected to be G a; all expected log Bayes factors are quadratic in a. So the size from which a cause
-is seen, the size from which it is told from every other cause, and the pairs that no size separates follow from G.
+With a cause of size a, the score is expected to be G a; all expected log Bayes factors are quadratic in a. So the size
+from which a cause is seen, the size from which it is told from every other cause, and the pairs that no size separates
+follow from G.
 """
 
 from dataclasses import dataclass
@@ -33,15 +34,15 @@ class Visibility:
     cuts: tuple[slice, ...]
 
     def seen(self, index: int, threshold: float) -> float:
-        """Return the size, in units of the first parameter, from which cause ``index`` is expected to pass ``threshold``; each of several
-        forces or masses at once in the same size: the worst of them.
+        """Return the size, in units of the first parameter, from which cause ``index`` is expected to pass
+        ``threshold``; each of several forces or masses at once in the same size: the worst of them.
         """
         one, cut = self.causes[index], self.cuts[index]
         return max(smallest(self.G[cut, cut], way, threshold) for way in unit_directions(one))
 
     def separation(self, index: int) -> tuple[Array, Array]:
-        """Return ``fixed``, ``growth`` (C,): log Bayes factor of cause ``index`` less that of every other one at size a (first parameter,
-        its own unit) is expected to be fixed + growth a².
+        """Return ``fixed``, ``growth`` (C,): log Bayes factor of cause ``index`` less that of every other one at size a
+        (first parameter, its own unit) is expected to be fixed + growth a².
         """
         way, cut = unit_directions(self.causes[index])[0], self.cuts[index]
         pull = self.G[:, cut] @ way
@@ -58,11 +59,16 @@ class Visibility:
         """(C,) expected log Bayes factor of every cause at size zero."""
         blocks = [self.G[c, c] for c in self.cuts]
         return np.array(
-            [-0.5 * np.linalg.slogdet(np.eye(len(b)) + b)[1] + 0.5 * np.trace(i @ b) for b, i in zip(blocks, self._inner, strict=True)]
+            [
+                -0.5 * np.linalg.slogdet(np.eye(len(b)) + b)[1] + 0.5 * np.trace(i @ b)
+                for b, i in zip(blocks, self._inner, strict=True)
+            ]
         )
 
     def told(self, index: int) -> float:
-        """Return the size from which cause ``index`` is told from every other cause; infinite if one of them looks the same."""
+        """Return the size from which cause ``index`` is told from every other cause; infinite if one of them looks
+        the same.
+        """
         fixed, growth = self.separation(index)
         others = np.arange(len(self.causes)) != index
         need = TOGETHER - fixed[others]
@@ -91,12 +97,18 @@ def visibility(found: Model, causes: tuple[Candidate, ...]) -> Visibility:
 def after_calibration(seen: Visibility, body: Body) -> Visibility:
     """Return what is left to see after the joints of ``body`` were placed by movement (``body.joint_errors``).
 
-    Of a wrong centre the placing leaves the share (posterior / prior standard deviation)². So these centres may vary here, by as much as
-    makes that share of each visible: they take with them what looks like a wrong centre.
+    Of a wrong centre the placing leaves the share (posterior / prior standard deviation)². So these centres may vary
+    here, by as much as makes that share of each visible: they take with them what looks like a wrong centre.
     """
     left = {error.joint: placing_leaves(error) for error in body.joint_errors}
-    at = {one.effect.target: cut for one, cut in zip(seen.causes, seen.cuts, strict=True) if one.names[0] == "joint_centre"}
-    picks = np.concatenate([np.arange(at[joint].start, at[joint].stop) for joint in left if joint in at] or [np.zeros(0, dtype=int)])
+    at = {
+        one.effect.target: cut
+        for one, cut in zip(seen.causes, seen.cuts, strict=True)
+        if one.names[0] == "joint_centre"
+    }
+    picks = np.concatenate(
+        [np.arange(at[joint].start, at[joint].stop) for joint in left if joint in at] or [np.zeros(0, dtype=int)]
+    )
     share = np.repeat([left[joint] for joint in left if joint in at], 3)
     own = np.diag(seen.G)[picks]
     size = np.sqrt((1 / share - 1) / np.maximum(own, 1e-12))
@@ -112,7 +124,9 @@ def placing_leaves(error: JointError) -> float:
 
 
 def detection_limits(seen: Visibility, body: Body, threshold: float) -> tuple[Unobservable, ...]:
-    """Return from which size on every cause is seen and told from the others, by who looks at ``body`` with its joints where they are."""
+    """Return from which size on every cause is seen and told from the others, by who looks at ``body`` with its
+    joints where they are.
+    """
     targets: dict[str, int] = {}
     for one in seen.causes:
         targets[one.names[0]] = targets.get(one.names[0], 0) + 1

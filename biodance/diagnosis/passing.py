@@ -1,7 +1,8 @@
-"""Causes that come and go: a touch of the rail, a helper's hand. Looked for only where nothing steady explains the session.
+"""Causes that come and go: a touch of the rail, a helper's hand. Looked for only where nothing steady explains the
+session.
 
-Each trial has its own course of the force in time, so there are hundreds of columns; three of the six channels stay free, which is why such
-a force does not explain just anything.
+Each trial has its own course of the force in time, so there are hundreds of columns; three of the six channels stay
+free, which is why such a force does not explain just anything.
 """
 
 from dataclasses import dataclass, replace
@@ -34,7 +35,8 @@ class _Passing:
 
 
 def with_passing(naming: Naming, chosen: Chosen[Effect] = None) -> Naming:
-    """Return the naming with a cause that comes and goes, if steady causes leave too much and it leaves less; else as it is.
+    """Return the naming with a cause that comes and goes, if steady causes leave too much and it leaves less; else as
+    it is.
 
     It is tried instead of what was named, and beside it; what leaves less is kept.
     """
@@ -51,7 +53,9 @@ def with_passing(naming: Naming, chosen: Chosen[Effect] = None) -> Naming:
 
 
 def _with(naming: Naming, base: Model, accepted: tuple[Round, ...], chosen: Chosen[Effect]) -> Naming | None:
-    """Return the naming of ``base`` with the most probable cause that comes and goes; None without one above the threshold."""
+    """Return the naming of ``base`` with the most probable cause that comes and goes; None without one above the
+    threshold.
+    """
     kinds = [one for effect in effects(chosen).values() for one in effect.everywhere(base.problem.cases[0])]
     found = [one for one in (_passing(base, effect) for effect in kinds) if one is not None]
     if not found:
@@ -72,7 +76,9 @@ def _with(naming: Naming, base: Model, accepted: tuple[Round, ...], chosen: Chos
 
 
 def one_sided(course: Array) -> bool:
-    """Return whether a force (n, 3) over time keeps to one side of its main direction, as what is touched does; a slow swell does not."""
+    """Return whether a force (n, 3) over time keeps to one side of its main direction, as what is touched does; a
+    slow swell does not.
+    """
     _, _, directions = np.linalg.svd(course, full_matrices=False)
     along = course @ directions[0]
     sides = np.sum(np.maximum(along, 0) ** 2), np.sum(np.minimum(along, 0) ** 2)
@@ -81,7 +87,9 @@ def one_sided(course: Array) -> bool:
 
 def _suspect(one: _Passing, penalty: float) -> ScoredCandidate:
     value = one.found.log_bayes_factor
-    return ScoredCandidate(Candidate(one.effect, one.white[:, :0], ()), value, value - penalty, np.zeros(0), one.found.visible)
+    return ScoredCandidate(
+        Candidate(one.effect, one.white[:, :0], ()), value, value - penalty, np.zeros(0), one.found.visible
+    )
 
 
 def _passing(base: Model, effect: Effect) -> _Passing | None:
@@ -110,8 +118,9 @@ def _loose(base: Model, one: _Passing) -> _Passing:
 
 
 def _named(base: Model, one: _Passing, course: Array, sized: _Passing) -> NamedCause:
-    """Return the cause with its ``course`` (k,) of coefficients of ``one`` cut by trials; as its size, the force while it acts: half of the
-    squares, as ``sized`` sees them, belong to larger ones (the largest of hundreds of values would be mostly noise).
+    """Return the cause with its ``course`` (k,) of coefficients of ``one`` cut by trials; as its size, the force while
+    it acts: half of the squares, as ``sized`` sees them, belong to larger ones (the largest of hundreds of values would
+    be mostly noise).
     """
     count, parts, start = len(one.effect.parameters), {}, 0
     for case in base.problem.cases:

@@ -24,14 +24,14 @@ from biodance.uncertainty.caution import widened
 from biodance.uncertainty.sources import Errors, forward, of_clusters
 from biodance.uncertainty.tolerances import in_state
 
-LIGHTEST = 0.2
+_LIGHTEST = 0.2
 """Share of the table's mass below which an identified segment is not believed."""
 
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """One trial to look at: ``trial`` prepared, its ``motion``, ``use`` (T,) frames whose wrench may be compared, ``start`` and ``end`` of
-    it as shares of the session's time.
+    """One trial to look at: ``trial`` prepared, its ``motion``, ``use`` (T,) frames whose wrench may be compared,
+    ``start`` and ``end`` of it as shares of the session's time.
     """
 
     trial: Trial
@@ -45,10 +45,11 @@ class Look:
 class Problem:
     """The session in rows, not yet whitened.
 
-    ``cases`` thinned trials with the parameters in use; ``spectrum`` where rows come from; ``target`` (r,) measured minus what the prior's
-    mean predicts; ``prior`` of the parameters and ``factor`` S (p, k) of its covariance; ``sip`` (r, k) columns W S; ``kinematics``
-    (r, K) columns of unit errors of ``groups`` (K); ``markers`` number m of marker rows, near the end; the last s rows: sizes that the
-    markers alone show of the causes ``shown`` (s; effect, target); ``notes`` what was left out.
+    ``cases`` thinned trials with the parameters in use; ``spectrum`` where rows come from; ``target`` (r,) measured
+    minus what the prior's mean predicts; ``prior`` of the parameters and ``factor`` S (p, k) of its covariance; ``sip``
+    (r, k) columns W S; ``kinematics`` (r, K) columns of unit errors of ``groups`` (K); ``markers`` number m of marker
+    rows, near the end; the last s rows: sizes that the markers alone show of the causes ``shown`` (s; effect, target);
+    ``notes`` what was left out.
     """
 
     cases: tuple[Case, ...]
@@ -70,7 +71,9 @@ class Problem:
 
     def columns(self, some: Sequence[Effect]) -> list[Array]:
         """Return (r, p) for each of ``some`` effects: what one unit of each parameter adds to the rows."""
-        wrench = self.spectrum.rows(tuple(np.concatenate([one.columns(case) for one in some], axis=2) for case in self.cases))
+        wrench = self.spectrum.rows(
+            tuple(np.concatenate([one.columns(case) for one in some], axis=2) for case in self.cases)
+        )
         ends = np.cumsum([len(one.parameters) for one in some])
         parts = np.split(wrench.reshape(self.wrench_rows, -1), ends[:-1], axis=1)
         return [np.concatenate([part, self.marker_rows(one)]) for part, one in zip(parts, some, strict=True)]
@@ -86,7 +89,9 @@ class Problem:
         return {}
 
     def marker_rows(self, effect: Effect) -> Array:
-        """Return (m + s, p): what one unit of each parameter of ``effect`` adds to the marker rows and to the sizes shown."""
+        """Return (m + s, p): what one unit of each parameter of ``effect`` adds to the marker rows and to the sizes
+        shown.
+        """
         found = [effect.marker_columns(case) for case in self.cases]
         out = np.zeros((self.markers, len(effect.parameters)))
         share = _shares(self.spectrum, len(self.cases))
@@ -100,14 +105,18 @@ class Problem:
         return np.concatenate([out, sizes])
 
     def with_parameters(self, phi: Array) -> "Problem":
-        """Return the problem whose faults are predicted with the parameters ``phi`` (10N,); what is measured against stays the prior."""
+        """Return the problem whose faults are predicted with the parameters ``phi`` (10N,); what is measured against
+        stays the prior.
+        """
         return replace(self, cases=tuple(case.with_parameters(phi) for case in self.cases))
 
     def with_matter(self, phi: Array) -> "Problem":
-        """Return the problem whose kinematic errors move the matter of ``phi`` (10N,): what is heavier than the table errs more."""
+        """Return the problem whose kinematic errors move the matter of ``phi`` (10N,): what is heavier than the
+        table errs more.
+        """
         body = self.cases[0].body
         table, own = phi.reshape(-1, 10).copy(), body.sip.phi.reshape(-1, 10)
-        absurd = table[:, 0] < LIGHTEST * own[:, 0]
+        absurd = table[:, 0] < _LIGHTEST * own[:, 0]
         table[absurd] = own[absurd]
         heavier = replace(body, sip=Sip(body.sip.segments, table.ravel(), body.sip.covariance))
         rows, markers = _kinematic_rows(self.spectrum, _errors(heavier, self.cases, self.spectrum))
@@ -115,7 +124,8 @@ class Problem:
 
 
 def problem(body: Body, looks: tuple[Look, ...], *, prior: Sip | None = None, chosen: Chosen[Effect] = None) -> Problem:
-    """Return the problem of ``looks`` at a session of ``body``; ``prior`` of its parameters, by default the table's with widened sd.
+    """Return the problem of ``looks`` at a session of ``body``; ``prior`` of its parameters, by default the table's
+    with widened sd.
 
     What the markers show by themselves is read for the whole family and for the ``chosen`` effects (`effects`).
 
@@ -150,7 +160,9 @@ def problem(body: Body, looks: tuple[Look, ...], *, prior: Sip | None = None, ch
 
 
 def sizes_shown(cases: tuple[Case, ...], causes: Mapping[str, Effect]) -> dict[tuple[str, str], float]:
-    """Return by effect and target the size of the first parameter that the markers of the session show by themselves."""
+    """Return by effect and target the size of the first parameter that the markers of the session show by
+    themselves.
+    """
     found = {}
     for name, kind in causes.items():
         for one in kind.everywhere(cases[0]) if type(kind).shown is not Effect.shown else ():
@@ -162,7 +174,8 @@ def sizes_shown(cases: tuple[Case, ...], causes: Mapping[str, Effect]) -> dict[t
 def _errors(body: Body, cases: tuple[Case, ...], where: Spectrum) -> list[list[Errors]]:
     """Return the elementary errors of every run of every trial."""
     return [
-        [forward(of_clusters(body), _part(case.motion, pick)) for pick in picks] for case, picks in zip(cases, where.picks, strict=True)
+        [forward(of_clusters(body), _part(case.motion, pick)) for pick in picks]
+        for case, picks in zip(cases, where.picks, strict=True)
     ]
 
 
@@ -171,7 +184,9 @@ def _part(motion: Motion, pick: NDArray[np.intp]) -> Motion:
 
 
 def _kinematic_rows(where: Spectrum, errors: list[list[Errors]]) -> tuple[Array, Array]:
-    """Return the rows (6 m, K) of the errors' wrenches and (3M, K) of the mean marker residuals; signs as `forward` has them."""
+    """Return the rows (6 m, K) of the errors' wrenches and (3M, K) of the mean marker residuals; signs as `forward`
+    has them.
+    """
     wrench, frames = [], 0
     markers = np.zeros_like(next(one for some in errors for one in some).markers)
     for index, some in enumerate(errors):
@@ -192,7 +207,9 @@ def _shares(where: Spectrum, count: int) -> Array:
 
 
 def _mean_markers(cases: tuple[Case, ...], where: Spectrum) -> Array:
-    """Return (M, 3) m: mean residual of every marker of the body over the session; zero for a marker that was never seen."""
+    """Return (M, 3) m: mean residual of every marker of the body over the session; zero for a marker that was never
+    seen.
+    """
     out = np.zeros((len(cases[0].body.markers.names), 3))
     for case, weight in zip(cases, _shares(where, len(cases)), strict=True):
         out[list(case.marker_columns)] += weight * case.marker_residual

@@ -1,7 +1,8 @@
-"""From the samples of a session's trials to rows by frequency: orthonormal cosine transform per run of used frames, low bands only.
+"""From the samples of a session's trials to rows by frequency: orthonormal cosine transform per run of used frames, low
+bands only.
 
-A stationary error is nearly independent between coefficients; within a band its six channels share a covariance. Recordings are low-passed
-at 10 Hz; what lies above the last of `BANDS` is not looked at.
+A stationary error is nearly independent between coefficients; within a band its six channels share a covariance.
+Recordings are low-passed at 10 Hz; what lies above the last of `BANDS` is not looked at.
 """
 
 from dataclasses import dataclass, replace
@@ -15,7 +16,7 @@ from biodance.records import Array, Markers, Motion, Wrench
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.noise import Noise
 
-RATE = 50.0
+_RATE = 50.0
 """Hz at which trials are looked at: derivatives of columns are still good to 7 % at the upper edge."""
 SHORTEST_RUN = 1.0
 """s: shorter runs of used frames tell nothing about slow bands and are left out."""
@@ -25,8 +26,8 @@ SHORTEST_RUN = 1.0
 class Spectrum:
     """Where the rows of a session come from.
 
-    ``layout`` bands and the point (3,) m about which moments are taken; ``picks`` per trial the runs of frames (indices); ``rates`` Hz per
-    trial; ``band``, ``trial`` (m,) of every row; ``seconds`` of all runs together.
+    ``layout`` bands and the point (3,) m about which moments are taken; ``picks`` per trial the runs of frames
+    (indices); ``rates`` Hz per trial; ``band``, ``trial`` (m,) of every row; ``seconds`` of all runs together.
     """
 
     layout: Noise
@@ -71,13 +72,16 @@ def spectrum(cases: tuple[Case, ...], uses: tuple[NDArray[np.bool_], ...], about
             seconds += pick.size / there.rate
     if not band:
         names = ", ".join(case.trial.name for case in cases)
-        raise TrialRefused(f"No trial of {names} has {SHORTEST_RUN:g} s of fully measured ground contact, so there is nothing to diagnose.")
+        raise TrialRefused(
+            f"No trial of {names} has {SHORTEST_RUN:g} s of fully measured ground contact, so there is nothing to "
+            f"diagnose."
+        )
     return Spectrum(Noise.unit(about, BANDS), tuple(picks), rates, np.concatenate(band), np.concatenate(trial), seconds)
 
 
 def thinned(case: Case, use: NDArray[np.bool_]) -> tuple[Case, NDArray[np.bool_]]:
     """Return the case and its mask (T,) at about `RATE`."""
-    step = max(1, round(case.motion.rate / RATE))
+    step = max(1, round(case.motion.rate / _RATE))
     if step == 1:
         return case, use
     old = case.motion

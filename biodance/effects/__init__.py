@@ -1,9 +1,10 @@
 """FAMILY: one candidate cause of disagreement per file, found automatically: to extend the model, add one file.
 
-The diagnosis fits these causes. The virtual lab makes its faults by OTHER code (``virtual_lab/faults.py``, ``causes.py``): what is hidden
-is not made by the formula that finds it. The name of an effect is the name of its file, which gives it as ``EFFECT``; the contract is
-`Effect` for causes that have columns and are fitted, `DiscreteEffect` for those that a look at the recording settles before any statistics.
-Other packages join by the entry points ``biodance.effects``, objects as arguments of ``diagnose``.
+The diagnosis fits these causes. The virtual lab makes its faults by OTHER code (``virtual_lab/faults.py``,
+``causes.py``): what is hidden is not made by the formula that finds it. The name of an effect is the name of its file,
+which gives it as ``EFFECT``; the contract is `Effect` for causes that have columns and are fitted, `DiscreteEffect` for
+those that a look at the recording settles before any statistics. Other packages join by the entry points
+``biodance.effects``, objects as arguments of ``diagnose``.
 """
 
 import inspect
@@ -50,15 +51,18 @@ def missing(candidate: object) -> tuple[str, ...]:
     return tuple(lacks)
 
 
-FAMILY: Family[Cause | type[Cause]] = Family("effect", "biodance.effects", __name__, "EFFECT", missing, lambda kind: kind.name)
+_FAMILY: Family[Cause | type[Cause]] = Family(
+    "effect", "biodance.effects", __name__, "EFFECT", missing, lambda kind: kind.name
+)
 
 
 def causes(chosen: Chosen[Cause | type[Cause]] = None) -> Mapping[str, Cause]:
     """Return the effects of both kinds by name, without a target: all, or the ``chosen`` ones.
 
-    Names choose from the family (UnknownName for others); objects and classes join what is chosen, the whole family where no name is given.
+    Names choose from the family (UnknownName for others); objects and classes join what is chosen, the whole family
+    where no name is given.
     """
-    found = FAMILY.choose(chosen)
+    found = _FAMILY.choose(chosen)
     return MappingProxyType({name: kind() if isinstance(kind, type) else kind for name, kind in found.items()})
 
 
@@ -80,8 +84,14 @@ def effect(name: str) -> Effect:
     return family[name]
 
 
-def gates(session: Session, cases: tuple[Case, ...] = (), *, chosen: Chosen[Cause | type[Cause]] = None) -> tuple[Gate, ...]:
-    """Return all checks of a session, those that are not well first; ``chosen`` limits or extends the effects (`causes`)."""
+def gates(
+    session: Session, cases: tuple[Case, ...] = (), *, chosen: Chosen[Cause | type[Cause]] = None
+) -> tuple[Gate, ...]:
+    """Return all checks of a session, those that are not well first; ``chosen`` limits or extends the effects
+    (`causes`).
+    """
     recorded = Recorded(session, cases)
-    found = [replace(gate, advice=kind.advice) for kind in discrete_effects(chosen).values() for gate in kind.look(recorded)]
+    found = [
+        replace(gate, advice=kind.advice) for kind in discrete_effects(chosen).values() for gate in kind.look(recorded)
+    ]
     return tuple(sorted(found, key=lambda gate: gate.ok))

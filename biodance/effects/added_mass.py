@@ -1,8 +1,9 @@
 """Something heavy is carried on a segment: a cuff, an orthosis, a bag.
 
-Signature: the ten columns of that segment's regressor in the proportions of a point mass; it depends on posture, speed and acceleration of
-the segment. Look-alikes: an error of the table for that segment; near the body's centre a wrong body mass; on the foot, the shank.
-Separated by moving that segment alone, by a reference session without the load, and by the scale.
+Signature: the ten columns of that segment's regressor in the proportions of a point mass; it depends on posture, speed
+and acceleration of the segment. Look-alikes: an error of the table for that segment; near the body's centre a wrong
+body mass; on the foot, the shank. Separated by moving that segment alone, by a reference session without the load, and
+by the scale.
 """
 
 import numpy as np
@@ -19,7 +20,9 @@ def point_mass(mass: float, place: Array) -> Array:
 
 
 class AddedMass(Effect):
-    """A point ``mass`` (kg) at ``place`` (x, y, z: m from the CoM of the segment in the table, segment axes) on segment ``target``."""
+    """A point ``mass`` (kg) at ``place`` (x, y, z: m from the CoM of the segment in the table, segment axes) on
+    segment ``target``.
+    """
 
     name = "added_mass"
     parameters = (

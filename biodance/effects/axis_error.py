@@ -1,7 +1,9 @@
-"""A channel or an axis of a force plate points the other way, or axes are exchanged: cabling, corners counted from another one.
+"""A channel or an axis of a force plate points the other way, or axes are exchanged: cabling, corners counted from
+another one.
 
-Signature: one channel is the mirror image of what the motion needs; or only a quarter turn of the plate puts the load under the feet.
-Look-alikes: a rotation of the plate by 90 or 180 degrees, which is the same thing. Separated by pushing the plate forwards and to the left.
+Signature: one channel is the mirror image of what the motion needs; or only a quarter turn of the plate puts the load
+under the feet. Look-alikes: a rotation of the plate by 90 or 180 degrees, which is the same thing. Separated by pushing
+the plate forwards and to the left.
 """
 
 import numpy as np
@@ -15,9 +17,11 @@ ALONE = 0.95
 MOVING = np.array([3.0, 3.0, np.inf, 3.0, 3.0, 1.5])
 """N, N·m: smallest standard deviation of the needed channel that says anything; the sign of Fz is gravity's."""
 MIRRORED = 0.5
-"""Share of the squared residual that must be left when the sign is turned (measured: below 0.25 where it is wrong, above 5 where not)."""
-SECONDS = 2.0
-WORDS = {
+"""Share of the squared residual that must be left when the sign is turned (measured: below 0.25 where it is wrong,
+above 5 where not).
+"""
+_SECONDS = 2.0
+_WORDS = {
     "corners": r"corners run the wrong way round",
     "axes": r"the plate axes were turned by (\d+) degrees",
     "shear": r"shear channels seem to have the wrong sign",
@@ -29,14 +33,17 @@ class AxisError(DiscreteEffect):
 
     name = "axis_error"
     separated_by = "Push the plate with a foot forwards, then to the left, then stand at its left edge."
-    advice = "Check cabling, polarity of the channels and the order of FORCE_PLATFORM:CORNERS; push the plate in known directions."
+    advice = (
+        "Check cabling, polarity of the channels and the order of FORCE_PLATFORM:CORNERS; push the plate in "
+        "known directions."
+    )
 
     @classmethod
     def look(cls, recorded: Recorded) -> tuple[Gate, ...]:
         """Return what the reader overruled, and the channels that mirror what the motion needs."""
         names = list(dict.fromkeys(plate.name for case in recorded.cases for plate in case.trial.plates))
         signs = (gate for name in names for gate in cls._signs(recorded.cases, name))
-        return (*overruled(recorded.session, WORDS, check="axes of the plates", effect=cls.name), *signs)
+        return (*overruled(recorded.session, _WORDS, check="axes of the plates", effect=cls.name), *signs)
 
     @classmethod
     def _signs(cls, cases: tuple[Case, ...], plate: str) -> tuple[Gate, ...]:
@@ -61,15 +68,16 @@ class AxisError(DiscreteEffect):
 
 
 def on_one_plate(case: Case, name: str) -> tuple[Array, Array] | None:
-    """Return measured and needed wrench (n, 6) about a plate's centre where it carries the person alone, less their means and what follows
-    the needed vertical force (a centre of mass that is a little off does); None without two seconds of that.
+    """Return measured and needed wrench (n, 6) about a plate's centre where it carries the person alone, less their
+    means and what follows the needed vertical force (a centre of mass that is a little off does); None without two
+    seconds of that.
     """
     plate = next((plate for plate in case.trial.plates if plate.name == name), None)
     if plate is None:
         return None
     total, own, needed = case.trial.wrench.value[:, 2], plate.wrench.value, case.predicted
     alone = (own[:, 2] > ALONE * total) & (own[:, 2] > 0.5 * needed[:, 2]) & np.isfinite(own).all(axis=1)
-    if alone.sum() < SECONDS * case.motion.rate:
+    if alone.sum() < _SECONDS * case.motion.rate:
         return None
     measured, needed = (at_point(value[alone], plate.centre) for value in (own, needed))
     nuisance = np.stack([np.ones(alone.sum()), needed[:, 2]], axis=1)

@@ -1,8 +1,8 @@
 """The declared body mass is wrong: clothes, shoes, an old entry, another scale.
 
-Signature: the whole residual is a share of the whole wrench, in all channels alike.
-Look-alikes: all six gains together (exactly), a load near the body's centre (pelvis, trunk, thighs), another value of gravity. Separated by
-weighing the person on the plate and on a scale.
+Signature: the whole residual is a share of the whole wrench, in all channels alike. Look-alikes: all six gains together
+(exactly), a load near the body's centre (pelvis, trunk, thighs), another value of gravity. Separated by weighing the
+person on the plate and on a scale.
 """
 
 from biodance.effects._base.case import Case

@@ -1,8 +1,8 @@
 """Something lifts the person: a harness on a rope, a bungee to the ceiling, a helper who holds under the arms.
 
-Signature: Fz lacks a part of the weight, less of it the higher the person is; the horizontal force points back under the suspension.
-Look-alikes: a wrong body mass or a gain of Fz while the person stays at one height; a steady contact at the same segment. Separated by
-squats, which change the height, and by weighing the person without the support.
+Signature: Fz lacks a part of the weight, less of it the higher the person is; the horizontal force points back under
+the suspension. Look-alikes: a wrong body mass or a gain of Fz while the person stays at one height; a steady contact at
+the same segment. Separated by squats, which change the height, and by weighing the person without the support.
 """
 
 import numpy as np
@@ -16,7 +16,9 @@ ROPE = 2.0
 
 
 class BodyWeightSupport(Effect):
-    """A mean lift ``force`` (N) on segment ``target`` from a rope of 2 m, and its ``stiffness`` (N/m): so much less per metre upwards."""
+    """A mean lift ``force`` (N) on segment ``target`` from a rope of 2 m, and its ``stiffness`` (N/m): so much less
+    per metre upwards.
+    """
 
     name = "body_weight_support"
     parameters = (
@@ -24,7 +26,9 @@ class BodyWeightSupport(Effect):
         Parameter("stiffness", "N/m", 150.0, "constant-force systems near 0, bungees some hundred newtons per metre"),
     )
     separated_by = "Squats: a spring gives back what it lifts when the person rises; a wrong mass does not."
-    advice = "Weigh the person without the support; measure the rope with a load cell, or record one trial with it slack."
+    advice = (
+        "Weigh the person without the support; measure the rope with a load cell, or record one trial with it slack."
+    )
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:

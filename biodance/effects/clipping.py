@@ -1,7 +1,7 @@
 """An amplifier or converter is at its end: the channel stays flat where the load goes on.
 
-Signature: the highest (or lowest) value of a channel comes many times in a row, exactly.
-Look-alikes: an unloaded plate whose noise was set to zero (flat at zero, not at the top). Separated by the histogram of the raw samples.
+Signature: the highest (or lowest) value of a channel comes many times in a row, exactly. Look-alikes: an unloaded plate
+whose noise was set to zero (flat at zero, not at the top). Separated by the histogram of the raw samples.
 """
 
 import numpy as np
@@ -10,11 +10,11 @@ from biodance.effects._base.case import at_point
 from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded, unit_of
 from biodance.records import CHANNELS, Array, Trial
 
-LONGEST = 0.015
+_LONGEST = 0.015
 """s that a channel may stay at its extreme value."""
-CLEARLY = 3.0
+_CLEARLY = 3.0
 """How many times longer than anywhere else the flat top must be: coarse converters repeat values everywhere."""
-SAME = 2e-5
+_SAME = 2e-5
 """Share of the channel's range within which two samples are the same number."""
 LEVELS = 64
 """Different values that a channel must have taken: a movement of a few steps of the converter has flat tops anyway."""
@@ -27,7 +27,9 @@ class Clipping(DiscreteEffect):
 
     name = "clipping"
     separated_by = "The histogram of the raw samples."
-    advice = "Choose a larger range of the amplifier for this channel and repeat the movement; what was cut off is lost."
+    advice = (
+        "Choose a larger range of the amplifier for this channel and repeat the movement; what was cut off is lost."
+    )
 
     @classmethod
     def look(cls, recorded: Recorded) -> tuple[Gate, ...]:
@@ -52,11 +54,17 @@ class Clipping(DiscreteEffect):
                 )
                 for target, (limit, trial) in found.items()
             )
-        return (Gate("range of the channels", True, "No channel of the plates is flat at its extremes."),) if trials else ()
+        return (
+            (Gate("range of the channels", True, "No channel of the plates is flat at its extremes."),)
+            if trials
+            else ()
+        )
 
 
 def clipped(trial: Trial) -> list[tuple[str, float]]:
-    """Return target and level of every channel that clips, about the plate's centre in lab axes and with its zero still in it."""
+    """Return target and level of every channel that clips, about the plate's centre in lab axes and with its zero
+    still in it.
+    """
     found = []
     for plate in trial.plates:
         channels = at_point(plate.wrench.value, plate.centre)
@@ -72,19 +80,19 @@ def flat_level(values: Array, rate: float) -> float | None:
     """Return the level (unit of ``values`` (S,)) at which a channel is flat; None where it is not."""
     values = values[np.isfinite(values)]
     span = float(np.ptp(values)) if values.size > 2 else 0.0
-    if not span > 0 or np.unique(np.round(values / (SAME * span))).size < LEVELS:
+    if not span > 0 or np.unique(np.round(values / (_SAME * span))).size < LEVELS:
         return None
-    same = np.abs(np.diff(values)) <= SAME * span
+    same = np.abs(np.diff(values)) <= _SAME * span
     starts = np.flatnonzero(same & ~np.append(False, same[:-1]))
     stops = np.flatnonzero(same & ~np.append(same[1:], False)) + 1
     lengths, levels = stops - starts, values[starts]
     highest, lowest = values.max(), values.min()
-    between = (levels < highest - 2 * SAME * span) & (levels > lowest + 2 * SAME * span)
+    between = (levels < highest - 2 * _SAME * span) & (levels > lowest + 2 * _SAME * span)
     elsewhere = lengths[between].max(initial=1)
     for extreme in (highest, lowest):
-        at = np.abs(levels - extreme) <= 2 * SAME * span
+        at = np.abs(levels - extreme) <= 2 * _SAME * span
         long = lengths[at].max(initial=0)
-        if long > LONGEST * rate and long > CLEARLY * elsewhere and abs(extreme) > AT_ZERO * np.abs(values).max():
+        if long > _LONGEST * rate and long > _CLEARLY * elsewhere and abs(extreme) > AT_ZERO * np.abs(values).max():
             return float(extreme)
     return None
 

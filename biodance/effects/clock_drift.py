@@ -1,7 +1,7 @@
 """The clocks of forces and markers run at different rates.
 
-Signature: a delay that grows during the session, zero in its middle.
-Look-alikes: a delay in one trial only; drift of the plate. Separated by a long session and by a trial repeated at the end.
+Signature: a delay that grows during the session, zero in its middle. Look-alikes: a delay in one trial only; drift of
+the plate. Separated by a long session and by a trial repeated at the end.
 """
 
 import numpy as np
@@ -16,7 +16,14 @@ class ClockDrift(Effect):
     """A ``stretch`` (s over the session): forces this much later at the end than at the start, against the markers."""
 
     name = "clock_drift"
-    parameters = (Parameter("stretch", "s", 0.01, "1-2.5 % rate errors of older video systems (ISBS 1723); a few ms in synchronised labs"),)
+    parameters = (
+        Parameter(
+            "stretch",
+            "s",
+            0.01,
+            "1-2.5 % rate errors of older video systems (ISBS 1723); a few ms in synchronised labs",
+        ),
+    )
     separated_by = "The first trial repeated at the end of a long session."
     advice = "Run cameras and forces from one clock; drop a marker on the plate before and after."
 

@@ -1,7 +1,8 @@
 """The person touches something that no plate measures: a rail, a helper's hand, the floor with the second foot.
 
-Signature: a force at one moving point of the body, so that only three of the six channels are free: the moment is the point times the
-force. Look-alikes: contact at a neighbouring segment; for a steady touch, offsets. Separated by the video, and by the rank of the residual.
+Signature: a force at one moving point of the body, so that only three of the six channels are free: the moment is the
+point times the force. Look-alikes: contact at a neighbouring segment; for a steady touch, offsets. Separated by the
+video, and by the rank of the residual.
 """
 
 import numpy as np
@@ -10,15 +11,19 @@ from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.records import Array
 
-STEP = 0.4
+_STEP = 0.4
 """s: a hand comes and goes within about a second."""
 
 
 class ExternalContact(Effect):
-    """A steady ``force`` (x, y, z: N, lab axes) ON the person at the far end of segment ``target``, which the plates lack."""
+    """A steady ``force`` (x, y, z: N, lab axes) ON the person at the far end of segment ``target``, which the plates
+    lack.
+    """
 
     name = "external_contact"
-    parameters = tuple(Parameter(f"force_{axis}", "N", 10.0, "light touch of 1 N to tens of newtons (IJmker 2015)") for axis in "xyz")
+    parameters = tuple(
+        Parameter(f"force_{axis}", "N", 10.0, "light touch of 1 N to tens of newtons (IJmker 2015)") for axis in "xyz"
+    )
     separated_by = "The video: what is touched, and when."
     advice = "Repeat the trial without touching anything; or measure the rail with a plate of its own."
 
@@ -30,7 +35,9 @@ class ExternalContact(Effect):
         return tuple(name for i, name in enumerate(case.body.segments) if (i in carried and i not in inner) or i == 0)
 
     def columns(self, case: Case) -> Array:
-        """Return minus the wrench of a unit force at the contact point: what another support carries, the plates miss."""
+        """Return minus the wrench of a unit force at the contact point: what another support carries, the plates
+        miss.
+        """
         index = case.body.segment_index(self.target)
         low, high = case.body.boxes[index]
         far = 0.5 * (low + high)
@@ -41,14 +48,14 @@ class ExternalContact(Effect):
         return -np.concatenate([force, moment], axis=1)
 
     def local(self, case: Case) -> Array | None:
-        """Return the contact as a force that comes and goes: hats of `STEP` s to both sides; None for the root, which hands and feet are
-        not: its forces would explain anything that hangs on the middle of the body.
+        """Return the contact as a force that comes and goes: hats of `STEP` s to both sides; None for the root, which
+        hands and feet are not: its forces would explain anything that hangs on the middle of the body.
         """
         if case.body.segment_index(self.target) == 0:
             return None
         time = case.motion.time
-        knots = time[0] + STEP * np.arange(int((time[-1] - time[0]) / STEP) + 2)
-        hats = np.maximum(0.0, 1.0 - np.abs(time[:, None] - knots) / STEP)
+        knots = time[0] + _STEP * np.arange(int((time[-1] - time[0]) / _STEP) + 2)
+        hats = np.maximum(0.0, 1.0 - np.abs(time[:, None] - knots) / _STEP)
         return (self.columns(case)[:, :, None, :] * hats[:, None, :, None]).reshape(time.size, 6, -1)
 
 

@@ -1,8 +1,8 @@
 """Forces went through a lower low-pass than the markers: in the amplifier, in the recording software, in an export.
 
-Signature: the quick part of every channel is missing in proportion to the fourth power of its frequency; holds are untouched.
-Look-alikes: a wobbling mass, a delay (where the other filter ran one way only), the inertia of skin under the markers. Separated by faster
-movements, and by the settings of the recording software.
+Signature: the quick part of every channel is missing in proportion to the fourth power of its frequency; holds are
+untouched. Look-alikes: a wobbling mass, a delay (where the other filter ran one way only), the inertia of skin under
+the markers. Separated by faster movements, and by the settings of the recording software.
 """
 
 import numpy as np
@@ -19,21 +19,27 @@ STRENGTH = 4.0 / REFERENCE**5
 
 
 class FilterMismatch(Effect):
-    """Forces filtered ``cutoff`` Hz lower than the reference of 10 Hz (to first order): zero-phase gain 1 / (1 + (f/f_c)⁴ - (f/10)⁴), in
-    which 1/f_c⁴ grows linearly with the parameter. What a report prints is f_c itself.
+    """Forces filtered ``cutoff`` Hz lower than the reference of 10 Hz (to first order): zero-phase gain 1 / (1 +
+    (f/f_c)⁴ - (f/10)⁴), in which 1/f_c⁴ grows linearly with the parameter. What a report prints is f_c itself.
     """
 
     name = "filter_mismatch"
-    parameters = (Parameter("cutoff", "Hz", 4.0, "6 Hz against 10 or 45 Hz are in common use (forceandmotion.org abstracts)"),)
+    parameters = (
+        Parameter("cutoff", "Hz", 4.0, "6 Hz against 10 or 45 Hz are in common use (forceandmotion.org abstracts)"),
+    )
     separated_by = "Fast alternating movements (arms at 2-3 Hz) against slow ones."
     advice = "Look up the filters of the amplifier and of the recording software; export forces unfiltered."
 
     def transform(self, case: Case, theta: Array) -> Case:
         """Return the case whose forces lack what the lower low-pass took."""
-        return case.with_added(case.trial.plates[0], _passed(case, case.predicted, float(np.ravel(theta)[0])) - case.predicted)
+        return case.with_added(
+            case.trial.plates[0], _passed(case, case.predicted, float(np.ravel(theta)[0])) - case.predicted
+        )
 
     def removed(self, case: Case, theta: Array) -> Array:
-        """Return what was measured less the same with what the lower low-pass took put back, as far as the reference passes it."""
+        """Return what was measured less the same with what the lower low-pass took put back, as far as the reference
+        passes it.
+        """
         value = case.trial.wrench.value
         return value - _passed(case, value, -float(np.ravel(theta)[0]))
 
@@ -45,8 +51,8 @@ class FilterMismatch(Effect):
 
 
 def _passed(case: Case, value: Array, lower: float) -> Array:
-    """Return ``value`` (T, 6) through a filter whose cut-off lies ``lower`` Hz under the reference; a negative one does not
-    raise more what lies over the reference.
+    """Return ``value`` (T, 6) through a filter whose cut-off lies ``lower`` Hz under the reference; a negative one does
+    not raise more what lies over the reference.
     """
     change = STRENGTH * lower
     steep = (np.arange(len(value)) * case.motion.rate / (2 * len(value))) ** 4

@@ -1,9 +1,9 @@
 """Time is wrong: a declared rate that was not the true one, frames that the cameras lost without saying so.
 
-Signature: at a wrong rate the accelerations, and with them the moving part of all forces, are too large by the square of the ratio, while
-weight is right; lost frames make forces late from one instant on.
-Look-alikes: a load (gravity grows with it, too, so it is fitted beside the clock); gains of all channels (which touch the weight, too); a
-delay (from the start on). Separated by a jump on the plate: flight time against height, and by a clock in the picture.
+Signature: at a wrong rate the accelerations, and with them the moving part of all forces, are too large by the square
+of the ratio, while weight is right; lost frames make forces late from one instant on. Look-alikes: a load (gravity
+grows with it, too, so it is fitted beside the clock); gains of all channels (which touch the weight, too); a delay
+(from the start on). Separated by a jump on the plate: flight time against height, and by a clock in the picture.
 """
 
 import numpy as np
@@ -22,20 +22,23 @@ from biodance.uncertainty.caution import widened
 BAND = 3.0
 """Hz: above, soft tissue decides how large accelerations seem."""
 RATIO = 0.12
-"""Largest relative error of the rate that is let pass (30 nulls and 16 loads up to 8 kg show 0.004 to 0.010); rates in use differ by 0.15
-and more."""
+"""Largest relative error of the rate that is let pass (30 nulls and 16 loads up to 8 kg show 0.004 to 0.010); rates in
+use differ by 0.15 and more.
+"""
 FITS = 0.9
-"""Least share of the moving wrench that body and clock together must explain, or nothing is said (nulls, wrong clocks: 0.97 and more)."""
-STEPS = 8
+"""Least share of the moving wrench that body and clock together must explain, or nothing is said (nulls, wrong
+clocks: 0.97 and more).
+"""
+_STEPS = 8
 COARSE = 20.0
 """Hz: movement below BAND needs no more samples than these."""
-NOISE = np.array([3.0, 3.0, 3.0, 1.5, 1.5, 1.0])
+_NOISE = np.array([3.0, 3.0, 3.0, 1.5, 1.5, 1.0])
 """N, N·m: what soft tissue leaves in one coefficient."""
-STEP = 0.018
+_STEP = 0.018
 """s by which the delay may differ between the two halves of a trial."""
 EXPLAINED = 0.5
 """Least share of the moving force that the motion must explain before anything is said."""
-EDGE = 0.5
+_EDGE = 0.5
 """s at each end of a trial that are not judged."""
 
 
@@ -44,11 +47,16 @@ class FrameRate(DiscreteEffect):
 
     name = "frame_rate"
     separated_by = "A jump on the plate (flight time against height), and a clock in the picture."
-    advice = "Compare the declared rates with the cameras' setting; look for dropped frames in the recording software and record again."
+    advice = (
+        "Compare the declared rates with the cameras' setting; look for dropped frames in the recording "
+        "software and record again."
+    )
 
     @classmethod
     def look(cls, recorded: Recorded) -> tuple[Gate, ...]:
-        """Return whether accelerations have the size that forces need, and whether the delay is the same from start to end."""
+        """Return whether accelerations have the size that forces need, and whether the delay is the same from start
+        to end.
+        """
         cut = {trial.name for trial in recorded.session.trials if clipped(trial)}
         whole = [case for case in recorded.cases if case.trial.name not in cut]
         parts = [(case, part) for case in whole if (part := moving_parts(case)) is not None]
@@ -63,32 +71,45 @@ class FrameRate(DiscreteEffect):
             return ()
         if abs(ratio - 1) > RATIO:
             said = (
-                f"Whatever the segments weigh, forces need {1 / ratio**2:.2f} times the motion's accelerations: the declared rate is "
+                f"Whatever the segments weigh, forces need {1 / ratio**2:.2f} times the motion's accelerations: the "
+                f"declared rate is "
                 f"{ratio:.3g} times the true one."
             )
             return (Gate("rate of the cameras", False, said, cls.name, "", ratio, "ratio", "1"),)
-        return (Gate("rate of the cameras", True, f"Accelerations fit the forces: declared over true rate {ratio:.3f}."),)
+        return (
+            Gate("rate of the cameras", True, f"Accelerations fit the forces: declared over true rate {ratio:.3f}."),
+        )
 
     @classmethod
     def _lost(cls, parts: list[tuple[Array, Array, float]]) -> tuple[Gate, ...]:
-        steps = [late(m[len(m) // 2 :], n[len(n) // 2 :], rate) - late(m[: len(m) // 2], n[: len(n) // 2], rate) for m, n, rate in parts]
+        steps = [
+            late(m[len(m) // 2 :], n[len(n) // 2 :], rate) - late(m[: len(m) // 2], n[: len(n) // 2], rate)
+            for m, n, rate in parts
+        ]
         if len(steps) < 2:
             return ()
         step = float(np.median(steps))
-        if abs(step) > STEP:
-            said = f"From the middle of the trials on, forces are {1000 * step:.0f} ms later than at their start: frames were lost."
+        if abs(step) > _STEP:
+            said = (
+                f"From the middle of the trials on, forces are {1000 * step:.0f} ms later than at their start: "
+                f"frames were lost."
+            )
             return (Gate("lost frames", False, said, cls.name, "", step, "lost", "s"),)
         return (
-            Gate("lost frames", True, f"The delay is the same at the start and at the end of the trials (within {1000 * STEP:.0f} ms)."),
+            Gate(
+                "lost frames",
+                True,
+                f"The delay is the same at the start and at the end of the trials (within {1000 * _STEP:.0f} ms).",
+            ),
         )
 
 
 def moving_parts(case: Case) -> tuple[Array, Array, float] | None:
-    """Return measured force less weight, the force that the accelerations need (n, 3) N, both below BAND, and the rate; the weight is made
-    to fit, so that units do not matter here. None where the motion does not explain the force.
+    """Return measured force less weight, the force that the accelerations need (n, 3) N, both below BAND, and the rate;
+    the weight is made to fit, so that units do not matter here. None where the motion does not explain the force.
     """
     frames, rate = case.motion.time.size, case.motion.rate
-    if frames < 2 * EDGE * rate + 2 * rate or rate < 3 * BAND:
+    if frames < 2 * _EDGE * rate + 2 * rate or rate < 3 * BAND:
         return None
     still = Motion(case.motion.time, case.motion.q, 0 * case.motion.v, 0 * case.motion.a)
     weight = predict_wrench(case.body, still, case.phi).force
@@ -98,23 +119,25 @@ def moving_parts(case: Case) -> tuple[Array, Array, float] | None:
     measured = force * (np.median(weight[:, 2]) / np.median(force[:, 2])) - weight
     measured = measured - np.median(measured, axis=0)
     smooth = low_pass(np.hstack([measured, case.predicted[:, :3] - weight]), rate, LowPass(order=4, cutoff=BAND))
-    inside = slice(int(EDGE * rate), -int(EDGE * rate))
+    inside = slice(int(_EDGE * rate), -int(_EDGE * rate))
     measured, needed = smooth[inside, :3], smooth[inside, 3:]
     alike = float((measured * needed).sum() / np.sqrt((measured**2).sum() * (needed**2).sum() + 1e-12))
     return (measured, needed, rate) if alike**2 > EXPLAINED else None
 
 
 def clock_beside_body(cases: list[Case]) -> tuple[float, float]:
-    """Return declared over true rate, and the share of the moving wrench that it explains together with the body's parameters.
+    """Return declared over true rate, and the share of the moving wrench that it explains together with the body's
+    parameters.
 
-    At a wrong rate the inertial part of the wrench grows with the square of the ratio, the part of gravity does not, while a load is heavy
-    in both; so the square is fitted beside all parameters (known as well as the table knows them) by Gauss-Newton steps.
+    At a wrong rate the inertial part of the wrench grows with the square of the ratio, the part of gravity does not,
+    while a load is heavy in both; so the square is fitted beside all parameters (known as well as the table knows them)
+    by Gauss-Newton steps.
     """
     body = cases[0].body
     factor, phi, square = prior_factor(widened(body.sip)), body.sip.phi, 1.0
     measured, heavy, driven = (np.concatenate(parts) for parts in zip(*map(_slow_parts, cases), strict=True))
     away = np.zeros(factor.shape[1])
-    for _ in range(STEPS):
+    for _ in range(_STEPS):
         here = phi + factor @ away
         slopes = np.column_stack([(heavy + square * driven) @ factor, driven @ here])
         left = measured - (heavy + square * driven) @ here
@@ -127,10 +150,11 @@ def clock_beside_body(cases: list[Case]) -> tuple[float, float]:
 
 
 def _slow_parts(case: Case) -> tuple[Array, Array, Array]:
-    """Return the cosine coefficients below BAND, over NOISE, of the measured wrench (n,), and of the regressors of weight and of
-    acceleration (n, 10N), about the point on the floor where the person stands; the weight is made to fit.
+    """Return the cosine coefficients below BAND, over NOISE, of the measured wrench (n,), and of the regressors of
+    weight and of acceleration (n, 10N), about the point on the floor where the person stands; the weight is made to
+    fit.
     """
-    skip, edge = max(1, int(case.motion.rate / COARSE)), int(EDGE * case.motion.rate)
+    skip, edge = max(1, int(case.motion.rate / COARSE)), int(_EDGE * case.motion.rate)
     take = slice(edge, -edge, skip)
     motion = case.motion
     some = Motion(motion.time[take], motion.q[take], motion.v[take], motion.a[take])
@@ -141,13 +165,17 @@ def _slow_parts(case: Case) -> tuple[Array, Array, Array]:
     shift[3:, :3] = -skew(np.array([*np.median(some.q[:, :2], axis=0), 0.0]))
 
     def coefficients(values: Array) -> Array:
-        return np.asarray(dct(shift @ values, axis=0, norm="ortho")[:count] / NOISE[:, None]).reshape(-1, values.shape[2])
+        return np.asarray(dct(shift @ values, axis=0, norm="ortho")[:count] / _NOISE[:, None]).reshape(
+            -1, values.shape[2]
+        )
 
     return coefficients(force[:, :, None])[:, 0], coefficients(weight), coefficients(whole - weight)
 
 
 def late(measured: Array, needed: Array, rate: float) -> float:
-    """Return by how many seconds the measured force (n, 3) is late against the needed one, to first order of a least-squares fit."""
+    """Return by how many seconds the measured force (n, 3) is late against the needed one, to first order of a
+    least-squares fit.
+    """
     speed = np.gradient(needed, 1 / rate, axis=0)
     return float(-((measured - needed) * speed).sum() / max((speed**2).sum(), 1e-12))
 

@@ -1,9 +1,8 @@
 """The head moves on the trunk; the model has trunk and head in one piece.
 
-Signature: five kilograms that follow the head markers instead of the trunk: mostly Mx and My, and Mz when the head turns; the head markers
-leave the model together.
-Look-alikes: skin that slides under C7, a centre of mass of the trunk that is too high or low. Separated by nodding and turning the head
-alone, and by asking the person to look at one point.
+Signature: five kilograms that follow the head markers instead of the trunk: mostly Mx and My, and Mz when the head
+turns; the head markers leave the model together. Look-alikes: skin that slides under C7, a centre of mass of the trunk
+that is too high or low. Separated by nodding and turning the head alone, and by asking the person to look at one point.
 """
 
 import numpy as np
@@ -15,10 +14,12 @@ from biodance.effects._base.effect import Parameter
 from biodance.effects._base.missing_joint import MissingJoint, share_of_body, shoulders
 
 NECK = 0.41
-"""Height, between shoulders and vertex, about which the head turns: the angle of the jaw (de Leva 1996: 0.39 men, 0.45 women). Nodding is
-shared by all of the neck; about its base the head's weight would move twice as far as it does in virtual persons."""
-AXES = {"neck_flexion": -np.eye(3)[2], "neck_bending": np.eye(3)[0], "neck_rotation": np.eye(3)[1]}
-MARKERS = 3
+"""Height, between shoulders and vertex, about which the head turns: the angle of the jaw (de Leva 1996: 0.39 men, 0.45
+women). Nodding is shared by all of the neck; about its base the head's weight would move twice as far as it does in
+virtual persons.
+"""
+_AXES = {"neck_flexion": -np.eye(3)[2], "neck_bending": np.eye(3)[0], "neck_rotation": np.eye(3)[1]}
+_MARKERS = 3
 
 
 class HeadJoint(MissingJoint):
@@ -27,7 +28,9 @@ class HeadJoint(MissingJoint):
     name = "head_joint"
     parameters = (
         Parameter("angle", "rad", 0.10, "5-15 deg rms of head movement in whole-body tasks (laboratory experience)"),
-        Parameter("beyond", "rad", 0.05, "half the angle: where the joint lies and what hangs on it is known to a half"),
+        Parameter(
+            "beyond", "rad", 0.05, "half the angle: where the joint lies and what hangs on it is known to a half"
+        ),
     )
     separated_by = "Nodding and turning the head alone, standing still."
     advice = "Accept a body with a neck, or ask the person to look at one point straight ahead."
@@ -44,12 +47,12 @@ def with_neck(case: Case) -> Body | None:
     """Return the body with three joints in the neck; None where the markers do not show the head."""
     body, middle = case.body, shoulders(case.body)
     seen = tuple(body.markers.names[c] for c in case.marker_columns if body.markers.names[c].endswith("HD"))
-    if middle is None or len(seen) < MARKERS:
+    if middle is None or len(seen) < _MARKERS:
         return None
     vertex = np.array([middle[0], body.boxes[body.segment_index("trunk_head"), 1, 1], 0.0])
     neck = middle + NECK * (vertex - middle)
     head = share_of_body(body, "head", top=vertex, bottom=neck)
-    return branch_off(body, Cut("trunk_head", "head", AXES, neck, head, seen))
+    return branch_off(body, Cut("trunk_head", "head", _AXES, neck, head, seen))
 
 
 EFFECT = HeadJoint

@@ -1,9 +1,11 @@
-"""A joint turns about another point than the model's: regressions, functional trials and palpation miss joint centres by centimetres.
+"""A joint turns about another point than the model's: regressions, functional trials and palpation miss joint centres
+by centimetres.
 
-Signature: what hangs on the joint lies elsewhere in proportion to how far the joint is bent, so the moment follows the joint's angle; the
-markers beyond the joint leave the model in the same measure. In the posture of the static trial nothing shows.
-Look-alikes: a misplaced marker of the same segment, another length of the bone, a centre of mass that is off in the segments that meet
-there. Separated by turning this joint through its whole range about all its axes (hip: star-arc) while the rest stands still.
+Signature: what hangs on the joint lies elsewhere in proportion to how far the joint is bent, so the moment follows the
+joint's angle; the markers beyond the joint leave the model in the same measure. In the posture of the static trial
+nothing shows. Look-alikes: a misplaced marker of the same segment, another length of the bone, a centre of mass that is
+off in the segments that meet there. Separated by turning this joint through its whole range about all its axes (hip:
+star-arc) while the rest stands still.
 """
 
 from dataclasses import replace
@@ -17,15 +19,21 @@ from biodance.records import Array
 
 
 class JointCentre(Effect):
-    """A ``shift`` (x, y, z: m, axes of the segment nearer to the root) from the model's centre of joint ``target`` to the true one."""
+    """A ``shift`` (x, y, z: m, axes of the segment nearer to the root) from the model's centre of joint ``target``
+    to the true one.
+    """
 
     name = "joint_centre"
     parameters = tuple(
-        Parameter(f"shift_{axis}", "m", 0.015, "hip: 12.3 mm (Harrington) to 25 mm (Davis) of error (Mantovani 2016)") for axis in "xyz"
+        Parameter(f"shift_{axis}", "m", 0.015, "hip: 12.3 mm (Harrington) to 25 mm (Davis) of error (Mantovani 2016)")
+        for axis in "xyz"
     )
     placed = True
     separated_by = "The joint alone through its whole range, about all its axes, the rest standing still."
-    advice = "Record a functional calibration of this joint (for the hip a star and an arc), or palpate and re-place its markers."
+    advice = (
+        "Record a functional calibration of this joint (for the hip a star and an arc), or palpate and re-place "
+        "its markers."
+    )
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:

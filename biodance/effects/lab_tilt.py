@@ -1,8 +1,8 @@
 """The laboratory's vertical, as the cameras were calibrated, is not gravity's.
 
-Signature: a constant horizontal force of body weight times the tilt, and its moment, which follows the height of the centre of mass.
-Look-alikes: offset of Fx with My, or Fy with Mx; pitch or roll of the plate. Separated by squats (the centre of mass changes height) and
-by a plumb line with two markers.
+Signature: a constant horizontal force of body weight times the tilt, and its moment, which follows the height of the
+centre of mass. Look-alikes: offset of Fx with My, or Fy with Mx; pitch or roll of the plate. Separated by squats (the
+centre of mass changes height) and by a plumb line with two markers.
 """
 
 import numpy as np
@@ -26,11 +26,15 @@ class LabTilt(Effect):
         return ("x", "y")
 
     def columns(self, case: Case) -> Array:
-        """Return the change of the predicted wrench per radian: the weight turns by axis x gravity, and its moment with it."""
+        """Return the change of the predicted wrench per radian: the weight turns by axis x gravity, and its moment
+        with it.
+        """
         turned = np.cross(axis_vector(self.target), case.body.gravity)
         table = case.phi.reshape(-1, 10)
         move = case.segments
-        first = np.einsum("tnij,nj->ti", move.rotation, table[:, 1:4]) + np.einsum("tni,n->ti", move.position, table[:, 0])
+        first = np.einsum("tnij,nj->ti", move.rotation, table[:, 1:4]) + np.einsum(
+            "tni,n->ti", move.position, table[:, 0]
+        )
         force = np.tile(-table[:, 0].sum() * turned, (len(first), 1))
         return np.concatenate([force, np.cross(first, -turned)], axis=1)[:, :, None]
 

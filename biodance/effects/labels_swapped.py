@@ -1,7 +1,8 @@
-"""Two markers carry each other's names: left and right, front and back of the wrist, for a whole session or from one trial on.
+"""Two markers carry each other's names: left and right, front and back of the wrist, for a whole session or from one
+trial on.
 
-Signature: both markers are far from the model, each where the other one should be.
-Look-alikes: a marker that fell off (one of the two is right then). Separated by exchanging the two names: only then does the body fit.
+Signature: both markers are far from the model, each where the other one should be. Look-alikes: a marker that fell off
+(one of the two is right then). Separated by exchanging the two names: only then does the body fit.
 """
 
 import numpy as np
@@ -13,19 +14,21 @@ from biodance.errors import BiodanceError
 from biodance.motion.ik.inverse_kinematics import solve_ik
 from biodance.records import Array, Markers, Trial
 
-FAR = 0.04
+_FAR = 0.04
 """m: RMS distance from which on a marker is suspected."""
 SUSPECTS = 4
-FRAMES = 8
+_FRAMES = 8
 CASES = 2
-"""At most so many suspects of so many trials are exchanged, in so many frames: a body that does not fit is slow to track."""
+"""At most so many suspects of so many trials are exchanged, in so many frames: a body that does not fit is slow to
+track.
+"""
 ROUGH = 1e-3
 """m, tolerance of the trial trackings."""
 BETTER = 0.3
 """Share of the squared distances that the exchange must leave at most."""
 OPPOSITE = 0.4
 """Cosine: how opposite one wrist must be to the mirrored other one."""
-LEAST = 0.03
+_LEAST = 0.03
 """m by which a left marker must lie to the right of its right partner in the static trial."""
 
 
@@ -49,11 +52,19 @@ class LabelsSwapped(DiscreteEffect):
                 found.setdefault(pair, []).append(case.trial.name)
         if found:
             return tuple(
-                Gate("labels of the markers", False, f"{a} and {b} carry each other's names in {', '.join(where)}.", cls.name, f"{a}/{b}")
+                Gate(
+                    "labels of the markers",
+                    False,
+                    f"{a} and {b} carry each other's names in {', '.join(where)}.",
+                    cls.name,
+                    f"{a}/{b}",
+                )
                 for (a, b), where in found.items()
             )
         looked = bool(statics or recorded.cases)
-        return (Gate("labels of the markers", True, "No two markers seem to carry each other's names."),) if looked else ()
+        return (
+            (Gate("labels of the markers", True, "No two markers seem to carry each other's names."),) if looked else ()
+        )
 
 
 def partner(name: str) -> str:
@@ -63,7 +74,9 @@ def partner(name: str) -> str:
 
 
 def crossed(trial: Trial) -> tuple[tuple[str, str], ...]:
-    """Return the pairs of left and right markers that lie on each other's side of the body, against the majority of pairs."""
+    """Return the pairs of left and right markers that lie on each other's side of the body, against the majority of
+    pairs.
+    """
     markers = trial.markers
     assert markers is not None
     pairs = [(name, partner(name)) for name in markers.names if name[:1] in "Ll" and partner(name) in markers]
@@ -78,12 +91,12 @@ def crossed(trial: Trial) -> tuple[tuple[str, str], ...]:
     strongest = np.linalg.svd(apart[known])[2][0]
     along = apart @ strongest
     leftwards = along * np.sign(np.nansum(np.sign(along)))
-    return tuple(pair for pair, side in zip(pairs, leftwards, strict=True) if side < -LEAST)
+    return tuple(pair for pair, side in zip(pairs, leftwards, strict=True) if side < -_LEAST)
 
 
 def turned_wrists(trial: Trial) -> tuple[tuple[str, str], ...]:
-    """Return the wrists whose thumb-side marker (WRA) lies behind and inside of the other one (WRB) while the person stands, against the
-    mirrored other wrist.
+    """Return the wrists whose thumb-side marker (WRA) lies behind and inside of the other one (WRB) while the person
+    stands, against the mirrored other wrist.
     """
     markers = trial.markers
     assert markers is not None
@@ -93,7 +106,7 @@ def turned_wrists(trial: Trial) -> tuple[tuple[str, str], ...]:
     middle = {name: _median(markers[name]) for name in needed}
     forward = sum((middle[f"{side}TOE"] - middle[f"{side}HEE"] for side in "LR"), np.zeros(3)) * [1, 1, 0]
     across = (middle["RHEE"] - middle["LHEE"]) * [1, 1, 0]
-    if not (np.isfinite(forward).all() and np.linalg.norm(forward) > 0.1 and np.linalg.norm(across) > LEAST):
+    if not (np.isfinite(forward).all() and np.linalg.norm(forward) > 0.1 and np.linalg.norm(across) > _LEAST):
         return ()
     forward /= np.linalg.norm(forward)
     right = np.array([forward[1], -forward[0], 0.0])
@@ -115,19 +128,23 @@ def _median(values: Array) -> Array:
 
 def _worst(cases: tuple[Case, ...]) -> list[Case]:
     """Return the trials whose markers are farthest from the body, at most CASES."""
-    return sorted(cases, key=lambda case: -float(np.nanmean(case.motion.residual**2)) if case.motion.residual.size else 0.0)[:CASES]
+    return sorted(
+        cases, key=lambda case: -float(np.nanmean(case.motion.residual**2)) if case.motion.residual.size else 0.0
+    )[:CASES]
 
 
 def exchanged(case: Case) -> tuple[tuple[str, str], ...]:
     """Return the pairs of far markers of a trial whose exchange makes the body fit."""
     squares = np.where(np.isfinite(case.motion.residual), case.motion.residual, 0.0) ** 2
     far = np.sqrt(squares.mean(axis=0)) if len(squares) else np.zeros(0)
-    order = [int(k) for k in np.argsort(-far)[:SUSPECTS] if far[k] > FAR]
+    order = [int(k) for k in np.argsort(-far)[:SUSPECTS] if far[k] > _FAR]
     if len(order) < 2 or case.trial.markers is None:
         return ()
-    frames = np.unique(np.linspace(0, case.motion.time.size - 1, FRAMES).astype(int))
+    frames = np.unique(np.linspace(0, case.motion.time.size - 1, _FRAMES).astype(int))
     names = [case.motion.marker_names[k] for k in order]
-    pairs = sorted(((a, b) for i, a in enumerate(names) for b in names[i + 1 :]), key=lambda pair: partner(pair[0]) != pair[1])
+    pairs = sorted(
+        ((a, b) for i, a in enumerate(names) for b in names[i + 1 :]), key=lambda pair: partner(pair[0]) != pair[1]
+    )
     before = _misfit(case.body, case.trial.markers, frames)
     for pair in pairs:
         if _misfit(case.body, _renamed(case.trial.markers, pair), frames) < BETTER * before:
@@ -136,7 +153,9 @@ def exchanged(case: Case) -> tuple[tuple[str, str], ...]:
 
 
 def _misfit(body: Body, markers: Markers, frames: Array) -> float:
-    """Return the mean square distance (m²) of some frames' markers to the body; infinite where they do not determine it."""
+    """Return the mean square distance (m²) of some frames' markers to the body; infinite where they do not determine
+    it.
+    """
     some = Markers(markers.names, markers.time[frames], markers.xyz[frames])
     try:
         return float(np.nanmean(solve_ik(body, some, tolerance=ROUGH).residual ** 2))

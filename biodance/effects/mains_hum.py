@@ -1,8 +1,8 @@
 """The mains hum in a channel: 50 or 60 Hz from a missing earth, a broken screen, a lamp.
 
-Signature: a narrow line at 50 or 60 Hz that is there when nobody moves.
-Look-alikes: vibration of a treadmill motor or a building, at other frequencies. Separated by a recording of the empty plate. After the
-low-pass nothing is left of it, unless it was sampled so slowly that it was folded into the movement.
+Signature: a narrow line at 50 or 60 Hz that is there when nobody moves. Look-alikes: vibration of a treadmill motor or
+a building, at other frequencies. Separated by a recording of the empty plate. After the low-pass nothing is left of it,
+unless it was sampled so slowly that it was folded into the movement.
 """
 
 import numpy as np
@@ -12,11 +12,11 @@ from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded, unit_of
 from biodance.records import CHANNELS, Array, Trial
 
 MAINS = (50.0, 60.0)
-LEAST = np.array([2.0, 2.0, 2.0, 0.6, 0.6, 0.6])
+_LEAST = np.array([2.0, 2.0, 2.0, 0.6, 0.6, 0.6])
 """N, N·m: a smaller amplitude harms nothing."""
-CLEARLY = 10.0
+_CLEARLY = 10.0
 """How far the line must stand over its neighbours."""
-SECONDS = 2.0
+_SECONDS = 2.0
 
 
 class MainsHum(DiscreteEffect):
@@ -24,7 +24,10 @@ class MainsHum(DiscreteEffect):
 
     name = "mains_hum"
     separated_by = "A recording of the empty plate."
-    advice = "Check earth and screens of the cables; keep them away from mains cables and lamps. Forces below 10 Hz are not touched."
+    advice = (
+        "Check earth and screens of the cables; keep them away from mains cables and lamps. Forces below 10 Hz "
+        "are not touched."
+    )
 
     @classmethod
     def look(cls, recorded: Recorded) -> tuple[Gate, ...]:
@@ -39,7 +42,7 @@ class MainsHum(DiscreteEffect):
         gates = []
         for (target, frequency), amplitudes_seen in seen.items():
             middle = float(np.median(amplitudes_seen))
-            if middle > LEAST[CHANNELS.index(target.rpartition(":")[2])]:
+            if middle > _LEAST[CHANNELS.index(target.rpartition(":")[2])]:
                 said = f"{target} hums at {frequency:g} Hz with an amplitude of {middle:.2g}."
                 gates.append(Gate("mains hum", False, said, cls.name, target, middle, "amplitude", unit_of(target)))
         none = (Gate("mains hum", True, "No channel of the plates hums at 50 or 60 Hz."),) if trials else ()
@@ -47,7 +50,9 @@ class MainsHum(DiscreteEffect):
 
 
 def lines(trial: Trial) -> dict[tuple[str, float], float]:
-    """Return the amplitude (N, N·m) by channel and frequency (Hz) of the mains; 0 where no line stands over its neighbours."""
+    """Return the amplitude (N, N·m) by channel and frequency (Hz) of the mains; 0 where no line stands over its
+    neighbours.
+    """
     found = {}
     for plate in trial.plates:
         if not _fast_enough(plate.wrench.rate, plate.wrench.time.size):
@@ -57,21 +62,27 @@ def lines(trial: Trial) -> dict[tuple[str, float], float]:
             amplitude, around = line(channels, plate.wrench.rate, frequency)
             for k, name in enumerate(CHANNELS):
                 target = name if len(trial.plates) == 1 else f"{plate.name}:{name}"
-                found[target, frequency] = float(amplitude[k]) if amplitude[k] > CLEARLY * around[k] else 0.0
+                found[target, frequency] = float(amplitude[k]) if amplitude[k] > _CLEARLY * around[k] else 0.0
     return found
 
 
 def line(values: Array, rate: float, frequency: float) -> tuple[Array, Array]:
-    """Return the amplitude (n,) of the line within 0.7 Hz of ``frequency``, and the median of the spectrum 2 to 8 Hz beside it."""
+    """Return the amplitude (n,) of the line within 0.7 Hz of ``frequency``, and the median of the spectrum 2 to 8 Hz
+    beside it.
+    """
     window = np.hanning(len(values))
-    spectrum = 2 * np.abs(np.fft.rfft(np.nan_to_num(values - np.nanmean(values, axis=0)) * window[:, None], axis=0)) / window.sum()
+    spectrum = (
+        2
+        * np.abs(np.fft.rfft(np.nan_to_num(values - np.nanmean(values, axis=0)) * window[:, None], axis=0))
+        / window.sum()
+    )
     away = np.abs(np.fft.rfftfreq(len(values), 1 / rate) - frequency)
     return spectrum[away < 0.7].max(axis=0), np.median(spectrum[(away > 2) & (away < 8)], axis=0)
 
 
 def _fast_enough(rate: float, samples: int) -> bool:
     """Return whether a recording can show 60 Hz and its neighbours."""
-    return rate > 2 * (max(MAINS) + 10) and samples > SECONDS * rate
+    return rate > 2 * (max(MAINS) + 10) and samples > _SECONDS * rate
 
 
 EFFECT = MainsHum

@@ -1,8 +1,8 @@
 """A load on one channel of a force plate shows in another channel.
 
-Signature: the residual of the second channel follows the first one (nearly always Fz, the largest).
-Look-alikes: a tilted plate or laboratory (Fz into Fx, Fy), a shifted plate or an offset (Fz into Mx, My while Fz hardly changes). Separated
-by movements that change Fz much and by standing at other places of the plate.
+Signature: the residual of the second channel follows the first one (nearly always Fz, the largest). Look-alikes: a
+tilted plate or laboratory (Fz into Fx, Fy), a shifted plate or an offset (Fz into Mx, My while Fz hardly changes).
+Separated by movements that change Fz much and by standing at other places of the plate.
 """
 
 import numpy as np
@@ -13,7 +13,9 @@ from biodance.records import CHANNELS, Array
 
 
 class PlateCrosstalk(Effect):
-    """``ratio`` of the second channel to the first (1, or m for a moment from a force) about the plate's centre; target ``Fz->My``."""
+    """``ratio`` of the second channel to the first (1, or m for a moment from a force) about the plate's centre;
+    target ``Fz->My``.
+    """
 
     name = "plate_crosstalk"
     parameters = (Parameter("ratio", "1 or m or 1/m", 0.01, "maker's limit of 2 % for classic strain-gauge plates"),)

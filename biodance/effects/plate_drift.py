@@ -1,7 +1,7 @@
 """The zero of a force-plate channel wanders during the session.
 
-Signature: an offset that grows from trial to trial, minus half at the start, plus half at the end.
-Look-alikes: a posture that changes with fatigue; a drifting clock. Separated by repeating the first trial at the end and by unloaded
+Signature: an offset that grows from trial to trial, minus half at the start, plus half at the end. Look-alikes: a
+posture that changes with fatigue; a drifting clock. Separated by repeating the first trial at the end and by unloaded
 recordings before and after.
 """
 
@@ -13,11 +13,18 @@ from biodance.records import Array
 
 
 class PlateDrift(Effect):
-    """A ``drift`` (N or N·m over the whole session) about the plate's centre in channel ``target``, zero in the middle of the session."""
+    """A ``drift`` (N or N·m over the whole session) about the plate's centre in channel ``target``, zero in the
+    middle of the session.
+    """
 
     name = "plate_drift"
     parameters = (
-        Parameter("drift", "N or N·m", 3.0, "a few newtons per session (laboratory experience; acceptance limit 1 N of one lab)"),
+        Parameter(
+            "drift",
+            "N or N·m",
+            3.0,
+            "a few newtons per session (laboratory experience; acceptance limit 1 N of one lab)",
+        ),
     )
     separated_by = "The first trial repeated at the end, and the empty plate before and after."
     advice = "Let the plate warm up, zero it before each trial."

@@ -1,8 +1,8 @@
 """A channel of a force plate reads a constant factor too much.
 
-Signature: the residual of one channel follows that channel itself.
-Look-alikes: all six gains together are a wrong body mass, exactly; the gain of Fz alone re-fits into the segment masses and leaves the
-fit as good as before. Separated by the scale's weight and by differences between channels.
+Signature: the residual of one channel follows that channel itself. Look-alikes: all six gains together are a wrong body
+mass, exactly; the gain of Fz alone re-fits into the segment masses and leaves the fit as good as before. Separated by
+the scale's weight and by differences between channels.
 """
 
 import numpy as np
@@ -16,7 +16,9 @@ class PlateGain(Effect):
     """A relative ``gain`` (0.04: reads 4 % too much) of channel ``target`` about the plate's centre."""
 
     name = "plate_gain"
-    parameters = (Parameter("gain", "1", 0.02, "3-5 N under dead loads of some hundred newtons (Cappello 2011, PMID 21392999)"),)
+    parameters = (
+        Parameter("gain", "1", 0.02, "3-5 N under dead loads of some hundred newtons (Cappello 2011, PMID 21392999)"),
+    )
     separated_by = "Squats against standing: the channel's own size must change."
     advice = "Check the channel with dead weights; correct sensitivity or calibration matrix."
 

@@ -1,8 +1,9 @@
-"""A force plate does not forget: after loading it reads less than after unloading to the same load (friction, glue, a loose top plate).
+"""A force plate does not forget: after loading it reads less than after unloading to the same load (friction, glue, a
+loose top plate).
 
-Signature: a step of the residual in one channel wherever that channel turns round, of the same size for small and large turns.
-Look-alikes: a delay (whose residual follows the speed of change), drift, a gain. Separated by loading and unloading in steps with the
-person standing still between them.
+Signature: a step of the residual in one channel wherever that channel turns round, of the same size for small and large
+turns. Look-alikes: a delay (whose residual follows the speed of change), drift, a gain. Separated by loading and
+unloading in steps with the person standing still between them.
 """
 
 import numpy as np
@@ -16,10 +17,14 @@ REVERSAL = np.array([5.0, 5.0, 20.0, 5.0, 5.0, 2.0])
 
 
 class PlateHysteresis(Effect):
-    """A loop of half ``width`` (N or N·m) in channel ``target`` about the plate's centre: read low on the way up, high on the way down."""
+    """A loop of half ``width`` (N or N·m) in channel ``target`` about the plate's centre: read low on the way up,
+    high on the way down.
+    """
 
     name = "plate_hysteresis"
-    parameters = (Parameter("width", "N or N·m", 3.0, "0.2-0.5 % of full scale in makers' sheets of strain-gauge plates"),)
+    parameters = (
+        Parameter("width", "N or N·m", 3.0, "0.2-0.5 % of full scale in makers' sheets of strain-gauge plates"),
+    )
     separated_by = "Weights put on and taken off one after the other, or slow squats with holds on the way down and up."
     advice = "Load and unload the plate with dead weights; look for a loose top plate, cable or screw."
 
@@ -36,7 +41,8 @@ class PlateHysteresis(Effect):
 
 
 def memory(load: Array, reversal: float) -> Array:
-    """Return the state (T,) from -1 (unloading) to 1 (loading) of a friction element: ds/dload = (+-1 - s) / reversal (Dahl 1968).
+    """Return the state (T,) from -1 (unloading) to 1 (loading) of a friction element: ds/dload = (+-1 - s) / reversal
+    (Dahl 1968).
 
     It starts in the middle of the loop; exact for a load (T,) that is monotonic between samples.
     """

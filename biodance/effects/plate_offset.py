@@ -1,8 +1,8 @@
 """A channel of a force plate does not read zero when nobody stands on it.
 
-Signature: a constant in one channel, whatever the movement and whatever its speed.
-Look-alikes: for Fz a wrong body mass (which scales all channels), for moments a shifted plate or a CoM that is off in the trunk (which
-follow Fz), for Fx a tilted plate. Separated by movements that change Fz (squats) and by an unloaded recording.
+Signature: a constant in one channel, whatever the movement and whatever its speed. Look-alikes: for Fz a wrong body
+mass (which scales all channels), for moments a shifted plate or a CoM that is off in the trunk (which follow Fz), for
+Fx a tilted plate. Separated by movements that change Fz (squats) and by an unloaded recording.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """A force plate lies elsewhere than the laboratory's file says.
 
-Signature: moments that follow the force, M = shift x f: for a shift along x mostly My following Fz.
-Look-alikes: offset of the moments, cross-talk Fz->Mx or My, and above all the trunk's centre of mass, which other tools move instead.
+Signature: moments that follow the force, M = shift x f: for a shift along x mostly My following Fz. Look-alikes: offset
+of the moments, cross-talk Fz->Mx or My, and above all the trunk's centre of mass, which other tools move instead.
 Separated by the centre of pressure against the foot markers, by Fz dynamics, and by a pole pressed on the plate.
 """
 
@@ -13,10 +13,14 @@ from biodance.records import Array
 
 
 class PlatePosition(Effect):
-    """A ``shift`` (m) along a lab axis of where the file puts the plate, relative to where it is; target ``plate1:x``."""
+    """A ``shift`` (m) along a lab axis of where the file puts the plate, relative to where it is; target
+    ``plate1:x``.
+    """
 
     name = "plate_position"
-    parameters = (Parameter("shift", "m", 0.010, "centre-of-pressure errors up to 30 mm (PMID 11091955); 1-2 mm wand errors"),)
+    parameters = (
+        Parameter("shift", "m", 0.010, "centre-of-pressure errors up to 30 mm (PMID 11091955); 1-2 mm wand errors"),
+    )
     separated_by = "Standing at several places, squats and a pole pressed onto marked points."
     advice = "Measure the plate's corners with markers and enter them again (FORCE_PLATFORM:CORNERS)."
 

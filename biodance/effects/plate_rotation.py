@@ -1,8 +1,8 @@
 """A force plate is turned against what the laboratory's file says.
 
-Signature: forces and moments turned about one axis: for yaw, Fx follows -Fy and Mx follows -My; for pitch and roll, Fx or Fy follows Fz.
-Look-alikes: pitch and roll look like cross-talk from Fz and like a tilted laboratory; yaw has none. Separated by lunges, arm swings and
-the plate's corners measured with markers.
+Signature: forces and moments turned about one axis: for yaw, Fx follows -Fy and Mx follows -My; for pitch and roll, Fx
+or Fy follows Fz. Look-alikes: pitch and roll look like cross-talk from Fz and like a tilted laboratory; yaw has none.
+Separated by lunges, arm swings and the plate's corners measured with markers.
 """
 
 import numpy as np
@@ -14,12 +14,16 @@ from biodance.records import Array
 
 
 class PlateRotation(Effect):
-    """An ``angle`` (rad) about a lab axis through the plate's centre by which the recorded wrench is turned; target ``plate1:z`` for
-    yaw.
+    """An ``angle`` (rad) about a lab axis through the plate's centre by which the recorded wrench is turned; target
+    ``plate1:z`` for yaw.
     """
 
     name = "plate_rotation"
-    parameters = (Parameter("angle", "rad", 0.02, "about 0.2 deg in a CalTester example report; 1 deg and more when corners are typed"),)
+    parameters = (
+        Parameter(
+            "angle", "rad", 0.02, "about 0.2 deg in a CalTester example report; 1 deg and more when corners are typed"
+        ),
+    )
     separated_by = "Lunges and arm swings in two directions; a pole pressed at a slant."
     advice = "Measure the plate's corners with markers and enter them again."
 

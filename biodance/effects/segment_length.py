@@ -1,9 +1,10 @@
-"""A segment is longer than the model's: typed measures, a body scaled on another day, shoes that came or went since the static trial.
+"""A segment is longer than the model's: typed measures, a body scaled on another day, shoes that came or went since the
+static trial.
 
-Signature: everything beyond the segment's far joint lies farther out; the markers on both sides of the bone contradict each other by the
-same distance in every posture, and the moment follows the segment's direction.
-Look-alikes: a joint centre shifted along the bone, markers misplaced along it. Separated by deep squats (legs) and elbow flexion (arms),
-and by measuring the bone.
+Signature: everything beyond the segment's far joint lies farther out; the markers on both sides of the bone contradict
+each other by the same distance in every posture, and the moment follows the segment's direction. Look-alikes: a joint
+centre shifted along the bone, markers misplaced along it. Separated by deep squats (legs) and elbow flexion (arms), and
+by measuring the bone.
 """
 
 from dataclasses import replace
@@ -22,10 +23,16 @@ class SegmentLength(Effect):
     """An ``error`` (m): segment ``target`` is this much longer, from its near to its far joint, than in the model."""
 
     name = "segment_length"
-    parameters = (Parameter("error", "m", 0.010, "3-20 mm between typed measures and markers (public recordings: 16 mm at the hip)"),)
+    parameters = (
+        Parameter(
+            "error", "m", 0.010, "3-20 mm between typed measures and markers (public recordings: 16 mm at the hip)"
+        ),
+    )
     placed = True
     separated_by = "Deep squats for the legs, full flexion of the elbow for the arms."
-    advice = "Measure the bone with a calliper between its landmarks; record a new static trial in the shoes of the session."
+    advice = (
+        "Measure the bone with a calliper between its landmarks; record a new static trial in the shoes of the session."
+    )
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:

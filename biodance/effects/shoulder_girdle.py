@@ -1,8 +1,8 @@
 """The shoulders move on the trunk: shrugging, reaching; the model has them fixed.
 
-Signature: the arm's weight moves by centimetres against the model, mostly in Mx and My; the shoulder markers leave the trunk's.
-Look-alikes: a misplaced shoulder marker (which does not come back), a centre of mass that is off in the upper arm. Separated by shrugging
-alone, with hanging arms.
+Signature: the arm's weight moves by centimetres against the model, mostly in Mx and My; the shoulder markers leave the
+trunk's. Look-alikes: a misplaced shoulder marker (which does not come back), a centre of mass that is off in the upper
+arm. Separated by shrugging alone, with hanging arms.
 """
 
 import numpy as np
@@ -17,18 +17,22 @@ STERNOCLAVICULAR = np.array([0.2, 0.0, 0.12])
 """Forwards, upwards and sideways from the middle of the shoulders, in half shoulder widths."""
 
 SHOULDERS = ("RSHO", "LSHO")
-"""Skin over the acromion follows the collar bone in part only, and how far is what is asked: the arm's markers show where the joint is."""
+"""Skin over the acromion follows the collar bone in part only, and how far is what is asked: the arm's markers show
+where the joint is.
+"""
 
 
 class ShoulderGirdle(MissingJoint):
-    """Both shoulders turn by ``angle`` (rad rms per axis) about the inner end of the collar bone, as their markers show; 0.1 rad carry the
-    shoulder by 15 mm.
+    """Both shoulders turn by ``angle`` (rad rms per axis) about the inner end of the collar bone, as their markers
+    show; 0.1 rad carry the shoulder by 15 mm.
     """
 
     name = "shoulder_girdle"
     parameters = (
         Parameter("angle", "rad", 0.10, "2-5 cm of the shoulder joint on the thorax (laboratory experience)"),
-        Parameter("beyond", "rad", 0.05, "half the angle: where the joint lies and what hangs on it is known to a half"),
+        Parameter(
+            "beyond", "rad", 0.05, "half the angle: where the joint lies and what hangs on it is known to a half"
+        ),
     )
     separated_by = "Shrugging alone, with hanging arms."
     advice = "Accept a body with collar bones; keep the shoulder markers on the acromion, not on the deltoid."
@@ -42,7 +46,9 @@ class ShoulderGirdle(MissingJoint):
 
 
 def with_clavicles(case: Case) -> Body | None:
-    """Return the body with two joints at the inner end of each collar bone; None where the markers do not show both shoulders."""
+    """Return the body with two joints at the inner end of each collar bone; None where the markers do not show both
+    shoulders.
+    """
     body, middle = case.body, shoulders(case.body)
     seen = {body.markers.names[c] for c in case.marker_columns}
     if middle is None or not seen.issuperset(SHOULDERS):

@@ -1,8 +1,8 @@
 """A load whose contents move is carried: a bottle, a water bag, a rucksack that swings.
 
-Signature: a carried mass, and beside it a horizontal force that goes on swinging at its own slow frequency when the person stops.
-Look-alikes: a rigid load on the same segment while the person moves slowly; drift of posture. Separated by a sudden stop followed by five
-seconds of standing still: what rings down there is not the person.
+Signature: a carried mass, and beside it a horizontal force that goes on swinging at its own slow frequency when the
+person stops. Look-alikes: a rigid load on the same segment while the person moves slowly; drift of posture. Separated
+by a sudden stop followed by five seconds of standing still: what rings down there is not the person.
 """
 
 import numpy as np
@@ -13,24 +13,34 @@ from biodance.effects._base.oscillator import point_motion, relative_motion, rid
 from biodance.effects.added_mass import point_mass
 from biodance.records import Array
 
-FREQUENCY = 1.5
+_FREQUENCY = 1.5
 """Hz: open vessels of 10 to 30 cm slosh at 1 to 2.5 Hz (w² = pi g / length, deep water)."""
-RANGE = (0.7, 3.0)
+_RANGE = (0.7, 3.0)
 """Hz: from a bath to a cup."""
-DAMPING = 0.08
-CARRIERS = ("pelvis", "trunk_head", "right_forearm_hand", "left_forearm_hand")
+_DAMPING = 0.08
+_CARRIERS = ("pelvis", "trunk_head", "right_forearm_hand", "left_forearm_hand")
 
 
 class SloshingLoad(Effect):
-    """A load of ``mass`` (kg) behind (trunk, pelvis) or at the end of (arms) segment ``target``, of which ``sloshing`` (kg) moves freely
-    in the horizontal plane at its own ``frequency`` (Hz).
+    """A load of ``mass`` (kg) behind (trunk, pelvis) or at the end of (arms) segment ``target``, of which ``sloshing``
+    (kg) moves freely in the horizontal plane at its own ``frequency`` (Hz).
     """
 
     name = "sloshing_load"
     parameters = (
         Parameter("mass", "kg", 2.0, "1-4 kg: hydration bags, bottles, shopping"),
-        Parameter("sloshing", "kg", 1.0, "about half of the liquid in a half-filled vessel moves (first mode of a rectangular tank)"),
-        Parameter("frequency", "Hz", 0.3, "vessels of 10 to 30 cm: 2.5 to 1.4 Hz; what is fitted is the difference from `FREQUENCY`"),
+        Parameter(
+            "sloshing",
+            "kg",
+            1.0,
+            "about half of the liquid in a half-filled vessel moves (first mode of a rectangular tank)",
+        ),
+        Parameter(
+            "frequency",
+            "Hz",
+            0.3,
+            "vessels of 10 to 30 cm: 2.5 to 1.4 Hz; what is fitted is the difference from `FREQUENCY`",
+        ),
     )
     separated_by = "A sudden stop and five seconds of standing still: the load goes on swinging, the person does not."
     advice = "Take the load off, or empty it, and repeat one trial."
@@ -38,11 +48,13 @@ class SloshingLoad(Effect):
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:
         """Return the segments that carry bags and bottles; every segment of a body that has none of these."""
-        return tuple(name for name in case.body.segments if name in CARRIERS) or case.body.segments
+        return tuple(name for name in case.body.segments if name in _CARRIERS) or case.body.segments
 
     def columns(self, case: Case) -> Array:
-        """Return the wrench per kilogram carried, and per kilogram that sloshes; nothing for the frequency of what is not there."""
-        rigid, sloshing = self._parts(case, FREQUENCY)
+        """Return the wrench per kilogram carried, and per kilogram that sloshes; nothing for the frequency of what
+        is not there.
+        """
+        rigid, sloshing = self._parts(case, _FREQUENCY)
         return np.stack([rigid, sloshing, np.zeros_like(rigid)], axis=2)
 
     def added(self, case: Case, theta: Array) -> Array:
@@ -60,7 +72,7 @@ class SloshingLoad(Effect):
         local = carried_at(case, index)
         rigid = case.regressor[:, :, 10 * index : 10 * index + 10] @ point_mass(1.0, local)
         place, acceleration = point_motion(case, index, local)
-        x, relative = relative_motion(acceleration, case.motion.rate, frequency=frequency, damping=DAMPING)
+        x, relative = relative_motion(acceleration, case.motion.rate, frequency=frequency, damping=_DAMPING)
         level = np.array([1.0, 1.0, 0.0])
         return rigid, riding_wrench(place, acceleration, (x * level, relative * level), gravity=case.body.gravity)
 
@@ -75,11 +87,13 @@ class SloshingLoad(Effect):
 
 
 def _frequency(theta: Array) -> float:
-    return float(np.clip(FREQUENCY + theta[2], *RANGE))
+    return float(np.clip(_FREQUENCY + theta[2], *_RANGE))
 
 
 def carried_at(case: Case, index: int) -> Array:
-    """Return where a load sits (3,) m in a segment's frame: the middle of the back of trunk and pelvis, the far end of others."""
+    """Return where a load sits (3,) m in a segment's frame: the middle of the back of trunk and pelvis, the far end
+    of others.
+    """
     low, high = case.body.boxes[index]
     place = np.array(0.5 * (low + high))
     if case.body.segments[index] in ("pelvis", "trunk_head"):

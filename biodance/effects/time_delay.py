@@ -1,7 +1,8 @@
 """Forces and markers are not recorded at the same instant.
 
 Signature: the residual is the time derivative of the wrench: large where forces change fast, nothing in holds.
-Look-alikes: another filter on forces than on markers. Separated by fast alternating movements and by dropping a marker on the plate.
+Look-alikes: another filter on forces than on markers. Separated by fast alternating movements and by dropping a marker
+on the plate.
 """
 
 import numpy as np
@@ -22,7 +23,11 @@ class TimeDelay(Effect):
     """A ``delay`` (s) of all forces against the markers; forces late = positive."""
 
     name = "time_delay"
-    parameters = (Parameter("delay", "s", 0.005, "2.1 to 10 ms measured between systems (van den Bogert 2000; Lemaire & Kuo 2024)"),)
+    parameters = (
+        Parameter(
+            "delay", "s", 0.005, "2.1 to 10 ms measured between systems (van den Bogert 2000; Lemaire & Kuo 2024)"
+        ),
+    )
     separated_by = "Fast alternating movements (arms at 2-3 Hz) in every direction."
     advice = "Drop a marker on the plate: its stop and the force must come in one frame; correct the trigger."
 

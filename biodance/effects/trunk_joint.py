@@ -1,9 +1,9 @@
 """The trunk bends in two places; the model bends it in one.
 
-Signature: the thorax leans and bends on the loins: half the body's mass moves by centimetres against the model, in Mx and My; the trunk
-markers stand away from where the pelvis would have them.
-Look-alikes: skin that slides over the spine, a trunk joint in the wrong place (which follows the trunk's angle only). Separated by
-rounding and arching the back alone, and by markers on the loins.
+Signature: the thorax leans and bends on the loins: half the body's mass moves by centimetres against the model, in Mx
+and My; the trunk markers stand away from where the pelvis would have them. Look-alikes: skin that slides over the
+spine, a trunk joint in the wrong place (which follows the trunk's angle only). Separated by rounding and arching the
+back alone, and by markers on the loins.
 """
 
 import numpy as np
@@ -15,25 +15,31 @@ from biodance.effects._base.effect import Parameter
 from biodance.effects._base.missing_joint import MissingJoint, doubting, share_of_body, shoulders
 
 XIPHION = 0.61
-"""Height of the xiphion between the trunk's joint and the shoulders (de Leva 1996, from the omphalion: 0.58 men, 0.65 women)."""
-PLACE = 0.25
-"""Height of the joint, likewise: L1/L2, two lumbar vertebrae of 37 mm above the omphalion, in the middle of the supple part of the back."""
-AXES = {"thorax_flexion": -np.eye(3)[2], "thorax_bending": np.eye(3)[0]}
-MARKERS = 4
+"""Height of the xiphion between the trunk's joint and the shoulders (de Leva 1996, from the omphalion: 0.58 men,
+0.65 women).
+"""
+_PLACE = 0.25
+"""Height of the joint, likewise: L1/L2, two lumbar vertebrae of 37 mm above the omphalion, in the middle of the
+supple part of the back.
+"""
+_AXES = {"thorax_flexion": -np.eye(3)[2], "thorax_bending": np.eye(3)[0]}
+_MARKERS = 4
 
 ELSEWHERE = ("HD", "SHO", "UPA", "ELB", "FRM", "WRA", "WRB", "FIN")
 """Markers that follow the neck, the shoulder blades and the arms as well as the thorax."""
 
 
 class TrunkJoint(MissingJoint):
-    """The thorax bends by ``angle`` (rad rms per axis) on the loins, in the course of time that the trunk markers show; turning about the
-    long axis cannot be told from the model's own joint.
+    """The thorax bends by ``angle`` (rad rms per axis) on the loins, in the course of time that the trunk markers show;
+    turning about the long axis cannot be told from the model's own joint.
     """
 
     name = "trunk_joint"
     parameters = (
         Parameter("angle", "rad", 0.06, "5-10 deg rms between lumbar and thoracic spine (laboratory experience)"),
-        Parameter("beyond", "rad", 0.03, "half the angle: where the joint lies and what hangs on it is known to a half"),
+        Parameter(
+            "beyond", "rad", 0.03, "half the angle: where the joint lies and what hangs on it is known to a half"
+        ),
     )
     separated_by = "Rounding and arching the back alone, standing still."
     advice = "Accept a body with a thorax, and put two more markers on the loins (L1, L3)."
@@ -53,13 +59,13 @@ def with_thorax(case: Case) -> Body | None:
         return None
     index = body.segment_index("trunk_head")
     on = tuple(name for name, s in zip(body.markers.names, body.markers.segment, strict=True) if s == index)
-    if sum(body.markers.segment[c] == index for c in case.marker_columns) < MARKERS:
+    if sum(body.markers.segment[c] == index for c in case.marker_columns) < _MARKERS:
         return None
-    place = PLACE * middle
-    loins = PLACE / XIPHION * share_of_body(body, "middle_trunk", top=place, bottom=np.zeros(3))
+    place = _PLACE * middle
+    loins = _PLACE / XIPHION * share_of_body(body, "middle_trunk", top=place, bottom=np.zeros(3))
     thorax = body.sip.phi[10 * index : 10 * index + 10] - loins
     arms = tuple(i for i, joint in enumerate(body.joints) if joint.parent == body.segment_joint[index])
-    extended = branch_off(body, Cut("trunk_head", "thorax", AXES, place, thorax, on, arms))
+    extended = branch_off(body, Cut("trunk_head", "thorax", _AXES, place, thorax, on, arms))
     return doubting(extended, [name for name in body.markers.names if name.endswith(ELSEWHERE)])
 
 

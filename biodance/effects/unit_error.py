@@ -1,8 +1,8 @@
 """Numbers stand in another unit than the file says: pounds for newtons, millimetres for metres, N·mm for N·m.
 
-Signature: every channel of a plate, or all moments, or all markers, are one of a few well-known factors too large or too small.
-Look-alikes: none; no person weighs 4.45 times as much. A foot beside the plate makes the weight too small, but by no fixed factor.
-Separated by the scale's weight and by the size of the person and the plates.
+Signature: every channel of a plate, or all moments, or all markers, are one of a few well-known factors too large or
+too small. Look-alikes: none; no person weighs 4.45 times as much. A foot beside the plate makes the weight too small,
+but by no fixed factor. Separated by the scale's weight and by the size of the person and the plates.
 """
 
 import numpy as np
@@ -21,11 +21,11 @@ FACTORS = {
     1 / STANDARD_GRAVITY: "kilograms-force declared as newtons",
     1e-3: "kilonewtons declared as newtons",
 }
-NEAR = 0.06
+_NEAR = 0.06
 """How near the ratio of weights must come to a factor: shoes, clothes and movement."""
-EVEN = 0.15
+_EVEN = 0.15
 """Largest spread of the ratio within a trial, or somebody steps on and off."""
-WORDS = {
+_WORDS = {
     "markers": r"can only be in (?:mm|cm|m), so lengths are",
     "corners": r"they were taken as (?:m|mm), the only unit",
     "origin": r"makes no sense in the file's unit and was taken in units of ([\d.e-]+) m",
@@ -38,12 +38,14 @@ class UnitError(DiscreteEffect):
 
     name = "unit_error"
     separated_by = "The person's weight on the plate and on a scale."
-    advice = "Correct the unit in the recording software (C3D: POINT:UNITS, ANALOG:UNITS, FORCE_PLATFORM) and export again."
+    advice = (
+        "Correct the unit in the recording software (C3D: POINT:UNITS, ANALOG:UNITS, FORCE_PLATFORM) and export again."
+    )
 
     @classmethod
     def look(cls, recorded: Recorded) -> tuple[Gate, ...]:
         """Return what the reader overruled, and whether the plates carry the person's weight up to a factor."""
-        return (*overruled(recorded.session, WORDS, check="units", effect=cls.name), *cls._weight(recorded))
+        return (*overruled(recorded.session, _WORDS, check="units", effect=cls.name), *cls._weight(recorded))
 
     @classmethod
     def _weight(cls, recorded: Recorded) -> tuple[Gate, ...]:
@@ -55,21 +57,23 @@ class UnitError(DiscreteEffect):
             return ()
         middle = float(np.median(ratios))
         for factor, meaning in FACTORS.items():
-            if abs(middle / factor - 1) < NEAR:
+            if abs(middle / factor - 1) < _NEAR:
                 said = f"The plates carry {middle:.4g} times the declared weight: {meaning}."
                 return (Gate("weight on the plates", False, said, cls.name, "", factor, "factor", "1"),)
         return (Gate("weight on the plates", True, f"The plates carry {middle:.3g} times the declared weight."),)
 
 
 def weight_ratio(trial: Trial, mass: float) -> float | None:
-    """Return the loaded plates' vertical force over the weight of ``mass`` kg (median); None where it is no steady whole."""
+    """Return the loaded plates' vertical force over the weight of ``mass`` kg (median); None where it is no steady
+    whole.
+    """
     if not trial.plates or any(p.wrench.time.shape != trial.plates[0].wrench.time.shape for p in trial.plates):
         return None
     vertical = np.sum([plate.wrench.value[:, 2] for plate in trial.plates], axis=0)
     if not vertical.size or not np.nanmax(np.abs(vertical)) > 0:
         return None
     low, middle, high = np.nanpercentile(vertical[np.abs(vertical) > 0.1 * np.nanmax(np.abs(vertical))], [25, 50, 75])
-    return float(middle / (mass * STANDARD_GRAVITY)) if middle > 0 and (high - low) < EVEN * middle else None
+    return float(middle / (mass * STANDARD_GRAVITY)) if middle > 0 and (high - low) < _EVEN * middle else None
 
 
 EFFECT = UnitError

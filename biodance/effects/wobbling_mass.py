@@ -1,9 +1,9 @@
 """Soft tissue swings on the bones: viscera in the trunk, muscle and fat on the thighs.
 
-Signature: part of the segment's mass follows the bone as a damped spring does: the residual is the change of the segment's acceleration,
-largest at the fast ends of movements and in landings, nothing in holds and slow movements.
-Look-alikes: another filter on forces than on markers; a delay; an error of that segment's mass. Separated by hops and heel drops, which
-excite more than 5 Hz; below that even ten kilograms hardly show.
+Signature: part of the segment's mass follows the bone as a damped spring does: the residual is the change of the
+segment's acceleration, largest at the fast ends of movements and in landings, nothing in holds and slow movements.
+Look-alikes: another filter on forces than on markers; a delay; an error of that segment's mass. Separated by hops and
+heel drops, which excite more than 5 Hz; below that even ten kilograms hardly show.
 """
 
 from biodance.effects._base.case import Case
@@ -11,18 +11,26 @@ from biodance.effects._base.effect import Effect, Parameter
 from biodance.effects._base.oscillator import point_motion, relative_motion, riding_wrench
 from biodance.records import Array
 
-FREQUENCY = {"trunk_head": 5.0}
-"""Hz: main resonance of the upright body under vertical vibration, 4 to 6 Hz (Griffin 1990, Handbook of Human Vibration)."""
+_FREQUENCY = {"trunk_head": 5.0}
+"""Hz: main resonance of the upright body under vertical vibration, 4 to 6 Hz (Griffin 1990, Handbook of Human
+Vibration).
+"""
 LIMBS = 10.0
-"""Hz: lowest resonances of the soft tissue of thigh and shank, 10 to 50 Hz (Wakeling & Nigg 2001, DOI 10.1152/jappl.2001.90.2.412)."""
-DAMPING = 0.3
+"""Hz: lowest resonances of the soft tissue of thigh and shank, 10 to 50 Hz (Wakeling & Nigg 2001, DOI
+10.1152/jappl.2001.90.2.412).
+"""
+_DAMPING = 0.3
 
 
 class WobblingMass(Effect):
-    """A ``mass`` (kg) of segment ``target`` that hangs on a damped spring at the segment's centre of mass instead of being rigid."""
+    """A ``mass`` (kg) of segment ``target`` that hangs on a damped spring at the segment's centre of mass instead of
+    being rigid.
+    """
 
     name = "wobbling_mass"
-    parameters = (Parameter("mass", "kg", 4.0, "a third to a half of trunk and thigh swings (Masters & Challis 2022, running)"),)
+    parameters = (
+        Parameter("mass", "kg", 4.0, "a third to a half of trunk and thigh swings (Masters & Challis 2022, running)"),
+    )
     separated_by = "Hops, heel drops and sudden stops: only content above 5 Hz shows it."
     advice = "Add three heel drops to the session and read them with a cut-off of 20 Hz or more."
 
@@ -37,7 +45,9 @@ class WobblingMass(Effect):
         index = case.body.segment_index(self.target)
         table = case.phi[10 * index : 10 * index + 10]
         place, acceleration = point_motion(case, index, table[1:4] / table[0])
-        moved = relative_motion(acceleration, case.motion.rate, frequency=FREQUENCY.get(self.target, LIMBS), damping=DAMPING)
+        moved = relative_motion(
+            acceleration, case.motion.rate, frequency=_FREQUENCY.get(self.target, LIMBS), damping=_DAMPING
+        )
         return riding_wrench(place, acceleration, moved, gravity=case.body.gravity)[:, :, None]
 
     def possible(self, theta: Array) -> bool:

@@ -1,10 +1,11 @@
-"""Added mass: which segment carries a load, how heavy, where on it, how sure - against an earlier session or against the table.
+"""Added mass: which segment carries a load, how heavy, where on it, how sure - against an earlier session or against
+the table.
 
-Hypotheses "a load sits on segment s" are compared with "no load" by Bayes factors under one linear Gaussian model: the body as known
-before (the posterior of the reference session, or the table), plus the ten parameters of a load whose mass and place inside the segment's
-box are unknown. The load's prior is the second moment of such loads, so that light and heavy ones both fit; its size is then estimated
-under a wider prior, which does not shrink it; a load is positive. The smallest load that the session could have found is computed from
-its information alone.
+Hypotheses "a load sits on segment s" are compared with "no load" by Bayes factors under one linear Gaussian model: the
+body as known before (the posterior of the reference session, or the table), plus the ten parameters of a load whose
+mass and place inside the segment's box are unknown. The load's prior is the second moment of such loads, so that light
+and heavy ones both fit; its size is then estimated under a wider prior, which does not shrink it; a load is positive.
+The smallest load that the session could have found is computed from its information alone.
 """
 
 from dataclasses import dataclass, replace
@@ -21,21 +22,23 @@ from biodance.identification.loads import load_moments, point_mass
 from biodance.identification.posterior import prior_factor
 from biodance.records import Array, Sip
 
-THRESHOLD = 0.05
+_THRESHOLD = 0.05
 """p of "no load" below which a load is announced."""
 
 
 WIDE = 5.0
-"""How much wider than for a typical load the prior of its size is; the typical one shrinks 2.4 kg on a forearm by 0.03."""
+"""How much wider than for a typical load the prior of its size is; the typical one shrinks 2.4 kg on a forearm by
+0.03.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class LoadCandidate:
     """The hypothesis of a load on one segment.
 
-    ``mass`` kg with ``sd``; ``place`` (3,) m of its CoM in the segment's joint frame with ``place_sd`` (3,), NaN where the mass is less
-    than twice its sd; ``log_bayes_factor`` against no load; ``probability`` among all hypotheses; ``smallest`` kg, the load on this
-    segment that this session would find in half of the cases.
+    ``mass`` kg with ``sd``; ``place`` (3,) m of its CoM in the segment's joint frame with ``place_sd`` (3,), NaN where
+    the mass is less than twice its sd; ``log_bayes_factor`` against no load; ``probability`` among all hypotheses;
+    ``smallest`` kg, the load on this segment that this session would find in half of the cases.
     """
 
     segment: str
@@ -64,7 +67,7 @@ class LoadSearch:
     @property
     def found(self) -> bool:
         """Whether a load is announced."""
-        return self.p_no_load < THRESHOLD and self.suspects[0].mass > 0
+        return self.p_no_load < _THRESHOLD and self.suspects[0].mass > 0
 
     @property
     def best(self) -> LoadCandidate:
@@ -79,10 +82,11 @@ class LoadSearch:
 
 
 def added_mass(session: Identification, *, reference: Identification | None = None) -> LoadSearch:
-    """Return where and how much mass ``session`` carries beyond ``reference`` (an unloaded session of the same person) or the table.
+    """Return where and how much mass ``session`` carries beyond ``reference`` (an unloaded session of the same person)
+    or the table.
 
-    Against the table alone, a load on pelvis, trunk or thigh cannot be told from a wrong table or a wrong scale: ``set`` then holds several
-    segments.
+    Against the table alone, a load on pelvis, trunk or thigh cannot be told from a wrong table or a wrong scale:
+    ``set`` then holds several segments.
 
     Raises
     ------
@@ -104,7 +108,8 @@ def added_mass(session: Identification, *, reference: Identification | None = No
 def expect_unloaded(reference: Identification, session: Identification) -> Sip:
     """Return what ``reference`` lets expect of the unloaded body in ``session``, with covariance.
 
-    The belief of the reference, moved by what the table itself changed between the sessions (another static trial, other lengths).
+    The belief of the reference, moved by what the table itself changed between the sessions (another static trial,
+    other lengths).
 
     Raises
     ------
@@ -116,7 +121,8 @@ def expect_unloaded(reference: Identification, session: Identification) -> Sip:
 
 
 def surprised(data: Information, before: Sip) -> tuple[Array, Array]:
-    """Return the data's rows (r, p) and what they show beyond ``before`` (r,), whitened by noise and by the uncertainty of ``before``.
+    """Return the data's rows (r, p) and what they show beyond ``before`` (r,), whitened by noise and by the uncertainty
+    of ``before``.
 
     With R phi = y + noise and phi ~ N(before): y - R before has the covariance 1 + R P R'.
     """
@@ -128,7 +134,9 @@ def surprised(data: Information, before: Sip) -> tuple[Array, Array]:
 
 
 def _suspect(body: Body, i: int, rows: Array, surprise: Array) -> LoadCandidate:
-    """Return the hypothesis of a load on segment ``i`` whose columns are ``rows`` (r, 10); its probability is filled in later."""
+    """Return the hypothesis of a load on segment ``i`` whose columns are ``rows`` (r, 10); its probability is filled
+    in later.
+    """
     U = load_moments(body, i)
     B = rows @ U
     S, t = B.T @ B, B.T @ surprise
@@ -144,6 +152,11 @@ def _suspect(body: Body, i: int, rows: Array, surprise: Array) -> LoadCandidate:
         place_sd = np.sqrt(np.diag(slope @ covariance[:4, :4] @ slope.T))
     shown = B.T @ (rows @ point_mass(body.boxes[i].mean(axis=0)))
     per_kg = 0.5 * float(shown @ inner @ shown)
-    wanted = np.log((1 - THRESHOLD) / THRESHOLD * len(body.segments)) - np.log(2.0) - occam - 0.5 * float(np.trace(S @ inner))
+    wanted = (
+        np.log((1 - _THRESHOLD) / _THRESHOLD * len(body.segments))
+        - np.log(2.0)
+        - occam
+        - 0.5 * float(np.trace(S @ inner))
+    )
     smallest = float(np.sqrt(max(wanted, 0.0) / per_kg)) if per_kg > 0 else float("inf")
     return LoadCandidate(body.segments[i], mass, sd, place, place_sd, bayes, 0.0, smallest)

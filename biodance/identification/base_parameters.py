@@ -1,9 +1,10 @@
-"""Base parameters: the combinations of SIP that a wrench can show, found numerically (Gautier 1991, doi 10.1002/rob.4620080405).
+"""Base parameters: the combinations of SIP that a wrench can show, found numerically (Gautier 1991, doi
+10.1002/rob.4620080405).
 
-Columns of the regressor that never move independently are regrouped: with the independent columns b and the dependent ones d,
-W_d = W_b beta, hence W phi = W_b (phi_b + beta phi_d). The choice of b is deterministic and the one the paper prints (eq. 5, 13): columns
-are taken in a fixed order, root first and mass and YY last within a segment, and kept when they add rank; so a child's mass regroups
-into its parents, and YY of a hinge into XX - YY.
+Columns of the regressor that never move independently are regrouped: with the independent columns b and the dependent
+ones d, W_d = W_b beta, hence W phi = W_b (phi_b + beta phi_d). The choice of b is deterministic and the one the paper
+prints (eq. 5, 13): columns are taken in a fixed order, root first and mass and YY last within a segment, and kept when
+they add rank; so a child's mass regroups into its parents, and YY of a hinge into XX - YY.
 """
 
 from dataclasses import dataclass
@@ -18,20 +19,24 @@ from biodance.records import Array, Motion, frozen_array
 
 PARAMETERS = ("M", "MX", "MY", "MZ", "XX", "XY", "YY", "XZ", "YZ", "ZZ")
 """Names of the ten parameters of a segment, in Pinocchio's order."""
-PREFERENCE = (1, 2, 3, 4, 5, 7, 8, 9, 6, 0)
+_PREFERENCE = (1, 2, 3, 4, 5, 7, 8, 9, 6, 0)
 """Order in which the columns of one segment are offered to the base set: YY and M last."""
 
 
 @dataclass(frozen=True, eq=False)
 class BaseParameters:
-    """The minimal set: ``columns`` (nb) indices into the 10N SIP; ``regroup`` (nb, 10N) with ``phi_b = regroup @ phi``; ``names`` (10N)."""
+    """The minimal set: ``columns`` (nb) indices into the 10N SIP; ``regroup`` (nb, 10N) with ``phi_b = regroup @
+    phi``; ``names`` (10N).
+    """
 
     columns: tuple[int, ...]
     regroup: Array
     names: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "regroup", frozen_array(self.regroup, (len(self.columns), len(self.names)), "BaseParameters.regroup"))
+        object.__setattr__(
+            self, "regroup", frozen_array(self.regroup, (len(self.columns), len(self.names)), "BaseParameters.regroup")
+        )
 
     @property
     def count(self) -> int:
@@ -49,7 +54,9 @@ class BaseParameters:
         return tuple(i for i, c in enumerate(self.columns) if c % 10 >= 4)
 
     def of_segment(self, index: int) -> tuple[int, ...]:
-        """Return the positions (in the base set) of the parameters of one segment (the sub-regressor W_bi of paper III.B)."""
+        """Return the positions (in the base set) of the parameters of one segment (the sub-regressor W_bi of paper
+        III.B).
+        """
         return tuple(i for i, c in enumerate(self.columns) if c // 10 == index)
 
     def relations(self, *, digits: int = 4) -> tuple[str, ...]:
@@ -70,9 +77,10 @@ class BaseParameters:
 def base_parameters(triangle: Array, names: tuple[str, ...], *, tolerance: float = 1e-8) -> BaseParameters:
     """Return the base parameters of a regressor given by its R factor ``triangle`` (p, p) or any rows (m, p).
 
-    A column counts as dependent when less than ``tolerance`` of its norm is left after projection on the columns kept before it.
+    A column counts as dependent when less than ``tolerance`` of its norm is left after projection on the columns kept
+    before it.
     """
-    order = sorted(range(triangle.shape[1]), key=lambda c: (c // 10, PREFERENCE.index(c % 10)))
+    order = sorted(range(triangle.shape[1]), key=lambda c: (c // 10, _PREFERENCE.index(c % 10)))
     scale = np.linalg.norm(triangle, axis=0)
     largest = scale.max(initial=0.0)
     kept: list[int] = []
@@ -100,14 +108,18 @@ def parameter_names(body: Body) -> tuple[str, ...]:
 
 
 def structural_base(body: Body, *, gravity: Array = GRAVITY, seed: int = 0) -> BaseParameters:
-    """Return the base parameters that ``body`` has for general motion: rank found on 100 random states (not on a recorded trial)."""
+    """Return the base parameters that ``body`` has for general motion: rank found on 100 random states (not on a
+    recorded trial).
+    """
     rng = np.random.default_rng(seed)
     frames = max(100, 5 * len(body.segments))
     q = rng.uniform(-2, 2, (frames, body.nq))
     if body.n_root:
         q[:, 3:7] = rng.normal(size=(frames, 4))
         q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
-    motion = Motion(np.arange(frames, dtype=float), q, rng.normal(0, 2, (frames, body.nv)), rng.normal(0, 4, (frames, body.nv)))
+    motion = Motion(
+        np.arange(frames, dtype=float), q, rng.normal(0, 2, (frames, body.nv)), rng.normal(0, 4, (frames, body.nv))
+    )
     W = regressor_of(segment_motion(body, motion), gravity=gravity)
     return base_parameters(fold(W.reshape(-1, W.shape[2])), parameter_names(body))
 
@@ -116,8 +128,8 @@ def structural_base(body: Body, *, gravity: Array = GRAVITY, seed: int = 0) -> B
 class BaseEstimate:
     """Weighted least squares on the base parameters (paper eq. 6, 7).
 
-    ``value``, ``sd`` (nb,) in SI units, ``covariance`` (nb, nb), ``condition`` of W_b, ``rank`` of the data in the base set
-    (rank < count: some cannot be known from these data; their sd is infinite).
+    ``value``, ``sd`` (nb,) in SI units, ``covariance`` (nb, nb), ``condition`` of W_b, ``rank`` of the data in the base
+    set (rank < count: some cannot be known from these data; their sd is infinite).
     """
 
     base: BaseParameters

@@ -1,8 +1,9 @@
 """From the trials of a session to what the subject weighs, segment by segment, with an interval for every number.
 
-The steps: band-wise statistics of every trial, noise learned, what wrong kinematics and plates could do discounted (twins), the table as
-prior (maximum a posteriori: its standard deviations and the noise of the data decide, no weight is tuned), then the nearest body that
-can exist. A session that cannot tell a parameter leaves it at the table's value with the table's interval, and says so.
+The steps: band-wise statistics of every trial, noise learned, what wrong kinematics and plates could do discounted
+(twins), the table as prior (maximum a posteriori: its standard deviations and the noise of the data decide, no weight
+is tuned), then the nearest body that can exist. A session that cannot tell a parameter leaves it at the table's value
+with the table's interval, and says so.
 """
 
 from dataclasses import dataclass, replace
@@ -30,7 +31,9 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-NOISE_ALONE = "The intervals count the noise alone, not soft tissue, joint centres and plates: they are several times too short."
+NOISE_ALONE = (
+    "The intervals count the noise alone, not soft tissue, joint centres and plates: they are several times too short."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +67,8 @@ class Identification:
 
     References
     ----------
-    Physical consistency: Traversaro et al. 2016, doi:10.1109/IROS.2016.7759801; Wensing et al. 2018, doi:10.1109/LRA.2017.2729659.
+    Physical consistency: Traversaro et al. 2016, doi:10.1109/IROS.2016.7759801; Wensing et al. 2018,
+    doi:10.1109/LRA.2017.2729659.
 
     Examples
     --------
@@ -96,13 +100,14 @@ class Identification:
         Parameters
         ----------
         quantity : str
-            "mass" (kg); "com x", "com y", "com z" (m, in the segment's joint frame); "Ixx" ... "Izz" (kg·m², about the centre of mass).
+            "mass" (kg); "com x", "com y", "com z" (m, in the segment's joint frame); "Ixx" ... "Izz" (kg·m², about the
+            centre of mass).
 
         Returns
         -------
         pandas.DataFrame
-            Index segment; table, table sd, identified, sd, low and high of the 95 % interval, each with its unit; ``from data`` (share of
-            the table's variance that the data removed), verdict.
+            Index segment; table, table sd, identified, sd, low and high of the 95 % interval, each with its unit;
+            ``from data`` (share of the table's variance that the data removed), verdict.
 
         Raises
         ------
@@ -137,7 +142,8 @@ class Identification:
         Returns
         -------
         matplotlib.axes.Axes
-            Kilograms; squares are the table's, circles identified: filled = known, pale = partly known, open = cannot be known.
+            Kilograms; squares are the table's, circles identified: filled = known, pale = partly known, open = cannot
+            be known.
 
         Examples
         --------
@@ -174,7 +180,9 @@ class Identification:
     @property
     def identified(self) -> Body:
         """The body with the identified parameters; raises `NotSolved` like `sip`."""
-        return replace(self.body, sip=self.sip, notes=(*self.body.notes, f"SIP identified from {', '.join(self.trials)}."))
+        return replace(
+            self.body, sip=self.sip, notes=(*self.body.notes, f"SIP identified from {', '.join(self.trials)}.")
+        )
 
     @property
     def unknown(self) -> tuple[Known, ...]:
@@ -183,8 +191,8 @@ class Identification:
 
 
 def identify_body(body: Body, fits: tuple[Fit, ...], *, prior: Sip | None = None) -> Identification:
-    """Return the identified parameters of ``body`` from the trials ``fits``; ``prior`` is what is known before (by default the table
-    in ``body.sip``, its standard deviations widened for frames that marker placement turns).
+    """Return the identified parameters of ``body`` from the trials ``fits``; ``prior`` is what is known before (by
+    default the table in ``body.sip``, its standard deviations widened for frames that marker placement turns).
 
     Trials without a usable frame are left out and named in the notes.
 
@@ -199,7 +207,9 @@ def identify_body(body: Body, fits: tuple[Fit, ...], *, prior: Sip | None = None
     for fit in used:
         total = total + statistics(body, fit, layout)
     noise, _ = learn_noise(total, may_carry(body, prior or widened(body.sip)))
-    found = conclude(body, total, tuple(fit.name for fit in used), noise=noise, found=mismatch(body, used, noise), prior=prior)
+    found = conclude(
+        body, total, tuple(fit.name for fit in used), noise=noise, found=mismatch(body, used, noise), prior=prior
+    )
     return replace(found, notes=(*notes, *found.notes))
 
 
@@ -214,7 +224,8 @@ def usable(body: Body, fits: tuple[Fit, ...]) -> tuple[tuple[Fit, ...], Array, t
     some = tuple(fit for fit in fits if fit.use.any())
     if not some:
         raise TrialRefused(
-            f"None of {len(fits)} trials has a frame to identify from: ground contact not measured or no motion. Record trials to fit."
+            f"None of {len(fits)} trials has a frame to identify from: ground contact not measured or no motion. "
+            f"Record trials to fit."
         )
     blind = [fit.name for fit in fits if not fit.use.any()]
     about = standing_point(some)
@@ -238,8 +249,8 @@ def conclude(
 ) -> Identification:
     """Return the identification from statistics that were gathered already, of several trials or of a stream of frames.
 
-    ``noise`` as learned (learned here if None); ``found`` what twins and plates disturb: without it the intervals count noise alone, far
-    too short, and the notes say so.
+    ``noise`` as learned (learned here if None); ``found`` what twins and plates disturb: without it the intervals count
+    noise alone, far too short, and the notes say so.
     """
     before = prior or widened(body.sip)
     noise = noise or learn_noise(total, may_carry(body, before))[0]
@@ -260,7 +271,9 @@ def conclude(
 
 
 def standing_point(fits: tuple[Fit, ...]) -> Array:
-    """Return the mean centre of pressure (3,) m of all used frames: the point about which the wrench's noise is described."""
+    """Return the mean centre of pressure (3,) m of all used frames: the point about which the wrench's noise is
+    described.
+    """
     points = np.concatenate([fit.wrench.cop()[fit.use] for fit in fits])
     loaded = points[np.isfinite(points).all(axis=1)]
     return loaded.mean(axis=0) if len(loaded) else np.zeros(3)
@@ -268,7 +281,9 @@ def standing_point(fits: tuple[Fit, ...]) -> Array:
 
 def _notes(known: tuple[Known, ...], fit: PhysicalFit) -> tuple[str, ...]:
     notes = []
-    lost = [f"{k.segment} {k.quantity}" for k in known if k.verdict == "cannot be known" and not k.quantity.startswith("I")]
+    lost = [
+        f"{k.segment} {k.quantity}" for k in known if k.verdict == "cannot be known" and not k.quantity.startswith("I")
+    ]
     if lost:
         notes.append(f"Cannot be known from this session (the table's value stands): {', '.join(lost)}.")
     moved = [name for name, acts in zip(fit.sip.segments, fit.moved, strict=True) if acts]

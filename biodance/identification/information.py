@@ -1,8 +1,9 @@
 """What the data say, compressed: the R factor of the whitened regressor and wrench.
 
-Least squares on any number of frames equals least squares on the small triangle R of [W y] = Q R; blocks are folded in one by one, so
-that a trial of any length needs constant memory, trials merge, and a recursive estimator ends at the batch result.
-The wrench is taken about a point near the feet, where its noise has the covariance that the whitening assumes.
+Least squares on any number of frames equals least squares on the small triangle R of [W y] = Q R; blocks are folded in
+one by one, so that a trial of any length needs constant memory, trials merge, and a recursive estimator ends at the
+batch result. The wrench is taken about a point near the feet, where its noise has the covariance that the whitening
+assumes.
 """
 
 from collections.abc import Iterable, Iterator
@@ -57,10 +58,13 @@ def fold(rows: Array, onto: Array | None = None) -> Array:
     return np.pad(triangle, ((0, missing), (0, 0))) if missing > 0 else triangle
 
 
-def information(body: Body, motion: Motion, wrench: Wrench, noise: Noise, *, use: NDArray[np.bool_] | None = None) -> Information:
+def information(
+    body: Body, motion: Motion, wrench: Wrench, noise: Noise, *, use: NDArray[np.bool_] | None = None
+) -> Information:
     """Return what one trial says about the 10N parameters of ``body``.
 
-    ``wrench`` (T, 6) at the times of ``motion``, about the lab origin; ``use`` (T,) True for the frames that count (all by default).
+    ``wrench`` (T, 6) at the times of ``motion``, about the lab origin; ``use`` (T,) True for the frames that count (all
+    by default).
 
     Raises
     ------
@@ -69,9 +73,13 @@ def information(body: Body, motion: Motion, wrench: Wrench, noise: Noise, *, use
     """
     used = np.ones(motion.time.size, dtype=bool) if use is None else use
     if wrench.time.size != motion.time.size:
-        raise TrialRefused(f"The wrench has {wrench.time.size} samples, the motion {motion.time.size}; prepare the trial first.")
+        raise TrialRefused(
+            f"The wrench has {wrench.time.size} samples, the motion {motion.time.size}; prepare the trial first."
+        )
     if not used.any():
-        raise TrialRefused("No frame of this trial may be used: all are masked (ground contact not measured, or markers hidden).")
+        raise TrialRefused(
+            "No frame of this trial may be used: all are masked (ground contact not measured, or markers hidden)."
+        )
     if np.isnan(wrench.value[used]).any():
         raise TrialRefused("The wrench is NaN in a frame that is to be used; mask the frame.")
     count = 0

@@ -1,7 +1,7 @@
 """What a session can know: every quantity with its interval before and after the data, and a verdict in words.
 
-Quantities are those an analyst asks for: mass, centre of mass and inertia about it, per segment. Their standard deviations follow from
-the covariance of the ten parameters by the first derivative.
+Quantities are those an analyst asks for: mass, centre of mass and inertia about it, per segment. Their standard
+deviations follow from the covariance of the ten parameters by the first derivative.
 """
 
 from dataclasses import dataclass
@@ -26,10 +26,12 @@ Knowability = Literal["known", "partly known", "cannot be known"]
 
 @dataclass(frozen=True)
 class Known:
-    """One quantity of one segment: ``value`` with ``sd`` after the data, ``table`` with ``table_sd`` before, in ``unit``.
+    """One quantity of one segment: ``value`` with ``sd`` after the data, ``table`` with ``table_sd`` before, in
+    ``unit``.
 
-    ``from_data`` is the share of the table's variance that the data removed (0 = all from the table); ``verdict`` in words: a quantity that
-    "cannot be known" from this session has the table's value and interval, whatever digits are printed.
+    ``from_data`` is the share of the table's variance that the data removed (0 = all from the table); ``verdict`` in
+    words: a quantity that "cannot be known" from this session has the table's value and interval, whatever digits are
+    printed.
     """
 
     segment: str
@@ -51,11 +53,18 @@ class Known:
 def mass_interval(known: Known) -> Interval:
     """Return the table's and the identified value of a quantity with their 95 % intervals, as they are drawn."""
     reach = SIGMAS * known.table_sd
-    return Interval(known.segment, (known.table, known.table - reach, known.table + reach), (known.value, *known.interval), known.verdict)
+    return Interval(
+        known.segment,
+        (known.table, known.table - reach, known.table + reach),
+        (known.value, *known.interval),
+        known.verdict,
+    )
 
 
 def segment_quantities(phi: Array) -> tuple[Array, Array]:
-    """Return the ten quantities (10,) of one segment and their derivative (10, 10) to ``phi`` (10,): m, CoM, inertia about the CoM."""
+    """Return the ten quantities (10,) of one segment and their derivative (10, 10) to ``phi`` (10,): m, CoM, inertia
+    about the CoM.
+    """
     mass, h = phi[0], phi[1:4]
     com = h / mass
     value = np.concatenate([[mass], com, np.empty(6)])
@@ -75,8 +84,9 @@ def segment_quantities(phi: Array) -> tuple[Array, Array]:
 def knowledge(after: Sip, before: Sip, belief: Posterior | None = None) -> tuple[Known, ...]:
     """Return all quantities of all segments, in order.
 
-    ``after`` and ``before`` with covariances about the true joint centres; what the data removed of the variance is judged in the model's
-    frames (``belief`` and its prior, else ``after`` and ``before``), where a misplaced joint centre is no ignorance.
+    ``after`` and ``before`` with covariances about the true joint centres; what the data removed of the variance is
+    judged in the model's frames (``belief`` and its prior, else ``after`` and ``before``), where a misplaced joint
+    centre is no ignorance.
     """
     then, first = (belief.covariance, belief.prior.covariance) if belief else (after.covariance, before.covariance)
     rows = []
@@ -84,12 +94,27 @@ def knowledge(after: Sip, before: Sip, belief: Posterior | None = None) -> tuple
         cut = slice(10 * i, 10 * i + 10)
         value, slope = segment_quantities(after.phi[cut])
         table, table_slope = segment_quantities(before.phi[cut])
-        sd, table_sd = _deviation(slope, after.covariance[cut, cut]), _deviation(table_slope, before.covariance[cut, cut])
+        sd, table_sd = (
+            _deviation(slope, after.covariance[cut, cut]),
+            _deviation(table_slope, before.covariance[cut, cut]),
+        )
         left, whole = (_deviation(table_slope, c[cut, cut]) for c in (then, first))
         share = np.clip(1 - np.divide(left**2, whole**2, out=np.ones(10), where=whole > 0), 0.0, 1.0)
         for k, (quantity, unit) in enumerate(zip(QUANTITIES, UNITS, strict=True)):
             numbers = [float(column[k]) for column in (value, sd, table, table_sd, share)]
-            rows.append(Known(segment, quantity, unit, numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], _verdict(numbers[4])))
+            rows.append(
+                Known(
+                    segment,
+                    quantity,
+                    unit,
+                    numbers[0],
+                    numbers[1],
+                    numbers[2],
+                    numbers[3],
+                    numbers[4],
+                    _verdict(numbers[4]),
+                )
+            )
     return tuple(rows)
 
 

@@ -23,7 +23,9 @@ def learn_noise(data: Statistics, prior: Sip, *, rounds: int = 12, tolerance: fl
 
     def improved(noise: Noise) -> Noise:
         belief = posterior(data.information(noise), prior)
-        return replace(noise, covariance=noise_of(data.moments(belief.mean, belief.covariance), start=START, worth=WORTH))
+        return replace(
+            noise, covariance=noise_of(data.moments(belief.mean, belief.covariance), start=START, worth=WORTH)
+        )
 
     first = Noise(np.tile(START, (len(data.count), 1, 1)), data.layout.about, data.layout.bands)
     noise = maximise(first, improved, lambda one: one.covariance, rounds=rounds, tolerance=tolerance)

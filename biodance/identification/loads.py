@@ -1,5 +1,5 @@
-"""Loads on segments: the ten parameters of a compact load, their second moment where mass and place are unknown, and a body that may
-carry one.
+"""Loads on segments: the ten parameters of a compact load, their second moment where mass and place are unknown, and a
+body that may carry one.
 """
 
 import numpy as np
@@ -7,30 +7,34 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.records import Array, Sip
 
-SCALE = 2.0
+_SCALE = 2.0
 """kg: typical size of a load; the answer changes little between half and twice of it."""
-RADIUS = 0.04
+_RADIUS = 0.04
 """m: radius of gyration of a compact load."""
-NEAR = 0.5
+_NEAR = 0.5
 """A load may lie this share of the box beyond the box (straps, wrist weights)."""
 UNDECLARED = 0.25
 """Share of a load's second moment that noise is learned with: 1 kg on every segment, undeclared."""
 
 
-def point_mass(place: Array, radius: float = RADIUS) -> Array:
-    """Return the ten parameters per kg of a compact load with CoM at ``place`` (3,) m and radius of gyration ``radius`` m."""
+def point_mass(place: Array, radius: float = _RADIUS) -> Array:
+    """Return the ten parameters per kg of a compact load with CoM at ``place`` (3,) m and radius of gyration
+    ``radius`` m.
+    """
     x, y, z = place
     r = radius**2
     return np.array([1.0, x, y, z, y * y + z * z + r, -x * y, x * x + z * z + r, -x * z, -y * z, x * x + y * y + r])
 
 
 def load_moments(body: Body, segment: int) -> Array:
-    """Return U (10, k): U U' is the second moment of the parameters of a load of typical mass in or near the segment's box."""
+    """Return U (10, k): U U' is the second moment of the parameters of a load of typical mass in or near the
+    segment's box.
+    """
     low, high = body.boxes[segment]
-    margin = NEAR * (high - low)
+    margin = _NEAR * (high - low)
     rng = np.random.default_rng(segment)
     place = rng.uniform(low - margin, high + margin, (2000, 3))
-    loads = np.array([point_mass(p) for p in place]) * SCALE
+    loads = np.array([point_mass(p) for p in place]) * _SCALE
     moment = loads.T @ loads / len(loads)
     value, vector = np.linalg.eigh(moment)
     keep = value > 1e-12 * value.max()
@@ -40,8 +44,8 @@ def load_moments(body: Body, segment: int) -> Array:
 def may_carry(body: Body, prior: Sip, *, share: Array | None = None) -> Sip:
     """Return ``prior`` with a covariance that leaves room for an undeclared load on every segment.
 
-    ``share`` (N,) of a load's second moment for every segment, by default `UNDECLARED`. Noise is learned under it: with the total mass
-    pinned to the declared one, a load would pass for slow noise.
+    ``share`` (N,) of a load's second moment for every segment, by default `UNDECLARED`. Noise is learned under it: with
+    the total mass pinned to the declared one, a load would pass for slow noise.
     """
     room = np.full(len(prior.segments), UNDECLARED) if share is None else share
     covariance = np.array(prior.covariance)

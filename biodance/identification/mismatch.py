@@ -30,7 +30,7 @@ EVERY = 8
 SHORTEST = 8
 """Frames: shorter runs have no accelerations worth the name."""
 KINEMATICS = (1.0, 1.4, 2.0, 2.8)
-NOISE = (1.7, 2.2, 3.0, 4.5, 7.0, 10.0, 15.0, 22.0)
+_NOISE = (1.7, 2.2, 3.0, 4.5, 7.0, 10.0, 15.0, 22.0)
 """Sizes among which the evidence chooses: of the kinematic errors (never smaller than drawn), and variance factor of
 the noise (never below 1.7: the parameters absorb part of what is noise)."""
 
@@ -114,7 +114,7 @@ def evident_sizes(data: Information, found: Mismatch, prior: Sip) -> Sizes:
     for part, kinematics in zip(parts, KINEMATICS, strict=True):
         value, vector = np.linalg.eigh(spread + part)
         turned = (vector.T @ e) ** 2
-        for noise in NOISE:
+        for noise in _NOISE:
             likely = -0.5 * float(np.sum(np.log(value + noise) + turned / (value + noise)))
             if likely > best:
                 best, chosen = likely, Sizes(kinematics, noise)

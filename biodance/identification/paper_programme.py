@@ -1,11 +1,11 @@
 """The quadratic programme of Bonnet et al. 2016 (eq. 8-11) as it stands, to compare with.
 
-    min |F - W phi|² + |phi_table - phi|²
-    s.t. M_i >= 0, CoM_i in its box, v' I_i v >= eps for sampled directions v, and the well-known base parameters as equalities.
+    min |F - W phi|² + |phi_table - phi|² s.t. M_i >= 0, CoM_i in its box, v' I_i v >= eps for sampled directions v, and
+    the well-known base parameters as equalities.
 
-Unweighted residuals (N and N·m alike) and unit prior weights, as printed. One thing is changed and must be: the printed eps = 1e-3 kg·m²
-exceeds the smallest moments of inertia of the table's own feet and forearms, so that the table itself would be infeasible; eps is taken
-relative to the table's smallest eigenvalue of each segment.
+Unweighted residuals (N and N·m alike) and unit prior weights, as printed. One thing is changed and must be: the printed
+eps = 1e-3 kg·m² exceeds the smallest moments of inertia of the table's own feet and forearms, so that the table itself
+would be infeasible; eps is taken relative to the table's smallest eigenvalue of each segment.
 """
 
 from dataclasses import dataclass
@@ -30,7 +30,9 @@ DIRECTIONS = 100
 
 @dataclass(frozen=True, eq=False)
 class PaperFit:
-    """Solution ``phi`` (10N,), the base estimate it was tied to, ``equalities`` how many; ``cause`` why there are none."""
+    """Solution ``phi`` (10N,), the base estimate it was tied to, ``equalities`` how many; ``cause`` why there are
+    none.
+    """
 
     phi: Array
     base: BaseEstimate
@@ -40,7 +42,9 @@ class PaperFit:
 
 
 def directions(count: int = DIRECTIONS) -> Array:
-    """Return ``count`` unit vectors (count, 3), spread evenly over the half sphere (golden spiral; v and -v say the same)."""
+    """Return ``count`` unit vectors (count, 3), spread evenly over the half sphere (golden spiral; v and -v say the
+    same).
+    """
     z = (np.arange(count) + 0.5) / count
     angle = np.arange(count) * np.pi * (3 - np.sqrt(5))
     radius = np.sqrt(1 - z**2)
@@ -76,10 +80,11 @@ def inequalities(body: "Body") -> tuple[Array, Array]:
 
 
 def paper_programme(data: Information, body: "Body") -> PaperFit | FailedFit:
-    """Return the solution of eq. 8 for ``data`` compressed with unit noise (1 N, 1 N·m), table values from ``body.sip``.
+    """Return the solution of eq. 8 for ``data`` compressed with unit noise (1 N, 1 N·m), table values from
+    ``body.sip``.
 
-    The equalities (eq. 11) tie the base parameters with a relative standard deviation of at most 10 %; where they contradict the boxes the
-    programme is solved again without them, and the status says so.
+    The equalities (eq. 11) tie the base parameters with a relative standard deviation of at most 10 %; where they
+    contradict the boxes the programme is solved again without them, and the status says so.
     """
     base = estimate_base(data, structural_base(body))
     tied = list(base.well_known)
@@ -87,19 +92,29 @@ def paper_programme(data: Information, body: "Body") -> PaperFit | FailedFit:
     phi, word = _solve(data, body, E, e)
     if phi is not None:
         return PaperFit(phi, base, len(tied), "solved")
-    cause = f"With the {len(tied)} base-parameter equalities the programme has no solution ({word}): they contradict the CoM boxes."
+    cause = (
+        f"With the {len(tied)} base-parameter equalities the programme has no solution ({word}): they contradict "
+        f"the CoM boxes."
+    )
     phi, word = _solve(data, body, E[:0], e[:0])
     if phi is not None:
         return PaperFit(phi, base, 0, "solved without equalities", cause)
-    return FailedFit(f"The paper's programme has no solution ({word}), not even without equalities: the CoM boxes contradict each other.")
+    return FailedFit(
+        f"The paper's programme has no solution ({word}), not even without equalities: the CoM boxes contradict each "
+        f"other."
+    )
 
 
 def _solve(data: Information, body: "Body", E: Array, e: Array) -> tuple[Array | None, str]:
-    """Solve eq. 8 in centred coordinates x = U (phi - centre), where the objective is |x|²; return phi and the solver's word."""
+    """Solve eq. 8 in centred coordinates x = U (phi - centre), where the objective is |x|²; return phi and the
+    solver's word.
+    """
     import cvxpy as cp
 
     count = data.triangle.shape[1]
-    stacked = np.concatenate([np.column_stack([data.triangle, data.target]), np.column_stack([np.eye(count), body.sip.phi])])
+    stacked = np.concatenate(
+        [np.column_stack([data.triangle, data.target]), np.column_stack([np.eye(count), body.sip.phi])]
+    )
     triangle = np.asarray(np.linalg.qr(stacked, mode="r"))
     inverse = np.linalg.inv(triangle[:count, :count])
     centre = inverse @ triangle[:count, count]

@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 
 
 def solve_convex(problem: "cp.Problem") -> str:
-    """Solve ``problem`` in place and return "optimal", or the solver's word for what it ran into: then no value is to be used."""
+    """Solve ``problem`` in place and return "optimal", or the solver's word for what it ran into: then no value is
+    to be used.
+    """
     import cvxpy as cp
 
     try:
@@ -32,13 +34,17 @@ def solve_convex(problem: "cp.Problem") -> str:
 
 
 RELATIVE_FLOOR = 1e-3
-"""Smallest eigenvalue allowed, as a share of the prior segment's own smallest eigenvalue (an absolute floor contradicts the tables)."""
+"""Smallest eigenvalue allowed, as a share of the prior segment's own smallest eigenvalue (an absolute floor
+contradicts the tables).
+"""
 
 TOLERANCE = 1e-7
-"""How far outside its limits a segment may lie by rounding, in its own units (CoM in m): ten times the solver's tolerance."""
+"""How far outside its limits a segment may lie by rounding, in its own units (CoM in m): ten times the solver's
+tolerance.
+"""
 GAP = 1e-6
 """How far inside the cone of possible bodies the programme stays, so that what it returns is inside for everybody."""
-NOTHING = 1e-9
+_NOTHING = 1e-9
 """Relative size of what rounding leaves of a zero."""
 THIN = 1e-2
 """Least second moment of a segment about an axis, relative to its largest, in the units: a rod has none."""
@@ -48,8 +54,8 @@ THIN = 1e-2
 class PhysicalFit:
     """A physically consistent estimate.
 
-    ``sip`` with the posterior's covariance; ``moved`` (N,) True for the segments that a constraint holds at the edge of what can be;
-    ``distance`` from the unconstrained mean in posterior standard deviations.
+    ``sip`` with the posterior's covariance; ``moved`` (N,) True for the segments that a constraint holds at the edge of
+    what can be; ``distance`` from the unconstrained mean in posterior standard deviations.
     """
 
     sip: Sip
@@ -61,7 +67,9 @@ class PhysicalFit:
 
 @dataclass(frozen=True, eq=False)
 class FailedFit:
-    """No consistent estimate was found: ``cause`` and cure in words. There are no parameters in it, so nobody can use them by mistake."""
+    """No consistent estimate was found: ``cause`` and cure in words. There are no parameters in it, so nobody can
+    use them by mistake.
+    """
 
     cause: str
     status: Literal["failed"] = "failed"
@@ -76,10 +84,11 @@ class FailedFit:
 
 
 def physical_fit(belief: Posterior, body: "Body") -> PhysicalFit | FailedFit:
-    """Return the physically consistent parameters nearest to the posterior mean, CoM inside ``body.com_boxes``; look at ``status``.
+    """Return the physically consistent parameters nearest to the posterior mean, CoM inside ``body.com_boxes``; look at
+    ``status``.
 
-    Only segments that violate are constrained, until none does: what a constraint that is not listed would not change is already nearest.
-    When the mean is consistent it is returned as it is.
+    Only segments that violate are constrained, until none does: what a constraint that is not listed would not change
+    is already nearest. When the mean is consistent it is returned as it is.
     """
     prior, limits = belief.prior, _limits(belief.prior, body)
     bound = np.zeros(len(prior.segments), dtype=bool)
@@ -95,15 +104,16 @@ def physical_fit(belief: Posterior, body: "Body") -> PhysicalFit | FailedFit:
 
 def _cause(word: str, segments: list[str]) -> str:
     return (
-        f"No possible body was found near what the data say (solver: {word}; segments {', '.join(segments)}): the data contradict every "
+        f"No possible body was found near what the data say (solver: {word}; segments {', '.join(segments)}): the "
+        f"data contradict every "
         "body that fits the boxes. Check the scaling, the declared mass and the force plates."
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _Limits:
-    """What N segments may be, in units of each: ``cone`` (N, 16, 10) maps ten parameters to a matrix of at least ``floor`` (N, 4, 4);
-    ``sides`` (N, 6, 10) to distances inside the CoM's box, m.
+    """What N segments may be, in units of each: ``cone`` (N, 16, 10) maps ten parameters to a matrix of at least
+    ``floor`` (N, 4, 4); ``sides`` (N, 6, 10) to distances inside the CoM's box, m.
     """
 
     cone: Array
@@ -111,7 +121,9 @@ class _Limits:
     sides: Array
 
     def room(self, phi: Array) -> Array:
-        """Return how far (N,) every segment of ``phi`` (10N,) is inside its limits; negative: no possible body, or CoM outside."""
+        """Return how far (N,) every segment of ``phi`` (10N,) is inside its limits; negative: no possible body, or
+        CoM outside.
+        """
         ten = phi.reshape(-1, 10, 1)
         inside = np.linalg.eigvalsh((self.cone @ ten).reshape(-1, 4, 4) - self.floor)[:, 0]
         return np.asarray(np.minimum(inside, (self.sides @ ten)[..., 0].min(axis=1)))
@@ -131,10 +143,11 @@ def _limits(prior: Sip, body: "Body") -> _Limits:
 
 
 def _nearest(belief: Posterior, limits: _Limits, bound: NDArray[np.intp]) -> tuple[Array | None, str]:
-    """Solve min |x|² s.t. the segments ``bound`` of mean + factor x are inside their limits; return x (k,) and the solver's word.
+    """Solve min |x|² s.t. the segments ``bound`` of mean + factor x are inside their limits; return x (k,) and the
+    solver's word.
 
-    x lies in the span of those segments' rows of the factor, so that the programme has ten unknowns per segment. If the solver stops, it
-    is asked again in units of the distance to the prior.
+    x lies in the span of those segments' rows of the factor, so that the programme has ten unknowns per segment. If the
+    solver stops, it is asked again in units of the distance to the prior.
     """
     rows = (10 * bound[:, None] + np.arange(10)).ravel()
     span = np.linalg.qr(belief.factor[rows].T)[0]
@@ -153,7 +166,9 @@ def _nearest(belief: Posterior, limits: _Limits, bound: NDArray[np.intp]) -> tup
 
 
 def _solve(local: Array, mean: Array, limits: _Limits, bound: NDArray[np.intp]) -> tuple[Array | None, str]:
-    """Return the smallest z for which mean + local z of the segments ``bound`` is inside the limits, and the solver's word."""
+    """Return the smallest z for which mean + local z of the segments ``bound`` is inside the limits, and the
+    solver's word.
+    """
     import cvxpy as cp
 
     z = cp.Variable(local.shape[1])
@@ -175,7 +190,8 @@ def _solve(local: Array, mean: Array, limits: _Limits, bound: NDArray[np.intp]) 
 def _free_axes(matrices: Array) -> Array:
     """Return the axes (r, 4) along which any of the pseudo-inertias ``matrices`` (16, k) has something.
 
-    Along the others a segment is as thin as the prior fixes it (a plate, a rod): there it has no room for a gap, and needs no limit.
+    Along the others a segment is as thin as the prior fixes it (a plate, a rod): there it has no room for a gap, and
+    needs no limit.
     """
     _, size, axes = np.linalg.svd(matrices.T.reshape(-1, 4))
-    return np.asarray(axes[size > NOTHING * size.max()])
+    return np.asarray(axes[size > _NOTHING * size.max()])

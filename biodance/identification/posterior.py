@@ -1,8 +1,9 @@
 """Maximum a posteriori: the table with its standard deviations, the data with their noise, and what follows from both.
 
-With phi = phi0 + S u, S S' = prior covariance and u standard normal, the whitened data R phi = r become A u = b with A = R S,
-b = r - R phi0. One QR of [A; 1] gives the posterior: nothing is inverted that may be singular (a pinned total mass, a parameter that the
-prior fixes), and no weight is tuned by hand - the tables' standard deviations and the noise of the data decide.
+With phi = phi0 + S u, S S' = prior covariance and u standard normal, the whitened data R phi = r become A u = b with A
+= R S, b = r - R phi0. One QR of [A; 1] gives the posterior: nothing is inverted that may be singular (a pinned total
+mass, a parameter that the prior fixes), and no weight is tuned by hand - the tables' standard deviations and the noise
+of the data decide.
 """
 
 from dataclasses import dataclass
@@ -18,8 +19,9 @@ from biodance.records import Array, Sip
 class Posterior:
     """Gaussian belief about the 10N SIP after the data.
 
-    ``mean`` (p,), ``factor`` (p, k) with ``covariance = factor @ factor.T``; ``prior`` as given; ``log_evidence`` of the data under
-    prior and noise (up to a constant of the data alone); ``chi2`` whitened misfit at the mean; ``frames`` used.
+    ``mean`` (p,), ``factor`` (p, k) with ``covariance = factor @ factor.T``; ``prior`` as given; ``log_evidence`` of
+    the data under prior and noise (up to a constant of the data alone); ``chi2`` whitened misfit at the mean;
+    ``frames`` used.
     """
 
     prior: Sip
@@ -41,7 +43,9 @@ class Posterior:
 
     @property
     def information(self) -> Array:
-        """(p,) share of each parameter that comes from the data: 1 - variance after / before; 0 for a parameter the prior fixes."""
+        """(p,) share of each parameter that comes from the data: 1 - variance after / before; 0 for a parameter the
+        prior fixes.
+        """
         before = np.diag(self.prior.covariance)
         after = np.sum(self.factor**2, axis=1)
         return np.where(before > 0, 1 - after / np.where(before > 0, before, 1.0), 0.0).clip(0.0, 1.0)

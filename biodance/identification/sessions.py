@@ -1,4 +1,6 @@
-"""Two sessions of one person: which quantities differ, and how sure that is (a limb after a cast, a prosthesis, weight lost)."""
+"""Two sessions of one person: which quantities differ, and how sure that is (a limb after a cast, a prosthesis,
+weight lost).
+"""
 
 from dataclasses import dataclass
 
@@ -17,8 +19,9 @@ from biodance.records import Array
 
 @dataclass(frozen=True)
 class Difference:
-    """``later`` minus ``earlier`` of one quantity of one segment: ``value`` with ``sd`` in ``unit``; ``p`` of a difference at least as
-    large if nothing had changed; ``known`` False where neither session's data say anything about it (both values are the table's).
+    """``later`` minus ``earlier`` of one quantity of one segment: ``value`` with ``sd`` in ``unit``; ``p`` of a
+    difference at least as large if nothing had changed; ``known`` False where neither session's data say anything about
+    it (both values are the table's).
     """
 
     segment: str
@@ -38,10 +41,11 @@ class Difference:
 def differences(earlier: Identification, later: Identification) -> tuple[Difference, ...]:
     """Return all differences, later minus earlier, each session with room for what it carries beyond the other.
 
-    The declared masses pin both totals, so a load that was not declared would be spread over the body. Every segment therefore gets room
-    D for a load, in proportion to the probability that one sits there (`added_mass`, in both directions: a load, a loss); values may
-    differ from those of the two tables of results. The two posteriors share the table P: what both still owe to it is common and
-    cancels. With the covariances C under the prior P + D and A = C (P + D)^-1, Var = C1 + C2 - A1 P A2' - A2 P A1'.
+    The declared masses pin both totals, so a load that was not declared would be spread over the body. Every segment
+    therefore gets room D for a load, in proportion to the probability that one sits there (`added_mass`, in both
+    directions: a load, a loss); values may differ from those of the two tables of results. The two posteriors share the
+    table P: what both still owe to it is common and cancels. With the covariances C under the prior P + D and A = C (P
+    + D)^-1, Var = C1 + C2 - A1 P A2' - A2 P A1'.
 
     Raises
     ------
@@ -51,7 +55,9 @@ def differences(earlier: Identification, later: Identification) -> tuple[Differe
         No possible body is near what one of the sessions says, with or without that room.
     """
     if earlier.sip.segments != later.sip.segments:
-        raise BiodanceError("The two sessions have different segments and cannot be compared. Use the same kind of body in both.")
+        raise BiodanceError(
+            "The two sessions have different segments and cannot be compared. Use the same kind of body in both."
+        )
     first, second = _with_room(earlier, later), _with_room(later, earlier)
     mutual = _owed(first) @ earlier.belief.prior.covariance @ _owed(second).T
     spread = first.covariance + second.covariance - mutual - mutual.T
@@ -92,7 +98,13 @@ def _possible(belief: Posterior, one: Identification) -> Array:
 def _with_room(one: Identification, other: Identification) -> Posterior:
     """Return the belief of session ``one`` with room for the loads that it carries beyond ``other``.
 
-    A load is positive: its probability counts as far as its mass is above zero, by degrees, so that rounding opens and closes no room.
+    A load is positive: its probability counts as far as its mass is above zero, by degrees, so that rounding opens and
+    closes no room.
     """
-    chance = {found.segment: found.probability * norm.cdf(found.mass / found.sd) for found in added_mass(one, reference=other).suspects}
-    return posterior(one.data, may_carry(one.body, one.belief.prior, share=np.array([chance[s] for s in one.body.segments])))
+    chance = {
+        found.segment: found.probability * norm.cdf(found.mass / found.sd)
+        for found in added_mass(one, reference=other).suspects
+    }
+    return posterior(
+        one.data, may_carry(one.body, one.belief.prior, share=np.array([chance[s] for s in one.body.segments]))
+    )

@@ -1,4 +1,6 @@
-"""Sufficient statistics of a session: all that any noise, prior or programme needs from the data, in constant memory."""
+"""Sufficient statistics of a session: all that any noise, prior or programme needs from the data, in constant
+memory.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -17,15 +19,18 @@ from biodance.uncertainty.bands import BANDS, Bands
 from biodance.uncertainty.learning import Moments
 from biodance.uncertainty.noise import Noise
 
-STILL, POSTURE_BANDS = 0.03, 2
-"""A run whose segments all stay within this RMS displacement (m) is standing: soft tissue and marker noise are as large as its sway, and
-regressors that are themselves wrong pull masses towards smaller sway. Its posture tells of CoM, so that only the slowest bands count."""
+_STILL, POSTURE_BANDS = 0.03, 2
+"""A run whose segments all stay within this RMS displacement (m) is standing: soft tissue and marker noise are as large
+as its sway, and regressors that are themselves wrong pull masses towards smaller sway. Its posture tells of CoM, so
+that only the slowest bands count.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """One trial to identify from: ``motion`` and ``wrench`` (about the lab origin) at the same times, ``use`` (T,) True where both hold;
-    ``outlier`` the share of body weight by which a frame may differ from the table's prediction (`Settings.outlier`).
+    """One trial to identify from: ``motion`` and ``wrench`` (about the lab origin) at the same times, ``use`` (T,) True
+    where both hold; ``outlier`` the share of body weight by which a frame may differ from the table's prediction
+    (`Settings.outlier`).
     """
 
     name: str
@@ -38,7 +43,8 @@ class Fit:
         frames = self.motion.time.size
         if self.wrench.time.size != frames or self.use.shape != (frames,):
             raise TrialRefused(
-                f"Trial {self.name}: motion has {frames} frames, wrench {self.wrench.time.size}, mask {self.use.size}; prepare it first."
+                f"Trial {self.name}: motion has {frames} frames, wrench {self.wrench.time.size}, mask "
+                f"{self.use.size}; prepare it first."
             )
         if np.isnan(self.wrench.value[self.use]).any():
             raise TrialRefused(f"Trial {self.name}: the wrench is NaN in a frame that is to be used; mask the frame.")
@@ -46,7 +52,8 @@ class Fit:
 
 @dataclass(frozen=True, eq=False)
 class Statistics:
-    """``gram`` (B, 6, p + 1, 6, p + 1) second moments of [W y] per band, wrench about ``layout.about``; ``count`` (B,) coefficients.
+    """``gram`` (B, 6, p + 1, 6, p + 1) second moments of [W y] per band, wrench about ``layout.about``; ``count`` (B,)
+    coefficients.
 
     ``layout`` carries bands, rate and point; its covariance is the identity (nothing is whitened yet).
     """
@@ -57,8 +64,12 @@ class Statistics:
 
     def __add__(self, other: "Statistics") -> "Statistics":
         """Return the statistics of both; they must have the same layout."""
-        if self.layout.bands.edges != other.layout.bands.edges or not np.array_equal(self.layout.about, other.layout.about):
-            raise BiodanceError("Statistics with different bands or points cannot be added; use one layout for all trials of a session.")
+        if self.layout.bands.edges != other.layout.bands.edges or not np.array_equal(
+            self.layout.about, other.layout.about
+        ):
+            raise BiodanceError(
+                "Statistics with different bands or points cannot be added; use one layout for all trials of a session."
+            )
         return Statistics(self.gram + other.gram, self.count + other.count, self.layout)
 
     def information(self, noise: Noise) -> Information:
@@ -71,7 +82,9 @@ class Statistics:
         return Information(np.asarray(np.linalg.qr(rows, mode="r")), int(self.count.sum()))
 
     def moments(self, phi: Array, covariance: Array) -> Moments:
-        """Return the summed squares of y - W phi per band, plus what the ``covariance`` (p, p) of phi adds (expectation step)."""
+        """Return the summed squares of y - W phi per band, plus what the ``covariance`` (p, p) of phi adds
+        (expectation step).
+        """
         z = np.append(-phi, 1.0)
         square = np.einsum("i,bcidj,j->bcd", z, self.gram, z, optimize=True)
         spread = np.einsum("bcidj,ij->bcd", self.gram[:, :, :-1, :, :-1], covariance, optimize=True)
@@ -90,7 +103,8 @@ def empty(parameters: int, layout: Noise) -> Statistics:
 
 
 def statistics(body: Body, fit: Fit, layout: Noise) -> Statistics:
-    """Return the statistics of one trial; memory does not grow with its length. Of standing only the posture counts (``STILL``).
+    """Return the statistics of one trial; memory does not grow with its length. Of standing only the posture counts
+    (``STILL``).
 
     Raises
     ------
@@ -98,7 +112,9 @@ def statistics(body: Body, fit: Fit, layout: Noise) -> Statistics:
         No frame of the trial may be used.
     """
     if not fit.use.any():
-        raise TrialRefused(f"Trial {fit.name}: no frame may be used (ground contact not measured, or markers hidden in all frames).")
+        raise TrialRefused(
+            f"Trial {fit.name}: no frame may be used (ground contact not measured, or markers hidden in all frames)."
+        )
     total = empty(10 * len(body.segments), layout)
     gram, count = total.gram.copy(), total.count.copy()
     size = gram.shape[2]
@@ -120,29 +136,32 @@ def statistics(body: Body, fit: Fit, layout: Noise) -> Statistics:
 def _is_standing(position: Array) -> bool:
     """Return whether all segments at ``position`` (T, N, 3) m stay where they are."""
     away = position - position.mean(axis=0)
-    return bool(np.sqrt(np.max(np.mean(np.sum(away**2, axis=-1), axis=0))) < STILL)
+    return bool(np.sqrt(np.max(np.mean(np.sum(away**2, axis=-1), axis=0))) < _STILL)
 
 
-LEVER = 0.5
+_LEVER = 0.5
 """m: the same limit for moments about the standing point."""
-AROUND = 0.5
+_AROUND = 0.5
 """s before and after such a frame that are masked too."""
 
 
 def believable(body: Body, fit: Fit, about: Array) -> tuple[Fit, str]:
-    """Return the trial without frames in which table and plates differ by more than ``fit.outlier``, and a sentence or ""."""
+    """Return the trial without frames in which table and plates differ by more than ``fit.outlier``, and a sentence
+    or "".
+    """
     limit = -fit.outlier * body.gravity[2] * body.sip.mass.sum()
     difference = fit.wrench.value - predict_wrench(body, fit.motion).value
     moment = difference[:, 3:] - np.cross(about, difference[:, :3])
-    size = np.maximum(np.linalg.norm(difference[:, :3], axis=1), np.linalg.norm(moment, axis=1) / LEVER)
+    size = np.maximum(np.linalg.norm(difference[:, :3], axis=1), np.linalg.norm(moment, axis=1) / _LEVER)
     wrong = fit.use & (size > limit)
     if not wrong.any():
         return fit, ""
-    wide = binary_dilation(wrong, iterations=max(1, round(AROUND * fit.motion.rate)))
+    wide = binary_dilation(wrong, iterations=max(1, round(_AROUND * fit.motion.rate)))
     left = fit.use & ~wide
     where = fit.motion.time[int(np.argmax(np.where(fit.use, size, -1.0)))]
     return replace(fit, use=left), (
         f"{fit.name}: {int((fit.use & ~left).sum())} of {int(fit.use.sum())} frames left out, the motion needs up to "
-        f"{size[fit.use].max():.0f} N more than the plates show (at {where:.2f} s, limit {limit:.0f} N): look for a posture that jumps or "
+        f"{size[fit.use].max():.0f} N more than the plates show (at {where:.2f} s, limit {limit:.0f} N): look for a "
+        f"posture that jumps or "
         "a contact beside the plates."
     )

@@ -1,8 +1,10 @@
-"""Identification while the subject still moves: frames go in as they come, what is known comes out, memory stays constant.
+"""Identification while the subject still moves: frames go in as they come, what is known comes out, memory stays
+constant.
 
-The statistics of a session are sums over blocks of frames (see `statistics`), so that a stream needs to keep the sums and the one block
-that is not full yet. At its end a stream holds the statistics of the batch, and `identification` gives the batch's result. In between,
-`progress` says which segments are known well enough, for the operator to ask for another posture or to end the session.
+The statistics of a session are sums over blocks of frames (see `statistics`), so that a stream needs to keep the sums
+and the one block that is not full yet. At its end a stream holds the statistics of the batch, and `identification`
+gives the batch's result. In between, `progress` says which segments are known well enough, for the operator to ask for
+another posture or to end the session.
 """
 
 from dataclasses import dataclass, replace
@@ -22,7 +24,7 @@ from biodance.records import Array, Motion, Wrench
 from biodance.uncertainty.bands import BLOCK_SAMPLES
 from biodance.uncertainty.caution import widened
 
-ENOUGH = ("mass", "com x", "com y", "com z")
+_ENOUGH = ("mass", "com x", "com y", "com z")
 """Quantities that must all be known before a segment is known well enough."""
 
 
@@ -49,7 +51,9 @@ class Stream:
 
     @property
     def statistics(self) -> Statistics:
-        """All frames so far, the running block included, about the mean centre of pressure: what the batch would have of them."""
+        """All frames so far, the running block included, about the mean centre of pressure: what the batch would
+        have of them.
+        """
         return about(_close(self).total, self.standing_point)
 
     @property
@@ -58,10 +62,11 @@ class Stream:
         return self.pressure[:3] / max(self.pressure[3], 1.0)
 
     def feed(self, motion: Motion, wrench: Wrench, use: NDArray[np.bool_]) -> "Stream":
-        """Return the stream after some more frames (one or many): ``motion`` and ``wrench`` (lab origin) at the same times, ``use`` (T,).
+        """Return the stream after some more frames (one or many): ``motion`` and ``wrench`` (lab origin) at the same
+        times, ``use`` (T,).
 
-        A time step unlike 1 / ``rate`` (another trial, lost frames) begins a new run. What the batch leaves out by itself
-        (`believable`) must be left out of ``use`` here, too.
+        A time step unlike 1 / ``rate`` (another trial, lost frames) begins a new run. What the batch leaves out by
+        itself (`believable`) must be left out of ``use`` here, too.
 
         Raises
         ------
@@ -92,18 +97,20 @@ class Stream:
         settled = _settle(self)
         found = settled.statistics
         if not found.count.any():
-            raise TrialRefused("No frame of this stream could be used yet: ground contact not measured, or markers hidden.")
+            raise TrialRefused(
+                "No frame of this stream could be used yet: ground contact not measured, or markers hidden."
+            )
         one = conclude(self.body, found, ("stream",), found=settled.disturbed)
         if one.status == "failed":
             return Progress((), (), one.cause)
-        open_ = {k.segment for k in one.known if k.quantity in ENOUGH and k.verdict != "known"}
+        open_ = {k.segment for k in one.known if k.quantity in _ENOUGH and k.verdict != "known"}
         return Progress(one.known, tuple(name for name in self.body.segments if name not in open_))
 
     def identification(self, fits: tuple[Fit, ...] = ()) -> Identification:
         """Return the identification from all frames so far: the batch's.
 
-        ``fits`` are the recorded trials, for the disturbances that twins and plates make over them (see `mismatch`); without them the
-        intervals count the noise alone, and the notes say so.
+        ``fits`` are the recorded trials, for the disturbances that twins and plates make over them (see `mismatch`);
+        without them the intervals count the noise alone, and the notes say so.
         """
         found = self.statistics
         noise, _ = learn_noise(found, may_carry(self.body, widened(self.body.sip)))
@@ -113,7 +120,8 @@ class Stream:
 
 @dataclass(frozen=True)
 class Progress:
-    """What a stream knows: every quantity with its interval, and the segments whose mass and centre of mass are known well enough.
+    """What a stream knows: every quantity with its interval, and the segments whose mass and centre of mass are known
+    well enough.
 
     Both are empty where the frames so far contradict every possible body: ``cause`` then says why and what to do.
     """
@@ -125,7 +133,7 @@ class Progress:
     @property
     def missing(self) -> tuple[tuple[str, str], ...]:
         """Segment and quantity of what is not known yet among mass and centre of mass, the least known first."""
-        open_ = [k for k in self.known if k.quantity in ENOUGH and k.verdict != "known"]
+        open_ = [k for k in self.known if k.quantity in _ENOUGH and k.verdict != "known"]
         return tuple((k.segment, k.quantity) for k in sorted(open_, key=lambda k: k.from_data))
 
 
@@ -144,7 +152,9 @@ def begin(body: Body, *, rate: float) -> Stream:
 
 
 def about(found: Statistics, point: Array) -> Statistics:
-    """Return the statistics with wrenches about another ``point`` (3,) m of the lab: an exact linear map of the channels."""
+    """Return the statistics with wrenches about another ``point`` (3,) m of the lab: an exact linear map of the
+    channels.
+    """
     layout = layout_for(point, found.layout.bands)
     move = layout.shift @ np.linalg.inv(found.layout.shift)
     return Statistics(np.einsum("ab,nbicj,dc->naidj", move, found.gram, move, optimize=True), found.count, layout)
@@ -184,12 +194,16 @@ def _marker_rms(motion: Motion) -> Array:
 
 
 def _pending_fit(stream: Stream) -> Fit:
-    """Return the pending frames as a trial, with a last frame that does not count, so that a block of one frame has a rate."""
+    """Return the pending frames as a trial, with a last frame that does not count, so that a block of one frame has
+    a rate.
+    """
     rows = np.concatenate([stream.pending, stream.pending[-1:]])
     nq, nv = stream.body.nq, stream.body.nv
     q, v, a, value, distance = np.split(rows[:, 1:], np.cumsum([nq, nv, nv, 6]), axis=1)
     time = rows[0, 0] + _stride(stream) / stream.rate * np.arange(len(rows))
-    return Fit("stream", Motion(time, q, v, a, distance, ("all",)), Wrench(time, value), np.arange(len(rows)) < len(rows) - 1)
+    return Fit(
+        "stream", Motion(time, q, v, a, distance, ("all",)), Wrench(time, value), np.arange(len(rows)) < len(rows) - 1
+    )
 
 
 def _close(stream: Stream) -> Stream:

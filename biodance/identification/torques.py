@@ -2,10 +2,12 @@
 
 The torque about a joint axis a through o is what the segments beyond it need less what the ground gives them,
 
-    torque = sum over segments beyond of  a . (M - o x F),      [F, M] = W_segment phi - ground wrench, about the lab origin,
+    torque = sum over segments beyond of  a . (M - o x F),      [F, M] = W_segment phi - ground wrench, about the lab
+    origin,
 
-linear in the parameters: torque = Y phi - c, hence the covariance Y C Y'. It holds at the tracked motion and the measured wrenches: errors
-of skin and plates in this very trial are not counted, those that went into the parameters are.
+linear in the parameters: torque = Y phi - c, hence the covariance Y C Y'. It holds at the tracked motion and the
+measured wrenches: errors of skin and plates in this very trial are not counted, those that went into the parameters
+are.
 """
 
 from collections.abc import Mapping
@@ -24,8 +26,9 @@ from biodance.records import Array, Motion, Wrench
 
 @dataclass(frozen=True, eq=False)
 class TorqueBands:
-    """Torques of the ``joints`` (n) of ``trial`` at ``time`` (T,) s: ``torque`` with ``sd`` and ``table`` (T, n) N·m along the positive
-    sense of each joint, with the identified and with the table's parameters; ``use`` (T,) True where the ground is fully measured.
+    """Torques of the ``joints`` (n) of ``trial`` at ``time`` (T,) s: ``torque`` with ``sd`` and ``table`` (T, n) N·m
+    along the positive sense of each joint, with the identified and with the table's parameters; ``use`` (T,) True where
+    the ground is fully measured.
     """
 
     trial: str
@@ -42,8 +45,11 @@ class TorqueBands:
         return SIGMAS * self.sd
 
 
-def torque_bands(found: Identification, motion: Motion, ground: Mapping[str, Wrench], *, trial: str, use: NDArray[np.bool_]) -> TorqueBands:
-    """Return the torques of ``motion`` under the ``ground`` wrenches (segment name -> wrench on it about the lab origin).
+def torque_bands(
+    found: Identification, motion: Motion, ground: Mapping[str, Wrench], *, trial: str, use: NDArray[np.bool_]
+) -> TorqueBands:
+    """Return the torques of ``motion`` under the ``ground`` wrenches (segment name -> wrench on it about the lab
+    origin).
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """Cross-validation: the table's and the identified body on trials, beside the measured wrench; how sure the gain is.
 
-Root mean squares alone cannot rank methods of identification (a wrong body can fit well), so the errors of the parameters and their
-intervals belong beside these numbers.
+Root mean squares alone cannot rank methods of identification (a wrong body can fit well), so the errors of the
+parameters and their intervals belong beside these numbers.
 """
 
 from dataclasses import dataclass
@@ -22,8 +22,8 @@ BLOCK_SECONDS = 1.0
 
 @dataclass(frozen=True, eq=False)
 class TrialValidation:
-    """One trial: ``measured``, ``table`` and ``identified`` wrenches about ``about`` (3,) m, the frames ``use`` (T,) compared, and how
-    well each agrees (paper Table II, Fig. 9).
+    """One trial: ``measured``, ``table`` and ``identified`` wrenches about ``about`` (3,) m, the frames ``use`` (T,)
+    compared, and how well each agrees (paper Table II, Fig. 9).
     """
 
     name: str
@@ -38,9 +38,11 @@ class TrialValidation:
 
 @dataclass(frozen=True, eq=False)
 class ResidualRatio:
-    """How much smaller the RMS residual of the second model is: ratio first / second of forces and of moments with 95 % intervals.
+    """How much smaller the RMS residual of the second model is: ratio first / second of forces and of moments with 95 %
+    intervals.
 
-    ``force``, ``moment`` the ratios; ``force_interval``, ``moment_interval`` (2,) from a block bootstrap; ``blocks`` drawn from.
+    ``force``, ``moment`` the ratios; ``force_interval``, ``moment_interval`` (2,) from a block bootstrap; ``blocks``
+    drawn from.
     """
 
     force: float
@@ -51,23 +53,32 @@ class ResidualRatio:
 
 
 def validate(body: Body, identified: Body, fit: Fit, *, about: Array) -> TrialValidation:
-    """Return how the table (``body.sip``) and the identified body predict the wrench of one trial, moments about ``about`` (3,) m lab.
+    """Return how the table (``body.sip``) and the identified body predict the wrench of one trial, moments about
+    ``about`` (3,) m lab.
 
-    ``about``: the middle of the plates, or `standing_point` of the session; moments about the distant lab origin hide the differences.
+    ``about``: the middle of the plates, or `standing_point` of the session; moments about the distant lab origin hide
+    the differences.
 
     Raises
     ------
     TrialRefused
         No frame of the trial may be compared.
     """
-    measured = moved(fit.wrench, about)
-    table, found = (moved(predict_wrench(one, fit.motion), about) for one in (body, identified))
+    measured = about_point(fit.wrench, about)
+    table, found = (about_point(predict_wrench(one, fit.motion), about) for one in (body, identified))
     return TrialValidation(
-        fit.name, about, measured, table, found, fit.use, compare(measured, table, fit.use), compare(measured, found, fit.use)
+        fit.name,
+        about,
+        measured,
+        table,
+        found,
+        fit.use,
+        compare(measured, table, fit.use),
+        compare(measured, found, fit.use),
     )
 
 
-def moved(wrench: Wrench, about: Array) -> Wrench:
+def about_point(wrench: Wrench, about: Array) -> Wrench:
     """Return the wrench with its moments about ``about`` (3,) m instead of the lab origin."""
     return Wrench(wrench.time, np.concatenate([wrench.force, wrench.moment - np.cross(about, wrench.force)], axis=1))
 
@@ -88,13 +99,18 @@ def residual_ratio(trials: tuple[TrialValidation, ...], *, draws: int = 1000, se
             first.append(_squares(trial.measured, trial.table, piece))
             second.append(_squares(trial.measured, trial.identified, piece))
     if len(first) < 3:
-        raise BiodanceError(f"The trials hold {len(first)} blocks of {BLOCK_SECONDS:g} s; an interval of the gain needs 3. Record longer.")
+        raise BiodanceError(
+            f"The trials hold {len(first)} blocks of {BLOCK_SECONDS:g} s; an interval of the gain needs 3. Record "
+            f"longer."
+        )
     a, b = np.array(first), np.array(second)
     drawn = np.random.default_rng(seed).integers(0, len(a), (draws, len(a)))
     ratio = np.sqrt(a[drawn].sum(axis=1) / b[drawn].sum(axis=1))
     low, high = np.percentile(ratio, [2.5, 97.5], axis=0)
     force, moment = np.sqrt(a.sum(axis=0) / b.sum(axis=0))
-    return ResidualRatio(float(force), float(moment), (float(low[0]), float(high[0])), (float(low[1]), float(high[1])), len(a))
+    return ResidualRatio(
+        float(force), float(moment), (float(low[0]), float(high[0])), (float(low[1]), float(high[1])), len(a)
+    )
 
 
 def _squares(measured: Wrench, simulated: Wrench, frames: NDArray[np.intp]) -> Array:

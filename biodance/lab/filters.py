@@ -1,9 +1,10 @@
 """The one low-pass filter of biodance: forwards and backwards, for forces and joint coordinates alike.
 
-Two passes give zero phase, double the order and square the gain. A filter designed for the stated cut-off would therefore damp by 6 dB
-there; the single pass is designed for a higher frequency, so that the two passes TOGETHER are 3 dB down (gain 1/sqrt(2)) at the stated
-cut-off. With the bilinear map the correction is exact: tan(pi f_design / rate) = tan(pi f_cutoff / rate) c, for a Butterworth filter with
-c = (sqrt(2) - 1)^(-1 / (2 order)), for a critically damped one (``order`` equal real poles) with c = (2^(1 / (2 order)) - 1)^(-1/2).
+Two passes give zero phase, double the order and square the gain. A filter designed for the stated cut-off would
+therefore damp by 6 dB there; the single pass is designed for a higher frequency, so that the two passes TOGETHER are 3
+dB down (gain 1/sqrt(2)) at the stated cut-off. With the bilinear map the correction is exact: tan(pi f_design / rate) =
+tan(pi f_cutoff / rate) c, for a Butterworth filter with c = (sqrt(2) - 1)^(-1 / (2 order)), for a critically damped one
+(``order`` equal real poles) with c = (2^(1 / (2 order)) - 1)^(-1/2).
 """
 
 from dataclasses import dataclass, replace
@@ -16,12 +17,14 @@ from biodance.errors import BiodanceError
 from biodance.records import Array
 from biodance.settings import FilterKind, FilterSettings, Settings
 
-NAMES: dict[FilterKind, str] = {"butterworth": "Butterworth", "critically_damped": "critically damped"}
+_NAMES: dict[FilterKind, str] = {"butterworth": "Butterworth", "critically_damped": "critically damped"}
 
 
 @dataclass(frozen=True)
 class LowPass:
-    """Low-pass of a ``kind``: ``order`` of one pass (both have twice that), ``cutoff`` Hz where both together are 3 dB down."""
+    """Low-pass of a ``kind``: ``order`` of one pass (both have twice that), ``cutoff`` Hz where both together are 3
+    dB down.
+    """
 
     order: int = FilterSettings.order
     cutoff: float = FilterSettings.cutoff
@@ -35,7 +38,7 @@ class LowPass:
 
     def __str__(self) -> str:
         down = f"3 dB down at {self.cutoff:g} Hz in both passes together"
-        return f"{NAMES[self.kind]} low-pass of order {self.order}, forwards and backwards, {down}"
+        return f"{_NAMES[self.kind]} low-pass of order {self.order}, forwards and backwards, {down}"
 
     def shortest(self, rate: float) -> int:
         """Return the shortest run of samples that is filtered: one period of the cut-off frequency."""
@@ -48,7 +51,9 @@ def motion_filter(settings: Settings) -> LowPass:
 
 
 def force_filter(settings: Settings) -> LowPass:
-    """Return the low-pass that an analyst chose for the forces: that of the joint coordinates, unless another cut-off was asked for."""
+    """Return the low-pass that an analyst chose for the forces: that of the joint coordinates, unless another
+    cut-off was asked for.
+    """
     chosen, same = settings.filter.force_cutoff, motion_filter(settings)
     return same if chosen == "same" else replace(same, cutoff=float(chosen))
 
@@ -65,7 +70,8 @@ def design_low_pass(settings: LowPass, rate: float) -> Array:
         raise BiodanceError(f"The sampling rate is {rate} Hz, which must be positive. Correct the rate in the file.")
     if settings.cutoff >= rate / 2:
         raise BiodanceError(
-            f"The cut-off {settings.cutoff:g} Hz is not below half the sampling rate ({rate:g} Hz). Choose a cut-off below {rate / 2:g} Hz."
+            f"The cut-off {settings.cutoff:g} Hz is not below half the sampling rate ({rate:g} Hz). Choose a cut-off "
+            f"below {rate / 2:g} Hz."
         )
     wanted = np.tan(np.pi * settings.cutoff / rate)
     if settings.kind == "critically_damped":
@@ -78,8 +84,9 @@ def design_low_pass(settings: LowPass, rate: float) -> Array:
 def low_pass(values: Array, rate: float, settings: LowPass) -> Array:
     """Return ``values`` (T, ...) low-passed along time without delay; NaN stay NaN.
 
-    ``rate`` in Hz. Every column is filtered from gap to gap, never across one; a run shorter than ``settings.shortest(rate)`` samples is
-    returned as it is (``left_raw`` tells which). The ends are continued by point reflection over one period of the cut-off.
+    ``rate`` in Hz. Every column is filtered from gap to gap, never across one; a run shorter than
+    ``settings.shortest(rate)`` samples is returned as it is (``left_raw`` tells which). The ends are continued by point
+    reflection over one period of the cut-off.
 
     Raises
     ------
@@ -91,7 +98,8 @@ def low_pass(values: Array, rate: float, settings: LowPass) -> Array:
     need = settings.shortest(rate)
     if values.shape[0] < need:
         raise BiodanceError(
-            f"{values.shape[0]} samples at {rate:g} Hz are too short for a low-pass at {settings.cutoff:g} Hz: at least {need} are needed. "
+            f"{values.shape[0]} samples at {rate:g} Hz are too short for a low-pass at {settings.cutoff:g} Hz: at "
+            f"least {need} are needed. "
             "Record longer or leave the signal as it is."
         )
     columns = values.reshape(values.shape[0], -1)
@@ -107,7 +115,9 @@ def low_pass(values: Array, rate: float, settings: LowPass) -> Array:
 
 
 def left_raw(values: Array, rate: float, settings: LowPass) -> NDArray[np.bool_]:
-    """Return where ``low_pass`` leaves a number as it is, because its run between two gaps is too short; shape of ``values``."""
+    """Return where ``low_pass`` leaves a number as it is, because its run between two gaps is too short; shape of
+    ``values``.
+    """
     columns = np.asarray(values, dtype=float).reshape(len(values), -1)
     out = np.zeros(columns.shape, dtype=bool)
     for column in np.flatnonzero(np.isnan(columns).any(axis=0)):

@@ -51,12 +51,13 @@ def inspect_paths(
 def inspect_file(path: str | Path, *, markers: MarkerSet | None = None) -> dict[str, Any]:
     """Return what is in one recording; a file that cannot be read gives the status "refused" and the reason.
 
-    Keys: ``file``; ``status`` "ok", "warning" or "refused"; ``reason`` (None if ok); ``format``; ``frames``, ``rate_hz``,
-    ``analog_rate_hz``; ``markers`` names; ``marker_set``; ``gaps_percent`` of the set's markers that were seen at all (of all markers,
-    without a set); ``subjects`` names in the file; ``plates`` with ``type``, ``corners_m``, ``mean_force_n`` (3), ``mean_vertical_n``,
-    ``zero_n`` (3, what the empty plate read and was taken off), ``cop_m`` (2, mean while loaded, lab frame) and ``decisions``;
-    ``mean_vertical_n`` of all plates together as the file stores it, before their zeros are taken off; ``mass_on_plates_kg`` in
-    quiet standing; ``declared_mass_kg``, ``declared_height_m``; ``history``; ``warnings``. What is not there is None; no number is NaN.
+    Keys: ``file``; ``status`` "ok", "warning" or "refused"; ``reason`` (None if ok); ``format``; ``frames``,
+    ``rate_hz``, ``analog_rate_hz``; ``markers`` names; ``marker_set``; ``gaps_percent`` of the set's markers that were
+    seen at all (of all markers, without a set); ``subjects`` names in the file; ``plates`` with ``type``,
+    ``corners_m``, ``mean_force_n`` (3), ``mean_vertical_n``, ``zero_n`` (3, what the empty plate read and was taken
+    off), ``cop_m`` (2, mean while loaded, lab frame) and ``decisions``; ``mean_vertical_n`` of all plates together as
+    the file stores it, before their zeros are taken off; ``mass_on_plates_kg`` in quiet standing; ``declared_mass_kg``,
+    ``declared_height_m``; ``history``; ``warnings``. What is not there is None; no number is NaN.
     """
     path = Path(path)
     try:
@@ -65,8 +66,16 @@ def inspect_file(path: str | Path, *, markers: MarkerSet | None = None) -> dict[
         return _refused(path, str(error))
     warnings = [*trial.warnings, *_never_seen(trial)]
     plates = [_plate(plate) for plate in trial.plates]
-    time = trial.markers.time if trial.markers is not None else trial.plates[0].wrench.time if trial.plates else np.empty(0)
-    vertical = [plate["mean_vertical_n"] + plate["zero_n"][2] for plate in plates]  # as the plates read, their zero still in it
+    time = (
+        trial.markers.time
+        if trial.markers is not None
+        else trial.plates[0].wrench.time
+        if trial.plates
+        else np.empty(0)
+    )
+    vertical = [
+        plate["mean_vertical_n"] + plate["zero_n"][2] for plate in plates
+    ]  # as the plates read, their zero still in it
     return {
         "file": str(path),
         "status": "warning" if warnings else "ok",

@@ -1,4 +1,6 @@
-"""Read text as laboratories write it: UTF-8 with or without a mark, UTF-16, or the Windows code page, with any line ends."""
+"""Read text as laboratories write it: UTF-8 with or without a mark, UTF-16, or the Windows code page, with any line
+ends.
+"""
 
 import codecs
 import hashlib
@@ -22,7 +24,9 @@ def read_bytes(path: Path) -> bytes:
     try:
         content = path.read_bytes()
     except OSError as error:
-        raise FileRefused(f"{path}: cannot be opened ({error.strerror or error}). Check the path and the rights.") from error
+        raise FileRefused(
+            f"{path}: cannot be opened ({error.strerror or error}). Check the path and the rights."
+        ) from error
     if not content:
         raise FileRefused(f"{path}: is empty (0 bytes). Export the recording again.")
     return content
@@ -31,7 +35,9 @@ def read_bytes(path: Path) -> bytes:
 def refuse_special(path: Path) -> None:
     """Raise FileRefused for a pipe, socket or device, on which reading could wait for ever."""
     if path.exists() and not path.is_file() and not path.is_dir():
-        raise FileRefused(f"{path}: is a pipe, socket or device, an ordinary file is expected. Copy the recording into a file.")
+        raise FileRefused(
+            f"{path}: is a pipe, socket or device, an ordinary file is expected. Copy the recording into a file."
+        )
 
 
 def sha256(content: bytes) -> str:
@@ -40,7 +46,8 @@ def sha256(content: bytes) -> str:
 
 
 def decode(content: bytes, path: Path) -> str:
-    """Return the text of ``content``: UTF-16 by its mark, else UTF-8, else Windows-1252 (every byte of it has a meaning, so it comes last).
+    """Return the text of ``content``: UTF-16 by its mark, else UTF-8, else Windows-1252 (every byte of it has a
+    meaning, so it comes last).
 
     All line ends become the Unix one.
 
@@ -52,7 +59,9 @@ def decode(content: bytes, path: Path) -> str:
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         text = content.decode("utf-16", errors="replace")
     elif TEXT_LOOKS_BINARY in content[:4096]:
-        raise FileRefused(f"{path}: holds binary data where text is expected. Check what the file is; its extension does not fit.")
+        raise FileRefused(
+            f"{path}: holds binary data where text is expected. Check what the file is; its extension does not fit."
+        )
     else:
         try:
             text = content.decode("utf-8-sig")
@@ -67,7 +76,9 @@ def read_text(path: Path) -> str:
 
 
 def cells(line: str) -> list[str]:
-    """Return the cells of one row: between tabs where there are tabs (a cell may be empty), else between runs of blanks."""
+    """Return the cells of one row: between tabs where there are tabs (a cell may be empty), else between runs of
+    blanks.
+    """
     return [cell.strip() for cell in line.rstrip("\r\n").split("\t")] if "\t" in line else line.split()
 
 

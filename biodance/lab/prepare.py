@@ -1,6 +1,8 @@
-"""Make a trial ready for the model: the set's markers with their gaps dealt with, and every plate filtered and sampled at marker times.
+"""Make a trial ready for the model: the set's markers with their gaps dealt with, and every plate filtered and sampled
+at marker times.
 
-The markers are NOT low-passed: the joint coordinates are, later and with the same filter, so that motion and forces pass it exactly once.
+The markers are NOT low-passed: the joint coordinates are, later and with the same filter, so that motion and forces
+pass it exactly once.
 """
 
 from dataclasses import replace
@@ -19,11 +21,12 @@ PREPARED = "Prepared for the model."
 
 
 def prepare(trial: Trial) -> Trial:
-    """Return the trial with only its set's markers, gaps filled where that is safe, and the plates' wrenches at marker times.
+    """Return the trial with only its set's markers, gaps filled where that is safe, and the plates' wrenches at marker
+    times.
 
-    ``trial.settings`` say how forces are filtered and up to which length gaps are bridged by a spline. Without markers the plates keep
-    their own times; markers outside the plates' time are cut off. Every step is a sentence in ``history``. A trial that was prepared
-    already is returned as it is.
+    ``trial.settings`` say how forces are filtered and up to which length gaps are bridged by a spline. Without markers
+    the plates keep their own times; markers outside the plates' time are cut off. Every step is a sentence in
+    ``history``. A trial that was prepared already is returned as it is.
 
     Raises
     ------
@@ -50,11 +53,15 @@ def prepare(trial: Trial) -> Trial:
         raise TrialRefused(f"Trial {trial.name}: {error}") from error
     done = {plate.decisions[-1]: [p.name for p in plates if p.decisions[-1] == plate.decisions[-1]] for plate in plates}
     history += [f"{', '.join(same)}: {how}" for how, same in done.items()]
-    return replace(trial, markers=markers, plates=plates, history=(*trial.history, *history), warnings=(*trial.warnings, *warnings))
+    return replace(
+        trial, markers=markers, plates=plates, history=(*trial.history, *history), warnings=(*trial.warnings, *warnings)
+    )
 
 
 def _common_time(markers: Markers, trial: Trial) -> tuple[Markers, list[str]]:
-    """Return the markers within the time that all plates recorded (one analog sample of tolerance), and what was cut off."""
+    """Return the markers within the time that all plates recorded (one analog sample of tolerance), and what was cut
+    off.
+    """
     times = [plate.wrench.time for plate in trial.plates if plate.wrench.time.size]
     if not times:
         return markers, []
@@ -65,11 +72,15 @@ def _common_time(markers: Markers, trial: Trial) -> tuple[Markers, list[str]]:
         return markers, []
     if not inside.any():
         raise TrialRefused(
-            f"Trial {trial.name}: the markers ({markers.time[0]:g} to {markers.time[-1]:g} s) and the plates ({first:g} to {last:g} s) "
+            f"Trial {trial.name}: the markers ({markers.time[0]:g} to {markers.time[-1]:g} s) and the plates "
+            f"({first:g} to {last:g} s) "
             "share no time. Synchronise the files."
         )
     kept = Markers(markers.names, markers.time[inside], markers.xyz[inside])
-    return kept, [f"{int((~inside).sum())} of {inside.size} frames were cut off: the plates recorded only {first:.3f} to {last:.3f} s."]
+    return kept, [
+        f"{int((~inside).sum())} of {inside.size} frames were cut off: the plates recorded only {first:.3f} to "
+        f"{last:.3f} s."
+    ]
 
 
 def _fill(markers: Markers, set_name: str, rules: GapSettings) -> tuple[Markers, list[str], list[str]]:
@@ -118,7 +129,9 @@ def _plate(plate: Plate, markers: Markers | None, low_pass: LowPass) -> Plate:
 
 
 def _sample(wrench: Wrench, time: Array) -> tuple[Array, str]:
-    """Return the wrench (T, 6) at marker times: exact where samples lie there, otherwise by a cubic spline (NaN beside unknown samples)."""
+    """Return the wrench (T, 6) at marker times: exact where samples lie there, otherwise by a cubic spline (NaN
+    beside unknown samples).
+    """
     after = np.clip(np.searchsorted(wrench.time, time), 0, wrench.time.size - 1)
     before = np.maximum(after - 1, 0)
     nearest = np.where(time - wrench.time[before] < wrench.time[after] - time, before, after)

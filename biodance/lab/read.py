@@ -1,4 +1,6 @@
-"""One door for every recording: look at its head, then at the extension, and hand the file to the reader of its format."""
+"""One door for every recording: look at its head, then at the extension, and hand the file to the reader of its
+format.
+"""
 
 import re
 from pathlib import Path
@@ -11,7 +13,7 @@ from biodance.lab.readers import Reader, extensions, head_text, readers
 from biodance.records import Role, Trial
 
 SUBJECT_DATA = {".mp": "Vicon measurements", ".vsk": "Vicon skeleton", ".enf": "Vicon Eclipse notes"}
-HEAD = 8192
+_HEAD = 8192
 """Bytes of a file that are looked at to find its reader."""
 
 
@@ -21,13 +23,14 @@ def format_of(path: str | Path, *, chosen: Chosen[Reader] = None) -> str:
 
 
 def reader_of(path: str | Path, *, chosen: Chosen[Reader] = None) -> Reader:
-    """Return the reader of a file: the one that knows its head (`sniffed`); where none does, the one that has its extension.
+    """Return the reader of a file: the one that knows its head (`sniffed`); where none does, the one that has its
+    extension.
 
     Raises
     ------
     FileRefused
-        The file is missing, empty, no ordinary file, subject data instead of a recording, or of no known format; the message lists the
-        legal formats.
+        The file is missing, empty, no ordinary file, subject data instead of a recording, or of no known format; the
+        message lists the legal formats.
     """
     path = Path(path)
     head = read_head(path)
@@ -38,7 +41,8 @@ def reader_of(path: str | Path, *, chosen: Chosen[Reader] = None) -> Reader:
     data = _subject_data(head)
     if data or extension in SUBJECT_DATA:
         raise FileRefused(
-            f"{path}: holds {SUBJECT_DATA[data or extension]}, not a recording. Give the folder, then it is read with the trials."
+            f"{path}: holds {SUBJECT_DATA[data or extension]}, not a recording. Give the folder, then it is read with "
+            f"the trials."
         )
     if extension in legal:
         return legal[extension]
@@ -58,9 +62,11 @@ def read_head(path: Path) -> bytes:
     refuse_special(path)
     try:
         with open(path, "rb") as stream:
-            head = stream.read(HEAD)
+            head = stream.read(_HEAD)
     except OSError as error:
-        raise FileRefused(f"{path}: cannot be opened ({error.strerror or error}). Check the path and the rights.") from error
+        raise FileRefused(
+            f"{path}: cannot be opened ({error.strerror or error}). Check the path and the rights."
+        ) from error
     if not head:
         raise FileRefused(f"{path}: is empty (0 bytes). Export the recording again.")
     return head
@@ -82,7 +88,8 @@ def read_trial(
 ) -> Trial:
     """Read the trial in a file of any format.
 
-    The forces of a .trc file are looked for beside it, in a .mot or .sto file of the same stem (or stem_grf, stem_forces).
+    The forces of a .trc file are looked for beside it, in a .mot or .sto file of the same stem (or stem_grf,
+    stem_forces).
 
     Parameters
     ----------
@@ -125,7 +132,8 @@ def read_trial(
         raise
     except Exception as error:
         raise FileRefused(
-            f"{path}: a reader failed on it ({type(error).__name__}: {error}). Please report this file; others are not affected."
+            f"{path}: a reader failed on it ({type(error).__name__}: {error}). Please report this file; others are "
+            f"not affected."
         ) from error
 
 

@@ -18,8 +18,9 @@ CLEARLY_TALLER = 1.3
 def body_is_tall_along_z(xyz: Array) -> bool:
     """Return True if the marker cloud (T, K, 3) is clearly taller along the third axis than along the second.
 
-    The extent is taken frame by frame and its median over time is compared, so that walking does not count as height; arms that are
-    spread sideways stay below 1.3 times the stature. A single marker has no extent: the answer is then False.
+    The extent is taken frame by frame and its median over time is compared, so that walking does not count as height;
+    arms that are spread sideways stay below 1.3 times the stature. A single marker has no extent: the answer is then
+    False.
     """
     seen = xyz[:, np.logical_not(np.isnan(xyz).all(axis=(0, 2)))]
     if seen.shape[1] < 2:
@@ -33,16 +34,18 @@ def body_is_tall_along_z(xyz: Array) -> bool:
 
 UPPER = ("head_front", "head_back", "c7", "jugular_notch", "mid_psis", "right_asis", "left_asis")
 LOWER = ("right_heel", "left_heel", "right_toe", "left_toe", "right_ankle_lateral", "left_ankle_lateral")
-AXES = "XYZ"
-CLEAR = 2.0
+_AXES = "XYZ"
+_CLEAR = 2.0
 """A direction counts if its largest component is so many times the others."""
 
 
 def turn_to_z_up(raw: RawC3d, markers: Markers | None) -> tuple[Array, tuple[str, ...], tuple[str, ...]]:
-    """Return the rotation lab_R_file (3, 3) that makes z point up, history and warnings; the identity if it does already.
+    """Return the rotation lab_R_file (3, 3) that makes z point up, history and warnings; the identity if it does
+    already.
 
-    ``markers`` are still in file axes. The floor of the plates decides the axis, the side on which the markers are its sign; without plates
-    the upright person overrules Y_SCREEN, unless Y_SCREEN says +Z (the person may lie down). x stays where it is not the vertical itself.
+    ``markers`` are still in file axes. The floor of the plates decides the axis, the side on which the markers are its
+    sign; without plates the upright person overrules Y_SCREEN, unless Y_SCREEN says +Z (the person may lie down). x
+    stays where it is not the vertical itself.
     """
     declared = _declared(raw, markers)
     floor, body = _floor(raw, markers), _body(markers)
@@ -64,7 +67,8 @@ def turn_to_z_up(raw: RawC3d, markers: Markers | None) -> tuple[Array, tuple[str
     for who, direction in witnesses.items():
         if direction is not None and not np.array_equal(direction, chosen):
             line = (
-                f"Up is {_name(chosen)} by {by}, but {_name(direction)} by {who}; the former was taken. Look at the person in the report."
+                f"Up is {_name(chosen)} by {by}, but {_name(direction)} by {who}; the former was taken. Look at "
+                f"the person in the report."
             )
             (history if who == "POINT:Y_SCREEN" else warnings).append(line)
     turn = _turn(chosen)
@@ -75,7 +79,7 @@ def turn_to_z_up(raw: RawC3d, markers: Markers | None) -> tuple[Array, tuple[str
 
 def _name(axis: Array) -> str:
     i = int(np.argmax(np.abs(axis)))
-    return ("+" if axis[i] > 0 else "-") + AXES[i]
+    return ("+" if axis[i] > 0 else "-") + _AXES[i]
 
 
 def _turn(up: Array) -> Array:
@@ -92,13 +96,15 @@ def _declared(raw: RawC3d, markers: Markers | None) -> Array | None:
     text = next(iter(texts(raw.parameters, "POINT", "Y_SCREEN")), "").upper().replace(" ", "")
     if not re.fullmatch(r"[+-]?[XYZ]", text):
         return None
-    i = AXES.index(text[-1])
+    i = _AXES.index(text[-1])
     below = markers is not None and bool(markers.seen.any()) and float(np.nanmedian(markers.xyz[..., i])) < 0
     return np.eye(3)[i] * (-1.0 if below else 1.0)
 
 
 def _floor(raw: RawC3d, markers: Markers | None) -> Array | None:
-    """Return the normal of the plates on the side of the markers; None without plates that lie in a coordinate plane."""
+    """Return the normal of the plates on the side of the markers; None without plates that lie in a coordinate
+    plane.
+    """
     corners = parameter_numbers(raw.parameters, "FORCE_PLATFORM", "CORNERS")
     count = int(corners.size // 12)
     if not count or not np.isfinite(corners).all():
@@ -114,7 +120,9 @@ def _floor(raw: RawC3d, markers: Markers | None) -> Array | None:
 
 
 def _body(markers: Markers | None) -> Array | None:
-    """Return the axis from the feet to the head or pelvis in most frames; None if the labels or the posture do not tell it."""
+    """Return the axis from the feet to the head or pelvis in most frames; None if the labels or the posture do not
+    tell it.
+    """
     found = recognise(markers.names) if markers is not None else None
     if markers is None or found is None:
         return None
@@ -128,9 +136,11 @@ def _body(markers: Markers | None) -> Array | None:
 
 
 def _axis(direction: Array) -> Array | None:
-    """Return the signed coordinate axis that a direction (3,) clearly follows; None if none or the direction is not finite."""
+    """Return the signed coordinate axis that a direction (3,) clearly follows; None if none or the direction is not
+    finite.
+    """
     size = np.sort(np.abs(direction))
-    if not np.isfinite(size).all() or size[2] <= CLEAR * size[1]:
+    if not np.isfinite(size).all() or size[2] <= _CLEAR * size[1]:
         return None
     i = int(np.argmax(np.abs(direction)))
     return np.eye(3)[i] * np.sign(direction[i])

@@ -1,7 +1,8 @@
 """What Vicon Nexus knows beside the recording: measurements (.mp), skeleton (.vsk), Eclipse notes on a trial (.enf).
 
-Lengths come in millimetres and masses in kilograms; here they leave in metres and kilograms, under the names of the C3D PROCESSING
-group (``Bodymass``, ``Height``, ``LLegLength`` ...). Angles are left out: they are results of the static trial, not measures of the person.
+Lengths come in millimetres and masses in kilograms; here they leave in metres and kilograms, under the names of the C3D
+PROCESSING group (``Bodymass``, ``Height``, ``LLegLength`` ...). Angles are left out: they are results of the static
+trial, not measures of the person.
 """
 
 import re
@@ -34,14 +35,18 @@ def read_mp(path: str | Path) -> dict[str, float]:
     path = Path(path)
     rows = re.findall(r"^\s*\$(\w+)\s*=\s*([-+]?[\d.,]+(?:[eE][-+]?\d+)?)\s*$", read_text(path), flags=re.MULTILINE)
     if not rows:
-        raise FileRefused(f"{path}: holds no row such as '$Bodymass = 66.2'. Save the subject's measurements again in Nexus.")
+        raise FileRefused(
+            f"{path}: holds no row such as '$Bodymass = 66.2'. Save the subject's measurements again in Nexus."
+        )
     return _in_si({name: parse_number(value.replace(",", "."), f"{path}, {name}") for name, value in rows})
 
 
 def read_vsk(path: str | Path) -> dict[str, float]:
-    """Return the measurements that were typed into a .vsk skeleton (its static parameters with a value): by name, in m and kg.
+    """Return the measurements that were typed into a .vsk skeleton (its static parameters with a value): by name, in m
+    and kg.
 
-    ``LeftLegLength`` is called ``LLegLength`` here, as in .mp and C3D files. Values that Nexus computes (read-only) are left out.
+    ``LeftLegLength`` is called ``LLegLength`` here, as in .mp and C3D files. Values that Nexus computes (read-only) are
+    left out.
 
     Raises
     ------
@@ -57,7 +62,10 @@ def read_vsk(path: str | Path) -> dict[str, float]:
     except ElementTree.ParseError as error:
         raise FileRefused(f"{path}: is not valid XML ({error}). Export the skeleton again from Nexus.") from error
     if root.tag != "KinematicModel":
-        raise FileRefused(f"{path}: its root is <{root.tag}>, a Vicon skeleton begins with <KinematicModel>. Export it again from Nexus.")
+        raise FileRefused(
+            f"{path}: its root is <{root.tag}>, a Vicon skeleton begins with <KinematicModel>. Export it again from "
+            f"Nexus."
+        )
     typed: dict[str, float] = {}
     for parameter in root.iter("StaticParameter"):
         name, value = parameter.get("NAME", ""), parameter.get("VALUE", "")
@@ -71,8 +79,9 @@ def read_vsk(path: str | Path) -> dict[str, float]:
 class EclipseNotes:
     """What the operator noted on a trial in Vicon Eclipse.
 
-    ``trial`` name without ending; ``type`` such as "Static" or "Dynamic" ("" = not said); ``description`` the condition; ``notes`` free
-    text; ``plates`` what the operator found of each plate, ``FP1`` -> "Auto", "Left", "Right" or "Invalid"; ``fields`` everything else.
+    ``trial`` name without ending; ``type`` such as "Static" or "Dynamic" ("" = not said); ``description`` the
+    condition; ``notes`` free text; ``plates`` what the operator found of each plate, ``FP1`` -> "Auto", "Left", "Right"
+    or "Invalid"; ``fields`` everything else.
     """
 
     trial: str
@@ -84,9 +93,11 @@ class EclipseNotes:
 
 
 def read_enf(path: str | Path) -> EclipseNotes:
-    """Return the notes of one ``<trial>.Trial.enf`` (or ``<trial>.Trial12.enf``) file; a file without any entry gives empty notes.
+    """Return the notes of one ``<trial>.Trial.enf`` (or ``<trial>.Trial12.enf``) file; a file without any entry gives
+    empty notes.
 
-    The rows are taken as they come (a note may hold any character), the encoding is found by itself, keys count without case.
+    The rows are taken as they come (a note may hold any character), the encoding is found by itself, keys count without
+    case.
 
     Raises
     ------
@@ -121,7 +132,9 @@ def read_enf(path: str | Path) -> EclipseNotes:
 
 
 def _in_si(values: dict[str, float]) -> dict[str, float]:
-    """Return the lengths in m and the masses in kg under the names of the PROCESSING group, without angles, flags and zeros."""
+    """Return the lengths in m and the masses in kg under the names of the PROCESSING group, without angles, flags
+    and zeros.
+    """
     measures: dict[str, float] = {}
     for name, value in values.items():
         short = SIDES.sub(lambda side: side[1][0], name)

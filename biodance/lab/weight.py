@@ -1,4 +1,6 @@
-"""Does somebody stand still in a trial, and which mass do the plates carry then? Needed before anything is known about the person."""
+"""Does somebody stand still in a trial, and which mass do the plates carry then? Needed before anything is known
+about the person.
+"""
 
 import numpy as np
 
@@ -6,14 +8,15 @@ from biodance.errors import TrialRefused
 from biodance.records import Array, Markers, Trial, Wrench
 from biodance.settings import STANDARD_GRAVITY, StandingRules
 
-BLOCK = 0.05  # s, the force is averaged over blocks of this length before it is judged
+_BLOCK = 0.05  # s, the force is averaged over blocks of this length before it is judged
 
 
 def movement(markers: Markers) -> float:
-    """Return how far the typical marker travels in the trial, m: the median over markers of the diagonal of the box it stays in.
+    """Return how far the typical marker travels in the trial, m: the median over markers of the diagonal of the box it
+    stays in.
 
-    The box is taken between the 2nd and 98th percentile of each coordinate, so that a flickering marker does not count as movement.
-    NaN if no marker was ever seen.
+    The box is taken between the 2nd and 98th percentile of each coordinate, so that a flickering marker does not count
+    as movement. NaN if no marker was ever seen.
     """
     seen = markers.seen.any(axis=0)
     if not seen.any():
@@ -28,9 +31,11 @@ def is_still(trial: Trial) -> bool:
 
 
 def standing_mass(trial: Trial) -> float | None:
-    """Return the mass in kg that the plates carry in the longest quiet part (as ``trial.settings.standing`` has it); None without one.
+    """Return the mass in kg that the plates carry in the longest quiet part (as ``trial.settings.standing`` has it);
+    None without one.
 
-    Only for trials in which the markers are still or that have no markers: a walker may have one foot beside the plates.
+    Only for trials in which the markers are still or that have no markers: a walker may have one foot beside the
+    plates.
     """
     if not trial.plates or (trial.markers is not None and not is_still(trial)):
         return None
@@ -40,21 +45,27 @@ def standing_mass(trial: Trial) -> float | None:
         return None
 
 
-def steady_mass(wrench: Wrench, *, rules: StandingRules | None = None, gravity: float = STANDARD_GRAVITY) -> float | None:
-    """Return the mass in kg that a wrench carries in its longest quiet part, by default within 3 % for 0.4 s; None without one."""
+def steady_mass(
+    wrench: Wrench, *, rules: StandingRules | None = None, gravity: float = STANDARD_GRAVITY
+) -> float | None:
+    """Return the mass in kg that a wrench carries in its longest quiet part, by default within 3 % for 0.4 s; None
+    without one.
+    """
     quiet = _longest_steady(_blocks(wrench.force[:, 2], wrench.rate), rules or StandingRules())
     return float(quiet.mean() / gravity) if quiet is not None else None
 
 
 def _blocks(vertical: Array, rate: float) -> Array:
     """Return the vertical force averaged over blocks of 0.05 s."""
-    size = max(1, round(BLOCK * rate)) if np.isfinite(rate) else 1
+    size = max(1, round(_BLOCK * rate)) if np.isfinite(rate) else 1
     count = vertical.size // size
     return vertical[: count * size].reshape(count, size).mean(axis=1)
 
 
 def _longest_steady(blocks: Array, rules: StandingRules) -> Array | None:
-    """Return the longest run of blocks that stay within the sway of their median; None if it is too short or carries nobody."""
+    """Return the longest run of blocks that stay within the sway of their median; None if it is too short or carries
+    nobody.
+    """
     middle = float(np.median(blocks)) if blocks.size else 0.0
     if not middle >= rules.force:
         return None
@@ -64,4 +75,4 @@ def _longest_steady(blocks: Array, rules: StandingRules) -> Array | None:
         return None
     longest = int(np.argmax(ends - starts))
     run = blocks[starts[longest] : ends[longest]]
-    return run if run.size * BLOCK >= rules.shortest - 1e-9 else None
+    return run if run.size * _BLOCK >= rules.shortest - 1e-9 else None

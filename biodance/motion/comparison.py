@@ -16,8 +16,8 @@ LEAST_FRAMES = 3
 class Agreement:
     """How two wrenches agree over ``frames`` frames.
 
-    ``rms`` (6,) N, N·m, root mean square of the difference per channel Fx Fy Fz Mx My Mz; ``correlation`` (6) Pearson's, None where it is
-    not defined; ``notes`` say why not.
+    ``rms`` (6,) N, N·m, root mean square of the difference per channel Fx Fy Fz Mx My Mz; ``correlation`` (6)
+    Pearson's, None where it is not defined; ``notes`` say why not.
     """
 
     frames: int
@@ -40,7 +40,8 @@ def compare(measured: Wrench, simulated: Wrench, mask: NDArray[np.bool_] | None 
     """
     if measured.time.shape != simulated.time.shape or not np.allclose(measured.time, simulated.time, rtol=0, atol=1e-6):
         raise BiodanceError(
-            f"The wrenches have different times ({measured.time.size} and {simulated.time.size} frames). Prepare the trial first."
+            f"The wrenches have different times ({measured.time.size} and {simulated.time.size} frames). Prepare the "
+            f"trial first."
         )
     chosen = np.ones(measured.time.size, dtype=bool) if mask is None else np.asarray(mask, dtype=bool)
     if chosen.shape != measured.time.shape:
@@ -48,7 +49,10 @@ def compare(measured: Wrench, simulated: Wrench, mask: NDArray[np.bool_] | None 
     known = np.isfinite(measured.value).all(axis=1) & np.isfinite(simulated.value).all(axis=1)
     used = chosen & known
     if not used.any():
-        raise TrialRefused(f"No frame is left to compare: {chosen.sum()} of {chosen.size} may be used, and none of them is known in both.")
+        raise TrialRefused(
+            f"No frame is left to compare: {chosen.sum()} of {chosen.size} may be used, and none of them is known in "
+            f"both."
+        )
     first, second = measured.value[used], simulated.value[used]
     rms = np.sqrt(np.mean((first - second) ** 2, axis=0))
     correlation = tuple(_pearson(a, b) for a, b in zip(first.T, second.T, strict=True))
@@ -61,7 +65,9 @@ def compare(measured: Wrench, simulated: Wrench, mask: NDArray[np.bool_] | None 
 
 
 def _pearson(first: Array, second: Array) -> float | None:
-    """Return Pearson's correlation of two signals (T,); None where one of them does not vary or there are too few samples."""
+    """Return Pearson's correlation of two signals (T,); None where one of them does not vary or there are too few
+    samples.
+    """
     if first.size < LEAST_FRAMES:
         return None
     a, b = first - first.mean(), second - second.mean()

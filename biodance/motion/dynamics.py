@@ -1,11 +1,13 @@
-"""What the joints do: torques from motion and ground wrenches, and the share of each foot where only the sum was measured.
+"""What the joints do: torques from motion and ground wrenches, and the share of each foot where only the sum was
+measured.
 
-Equation of motion of a tree with a free root (M, h: inertia matrix and bias; f_k: wrench of the ground on segment k, J_k its Jacobian):
+Equation of motion of a tree with a free root (M, h: inertia matrix and bias; f_k: wrench of the ground on segment k,
+J_k its Jacobian):
 
     M(q) a + h(q, v) = [0; torque] + sum_k J_k' f_k
 
-so that the torques are the lower rows of ``rnea - sum_k J_k' f_k``. The upper six are the residual: the wrench that motion and
-parameters need but that was not measured.
+so that the torques are the lower rows of ``rnea - sum_k J_k' f_k``. The upper six are the residual: the wrench that
+motion and parameters need but that was not measured.
 """
 
 from collections.abc import Mapping
@@ -25,8 +27,9 @@ from biodance.settings import COP_FORCE
 class JointTorques:
     """Joint torques and what remains at the root.
 
-    ``time`` (T,) s; ``torque`` (T, n) N·m along the positive sense of each joint of the body, applied by the muscles; ``residual`` (T, 6)
-    N, N·m about the lab origin, force first: needed minus applied wrench (T, 0 for a body with fixed root).
+    ``time`` (T,) s; ``torque`` (T, n) N·m along the positive sense of each joint of the body, applied by the muscles;
+    ``residual`` (T, 6) N, N·m about the lab origin, force first: needed minus applied wrench (T, 0 for a body with
+    fixed root).
     """
 
     time: Array
@@ -37,8 +40,8 @@ class JointTorques:
 def joint_torques(body: Body, motion: Motion, contacts: Mapping[str, Wrench]) -> JointTorques:
     """Return the torques of ``motion`` under the wrenches that act on the named segments.
 
-    ``contacts`` segment name -> wrench of the surroundings ON that segment, about the lab origin, at the times of the motion. The
-    inertial parameters are ``body.sip``, gravity is the body's.
+    ``contacts`` segment name -> wrench of the surroundings ON that segment, about the lab origin, at the times of the
+    motion. The inertial parameters are ``body.sip``, gravity is the body's.
 
     Raises
     ------
@@ -49,7 +52,9 @@ def joint_torques(body: Body, motion: Motion, contacts: Mapping[str, Wrench]) ->
     """
     for segment, wrench in contacts.items():
         if wrench.time.shape != motion.time.shape or not np.allclose(wrench.time, motion.time, rtol=0, atol=1e-6):
-            raise BiodanceError(f"The wrench on {segment} has other times than the motion. Prepare the trial before tracking it.")
+            raise BiodanceError(
+                f"The wrench on {segment} has other times than the motion. Prepare the trial before tracking it."
+            )
     pin = load_pinocchio()
     model = body.model
     data = model.createData()
@@ -69,9 +74,11 @@ def joint_torques(body: Body, motion: Motion, contacts: Mapping[str, Wrench]) ->
 
 
 def zmp(wrench: Wrench, *, height: float = 0.0, threshold: float = COP_FORCE) -> Array:
-    """Return the zero-moment point (T, 3) m of a wrench on the horizontal plane ``z = height`` m; NaN where |Fz| < ``threshold`` N.
+    """Return the zero-moment point (T, 3) m of a wrench on the horizontal plane ``z = height`` m; NaN where |Fz| <
+    ``threshold`` N.
 
-    For a measured wrench it is the centre of pressure, for a simulated one the point that must lie inside the base of support.
+    For a measured wrench it is the centre of pressure, for a simulated one the point that must lie inside the base of
+    support.
     """
     return wrench.cop(height=height, threshold=threshold)
 
@@ -81,16 +88,17 @@ def distribute(
 ) -> tuple[Wrench, Wrench]:
     """Return the wrenches of the right and the left foot, whose sum is ``total``.
 
-    ``right``, ``left`` (T, 3) m: centres of the soles, their z the height of the ground there; ``touching`` (T, 2) True where the right,
-    the left foot stands. A foot alone takes all. With both feet down (or none) the shares are linear in the distances of the zero-moment
-    point to the two centres, after Xiang et al. as cited for the paper's eq. 2:
+    ``right``, ``left`` (T, 3) m: centres of the soles, their z the height of the ground there; ``touching`` (T, 2) True
+    where the right, the left foot stands. A foot alone takes all. With both feet down (or none) the shares are linear
+    in the distances of the zero-moment point to the two centres, after Xiang et al. as cited for the paper's eq. 2:
 
         share_right = d_left / (d_right + d_left),    share_left = d_right / (d_right + d_left).
 
-    The paper prints d_right over the sum for the right foot; that would load the foot FARTHER from the zero-moment point, so the two are
-    exchanged here. The paper scales the whole wrench, which puts both feet's centres of pressure on the total's, often between the feet;
-    here each foot's force acts at its own centre, both moved by the same small vector, so that forces and moments still add up exactly.
-    With less than ``threshold`` N of vertical force there is no zero-moment point: two halves.
+    The paper prints d_right over the sum for the right foot; that would load the foot FARTHER from the zero-moment
+    point, so the two are exchanged here. The paper scales the whole wrench, which puts both feet's centres of pressure
+    on the total's, often between the feet; here each foot's force acts at its own centre, both moved by the same small
+    vector, so that forces and moments still add up exactly. With less than ``threshold`` N of vertical force there is
+    no zero-moment point: two halves.
 
     Raises
     ------
@@ -98,7 +106,10 @@ def distribute(
         An array has the wrong shape.
     """
     frames = total.time.size
-    right, left = frozen_array(right, (frames, 3), "distribute: right"), frozen_array(left, (frames, 3), "distribute: left")
+    right, left = (
+        frozen_array(right, (frames, 3), "distribute: right"),
+        frozen_array(left, (frames, 3), "distribute: left"),
+    )
     if np.shape(touching) != (frames, 2):
         raise BiodanceError(f"distribute: touching has shape {np.shape(touching)}, expected {(frames, 2)}.")
     share = _right_share(total, right, left, np.asarray(touching, dtype=bool), threshold)
@@ -122,7 +133,9 @@ def _right_share(total: Wrench, right: Array, left: Array, touching: NDArray[np.
 
 
 def _act_at(wrench: Wrench, height: Array) -> tuple[Array, Array]:
-    """Return the zero-moment point (T, 3) m at the heights (T,) m of each frame and the free vertical moment (T, 3) N·m there."""
+    """Return the zero-moment point (T, 3) m at the heights (T,) m of each frame and the free vertical moment (T, 3)
+    N·m there.
+    """
     (fx, fy, fz), (mx, my, _) = wrench.force.T, wrench.moment.T
     safe = np.where(fz == 0, 1.0, fz)
     point = np.stack([(fx * height - my) / safe, (fy * height + mx) / safe, height], axis=1)

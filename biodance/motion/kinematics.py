@@ -10,8 +10,9 @@ from biodance.records import Array, Motion
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """Poses in the lab frame: ``joint_rotation`` (T, n, 3, 3), ``joint_position`` (T, n, 3) m of the joint frames (after their angle);
-    ``rotation`` (T, N, 3, 3), ``position`` (T, N, 3) m of the segment frames; ``root_rotation`` (T, 3, 3), ``root_position`` (T, 3) m.
+    """Poses in the lab frame: ``joint_rotation`` (T, n, 3, 3), ``joint_position`` (T, n, 3) m of the joint frames
+    (after their angle); ``rotation`` (T, N, 3, 3), ``position`` (T, N, 3) m of the segment frames; ``root_rotation``
+    (T, 3, 3), ``root_position`` (T, 3) m.
     """
 
     joint_rotation: Array
@@ -66,7 +67,11 @@ def poses(body: Body, q: Array) -> Poses:
     rotation, position = np.empty((frames, n, 3, 3)), np.empty((frames, n, 3))
     angles = q[:, body.nq - n :]
     for i, joint in enumerate(body.joints):
-        parent_r, parent_p = (root_rotation, root_position) if joint.parent < 0 else (rotation[:, joint.parent], position[:, joint.parent])
+        parent_r, parent_p = (
+            (root_rotation, root_position)
+            if joint.parent < 0
+            else (rotation[:, joint.parent], position[:, joint.parent])
+        )
         rotation[:, i] = parent_r @ (joint.rotation @ axis_rotation(joint.axis, angles[:, i]))
         position[:, i] = parent_p + parent_r @ joint.translation
     carrier = body.segment_joint
@@ -105,7 +110,9 @@ def segment_motion(body: Body, motion: Motion) -> SegmentMotion:
     for i, joint in enumerate(body.joints):
         p = joint.parent
         w, dw, a0, x0 = (
-            (w_root, dw_root, acc_root, pose.root_position) if p < 0 else (omega[:, p], alpha[:, p], acc[:, p], pose.joint_position[:, p])
+            (w_root, dw_root, acc_root, pose.root_position)
+            if p < 0
+            else (omega[:, p], alpha[:, p], acc[:, p], pose.joint_position[:, p])
         )
         arm = pose.joint_position[:, i] - x0
         axis = pose.joint_rotation[:, i] @ joint.axis
@@ -118,7 +125,9 @@ def segment_motion(body: Body, motion: Motion) -> SegmentMotion:
     def gather(root: Array, joints: Array) -> Array:
         return np.stack([root if j < 0 else joints[:, j] for j in pick], axis=1)
 
-    return SegmentMotion(pose.rotation, pose.position, gather(w_root, omega), gather(dw_root, alpha), gather(acc_root, acc))
+    return SegmentMotion(
+        pose.rotation, pose.position, gather(w_root, omega), gather(dw_root, alpha), gather(acc_root, acc)
+    )
 
 
 def below(body: Body) -> Array:
@@ -156,8 +165,8 @@ def skew(vector: Array) -> Array:
 
 
 def jacobian(body: Body, pose: Poses, segment: list[int], points: Array) -> tuple[Array, Array]:
-    """Return (T, 3S, nv) of points (T, S, 3) on segments and of their turn, per unit of the lab-frame tangent [root place, root turn,
-    angles].
+    """Return (T, 3S, nv) of points (T, S, 3) on segments and of their turn, per unit of the lab-frame tangent [root
+    place, root turn, angles].
     """
     frames, count = points.shape[:2]
     place, turn = np.zeros((2, frames, count, 3, body.nv))

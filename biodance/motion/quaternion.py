@@ -41,7 +41,9 @@ def matrix(a: Array) -> Array:
 
 
 def continuous(a: Array) -> Array:
-    """Return quaternions (4, ..., T) with the sign that makes neighbours in time close (q and -q are the same rotation)."""
+    """Return quaternions (4, ..., T) with the sign that makes neighbours in time close (q and -q are the same
+    rotation).
+    """
     together = np.sum(a[..., 1:] * a[..., :-1], axis=0) >= 0
     flips = np.cumprod(np.where(together, 1.0, -1.0), axis=-1)
     return np.concatenate([a[..., :1], a[..., 1:] * flips], axis=-1)

@@ -1,7 +1,8 @@
-"""The root regressor: the ground wrench that a motion needs, linear in the standard inertial parameters (paper eq. 3, upper part).
+"""The root regressor: the ground wrench that a motion needs, linear in the standard inertial parameters (paper eq. 3,
+upper part).
 
-For every segment with origin p, rotation R, angular velocity w and acceleration dw (lab frame) and origin acceleration a,
-with g the gravity vector, first moment h = R mc and inertia J = R I R' about the segment origin:
+For every segment with origin p, rotation R, angular velocity w and acceleration dw (lab frame) and origin acceleration
+a, with g the gravity vector, first moment h = R mc and inertia J = R I R' about the segment origin:
 
     f = m (a - g) + dw x h + w x (w x h)
     n = h x (a - g) + J dw + w x J w        (about the segment origin)
@@ -41,7 +42,9 @@ def _inertia_columns(local: Array) -> Array:
 
 
 def regressor_of(segments: SegmentMotion, *, gravity: Array) -> Array:
-    """Return W (T, 6, 10N): wrench about the lab origin, force first, per unit of each parameter; ``gravity`` (3,) m/s², lab frame."""
+    """Return W (T, 6, 10N): wrench about the lab origin, force first, per unit of each parameter; ``gravity`` (3,)
+    m/s², lab frame.
+    """
     rotation, position = segments.rotation, segments.position
     frames, count = position.shape[:2]
     turned = np.swapaxes(rotation, -1, -2)
@@ -62,10 +65,11 @@ def regressor_of(segments: SegmentMotion, *, gravity: Array) -> Array:
 
 
 def regressor(body: Body, motion: Motion) -> Array:
-    """Return W (T, 6, 10N) of ``body`` during ``motion``: ``W[t] @ sip.phi`` is the ground wrench about the lab origin (N, N·m).
+    """Return W (T, 6, 10N) of ``body`` during ``motion``: ``W[t] @ sip.phi`` is the ground wrench about the lab origin
+    (N, N·m).
 
-    Parameters of segment i are columns 10i..10i+9 in Pinocchio's order [m, mc (3), Ixx, Ixy, Iyy, Ixz, Iyz, Izz] about the segment's joint
-    frame. Gravity is the body's.
+    Parameters of segment i are columns 10i..10i+9 in Pinocchio's order [m, mc (3), Ixx, Ixy, Iyy, Ixz, Iyz, Izz] about
+    the segment's joint frame. Gravity is the body's.
     """
     return regressor_of(segment_motion(body, motion), gravity=body.gravity)
 

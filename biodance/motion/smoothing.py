@@ -1,9 +1,10 @@
-"""Positions, velocities and accelerations of a body from the noisy postures of its frames, consistent on the manifold of postures.
+"""Positions, velocities and accelerations of a body from the noisy postures of its frames, consistent on the manifold
+of postures.
 
-The smooth coordinates of ``chart`` (root position, quaternions of the root and of every ball joint, other angles) pass the same low-pass
-as the forces, the quaternions are made unit again, and a quintic spline through the samples gives the derivatives in closed form; nothing
-is differenced. With u a unit quaternion, P = u^-1 u' is half the angular velocity in the turned frame, and half its derivative is the
-vector part of u^-1 u'' - P² (docs/derivations.md, "Smoothing").
+The smooth coordinates of ``chart`` (root position, quaternions of the root and of every ball joint, other angles) pass
+the same low-pass as the forces, the quaternions are made unit again, and a quintic spline through the samples gives the
+derivatives in closed form; nothing is differenced. With u a unit quaternion, P = u^-1 u' is half the angular velocity
+in the turned frame, and half its derivative is the vector part of u^-1 u'' - P² (docs/derivations.md, "Smoothing").
 """
 
 import numpy as np
@@ -16,19 +17,22 @@ from biodance.motion.ik.chart import Balls, Smooth, chart_of
 from biodance.motion.quaternion import conjugate, continuous, matrix, normalised, product
 from biodance.records import Array, Motion
 
-DEGREE = 5
+_DEGREE = 5
 """Degree of the spline: continuous acceleration and jerk."""
 
 LEAST_COSINE = 1e-3
-"""Smallest |cos| of a ball joint's second angle that rates are divided by: nearer to the singularity the rates are bounded, not exact."""
+"""Smallest |cos| of a ball joint's second angle that rates are divided by: nearer to the singularity the rates are
+bounded, not exact.
+"""
 
 
 def smooth(body: Body, time: Array, q: Array, *, settings: LowPass | None = None) -> Motion:
-    """Return the smoothed motion of ``body`` from the postures ``q`` (T, nq) at the times ``time`` (T,) s, evenly spaced.
+    """Return the smoothed motion of ``body`` from the postures ``q`` (T, nq) at the times ``time`` (T,) s, evenly
+    spaced.
 
-    ``settings`` None: the default low-pass. A single frame is a pose at rest: v and a are zero. Joint angles may leave their limits by
-    what the filter rounds off; in the first and last period of the cut-off v and a are less certain. Root v
-    and a: linear, angular, in the root's own frame, a = dv/dt (Pinocchio's convention).
+    ``settings`` None: the default low-pass. A single frame is a pose at rest: v and a are zero. Joint angles may leave
+    their limits by what the filter rounds off; in the first and last period of the cut-off v and a are less certain.
+    Root v and a: linear, angular, in the root's own frame, a = dv/dt (Pinocchio's convention).
 
     Raises
     ------
@@ -43,7 +47,9 @@ def smooth(body: Body, time: Array, q: Array, *, settings: LowPass | None = None
     chart = chart_of(body)
     rough = np.asarray(q).T
     filtered = chart.split(low_pass(chart.smooth(rough).stacked().T, _rate(time), settings).T)
-    even = Smooth(filtered.place, continuous(normalised(filtered.root)), continuous(normalised(filtered.ball)), filtered.angle)
+    even = Smooth(
+        filtered.place, continuous(normalised(filtered.root)), continuous(normalised(filtered.ball)), filtered.angle
+    )
     first, second = (chart.split(d) for d in _derivatives(time, even.stacked()))
     posture = chart.posture(even, rough[len(rough) - chart.joint_count :])
     v, a = np.empty((2, body.nv, len(time)))
@@ -58,10 +64,12 @@ def smooth(body: Body, time: Array, q: Array, *, settings: LowPass | None = None
 
 
 def _derivatives(time: Array, values: Array) -> tuple[Array, Array]:
-    """Return the first and second derivatives (m, T) of the quintic spline through ``values`` (m, T), free at both ends."""
+    """Return the first and second derivatives (m, T) of the quintic spline through ``values`` (m, T), free at both
+    ends.
+    """
     free = np.zeros(len(values))
     ends = [(3, free), (4, free)]
-    spline = make_interp_spline(time, values.T, k=DEGREE, bc_type=(ends, ends))
+    spline = make_interp_spline(time, values.T, k=_DEGREE, bc_type=(ends, ends))
     return spline(time, nu=1).T, spline(time, nu=2).T
 
 
@@ -73,17 +81,22 @@ def _check(time: Array, q: Array, settings: LowPass) -> None:
     """Refuse what cannot be smoothed."""
     bad = np.isnan(q).any(axis=1)
     if bad.any():
-        raise TrialRefused(f"Frame {int(bad.argmax())} has no posture (NaN); smooth only frames that the inverse kinematics gave.")
+        raise TrialRefused(
+            f"Frame {int(bad.argmax())} has no posture (NaN); smooth only frames that the inverse kinematics gave."
+        )
     if len(time) < 2:
         return
     steps = np.diff(time)
     if np.ptp(steps) > 0.01 * steps.mean():
         frame = int(np.abs(steps - np.median(steps)).argmax())
-        raise TrialRefused(f"The frames are not evenly spaced: {steps[frame]:g} s after frame {frame}, {np.median(steps):g} s usually.")
-    need = max(settings.shortest(_rate(time)), DEGREE + 1)
+        raise TrialRefused(
+            f"The frames are not evenly spaced: {steps[frame]:g} s after frame {frame}, {np.median(steps):g} s usually."
+        )
+    need = max(settings.shortest(_rate(time)), _DEGREE + 1)
     if len(time) < need:
         raise TrialRefused(
-            f"{len(time)} frames at {_rate(time):g} Hz are too few for velocities behind a low-pass at {settings.cutoff:g} Hz: "
+            f"{len(time)} frames at {_rate(time):g} Hz are too few for velocities behind a low-pass at "
+            f"{settings.cutoff:g} Hz: "
             f"at least {need} are needed. Record longer, or use one frame as a static pose."
         )
 
@@ -100,9 +113,11 @@ def _root_rates(at: Smooth, first: Smooth, second: Smooth) -> tuple[Array, Array
 
 
 def _ball_rates(joints: Balls, angles: Array, at: Array, first: Array, second: Array) -> tuple[Array, Array]:
-    """Return the rates and accelerations (3, G, T) of the ball joints' angles from their quaternions (4, G, T) and the derivatives.
+    """Return the rates and accelerations (3, G, T) of the ball joints' angles from their quaternions (4, G, T) and the
+    derivatives.
 
-    In the frame after the first angle, with b the second one (all times the sign): w1 = t1' + sin(b) t3', w2 = t2', w3 = cos(b) t3'.
+    In the frame after the first angle, with b the second one (all times the sign): w1 = t1' + sin(b) t3', w2 = t2', w3
+    = cos(b) t3'.
     """
     sign = joints.sign
     half = product(first, conjugate(at))

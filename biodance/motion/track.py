@@ -25,13 +25,14 @@ def track(body: Body, trial: Trial) -> Motion:
     Returns
     -------
     Motion
-        ``residual`` (T, K) m are the distances before smoothing, of the markers that both share; ``determined`` (T,) is False where a
-        frame's own markers leave its posture open or do not let it settle; ``notes`` say so.
+        ``residual`` (T, K) m are the distances before smoothing, of the markers that both share; ``determined`` (T,) is
+        False where a frame's own markers leave its posture open or do not let it settle; ``notes`` say so.
 
     Raises
     ------
     TrialRefused
-        The trial has no markers, no frame with enough of them (the missing ones are named), or too few or uneven frames to smooth.
+        The trial has no markers, no frame with enough of them (the missing ones are named), or too few or uneven frames
+        to smooth.
 
     References
     ----------
@@ -43,7 +44,9 @@ def track(body: Body, trial: Trial) -> Motion:
     Motion(23 joint angles, 611 frames at 100 Hz, 6.10 s)
     """
     if trial.markers is None or not trial.markers.time.size:
-        raise TrialRefused(f"Trial {trial.name}: no markers were recorded, so there is no motion. Export the trial with its markers.")
+        raise TrialRefused(
+            f"Trial {trial.name}: no markers were recorded, so there is no motion. Export the trial with its markers."
+        )
     try:
         found = solve_ik(body, trial.markers)
         motion = smooth(body, trial.markers.time, found.q, settings=motion_filter(trial.settings))

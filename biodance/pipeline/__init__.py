@@ -1,1 +1,3 @@
-"""One session through all stages: read, prepared, scaled, tracked, compared. A step that fails is a status with a reason."""
+"""One session through all stages: read, prepared, scaled, tracked, compared. A step that fails is a status with a
+reason.
+"""

@@ -1,5 +1,5 @@
-"""Who moves in this session: the body scaled on a static trial, its joints placed by the movement, else from stature alone; how it came
-about is said.
+"""Who moves in this session: the body scaled on a static trial, its joints placed by the movement, else from stature
+alone; how it came about is said.
 """
 
 from functools import partial
@@ -16,10 +16,14 @@ from biodance.records import Subject
 from biodance.settings import Settings
 
 
-def body_of(subject: Subject, read: tuple[Prepared, ...], settings: Settings, steps: list[Step]) -> tuple[Body | None, str]:
-    """Return the body of the session and one sentence on where it comes from; None without mass, stature or markers, with the step refused.
+def body_of(
+    subject: Subject, read: tuple[Prepared, ...], settings: Settings, steps: list[Step]
+) -> tuple[Body | None, str]:
+    """Return the body of the session and one sentence on where it comes from; None without mass, stature or markers,
+    with the step refused.
 
-    Every static trial is tried in turn; where none can be used, lengths come from stature and markers from their usual places.
+    Every static trial is tried in turn; where none can be used, lengths come from stature and markers from their usual
+    places.
     """
     attempt(steps, "subject", partial(subject.require, "mass", "stature"))
     if steps[-1].status != "done":
@@ -35,13 +39,23 @@ def body_of(subject: Subject, read: tuple[Prepared, ...], settings: Settings, st
                 f"Scaled on the static trial {static.name}, {how}; masses and inertias from the table {settings.table}."
             )
     if not statics:
-        steps.append(Step("scale", "refused", "No static trial can be used, so the body comes from stature alone. Record a static trial."))
+        steps.append(
+            Step(
+                "scale",
+                "refused",
+                "No static trial can be used, so the body comes from stature alone. Record a static trial.",
+            )
+        )
     sets = [one.trial.marker_set for one in read if one.trial.marker_set]
     if not sets:
         return None, "No body: no trial has markers of a known set."
     generic = partial(human, subject, table=settings.table, markers=sets[0], gravity=settings.gravity)
     body = attempt(steps, "body from stature", lambda: with_tracking_limits(generic()))
-    return body, f"From stature alone, with the usual places of the markers; masses and inertias from the table {settings.table}."
+    return (
+        body,
+        f"From stature alone, with the usual places of the markers; masses and inertias from the table "
+        f"{settings.table}.",
+    )
 
 
 def placed_by_movement(scaling: Scaling, read: tuple[Prepared, ...]) -> Scaling:
@@ -56,5 +70,8 @@ def placed_by_movement(scaling: Scaling, read: tuple[Prepared, ...]) -> Scaling:
     fits = [one.trial for one in read if one.usable and one.trial.role == "fit" and one.trial.marker_set == wanted]
     same = [trial.markers for trial in fits if trial.markers is not None]
     if not same:
-        raise TrialRefused("No trial with role fit has markers of the static trial's set, so the joints stay where that trial shows them.")
+        raise TrialRefused(
+            "No trial with role fit has markers of the static trial's set, so the joints stay where that trial shows "
+            "them."
+        )
     return functional_joints(scaling, same).scaling

@@ -21,7 +21,12 @@ def mass_check(subject: Subject, standing: QuietStanding | None, limits: CheckLi
     difference = abs(100 * (standing.mass / subject.mass - 1))
     return [
         _upper(
-            "mass on the plates against declared", standing.trial, difference, limits.mass, "%", "Weigh again, or check the plates' zero."
+            "mass on the plates against declared",
+            standing.trial,
+            difference,
+            limits.mass,
+            "%",
+            "Weigh again, or check the plates' zero.",
         )
     ]
 
@@ -32,26 +37,68 @@ def standing_check(standing: QuietStanding | None, limits: CheckLimits) -> list[
         return []
     distance = 1000 * float(np.hypot(standing.com_ahead, standing.com_left))
     advice = "Check the plates' place in the lab, and the markers of pelvis and trunk."
-    return [_upper("centre of mass off the centre of pressure, standing", standing.trial, distance, 1000 * limits.standing, "mm", advice)]
+    return [
+        _upper(
+            "centre of mass off the centre of pressure, standing",
+            standing.trial,
+            distance,
+            1000 * limits.standing,
+            "mm",
+            advice,
+        )
+    ]
 
 
 def trial_checks(result: TrialResult, mass: float) -> list[Check]:
-    """Check marker distances, gaps, measured frames and forces of one trial; ``mass`` kg of the body, for the body weight."""
+    """Check marker distances, gaps, measured frames and forces of one trial; ``mass`` kg of the body, for the body
+    weight.
+    """
     name, limits, found = result.trial.name, result.trial.settings.checks, []
     if result.fit:
         advice = "See the worst marker in the trial's figure: placed, labelled and filled rightly?"
-        found.append(_upper("marker distance, RMS", name, 1000 * result.fit.total_rms, 1000 * limits.marker_rms, "mm", advice))
-        found.append(_upper("marker distance, largest", name, 1000 * result.fit.total_max, 1000 * limits.marker_largest, "mm", advice))
+        found.append(
+            _upper("marker distance, RMS", name, 1000 * result.fit.total_rms, 1000 * limits.marker_rms, "mm", advice)
+        )
+        found.append(
+            _upper(
+                "marker distance, largest",
+                name,
+                1000 * result.fit.total_max,
+                1000 * limits.marker_largest,
+                "mm",
+                advice,
+            )
+        )
     if result.motion is not None:
         share = 100 * float(np.mean(~result.motion.determined))
-        found.append(_upper("posture left open", name, share, limits.open, "%", "See the gaps: which segment lost its markers?"))
+        found.append(
+            _upper("posture left open", name, share, limits.open, "%", "See the gaps: which segment lost its markers?")
+        )
     if result.gaps:
-        found.append(_upper("markers not seen", name, result.gaps_percent, limits.gaps, "%", "Fill the gaps in the capture software."))
+        found.append(
+            _upper(
+                "markers not seen",
+                name,
+                result.gaps_percent,
+                limits.gaps,
+                "%",
+                "Fill the gaps in the capture software.",
+            )
+        )
     comparison = result.comparison
     if comparison and result.trial.role != "static":
         seconds = comparison.used.sum() * float(np.median(np.diff(comparison.time)))
         advice = "Step onto the plates only, or record more of the trial on them."
-        found.append(Check("fully measured", name, f"{seconds:.2f} s", f"at least {limits.seconds:g} s", seconds >= limits.seconds, advice))
+        found.append(
+            Check(
+                "fully measured",
+                name,
+                f"{seconds:.2f} s",
+                f"at least {limits.seconds:g} s",
+                seconds >= limits.seconds,
+                advice,
+            )
+        )
     if comparison and comparison.used.any():
         share = 100 * float(np.max(comparison.rms[:3])) / (mass * result.trial.settings.gravity)
         advice = "See the trial's wrench figure: is it an offset, a delay or a scale?"

@@ -1,4 +1,6 @@
-"""A dance for one person or robot, from what is known of it to the numbers of the finished dance, all steps in order."""
+"""A dance for one person or robot, from what is known of it to the numbers of the finished dance, all steps in
+order.
+"""
 
 import time
 from collections.abc import Callable, Iterable
@@ -27,11 +29,11 @@ from biodance.dance.verify import Margin, broken
 from biodance.errors import BiodanceError
 from biodance.records import Subject
 
-Tell = Callable[[str, int, int], None]
+_Tell = Callable[[str, int, int], None]
 """Told what is being done, how many parts are finished and of how many (0: not counted)."""
 UNFINISHED = "unfinished"
 """Folder with what is finished of a dance whose design was stopped."""
-OURS = (
+_OURS = (
     *("results.json", "dance.npz", "dance.c3d", "dance.csv", "cues.md", "margins.md"),
     *("postures.png", "postures_3d.png", "criterion.png", "zmp.png", "expectation.png"),
 )
@@ -107,21 +109,24 @@ class DanceResult:
         return not self.notes and (np.isfinite(self.plan.budget) or counted == self.plan.count)
 
 
-LEGAL = {"mass": (30.0, 200.0, "kg"), "stature": (1.2, 2.2, "m")}
+_LEGAL = {"mass": (30.0, 200.0, "kg"), "stature": (1.2, 2.2, "m")}
 
 
 def dancer(subject: Subject, plan: Plan) -> Body:
-    """Return the body of a person for whom a dance is designed: a generic one, joints within the ranges that the plan names.
+    """Return the body of a person for whom a dance is designed: a generic one, joints within the ranges that the plan
+    names.
 
     Raises
     ------
     BiodanceError
         Mass or stature are outside the range of the tables.
     """
-    for name, (low, high, unit) in LEGAL.items():
+    for name, (low, high, unit) in _LEGAL.items():
         value = getattr(subject, name)
         if not low <= value <= high:
-            raise BiodanceError(f"The {name} is {value:g} {unit}; a dance is designed for {low:g} to {high:g} {unit}. Correct it.")
+            raise BiodanceError(
+                f"The {name} is {value:g} {unit}; a dance is designed for {low:g} to {high:g} {unit}. Correct it."
+            )
     return replace(human(subject), limits=joint_limits(subject, within=plan.ranges))
 
 
@@ -132,11 +137,12 @@ def make_dance(
     *,
     limits: Iterable[Limit | type[Limit]] = (),
     seed: int = 0,
-    tell: Tell = lambda *_: None,
+    tell: _Tell = lambda *_: None,
     resume: Path | None = None,
     makers: Makers = PERSONS,
 ) -> DanceResult:
-    """Design, check and count a dance of ``plan`` for ``body`` with the limits of ``person``; ``resume`` keeps what is finished meanwhile.
+    """Design, check and count a dance of ``plan`` for ``body`` with the limits of ``person``; ``resume`` keeps what is
+    finished meanwhile.
 
     ``limits`` are kept beside those of the plan, or in place of one of the same name (`dance.limits`).
 
@@ -183,11 +189,13 @@ def dance_folder(out: Path, *, force: bool = False) -> Path:
         raise BiodanceError(f"{out}: is a file; a dance needs a folder. Choose another --out.")
     out.mkdir(parents=True, exist_ok=True)
     found = sorted(path.name for path in out.iterdir() if path.name != UNFINISHED)
-    foreign = [name for name in found if name not in OURS]
+    foreign = [name for name in found if name not in _OURS]
     if foreign:
         raise BiodanceError(f"{out}: holds files that are not of a dance ({foreign[0]}). Choose another --out.")
     if found and not force:
-        raise BiodanceError(f"{out}: holds a dance already and nothing is overwritten. Choose another --out, or --force.")
+        raise BiodanceError(
+            f"{out}: holds a dance already and nothing is overwritten. Choose another --out, or --force."
+        )
     for name in found:
         (out / name).unlink()
     return out
@@ -217,10 +225,11 @@ def make_robot_dance(
     *,
     limits: Iterable[Limit | type[Limit]] = (),
     seed: int = 0,
-    tell: Tell = lambda *_: None,
+    tell: _Tell = lambda *_: None,
     resume: Path | None = None,
 ) -> DanceResult:
-    """Design, check and count a dance for a robot (`robot_dancer`), with the limits of ``person`` beyond those of its file.
+    """Design, check and count a dance for a robot (`robot_dancer`), with the limits of ``person`` beyond those of its
+    file.
 
     See `dance.make_dance`.
 
@@ -229,7 +238,9 @@ def make_robot_dance(
     BiodanceError
         The protocol is not one for robots.
     """
-    found = make_dance(body, robot_plan(body, plan), person, limits=limits, seed=seed, tell=tell, resume=resume, makers=ROBOTS)
+    found = make_dance(
+        body, robot_plan(body, plan), person, limits=limits, seed=seed, tell=tell, resume=resume, makers=ROBOTS
+    )
     coarse = unchecked_pairs(body)
     words = (f"Not kept apart, since their boxes overlap at zero angles: {', '.join(coarse)}.",) if coarse else ()
     return replace(found, notes=(*body.notes, *words, *found.notes))

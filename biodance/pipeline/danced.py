@@ -11,7 +11,7 @@ from biodance.errors import BiodanceError
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion, Subject
 from biodance.virtual_lab.choreography import septic
-from biodance.virtual_lab.dancing import USUAL, Performer, Shown, copy_dance
+from biodance.virtual_lab.dancing import USUAL_PERFORMER, Performer, Shown, copy_dance
 from biodance.virtual_lab.laboratory import FIRST_VISIT, LabVisit, perform_in, record, scale_reading, set_up, write
 from biodance.virtual_lab.performance import Performance
 from biodance.virtual_lab.person import make_person
@@ -19,15 +19,16 @@ from biodance.virtual_lab.protocol import Protocol, read_protocol
 from biodance.virtual_lab.simulate import TRUTH, session_toml
 from biodance.virtual_lab.truth import truth
 
-RATE = 100.0
+_RATE = 100.0
 LIFT = 0.4
 """Share of a move in which a foot leaves the ground, at its beginning, or comes back, at its end."""
-OTHERS = "squat"
+_OTHERS = "squat"
 """Protocol from which the static trial and the squats kept for validation are taken."""
 
 
 def stretches(dance: Dance) -> tuple[Shown, ...]:
-    """Return the dance in stretches between the steps by which a foot changes its place; the steps themselves are not recorded.
+    """Return the dance in stretches between the steps by which a foot changes its place; the steps themselves are not
+    recorded.
 
     Raises
     ------
@@ -35,15 +36,21 @@ def stretches(dance: Dance) -> tuple[Shown, ...]:
         The dance is on a stool, which virtual persons cannot do.
     """
     if any(stance.seat for stance in dance.stances):
-        raise BiodanceError(f"Dance {dance.protocol}: is danced on a stool; virtual persons stand. Choose a standing protocol.")
-    motion, groups = dance.motion(RATE), [[0]]
+        raise BiodanceError(
+            f"Dance {dance.protocol}: is danced on a stool; virtual persons stand. Choose a standing protocol."
+        )
+    motion, groups = dance.motion(_RATE), [[0]]
     for p in range(1, len(dance.stances)):
         same = np.array_equal(dance.stances[p].ankle, dance.stances[p - 1].ankle)
         groups[-1].append(p) if same else groups.append([p])
     out = []
     for number, group in enumerate(groups, start=1):
         if len(group) > 1:
-            mine = [phase for phase in dance.phases if phase.posture in group and (phase.kind == "hold" or phase.posture > group[0])]
+            mine = [
+                phase
+                for phase in dance.phases
+                if phase.posture in group and (phase.kind == "hold" or phase.posture > group[0])
+            ]
             out.append(_shown(dance, motion, mine, f"dance_{number}"))
     return tuple(out)
 
@@ -52,7 +59,9 @@ def _shown(dance: Dance, motion: Motion, phases: list[Phase], name: str) -> Show
     rows = (motion.time >= phases[0].start - 1e-9) & (motion.time <= phases[-1].end + 1e-9)
     part = Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.a[rows])
     raised = np.max([_raised(dance, phase, part.time) for phase in phases], axis=0)
-    return Shown(name, dance.body, part, phases[0].stance.ankle, raised, zmp_path(predict_wrench(dance.body, part).value))
+    return Shown(
+        name, dance.body, part, phases[0].stance.ankle, raised, zmp_path(predict_wrench(dance.body, part).value)
+    )
 
 
 def _raised(dance: Dance, phase: Phase, time: Array) -> Array:
@@ -74,10 +83,11 @@ def simulate_dance(
     out: Path,
     *,
     seed: int,
-    performer: Performer = USUAL,
+    performer: Performer = USUAL_PERFORMER,
     visit: LabVisit = FIRST_VISIT,
 ) -> Path:
-    """Write the session of a virtual person who dances ``dance``: static, the dance in stretches, two trials of squats for validation.
+    """Write the session of a virtual person who dances ``dance``: static, the dance in stretches, two trials of squats
+    for validation.
 
     ``seed`` is the person. The same arguments write the same bytes.
 
@@ -91,7 +101,9 @@ def simulate_dance(
     person = make_person(subject, seed, tolerances=visit.tolerances, session=visit.number)
     instruments, lab = set_up(person, visit), visit.laboratory
     done: list[Performance] = [
-        perform_in(instruments, person, trial) for trial in read_protocol(OTHERS).trials if trial.role in ("static", "validate")
+        perform_in(instruments, person, trial)
+        for trial in read_protocol(_OTHERS).trials
+        if trial.role in ("static", "validate")
     ]
     for shown in stretches(dance):
         done.append(
@@ -111,5 +123,7 @@ def simulate_dance(
     plan = Protocol(dance.protocol, "a designed dance", tuple(performance.plan for performance in done))
     (out / "session.toml").write_text(session_toml(person, plan, scale_reading(person, visit.number, visit.tolerances)))
     (out / TRUTH).mkdir()
-    (out / TRUTH / "truth.json").write_text(json.dumps(truth(person, dance.protocol, instruments, done), indent=1) + "\n")
+    (out / TRUTH / "truth.json").write_text(
+        json.dumps(truth(person, dance.protocol, instruments, done), indent=1) + "\n"
+    )
     return out

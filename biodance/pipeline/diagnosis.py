@@ -1,4 +1,6 @@
-"""What the simulation of a session gets wrong: checks first, then causes; what accepting them changes in the body and gains elsewhere."""
+"""What the simulation of a session gets wrong: checks first, then causes; what accepting them changes in the body
+and gains elsewhere.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -104,8 +106,9 @@ def diagnose_session(
 ) -> SessionDiagnosis:
     """Return the diagnosis of an examined session, with the gain of every finding on the trials that were kept.
 
-    ``reference`` an earlier session of the same person without fault or load: its posterior is then what is known of the body;
-    ``tolerances`` as learned by the laboratory; ``effects`` names limit the causes to these, objects (``[MyEffect()]``) join the family.
+    ``reference`` an earlier session of the same person without fault or load: its posterior is then what is known of
+    the body; ``tolerances`` as learned by the laboratory; ``effects`` names limit the causes to these, objects
+    (``[MyEffect()]``) join the family.
 
     Raises
     ------
@@ -120,7 +123,9 @@ def diagnose_session(
     if result.body is None or not fitted:
         if failed:
             return SessionDiagnosis(_by_checks(checks))
-        raise SessionRefused(f"{result.session.folder}: there is nothing to diagnose. {result.body_source} {_reasons(result)}".strip())
+        raise SessionRefused(
+            f"{result.session.folder}: there is nothing to diagnose. {result.body_source} {_reasons(result)}".strip()
+        )
     tell("looking for causes")
     own = Own(tolerances) if tolerances else own_tolerances(result.body, fitted)
     try:
@@ -137,7 +142,9 @@ def diagnose_session(
         if failed:
             return SessionDiagnosis(_by_checks(checks))
         raise
-    examined = _noted(examined, *_untold(reference), *result.doubts, *standing_notes(result), *left_out(result.trials), *own.notes)
+    examined = _noted(
+        examined, *_untold(reference), *result.doubts, *standing_notes(result), *left_out(result.trials), *own.notes
+    )
     if failed:
         return SessionDiagnosis(_by_checks(checks, examined), examined)
     if examined.named and not own.believed:
@@ -154,7 +161,8 @@ def standing_notes(result: SessionResult) -> tuple[str, ...]:
     ahead, left = 1000 * found.com_ahead, 1000 * found.com_left
     sides = "in front of" if ahead > 0 else "behind", "left" if left > 0 else "right"
     return (
-        f"Standing still ({found.trial}), the table's centre of mass lies {abs(ahead):.0f} mm {sides[0]} the centre of pressure and "
+        f"Standing still ({found.trial}), the table's centre of mass lies {abs(ahead):.0f} mm {sides[0]} the centre "
+        f"of pressure and "
         f"{abs(left):.0f} mm to its {sides[1]}.",
     )
 
@@ -182,9 +190,16 @@ def foresee_dance(path: Path) -> Foresight:
 
 
 def _disbelieved(one: Diagnosis) -> Diagnosis:
-    """Return the diagnosis without its names, which become a note: the tolerances under which they were found do not hold here."""
+    """Return the diagnosis without its names, which become a note: the tolerances under which they were found do not
+    hold here.
+    """
     alike = ", ".join(f"{finding.effect} {finding.target}".strip() for finding in one.findings)
-    return replace(one, verdict="unexplained", findings=(), notes=(*one.notes, f"What is left resembles {alike}, which is not believed."))
+    return replace(
+        one,
+        verdict="unexplained",
+        findings=(),
+        notes=(*one.notes, f"What is left resembles {alike}, which is not believed."),
+    )
 
 
 def _noted(examined: Examined, *notes: str) -> Examined:
@@ -193,7 +208,9 @@ def _noted(examined: Examined, *notes: str) -> Examined:
 
 
 def _prior(reference: SessionIdentification | None, result: SessionResult) -> Sip | None:
-    """Return what an earlier session lets expect of the body; None without one, or where nothing was identified from it."""
+    """Return what an earlier session lets expect of the body; None without one, or where nothing was identified from
+    it.
+    """
     if reference is None or result.identification is None or reference.identification.status == "failed":
         return None
     return expect_unloaded(reference.identification, result.identification.identification)
@@ -203,7 +220,10 @@ def _untold(reference: SessionIdentification | None) -> tuple[str, ...]:
     """Say that the reference tells nothing of the body, if so."""
     if reference is None or reference.identification.status == "solved":
         return ()
-    return (f"Session {reference.name} tells nothing of the body, so the table is what is known before. {reference.identification.cause}",)
+    return (
+        f"Session {reference.name} tells nothing of the body, so the table is what is known before. "
+        f"{reference.identification.cause}",
+    )
 
 
 def _cases(body: Body | None, found: tuple[Look, ...]) -> tuple[Case, ...]:
@@ -211,15 +231,21 @@ def _cases(body: Body | None, found: tuple[Look, ...]) -> tuple[Case, ...]:
     if body is None:
         return ()
     return tuple(
-        Case(body, look.trial, look.motion, body.sip.phi, np.linspace(look.start, look.end, look.motion.time.size)) for look in found
+        Case(body, look.trial, look.motion, body.sip.phi, np.linspace(look.start, look.end, look.motion.time.size))
+        for look in found
     )
 
 
 def _by_checks(checks: tuple[Gate, ...], examined: Examined | None = None) -> Diagnosis:
-    """Return the diagnosis of a session in which a check failed: what it found, and nothing built on unmended recordings."""
+    """Return the diagnosis of a session in which a check failed: what it found, and nothing built on unmended
+    recordings.
+    """
     left = examined.diagnosis if examined else None
     findings = tuple(_finding(gate) for gate in checks if not gate.ok)
-    note = "A check named its cause before any statistics. Mend it and diagnose again: nothing is fitted to recordings that are wrong."
+    note = (
+        "A check named its cause before any statistics. Mend it and diagnose again: nothing is fitted to "
+        "recordings that are wrong."
+    )
     clean = examined is not None and left is not None and left.verdict == "named, complete" and not examined.suspicious
     return Diagnosis(
         verdict="named, complete" if clean else "named, incomplete",
@@ -240,18 +266,24 @@ def _finding(gate: Gate) -> Finding:
 
 
 def _reasons(result: SessionResult) -> str:
-    return " ".join(dict.fromkeys(reason for trial in result.trials if trial.trial.role in FITTED_ROLES for reason in trial.reasons))
+    return " ".join(
+        dict.fromkeys(reason for trial in result.trials if trial.trial.role in FITTED_ROLES for reason in trial.reasons)
+    )
 
 
 def _with_gains(result: SessionResult, examined: Examined) -> SessionDiagnosis:
-    """Return the diagnosis with what accepting its findings changes, where there are any and movement to identify from."""
+    """Return the diagnosis with what accepting its findings changes, where there are any and movement to identify
+    from.
+    """
     before = result.identification.identification if result.identification else None
     if not examined.named or before is None:
         return SessionDiagnosis(examined.diagnosis, examined, before)
     try:
         return _accepted(result, examined, before)
     except TrialRefused as why:  # named in standing, and no movement to identify from
-        return SessionDiagnosis(_noted(examined, f"What accepting the findings changes is not known. {why}").diagnosis, examined, before)
+        return SessionDiagnosis(
+            _noted(examined, f"What accepting the findings changes is not known. {why}").diagnosis, examined, before
+        )
     except NotSolved as why:
         return SessionDiagnosis(examined.diagnosis, examined, before, failures={"what accepting changes": str(why)})
 
@@ -266,7 +298,9 @@ def _accepted(result: SessionResult, examined: Examined, before: Identification)
     findings = tuple(replace(one, changes=_changes(before, after)) for one in examined.diagnosis.findings)
     if not kept:
         return SessionDiagnosis(replace(examined.diagnosis, findings=findings), examined, before, after)
-    as_is, better = (tuple(case_fit(*pair) for pair in some) for some in (kept, [(accept(case, named), use) for case, use in kept]))
+    as_is, better = (
+        tuple(case_fit(*pair) for pair in some) for some in (kept, [(accept(case, named), use) for case, use in kept])
+    )
     about = standing_point(as_is)
     left = residuals_of(before.identified, as_is, about), residuals_of(after.identified, better, about)
     used = (
@@ -294,5 +328,7 @@ def _changes(before: Identification, after: Identification) -> tuple[str, ...]:
     change = {name: now.get(name, 0.0) - mass for name, mass in then.items()}
     most = sorted(change, key=lambda name: -abs(change[name]))[:3]
     return tuple(
-        f"{name.replace('_', ' ')}: {then[name]:.2f} kg becomes {now.get(name, 0.0):.2f} kg" for name in most if abs(change[name]) >= 0.01
+        f"{name.replace('_', ' ')}: {then[name]:.2f} kg becomes {now.get(name, 0.0):.2f} kg"
+        for name in most
+        if abs(change[name]) >= 0.01
     )

@@ -53,17 +53,18 @@ def export(
     out : str or pathlib.Path
         The file to write; it must not exist.
     format : str
-        ``osim``, ``urdf``, ``mjcf``, ``biomod``, ``csv``: the body with the identified parameters, where there are trials to identify from,
-        else with the table's. ``trc``: the prepared markers of a trial, ``mot``: its joint coordinates, of the model that ``osim`` writes;
-        ``c3d``: a copy of its recording with angles, moments, wrenches, centre of mass and events.
+        ``osim``, ``urdf``, ``mjcf``, ``biomod``, ``csv``: the body with the identified parameters, where there are
+        trials to identify from, else with the table's. ``trc``: the prepared markers of a trial, ``mot``: its joint
+        coordinates, of the model that ``osim`` writes; ``c3d``: a copy of its recording with angles, moments, wrenches,
+        centre of mass and events.
     trial : str, optional
         Name of the trial for ``trc`` and ``mot``; by default the only one that moves.
     subject : str, optional
         The person where files hold several.
-    markers : str, optional
-        The marker set that was worn: a file or a name.
     meshes : pathlib.Path, optional
         Folder with a closed mesh a segment (``right_thigh.stl``, m, in the segment's axes), shown by glb and osim.
+    markers : str, optional
+        The marker set that was worn: a file or a name.
     tell : callable, optional
         Called with what is being done, in words.
 
@@ -98,7 +99,9 @@ def export(
         kept = folder if folder.is_file() else folder / BODY
         if kept.is_file():
             if format in MOTION_FORMATS:
-                raise SessionRefused(f"{folder}: holds a body and no trial. Give the session folder to export {format}.")
+                raise SessionRefused(
+                    f"{folder}: holds a body and no trial. Give the session folder to export {format}."
+                )
             body, words = read_body(kept)
             return _model(body, out, format, words, meshes), words
         session = read_session(folder, subject_name=subject, markers=markers, tell=tell)
@@ -155,7 +158,9 @@ def body_of_result(result: SessionResult) -> tuple[Body, str]:
 
 @contextmanager
 def replaceable(out: Path, *, force: bool) -> Iterator[Path]:
-    """Yield the path to write to: ``out``, or with ``force`` a path beside it that replaces an existing ``out`` once all is written."""
+    """Yield the path to write to: ``out``, or with ``force`` a path beside it that replaces an existing ``out`` once
+    all is written.
+    """
     if not (force and out.is_file()):
         yield out
         return
@@ -174,7 +179,9 @@ def _chosen(session: Session, name: str | None) -> Trial:
         return session[name]
     moving = [trial for trial in session.trials if trial.role != "static"]
     if len(moving) != 1:
-        raise TrialRefused(f"{session.folder}: holds the trials {', '.join(trial.name for trial in session)}. Choose one with --trial.")
+        raise TrialRefused(
+            f"{session.folder}: holds the trials {', '.join(trial.name for trial in session)}. Choose one with --trial."
+        )
     return moving[0]
 
 
@@ -190,11 +197,15 @@ def _motion(result: SessionResult, name: str, out: Path) -> tuple[Path, str]:
     if result.body is None or one.motion is None:
         raise TrialRefused(f"Trial {name}: it gives no motion. {one.reason or result.body_source}")
     table = opensim_coordinates(result.body, one.motion)
-    return write_mot(out, table), f"Joint coordinates of trial {name}, rad and m, y up; the model is exported with --format osim."
+    return write_mot(
+        out, table
+    ), f"Joint coordinates of trial {name}, rad and m, y up; the model is exported with --format osim."
 
 
 def opensim_coordinates(body: Body, motion: Motion) -> TimeTable:
-    """Return the coordinates of ``motion`` (T frames) by name: rad and m, root in OpenSim's ground (y up), joints as in ``body``."""
+    """Return the coordinates of ``motion`` (T frames) by name: rad and m, root in OpenSim's ground (y up), joints as
+    in ``body``.
+    """
     names = [joint.name for joint in body.joints]
     angles = motion.q[:, body.nq - len(names) :]
     if not body.n_root:

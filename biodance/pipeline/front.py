@@ -25,7 +25,7 @@ Visit: TypeAlias = Session | SessionResult | str | Path
 """A session: as read, as examined, or its folder."""
 Earlier: TypeAlias = SessionIdentification | Visit
 """An earlier session: as identified, or anything that can be."""
-Tell: TypeAlias = Callable[[str], None]
+_Tell: TypeAlias = Callable[[str], None]
 
 
 def _silent(_: str) -> None:
@@ -39,7 +39,8 @@ class SessionComparison:
     Parameters
     ----------
     earlier, later : SessionIdentification
-        What each says by itself; ``later.changes`` are the differences, ``later.search`` the load looked for against ``earlier``.
+        What each says by itself; ``later.changes`` are the differences, ``later.search`` the load looked for against
+        ``earlier``.
 
     Examples
     --------
@@ -52,8 +53,11 @@ class SessionComparison:
     later: SessionIdentification
 
     def __repr__(self) -> str:
-        sure = [one for one in self.later.changes if one.known and one.p < CERTAIN / max(1, len(self.later.changes))]
-        told = ", ".join(f"{one.segment} {one.quantity} {one.value:+.3g} {one.unit}" for one in sure) or "no certain change"
+        sure = [one for one in self.later.changes if one.known and one.p < _CERTAIN / max(1, len(self.later.changes))]
+        told = (
+            ", ".join(f"{one.segment} {one.quantity} {one.value:+.3g} {one.unit}" for one in sure)
+            or "no certain change"
+        )
         return f"SessionComparison({self.earlier.name!r} -> {self.later.name!r}: {told})"
 
     def _repr_html_(self) -> str:
@@ -76,14 +80,16 @@ class SessionComparison:
         import pandas as pd
 
         rows = [(c.segment, c.quantity, c.unit, c.value, c.sd, *c.interval, c.p, c.known) for c in self.later.changes]
-        return pd.DataFrame(rows, columns=["segment", "quantity", "unit", "difference", "sd", "low", "high", "p", "known"])
+        return pd.DataFrame(
+            rows, columns=["segment", "quantity", "unit", "difference", "sd", "low", "high", "p", "known"]
+        )
 
 
-CERTAIN = 0.05
+_CERTAIN = 0.05
 """Probability that any of all changes is called certain though nothing changed (Bonferroni)."""
 
 
-def identify(session: Visit, *, reference: Earlier | None = None, tell: Tell = _silent) -> SessionIdentification:
+def identify(session: Visit, *, reference: Earlier | None = None, tell: _Tell = _silent) -> SessionIdentification:
     """Return what every segment of a person weighs, with intervals, validated on the trials kept.
 
     Parameters
@@ -98,8 +104,8 @@ def identify(session: Visit, *, reference: Earlier | None = None, tell: Tell = _
     Returns
     -------
     SessionIdentification
-        ``identification.sip`` (N segments, kg, kg·m, kg·m² in the segments' joint frames) with covariance and `status`, the agreement of
-        table and identified body with the plates on every trial, and the search for an added mass.
+        ``identification.sip`` (N segments, kg, kg·m, kg·m² in the segments' joint frames) with covariance and `status`,
+        the agreement of table and identified body with the plates on every trial, and the search for an added mass.
 
     Raises
     ------
@@ -112,8 +118,8 @@ def identify(session: Visit, *, reference: Earlier | None = None, tell: Tell = _
 
     References
     ----------
-    Bayesian linear regression of the ground wrench on the standard inertial parameters, physically consistent by linear matrix
-    inequalities; docs/derivations.md.
+    Bayesian linear regression of the ground wrench on the standard inertial parameters, physically consistent by linear
+    matrix inequalities; docs/derivations.md.
 
     Examples
     --------
@@ -133,16 +139,18 @@ def diagnose(
     reference: Earlier | None = None,
     effects: Chosen[Effect | DiscreteEffect | type[Effect | DiscreteEffect]] = None,
     tolerances: Tolerances | None = None,
-    tell: Tell = _silent,
+    tell: _Tell = _silent,
 ) -> SessionDiagnosis:
-    """Return what the simulation of a visit gets wrong: cause, size, how sure, what else it could be, and what naming it gains.
+    """Return what the simulation of a visit gets wrong: cause, size, how sure, what else it could be, and what naming
+    it gains.
 
     Parameters
     ----------
     session : Session, SessionResult, str or pathlib.Path
         The visit: as `read_session` or `examine` return it, or its folder.
     reference : SessionIdentification, Session, SessionResult, str or pathlib.Path, optional
-        An earlier visit of the same person without fault or load: the body is then known ten times better than from the table.
+        An earlier visit of the same person without fault or load: the body is then known ten times better than from the
+        table.
     effects : iterable, optional
         The causes to look for, by name or as objects of your own; by default all.
     tolerances : Tolerances, optional
@@ -153,7 +161,8 @@ def diagnose(
     Returns
     -------
     SessionDiagnosis
-        Its `verdict` is "nothing wrong", "named, complete", "named, incomplete" or "unexplained"; `findings` and `table` name the causes.
+        Its `verdict` is "nothing wrong", "named, complete", "named, incomplete" or "unexplained"; `findings` and
+        `table` name the causes.
 
     Raises
     ------
@@ -168,7 +177,8 @@ def diagnose(
 
     References
     ----------
-    Candidate causes are ranked by Bayes factors under the tolerances of everything that is no fault; docs/derivations.md.
+    Candidate causes are ranked by Bayes factors under the tolerances of everything that is no fault;
+    docs/derivations.md.
 
     Examples
     --------
@@ -182,7 +192,7 @@ def diagnose(
     return diagnose_session(result, reference=before, tolerances=tolerances, effects=asked, tell=tell)
 
 
-def compare_sessions(earlier: Earlier, later: Earlier, *, tell: Tell = _silent) -> SessionComparison:
+def compare_sessions(earlier: Earlier, later: Earlier, *, tell: _Tell = _silent) -> SessionComparison:
     """Return what changed in a person from an earlier visit to a later one.
 
     Parameters
@@ -195,7 +205,8 @@ def compare_sessions(earlier: Earlier, later: Earlier, *, tell: Tell = _silent) 
     Returns
     -------
     SessionComparison
-        Every difference of mass (kg), centre of mass (m) and inertia (kg·m²) with its 95 % interval, and the load looked for.
+        Every difference of mass (kg), centre of mass (m) and inertia (kg·m²) with its 95 % interval, and the load
+        looked for.
 
     Raises
     ------
@@ -215,14 +226,14 @@ def compare_sessions(earlier: Earlier, later: Earlier, *, tell: Tell = _silent) 
     return SessionComparison(first, replace(second, changes=differences(first.identification, second.identification)))
 
 
-def _examined(session: Visit, tell: Tell) -> SessionResult:
+def _examined(session: Visit, tell: _Tell) -> SessionResult:
     """Return the visit with all stages done."""
     if isinstance(session, SessionResult):
         return session
     return examine(session if isinstance(session, Session) else read_session(session, tell=tell), tell=tell)
 
 
-def _earlier(session: Earlier, tell: Tell) -> SessionIdentification:
+def _earlier(session: Earlier, tell: _Tell) -> SessionIdentification:
     """Return what a visit says about the body."""
     return session if isinstance(session, SessionIdentification) else identification_of(_examined(session, tell))
 

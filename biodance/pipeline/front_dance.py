@@ -34,7 +34,8 @@ def design_dance(
     limits : str or pathlib.Path, optional
         TOML file with what this person can and may do.
     own_limits : iterable of Limit, optional
-        Limits of your own, kept beside those of the protocol or in place of one of the same name (`biodance.dance.limits`).
+        Limits of your own, kept beside those of the protocol or in place of one of the same name
+        (`biodance.dance.limits`).
     seed : int
         The same seed gives the same dance.
     tell : callable, optional
@@ -58,7 +59,8 @@ def design_dance(
 
     References
     ----------
-    Exciting motions by the condition number of the sub-regressors, weighted with the segments' masses; docs/derivations.md.
+    Exciting motions by the condition number of the sub-regressors, weighted with the segments' masses;
+    docs/derivations.md.
 
     Examples
     --------
@@ -79,7 +81,11 @@ def design_dance(
 
 
 def verify_dance(
-    dance: "Dance | str | Path", protocol: str | Path | None = None, *, limits: str | Path | None = None, body: Body | None = None
+    dance: "Dance | str | Path",
+    protocol: str | Path | None = None,
+    *,
+    limits: str | Path | None = None,
+    body: Body | None = None,
 ) -> "tuple[Margin, ...]":
     """Return what is left of every limit over a whole dance, judged by code that its design did not use.
 
@@ -118,12 +124,15 @@ def verify_dance(
     from biodance.dance.verify import verify
 
     one = dance if isinstance(dance, Dance) else Dance.load(dance)
-    own, plan, _ = fit_to_person(body or one.body, read_plan(protocol or one.protocol), read_person(Path(limits)) if limits else HEALTHY)
+    own, plan, _ = fit_to_person(
+        body or one.body, read_plan(protocol or one.protocol), read_person(Path(limits)) if limits else HEALTHY
+    )
     return verify(own, one, plan.limits)
 
 
 def simulate(subject: Subject, protocol: str, out: str | Path, *, seed: int = 0, effects: Iterable[str] = ()) -> Path:
-    """Write a simulated visit as a laboratory would have: C3D files and session.toml, the truth apart in ``truth/truth.json``.
+    """Write a simulated visit as a laboratory would have: C3D files and session.toml, the truth apart in
+    ``truth/truth.json``.
 
     Parameters
     ----------

@@ -1,4 +1,6 @@
-"""What the session says about the body: identification from the fit trials, validation on the others, search for a load."""
+"""What the session says about the body: identification from the fit trials, validation on the others, search for a
+load.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -26,7 +28,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 UNEXPLAINED = 0.5
-"""kg between plates and identified body over the fit trials: more than the scale's uncertainty, shoes and a zero allow."""
+"""kg between plates and identified body over the fit trials: more than the scale's uncertainty, shoes and a zero
+allow.
+"""
 FITTED_ROLES: tuple[Role, ...] = ("fit",)
 KEPT_ROLES: tuple[Role, ...] = ("validate", "check")
 
@@ -56,8 +60,8 @@ class SessionIdentification:
     notes : tuple of str
         What a person should know.
     failures : mapping
-        What could not be computed ("segments", "reference", "differences"), each with cause and cure: without segments there is nothing
-        to compare, to validate or to drive joints with, and those fields are empty.
+        What could not be computed ("segments", "reference", "differences"), each with cause and cure: without segments
+        there is nothing to compare, to validate or to drive joints with, and those fields are empty.
 
     Examples
     --------
@@ -79,7 +83,10 @@ class SessionIdentification:
 
     def __repr__(self) -> str:
         sip = self.identification.sip
-        return f"SessionIdentification({self.name!r}: {self.status}, {len(sip.segments)} segments, {sip.mass.sum():.1f} kg)"
+        return (
+            f"SessionIdentification({self.name!r}: {self.status}, {len(sip.segments)} segments, "
+            f"{sip.mass.sum():.1f} kg)"
+        )
 
     def _repr_html_(self) -> str:
         return display.card(repr(self), self.table(), self.notes)
@@ -111,11 +118,15 @@ class SessionIdentification:
 
 
 def trial_fit(result: TrialResult) -> Fit | None:
-    """Return what a trial gives to identify from or to validate on; None without motion, wrench or a frame to compare."""
+    """Return what a trial gives to identify from or to validate on; None without motion, wrench or a frame to
+    compare.
+    """
     found = result.comparison
     if found is None or result.motion is None or not found.used.any():
         return None
-    return Fit(result.trial.name, result.motion, Wrench(found.time, found.measured), found.used, result.trial.settings.outlier)
+    return Fit(
+        result.trial.name, result.motion, Wrench(found.time, found.measured), found.used, result.trial.settings.outlier
+    )
 
 
 def can_identify(results: tuple[TrialResult, ...]) -> bool:
@@ -128,8 +139,8 @@ def identify_trials(
 ) -> SessionIdentification:
     """Identify ``body`` from the trials with role fit, validate on those kept, and look for a load.
 
-    ``name`` of the session; ``reference`` an earlier, unloaded session of the same person: what changed since is told, and a load is looked
-    for against it; without it, against the table.
+    ``name`` of the session; ``reference`` an earlier, unloaded session of the same person: what changed since is told,
+    and a load is looked for against it; without it, against the table.
 
     Raises
     ------
@@ -139,14 +150,16 @@ def identify_trials(
     fits, others = _fits(results, FITTED_ROLES), _fits(results, KEPT_ROLES)
     if not fits:
         raise TrialRefused(
-            f"Session {name} has no trial with role fit in which markers and plates measure all, so nothing can be identified. "
+            f"Session {name} has no trial with role fit in which markers and plates measure all, so nothing can be "
+            f"identified. "
             "Record movement on the plates, or set roles in session.toml."
         )
     found = identify_body(body, fits)
     failures = {"segments": found.cause} if found.status == "failed" else {}
     if reference is not None and "segments" in reference.failures:
         failures["reference"] = (
-            f"Session {reference.name} tells no body to compare with, so loads are looked for against the table and no change is told. "
+            f"Session {reference.name} tells no body to compare with, so loads are looked for against the table and "
+            f"no change is told. "
             f"{reference.failures['segments']}"
         )
         reference = None
@@ -166,7 +179,9 @@ def identify_trials(
     return one if found.status == "failed" else _predicted(one, results, fits, others)
 
 
-def _changes(reference: SessionIdentification | None, found: Identification, failures: dict[str, str]) -> tuple[Difference, ...]:
+def _changes(
+    reference: SessionIdentification | None, found: Identification, failures: dict[str, str]
+) -> tuple[Difference, ...]:
     """Return what changed since the session ``reference``; why that cannot be told is added to ``failures``."""
     if reference is None or found.status == "failed":
         return ()
@@ -182,10 +197,15 @@ def _predicted(
 ) -> SessionIdentification:
     """Return the same with what the identified body predicts of all trials."""
     found, about, identified = one.identification, standing_point(fits), one.identification.identified
-    fitted, kept = (tuple(validate(found.body, identified, fit, about=about) for fit in some) for some in (fits, others))
+    fitted, kept = (
+        tuple(validate(found.body, identified, fit, about=about) for fit in some) for some in (fits, others)
+    )
     notes = list(one.notes)
     if not kept:
-        notes.append("No trial was kept for validation, so the gain is not proven. Record squats, or give a trial the role validate.")
+        notes.append(
+            "No trial was kept for validation, so the gain is not proven. Record squats, or give a trial the role "
+            "validate."
+        )
     notes += _weight(fitted, -float(found.body.gravity[2]))
     return replace(
         one,
@@ -199,7 +219,9 @@ def _predicted(
 
 
 def _torques(found: Identification, results: tuple[TrialResult, ...]) -> TorqueBands | None:
-    """Return the joint torques of the first trial kept, else of the first fitted, whose plates tell what each foot carries."""
+    """Return the joint torques of the first trial kept, else of the first fitted, whose plates tell what each foot
+    carries.
+    """
     for role in (*KEPT_ROLES, *FITTED_ROLES):
         for one in results:
             if one.trial.role != role or one.motion is None or one.comparison is None or not one.trial.plates:
@@ -212,13 +234,20 @@ def _torques(found: Identification, results: tuple[TrialResult, ...]) -> TorqueB
 
 
 def _weight(fitted: tuple[TrialValidation, ...], gravity: float) -> list[str]:
-    """Say it where the plates carry another weight than the identified body has: the table's total is pinned to the declared mass."""
-    missing = np.concatenate([(trial.measured.force - trial.identified.force)[trial.use, 2] for trial in fitted]).mean() / gravity
+    """Say it where the plates carry another weight than the identified body has: the table's total is pinned to the
+    declared mass.
+    """
+    missing = (
+        np.concatenate([(trial.measured.force - trial.identified.force)[trial.use, 2] for trial in fitted]).mean()
+        / gravity
+    )
     if abs(missing) <= UNEXPLAINED:
         return []
     return [
-        f"The plates carry {abs(missing):.2f} kg {'more' if missing > 0 else 'less'} than the identified body, whose total is tied to the "
-        "declared mass: a load, or a wrong mass_kg. Until that is settled the masses of single segments and their changes absorb it; see "
+        f"The plates carry {abs(missing):.2f} kg {'more' if missing > 0 else 'less'} than the identified body, whose "
+        f"total is tied to the "
+        "declared mass: a load, or a wrong mass_kg. Until that is settled the masses of single segments and their "
+        "changes absorb it; see "
         "Added mass."
     ]
 

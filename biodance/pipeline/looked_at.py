@@ -22,18 +22,32 @@ from biodance.uncertainty.tolerances import REFERENCE_PERSON, Tolerances, shippe
 
 @dataclass(frozen=True, eq=False)
 class Own:
-    """``tolerances`` that hold for some recordings, ``notes`` on what changed, and whether a name found under them is ``believed``."""
+    """``tolerances`` that hold for some recordings, ``notes`` on what changed, and whether a name found under them
+    is ``believed``.
+    """
 
     tolerances: Tolerances
     notes: tuple[str, ...] = ()
     believed: bool = True
 
 
-ENOUGH = 10.0
+_ENOUGH = 10.0
 """s of fully measured movement beside which quiet standing tells nothing more."""
 MORE = 1.6
-"""So many times as large it must be before soft tissue is believed to be larger than theirs (five real walks: 2.4 to 4.8 times)."""
-SOFT = ("flesh ", "sag ", "slide ", "tilt ", "marker ", "joint_centre ", "segment_length ", "marker_misplaced ", "shown ")
+"""So many times as large it must be before soft tissue is believed to be larger than theirs (five real walks: 2.4 to
+4.8 times).
+"""
+_SOFT = (
+    "flesh ",
+    "sag ",
+    "slide ",
+    "tilt ",
+    "marker ",
+    "joint_centre ",
+    "segment_length ",
+    "marker_misplaced ",
+    "shown ",
+)
 """Keys of the tolerances that grow with it."""
 SWAYING = 0.3
 """Hz: above, what a person who stands still does to the plates is heart, breath and muscles, which no marker shows."""
@@ -42,8 +56,8 @@ UNREST = 1.5
 
 
 def looks(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[Look, ...]:
-    """Return the trials of the given roles that have motion and measured contact, each at its place in the session's time; static trials
-    belong to that time only where they are asked for.
+    """Return the trials of the given roles that have motion and measured contact, each at its place in the session's
+    time; static trials belong to that time only where they are asked for.
     """
     moving = [one for one in results if one.motion is not None and (one.trial.role != "static" or "static" in roles)]
     ends = np.cumsum([float(one.motion.time[-1] - one.motion.time[0]) for one in moving if one.motion is not None])
@@ -57,10 +71,12 @@ def looks(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[Lo
 
 
 def looked_at(results: tuple[TrialResult, ...]) -> tuple[Look, ...]:
-    """Return the trials to look at: those to fit, else those kept, and quiet standing beside them where they are short."""
+    """Return the trials to look at: those to fit, else those kept, and quiet standing beside them where they are
+    short.
+    """
     roles = FITTED_ROLES if looks(results, FITTED_ROLES) else KEPT_ROLES
     moving = looks(results, roles)
-    return moving if sum(map(_seconds, moving)) >= ENOUGH else looks(results, ("static", *roles))
+    return moving if sum(map(_seconds, moving)) >= _ENOUGH else looks(results, ("static", *roles))
 
 
 def left_out(results: tuple[TrialResult, ...]) -> tuple[str, ...]:
@@ -74,7 +90,10 @@ def left_out(results: tuple[TrialResult, ...]) -> tuple[str, ...]:
         if name not in seen:
             notes.append(f"{name} was left out. {' '.join(one.reasons)}".strip())
         elif seen[name] == 0:
-            notes.append(f"{name} was left out: no {SHORTEST_RUN:g} s in which the plates measure all ground contact without a break.")
+            notes.append(
+                f"{name} was left out: no {SHORTEST_RUN:g} s in which the plates measure all ground contact without a "
+                f"break."
+            )
     return tuple(notes)
 
 
@@ -87,17 +106,19 @@ def _seconds(look: Look) -> float:
 
 
 def own_tolerances(body: Body, chosen: tuple[Look, ...]) -> Own:
-    """Return the shipped tolerances as they hold for these recordings: with markers that move more on the body than those of virtual
-    sessions, and with the unrest of a person who stands still where standing is looked at.
+    """Return the shipped tolerances as they hold for these recordings: with markers that move more on the body than
+    those of virtual sessions, and with the unrest of a person who stands still where standing is looked at.
     """
     found, notes = shipped(), []
     factor = soft_tissue(chosen) / error_size("marker_distance", "first quartile", state="after")
     if factor > MORE:
-        sizes = {key: size * (factor if key.startswith(SOFT) else 1.0) for key, size in found.sizes.items()}
+        sizes = {key: size * (factor if key.startswith(_SOFT) else 1.0) for key, size in found.sizes.items()}
         found = replace(found, sizes=sizes)
         notes.append(
-            f"Markers are farther from the body than where tolerances were learned ({factor:.1f} times in the first quartile): soft "
-            "tissue and joints may err as much more, and no cause is named from such movement. Tolerances learned on sessions of your own "
+            f"Markers are farther from the body than where tolerances were learned ({factor:.1f} times in the first "
+            f"quartile): soft "
+            "tissue and joints may err as much more, and no cause is named from such movement. Tolerances learned on "
+            "sessions of your own "
             "laboratory without fault (biodance.diagnosis.learning) hold for it."
         )
     standing = tuple(look for look in chosen if look.trial.role == "static" and _seconds(look) > 0)
@@ -106,14 +127,18 @@ def own_tolerances(body: Body, chosen: tuple[Look, ...]) -> Own:
         found = replace(found, noise=found.noise + shaken * (REFERENCE_PERSON / body.sip.mass.sum()) ** 2)
         size = np.sqrt(np.einsum("b,bcc->c", 2 * np.diff(BANDS.edges) / BANDS.rate, shaken))
         notes.append(
-            f"Standing still, the person moves the forces by {size[:3].max():.1f} N and the moments by {size[3:].max():.1f} N·m above "
-            f"{SWAYING:g} Hz (heart, breath, muscles; root mean square), which no marker shows: a fault must be larger to be seen."
+            f"Standing still, the person moves the forces by {size[:3].max():.1f} N and the moments by "
+            f"{size[3:].max():.1f} N·m above "
+            f"{SWAYING:g} Hz (heart, breath, muscles; root mean square), which no marker shows: a fault must be "
+            f"larger to be seen."
         )
     return Own(found, tuple(notes), believed=factor <= MORE)
 
 
 def soft_tissue(chosen: tuple[Look, ...]) -> float:
-    """Return the first quartile over markers and moving trials of the RMS distance to the body, m: markers that are wrong do not count."""
+    """Return the first quartile over markers and moving trials of the RMS distance to the body, m: markers that are
+    wrong do not count.
+    """
     moving = [look.motion.residual for look in chosen if look.trial.role != "static" and _seconds(look) > 0]
     with np.errstate(invalid="ignore"):
         each = [np.sqrt(np.nanmean(residual**2, axis=0)) for residual in moving if residual.size]
@@ -121,8 +146,8 @@ def soft_tissue(chosen: tuple[Look, ...]) -> float:
 
 
 def unrest(body: Body, standing: tuple[Look, ...], about: Array) -> Array:
-    """Return (B, 6, 6) covariance of a coefficient of what standing still leaves above `SWAYING`, per band, moments about ``about`` (3,) m;
-    zero below.
+    """Return (B, 6, 6) covariance of a coefficient of what standing still leaves above `SWAYING`, per band, moments
+    about ``about`` (3,) m; zero below.
     """
     cases, uses = zip(*(_thinned(body, look) for look in standing), strict=True)
     where = spectrum(cases, uses, about)

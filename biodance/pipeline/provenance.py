@@ -15,15 +15,29 @@ from biodance.library import PACKAGE
 from biodance.pipeline.results import SessionResult
 from biodance.settings import Value
 
-LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "pin", "cvxpy", "clarabel", "pandas", "ezc3d", "trimesh", "pyvista", "matplotlib")
-UNKNOWN = "unknown"
+LIBRARIES = (
+    "numpy",
+    "scipy",
+    "numba",
+    "llvmlite",
+    "pin",
+    "cvxpy",
+    "clarabel",
+    "pandas",
+    "ezc3d",
+    "trimesh",
+    "pyvista",
+    "matplotlib",
+)
+_UNKNOWN = "unknown"
 
 
 @dataclass(frozen=True)
 class Provenance:
-    """``created`` UTC time, ISO 8601: the only thing that differs when the same software runs again on the same files and machine;
-    ``commit`` of biodance, "unknown" in an installed wheel, with "+changed" where files differ from it; ``versions`` library -> version;
-    ``blas`` that numpy multiplies matrices with; ``inputs`` file name -> sha256; ``settings`` dotted key -> value, all of them.
+    """``created`` UTC time, ISO 8601: the only thing that differs when the same software runs again on the same files
+    and machine; ``commit`` of biodance, "unknown" in an installed wheel, with "+changed" where files differ from it;
+    ``versions`` library -> version; ``blas`` that numpy multiplies matrices with; ``inputs`` file name -> sha256;
+    ``settings`` dotted key -> value, all of them.
     """
 
     created: str
@@ -64,27 +78,33 @@ def _name(path: Path, folder: Path) -> str:
 
 @cache
 def commit(package: Path = PACKAGE) -> str:
-    """Return the git commit of the checkout that holds ``package``, with "+changed" where files of it differ; else "unknown"."""
+    """Return the git commit of the checkout that holds ``package``, with "+changed" where files of it differ; else
+    "unknown".
+    """
     if not (package.parent / ".git").exists():
-        return UNKNOWN
+        return _UNKNOWN
     try:
         found = _git(package.parent, "rev-parse", "HEAD")
         return found + ("+changed" if _git(package.parent, "status", "--porcelain", "--untracked-files=no") else "")
     except (OSError, subprocess.SubprocessError):
-        return UNKNOWN
+        return _UNKNOWN
 
 
 def _git(folder: Path, *words: str) -> str:
-    return subprocess.run(["git", *words], cwd=folder, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
+    return subprocess.run(
+        ["git", *words], cwd=folder, capture_output=True, text=True, check=True, timeout=10
+    ).stdout.strip()
 
 
 @cache
 def blas() -> str:
-    """Return which BLAS numpy runs on: the library and version it was built with, and the kernel where that can be asked."""
+    """Return which BLAS numpy runs on: the library and version it was built with, and the kernel where that can be
+    asked.
+    """
     import numpy as np
 
     built = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
-    said = f"{built.get('name', UNKNOWN)} {built.get('version', '')}".strip()
+    said = f"{built.get('name', _UNKNOWN)} {built.get('version', '')}".strip()
     return " ".join([said, *_kernels()])
 
 
@@ -93,11 +113,17 @@ def _kernels() -> list[str]:
     from threadpoolctl import threadpool_info
 
     found = [one for one in threadpool_info() if one.get("user_api") == "blas"]
-    return sorted({f"({one.get('architecture', UNKNOWN)}, {one['num_threads']} threads)" for one in found})
+    return sorted({f"({one.get('architecture', _UNKNOWN)}, {one['num_threads']} threads)" for one in found})
 
 
 def provenance(result: SessionResult, *, created: str) -> Provenance:
     """Collect the provenance of ``result``; ``created`` is the UTC time to write into it (see `now`)."""
-    versions = {"biodance": __version__, "python": platform.python_version(), **{name: _version(name) for name in LIBRARIES}}
-    inputs = {_name(trial.trial.source.path, result.session.folder): trial.trial.source.sha256 for trial in result.trials}
+    versions = {
+        "biodance": __version__,
+        "python": platform.python_version(),
+        **{name: _version(name) for name in LIBRARIES},
+    }
+    inputs = {
+        _name(trial.trial.source.path, result.session.folder): trial.trial.source.sha256 for trial in result.trials
+    }
     return Provenance(created, commit(), versions, blas(), inputs, result.settings.as_dict())

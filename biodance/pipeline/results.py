@@ -1,6 +1,8 @@
-"""What the pipeline found in one session: the records that the report draws and that results.json holds. Computes nothing.
+"""What the pipeline found in one session: the records that the report draws and that results.json holds. Computes
+nothing.
 
-All records are frozen; arrays are in SI units in the lab frame (z up); a wrench is the ground's action on the subject about the lab origin.
+All records are frozen; arrays are in SI units in the lab frame (z up); a wrench is the ground's action on the subject
+about the lab origin.
 """
 
 from collections.abc import Iterator, Mapping
@@ -28,7 +30,8 @@ Status = Literal["ok", "warning", "refused"]
 class Step:
     """One step on one trial or on the session.
 
-    ``status`` "done"; "refused": the data cannot carry it, ``text`` says why and what to do; "failed": a fault of biodance itself.
+    ``status`` "done"; "refused": the data cannot carry it, ``text`` says why and what to do; "failed": a fault of
+    biodance itself.
     """
 
     name: str
@@ -38,7 +41,9 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class MarkerFit:
-    """Distance of the markers to the model: per marker ``names`` (K), ``rms`` and ``max`` (K,) m, NaN = never seen; all together in m."""
+    """Distance of the markers to the model: per marker ``names`` (K), ``rms`` and ``max`` (K,) m, NaN = never seen;
+    all together in m.
+    """
 
     names: tuple[str, ...]
     rms: Array
@@ -51,9 +56,9 @@ class MarkerFit:
 class WrenchComparison:
     """Measured beside simulated wrench.
 
-    ``time`` (T,) s; ``measured``, ``simulated`` (T, 6) N, N·m about the lab origin; ``used`` (T,) True where the plates measure all
-    that the ground does; ``rms`` (6,) N, N·m and ``correlation`` (6,) over the used frames, NaN = not defined; ``notes`` why frames
-    were left out.
+    ``time`` (T,) s; ``measured``, ``simulated`` (T, 6) N, N·m about the lab origin; ``used`` (T,) True where the plates
+    measure all that the ground does; ``rms`` (6,) N, N·m and ``correlation`` (6,) over the used frames, NaN = not
+    defined; ``notes`` why frames were left out.
     """
 
     time: Array
@@ -101,11 +106,13 @@ class WrenchComparison:
 
 @dataclass(frozen=True, eq=False)
 class QuietStanding:
-    """A quiet standing on the plates from ``start`` to ``end`` s; ``mass`` kg on the plates (mean vertical force / g), ``mass_sd`` kg.
+    """A quiet standing on the plates from ``start`` to ``end`` s; ``mass`` kg on the plates (mean vertical force / g),
+    ``mass_sd`` kg.
 
-    ``cop`` and ``com`` (T, 2) m, horizontal lab coordinates of the centre of pressure and of the table's centre of mass (``com`` empty
-    without a tracked motion); ``forward`` (2,) unit vector the subject faces; ``com_ahead``, ``com_left`` m: mean of CoM minus CoP along
-    it and to its left; ``feet`` (F, 2) m foot landmarks and their ``foot_names`` (``left_heel`` ...); ``plates`` (P, 4, 2) m corners.
+    ``cop`` and ``com`` (T, 2) m, horizontal lab coordinates of the centre of pressure and of the table's centre of mass
+    (``com`` empty without a tracked motion); ``forward`` (2,) unit vector the subject faces; ``com_ahead``,
+    ``com_left`` m: mean of CoM minus CoP along it and to its left; ``feet`` (F, 2) m foot landmarks and their
+    ``foot_names`` (``left_heel`` ...); ``plates`` (P, 4, 2) m corners.
     """
 
     trial: str
@@ -127,11 +134,12 @@ class QuietStanding:
 class Still:
     """One instant to draw in 3-D.
 
-    ``bones`` (B, 2, 3) m lines with ``sides`` (B) "left", "right" or "middle"; ``markers`` (K, 3) m as measured; ``plates`` (P, 4, 3) m
-    corners; ``com`` (3,) m; ``force`` and ``cop`` (3,) N, m of the total wrench (NaN = unloaded); ``forward`` (2,) unit vector the
-    subject faces. ``boxes`` (N, 2, 3) m of the segments with ``rotations`` (N, 3, 3) and ``positions`` (N, 3) m in the lab and their
-    ``box_sides``; ``residual`` (3,) N measured minus predicted force, ``load`` (3,) m place of a load that was found (NaN = none);
-    ``about`` what the picture shows, one sentence.
+    ``bones`` (B, 2, 3) m lines with ``sides`` (B) "left", "right" or "middle"; ``markers`` (K, 3) m as measured;
+    ``plates`` (P, 4, 3) m corners; ``com`` (3,) m; ``force`` and ``cop`` (3,) N, m of the total wrench (NaN =
+    unloaded); ``forward`` (2,) unit vector the subject faces. ``boxes`` (N, 2, 3) m of the segments with ``rotations``
+    (N, 3, 3) and ``positions`` (N, 3) m in the lab and their ``box_sides``; ``residual`` (3,) N measured minus
+    predicted force, ``load`` (3,) m place of a load that was found (NaN = none); ``about`` what the picture shows, one
+    sentence.
     """
 
     trial: str
@@ -155,7 +163,9 @@ class Still:
 
 @dataclass(frozen=True)
 class Check:
-    """One row of the quality table: ``value`` as text with unit, the ``limit`` it is held against, and whether it is inside."""
+    """One row of the quality table: ``value`` as text with unit, the ``limit`` it is held against, and whether it is
+    inside.
+    """
 
     what: str
     where: str
@@ -167,7 +177,8 @@ class Check:
 
 @dataclass(frozen=True, eq=False)
 class TrialResult:
-    """One trial after all steps: ``trial`` prepared (as read where preparing was refused); ``gaps`` as recorded, before any was filled.
+    """One trial after all steps: ``trial`` prepared (as read where preparing was refused); ``gaps`` as recorded, before
+    any was filled.
 
     None where the data could not carry a result.
     """
@@ -200,7 +211,9 @@ class TrialResult:
 
     @property
     def status(self) -> Status:
-        """State of the trial: "refused" where no step after preparing was done, "warning" where a person must look, "ok" otherwise."""
+        """State of the trial: "refused" where no step after preparing was done, "warning" where a person must look,
+        "ok" otherwise.
+        """
         if all(step.status != "done" or step.name == "prepare" for step in self.steps):
             return "refused"
         return "warning" if self.reasons else "ok"
@@ -241,10 +254,10 @@ class SessionResult:
         The quiet standing whose weight is compared with the declared mass, or None.
     still : Still or None
         One instant to draw, or None.
-    more_stills : tuple of Still
-        The frame with the largest residual force, and a load that was found.
     identification : SessionIdentification or None
         None where no trial is to be identified from, or it was refused.
+    more_stills : tuple of Still
+        The frame with the largest residual force, and a load that was found.
 
     Examples
     --------
@@ -267,7 +280,10 @@ class SessionResult:
     more_stills: tuple[Still, ...] = ()
 
     def __repr__(self) -> str:
-        return f"SessionResult({self.session.folder.name!r}: {', '.join(f'{one.name} {one.status}' for one in self.trials)})"
+        return (
+            f"SessionResult({self.session.folder.name!r}: "
+            f"{', '.join(f'{one.name} {one.status}' for one in self.trials)})"
+        )
 
     def _repr_html_(self) -> str:
         return display.card(repr(self), self.table(), [self.body_source])
@@ -288,8 +304,8 @@ class SessionResult:
         Returns
         -------
         pandas.DataFrame
-            Index trial; role, status, markers to the body (mm, RMS and largest), measured frames, RMS difference of force (N) and moment
-            (N·m, about the lab origin) between plates and simulation with the table, reason.
+            Index trial; role, status, markers to the body (mm, RMS and largest), measured frames, RMS difference of
+            force (N) and moment (N·m, about the lab origin) between plates and simulation with the table, reason.
 
         Examples
         --------
@@ -338,8 +354,14 @@ class SessionResult:
     @property
     def needs_a_person(self) -> bool:
         """Whether anything was refused, warned about, not computed or outside its limit."""
-        trouble = bool(self.failures) or any(step.status != "done" for step in self.steps) or any(t.status != "ok" for t in self.trials)
-        return trouble or bool(self.session.refused or self.doubts) or any(not check.inside for check in self.all_checks)
+        trouble = (
+            bool(self.failures)
+            or any(step.status != "done" for step in self.steps)
+            or any(t.status != "ok" for t in self.trials)
+        )
+        return (
+            trouble or bool(self.session.refused or self.doubts) or any(not check.inside for check in self.all_checks)
+        )
 
 
 def _row(one: TrialResult) -> dict[str, Any]:

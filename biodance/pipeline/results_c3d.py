@@ -20,18 +20,21 @@ from biodance.pipeline.results import TrialResult
 from biodance.pipeline.standing import centre_of_mass
 from biodance.records import Array, Wrench
 
-NAMES = {True: "Foot Strike", False: "Foot Off"}
+_NAMES = {True: "Foot Strike", False: "Foot Off"}
 
 
-def results_into_c3d(one: TrialResult, body: Body, path: Path, *, source: str, subject: str | None = None) -> tuple[Path, str]:
+def results_into_c3d(
+    one: TrialResult, body: Body, path: Path, *, source: str, subject: str | None = None
+) -> tuple[Path, str]:
     """Write a copy of the C3D file of one trial with its results; return its path and one sentence on what it holds.
 
-    ``body`` that moved, with the parameters to predict with, and ``source`` in words where they come from; ``subject`` the person where
-    the file holds several.
+    ``body`` that moved, with the parameters to predict with, and ``source`` in words where they come from; ``subject``
+    the person where the file holds several.
 
-    Joint angles (deg) and joint moments (N·m, what the muscles do), positive as the joints of the body; measured and predicted wrench
-    about the lab origin (of the prepared, filtered trial); the centre of mass; foot strikes and offs on the plates; in the group BIODANCE
-    the masses of all segments. Moments and wrenches only where the plates measure all that the ground does.
+    Joint angles (deg) and joint moments (N·m, what the muscles do), positive as the joints of the body; measured and
+    predicted wrench about the lab origin (of the prepared, filtered trial); the centre of mass; foot strikes and offs
+    on the plates; in the group BIODANCE the masses of all segments. Moments and wrenches only where the plates measure
+    all that the ground does.
 
     Raises
     ------
@@ -44,14 +47,19 @@ def results_into_c3d(one: TrialResult, body: Body, path: Path, *, source: str, s
     if one.motion is None:
         raise TrialRefused(f"Trial {trial}: it gives no motion, so there are no results to write. {one.reason}")
     if one.trial.source.format != "C3D":
-        raise TrialRefused(f"Trial {trial}: comes from a file of the format {one.trial.source.format}. Only a C3D file is copied as one.")
+        raise TrialRefused(
+            f"Trial {trial}: comes from a file of the format {one.trial.source.format}. Only a C3D file is copied as "
+            f"one."
+        )
     outputs, events = [*_angles(body, one)], tuple[Event, ...]()
     outputs.append(Output("BodyCentreOfMass", "MODELED_MARKERS", centre_of_mass(body, one.motion), "x, y, z"))
     contact = _contact(body, one)
     if contact is not None:
         outputs += [*_wrenches(body, one), *_moments(body, one, contact)]
         feet = foot_wrenches(one.trial, contact, soles_from_body(body, one.motion))
-        events = tuple(Event(event.time, event.side.title(), NAMES[event.down]) for event in foot_events(feet, contact))
+        events = tuple(
+            Event(event.time, event.side.title(), _NAMES[event.down]) for event in foot_events(feet, contact)
+        )
     said: dict[str, FileValue] = {
         "VERSION": [__version__],
         "SOURCE": [source[:255]],
@@ -73,7 +81,9 @@ def _contact(body: Body, one: TrialResult) -> Contact | None:
 
 
 def _groups(body: Body) -> Iterator[tuple[str, list[int], str]]:
-    """Yield name (``RightHip``), indices and names of the axes (``flexion, adduction, rotation``) of every joint of the body."""
+    """Yield name (``RightHip``), indices and names of the axes (``flexion, adduction, rotation``) of every joint of
+    the body.
+    """
     chain: list[int] = []
     for i, joint in enumerate(body.joints):
         chain.append(i)
@@ -115,7 +125,10 @@ def _wrenches(body: Body, one: TrialResult) -> Iterator[Output]:
     assert one.comparison is not None
     found = one.comparison
     predicted = predict_wrench(body, one.motion)
-    for word, wrench in (("Measured", Wrench(found.time, found.measured)), ("Predicted", replace(predicted, time=found.time))):
+    for word, wrench in (
+        ("Measured", Wrench(found.time, found.measured)),
+        ("Predicted", replace(predicted, time=found.time)),
+    ):
         value = np.where(found.used[:, None], wrench.value, np.nan)
         yield Output(f"{word}GroundForce", "FORCES", value[:, :3], "x, y, z of the ground's force on the subject")
         yield Output(f"{word}GroundMoment", "MOMENTS", value[:, 3:], "x, y, z of its moment about the lab origin")

@@ -16,7 +16,7 @@ from biodance.pipeline.trial import attempt, examine_trial, prepare_trial
 from biodance.records import Session
 from biodance.settings import StandingRules
 
-STOPPED = Step("stop", "refused", "Not done: the run was stopped by Ctrl-C before this trial.")
+_STOPPED = Step("stop", "refused", "Not done: the run was stopped by Ctrl-C before this trial.")
 
 
 def examine(
@@ -25,7 +25,8 @@ def examine(
     reference: SessionIdentification | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> SessionResult:
-    """Take a session through all stages: prepare, scale, track, compare, identify; one trial that fails never stops the others.
+    """Take a session through all stages: prepare, scale, track, compare, identify; one trial that fails never stops the
+    others.
 
     Ctrl-C ends the work after the trials that are done; the others say so (``SessionResult.stopped``).
 
@@ -73,13 +74,15 @@ def examine(
             tell(f"tracking {one.trial.name}")
             results.append(examine_trial(one, body, mass=session.subject.mass))
     except KeyboardInterrupt:
-        results += [TrialResult(one.trial, (*one.steps, STOPPED), one.gaps) for one in read[len(results) :]]
+        results += [TrialResult(one.trial, (*one.steps, _STOPPED), one.gaps) for one in read[len(results) :]]
     done = tuple(replace(result, checks=tuple(trial_checks(result, session.subject.mass))) for result in results)
     standing = attempt(steps, "standing", lambda: best_standing(done))
     identification, limits = None, session.settings.checks
     if body is not None and can_identify(done):
         tell("identifying the segments")
-        identification = attempt(steps, "identify", partial(identify_trials, body, done, name=session.folder.name, reference=reference))
+        identification = attempt(
+            steps, "identify", partial(identify_trials, body, done, name=session.folder.name, reference=reference)
+        )
     return SessionResult(
         session=session,
         subject=session.subject,
@@ -114,7 +117,8 @@ def best_standing(results: tuple[TrialResult, ...]) -> QuietStanding:
     if not found:
         shortest = min((one.trial.settings.standing.shortest for one in results), default=StandingRules.shortest)
         raise TrialRefused(
-            f"Nobody stands still for {shortest:g} s with both feet on the plates in any trial, so the declared mass cannot be checked. "
+            f"Nobody stands still for {shortest:g} s with both feet on the plates in any trial, so the declared mass "
+            f"cannot be checked. "
             "Record a few seconds of quiet standing on the plates."
         )
     order = {"static": 0, "check": 1}

@@ -1,7 +1,8 @@
 """Quiet standing on the plates: the mass they carry, and the centre of mass beside the centre of pressure.
 
-Standing still, the mean centre of mass lies over the mean centre of pressure, and the mean vertical force is the weight: two checks
-that need no model of motion. Quiet is the longest run in which the vertical force stays within a few percent of its median.
+Standing still, the mean centre of mass lies over the mean centre of pressure, and the mean vertical force is the
+weight: two checks that need no model of motion. Quiet is the longest run in which the vertical force stays within a few
+percent of its median.
 """
 
 import numpy as np
@@ -16,11 +17,17 @@ from biodance.pipeline.results import QuietStanding
 from biodance.records import Array, Markers, Motion, Trial
 from biodance.settings import StandingRules
 
-FOOT_LANDMARKS = tuple(f"{side}_{place}" for side in ("left", "right") for place in ("heel", "toe", "ankle_lateral", "toe_lateral"))
+FOOT_LANDMARKS = tuple(
+    f"{side}_{place}" for side in ("left", "right") for place in ("heel", "toe", "ankle_lateral", "toe_lateral")
+)
 
 
-def quiet_run(vertical: Array, used: NDArray[np.bool_], rate: float, rules: StandingRules | None = None) -> slice | None:
-    """Return the longest run of ``used`` frames (T,) in which the ``vertical`` force (T,) N is steady; None if it is too short."""
+def quiet_run(
+    vertical: Array, used: NDArray[np.bool_], rate: float, rules: StandingRules | None = None
+) -> slice | None:
+    """Return the longest run of ``used`` frames (T,) in which the ``vertical`` force (T,) N is steady; None if it is
+    too short.
+    """
     rules = rules or StandingRules()
     if not used.any() or np.median(vertical[used]) < rules.force:
         return None
@@ -50,7 +57,11 @@ def _feet(trial: Trial, run: slice) -> tuple[tuple[str, ...], Array]:
         return (), np.empty((0, 2))
     marker_set = read_marker_set(trial.marker_set)
     found = {name: landmark(trial.markers, marker_set, name) for name in FOOT_LANDMARKS}
-    places = {name: np.nanmean(path[run, :2], axis=0) for name, path in found.items() if path is not None and np.isfinite(path[run]).any()}
+    places = {
+        name: np.nanmean(path[run, :2], axis=0)
+        for name, path in found.items()
+        if path is not None and np.isfinite(path[run]).any()
+    }
     return tuple(places), np.array(list(places.values())).reshape(-1, 2)
 
 
@@ -59,10 +70,14 @@ def _still(markers: Markers | None, run: slice, within: float) -> bool:
     return markers is None or movement(Markers(markers.names, markers.time[run], markers.xyz[run])) <= within
 
 
-def quiet_standing(trial: Trial, used: NDArray[np.bool_], body: Body | None, motion: Motion | None) -> QuietStanding | None:
-    """Return the quiet standing of a prepared trial, over the longest steady run of the frames ``used`` (T,); None without one.
+def quiet_standing(
+    trial: Trial, used: NDArray[np.bool_], body: Body | None, motion: Motion | None
+) -> QuietStanding | None:
+    """Return the quiet standing of a prepared trial, over the longest steady run of the frames ``used`` (T,); None
+    without one.
 
-    Steady means the vertical force, and the markers where there are any: walking, too, loads the plates evenly for a moment.
+    Steady means the vertical force, and the markers where there are any: walking, too, loads the plates evenly for a
+    moment.
     """
     wrench, rules = trial.wrench, trial.settings.standing
     run = quiet_run(wrench.force[:, 2], used, wrench.rate, rules)

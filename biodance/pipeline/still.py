@@ -1,4 +1,6 @@
-"""Choose and lay out one instant of a session to draw in 3-D: standing, where the residual is largest, where a load sits."""
+"""Choose and lay out one instant of a session to draw in 3-D: standing, where the residual is largest, where a load
+sits.
+"""
 
 from dataclasses import replace
 
@@ -27,7 +29,9 @@ def _parents(body: Body) -> list[int]:
 
 
 def _tip(box: Array) -> Array:
-    """Return the end (3,) m of a segment without child: the middle of the face of its ``box`` (2, 3) that lies farthest from the origin."""
+    """Return the end (3,) m of a segment without child: the middle of the face of its ``box`` (2, 3) that lies
+    farthest from the origin.
+    """
     middle = box.mean(axis=0)
     side, axis = np.unravel_index(np.argmax(np.abs(box)), box.shape)
     middle[axis] = box[side, axis]
@@ -41,8 +45,8 @@ def _side(segment: str) -> str:
 def bone_lines(body: Body, pose: Poses) -> tuple[Array, tuple[str, ...]]:
     """Return lines (B, 2, 3) m of the first frame of ``pose`` and their sides.
 
-    A segment is drawn from its origin to the origin of its child; to the middle of a left and a right child, which a bar joins; beyond its
-    children, or without any, to the end of its box. Only the trunk reaches beyond its children.
+    A segment is drawn from its origin to the origin of its child; to the middle of a left and a right child, which a
+    bar joins; beyond its children, or without any, to the end of its box. Only the trunk reaches beyond its children.
     """
     parents, place = _parents(body), pose.position[0]
     lines: list[tuple[Array, Array]] = []
@@ -59,7 +63,11 @@ def bone_lines(body: Body, pose: Poses) -> tuple[Array, tuple[str, ...]]:
             draw(pair[0], pair[-1], "middle")
             draw(start, (pair[0] + pair[-1]) / 2, "middle")
             start = (pair[0] + pair[-1]) / 2
-        for j in (j for j, parent in enumerate(parents) if parent == i and (len(pair) < 2 or _side(body.segments[j]) == "middle")):
+        for j in (
+            j
+            for j, parent in enumerate(parents)
+            if parent == i and (len(pair) < 2 or _side(body.segments[j]) == "middle")
+        ):
             draw(place[i], place[j], _side(body.segments[j]))
         if i not in parents or segment.startswith("trunk"):
             draw(start, place[i] + pose.rotation[0, i] @ _tip(body.boxes[i]), _side(segment))
@@ -87,7 +95,10 @@ def still_at(body: Body, one: TrialResult, frame: int) -> Still:
     assert trial.markers is not None
     force, cop = np.full(3, np.nan), np.full(3, np.nan)
     if trial.plates:
-        force, cop = trial.wrench.force[frame], trial.wrench.cop(height=float(np.mean([p.height for p in trial.plates])))[frame]
+        force, cop = (
+            trial.wrench.force[frame],
+            trial.wrench.cop(height=float(np.mean([p.height for p in trial.plates])))[frame],
+        )
     posed = posture_still(body, motion.q[frame], trial.name)
     return replace(
         posed,
@@ -125,7 +136,9 @@ def posture_still(body: Body, q: Array, title: str) -> Still:
 
 
 def worst_still(body: Body, results: tuple[TrialResult, ...]) -> Still | None:
-    """Return the fully measured frame in which the force that ``body`` needs differs most from the measured one; None without any."""
+    """Return the fully measured frame in which the force that ``body`` needs differs most from the measured one;
+    None without any.
+    """
     worst: tuple[float, TrialResult, int, Array] | None = None
     for one in results:
         found, motion = one.comparison, one.motion
@@ -140,12 +153,17 @@ def worst_still(body: Body, results: tuple[TrialResult, ...]) -> Still | None:
         return None
     size_n, one, frame, force = worst
     x, y, z = (f"{value:+.0f}" for value in force)
-    about = f"The worst frame: the plates measured {size_n:.0f} N other than the body needs (x {x}, y {y}, z {z} N; arrow: 1 m for 100 N)."
+    about = (
+        f"The worst frame: the plates measured {size_n:.0f} N other than the body needs (x {x}, y {y}, z {z} N; "
+        f"arrow: 1 m for 100 N)."
+    )
     return replace(still_at(body, one, frame), residual=force, about=about)
 
 
 def load_still(body: Body, results: tuple[TrialResult, ...], search: LoadSearch) -> Still | None:
-    """Return the still of the body with the load that was found, where it sits; None without one, or where its place is not known."""
+    """Return the still of the body with the load that was found, where it sits; None without one, or where its place
+    is not known.
+    """
     if not search.found or not np.isfinite(search.best.place).all():
         return None
     still, best = still_of(body, results), search.best
@@ -153,5 +171,8 @@ def load_still(body: Body, results: tuple[TrialResult, ...], search: LoadSearch)
     assert one.motion is not None
     pose, segment = poses(body, one.motion.q[one.motion.time.size // 2]), body.segment_index(best.segment)
     place = pose.position[0, segment] + pose.rotation[0, segment] @ best.place
-    about = f"The load that was found: {best.mass:.2f} kg ± {best.sd:.2f} kg on the {best.segment.replace('_', ' ')} (yellow)."
+    about = (
+        f"The load that was found: {best.mass:.2f} kg ± {best.sd:.2f} kg on the {best.segment.replace('_', ' ')} "
+        f"(yellow)."
+    )
     return replace(still, load=place, about=about)

@@ -1,6 +1,7 @@
 """What was found in a session as pandas tables: tidy, units in the names of the columns, angles in degrees.
 
-One row is one segment, one check, one marker of a trial, one frame of a trial, one parameter of a finding ...; everything else is SI.
+One row is one segment, one check, one marker of a trial, one frame of a trial, one parameter of a finding ...;
+everything else is SI.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -18,12 +19,12 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 Row = Mapping[str, Any]
-UNITS = {"F": "N", "M": "Nm"}
-AXES = ("x", "y", "z")
-TENSOR = ("xx", "xy", "yy", "xz", "yz", "zz")
+_UNITS = {"F": "N", "M": "Nm"}
+_AXES = ("x", "y", "z")
+_TENSOR = ("xx", "xy", "yy", "xz", "yz", "zz")
 TRIALS = ("trial", "role", "status", "reason", "marker_rms_m", "marker_max_m", "gaps_percent", "frames_used")
 CHECKS = ("what", "where", "value", "limit", "inside", "advice")
-MARKERS = ("trial", "marker", "rms_m", "max_m", "gaps_percent", "longest_gap_s")
+_MARKERS = ("trial", "marker", "rms_m", "max_m", "gaps_percent", "longest_gap_s")
 FINDINGS = (
     "effect",
     "target",
@@ -44,16 +45,17 @@ ADEQUACY = ("channel", "band_low_hz", "band_high_hz", "z", "trial", "second_s")
 def session_tables(result: SessionResult, diagnosis: Diagnosis | None = None) -> dict[str, "DataFrame"]:
     """Return all tables of a session by name.
 
-    Always ``trials``, ``checks``, ``markers`` (distance to the model), ``marker_residuals`` (m by frame), ``angles`` (deg by frame),
-    ``wrench`` (N, N·m by frame: measured, of the table's body, of the identified one, about the lab origin); with an identification
-    ``segments``, ``moments`` (N·m by frame, of the trial whose feet are known) and ``validation``; with a diagnosis ``findings``,
-    ``unobservable`` and ``adequacy``. A table without rows has its columns all the same.
+    Always ``trials``, ``checks``, ``markers`` (distance to the model), ``marker_residuals`` (m by frame), ``angles``
+    (deg by frame), ``wrench`` (N, N·m by frame: measured, of the table's body, of the identified one, about the lab
+    origin); with an identification ``segments``, ``moments`` (N·m by frame, of the trial whose feet are known) and
+    ``validation``; with a diagnosis ``findings``, ``unobservable`` and ``adequacy``. A table without rows has its
+    columns all the same.
     """
     found = result.identification
     tables = {
         "trials": _frame(map(_trial, result.trials), TRIALS),
         "checks": _frame(({name: getattr(check, name) for name in CHECKS} for check in result.all_checks), CHECKS),
-        "markers": _frame((row for one in result.trials for row in _markers(one)), MARKERS),
+        "markers": _frame((row for one in result.trials for row in _markers(one)), _MARKERS),
         "marker_residuals": _joined(map(_residuals, result.trials)),
         "angles": _joined(_angles(result, one) for one in result.trials),
         "wrench": _joined(_wrench(result, one) for one in result.trials),
@@ -88,7 +90,12 @@ def _by_frame(trial: str, time: Array, columns: Mapping[str, Any]) -> "DataFrame
 def _trial(one: TrialResult) -> Row:
     fit, used = one.fit, one.comparison
     nothing = float("nan")
-    values = (fit.total_rms if fit else nothing, fit.total_max if fit else nothing, one.gaps_percent, int(used.used.sum()) if used else 0)
+    values = (
+        fit.total_rms if fit else nothing,
+        fit.total_max if fit else nothing,
+        one.gaps_percent,
+        int(used.used.sum()) if used else 0,
+    )
     return dict(zip(TRIALS, (one.trial.name, one.trial.role, one.status, one.reason, *values), strict=True))
 
 
@@ -98,14 +105,16 @@ def _markers(one: TrialResult) -> Iterable[Row]:
     nothing = (float("nan"), float("nan"))
     for name in dict.fromkeys((*gaps, *distance)):
         values = (one.trial.name, name, *distance.get(name, nothing), *gaps.get(name, nothing))
-        yield dict(zip(MARKERS, values, strict=True))
+        yield dict(zip(_MARKERS, values, strict=True))
 
 
 def _residuals(one: TrialResult) -> "DataFrame | None":
     motion = one.motion
     if motion is None:
         return None
-    return _by_frame(one.trial.name, motion.time, {f"{name}_m": motion.residual[:, k] for k, name in enumerate(motion.marker_names)})
+    return _by_frame(
+        one.trial.name, motion.time, {f"{name}_m": motion.residual[:, k] for k, name in enumerate(motion.marker_names)}
+    )
 
 
 def _angles(result: SessionResult, one: TrialResult) -> "DataFrame | None":
@@ -113,7 +122,9 @@ def _angles(result: SessionResult, one: TrialResult) -> "DataFrame | None":
         return None
     names, motion = [joint.name for joint in result.body.joints], one.motion
     angle = np.degrees(motion.q[:, motion.q.shape[1] - len(names) :])
-    columns: dict[str, Any] = {"determined": motion.determined} | {f"{name}_deg": angle[:, j] for j, name in enumerate(names)}
+    columns: dict[str, Any] = {"determined": motion.determined} | {
+        f"{name}_deg": angle[:, j] for j, name in enumerate(names)
+    }
     return _by_frame(one.trial.name, motion.time, columns)
 
 
@@ -128,12 +139,15 @@ def _wrench(result: SessionResult, one: TrialResult) -> "DataFrame | None":
 
 
 def _six(what: str, value: Array) -> dict[str, Array]:
-    return {f"{what}_{channel}_{UNITS[channel[0]]}": value[:, k] for k, channel in enumerate(CHANNELS)}
+    return {f"{what}_{channel}_{_UNITS[channel[0]]}": value[:, k] for k, channel in enumerate(CHANNELS)}
 
 
 def _segments(found: SessionIdentification) -> "DataFrame":
-    names = ["mass_kg", *(f"com_{a}_m" for a in AXES), *(f"inertia_{t}_kgm2" for t in TENSOR)]
-    columns = ["segment", *(f"{name}{kind}" for name in names for kind in ("", "_sd", "_table", "_table_sd", "_from_data"))]
+    names = ["mass_kg", *(f"com_{a}_m" for a in _AXES), *(f"inertia_{t}_kgm2" for t in _TENSOR)]
+    columns = [
+        "segment",
+        *(f"{name}{kind}" for name in names for kind in ("", "_sd", "_table", "_table_sd", "_from_data")),
+    ]
     rows = []
     for segment in found.identification.sip.segments:
         known = [one for one in found.identification.known if one.segment == segment]
@@ -148,19 +162,32 @@ def _moments(found: SessionIdentification) -> "DataFrame":
         return _joined(())
     columns: dict[str, Any] = {"used": bands.use}
     for j, name in enumerate(bands.joints):
-        columns |= {f"{name}_Nm": bands.torque[:, j], f"{name}_Nm_sd": bands.sd[:, j], f"{name}_Nm_table": bands.table[:, j]}
+        columns |= {
+            f"{name}_Nm": bands.torque[:, j],
+            f"{name}_Nm_sd": bands.sd[:, j],
+            f"{name}_Nm_table": bands.table[:, j],
+        }
     return _by_frame(bands.trial, bands.time, columns)
 
 
 def _validation(found: SessionIdentification) -> "DataFrame":
-    columns = ("trial", "kept", "channel", "unit", "rms_table", "rms_identified", "correlation_table", "correlation_identified")
+    columns = (
+        "trial",
+        "kept",
+        "channel",
+        "unit",
+        "rms_table",
+        "rms_identified",
+        "correlation_table",
+        "correlation_identified",
+    )
     rows = []
     for kept, trials in ((True, found.validations), (False, found.fitted)):
         for one in trials:
             table, identified = one.table_agreement, one.identified_agreement
             for k, channel in enumerate(CHANNELS):
                 values = (table.rms[k], identified.rms[k], table.correlation[k], identified.correlation[k])
-                rows.append(dict(zip(columns, (one.name, kept, channel, UNITS[channel[0]], *values), strict=True)))
+                rows.append(dict(zip(columns, (one.name, kept, channel, _UNITS[channel[0]], *values), strict=True)))
     return _frame(rows, columns)
 
 
@@ -170,7 +197,11 @@ def _diagnosed(one: Diagnosis) -> dict[str, "DataFrame"]:
         gain = finding.gain.ci95 if finding.gain else (float("nan"), float("nan"))
         about = (finding.visible_fraction, finding.log_bayes_factor, *gain, finding.advice)
         for p in finding.parameters:
-            rows.append(dict(zip(FINDINGS, (finding.effect, finding.target, p.name, p.value, p.sd, p.unit, *about), strict=True)))
+            rows.append(
+                dict(
+                    zip(FINDINGS, (finding.effect, finding.target, p.name, p.value, p.sd, p.unit, *about), strict=True)
+                )
+            )
     left = [dict(zip(ADEQUACY, (a.channel, *a.band_hz, a.z, a.trial, a.second), strict=True)) for a in one.adequacy]
     return {
         "findings": _frame(rows, FINDINGS),

@@ -29,8 +29,8 @@ log = logging.getLogger(__name__)
 def attempt(steps: list[Step], name: str, work: Callable[[], T]) -> T | None:
     """Do ``work``, append what became of it to ``steps`` and return its result; None where it was refused or failed.
 
-    A `BiodanceError` is a refusal: the data cannot carry this step. Any other exception is a fault of biodance: it is named as such, its
-    traceback goes to the log (level debug), and the remaining steps are done all the same.
+    A `BiodanceError` is a refusal: the data cannot carry this step. Any other exception is a fault of biodance: it is
+    named as such, its traceback goes to the log (level debug), and the remaining steps are done all the same.
     """
     try:
         value = work()
@@ -39,7 +39,10 @@ def attempt(steps: list[Step], name: str, work: Callable[[], T]) -> T | None:
         return None
     except Exception as error:
         log.debug("step %s failed", name, exc_info=True)
-        fault = f"biodance itself failed in the step {name} ({type(error).__name__}: {error}); the rest was done. Please report this."
+        fault = (
+            f"biodance itself failed in the step {name} ({type(error).__name__}: {error}); the rest was done. "
+            f"Please report this."
+        )
         steps.append(Step(name, "failed", fault))
         return None
     steps.append(Step(name, "done"))
@@ -84,7 +87,9 @@ def marker_fit(motion: Motion) -> MarkerFit:
     rms = np.sqrt(np.divide(total.sum(axis=0), count, out=np.full(count.shape, np.nan), where=count > 0))
     largest = np.where(count > 0, np.where(seen, motion.residual, -np.inf).max(axis=0, initial=-np.inf), np.nan)
     overall = np.sqrt(total.sum() / count.sum()) if count.any() else np.nan
-    return MarkerFit(motion.marker_names, rms, largest, float(overall), float(np.nanmax(largest)) if count.any() else np.nan)
+    return MarkerFit(
+        motion.marker_names, rms, largest, float(overall), float(np.nanmax(largest)) if count.any() else np.nan
+    )
 
 
 def feet(trial: Trial, body: Body | None, motion: Motion | None) -> Soles:
@@ -104,7 +109,8 @@ def feet(trial: Trial, body: Body | None, motion: Motion | None) -> Soles:
 
 
 def compare_wrenches(trial: Trial, body: Body, motion: Motion, contact: Contact) -> WrenchComparison:
-    """Compare the measured wrench of a prepared trial with the one that ``motion`` needs, over the fully measured frames.
+    """Compare the measured wrench of a prepared trial with the one that ``motion`` needs, over the fully measured
+    frames.
 
     Raises
     ------
@@ -115,15 +121,21 @@ def compare_wrenches(trial: Trial, body: Body, motion: Motion, contact: Contact)
     if np.nanmax(measured.force[:, 2], initial=0.0) < trial.settings.standing.force:
         raise TrialRefused(f"Trial {trial.name}: nobody stands on the plates, so there is no wrench to compare with.")
     if not contact.measured.any():
-        raise TrialRefused(f"Trial {trial.name}: {' '.join(contact.notes)} So measured and simulated wrench cannot be compared.")
+        raise TrialRefused(
+            f"Trial {trial.name}: {' '.join(contact.notes)} So measured and simulated wrench cannot be compared."
+        )
     chosen = contact.measured & motion.determined
     if not chosen.any():
-        raise TrialRefused(f"Trial {trial.name}: in no fully measured frame do the markers fix the posture. See the gaps of the trial.")
+        raise TrialRefused(
+            f"Trial {trial.name}: in no fully measured frame do the markers fix the posture. See the gaps of the trial."
+        )
     agreement = compare(measured, simulated, chosen)
     known = np.isfinite(measured.value).all(axis=1) & np.isfinite(simulated.value).all(axis=1)
     correlation = np.array([np.nan if value is None else value for value in agreement.correlation])
     notes = (*contact.notes, *agreement.notes)
-    return WrenchComparison(measured.time, measured.value, simulated.value, chosen & known, agreement.rms, correlation, notes)
+    return WrenchComparison(
+        measured.time, measured.value, simulated.value, chosen & known, agreement.rms, correlation, notes
+    )
 
 
 def track_trial(trial: Trial, body: Body | None) -> Motion:
@@ -138,7 +150,8 @@ def track_trial(trial: Trial, body: Body | None) -> Motion:
         raise TrialRefused(f"Trial {trial.name}: it has no markers, so no motion; only its plates are reported.")
     if not trial.marker_set:
         raise TrialRefused(
-            f"Trial {trial.name}: its {len(trial.markers.names)} labels are of no known marker set, so no body can follow them. "
+            f"Trial {trial.name}: its {len(trial.markers.names)} labels are of no known marker set, so no body can "
+            f"follow them. "
             "Label them as in anthropometry/marker_sets, or describe your own set in a TOML file of that form "
             "and give it with --markers FILE, or say [markers] file or map in session.toml."
         )
@@ -158,7 +171,13 @@ def examine_trial(read: Prepared, body: Body | None, *, mass: float) -> TrialRes
     motion = attempt(steps, "track", lambda: track_trial(trial, body))
     fit = marker_fit(motion) if motion else None
     if not trial.plates:
-        steps.append(Step("wrench", "refused", f"Trial {trial.name}: it has no usable force plate, so there is no wrench to compare with."))
+        steps.append(
+            Step(
+                "wrench",
+                "refused",
+                f"Trial {trial.name}: it has no usable force plate, so there is no wrench to compare with.",
+            )
+        )
         return TrialResult(trial, tuple(steps), read.gaps, fit, motion)
     if not trial.marker_set:
         everything = np.ones(trial.wrench.time.size, dtype=bool)

@@ -1,8 +1,8 @@
 """The frozen records that every stage of biodance speaks.
 
-Conventions, everywhere behind the reader: SI units (m, kg, s, N, N·m, rad); lab frame with z up; wrenches are the ground's
-action ON the subject, about the lab origin, force first; time is the first axis; NaN means "not seen". Arrays are copied,
-checked for shape at birth and read-only afterwards; change a record with ``dataclasses.replace``.
+Conventions, everywhere behind the reader: SI units (m, kg, s, N, N·m, rad); lab frame with z up; wrenches are the
+ground's action ON the subject, about the lab origin, force first; time is the first axis; NaN means "not seen". Arrays
+are copied, checked for shape at birth and read-only afterwards; change a record with ``dataclasses.replace``.
 """
 
 from biodance.records.arrays import CHANNEL_TITLES, CHANNELS, Array, Index, by_name, frozen_array

@@ -53,7 +53,9 @@ def check_time(time: ArrayLike, what: str) -> Array:
     time = frozen_array(time, (None,), f"{what}.time")
     if time.size > 1 and not np.all(np.diff(time) > 0):
         frame = int(np.argmin(np.diff(time) > 0))
-        raise BiodanceError(f"{what}.time does not increase at sample {frame + 1} ({time[frame]:g} s, {time[frame + 1]:g} s).")
+        raise BiodanceError(
+            f"{what}.time does not increase at sample {frame + 1} ({time[frame]:g} s, {time[frame + 1]:g} s)."
+        )
     return time
 
 
@@ -69,7 +71,9 @@ def rate_of(time: Array) -> float:
 
 
 def by_name(trials: Iterable[Named], name: str, kind: str) -> Named:
-    """Return the one of ``trials`` that has a ``name``; UnknownName says what it is no ``kind`` of and lists all names."""
+    """Return the one of ``trials`` that has a ``name``; UnknownName says what it is no ``kind`` of and lists all
+    names.
+    """
     found = {one.name: one for one in trials}
     if name not in found:
         raise UnknownName.of(kind, name, tuple(found))

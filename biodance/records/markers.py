@@ -104,7 +104,9 @@ class Markers:
         ('LASI', 'RASI')
         """
         names = tuple(names)
-        return Markers(names, self.time, np.stack([self[n] for n in names], axis=1) if names else np.empty((self.time.size, 0, 3)))
+        return Markers(
+            names, self.time, np.stack([self[n] for n in names], axis=1) if names else np.empty((self.time.size, 0, 3))
+        )
 
     def table(self) -> "pd.DataFrame":
         """Return the trajectories as a table.

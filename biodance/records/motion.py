@@ -26,7 +26,8 @@ class Motion:
     q : array_like
         (T, nq). A free-flyer root comes first: x y z m, quaternion x y z w, then joint angles rad.
     v, a : array_like
-        (T, nv) velocity and acceleration; of the root linear, then angular, in the root's OWN frame; m/s, rad/s and per s.
+        (T, nv) velocity and acceleration; of the root linear, then angular, in the root's OWN frame; m/s, rad/s and per
+        s.
     residual : array_like
         (T, K) m, distance of every marker to the model; NaN = not seen.
     marker_names : tuple of str
@@ -78,11 +79,16 @@ class Motion:
         )
         if self.joint_names and self._root + len(self.joint_names) != self.q.shape[1]:
             names, columns = len(self.joint_names), self.q.shape[1]
-            raise BiodanceError(f"Motion.joint_names has {names} names for {columns} columns of q, {self._root} of them the root's.")
+            raise BiodanceError(
+                f"Motion.joint_names has {names} names for {columns} columns of q, {self._root} of them the root's."
+            )
 
     def __repr__(self) -> str:
         left = int(np.sum(~self.determined))
-        return f"Motion({self.q.shape[1] - self._root} joint angles, {span(self.time)}{f', {left} frames left open' if left else ''})"
+        return (
+            f"Motion({self.q.shape[1] - self._root} joint angles, "
+            f"{span(self.time)}{f', {left} frames left open' if left else ''})"
+        )
 
     def _repr_html_(self) -> str:
         return display.card(repr(self), self.table().describe(), self.notes)
@@ -113,7 +119,8 @@ class Motion:
         Returns
         -------
         pandas.DataFrame
-            Index time (s); ``root x (m)`` ..., ``root qx`` ... (quaternion), then joint angles, ``left_knee_flexion (deg)`` and so on.
+            Index time (s); ``root x (m)`` ..., ``root qx`` ... (quaternion), then joint angles, ``left_knee_flexion
+            (deg)`` and so on.
 
         Examples
         --------

@@ -107,7 +107,11 @@ class Trial:
 
     def __repr__(self) -> str:
         row = self._row()
-        worn = f"{row['markers']} markers ({self.marker_set or 'no known set'})" if self.markers is not None else "no markers"
+        worn = (
+            f"{row['markers']} markers ({self.marker_set or 'no known set'})"
+            if self.markers is not None
+            else "no markers"
+        )
         plates = f"{len(self.plates)} plate{'s' if len(self.plates) != 1 else ''}"
         return f"Trial({self.name!r}, {self.role}, {worn}, {plates}, {row['duration (s)']:.2f} s)"
 
@@ -116,7 +120,13 @@ class Trial:
 
     def _row(self) -> dict[str, Any]:
         """Return what the table of a session says about this trial."""
-        time = self.markers.time if self.markers is not None else self.plates[0].wrench.time if self.plates else np.zeros(0)
+        time = (
+            self.markers.time
+            if self.markers is not None
+            else self.plates[0].wrench.time
+            if self.plates
+            else np.zeros(0)
+        )
         return {
             "trial": self.name,
             "role": self.role,
@@ -133,7 +143,9 @@ class Trial:
     def wrench(self) -> Wrench:
         """Total wrench of all plates about the lab origin; TrialRefused without plates or with different time bases."""
         if not self.plates:
-            raise TrialRefused(f"Trial {self.name}: no force plate was recorded, so there is no wrench. Record with the plates on.")
+            raise TrialRefused(
+                f"Trial {self.name}: no force plate was recorded, so there is no wrench. Record with the plates on."
+            )
         time = self.plates[0].wrench.time
         if any(not np.array_equal(p.wrench.time, time) for p in self.plates):
             raise TrialRefused(f"Trial {self.name}: the plates have different time bases; prepare the trial first.")
@@ -172,7 +184,8 @@ class Session:
     >>> session["squat1"]
     Traceback (most recent call last):
         ...
-    biodance.errors.UnknownName: 'squat1' is not a trial of session visit. Did you mean 'squat_1'? Legal: dance_1, squat_1, static.
+    biodance.errors.UnknownName: 'squat1' is not a trial of session visit. Did you mean 'squat_1'? Legal: dance_1,
+    squat_1, static.
     """
 
     subject: Subject
@@ -183,7 +196,9 @@ class Session:
 
     def __post_init__(self) -> None:
         if any(trial.settings != self.settings for trial in self.trials):
-            raise BiodanceError("The trials of this session were read with different settings. Read them again together.")
+            raise BiodanceError(
+                "The trials of this session were read with different settings. Read them again together."
+            )
 
     def __repr__(self) -> str:
         told = ", ".join(f"{trial.name} ({trial.role})" for trial in self.trials[:6])
@@ -192,7 +207,9 @@ class Session:
         return f"Session({self.folder.name!r}, {len(self.trials)} trials: {told}{more}{left})"
 
     def _repr_html_(self) -> str:
-        return display.card(repr(self), self.table(), (*(f"Refused: {why}" for why in self.refused.values()), *self.notes))
+        return display.card(
+            repr(self), self.table(), (*(f"Refused: {why}" for why in self.refused.values()), *self.notes)
+        )
 
     def __getitem__(self, name: str) -> Trial:
         """Return the trial of that name; UnknownName lists all names."""
@@ -247,4 +264,6 @@ class Session:
         """
         import pandas as pd
 
-        return pd.DataFrame([trial._row() for trial in self.trials]).set_index("trial") if self.trials else pd.DataFrame()
+        return (
+            pd.DataFrame([trial._row() for trial in self.trials]).set_index("trial") if self.trials else pd.DataFrame()
+        )

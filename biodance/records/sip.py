@@ -13,7 +13,13 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-INERTIAL = ("mass (kg)", "com x (m)", "com y (m)", "com z (m)", *(f"I{axes} (kg·m²)" for axes in ("xx", "xy", "yy", "xz", "yz", "zz")))
+INERTIAL = (
+    "mass (kg)",
+    "com x (m)",
+    "com y (m)",
+    "com z (m)",
+    *(f"I{axes} (kg·m²)" for axes in ("xx", "xy", "yy", "xz", "yz", "zz")),
+)
 """Columns of a table of segments: centre of mass and inertia in and about the segment's joint frame."""
 
 
@@ -26,8 +32,8 @@ class Sip:
     segments : tuple of str
         (N) names.
     phi : array_like
-        (10N,) segment after segment, each [m, mcx, mcy, mcz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz] (Pinocchio's order) in kg, kg·m, kg·m²; first
-        moment and inertia about and in the segment's JOINT frame.
+        (10N,) segment after segment, each [m, mcx, mcy, mcz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz] (Pinocchio's order) in kg,
+        kg·m, kg·m²; first moment and inertia about and in the segment's JOINT frame.
     covariance : array_like
         (10N, 10N) in the same units.
 
@@ -108,7 +114,8 @@ class Sip:
         Returns
         -------
         pandas.DataFrame
-            Index segment; ``mass (kg)``, ``mass sd (kg)``, ``com x (m)`` ..., ``Ixx (kg·m²)`` ..., in and about the segment's joint frame.
+            Index segment; ``mass (kg)``, ``mass sd (kg)``, ``com x (m)`` ..., ``Ixx (kg·m²)`` ..., in and about the
+            segment's joint frame.
 
         Examples
         --------

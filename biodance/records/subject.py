@@ -68,4 +68,6 @@ class Subject:
         unknown = [quantity for quantity in quantities if np.isnan(getattr(self, quantity))]
         if unknown:
             verb, wanted = "is" if len(unknown) == 1 else "are", " and ".join(keys[quantity] for quantity in unknown)
-            raise SessionRefused(f"{self.name or 'Subject'}: the {' and '.join(unknown)} {verb} not known. Set {wanted} in session.toml.")
+            raise SessionRefused(
+                f"{self.name or 'Subject'}: the {' and '.join(unknown)} {verb} not known. Set {wanted} in session.toml."
+            )

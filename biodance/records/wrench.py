@@ -6,7 +6,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from biodance import display
-from biodance.records.arrays import CHANNEL_TITLES, CHANNELS, Array, assign, check_time, frozen_array, in_time, rate_of, span
+from biodance.records.arrays import (
+    CHANNEL_TITLES,
+    CHANNELS,
+    Array,
+    assign,
+    check_time,
+    frozen_array,
+    in_time,
+    rate_of,
+    span,
+)
 from biodance.settings import COP_FORCE
 
 if TYPE_CHECKING:
@@ -182,7 +192,10 @@ class Plate:
     zero: Array = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
-        corners, zero = frozen_array(self.corners, (4, 3), f"{self.name}.corners"), frozen_array(self.zero, (3,), f"{self.name}.zero")
+        corners, zero = (
+            frozen_array(self.corners, (4, 3), f"{self.name}.corners"),
+            frozen_array(self.zero, (3,), f"{self.name}.zero"),
+        )
         assign(self, corners=corners, zero=zero, decisions=tuple(self.decisions))
 
     def __repr__(self) -> str:

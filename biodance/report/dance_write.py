@@ -1,4 +1,6 @@
-"""Write a designed dance into a folder: for programs, for the motion-capture screen, for the robot, for the person who calls it."""
+"""Write a designed dance into a folder: for programs, for the motion-capture screen, for the robot, for the person
+who calls it.
+"""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,7 +21,7 @@ from biodance.report.documents.session import plain_values, to_text
 from biodance.report.figures.dance import criterion_figure, expectation_figure, postures_figure, zmp_figure
 from biodance.report.figures.solid import solid_pngs
 
-RATE = 100.0
+_RATE = 100.0
 """Hz of the preview's markers."""
 SIDES = ("right", "left")
 DOTS = 160
@@ -62,7 +64,10 @@ def write_dance(result: DanceResult, folder: Path) -> dict[str, Any]:
 def dance_document(result: DanceResult) -> dict[str, Any]:
     """Return what `biodance dance` promises as results.json (see docs/guide/dance.md); SI units by suffix."""
     dance, account, expectation = result.dance, result.account, result.expectation
-    limits = [{"limit": m.limit, "worst": m.worst, "where_s": m.where_s, "unit": m.unit, "what": m.what} for m in result.margins]
+    limits = [
+        {"limit": m.limit, "worst": m.worst, "where_s": m.where_s, "unit": m.unit, "what": m.what}
+        for m in result.margins
+    ]
     criterion = None
     if account is not None:
         criterion = {
@@ -100,12 +105,23 @@ def _curve(result: DanceResult) -> dict[str, Any] | None:
     if result.expectation is None:
         return None
     e = result.expectation
-    return {"segments": e.segments, "duration_s": e.duration, "mass_kg": e.mass, "com_m": e.com, "inertia_kgm2": e.inertia}
+    return {
+        "segments": e.segments,
+        "duration_s": e.duration,
+        "mass_kg": e.mass,
+        "com_m": e.com,
+        "inertia_kgm2": e.inertia,
+    }
 
 
 def _held(dance: Dance, chosen: Sequence[int]) -> tuple[Any, Any, Any]:
     """Return coordinates, rates and accelerations (K, n) of the chosen postures."""
-    x = np.array([dance.chain.plant(dance.postures[p][None], dance.stances[p].planted, dance.stances[p].ankle)[0] for p in chosen])
+    x = np.array(
+        [
+            dance.chain.plant(dance.postures[p][None], dance.stances[p].planted, dance.stances[p].ankle)[0]
+            for p in chosen
+        ]
+    )
     return x, np.zeros_like(x), np.zeros_like(x)
 
 
@@ -116,18 +132,22 @@ def _short(stance: Stance) -> str:
 
 
 def cues(dance: Dance) -> str:
-    """Return the cue sheet of all postures, those in between included: in words for a person, joint angles for a robot without markers."""
+    """Return the cue sheet of all postures, those in between included: in words for a person, joint angles for a
+    robot without markers.
+    """
     if not dance.body.markers.names:
         return angle_sheet(dance, _held(dance, range(len(dance.stances)))[0][:, 6:])
     words = tuple(stance_words(s) for s in dance.stances)
     angles = _held(dance, range(len(dance.stances)))[0][:, 6:]
     planted = tuple(tuple(SIDES[side] for side in s.planted) for s in dance.stances)
-    return cue_sheet(dance.body, angles, words, planted, move=float(np.median(dance.move)), hold=float(np.max(dance.hold)))
+    return cue_sheet(
+        dance.body, angles, words, planted, move=float(np.median(dance.move)), hold=float(np.max(dance.hold))
+    )
 
 
 def write_preview(dance: Dance, path: Path) -> None:
     """Write the dance as virtual markers at 100 Hz: what the cameras will see of a person who dances it exactly."""
-    motion, markers = dance.motion(RATE), dance.body.markers
+    motion, markers = dance.motion(_RATE), dance.body.markers
     xyz = poses(dance.body, motion.q).points(list(markers.segment), markers.position)
     weight = float(dance.body.sip.mass.sum())
     path.unlink(missing_ok=True)
@@ -140,7 +160,12 @@ def write_preview(dance: Dance, path: Path) -> None:
 
 def margin_table(margins: Sequence[Margin]) -> str:
     """Return the margins as a Markdown table: what is left of every limit where it is tightest."""
-    lines = ["# What is left of every limit", "", "Checked on the finished dance, every 0.01 s, by other code than its design.", ""]
+    lines = [
+        "# What is left of every limit",
+        "",
+        "Checked on the finished dance, every 0.01 s, by other code than its design.",
+        "",
+    ]
     lines += ["| limit | least margin | unit | at, s | of |", "|---|---|---|---|---|"]
     lines += [f"| {_plain(m.limit)} | {m.worst:.4g} | {m.unit} | {m.where_s:.2f} | {_plain(m.what)} |" for m in margins]
     return "\n".join(lines) + "\n"
@@ -158,11 +183,21 @@ def print_dance(found: dict[str, Any]) -> None:
     console = Console()
     if found["feasible"]:
         criterion = found["criterion"]
-        console.print(f"{found['postures']} postures, {found['transitions']} moves, {found['duration_s']:.0f} s ({found['protocol']})")
-        console.print(f"static criterion {criterion['static']:.1f} kg, {criterion['static'] / criterion['static_bound']:.2f} of its bound")
+        console.print(
+            f"{found['postures']} postures, {found['transitions']} moves, {found['duration_s']:.0f} s "
+            f"({found['protocol']})"
+        )
+        console.print(
+            f"static criterion {criterion['static']:.1f} kg, {criterion['static'] / criterion['static_bound']:.2f} of "
+            f"its bound"
+        )
         for rows, keys, title in (
             (found["margins"], ("limit", "worst", "unit", "where_s", "what"), "least margins"),
-            (found["expected_sd"], ("segment", "mass_kg", "mass_table_kg", "com_m", "com_table_m"), "expected standard deviations"),
+            (
+                found["expected_sd"],
+                ("segment", "mass_kg", "mass_table_kg", "com_m", "com_table_m"),
+                "expected standard deviations",
+            ),
         ):
             table = Table(box=None, pad_edge=False, title=title, title_justify="left")
             for key in keys:
@@ -181,7 +216,9 @@ SETPOINT_RATE = 100.0
 
 
 def write_angles(dance: Dance, path: Path) -> None:
-    """Write time (s), place of the root (m), its quaternion x y z w, and all joint angles (rad) at 100 Hz as CSV, lab frame, z up."""
+    """Write time (s), place of the root (m), its quaternion x y z w, and all joint angles (rad) at 100 Hz as CSV,
+    lab frame, z up.
+    """
     motion = dance.motion(SETPOINT_RATE)
     names = ["time_s", *(f"root_{axis}_m" for axis in "xyz"), *(f"root_q{axis}" for axis in "xyzw")]
     names += [f"{joint.name}_rad" for joint in dance.body.joints]
@@ -191,7 +228,9 @@ def write_angles(dance: Dance, path: Path) -> None:
 
 
 def angle_sheet(dance: Dance, angles: Array) -> str:
-    """Return the postures as a Markdown table of joint angles, degrees: ``angles`` (P, n) rad of all postures of the dance."""
+    """Return the postures as a Markdown table of joint angles, degrees: ``angles`` (P, n) rad of all postures of the
+    dance.
+    """
     joints = [joint.name for joint in dance.body.joints]
     lines = [
         "# The dance, posture by posture",

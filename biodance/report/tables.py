@@ -1,4 +1,6 @@
-"""Write tables into a folder: each as CSV, for eyes and spreadsheets, and as Parquet, which keeps types and is read ten times faster."""
+"""Write tables into a folder: each as CSV, for eyes and spreadsheets, and as Parquet, which keeps types and is read
+ten times faster.
+"""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,7 +20,8 @@ def tables_folder(folder: Path, session: Path, *, force: bool) -> Path:
     Raises
     ------
     SessionRefused
-        It is the session folder or one above it, a file, holds anything else than tables, or holds tables and not ``force``.
+        It is the session folder or one above it, a file, holds anything else than tables, or holds tables and not
+        ``force``.
     """
     folder, session = folder.resolve(), session.resolve()
     if folder == session or folder in session.parents:
@@ -29,11 +32,15 @@ def tables_folder(folder: Path, session: Path, *, force: bool) -> Path:
     other = [name for name in files if Path(name).suffix not in ENDINGS]
     if files and (other or not force):
         wanted = "Give another folder for --tables" if other else "Give another folder, or --force"
-        raise SessionRefused(f"{folder}: holds files already ({(other or files)[0]}) and nothing is overwritten. {wanted}.")
+        raise SessionRefused(
+            f"{folder}: holds files already ({(other or files)[0]}) and nothing is overwritten. {wanted}."
+        )
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise SessionRefused(f"{folder}: cannot be made ({error.strerror or error}). Choose a place where you may write.") from error
+        raise SessionRefused(
+            f"{folder}: cannot be made ({error.strerror or error}). Choose a place where you may write."
+        ) from error
     return folder
 
 

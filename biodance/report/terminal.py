@@ -17,14 +17,20 @@ def _inspected_lines(record: dict[str, Any]) -> list[str]:
     lines = []
     if record.get("markers"):
         known = record.get("marker_set") or "no known set"
-        lines.append(f"{len(record['markers'])} markers ({known}), {format_number(record.get('gaps_percent'))} % not seen")
+        lines.append(
+            f"{len(record['markers'])} markers ({known}), {format_number(record.get('gaps_percent'))} % not seen"
+        )
     for plate in record.get("plates") or ():
         lines.append(
-            f"{plate.get('name', 'plate')}, TYPE {plate['type']}: {format_number(plate.get('mean_vertical_n'))} N vertical on average"
+            f"{plate.get('name', 'plate')}, TYPE {plate['type']}: {format_number(plate.get('mean_vertical_n'))} N "
+            f"vertical on average"
         )
         lines += [f"  {decision}" for decision in plate.get("decisions", ())]
     if record.get("plates"):
-        on_plates, declared = format_number(record.get("mass_on_plates_kg"), 2), format_number(record.get("declared_mass_kg"), 2)
+        on_plates, declared = (
+            format_number(record.get("mass_on_plates_kg"), 2),
+            format_number(record.get("declared_mass_kg"), 2),
+        )
         lines.append(f"mass on the plates {on_plates} kg, declared {declared} kg")
     return lines + [f"look: {warning}" for warning in record.get("warnings") or ()]
 
@@ -32,11 +38,16 @@ def _inspected_lines(record: dict[str, Any]) -> list[str]:
 def print_inspected(records: Sequence[dict[str, Any]], console: Console) -> None:
     """Print what `biodance inspect` read of every file."""
     for record in records:
-        rates = f"{record.get('frames') or 0} frames, {format_number(record.get('rate_hz'), 0)} / {format_number(record.get('analog_rate_hz'), 0)} Hz"
+        rates = (
+            f"{record.get('frames') or 0} frames, {format_number(record.get('rate_hz'), 0)} / "
+            f"{format_number(record.get('analog_rate_hz'), 0)} Hz"
+        )
         facts = f" {record.get('format') or ''}, {rates}" if record["status"] != "refused" else ""
         console.print(f"[bold]{escape(str(record['file']))}[/]: {record['status']}{escape(facts)}", soft_wrap=True)
         lines = (
-            _inspected_lines(record) if record["status"] != "refused" else [without_path(str(record.get("reason")), str(record["file"]))]
+            _inspected_lines(record)
+            if record["status"] != "refused"
+            else [without_path(str(record.get("reason")), str(record["file"]))]
         )
         for line in lines:
             console.print(f"  {escape(line)}", soft_wrap=True)
@@ -74,17 +85,22 @@ def print_identification(found: dict[str, Any], console: Console) -> None:
         table.add_column(heading)
     for row in found["segments"]:
         mass = f"{format_number(row['mass_kg'], 2)} ± {format_number(row['mass_sd_kg'], 2)}"
-        table.add_row(row["name"], mass, format_number(row["mass_prior_kg"], 2), f"{format_number(100 * row['information'], 0)} %")
+        table.add_row(
+            row["name"], mass, format_number(row["mass_prior_kg"], 2), f"{format_number(100 * row['information'], 0)} %"
+        )
     if found["segments"]:
         console.print(table)
     for row in found["validation"]:
-        told = ", ".join(f"{name} {' '.join(format_number(x) for x in row[name]['rms'])}" for name in ("table", "identified"))
+        told = ", ".join(
+            f"{name} {' '.join(format_number(x) for x in row[name]['rms'])}" for name in ("table", "identified")
+        )
         console.print(f"{escape(row['trial'])}, RMS Fx Fy Fz Mx My Mz: {told}", soft_wrap=True)
     load = found["added_mass"]
     if load:
         low, high = (format_number(x, 2) for x in load["ci95_kg"])
         console.print(
-            f"added mass: {format_number(load['kg'], 2)} kg ({low} to {high}) on {load['segment']}, beyond {escape(load['reference'])}"
+            f"added mass: {format_number(load['kg'], 2)} kg ({low} to {high}) on {load['segment']}, beyond "
+            f"{escape(load['reference'])}"
         )
     else:
         console.print(f"added mass: none found beyond {escape(found['added_mass_search']['reference'])}")
@@ -98,7 +114,10 @@ def print_foresight(found: dict[str, Any], console: Console) -> None:
     for heading in ("cause", "will be seen from", "and told from the others from", "typical"):
         table.add_column(heading)
     for row in found["limits"]:
-        cells = (f"{row[key]:.3g} {row['unit']}" if row[key] is not None else "never" for key in ("limit", "told_from", "typical"))
+        cells = (
+            f"{row[key]:.3g} {row['unit']}" if row[key] is not None else "never"
+            for key in ("limit", "told_from", "typical")
+        )
         table.add_row(escape(f"{row['effect']} {row['target']}".strip()), *cells)
     console.print(table)
     for pair in found["confusions"]:
@@ -119,10 +138,15 @@ def print_diagnosis(found: dict[str, Any], console: Console) -> None:
         )
         others = ", ".join(f"{a['effect']} {a['target']}".strip() for a in finding["set"][1:])
         told = f"; it could also be: {others}" if others else ""
-        console.print(f"found: [bold]{escape(finding['effect'])} {escape(finding['target'])}[/]: {escape(sizes + told)}", soft_wrap=True)
+        console.print(
+            f"found: [bold]{escape(finding['effect'])} {escape(finding['target'])}[/]: {escape(sizes + told)}",
+            soft_wrap=True,
+        )
         if finding["gain"]:
             low, high = (100 * x for x in finding["gain"]["ci95"])
-            console.print(f"  accepting it removes {low:.0f} to {high:.0f} % of the difference on trials not used", soft_wrap=True)
+            console.print(
+                f"  accepting it removes {low:.0f} to {high:.0f} % of the difference on trials not used", soft_wrap=True
+            )
         console.print(f"  {escape(finding['advice'])}", soft_wrap=True)
     if found["verdict"] in ("unexplained", "named, incomplete") and found["adequacy"]:
         worst = found["adequacy"][0]

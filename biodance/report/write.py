@@ -16,25 +16,28 @@ from biodance.report.figures.solid import still_addresses
 from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
 from biodance.report.pages.session import page
 
-PAGE, NUMBERS = "report.html", "results.json"
+PAGE, _NUMBERS = "report.html", "results.json"
 
 
 def write_report(result: SessionResult, folder: Path, *, diagnosis: SessionDiagnosis | None = None) -> dict[str, Any]:
-    """Write ``report.html`` and ``results.json`` into ``folder`` (which exists) and return the content of the latter."""
+    """Write ``report.html`` and ``results.json`` into ``folder`` (which exists) and return the content of the
+    latter.
+    """
     made = provenance(result, created=now())
     found = results_document(result, made) | {"diagnosis": diagnosis_document(diagnosis) if diagnosis else None}
-    _write(folder, {NUMBERS: to_text(found), PAGE: _page(result, made, diagnosis)})
+    _write(folder, {_NUMBERS: to_text(found), PAGE: _page(result, made, diagnosis)})
     return dict(plain_values(found))
 
 
 def write_identification(result: SessionResult, found: SessionIdentification, folder: Path) -> dict[str, Any]:
-    """Write ``report.html``, ``results.json`` with the identification alone and ``body.json``, the identified body; return the numbers.
+    """Write ``report.html``, ``results.json`` with the identification alone and ``body.json``, the identified body;
+    return the numbers.
 
     After a failed fit there is no ``body.json``.
     """
     made = provenance(result, created=now())
     numbers = {"session": result.session.folder.name, **identification_document(found), "provenance": made.as_dict()}
-    files = {NUMBERS: to_text(numbers), PAGE: _page(result, made)}
+    files = {_NUMBERS: to_text(numbers), PAGE: _page(result, made)}
     if found.identification.status == "solved":
         files[BODY] = body_text(*body_of_result(result))
     _write(folder, files)
@@ -48,11 +51,18 @@ def write_diagnosis(result: SessionResult, found: SessionDiagnosis, folder: Path
     """
     made = provenance(result, created=now())
     failures = {**result.failures, **found.failures}
-    numbers = {"session": result.session.folder.name, **diagnosis_document(found), "failures": failures, "provenance": made.as_dict()}
-    files = {NUMBERS: to_text(numbers), PAGE: diagnosis_page(result, found, made)}
+    numbers = {
+        "session": result.session.folder.name,
+        **diagnosis_document(found),
+        "failures": failures,
+        "provenance": made.as_dict(),
+    }
+    files = {_NUMBERS: to_text(numbers), PAGE: diagnosis_page(result, found, made)}
     if accepted and found.accepted is not None:
         named = ", ".join(f"{one.effect} {one.target}".strip() for one in found.diagnosis.findings)
-        files[BODY] = body_text(found.accepted.identified, f"Session {result.session.folder.name}: identified with {named} accepted.")
+        files[BODY] = body_text(
+            found.accepted.identified, f"Session {result.session.folder.name}: identified with {named} accepted."
+        )
     _write(folder, files)
     return dict(plain_values(numbers))
 

@@ -12,8 +12,12 @@ GENERAL = "general"
 
 
 def number_field(default: float, low: float, high: float, unit: str, meaning: str, *, word: str = "") -> Any:
-    """Return the field of a number from ``low`` to ``high``; where there is a ``word``, it is the default and legal, too."""
-    return field(default=word or default, metadata={"legal": (low, high), "unit": unit, "meaning": meaning, "word": word})
+    """Return the field of a number from ``low`` to ``high``; where there is a ``word``, it is the default and legal,
+    too.
+    """
+    return field(
+        default=word or default, metadata={"legal": (low, high), "unit": unit, "meaning": meaning, "word": word}
+    )
 
 
 def word_field(default: str, legal: tuple[str, ...], meaning: str) -> Any:
@@ -22,7 +26,9 @@ def word_field(default: str, legal: tuple[str, ...], meaning: str) -> Any:
 
 
 class Setting(NamedTuple):
-    """One setting: its dotted ``key``, ``value``, ``unit`` ("" without one), ``meaning``, and the ``legal`` values in words."""
+    """One setting: its dotted ``key``, ``value``, ``unit`` ("" without one), ``meaning``, and the ``legal`` values
+    in words.
+    """
 
     key: str
     value: Value
@@ -33,14 +39,18 @@ class Setting(NamedTuple):
 
 @dataclass(frozen=True)
 class Group:
-    """Settings that belong together; every value is checked at birth, a whole number where a float is meant becomes one."""
+    """Settings that belong together; every value is checked at birth, a whole number where a float is meant becomes
+    one.
+    """
 
     name: ClassVar[str]
 
     def __post_init__(self) -> None:
         for one in fields(self):
             if "legal" in one.metadata:
-                object.__setattr__(self, one.name, _legal_value(_key(self.name, one.name), getattr(self, one.name), one))
+                object.__setattr__(
+                    self, one.name, _legal_value(_key(self.name, one.name), getattr(self, one.name), one)
+                )
 
     def rows(self) -> tuple[Setting, ...]:
         """Return the group's own settings in order.
@@ -56,7 +66,10 @@ class Group:
         'Hz'
         """
         told = [(one.name, one.metadata) for one in fields(self) if "legal" in one.metadata]
-        return tuple(Setting(_key(self.name, name), getattr(self, name), a["unit"], a["meaning"], _legal_words(a)) for name, a in told)
+        return tuple(
+            Setting(_key(self.name, name), getattr(self, name), a["unit"], a["meaning"], _legal_words(a))
+            for name, a in told
+        )
 
 
 def _key(group: str, name: str) -> str:
@@ -80,12 +93,18 @@ def _legal_value(key: str, value: object, one: Any) -> Value:
             return value
     elif word and value == word:
         return word
-    elif isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value) and legal[0] <= value <= legal[1]:
+    elif (
+        isinstance(value, int | float)
+        and not isinstance(value, bool)
+        and isfinite(value)
+        and legal[0] <= value <= legal[1]
+    ):
         if not isinstance(one.default, int):
             return float(value)
         if float(value).is_integer():
             return int(value)
     whole = ", a whole number" if isinstance(one.default, int) else ""
     raise BiodanceError(
-        f"The setting {key} = {value!r} is not legal ({one.metadata['meaning']}). Legal: {_legal_words(one.metadata)}{whole}."
+        f"The setting {key} = {value!r} is not legal ({one.metadata['meaning']}). Legal: "
+        f"{_legal_words(one.metadata)}{whole}."
     )

@@ -33,10 +33,14 @@ class FilterSettings(Group):
     """
 
     name = "filter"
-    kind: FilterKind = word_field("butterworth", ("butterworth", "critically_damped"), "low-pass of joint coordinates and forces")
+    kind: FilterKind = word_field(
+        "butterworth", ("butterworth", "critically_damped"), "low-pass of joint coordinates and forces"
+    )
     order: int = number_field(5, 1, 10, "", "order of one of its two passes")
     cutoff: float = number_field(10.0, 1.0, 100.0, "Hz", "frequency at which both passes together are 3 dB down")
-    force_cutoff: float | Literal["same"] = number_field(0.0, 1.0, 500.0, "Hz", "the same for the forces of the plates", word="same")
+    force_cutoff: float | Literal["same"] = number_field(
+        0.0, 1.0, 500.0, "Hz", "the same for the forces of the plates", word="same"
+    )
 
 
 @dataclass(frozen=True)
@@ -83,14 +87,20 @@ class ContactRules(Group):
     """
 
     name = "contact"
-    height: float = number_field(0.04, 0.005, 0.2, "m", "a point of the sole lower than this over a surface may touch it ...")
+    height: float = number_field(
+        0.04, 0.005, 0.2, "m", "a point of the sole lower than this over a surface may touch it ..."
+    )
     speed: float = number_field(0.8, 0.05, 3.0, "m/s", "... where it is also slower than this")
     around: float = number_field(0.05, 0.0, 0.5, "s", "time before and after that in which it may touch, too")
     still: float = number_field(0.15, 0.01, 1.0, "m/s", "a foot rests where its whole sole is slower than this ...")
     lasting: float = number_field(0.1, 0.02, 2.0, "s", "... for this long")
     force: float = number_field(20.0, 1.0, 200.0, "N", "a plate that carries less vertical force is not loaded")
-    loaded: float = number_field(0.05, 0.0, 0.5, "", "share of the trial's largest vertical force from which a plate is loaded")
-    pressed: float = number_field(0.2, 0.0, 0.9, "", "the same, from which its centre of pressure is held against the soles")
+    loaded: float = number_field(
+        0.05, 0.0, 0.5, "", "share of the trial's largest vertical force from which a plate is loaded"
+    )
+    pressed: float = number_field(
+        0.2, 0.0, 0.9, "", "the same, from which its centre of pressure is held against the soles"
+    )
     outside: float = number_field(0.02, 0.0, 0.2, "m", "distance of the centre of pressure from the soles that is said")
 
 
@@ -121,8 +131,8 @@ class StandingRules(Group):
 class CheckLimits(Group):
     """The limits of the quality table; what is outside needs a person, nothing is left out for it.
 
-    The RMS marker distance follows OpenSim's user guide, the force Hicks et al. 2015 (doi:10.1115/1.4029304); the largest distance is a
-    hand's breadth, the mass shoes, clothes and a meal; the others are the project's own.
+    The RMS marker distance follows OpenSim's user guide, the force Hicks et al. 2015 (doi:10.1115/1.4029304); the
+    largest distance is a hand's breadth, the mass shoes, clothes and a meal; the others are the project's own.
 
     Parameters
     ----------
@@ -148,6 +158,10 @@ class CheckLimits(Group):
     marker_largest: float = number_field(0.080, 0.002, 1.0, "m", "distance of the markers to the model, largest")
     gaps: float = number_field(5.0, 0.0, 100.0, "%", "marker samples not seen")
     open: float = number_field(1.0, 0.0, 100.0, "%", "frames in which the markers seen do not fix the posture")
-    seconds: float = number_field(0.5, 0.0, 60.0, "s", "least time of a trial in which the plates measure all ground contact")
+    seconds: float = number_field(
+        0.5, 0.0, 60.0, "s", "least time of a trial in which the plates measure all ground contact"
+    )
     force: float = number_field(5.0, 0.1, 100.0, "%", "RMS difference of measured and simulated force, of body weight")
-    standing: float = number_field(0.050, 0.001, 0.5, "m", "mean centre of mass against mean centre of pressure, standing")
+    standing: float = number_field(
+        0.050, 0.001, 0.5, "m", "mean centre of mass against mean centre of pressure, standing"
+    )

@@ -6,7 +6,15 @@ from typing import Any, Literal
 
 from biodance.errors import BiodanceError, UnknownName
 from biodance.settings.group import GENERAL, Group, Setting, Value, number_field, word_field
-from biodance.settings.groups import STANDARD_GRAVITY, CheckLimits, ContactRules, FilterSettings, GapSettings, Hip, StandingRules
+from biodance.settings.groups import (
+    STANDARD_GRAVITY,
+    CheckLimits,
+    ContactRules,
+    FilterSettings,
+    GapSettings,
+    Hip,
+    StandingRules,
+)
 
 
 @dataclass(frozen=True)
@@ -53,13 +61,19 @@ class Settings(Group):
     """
 
     name = GENERAL
-    table: str = word_field("de_leva_1996", (), "table of segment inertial parameters: what is known of the body beforehand")
-    hip: Hip = word_field("harrington", ("harrington", "davis"), "regression of the hip joint centres in the static trial")
+    table: str = word_field(
+        "de_leva_1996", (), "table of segment inertial parameters: what is known of the body beforehand"
+    )
+    hip: Hip = word_field(
+        "harrington", ("harrington", "davis"), "regression of the hip joint centres in the static trial"
+    )
     joints: Literal["functional", "static"] = word_field(
         "functional", ("functional", "static"), "joints from the movement, or static alone"
     )
     gravity: float = number_field(STANDARD_GRAVITY, 9.7, 9.9, "m/s²", "gravity in the laboratory, along -z")
-    outlier: float = number_field(0.3, 0.05, 5.0, "", "share of body weight by which frames may differ from the table's prediction")
+    outlier: float = number_field(
+        0.3, 0.05, 5.0, "", "share of body weight by which frames may differ from the table's prediction"
+    )
     filter: FilterSettings = FilterSettings()
     gaps: GapSettings = GapSettings()
     contact: ContactRules = ContactRules()
@@ -67,7 +81,9 @@ class Settings(Group):
     checks: CheckLimits = CheckLimits()
 
     def __repr__(self) -> str:
-        changed = [f"{one.key}={one.value!r}" for one, usual in zip(self.all(), USUAL.all(), strict=True) if one != usual]
+        changed = [
+            f"{one.key}={one.value!r}" for one, usual in zip(self.all(), USUAL.all(), strict=True) if one != usual
+        ]
         return f"Settings({', '.join(changed)})"
 
     def all(self) -> tuple[Setting, ...]:
@@ -131,7 +147,9 @@ class Settings(Group):
                 raise UnknownName.of("setting", key, legal)
         own: dict[str, Any] = {key: value for key, value in flat.items() if "." not in key}
         for name, group in self._groups().items():
-            inner: dict[str, Any] = {key.partition(".")[2]: value for key, value in flat.items() if key.startswith(f"{name}.")}
+            inner: dict[str, Any] = {
+                key.partition(".")[2]: value for key, value in flat.items() if key.startswith(f"{name}.")
+            }
             own |= {name: replace(group, **inner)} if inner else {}
         return replace(self, **own)
 
@@ -186,7 +204,10 @@ def assignments(texts: Iterable[str]) -> dict[str, object]:
     for text in texts:
         key, equals, value = (part.strip() for part in text.partition("="))
         if not (key and equals and value):
-            raise BiodanceError(f"--set {text}: is no assignment. Write for example --set filter.cutoff=6; biodance settings prints all.")
+            raise BiodanceError(
+                f"--set {text}: is no assignment. Write for example --set filter.cutoff=6; biodance settings prints "
+                f"all."
+            )
         out[key] = _value_of(value.strip("\"'"))
     return out
 

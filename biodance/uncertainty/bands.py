@@ -70,8 +70,8 @@ class Bands:
 
     def runs(self, use: NDArray[np.bool_], rate: float) -> Iterator[NDArray[np.intp]]:
         """Yield the frames (indices) of every consecutive run of used frames ``use`` (T,) of a recording at ``rate``
-        Hz, thinned to the rate of these bands, at most `BLOCK_SAMPLES` at a time. Recordings are low-passed far below half
-        that rate: thinning loses nothing.
+        Hz, thinned to the rate of these bands, at most `BLOCK_SAMPLES` at a time. Recordings are low-passed far below
+        half that rate: thinning loses nothing.
         """
         edge = np.flatnonzero(np.diff(np.concatenate([[False], use, [False]]).astype(int)))
         for start, stop in zip(edge[::2], edge[1::2], strict=True):

@@ -13,7 +13,14 @@ from biodance.body.tables.error_sizes import error_size, joint_size
 from biodance.motion.kinematics import skew
 from biodance.records import Array, Sip
 
-JOINT = {"thigh": "hip", "shank": "knee", "foot": "ankle", "trunk_head": "trunk", "upper_arm": "shoulder", "forearm_hand": "elbow"}
+JOINT = {
+    "thigh": "hip",
+    "shank": "knee",
+    "foot": "ankle",
+    "trunk_head": "trunk",
+    "upper_arm": "shoulder",
+    "forearm_hand": "elbow",
+}
 """The joint at the origin of each segment's frame."""
 
 
@@ -78,14 +85,22 @@ def _mass_spread(prior: Sip) -> Array:
     """
     table, variance = prior.phi.reshape(-1, 10), np.diag(prior.covariance)[::10]
     mass = np.maximum(table[:, 0], 1e-12)
-    missing = np.sqrt(np.maximum(error_size("segment_mass", "floor") ** 2 - variance / mass**2, 0.0)) * (table[:, 0] > 0) * (variance > 0)
+    missing = (
+        np.sqrt(np.maximum(error_size("segment_mass", "floor") ** 2 - variance / mass**2, 0.0))
+        * (table[:, 0] > 0)
+        * (variance > 0)
+    )
     names = [name.removeprefix("right_").removeprefix("left_") for name in prior.segments]
     sides = error_size("left_right_correlation", "mass")
-    alike = np.array([[1.0 if a == b else sides if x == y else 0.0 for b, y in enumerate(names)] for a, x in enumerate(names)])
+    alike = np.array(
+        [[1.0 if a == b else sides if x == y else 0.0 for b, y in enumerate(names)] for a, x in enumerate(names)]
+    )
     masses = alike * np.outer(missing * mass, missing * mass)
     total = masses.sum(axis=1)
     masses = masses - np.outer(total, total) / (total.sum() + error_size("scale", "mass") ** 2)
-    return np.asarray(np.kron(masses, np.ones((10, 10))) * np.outer(prior.phi / np.repeat(mass, 10), prior.phi / np.repeat(mass, 10)))
+    return np.asarray(
+        np.kron(masses, np.ones((10, 10))) * np.outer(prior.phi / np.repeat(mass, 10), prior.phi / np.repeat(mass, 10))
+    )
 
 
 def _turn_slope(phi: Array) -> Array:

@@ -19,7 +19,9 @@ def deviations(body: Body, sources: tuple[ErrorSource, ...]) -> Array:
     """
     placed = {error.joint: {"joint_centre": error.centre, "tilt": error.axis} for error in body.joint_errors}
     found: dict[tuple[str, str], float] = {}
-    for group, joint in ((group, joint) for source in sources for group, joint in zip(source.groups, source.joints, strict=True)):
+    for group, joint in (
+        (group, joint) for source in sources for group, joint in zip(source.groups, source.joints, strict=True)
+    ):
         quantity, _, target = group.partition(" ")
         if (group, joint) not in found:
             found[group, joint] = placed[joint][quantity] if joint in placed else _of_table(quantity, target, joint)

@@ -68,7 +68,12 @@ def floor() -> Array:
 
 
 def maximise(
-    start: Learned, improved: Callable[[Learned], Learned], covariance: Callable[[Learned], Array], *, rounds: int, tolerance: float = 0.0
+    start: Learned,
+    improved: Callable[[Learned], Learned],
+    covariance: Callable[[Learned], Array],
+    *,
+    rounds: int,
+    tolerance: float = 0.0,
 ) -> Learned:
     """Return ``start`` after at most ``rounds`` of expectation and maximisation (``improved``), fewer once the
     log-determinants of all its noise covariances (B, 6, 6) change by less than ``tolerance``.

@@ -23,7 +23,9 @@ class Noise:
     bands: Bands = WHITE
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "covariance", frozen_array(self.covariance, (len(self.bands), 6, 6), "Noise.covariance"))
+        object.__setattr__(
+            self, "covariance", frozen_array(self.covariance, (len(self.bands), 6, 6), "Noise.covariance")
+        )
         object.__setattr__(self, "about", frozen_array(self.about, (3,), "Noise.about"))
 
     @classmethod

@@ -31,8 +31,13 @@ def plate_sources() -> Plates:
     """
     mixing, offset, delay = np.zeros((PLATE_SOURCES, 6, 6)), np.zeros((PLATE_SOURCES, 6)), np.zeros(PLATE_SOURCES)
     rows, columns = np.divmod(np.arange(36), 6)
-    mixing[np.arange(36), rows, columns] = [_share(CHANNELS[c], CHANNELS[r]) for r, c in zip(rows, columns, strict=True)]
-    turn, shift = (skew(np.diag([around_zero(f"{name} {axis}") for axis in "xyz"])) for name in ("plate_rotation", "plate_position"))
+    mixing[np.arange(36), rows, columns] = [
+        _share(CHANNELS[c], CHANNELS[r]) for r, c in zip(rows, columns, strict=True)
+    ]
+    turn, shift = (
+        skew(np.diag([around_zero(f"{name} {axis}") for axis in "xyz"]))
+        for name in ("plate_rotation", "plate_position")
+    )
     mixing[36:39, :3, :3] = mixing[36:39, 3:, 3:] = turn
     mixing[39:42, 3:, :3] = shift
     offset[42:48] = np.diag([around_zero(f"plate_offset {channel}", "offset") for channel in CHANNELS])
@@ -54,7 +59,10 @@ def plate_errors(wrench: Array, rate: float, noise: Noise, plates: Plates) -> Ar
     """
     near = wrench @ noise.shift.T
     late = np.gradient(near, 1.0 / rate, axis=0)[..., None] * plates.delay
-    return np.asarray(np.linalg.inv(noise.shift) @ (np.tensordot(near, plates.mixing, axes=(1, 2)).swapaxes(1, 2) + plates.offset.T - late))
+    return np.asarray(
+        np.linalg.inv(noise.shift)
+        @ (np.tensordot(near, plates.mixing, axes=(1, 2)).swapaxes(1, 2) + plates.offset.T - late)
+    )
 
 
 def _share(source: str, target: str) -> float:

@@ -62,7 +62,10 @@ class Response:
         pose, frames = poses(body, motion.q), motion.time.size
         every, segment = list(range(len(body.segments))), list(body.markers.segment)
         J, _ = jacobian(body, pose, segment, pose.points(segment, body.markers.position))
-        moved, turned = (part.reshape(frames, len(every), 3, body.nv) for part in jacobian(body, pose, every, centres_of_mass(body, pose)))
+        moved, turned = (
+            part.reshape(frames, len(every), 3, body.nv)
+            for part in jacobian(body, pose, every, centres_of_mass(body, pose))
+        )
         place, turn = (part.reshape(frames, len(every), 18, 3) for part in functionals(body, motion))
         tangent = np.zeros((frames, 18, body.nv))
         for s in every:
@@ -96,7 +99,9 @@ class Response:
         second, first = derivatives(self.motion.time.size)
         frames, rate, size = len(weight), self.motion.rate, weight.shape[2]
         flat = weight.reshape(frames, -1)
-        back = np.stack([rate**2 * (second.T @ flat), rate * (first.T @ flat), flat], axis=1).reshape(frames, 1, 18, size)
+        back = np.stack([rate**2 * (second.T @ flat), rate * (first.T @ flat), flat], axis=1).reshape(
+            frames, 1, 18, size
+        )
         on_place, on_turn = (np.swapaxes(part, -1, -2) @ back for part in (self.place, self.turn))
         marker = np.swapaxes(self.follow, 1, 2) @ (np.swapaxes(self.tangent, 1, 2) @ back[:, 0])
         return Pull(on_place, on_turn, marker.reshape(frames, -1, 3, size))

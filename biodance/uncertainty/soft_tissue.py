@@ -27,7 +27,9 @@ class Slide(ErrorSource):
     def groups(self) -> tuple[str, ...]:
         """Every pattern of a segment, times every angle beside it."""
         count = zip(self.body.segments, self.patterns, _near(self.body), strict=True)
-        return tuple(f"slide {kind_of(name)}" for name, pattern, near in count for _ in range(pattern.shape[2] * near.size))
+        return tuple(
+            f"slide {kind_of(name)}" for name, pattern, near in count for _ in range(pattern.shape[2] * near.size)
+        )
 
     def forward(self, trial: Response) -> Effects:
         """Return functional and residual of the patterns, times the angles."""
@@ -97,7 +99,9 @@ class Sag(ErrorSource):
             on, moved = self._moved(trial, s)
             rows = (3 * on[:, None] + np.arange(3)).ravel()
             parts.append(trial.of_markers(np.tile(moved, (1, on.size))[:, :, None], rows))
-        return np.concatenate([value for value, _ in parts], axis=2), np.concatenate([left for _, left in parts], axis=2)
+        return np.concatenate([value for value, _ in parts], axis=2), np.concatenate(
+            [left for _, left in parts], axis=2
+        )
 
     def transpose(self, trial: Response, pull: Pull) -> Array:
         """Return the weights on a segment's markers along the acceleration, summed over time."""
@@ -139,7 +143,9 @@ class Flesh(ErrorSource):
     def transpose(self, trial: Response, pull: Pull) -> Array:
         """Return the weights on the centres of mass in segment axes, summed over time with the angles."""
         local = np.swapaxes(trial.pose.rotation, -1, -2) @ pull.place
-        return np.concatenate([_with_angles(local[:, s], trial.angles[:, near]) for s, near in enumerate(_near(self.body))])
+        return np.concatenate(
+            [_with_angles(local[:, s], trial.angles[:, near]) for s, near in enumerate(_near(self.body))]
+        )
 
     def squares(self, trial: Response) -> Array:
         """Return zeros: no marker sees it."""

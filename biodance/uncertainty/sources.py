@@ -60,7 +60,9 @@ def forward(sources: tuple[ErrorSource, ...], motion: Motion) -> Errors:
     trial = Response.of(sources[0].body, motion)
     effects = [source.forward(trial) for source in sources]
     wrench = np.concatenate([trial.wrench(value) for value, _ in effects], axis=2)
-    names, joints = (tuple(name for source in sources for name in getattr(source, which)) for which in ("groups", "joints"))
+    names, joints = (
+        tuple(name for source in sources for name in getattr(source, which)) for which in ("groups", "joints")
+    )
     return Errors(names, joints, wrench, np.concatenate([left for _, left in effects], axis=2))
 
 
@@ -81,6 +83,8 @@ def _patterns(body: Body) -> tuple[Array, ...]:
         places = body.markers.position[worn == s]
         middle = places - places.mean(axis=0) if len(places) else places
         turns = [np.cross(axis, middle) / CLUSTER_REACH for axis in np.eye(3)]
-        kept = [np.tile(axis, (len(places), 1)) for axis in np.eye(3)] + [turn for turn in turns if np.abs(turn).max(initial=0) > 1e-6]
+        kept = [np.tile(axis, (len(places), 1)) for axis in np.eye(3)] + [
+            turn for turn in turns if np.abs(turn).max(initial=0) > 1e-6
+        ]
         found.append(np.stack(kept, axis=2) if len(places) else np.empty((0, 3, 0)))
     return tuple(found)

@@ -111,7 +111,14 @@ def read_tolerances(text: str) -> Tolerances:
     raw = tomllib.loads(text)
     noise, energy, energy_sd = (np.array(raw[name]) for name in ("noise", "energy", "energy_sd"))
     return Tolerances(
-        raw.get("sizes", {}), noise, energy, energy_sd, raw["threshold"], raw["origin"], raw.get("means", {}), raw.get("accuracy", {})
+        raw.get("sizes", {}),
+        noise,
+        energy,
+        energy_sd,
+        raw["threshold"],
+        raw["origin"],
+        raw.get("means", {}),
+        raw.get("accuracy", {}),
     )
 
 
@@ -122,7 +129,9 @@ def to_toml(found: Tolerances) -> str:
         rows = ", ".join("[" + ", ".join(f"{x:.4g}" for x in row) + "]" for row in getattr(found, name))
         lines.append(f"{name} = [{rows}]")
     lines.append("noise = [")
-    lines += ["  [" + ", ".join("[" + ", ".join(f"{x:.5g}" for x in row) + "]" for row in band) + "]," for band in found.noise]
+    lines += [
+        "  [" + ", ".join("[" + ", ".join(f"{x:.5g}" for x in row) + "]" for row in band) + "]," for band in found.noise
+    ]
     lines += ["]", "", "[sizes]"]
     lines += [f'"{key}" = {value:.4g}' for key, value in sorted(found.sizes.items())]
     lines += ["", "[means]"] + [f'"{key}" = {value:.4g}' for key, value in sorted(found.means.items())]
@@ -155,7 +164,9 @@ def mean_key(name: str, target: str, parameter: str) -> str:
     return " ".join(filter(None, (name, rest if colon and plate.startswith("plate") else target, parameter)))
 
 
-def whitened(rows: Array, band: NDArray[np.intp], marker_keys: tuple[str, ...], mass: float, tolerances: Tolerances) -> Array:
+def whitened(
+    rows: Array, band: NDArray[np.intp], marker_keys: tuple[str, ...], mass: float, tolerances: Tolerances
+) -> Array:
     """Return ``rows`` (r, n) in units of their standard deviation."""
     count = 6 * band.size
     wrench = rows[:count].reshape(band.size, 6, -1)

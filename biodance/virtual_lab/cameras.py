@@ -1,4 +1,6 @@
-"""What the cameras record: marker trajectories with skin and fat between bone and marker, noise, gaps, in the lab's own axes."""
+"""What the cameras record: marker trajectories with skin and fat between bone and marker, noise, gaps, in the lab's
+own axes.
+"""
 
 from dataclasses import dataclass
 
@@ -27,13 +29,14 @@ PULL: dict[str, dict[str, float]] = {
     "forearm": {"elbow_flexion": 5, "forearm_pronation": 7},
     "hand": {"wrist_flexion": 4},
 }
-"""mm per rad, rms length of the pull of each joint on a marker: a deep squat moves thigh markers 18 mm, shank markers 8 mm (Lahkar 2021;
-thigh and shank in gait 18 and 17 mm, PMC8631460; back 9-10 mm, Zemp 2014; foot < 9 mm)."""
+"""mm per rad, rms length of the pull of each joint on a marker: a deep squat moves thigh markers 18 mm, shank markers 8
+mm (Lahkar 2021; thigh and shank in gait 18 and 17 mm, PMC8631460; back 9-10 mm, Zemp 2014; foot < 9 mm).
+"""
 SHOULDER_PULL = {"shoulder_flexion": 12.0, "shoulder_adduction": 12.0}
 """mm per rad for SHO and RBAK: the shoulder blade slides on the thorax."""
 SWING = {"THI": 9.0, "UPA": 10.0, "TIB": 12.0, "FRM": 14.0}
-"""Hz, natural frequency of flesh and marker where muscle lies under the skin: 9 Hz sags by 3 mm under gravity. Judgement, set so that
-fast squats leave residuals of the size of those in Jovic et al. (Table II).
+"""Hz, natural frequency of flesh and marker where muscle lies under the skin: 9 Hz sags by 3 mm under gravity.
+Judgement, set so that fast squats leave residuals of the size of those in Jovic et al. (Table II).
 """
 BONY = 16.0
 """Hz, the same where bone lies under the skin: all other markers."""
@@ -43,14 +46,18 @@ DRIFT = 0.0005
 
 @dataclass(frozen=True, eq=False)
 class SoftTissue:
-    """Coefficients of one person in one session: ``pull`` (n, K, 3) m/rad per true joint; ``sag`` (K,) s² multiplies the specific force."""
+    """Coefficients of one person in one session: ``pull`` (n, K, 3) m/rad per true joint; ``sag`` (K,) s² multiplies
+    the specific force.
+    """
 
     pull: Array
     sag: Array
 
 
 def draw_soft_tissue(person: Person, session: int, tolerances: LabTolerances) -> SoftTissue:
-    """Draw the coefficients: most belong to the person, a share of their variance to the day (clothes, tape, place on the skin)."""
+    """Draw the coefficients: most belong to the person, a share of their variance to the day (clothes, tape, place
+    on the skin).
+    """
     joints = [joint.name for joint in person.body.joints]
     markers = person.body.markers
     scale = np.zeros((len(joints), len(markers.names)))
@@ -68,7 +75,9 @@ def draw_soft_tissue(person: Person, session: int, tolerances: LabTolerances) ->
     share = tolerances.soft_tissue_day
     shape = (*scale.shape, 3)
     direction = np.sqrt(1 - share) * own.normal(size=shape) + np.sqrt(share) * day.normal(size=shape)
-    soft = np.exp(0.3 * (np.sqrt(1 - share) * own.normal(size=swing.size) + np.sqrt(share) * day.normal(size=swing.size)))
+    soft = np.exp(
+        0.3 * (np.sqrt(1 - share) * own.normal(size=swing.size) + np.sqrt(share) * day.normal(size=swing.size))
+    )
     return SoftTissue(tolerances.soft_tissue * scale[..., None] * direction, tolerances.soft_tissue * soft / swing**2)
 
 
@@ -79,7 +88,9 @@ def _kind_and_side(segment: str, marker: str) -> tuple[str, str]:
 
 
 def reference_angles(person: Person) -> Array:
-    """Return the true joint angles (39,) rad of the posture in which the markers were glued: upright, arms slightly away."""
+    """Return the true joint angles (39,) rad of the posture in which the markers were glued: upright, arms slightly
+    away.
+    """
     angles = dict(person.habits.angles)
     for side in ("right", "left"):
         flexion, adduction, rotation, elbow = np.radians(STAND.values[f"{side}_arm"])
@@ -89,12 +100,18 @@ def reference_angles(person: Person) -> Array:
 
 
 def skin_displacement(
-    tissue: SoftTissue, person: Person, poses: Poses, angles: Array, acceleration: Array, time: Array, rng: np.random.Generator
+    tissue: SoftTissue,
+    person: Person,
+    poses: Poses,
+    angles: Array,
+    acceleration: Array,
+    time: Array,
+    rng: np.random.Generator,
 ) -> Array:
     """Return the displacement (T, K, 3) m of the markers against the bone, lab frame.
 
-    ``poses`` of the true body, ``angles`` (T, 39) rad, ``acceleration`` (T, K, 3) m/s² of the marker places fixed to the bone, at
-    ``time`` (T,) s.
+    ``poses`` of the true body, ``angles`` (T, 39) rad, ``acceleration`` (T, K, 3) m/s² of the marker places fixed to
+    the bone, at ``time`` (T,) s.
     """
     markers: SegmentMarkers = person.body.markers
     turn = poses.rotation[:, list(markers.segment)]
@@ -112,7 +129,9 @@ LONGEST_GAP, SHORTEST_GAP = 0.30, 0.05
 
 
 def true_markers(performance: Performance, tissue: SoftTissue, time: Array, rng: np.random.Generator) -> Array:
-    """Return the true marker positions (T, K, 3) m at ``time`` (T,) s: fixed to the bone, plus what the skin adds; true vertical."""
+    """Return the true marker positions (T, K, 3) m at ``time`` (T,) s: fixed to the bone, plus what the skin adds;
+    true vertical.
+    """
     from scipy.interpolate import make_interp_spline
 
     person = performance.person
@@ -125,9 +144,15 @@ def true_markers(performance: Performance, tissue: SoftTissue, time: Array, rng:
 
 
 def film(
-    performance: Performance, tissue: SoftTissue, time: Array, tilt: Array, tolerances: LabTolerances, rng: np.random.Generator
+    performance: Performance,
+    tissue: SoftTissue,
+    time: Array,
+    tilt: Array,
+    tolerances: LabTolerances,
+    rng: np.random.Generator,
 ) -> Markers:
-    """Return what the cameras deliver at ``time`` (T,) s, lab frame; ``tilt`` (3, 3) turns true-vertical axes into the laboratory's.
+    """Return what the cameras deliver at ``time`` (T,) s, lab frame; ``tilt`` (3, 3) turns true-vertical axes into the
+    laboratory's.
 
     Gaps come in every trial except the static one, which every laboratory repeats until it is complete.
     """

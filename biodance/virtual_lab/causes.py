@@ -1,4 +1,6 @@
-"""All causes that can be hidden in a session, by name: in the files, in the person, around the person; asked for in words."""
+"""All causes that can be hidden in a session, by name: in the files, in the person, around the person; asked for in
+words.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -21,7 +23,9 @@ from biodance.virtual_lab.protocol import Protocol
 
 @dataclass(frozen=True)
 class Hidden:
-    """One cause to hide: its ``name``, where (``target``) and how large (``values`` by parameter, SI units; a place has three numbers)."""
+    """One cause to hide: its ``name``, where (``target``) and how large (``values`` by parameter, SI units; a place
+    has three numbers).
+    """
 
     name: str
     target: str
@@ -31,7 +35,8 @@ class Hidden:
         """Return the values, one number each; BiodanceError unless they are exactly the ``legal`` ones."""
         if sorted(self.values) != sorted(legal):
             raise BiodanceError(
-                f"Effect {self.name} has the parameters {', '.join(legal) or 'none'}; got {', '.join(self.values) or 'none'}."
+                f"Effect {self.name} has the parameters {', '.join(legal) or 'none'}; got "
+                f"{', '.join(self.values) or 'none'}."
             )
         return {name: self.vector(name, 1)[0] for name in legal}
 
@@ -39,14 +44,17 @@ class Hidden:
         """Return one value of ``count`` numbers; BiodanceError if it is missing or has another count."""
         if name not in self.values or len(self.values[name]) != count:
             raise BiodanceError(
-                f"Effect {self.name}: {name} needs {count} number{'s' * (count > 1)}, got {self.values.get(name)}. Example: 0.05;0;0"
+                f"Effect {self.name}: {name} needs {count} number{'s' * (count > 1)}, got {self.values.get(name)}. "
+                f"Example: 0.05;0;0"
             )
         return self.values[name]
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What a cause may change: the ``visit``, and the ``loads`` that the ``person`` carries through the trials of ``protocol``."""
+    """What a cause may change: the ``visit``, and the ``loads`` that the ``person`` carries through the trials of
+    ``protocol``.
+    """
 
     person: Person
     protocol: Protocol
@@ -58,32 +66,47 @@ def clock_of(protocol: Protocol) -> dict[str, tuple[float, float]]:
     """Return from and to where in the session (0 to 1) every trial lies, the trials one after another."""
     ends = np.cumsum([trial.duration for trial in protocol.trials])
     starts = ends - [trial.duration for trial in protocol.trials]
-    return {t.name: (float(a / ends[-1]), float(b / ends[-1])) for t, a, b in zip(protocol.trials, starts, ends, strict=True)}
+    return {
+        t.name: (float(a / ends[-1]), float(b / ends[-1]))
+        for t, a, b in zip(protocol.trials, starts, ends, strict=True)
+    }
 
 
 FAULTS: dict[str, Callable[..., Fault]] = {
     f.__name__: f
     for f in (
-        faults.plate_offset, faults.plate_gain, faults.plate_crosstalk, faults.plate_drift, faults.time_delay, faults.clock_drift,
-        faults.plate_position, faults.plate_rotation, faults.body_mass, faults.unit_error, faults.axis_error, faults.clipping,
+        faults.plate_offset, faults.plate_gain, faults.plate_crosstalk, faults.plate_drift, faults.time_delay,
+        faults.clock_drift,
+        faults.plate_position, faults.plate_rotation, faults.body_mass, faults.unit_error, faults.axis_error,
+        faults.clipping,
         faults.mains_hum, faults.labels_swapped, amplifier_faults.filter_mismatch, amplifier_faults.plate_hysteresis,
-        amplifier_faults.plate_creep, amplifier_faults.plate_bending, amplifier_faults.loose_connection, amplifier_faults.trigger_jitter,
-        amplifier_faults.object_on_plate, amplifier_faults.saturating, camera_faults.frame_rate, camera_faults.dropped_frames,
+        amplifier_faults.plate_creep, amplifier_faults.plate_bending, amplifier_faults.loose_connection,
+        amplifier_faults.trigger_jitter,
+        amplifier_faults.object_on_plate, amplifier_faults.saturating, camera_faults.frame_rate,
+        camera_faults.dropped_frames,
         camera_faults.swaying_cameras,
     )
 }  # fmt: skip
 FORCES: dict[str, Callable[..., AppliedForce]] = {
     f.__name__: f
-    for f in (forces.external_contact, forces.body_weight_support, forces.slack_harness, forces.table_edge, forces.spinning_wheel)
+    for f in (
+        forces.external_contact,
+        forces.body_weight_support,
+        forces.slack_harness,
+        forces.table_edge,
+        forces.spinning_wheel,
+    )
 }
-UNKNOWN = (
-    "plate_creep", "plate_bending", "loose_connection", "trigger_jitter", "object_on_plate", "saturating", "swaying_cameras",
+_UNKNOWN = (
+    "plate_creep", "plate_bending", "loose_connection", "trigger_jitter", "object_on_plate", "saturating",
+    "swaying_cameras",
     "slack_harness", "table_edge", "spinning_wheel",
 )  # fmt: skip
 
 
 def fault_of(cause: Hidden, clock: dict[str, tuple[float, float]]) -> Fault:
-    """Return the change of a recording that a cause makes; ``clock`` says from and to where in the session each trial lies.
+    """Return the change of a recording that a cause makes; ``clock`` says from and to where in the session each trial
+    lies.
 
     Raises
     ------
@@ -141,12 +164,20 @@ def _shifted(field: Literal["joint_shifts", "marker_shifts"]) -> Callable[[Hidde
 
 
 def _longer(cause: Hidden, scene: Scene) -> Scene:
-    """Make a thigh or shank ``error`` m longer than its markers say: the joint at its end lies lower, with all that hangs on it."""
-    ends = {f"{side}_{upper}": f"{side}_{joint}" for side in ("right", "left") for upper, joint in (("thigh", "knee"), ("shank", "ankle"))}
+    """Make a thigh or shank ``error`` m longer than its markers say: the joint at its end lies lower, with all that
+    hangs on it.
+    """
+    ends = {
+        f"{side}_{upper}": f"{side}_{joint}"
+        for side in ("right", "left")
+        for upper, joint in (("thigh", "knee"), ("shank", "ankle"))
+    }
     if cause.target not in ends:
         raise UnknownName.of("segment whose length can be wrong", cause.target, tuple(ends))
     shift = np.array([0.0, -cause.numbers(("error",))["error"], 0.0])
-    return replace(scene, visit=replace(scene.visit, joint_shifts={**scene.visit.joint_shifts, ends[cause.target]: shift}))
+    return replace(
+        scene, visit=replace(scene.visit, joint_shifts={**scene.visit.joint_shifts, ends[cause.target]: shift})
+    )
 
 
 def _motion(tolerance: str) -> Callable[[Hidden, Scene], Scene]:
@@ -154,7 +185,9 @@ def _motion(tolerance: str) -> Callable[[Hidden, Scene], Scene]:
 
     def change(cause: Hidden, scene: Scene) -> Scene:
         angle = cause.numbers(("angle",))["angle"]
-        return replace(scene, visit=replace(scene.visit, tolerances=replace(scene.visit.tolerances, **{tolerance: angle})))
+        return replace(
+            scene, visit=replace(scene.visit, tolerances=replace(scene.visit.tolerances, **{tolerance: angle}))
+        )
 
     return change
 
@@ -211,14 +244,18 @@ def parse_cause(text: str) -> Hidden:
     for part in filter(None, rest.split(",")):
         key, equals, value = part.partition("=")
         if not equals:
-            raise BiodanceError(f"--effect {text}: {part!r} is not parameter=value. Example: plate_gain:target=Fz,gain=0.04")
+            raise BiodanceError(
+                f"--effect {text}: {part!r} is not parameter=value. Example: plate_gain:target=Fz,gain=0.04"
+            )
         if key == "target":
             target = value
             continue
         try:
             values[key] = tuple(float(number) for number in value.split(";"))
         except ValueError as error:
-            raise BiodanceError(f"--effect {text}: {value!r} is not a number (or three, as 0.05;0;0), for {key}.") from error
+            raise BiodanceError(
+                f"--effect {text}: {value!r} is not a number (or three, as 0.05;0;0), for {key}."
+            ) from error
     return Hidden(name, target, values)
 
 

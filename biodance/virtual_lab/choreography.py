@@ -1,7 +1,8 @@
-"""From steps to smooth curves: every quantity of a posture over time, with the inaccuracy of a person who follows a video.
+"""From steps to smooth curves: every quantity of a posture over time, with the inaccuracy of a person who follows a
+video.
 
-Moves are septic rest-to-rest polynomials (velocity, acceleration and jerk vanish at both ends); a foot rises only after the weight has left
-it and takes weight only after it has landed.
+Moves are septic rest-to-rest polynomials (velocity, acceleration and jerk vanish at both ends); a foot rises only after
+the weight has left it and takes weight only after it has landed.
 """
 
 from dataclasses import dataclass
@@ -13,7 +14,8 @@ from biodance.virtual_lab.protocol import FIELDS, STAND, ProtocolPosture, Protoc
 from biodance.virtual_lab.randomness import smooth_noise
 
 COLUMNS = {
-    name: slice(sum(map(len, list(FIELDS.values())[:i])), sum(map(len, list(FIELDS.values())[: i + 1]))) for i, name in enumerate(FIELDS)
+    name: slice(sum(map(len, list(FIELDS.values())[:i])), sum(map(len, list(FIELDS.values())[: i + 1])))
+    for i, name in enumerate(FIELDS)
 }
 SIDES = ("right", "left")
 SHIFT, RAISED = COLUMNS["shift"].start, sum(map(len, FIELDS.values()))
@@ -26,8 +28,8 @@ WEIGHT_FIRST = 0.45
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """``time`` (T,) s; ``values`` (T, WIDTH): the fields of a posture side by side (degrees, m, shares), then how far each foot is
-    raised (0..1).
+    """``time`` (T,) s; ``values`` (T, WIDTH): the fields of a posture side by side (degrees, m, shares), then how far
+    each foot is raised (0..1).
     """
 
     time: Array
@@ -71,13 +73,18 @@ def _target(posture: ProtocolPosture, rng: np.random.Generator, sloppiness: floa
     return target
 
 
-def _windows(previous: Array, target: Array, move: float, rng: np.random.Generator, sloppiness: float) -> tuple[Array, Array]:
+def _windows(
+    previous: Array, target: Array, move: float, rng: np.random.Generator, sloppiness: float
+) -> tuple[Array, Array]:
     """Return start and duration (WIDTH,) s of every column's move within a step."""
     late = np.minimum(np.abs(2.0 * sloppiness * rng.normal(size=WIDTH)), 0.3) * move
     start, duration = late, move - late
     for foot in (RAISED, RAISED + 1):
         if target[foot] > previous[foot]:
-            start[[SHIFT, foot]], duration[[SHIFT, foot]] = (0.0, WEIGHT_FIRST * move), (WEIGHT_FIRST * move, (1 - WEIGHT_FIRST) * move)
+            start[[SHIFT, foot]], duration[[SHIFT, foot]] = (
+                (0.0, WEIGHT_FIRST * move),
+                (WEIGHT_FIRST * move, (1 - WEIGHT_FIRST) * move),
+            )
         elif target[foot] < previous[foot]:
             start[[SHIFT, foot]], duration[[SHIFT, foot]] = (
                 ((1 - WEIGHT_FIRST) * move, 0.0),

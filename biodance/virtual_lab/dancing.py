@@ -1,7 +1,8 @@
 """A virtual person copies a planned dance from a screen: late, slower, degrees off in every joint, but on both feet.
 
-The plan is a motion of the 12-segment model with its feet and its zero-moment point. The person's own bones, habits and soft parts differ,
-so the copy is made joint by joint; the path of the pelvis then keeps the zero-moment point where the plan has it.
+The plan is a motion of the 12-segment model with its feet and its zero-moment point. The person's own bones, habits and
+soft parts differ, so the copy is made joint by joint; the path of the pelvis then keeps the zero-moment point where the
+plan has it.
 """
 
 from dataclasses import dataclass
@@ -26,7 +27,7 @@ from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances
 
 ARM = ("shoulder_flexion", "shoulder_adduction", "shoulder_rotation", "elbow_flexion")
 FREE_LEG = ("hip_flexion", "hip_adduction", "hip_rotation", "knee_flexion", "ankle_dorsiflexion")
-JOINTS = {
+_JOINTS = {
     "trunk": ("trunk_flexion", "trunk_bending", "trunk_rotation"),
     **{f"{side}_arm": tuple(f"{side}_{joint}" for joint in ARM) for side in SIDES},
     **{f"{side}_leg": tuple(f"{side}_{joint}" for joint in FREE_LEG) for side in SIDES},
@@ -44,7 +45,9 @@ AWAY, SOFTNESS = 0.6, 80.0
 
 @dataclass(frozen=True)
 class Performer:
-    """How well somebody copies: ``tracking`` rad, root mean square error of every joint; ``pace`` how many times the planned duration."""
+    """How well somebody copies: ``tracking`` rad, root mean square error of every joint; ``pace`` how many times the
+    planned duration.
+    """
 
     tracking: float = float(np.radians(7.0))
     pace: float = 1.2
@@ -52,11 +55,12 @@ class Performer:
     def __post_init__(self) -> None:
         if not (0 <= self.tracking < 0.6 and 0.5 <= self.pace <= 5):
             raise BiodanceError(
-                f"Performer: tracking {self.tracking:g} rad, pace {self.pace:g}; legal are 0 to 0.6 rad and 0.5 to 5 times the duration."
+                f"Performer: tracking {self.tracking:g} rad, pace {self.pace:g}; legal are 0 to 0.6 rad and 0.5 to 5 "
+                f"times the duration."
             )
 
 
-USUAL = Performer()
+USUAL_PERFORMER = Performer()
 """Seven degrees off in every joint, a fifth slower than shown."""
 
 
@@ -64,8 +68,8 @@ USUAL = Performer()
 class Shown:
     """One stretch of a dance as it is shown, both feet staying where they are.
 
-    ``motion`` of ``body``, resting at both ends; ``ankle`` (2, 3) m right and left; ``raised`` (T, 2) 0 = planted .. 1 = free, right and
-    left; ``pressure`` (T, 2) m zero-moment point.
+    ``motion`` of ``body``, resting at both ends; ``ankle`` (2, 3) m right and left; ``raised`` (T, 2) 0 = planted .. 1
+    = free, right and left; ``pressure`` (T, 2) m zero-moment point.
     """
 
     name: str
@@ -91,7 +95,9 @@ def copy_dance(
     performer: Performer = Performer(),
     tolerances: LabTolerances = REALISTIC,
 ) -> Performance:
-    """Let ``person`` copy one stretch around ``centre`` (2,) m, facing ``heading`` rad; the same arguments give the same motion."""
+    """Let ``person`` copy one stretch around ``centre`` (2,) m, facing ``heading`` rad; the same arguments give the
+    same motion.
+    """
     rng = stream(person.seed, "copy", str(session), shown.name)
     duration = round((shown.motion.time[-1] - shown.motion.time[0]) * performer.pace, 1)
     time = -MARGIN + np.arange(round((duration + 2 * MARGIN) * NODE_RATE) + 1) / NODE_RATE
@@ -100,24 +106,28 @@ def copy_dance(
     values, pressure = (make_interp_spline(shown.motion.time, what, k=5)(when) for what in (_fields(shown), smoothed))
     values[:, RAISED:] = np.clip(values[:, RAISED:], 0.0, 1.0)
     error = np.degrees(performer.tracking) * smooth_noise(rng, time, columns=WIDTH, cutoff=WANDER)
-    for field in JOINTS:
+    for field in _JOINTS:
         values[:, COLUMNS[field]] += error[:, COLUMNS[field]]
     values[:, COLUMNS["pelvis"]] += PELVIS * error[:, COLUMNS["pelvis"]]
     stance, middle, turn = _stand(person, shown, centre, heading, rng)
-    target = centre + (pressure - middle) @ turn[:2, :2].T + tolerances.sway * smooth_noise(rng, time, columns=2, cutoff=0.5)
+    target = (
+        centre + (pressure - middle) @ turn[:2, :2].T + tolerances.sway * smooth_noise(rng, time, columns=2, cutoff=0.5)
+    )
     apart = shown.ankle[1, 1] - shown.ankle[0, 1]
     values[:, SHIFT] = np.clip((shown.ankle[1, 1] - pressure[:, 1]) / apart, 0.0, 1.0)
     curves = Curves(time, values)
     pose = upper_body(person, curves, stance, tolerances, rng)
     nodes, missed = keep_balance(person, pose, curves, stance, target, height=_height)
-    return Performance(TrialPlan(shown.name, "fit", "parallel", (), duration / 2), person, stance, curves, time, nodes, missed)
+    return Performance(
+        TrialPlan(shown.name, "fit", "parallel", (), duration / 2), person, stance, curves, time, nodes, missed
+    )
 
 
 def _fields(shown: Shown) -> Array:
     """Return the plan in the fields of a posture (T, WIDTH), without lean and shift."""
     body, q = shown.body, shown.motion.q
     angle, out = np.degrees(q[:, body.nq - len(body.joints) :]), np.zeros((len(q), WIDTH))
-    for field, names in JOINTS.items():
+    for field, names in _JOINTS.items():
         out[:, COLUMNS[field]] = angle[:, [body.joint_index(name) for name in names]]
     out[:, COLUMNS["pelvis"]] = pelvis_angles(quaternion_matrix(q[:, 3:7]))
     out[:, COLUMNS["depth"]] = _depth(shown)[:, None]
@@ -142,27 +152,36 @@ def _depth(shown: Shown) -> Array:
 
 def _height(person: Person, pose: Pose, curves: Curves, stance: FootStance, xy: Array) -> Array:
     """Return the height (T,) m of the pelvis of the person who copies."""
-    raised, ankle = np.stack([curves.raised(side) for side in SIDES], axis=1), np.array([stance.ankle[side] for side in SIDES])
+    raised, ankle = (
+        np.stack([curves.raised(side) for side in SIDES], axis=1),
+        np.array([stance.ankle[side] for side in SIDES]),
+    )
     highest, length = _reach(person.body, pose.pelvis_turn, xy, ankle, raised)
     return highest - curves["depth"][:, 0] * length
 
 
 def _reach(body: Body, turn: Array, xy: Array, ankle: Array, raised: Array) -> tuple[Array, float]:
-    """Return the highest place (T,) m of a pelvis at ``turn`` (T, 3, 3) over ``xy`` (T, 2) m, and the mean length m of the legs.
+    """Return the highest place (T,) m of a pelvis at ``turn`` (T, 3, 3) over ``xy`` (T, 2) m, and the mean length m of
+    the legs.
 
-    A foot that is lifted gives way as it rises (`posing.pelvis_height` lets go at once, which would throw up a leaning body).
+    A foot that is lifted gives way as it rises (`posing.pelvis_height` lets go at once, which would throw up a leaning
+    body).
     """
     tops, lengths = [], []
     for k, side in enumerate(SIDES):
         leg = Leg.of(body, side)
         hip, reach = turn @ leg.hip, float(leg.length(STRAIGHT))
         across = np.sum((xy + hip[:, :2] - ankle[k, :2]) ** 2, axis=1)
-        tops.append(ankle[k, 2] + np.sqrt(np.maximum(reach**2 - across, (0.5 * reach) ** 2)) - hip[:, 2] + AWAY * raised[:, k])
+        tops.append(
+            ankle[k, 2] + np.sqrt(np.maximum(reach**2 - across, (0.5 * reach) ** 2)) - hip[:, 2] + AWAY * raised[:, k]
+        )
         lengths.append(reach)
     return -logsumexp(-SOFTNESS * np.array(tops), axis=0) / SOFTNESS, float(np.mean(lengths))
 
 
-def _stand(person: Person, shown: Shown, centre: Array, heading: float, rng: np.random.Generator) -> tuple[FootStance, Array, Array]:
+def _stand(
+    person: Person, shown: Shown, centre: Array, heading: float, rng: np.random.Generator
+) -> tuple[FootStance, Array, Array]:
     """Return where the person's feet are, the plan's middle (2,) m and the turn (3, 3) from the plan to the lab."""
     turn = axis_rotation(Z, np.array([heading]))[0]
     middle = shown.ankle[:, :2].mean(axis=0) + np.array([0.04, 0.0])

@@ -1,8 +1,9 @@
 """Faults of instruments and hands, made in the raw recording: analog samples, corners, labels, typed measures.
 
-Written without the formulas of ``effects``: what is hidden in a file must not be made by the formula that finds it. Every fault speaks
-about the plate's wrench on the subject about the plate's centre in lab axes (channels ``Fx`` .. ``Mz``), reached through the plate's own
-decoding, and is put back into the channels as the amplifier would have given it.
+Written without the formulas of ``effects``: what is hidden in a file must not be made by the formula that finds it.
+Every fault speaks about the plate's wrench on the subject about the plate's centre in lab axes (channels ``Fx`` ..
+``Mz``), reached through the plate's own decoding, and is put back into the channels as the amplifier would have given
+it.
 """
 
 from collections.abc import Callable
@@ -34,7 +35,9 @@ def decoding(plate: PlateRecording) -> Array:
 
 
 def on_plate(target: str, change: PlateChange) -> Fault:
-    """Return the fault that applies ``change`` to the plate that the target names (``plate2:Fz``), or to the first one."""
+    """Return the fault that applies ``change`` to the plate that the target names (``plate2:Fz``), or to the first
+    one.
+    """
 
     def fault(recording: Recording) -> Recording:
         index = _plate_index(target, len(recording.plates))
@@ -98,7 +101,9 @@ def plate_crosstalk(target: str, ratio: float) -> Fault:
 
 
 def plate_drift(target: str, drift: float, clock: dict[str, tuple[float, float]]) -> Fault:
-    """Let the zero of a channel wander by ``drift`` over the session; ``clock`` says from and to where in the session each trial lies."""
+    """Let the zero of a channel wander by ``drift`` over the session; ``clock`` says from and to where in the
+    session each trial lies.
+    """
     unit = np.eye(6)[fault_channel(target)]
 
     def change(wrench: Array, recording: Recording) -> Array:

@@ -1,8 +1,9 @@
-"""The true masses of a virtual person: pseudo-inertias drawn around a population mean, physically possible by construction.
+"""The true masses of a virtual person: pseudo-inertias drawn around a population mean, physically possible by
+construction.
 
-A pseudo-inertia is the 4x4 matrix J = [[S, h], [h', m]] of a body's density: S = second moment, h = first moment, m = mass. Any positive
-density gives J >= 0; a linear map of the body's points, J -> A J A', keeps it so. Population mean: rounded midpoint of Dumas & Wojtusch
-2018 and de Leva 1996, so that neither table is the truth.
+A pseudo-inertia is the 4x4 matrix J = [[S, h], [h', m]] of a body's density: S = second moment, h = first moment, m =
+mass. Any positive density gives J >= 0; a linear map of the body's points, J -> A J A', keeps it so. Population mean:
+rounded midpoint of Dumas & Wojtusch 2018 and de Leva 1996, so that neither table is the truth.
 """
 
 import numpy as np
@@ -12,7 +13,7 @@ from biodance.virtual_lab.randomness import stream
 from biodance.virtual_lab.skeleton import ARM_AND_LEG, TRUE_SEGMENTS, Proportions
 
 PopulationRow = tuple[float, float, float, float, float, float, float]
-FEMALE: dict[str, PopulationRow] = {
+_FEMALE: dict[str, PopulationRow] = {
     "pelvis": (13.9, -0.080, 0.772, 0.0, 0.950, 1.050, 0.820),
     "lumbar": (4.3, 0.150, 0.590, 0.0, 0.650, 0.780, 0.520),
     "thorax": (25.2, 0.030, 0.458, 0.0, 0.380, 0.320, 0.340),
@@ -24,7 +25,7 @@ FEMALE: dict[str, PopulationRow] = {
     "forearm": (1.4, 0.010, -0.435, 0.010, 0.265, 0.117, 0.257),
     "hand": (0.53, 0.040, -0.760, 0.024, 0.580, 0.400, 0.570),
 }
-MALE: dict[str, PopulationRow] = {
+_MALE: dict[str, PopulationRow] = {
     "pelvis": (13.3, 0.000, 0.720, 0.0, 1.020, 1.060, 0.960),
     "lumbar": (3.3, 0.120, 0.640, 0.0, 0.540, 0.660, 0.430),
     "thorax": (29.2, 0.015, 0.445, 0.0, 0.420, 0.330, 0.360),
@@ -36,11 +37,15 @@ MALE: dict[str, PopulationRow] = {
     "forearm": (1.66, -0.006, -0.435, 0.006, 0.272, 0.116, 0.278),
     "hand": (0.60, 0.040, -0.820, 0.037, 0.580, 0.400, 0.600),
 }
-"""Mass in per cent of the body; CoM (x, y, z) and radii of gyration about it (x, y, z) in fractions of the segment's length."""
+"""Mass in per cent of the body; CoM (x, y, z) and radii of gyration about it (x, y, z) in fractions of the segment's
+length.
+"""
 
 
 def true_pseudo_inertia(mass: float, com: Array, radii: Array) -> Array:
-    """Return J (4, 4) of a body of ``mass`` kg with CoM (3,) m and radii of gyration (3,) m about the frame's axes at the CoM."""
+    """Return J (4, 4) of a body of ``mass`` kg with CoM (3,) m and radii of gyration (3,) m about the frame's axes
+    at the CoM.
+    """
     gyration = np.asarray(radii, float) ** 2
     second = np.diag(0.5 * gyration.sum() - gyration)
     out = np.empty((4, 4))
@@ -51,7 +56,9 @@ def true_pseudo_inertia(mass: float, com: Array, radii: Array) -> Array:
 
 
 def parameters_of_inertia(J: Array) -> Array:
-    """Return phi (10,) = [m, mc, Ixx, Ixy, Iyy, Ixz, Iyz, Izz] of a pseudo-inertia, about the frame's origin (kg, kg·m, kg·m²)."""
+    """Return phi (10,) = [m, mc, Ixx, Ixy, Iyy, Ixz, Iyz, Izz] of a pseudo-inertia, about the frame's origin (kg,
+    kg·m, kg·m²).
+    """
     second = J[:3, :3]
     inertia = np.trace(second) * np.eye(3) - second
     rows, columns = (0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2)
@@ -77,20 +84,35 @@ def place_inertia(J: Array, rotation: Array, position: Array) -> Array:
 
 
 def _stretched(J: Array, rng: np.random.Generator, shape_sd: float, com_sd: float) -> Array:
-    """Return J after a random linear map of the body about its CoM and a random shift, both relative to the body's own size."""
+    """Return J after a random linear map of the body about its CoM and a random shift, both relative to the body's
+    own size.
+    """
     com = J[:3, 3] / J[3, 3]
     centred = place_inertia(J, np.eye(3), -com)
     size = np.sqrt(np.diag(centred)[:3] / J[3, 3])
-    return place_inertia(centred, np.eye(3) + shape_sd * rng.normal(size=(3, 3)), com + com_sd * size * rng.normal(size=3))
+    return place_inertia(
+        centred, np.eye(3) + shape_sd * rng.normal(size=(3, 3)), com + com_sd * size * rng.normal(size=3)
+    )
 
 
-def draw_sip(size: Proportions, mass: float, sex: str, seed: int, *, mass_sd: float, side_sd: float, shape_sd: float, com_sd: float) -> Sip:
+def draw_sip(
+    size: Proportions,
+    mass: float,
+    sex: str,
+    seed: int,
+    *,
+    mass_sd: float,
+    side_sd: float,
+    shape_sd: float,
+    com_sd: float,
+) -> Sip:
     """Draw the true parameters of the 16 segments; their masses add up to ``mass`` kg exactly.
 
-    ``mass_sd`` is the relative sd of a kind of segment, common to both sides; ``side_sd`` that between right and left; ``shape_sd`` that of
-    the linear map of the shape; ``com_sd`` the sd of the CoM shift in units of the body's own spread along each axis.
+    ``mass_sd`` is the relative sd of a kind of segment, common to both sides; ``side_sd`` that between right and left;
+    ``shape_sd`` that of the linear map of the shape; ``com_sd`` the sd of the CoM shift in units of the body's own
+    spread along each axis.
     """
-    table = FEMALE if sex == "F" else MALE
+    table = _FEMALE if sex == "F" else _MALE
     rng = stream(seed, "flesh")
     factor = {kind: np.exp(mass_sd * rng.normal()) for kind in table}
     bodies = []

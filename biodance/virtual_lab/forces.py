@@ -28,7 +28,7 @@ GRIPS = {
 """Where something touches each part of the body: the true segment and the place in its frame, m."""
 CEILING = 3.2
 """m over the floor: where ropes hang from."""
-TOUCH, GRIP = 1.6, 0.25
+TOUCH, _GRIP = 1.6, 0.25
 """s: how long a hand stays on a rail, and how long it takes to take the load and to leave it."""
 
 
@@ -55,24 +55,30 @@ def touches(time: Array, rng: np.random.Generator, *, every: float) -> Array:
     out = np.zeros_like(time)
     for start in np.arange(time[0], time[-1] - every + 1e-9, every):
         begin = start + rng.uniform(0.0, every - TOUCH)
-        out += septic((time - begin) / GRIP) * septic((begin + TOUCH - time) / GRIP)
+        out += septic((time - begin) / _GRIP) * septic((begin + TOUCH - time) / _GRIP)
     return out
 
 
 def external_contact(target: str, force: float) -> AppliedForce:
-    """Touch a rail or be held by a helper: touches of ``force`` (N), mostly from below, at a part of the body; one in every 4 s."""
+    """Touch a rail or be held by a helper: touches of ``force`` (N), mostly from below, at a part of the body; one
+    in every 4 s.
+    """
 
     def act(performance: Performance, time: Array) -> Array:
         rng = stream(performance.person.seed, "touch", target, performance.plan.name)
         direction = np.array([0.35 * rng.normal(), 0.35 * rng.normal(), 1.0])
         strength = force * touches(time, rng, every=4.0) * (performance.plan.role != "static")
-        return force_at_point(strength[:, None] * direction / np.linalg.norm(direction), grip(target, true_poses(performance, time)))
+        return force_at_point(
+            strength[:, None] * direction / np.linalg.norm(direction), grip(target, true_poses(performance, time))
+        )
 
     return act
 
 
 def body_weight_support(target: str, force: float, stiffness: float) -> AppliedForce:
-    """Hang a rope from the ceiling to a harness at the pelvis: ``force`` (N) when standing, ``stiffness`` (N/m) as the person goes down."""
+    """Hang a rope from the ceiling to a harness at the pelvis: ``force`` (N) when standing, ``stiffness`` (N/m) as
+    the person goes down.
+    """
 
     def act(performance: Performance, time: Array) -> Array:
         if performance.plan.role == "static":
@@ -87,7 +93,9 @@ def body_weight_support(target: str, force: float, stiffness: float) -> AppliedF
 
 
 def slack_harness(target: str, stiffness: float) -> AppliedForce:
-    """Hang a safety rope that is loose until the hips are 5 cm down, then pulls with the square of its stretch (N = stiffness m²)."""
+    """Hang a safety rope that is loose until the hips are 5 cm down, then pulls with the square of its stretch (N =
+    stiffness m²).
+    """
 
     def act(performance: Performance, time: Array) -> Array:
         point = grip("trunk_head", true_poses(performance, time))
@@ -100,7 +108,9 @@ def slack_harness(target: str, stiffness: float) -> AppliedForce:
 
 
 def table_edge(target: str, force: float) -> AppliedForce:
-    """Let the right thigh run against furniture: short horizontal pushes of ``force`` (N), one in every 2 s, of either sign."""
+    """Let the right thigh run against furniture: short horizontal pushes of ``force`` (N), one in every 2 s, of
+    either sign.
+    """
 
     def act(performance: Performance, time: Array) -> Array:
         rng = stream(performance.person.seed, "table", performance.plan.name)
@@ -108,13 +118,17 @@ def table_edge(target: str, force: float) -> AppliedForce:
         for start in np.arange(time[0], time[-1] - 2.0, 2.0):
             begin = start + rng.uniform(0.0, 1.4)
             strength += rng.choice([-1.0, 1.0]) * force * np.sin(np.pi * np.clip((time - begin) / 0.6, 0.0, 1.0)) ** 2
-        return force_at_point(strength[:, None] * np.array([0.8, 0.6, 0.0]), grip("right_thigh", true_poses(performance, time)))
+        return force_at_point(
+            strength[:, None] * np.array([0.8, 0.6, 0.0]), grip("right_thigh", true_poses(performance, time))
+        )
 
     return act
 
 
 def spinning_wheel(target: str, momentum: float) -> AppliedForce:
-    """Carry a wheel that spins in a rucksack about the right-left axis of the chest: its angular ``momentum`` (N·m·s) resists turning."""
+    """Carry a wheel that spins in a rucksack about the right-left axis of the chest: its angular ``momentum``
+    (N·m·s) resists turning.
+    """
 
     def act(performance: Performance, time: Array) -> Array:
         turn = true_poses(performance, time).rotation[:, TRUE_SEGMENTS.index("thorax")]
@@ -126,7 +140,9 @@ def spinning_wheel(target: str, momentum: float) -> AppliedForce:
 
 @dataclass(frozen=True)
 class Spring:
-    """How a loose mass hangs: ``frequency`` Hz undamped, ``damping`` ratio, ``free`` (3,) 1 or 0 = it can move along lab x, y, z."""
+    """How a loose mass hangs: ``frequency`` Hz undamped, ``damping`` ratio, ``free`` (3,) 1 or 0 = it can move along
+    lab x, y, z.
+    """
 
     frequency: float
     damping: float
@@ -140,7 +156,8 @@ LIQUID = Spring(1.3, 0.08, (1.0, 1.0, 0.0))
 
 
 def swing(acceleration: Array, step: float, spring: Spring) -> tuple[Array, Array]:
-    """Return z (T, 3) m and z'' (T, 3) m/s² of a mass on a spring whose foot moves with ``acceleration`` (T, 3) m/s², from rest.
+    """Return z (T, 3) m and z'' (T, 3) m/s² of a mass on a spring whose foot moves with ``acceleration`` (T, 3) m/s²,
+    from rest.
 
     ``step`` s between samples; exact for an acceleration that is linear between samples.
     """
@@ -155,7 +172,9 @@ def swing(acceleration: Array, step: float, spring: Spring) -> tuple[Array, Arra
 
 
 def loose(segment: str, place: Array, mass: float, spring: Spring) -> AppliedForce:
-    """Return the force of ``mass`` kg, counted as fixed at ``place`` (3,) m of a true segment but hanging there on a spring."""
+    """Return the force of ``mass`` kg, counted as fixed at ``place`` (3,) m of a true segment but hanging there on a
+    spring.
+    """
 
     def act(performance: Performance, time: Array) -> Array:
         from scipy.interpolate import make_interp_spline
@@ -163,7 +182,9 @@ def loose(segment: str, place: Array, mass: float, spring: Spring) -> AppliedFor
         point = true_poses(performance, time).points([TRUE_SEGMENTS.index(segment)], place[None])[:, 0]
         acceleration = make_interp_spline(time, point, k=5).derivative(2)(time)
         z, z2 = (np.array(spring.free) * curve for curve in swing(acceleration, float(time[1] - time[0]), spring))
-        moment = np.cross(point + z, mass * (acceleration + z2 - GRAVITY)) - np.cross(point, mass * (acceleration - GRAVITY))
+        moment = np.cross(point + z, mass * (acceleration + z2 - GRAVITY)) - np.cross(
+            point, mass * (acceleration - GRAVITY)
+        )
         return -np.concatenate([mass * z2, moment], axis=1)
 
     return act
@@ -176,7 +197,9 @@ def wobbling_mass(person: Person, target: str, mass: float) -> AppliedForce:
 
 
 def sloshing_load(person: Person, target: str, mass: float, sloshing: float) -> tuple[AddedLoad, AppliedForce]:
-    """Carry a vessel of ``mass`` kg behind one of the 12 segments, of which ``sloshing`` kg move: the load, and what sloshing adds."""
+    """Carry a vessel of ``mass`` kg behind one of the 12 segments, of which ``sloshing`` kg move: the load, and what
+    sloshing adds.
+    """
     segment = _carrier(target)
     place = person.body.sip.com[TRUE_SEGMENTS.index(segment)] + np.array([-0.16, 0.0, 0.0])
     return AddedLoad(segment, mass, place, np.full(3, 0.05)), loose(segment, place, sloshing, LIQUID)

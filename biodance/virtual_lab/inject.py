@@ -1,7 +1,7 @@
 """Write an instrument's fault into a copy of a REAL recording: exact ground truth on real skin, feet and cameras.
 
-The copy has the bytes of the original everywhere but in the numbers that the fault changes: analog samples, marker coordinates, corners of
-the plates. Parameters, labels, units and signs stay as the laboratory wrote them.
+The copy has the bytes of the original everywhere but in the numbers that the fault changes: analog samples, marker
+coordinates, corners of the plates. Parameters, labels, units and signs stay as the laboratory wrote them.
 """
 
 from dataclasses import dataclass, replace
@@ -39,7 +39,9 @@ class _Axes:
 
 @dataclass(frozen=True, eq=False)
 class _Stored:
-    """How one plate is stored: its ``parameters``, ``factors`` (C,) to SI, ``sign`` (+1 reaction, -1 load) and SI ``recording``."""
+    """How one plate is stored: its ``parameters``, ``factors`` (C,) to SI, ``sign`` (+1 reaction, -1 load) and SI
+    ``recording``.
+    """
 
     parameters: PlateParameters
     factors: Array
@@ -50,13 +52,14 @@ class _Stored:
 def inject(path_in: Path, path_out: Path, fault: Fault) -> Path:
     """Write a copy of the C3D file ``path_in`` with ``fault`` in it to ``path_out`` and return that path.
 
-    ``fault`` sees the file as a `Recording`: markers in m (lab frame, z up), plates in SI with the reaction on the subject, TYPE 2 and 4.
-    It may change samples, coordinates and corners, not their number, labels or rates.
+    ``fault`` sees the file as a `Recording`: markers in m (lab frame, z up), plates in SI with the reaction on the
+    subject, TYPE 2 and 4. It may change samples, coordinates and corners, not their number, labels or rates.
 
     Raises
     ------
     BiodanceError
-        ``path_out`` exists, the file has plates of other types, or the fault changes what cannot be written into a copy.
+        ``path_out`` exists, the file has plates of other types, or the fault changes what cannot be written into a
+        copy.
     """
     if path_out.exists():
         raise BiodanceError(f"{path_out}: the file exists already and is not overwritten. Choose another name.")
@@ -89,7 +92,9 @@ def _plates(raw: RawC3d, axes: _Axes) -> tuple[_Stored, ...]:
     for number in range(1, count_plates(raw)[0] + 1):
         plate = plate_parameters(raw, number)
         if plate.type not in (2, 4):
-            raise BiodanceError(f"{raw.path}: plate {number} is of TYPE {plate.type}; faults are written into TYPE 2 and 4.")
+            raise BiodanceError(
+                f"{raw.path}: plate {number} is of TYPE {plate.type}; faults are written into TYPE 2 and 4."
+            )
         columns = list(plate.channels)
         units = tuple(raw.analog_units[c] for c in columns)
         factors = np.array(unit_factors(plate, units, metres=axes.metres)[0])
@@ -120,7 +125,8 @@ def _refuse_other_changes(path: Path, before: Recording, after: Recording) -> No
     )
     if not same:
         raise BiodanceError(
-            f"{path}: this fault changes rates, lengths, labels or typed measures; only numbers can be written into a copy."
+            f"{path}: this fault changes rates, lengths, labels or typed measures; only numbers can be written into a "
+            f"copy."
         )
 
 
@@ -136,7 +142,9 @@ def _rows(content: bytearray, layout: Layout) -> Array:
 
 
 def _bytes(numbers: Array, layout: Layout) -> bytes:
-    """Return numbers as the file's processor stores them; DEC: exponent two larger, words exchanged (inverse of ``lab.floats``)."""
+    """Return numbers as the file's processor stores them; DEC: exponent two larger, words exchanged (inverse of
+    ``lab.floats``).
+    """
     if numbers.dtype.kind != "f":
         return numbers.tobytes()
     if layout.processor != DEC:
@@ -167,12 +175,16 @@ def _put_channels(rows: Array, layout: Layout, stored: _Stored, changed: PlateRe
 
 
 def _put_corners(content: bytearray, stop: int, layout: Layout, stored: _Stored, corners: Array) -> None:
-    """Overwrite the twelve floats of a plate's ``corners`` (4, 3), file units and axes, where they stand in the parameter section."""
+    """Overwrite the twelve floats of a plate's ``corners`` (4, 3), file units and axes, where they stand in the
+    parameter section.
+    """
     written = stored.parameters.corners
     if np.allclose(corners, written, rtol=0, atol=1e-4):
         return
     old, new = _bytes(written.ravel(), layout), _bytes(corners.ravel(), layout)
     if content.count(old, 0, stop) != 1:
-        raise BiodanceError(f"Plate {stored.parameters.number}: its corners stand in the file {content.count(old, 0, stop)} times.")
+        raise BiodanceError(
+            f"Plate {stored.parameters.number}: its corners stand in the file {content.count(old, 0, stop)} times."
+        )
     at = content.find(old, 0, stop)
     content[at : at + len(new)] = new

@@ -1,4 +1,6 @@
-"""Faults of cameras, clocks, amplifiers and plates: made in stored trajectories and raw samples, without the formulas of ``effects``."""
+"""Faults of cameras, clocks, amplifiers and plates: made in stored trajectories and raw samples, without the
+formulas of ``effects``.
+"""
 
 from dataclasses import replace
 
@@ -33,7 +35,9 @@ def dropped_frames(target: str, count: float) -> Fault:
         markers = recording.markers
         frames = markers.time.size
         if not 0 < lost < frames // 4:
-            raise BiodanceError(f"dropped_frames: count = {count:g}; legal: 1 to {frames // 4} frames of this recording.")
+            raise BiodanceError(
+                f"dropped_frames: count = {count:g}; legal: 1 to {frames // 4} frames of this recording."
+            )
         kept = np.delete(np.arange(frames), np.arange(frames // 2, frames // 2 + lost))
         samples = len(recording.plates[0].channels) // frames
         shorter = Markers(markers.names, markers.time[: kept.size], markers.xyz[kept])
@@ -44,7 +48,9 @@ def dropped_frames(target: str, count: float) -> Fault:
 
 
 def swaying_cameras(target: str, sway: float) -> Fault:
-    """Swing the frame that carries the cameras at 1.7 Hz with an amplitude of ``sway`` (m): all markers seem to move."""
+    """Swing the frame that carries the cameras at 1.7 Hz with an amplitude of ``sway`` (m): all markers seem to
+    move.
+    """
 
     def fault(recording: Recording) -> Recording:
         markers = recording.markers
@@ -55,18 +61,22 @@ def swaying_cameras(target: str, sway: float) -> Fault:
     return fault
 
 
-SLACK = (10.0, 20.0, 40.0)
+_SLACK = (10.0, 20.0, 40.0)
 """N, half widths of the plays in the plate's joints; a third of it in N·m."""
 
 
 def filter_mismatch(target: str, cutoff: float) -> Fault:
-    """Smooth all channels at ``cutoff`` Hz (second order, twice, without lag), as an amplifier may before they are stored."""
+    """Smooth all channels at ``cutoff`` Hz (second order, twice, without lag), as an amplifier may before they are
+    stored.
+    """
 
     def fault(recording: Recording) -> Recording:
         from scipy.signal import butter, sosfiltfilt
 
         if not 0 < cutoff < recording.analog_rate / 2:
-            raise BiodanceError(f"filter_mismatch: cutoff = {cutoff:g} Hz; legal: above 0 and below {recording.analog_rate / 2:g} Hz.")
+            raise BiodanceError(
+                f"filter_mismatch: cutoff = {cutoff:g} Hz; legal: above 0 and below {recording.analog_rate / 2:g} Hz."
+            )
         smooth = butter(2, cutoff, fs=recording.analog_rate, output="sos")
         plates = tuple(replace(p, channels=sosfiltfilt(smooth, p.channels, axis=0)) for p in recording.plates)
         return replace(recording, plates=plates)
@@ -75,9 +85,11 @@ def filter_mismatch(target: str, cutoff: float) -> Fault:
 
 
 def plate_hysteresis(target: str, width: float) -> Fault:
-    """Let a channel follow its load in a loop of half ``width`` (N or N·m): part of the load passes through joints with play (`SLACK`)."""
+    """Let a channel follow its load in a loop of half ``width`` (N or N·m): part of the load passes through joints
+    with play (`SLACK`).
+    """
     index = fault_channel(target)
-    slacks = np.array(SLACK) * (1.0 if index < 3 else 0.33)
+    slacks = np.array(_SLACK) * (1.0 if index < 3 else 0.33)
 
     def change(wrench: Array, _: Recording) -> Array:
         out, load = wrench.copy(), wrench[:, index]
@@ -113,7 +125,9 @@ def plate_creep(target: str, ratio: float) -> Fault:
 
 
 def plate_bending(target: str, size: float) -> Fault:
-    """Bend the top plate: the centre of pressure errs with the square of its distance from the middle, by ``size`` (m) at the long edge."""
+    """Bend the top plate: the centre of pressure errs with the square of its distance from the middle, by ``size``
+    (m) at the long edge.
+    """
 
     def change(wrench: Array, _: Recording) -> Array:
         out = wrench.copy()
@@ -128,7 +142,9 @@ def plate_bending(target: str, size: float) -> Fault:
 
 
 def loose_connection(target: str, gain: float) -> Fault:
-    """Shake a plug with bad contact: for some tenths of a second a channel reads ``gain`` too much, about once in 3 s and at least once."""
+    """Shake a plug with bad contact: for some tenths of a second a channel reads ``gain`` too much, about once in 3
+    s and at least once.
+    """
     index = fault_channel(target)
 
     def change(wrench: Array, recording: Recording) -> Array:
@@ -143,7 +159,9 @@ def loose_connection(target: str, gain: float) -> Fault:
 
 
 def trigger_jitter(target: str, jitter: float) -> Fault:
-    """Start the forces of every trial at another time: late by a standard deviation of ``jitter`` (s), drawn per trial."""
+    """Start the forces of every trial at another time: late by a standard deviation of ``jitter`` (s), drawn per
+    trial.
+    """
     return lambda recording: all_late(recording, np.asarray(jitter * stream(3, "trigger", recording.name).normal()))
 
 
@@ -160,7 +178,9 @@ def object_on_plate(target: str, weight: float) -> Fault:
 
 
 def saturating(target: str, ratio: float) -> Fault:
-    """Let a channel read less the more it is loaded: ``ratio`` less at 1000 N or 300 N·m, growing with the square of the load."""
+    """Let a channel read less the more it is loaded: ``ratio`` less at 1000 N or 300 N·m, growing with the square of
+    the load.
+    """
     index = fault_channel(target)
     full = 1000.0 if index < CHANNELS.index("Mx") else 300.0
 

@@ -22,8 +22,9 @@ from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances
 
 @dataclass(frozen=True, eq=False)
 class Laboratory:
-    """``centre`` (2,) m where the subject stands; ``heading`` rad from lab x that the subject faces; ``plates`` 1, or 2 = one under each
-    foot; ``plate_type`` 2 or 4; ``camera_rate`` Hz, ``samples`` of force per camera frame, ``bits`` of the converter.
+    """``centre`` (2,) m where the subject stands; ``heading`` rad from lab x that the subject faces; ``plates`` 1, or 2
+    = one under each foot; ``plate_type`` 2 or 4; ``camera_rate`` Hz, ``samples`` of force per camera frame, ``bits`` of
+    the converter.
     """
 
     centre: tuple[float, float] = (0.3, 0.2)
@@ -36,15 +37,19 @@ class Laboratory:
 
     def __post_init__(self) -> None:
         if self.plates not in (1, 2) or self.plate_type not in (2, 4):
-            raise BiodanceError(f"Laboratory: {self.plates} plates of TYPE {self.plate_type}; legal are 1 or 2 plates of TYPE 2 or 4.")
+            raise BiodanceError(
+                f"Laboratory: {self.plates} plates of TYPE {self.plate_type}; legal are 1 or 2 plates of TYPE 2 or 4."
+            )
         if self.camera_rate <= 0 or self.samples < 1:
-            raise BiodanceError(f"Laboratory: {self.camera_rate} Hz with {self.samples} force samples per frame; both must be positive.")
+            raise BiodanceError(
+                f"Laboratory: {self.camera_rate} Hz with {self.samples} force samples per frame; both must be positive."
+            )
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """One trial as the instruments deliver it, before it is written; ``parameters`` of the C3D file. Faults are functions of this
-    record.
+    """One trial as the instruments deliver it, before it is written; ``parameters`` of the C3D file. Faults are
+    functions of this record.
     """
 
     name: str
@@ -60,13 +65,14 @@ Fault = Callable[[Recording], Recording]
 
 @dataclass(frozen=True, eq=False)
 class LabVisit:
-    """The day of a session: its ``number`` (another day: markers glued, postures performed, instruments drawn anew), the ``laboratory``,
-    the ``tolerances`` of everything, and ``faults`` that change each recording (markers, raw analog samples, parameters) before it is
-    written.
+    """The day of a session: its ``number`` (another day: markers glued, postures performed, instruments drawn anew),
+    the ``laboratory``, the ``tolerances`` of everything, and ``faults`` that change each recording (markers, raw analog
+    samples, parameters) before it is written.
 
-    ``tilt`` (3,) rad turns the laboratory's axes off the true vertical, beyond the tolerance; ``forces`` act on the person beside gravity
-    and ground; ``joint_shifts`` (3,) m by joint (``right_hip``) move true joint centres in the parent's frame, with all that hangs on
-    them; ``marker_shifts`` (3,) m by label move markers on their segments after the static trial.
+    ``tilt`` (3,) rad turns the laboratory's axes off the true vertical, beyond the tolerance; ``forces`` act on the
+    person beside gravity and ground; ``joint_shifts`` (3,) m by joint (``right_hip``) move true joint centres in the
+    parent's frame, with all that hangs on them; ``marker_shifts`` (3,) m by label move markers on their segments after
+    the static trial.
     """
 
     number: int = 0
@@ -85,7 +91,9 @@ FIRST_VISIT = LabVisit()
 
 @dataclass(frozen=True, eq=False)
 class Instruments:
-    """What is true of a visit's instruments: plates, the cameras' ``tilt`` (3, 3) from true vertical, the skin under the markers."""
+    """What is true of a visit's instruments: plates, the cameras' ``tilt`` (3, 3) from true vertical, the skin under
+    the markers.
+    """
 
     visit: LabVisit
     plates: tuple[TruePlate, ...]
@@ -101,39 +109,67 @@ def set_up(person: Person, visit: LabVisit) -> Instruments:
     middle = np.array([*laboratory.centre, 0.0])
     leftward = np.array([-np.sin(laboratory.heading), np.cos(laboratory.heading), 0.0]) * HALF_SIZE[0]
     sides = [("both", 0.0)] if laboratory.plates == 1 else [("right", -1.0), ("left", 1.0)]
-    plates = tuple(lay_plate(middle + sign * leftward, laboratory.heading, side, tolerances, rng) for side, sign in sides)
-    return Instruments(visit, plates, frozen_array(small_rotation(tilt), (3, 3), "tilt"), draw_soft_tissue(person, session, tolerances))
+    plates = tuple(
+        lay_plate(middle + sign * leftward, laboratory.heading, side, tolerances, rng) for side, sign in sides
+    )
+    return Instruments(
+        visit, plates, frozen_array(small_rotation(tilt), (3, 3), "tilt"), draw_soft_tissue(person, session, tolerances)
+    )
 
 
 def perform_in(instruments: Instruments, person: Person, plan: TrialPlan) -> Performance:
-    """Let the person perform one trial where the laboratory's plates are, with the forces and the moved markers of the visit."""
+    """Let the person perform one trial where the laboratory's plates are, with the forces and the moved markers of
+    the visit.
+    """
     visit = instruments.visit
     lab = visit.laboratory
     if plan.role != "static":
         person = person.with_markers_moved(visit.marker_shifts)
-    done = perform(person, plan, visit.number, tolerances=visit.tolerances, centre=np.array(lab.centre), heading=lab.heading)
+    done = perform(
+        person, plan, visit.number, tolerances=visit.tolerances, centre=np.array(lab.centre), heading=lab.heading
+    )
     return replace(done, forces=visit.forces)
 
 
 def record(performance: Performance, instruments: Instruments) -> Recording:
-    """Return what the instruments deliver of one performance: markers at the camera rate, plates at ``samples`` times that rate."""
+    """Return what the instruments deliver of one performance: markers at the camera rate, plates at ``samples``
+    times that rate.
+    """
     visit, plan, seed = instruments.visit, performance.plan, performance.person.seed
     lab, tolerances, session = visit.laboratory, visit.tolerances, visit.number
     frames = round(plan.duration * lab.camera_rate) + 1
     time = np.arange(frames) / lab.camera_rate
     analog_rate = lab.camera_rate * lab.samples
     fine = np.arange(frames * lab.samples) / analog_rate
-    markers = film(performance, instruments.tissue, time, instruments.tilt, tolerances, stream(seed, "cameras", str(session), plan.name))
+    markers = film(
+        performance,
+        instruments.tissue,
+        time,
+        instruments.tilt,
+        tolerances,
+        stream(seed, "cameras", str(session), plan.name),
+    )
     noise = stream(seed, "plates", str(session), plan.name)
     plates = tuple(
-        digitise(sense_plate(performance, plate, fine, instruments.tilt, tolerances, noise), plate, kind=lab.plate_type, bits=lab.bits)
+        digitise(
+            sense_plate(performance, plate, fine, instruments.tilt, tolerances, noise),
+            plate,
+            kind=lab.plate_type,
+            bits=lab.bits,
+        )
         for plate in instruments.plates
     )
-    return Recording(plan.name, plan.role, markers, plates, analog_rate, measurements(performance.person, session, tolerances))
+    return Recording(
+        plan.name, plan.role, markers, plates, analog_rate, measurements(performance.person, session, tolerances)
+    )
 
 
-def measurements(person: Person, session: int, tolerances: LabTolerances) -> dict[str, dict[str, list[float] | list[str] | float | str]]:
-    """Return the C3D groups with the subject's typed measurements, as Vicon stores them (mm, kg), with errors of tape and calliper."""
+def measurements(
+    person: Person, session: int, tolerances: LabTolerances
+) -> dict[str, dict[str, list[float] | list[str] | float | str]]:
+    """Return the C3D groups with the subject's typed measurements, as Vicon stores them (mm, kg), with errors of
+    tape and calliper.
+    """
     rng = stream(person.seed, "measurements", str(session))
     size = person.size
     sided = {
@@ -167,6 +203,10 @@ def write(recording: Recording, folder: Path) -> Path:
     """Write one recording as ``folder/NAME.c3d`` and return the path; an existing file is never overwritten."""
     path = folder / f"{recording.name}.c3d"
     write_c3d(
-        path, markers=recording.markers, plates=recording.plates, analog_rate=recording.analog_rate, parameters=dict(recording.parameters)
+        path,
+        markers=recording.markers,
+        plates=recording.plates,
+        analog_rate=recording.analog_rate,
+        parameters=dict(recording.parameters),
     )
     return path

@@ -25,14 +25,18 @@ MERGED: dict[str, tuple[str, tuple[str, ...]]] = {
     "left_upper_arm": ("left_shoulder_rotation", ("left_upper_arm",)),
     "left_forearm_hand": ("left_elbow_flexion", ("left_forearm", "left_hand")),
 }
-"""Each of the 12 segments: the true joint whose frame it is written in ("" = the root), and the true segments it consists of."""
+"""Each of the 12 segments: the true joint whose frame it is written in ("" = the root), and the true segments it
+consists of.
+"""
 CARRIERS = {"trunk_head": "thorax", "right_forearm_hand": "right_forearm", "left_forearm_hand": "left_forearm"}
 """The true segment that carries a load on a merged one."""
 TrueFrames = dict[str, tuple[Array, Array]]
 
 
 def _frames(person: Person, body: Body, q: Array | None = None) -> tuple[TrueFrames, TrueFrames]:
-    """Return the poses (3, 3), (3,) m of the 12 frames and of the 16 segments at ``q`` (46,), by default as the markers were glued."""
+    """Return the poses (3, 3), (3,) m of the 12 frames and of the 16 segments at ``q`` (46,), by default as the
+    markers were glued.
+    """
     if q is None:
         q = body.neutral
         q[7:] = reference_angles(person)
@@ -41,15 +45,19 @@ def _frames(person: Person, body: Body, q: Array | None = None) -> tuple[TrueFra
     for segment, (joint, _) in MERGED.items():
         j = body.joint_index(joint) if joint else -1
         merged[segment] = (
-            (pose.joint_rotation[0, j], pose.joint_position[0, j]) if joint else (pose.root_rotation[0], pose.root_position[0])
+            (pose.joint_rotation[0, j], pose.joint_position[0, j])
+            if joint
+            else (pose.root_rotation[0], pose.root_position[0])
         )
     return merged, {name: (pose.rotation[0, i], pose.position[0, i]) for i, name in enumerate(TRUE_SEGMENTS)}
 
 
 def merged_sip(person: Person, body: Body) -> Sip:
-    """Return the true parameters of ``body`` (with or without loads) in the 12 segments, each in its own true joint frame.
+    """Return the true parameters of ``body`` (with or without loads) in the 12 segments, each in its own true joint
+    frame.
 
-    Joints that the 12-segment model lacks (thorax, neck, forearm, wrist) are frozen in the posture in which the markers were glued.
+    Joints that the 12-segment model lacks (thorax, neck, forearm, wrist) are frozen in the posture in which the markers
+    were glued.
     """
     merged, true = _frames(person, body)
     phi = []
@@ -67,8 +75,8 @@ def merged_sip(person: Person, body: Body) -> Sip:
 def load_on(person: Person, segment: str, mass: float, *, place: Array | None = None) -> AddedLoad:
     """Return a load of ``mass`` kg on one of the 12 segments.
 
-    ``place`` (3,) m is its centre in that segment's true joint frame; by default 6 cm outwards of the segment's centre of mass (pelvis
-    and trunk: 10 cm backwards). The forearm carries for forearm_hand, the thorax for trunk_head.
+    ``place`` (3,) m is its centre in that segment's true joint frame; by default 6 cm outwards of the segment's centre
+    of mass (pelvis and trunk: 10 cm backwards). The forearm carries for forearm_hand, the thorax for trunk_head.
 
     Raises
     ------

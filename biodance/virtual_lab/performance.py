@@ -1,6 +1,7 @@
 """Perform a trial: the true motion and the true ground wrench of a virtual person, by pinocchio's own dynamics.
 
-The path of the pelvis is what keeps the balance: the zero-moment point of the full body is brought to where the posture asks for it.
+The path of the pelvis is what keeps the balance: the zero-moment point of the full body is brought to where the posture
+asks for it.
 """
 
 from collections.abc import Callable
@@ -25,7 +26,7 @@ NODE_RATE = 100.0
 """Hz of the nodes of the motion's spline; the instruments sample the spline at their own rates."""
 MARGIN = 0.1
 """s of motion before and after the recording, for late force samples."""
-ROUNDS = 12
+_ROUNDS = 12
 """Largest number of balance corrections; 5 to 8 suffice."""
 SETTLED = 0.004
 """m: the balance is settled when the zero-moment point is everywhere this close to the place wanted."""
@@ -35,8 +36,9 @@ SETTLED = 0.004
 class Performance:
     """One trial as it truly happened: the motion is a quintic spline through ``nodes`` (T, 46) at ``node_time`` (T,) s.
 
-    ``plan`` what was asked; ``stance`` where the feet stood; ``curves`` the postures; ``balance_error`` m: the farthest that the
-    zero-moment point was from the place wanted. ``forces`` act on the person beside gravity and the ground: a hand on a rail, a rope.
+    ``plan`` what was asked; ``stance`` where the feet stood; ``curves`` the postures; ``balance_error`` m: the farthest
+    that the zero-moment point was from the place wanted. ``forces`` act on the person beside gravity and the ground: a
+    hand on a rail, a rope.
     """
 
     plan: TrialPlan
@@ -66,8 +68,8 @@ class Performance:
         return make_interp_spline(time, needed - sum(force(self, time) for force in self.forces), k=5)
 
     def wrench(self, time: Array) -> Wrench:
-        """Return the true ground wrench on the person about the lab origin at ``time`` (T,) s, all feet together: what the motion needs
-        less what the ``forces`` do.
+        """Return the true ground wrench on the person about the lab origin at ``time`` (T,) s, all feet together: what
+        the motion needs less what the ``forces`` do.
         """
         return Wrench(time, self._wrench_spline(time))
 
@@ -81,11 +83,19 @@ AppliedForce = Callable[[Performance, Array], Array]
 
 
 def perform(
-    person: Person, plan: TrialPlan, session: int, *, tolerances: LabTolerances = REALISTIC, centre: Array, heading: float = 0.0
+    person: Person,
+    plan: TrialPlan,
+    session: int,
+    *,
+    tolerances: LabTolerances = REALISTIC,
+    centre: Array,
+    heading: float = 0.0,
 ) -> Performance:
-    """Let ``person`` perform one trial around ``centre`` (2,) m of the lab floor, facing ``heading`` rad from lab x (anticlockwise).
+    """Let ``person`` perform one trial around ``centre`` (2,) m of the lab floor, facing ``heading`` rad from lab x
+    (anticlockwise).
 
-    ``session`` decides what differs from day to day and from trial to trial; the same arguments give the same motion, bit for bit.
+    ``session`` decides what differs from day to day and from trial to trial; the same arguments give the same motion,
+    bit for bit.
     """
     rng = stream(person.seed, "performance", str(session), plan.name)
     count = round((plan.duration + 2 * MARGIN) * NODE_RATE) + 1
@@ -99,7 +109,9 @@ def perform(
 
 
 def wanted_pressure(curves: Curves, stance: FootStance) -> Array:
-    """Return where the centre of pressure should be (T, 2) m: between the feet by the share of weight, plus the posture's lean."""
+    """Return where the centre of pressure should be (T, 2) m: between the feet by the share of weight, plus the
+    posture's lean.
+    """
     right = curves["shift"]
     forward, sideways = curves["lean"][:, :1], curves["lean"][:, 1:]
     ahead = np.array([np.cos(stance.heading), np.sin(stance.heading)])
@@ -111,15 +123,16 @@ def wanted_pressure(curves: Curves, stance: FootStance) -> Array:
 def keep_balance(
     person: Person, pose: Pose, curves: Curves, stance: FootStance, target: Array, *, height: Height = pelvis_height
 ) -> tuple[Array, float]:
-    """Return the configurations (T, 46) whose zero-moment point follows ``target`` (T, 2) m, and the largest distance left, m.
+    """Return the configurations (T, 46) whose zero-moment point follows ``target`` (T, 2) m, and the largest distance
+    left, m.
 
-    Each round moves the pelvis by the bounded solution of  d - h d'' = -(error), the linear pendulum with h = height of the centre of mass
-    over (g + its vertical acceleration); the legs, the arms' momentum and all else are in the error.
+    Each round moves the pelvis by the bounded solution of  d - h d'' = -(error), the linear pendulum with h = height of
+    the centre of mass over (g + its vertical acceleration); the legs, the arms' momentum and all else are in the error.
     """
     time = curves.time
     xy = target.copy()
     q = stand_on_feet(person, pose, curves, stance, xy, height=height)
-    for _ in range(ROUNDS):
+    for _ in range(_ROUNDS):
         motion = _motion(_splines(time, q), time)
         value = true_wrench(person, motion).value
         vertical = value[:, 2]
@@ -143,7 +156,8 @@ def _pendulum(right: Array, h: Array, step: float) -> Array:
 
 
 def _without_ripple(path: Array) -> Array:
-    """Return a path (T, 2) without what alternates from node to node: 50 Hz, which rounds would build up and a plate would show as hum.
+    """Return a path (T, 2) without what alternates from node to node: 50 Hz, which rounds would build up and a plate
+    would show as hum.
 
     Cubics pass unchanged.
     """
@@ -177,13 +191,17 @@ def _motion(splines: tuple[Any, Any, Any], time: Array) -> Motion:
 
 
 def _twice_conjugate_times(quaternion: Array, rate: Array) -> Array:
-    """Return the vector part (T, 3) of 2 q* r: the angular velocity for r = q', its derivative for r = q'' (unit q, x y z w)."""
+    """Return the vector part (T, 3) of 2 q* r: the angular velocity for r = q', its derivative for r = q'' (unit q,
+    x y z w).
+    """
     vector, scalar = quaternion[:, :3], quaternion[:, 3:]
     return 2 * (scalar * rate[:, :3] - rate[:, 3:] * vector - np.cross(vector, rate[:, :3]))
 
 
 def true_wrench(person: Person, motion: Motion) -> Wrench:
-    """Return the ground wrench about the lab origin that ``motion`` of the loaded true body needs, by pinocchio's RNEA."""
+    """Return the ground wrench about the lab origin that ``motion`` of the loaded true body needs, by pinocchio's
+    RNEA.
+    """
     pin = load_pinocchio()
     model = person.loaded_body.model.copy()
     model.gravity = pin.Motion(np.array(GRAVITY), np.zeros(3))

@@ -12,14 +12,21 @@ from biodance.records import Array, Sip, Subject, frozen_array
 from biodance.virtual_lab.flesh import draw_sip, of_parameters, parameters_of_inertia, true_pseudo_inertia
 from biodance.virtual_lab.placement import glue_markers
 from biodance.virtual_lab.randomness import stream
-from biodance.virtual_lab.skeleton import LIMITS_DEGREES, TRUE_SEGMENTS, Proportions, build_joints, draw_proportions, on_side
+from biodance.virtual_lab.skeleton import (
+    LIMITS_DEGREES,
+    TRUE_SEGMENTS,
+    Proportions,
+    build_joints,
+    draw_proportions,
+    on_side,
+)
 from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances
 
 
 @dataclass(frozen=True, eq=False)
 class AddedLoad:
-    """A load fixed to a segment of the true body: ``mass`` kg, ``place`` (3,) m its CoM in the segment's frame, ``radii`` (3,) m of
-    gyration.
+    """A load fixed to a segment of the true body: ``mass`` kg, ``place`` (3,) m its CoM in the segment's frame,
+    ``radii`` (3,) m of gyration.
     """
 
     segment: str
@@ -38,8 +45,8 @@ class AddedLoad:
 
 @dataclass(frozen=True)
 class Habits:
-    """How a person stands, drawn once: ``angles`` rad added to true joints by name; ``stance`` m between the ankles; ``toe_out`` rad
-    (right, left).
+    """How a person stands, drawn once: ``angles`` rad added to true joints by name; ``stance`` m between the ankles;
+    ``toe_out`` rad (right, left).
     """
 
     angles: dict[str, float]
@@ -49,8 +56,8 @@ class Habits:
 
 @dataclass(frozen=True, eq=False)
 class Person:
-    """A subject whose truth is known: ``body`` of 16 segments with its true SIP WITHOUT ``loads``, markers as glued in the present
-    session.
+    """A subject whose truth is known: ``body`` of 16 segments with its true SIP WITHOUT ``loads``, markers as glued in
+    the present session.
     """
 
     subject: Subject
@@ -67,7 +74,9 @@ class Person:
         for load in self.loads:
             i = 10 * TRUE_SEGMENTS.index(load.segment)
             phi[i : i + 10] += parameters_of_inertia(true_pseudo_inertia(load.mass, load.place, load.radii))
-        return replace(self.body, name="virtual person with loads", sip=Sip(TRUE_SEGMENTS, phi, self.body.sip.covariance))
+        return replace(
+            self.body, name="virtual person with loads", sip=Sip(TRUE_SEGMENTS, phi, self.body.sip.covariance)
+        )
 
     @property
     def mass(self) -> float:
@@ -75,7 +84,9 @@ class Person:
         return float(self.loaded_body.sip.mass.sum())
 
     def with_markers_moved(self, shifts: Mapping[str, Array]) -> "Person":
-        """Return the person with markers moved by ``shifts`` (3,) m in their true segments' frames; UnknownName lists the labels."""
+        """Return the person with markers moved by ``shifts`` (3,) m in their true segments' frames; UnknownName
+        lists the labels.
+        """
         markers = self.body.markers
         position = np.array(markers.position)
         for label, shift in shifts.items():
@@ -86,8 +97,8 @@ class Person:
 
 
 NO_SHIFTS: Mapping[str, Array] = MappingProxyType({})
-BEYOND = {"hip": "thigh", "knee": "shank", "ankle": "foot", "shoulder": "upper_arm"}
-MOVABLE = (*(f"{side}_{joint}" for side in ("right", "left") for joint in BEYOND), "lumbar", "neck")
+_BEYOND = {"hip": "thigh", "knee": "shank", "ankle": "foot", "shoulder": "upper_arm"}
+MOVABLE = (*(f"{side}_{joint}" for side in ("right", "left") for joint in _BEYOND), "lumbar", "neck")
 """Joints whose true centre can be moved."""
 
 
@@ -102,18 +113,28 @@ def make_person(
 ) -> Person:
     """Return the virtual person number ``seed`` of the given mass (kg), stature (m) and sex.
 
-    The same ``seed`` is the same body for ever; ``session`` only moves the markers as another day does. ``loads`` come on top of the
-    subject's mass. ``joint_shifts`` (3,) m by joint (one of ``MOVABLE``) move true joint centres in the frame of the segment before them.
+    The same ``seed`` is the same body for ever; ``session`` only moves the markers as another day does. ``loads`` come
+    on top of the subject's mass. ``joint_shifts`` (3,) m by joint (one of ``MOVABLE``) move true joint centres in the
+    frame of the segment before them.
     """
     t = tolerances
     size = draw_proportions(subject, seed, length_sd=t.segment_length, centre_sd=t.joint_centre, tilt_sd=t.joint_axis)
     size = _with_joints_moved(size, joint_shifts)
     sip = draw_sip(
-        size, subject.mass, subject.sex, seed, mass_sd=t.segment_mass, side_sd=t.side_mass, shape_sd=t.segment_shape, com_sd=t.com
+        size,
+        subject.mass,
+        subject.sex,
+        seed,
+        mass_sd=t.segment_mass,
+        side_sd=t.side_mass,
+        shape_sd=t.segment_shape,
+        com_sd=t.com,
     )
     joints = build_joints(size)
     lower, upper = np.radians([LIMITS_DEGREES[j.name.removeprefix("right_").removeprefix("left_")] for j in joints]).T
-    limits = JointLimits(lower, upper, np.full(len(joints), 15.0), np.full(len(joints), -400.0), np.full(len(joints), 400.0))
+    limits = JointLimits(
+        lower, upper, np.full(len(joints), 15.0), np.full(len(joints), -400.0), np.full(len(joints), 400.0)
+    )
     boxes = np.stack([_box(sip.of(segment)) for segment in TRUE_SEGMENTS])
     body = Body(
         "virtual person",
@@ -135,7 +156,9 @@ def _with_joints_moved(size: Proportions, shifts: Mapping[str, Array]) -> Propor
         if joint not in MOVABLE:
             raise UnknownName.of("joint of the virtual subject whose centre can be moved", joint, MOVABLE)
         side, _, kind = joint.rpartition("_")
-        moved[TRUE_SEGMENTS.index(f"{side}_{BEYOND[kind]}" if side else {"lumbar": "lumbar", "neck": "head"}[kind])] += shift
+        moved[
+            TRUE_SEGMENTS.index(f"{side}_{_BEYOND[kind]}" if side else {"lumbar": "lumbar", "neck": "head"}[kind])
+        ] += shift
     return replace(size, centre_shift=moved)
 
 
@@ -148,7 +171,9 @@ def _box(phi: Array) -> Array:
 
 
 def _sole(size: Proportions, side: str) -> Foot:
-    """Return the outline of a foot on the ground: heel 27 % of its length behind the ankle (mesh of Millard et al. 2017)."""
+    """Return the outline of a foot on the ground: heel 27 % of its length behind the ankle (mesh of Millard et al.
+    2017).
+    """
     back, front, half = -0.27 * size["sole"], 0.73 * size["sole"], size["sole_breadth"] / 2
     corners = [
         (back, 0.6 * half),

@@ -1,7 +1,8 @@
 """Where the 39 plug-in-gait markers are glued on a virtual person: on the true 16 segments, with an error per session.
 
-Places: means of the static trials of nine adults in public recordings, moved from the 12 segments of the reading model to the true ones.
-Wands (THI, TIB, UPA, FRM) sit at a different height on each side, as the guide of the marker set asks.
+Places: means of the static trials of nine adults in public recordings, moved from the 12 segments of the reading model
+to the true ones. Wands (THI, TIB, UPA, FRM) sit at a different height on each side, as the guide of the marker set
+asks.
 """
 
 import numpy as np
@@ -14,7 +15,9 @@ from biodance.virtual_lab.skeleton import TRUE_SEGMENTS, Proportions, on_side
 MARKER_RADIUS = 0.007
 """m; 14 mm markers, the plug-in-gait default."""
 SKIN_PLANE = np.array([1.0, 1.0, 0.35])
-"""Placement errors are along the skin; through it (z for the lateral markers of the limbs) the bone holds the marker."""
+"""Placement errors are along the skin; through it (z for the lateral markers of the limbs) the bone holds the
+marker.
+"""
 
 Place = tuple[str, tuple[float, float, float]]
 

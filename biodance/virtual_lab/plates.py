@@ -1,8 +1,8 @@
-"""What force plates record of a performance: true wrench, true place of the plate, gain, cross-talk, offset, noise, delay, steps of the
-converter.
+"""What force plates record of a performance: true wrench, true place of the plate, gain, cross-talk, offset, noise,
+delay, steps of the converter.
 
-The model is an AMTI BP400600: z down, origin under the surface, the ground's reaction on the subject in plate axes as Vicon writes TYPE
-2, or volts with the calibration matrix of a real unit as TYPE 4.
+The model is an AMTI BP400600: z down, origin under the surface, the ground's reaction on the subject in plate axes as
+Vicon writes TYPE 2, or volts with the calibration matrix of a real unit as TYPE 4.
 """
 
 from dataclasses import dataclass
@@ -19,9 +19,9 @@ HALF_SIZE = np.array([0.2, 0.3])
 """m, half sides along plate x and y."""
 ORIGIN = np.array([0.0004, -0.0006, -0.0380])
 """m, from the sensor's origin to the centre of the surface, plate axes (z down, hence negative)."""
-NEWTON, INCH = 4.4482216152605, 0.0254
+NEWTON, _INCH = 4.4482216152605, 0.0254
 CALIBRATION = (
-    np.diag([NEWTON] * 3 + [NEWTON * INCH] * 3)
+    np.diag([NEWTON] * 3 + [NEWTON * _INCH] * 3)
     @ np.array(
         [
             [0.6521, 0.0045, -0.0002, -0.0057, -0.0019, 0.0020],
@@ -34,15 +34,18 @@ CALIBRATION = (
     )
     * 50.0
 )
-"""(6, 6) N/V and N·m/V: the sheet of a real AMTI unit (pounds, pound-inches per microvolt and volt) at gain 2000 and 10 V excitation."""
+"""(6, 6) N/V and N·m/V: the sheet of a real AMTI unit (pounds, pound-inches per microvolt and volt) at gain 2000 and
+10 V excitation.
+"""
 FULL_SCALE = 10.0 * np.diag(CALIBRATION)
 """(6,) N, N·m at 10 V: 1450, 1450, 5710, 728, 574, 309."""
 
 
 @dataclass(frozen=True, eq=False)
 class TruePlate:
-    """One plate as it truly is: ``corners`` (4, 3) m as surveyed; ``turn`` (3, 3), ``centre`` (3,) m its true pose in the lab frame;
-    ``mixing`` (6, 6) gains and cross-talk; ``offset`` (6,) N, N·m; ``side`` whose foot it carries, "both" for a single plate.
+    """One plate as it truly is: ``corners`` (4, 3) m as surveyed; ``turn`` (3, 3), ``centre`` (3,) m its true pose in
+    the lab frame; ``mixing`` (6, 6) gains and cross-talk; ``offset`` (6,) N, N·m; ``side`` whose foot it carries,
+    "both" for a single plate.
     """
 
     corners: Array
@@ -53,12 +56,17 @@ class TruePlate:
     side: str = "both"
 
 
-def lay_plate(centre: Array, heading: float, side: str, tolerances: LabTolerances, rng: np.random.Generator) -> TruePlate:
-    """Return a plate whose long side lies along ``heading`` (rad from lab x), surveyed at ``centre`` (3,) m and truly a little
-    elsewhere.
+def lay_plate(
+    centre: Array, heading: float, side: str, tolerances: LabTolerances, rng: np.random.Generator
+) -> TruePlate:
+    """Return a plate whose long side lies along ``heading`` (rad from lab x), surveyed at ``centre`` (3,) m and truly a
+    little elsewhere.
     """
     t, relative = tolerances, FULL_SCALE / FULL_SCALE[2]
-    forward, leftward = np.array([np.cos(heading), np.sin(heading), 0.0]), np.array([-np.sin(heading), np.cos(heading), 0.0])
+    forward, leftward = (
+        np.array([np.cos(heading), np.sin(heading), 0.0]),
+        np.array([-np.sin(heading), np.cos(heading), 0.0]),
+    )
     turn = np.stack([leftward, forward, np.array([0.0, 0.0, -1.0])], axis=1)
     signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
     corners = centre + (signs * HALF_SIZE) @ turn[:, :2].T
@@ -66,14 +74,20 @@ def lay_plate(centre: Array, heading: float, side: str, tolerances: LabTolerance
     np.fill_diagonal(mixing, 1.0 + t.plate_gain * rng.normal(size=6))
     true_turn = turn @ small_rotation(t.plate_rotation * rng.normal(size=3))
     return TruePlate(
-        corners, true_turn, centre + t.plate_position * rng.normal(size=3), mixing, t.plate_offset * relative * rng.normal(size=6), side
+        corners,
+        true_turn,
+        centre + t.plate_position * rng.normal(size=3),
+        mixing,
+        t.plate_offset * relative * rng.normal(size=6),
+        side,
     )
 
 
 def contact_wrench(performance: Performance, time: Array, side: str) -> Array:
     """Return the true wrench (T, 6) about the lab origin under one foot, or under "both".
 
-    The weight is shared as planned; each foot's pressure lies as far from its own place as the common one from the place wanted.
+    The weight is shared as planned; each foot's pressure lies as far from its own place as the common one from the
+    place wanted.
     """
     wrench = performance.wrench(time)
     if side == "both":
@@ -89,10 +103,15 @@ def contact_wrench(performance: Performance, time: Array, side: str) -> Array:
 
 
 def sense_plate(
-    performance: Performance, plate: TruePlate, time: Array, tilt: Array, tolerances: LabTolerances, rng: np.random.Generator
+    performance: Performance,
+    plate: TruePlate,
+    time: Array,
+    tilt: Array,
+    tolerances: LabTolerances,
+    rng: np.random.Generator,
 ) -> Array:
-    """Return what the plate's six channels say (S, 6) N, N·m at ``time`` (S,) s: reaction on the subject, plate axes, about the plate's
-    origin.
+    """Return what the plate's six channels say (S, 6) N, N·m at ``time`` (S,) s: reaction on the subject, plate axes,
+    about the plate's origin.
 
     ``tilt`` (3, 3) turns true-vertical axes into the laboratory's.
     """
@@ -106,7 +125,9 @@ def sense_plate(
 
 
 def digitise(channels: Array, plate: TruePlate, *, kind: int, bits: int) -> PlateRecording:
-    """Return channels (S, 6) N, N·m as the converter stores them: ``bits`` over ±10 V, ``kind`` TYPE 2 or, in volts, TYPE 4."""
+    """Return channels (S, 6) N, N·m as the converter stores them: ``bits`` over ±10 V, ``kind`` TYPE 2 or, in volts,
+    TYPE 4.
+    """
     calibration = CALIBRATION if kind == 4 else np.diag(FULL_SCALE / 10.0)
     step = 20.0 / 2**bits
     volts = np.clip(np.round(channels @ np.linalg.inv(calibration).T / step) * step, -10.0, 10.0)

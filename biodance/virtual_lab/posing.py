@@ -15,8 +15,8 @@ from biodance.virtual_lab.person import Person
 from biodance.virtual_lab.randomness import smooth_noise
 from biodance.virtual_lab.tolerances import LabTolerances
 
-X, Y, Z = np.eye(3)
-SHARPNESS = 250.0
+_X, _Y, Z = np.eye(3)
+_SHARPNESS = 250.0
 """1/m: the height of the pelvis turns from one leg's limit to the other's within some millimetres."""
 CLEARANCE = np.radians([18.0, 0.0, 0.0, 34.0, 12.0, 0.0])
 """Extra leg angles halfway up and down, so that the toes clear the ground (order of ``legs.LEG``)."""
@@ -26,8 +26,8 @@ STRAIGHT = np.radians(9.0)
 
 @dataclass(frozen=True, eq=False)
 class FootStance:
-    """Where the feet stand in one trial: ``heading`` rad from lab x; per side ``ankle`` (3,) m, ``foot_turn`` (3, 3), ``pressure`` (2,)
-    m where the foot presses when it carries the weight.
+    """Where the feet stand in one trial: ``heading`` rad from lab x; per side ``ankle`` (3,) m, ``foot_turn`` (3, 3),
+    ``pressure`` (2,) m where the foot presses when it carries the weight.
     """
 
     heading: float
@@ -37,8 +37,8 @@ class FootStance:
 
 
 def take_stance(person: Person, kind: str, centre: Array, heading: float, rng: np.random.Generator) -> FootStance:
-    """Return the feet of a trial around ``centre`` (2,) m: parallel, or the right foot 0.1 m in front; re-placed by about 5 mm and 1
-    degree.
+    """Return the feet of a trial around ``centre`` (2,) m: parallel, or the right foot 0.1 m in front; re-placed by
+    about 5 mm and 1 degree.
     """
     heading = heading + float(np.radians(1.0) * rng.normal())
     forward, left = np.array([np.cos(heading), np.sin(heading)]), np.array([-np.sin(heading), np.cos(heading)])
@@ -60,16 +60,20 @@ def take_stance(person: Person, kind: str, centre: Array, heading: float, rng: n
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """All that is known before the feet and the balance are: ``q`` (T, 46) with upper body and pelvis rotation, ``pelvis_turn`` (T, 3,
-    3).
+    """All that is known before the feet and the balance are: ``q`` (T, 46) with upper body and pelvis rotation,
+    ``pelvis_turn`` (T, 3, 3).
     """
 
     q: Array
     pelvis_turn: Array
 
 
-def upper_body(person: Person, curves: Curves, stance: FootStance, tolerances: LabTolerances, rng: np.random.Generator) -> Pose:
-    """Return the pose above the legs: the posture's angles, shared out over the true joints, with what no instruction asks for."""
+def upper_body(
+    person: Person, curves: Curves, stance: FootStance, tolerances: LabTolerances, rng: np.random.Generator
+) -> Pose:
+    """Return the pose above the legs: the posture's angles, shared out over the true joints, with what no
+    instruction asks for.
+    """
     body, t, time = person.body, tolerances, curves.time
     angle = np.zeros((time.size, len(body.joints)))
     unasked = dict(zip(_UNASKED, smooth_noise(rng, time, columns=len(_UNASKED), cutoff=0.8).T, strict=True))
@@ -87,12 +91,20 @@ def upper_body(person: Person, curves: Curves, stance: FootStance, tolerances: L
         add(f"thorax_{motion}", t.thorax_share * trunk[:, k])
         add(f"neck_{motion}", head[:, k])
     for name, curve in unasked.items():
-        rms = t.head_motion if name.startswith("neck") else t.thorax_motion if name.startswith("thorax") else t.wrist_motion
+        rms = (
+            t.head_motion
+            if name.startswith("neck")
+            else t.thorax_motion
+            if name.startswith("thorax")
+            else t.wrist_motion
+        )
         add(name, rms * curve)
     add("thorax_flexion", -t.breathing * np.sin(2 * np.pi * 0.25 * time + rng.uniform(0, 2 * np.pi)))
     for side in SIDES:
         arm = np.radians(curves[f"{side}_arm"])
-        for name, column in zip(("shoulder_flexion", "shoulder_adduction", "shoulder_rotation", "elbow_flexion"), arm.T, strict=True):
+        for name, column in zip(
+            ("shoulder_flexion", "shoulder_adduction", "shoulder_rotation", "elbow_flexion"), arm.T, strict=True
+        ):
             add(f"{side}_{name}", column)
         add(f"{side}_clavicle_elevation", t.clavicle_rhythm * np.sqrt(arm[:, 0] ** 2 + arm[:, 1] ** 2 + 0.01))
         shrug = t.girdle_motion * smooth_noise(girdle, time, columns=2, cutoff=0.6)
@@ -119,7 +131,7 @@ _UNASKED = (
 def _pelvis_turn(angle: Array, heading: float) -> Array:
     """Return lab_R_pelvis (T, 3, 3) of forward tilt, right drop and left turn (T, 3) rad."""
     tilt, drop, turn = angle.T
-    return axis_rotation(Z, heading + turn) @ UPRIGHT @ axis_rotation(X, drop) @ axis_rotation(-Z, tilt)
+    return axis_rotation(Z, heading + turn) @ UPRIGHT @ axis_rotation(_X, drop) @ axis_rotation(-Z, tilt)
 
 
 def _quaternion(turn: Array) -> Array:
@@ -133,7 +145,9 @@ def _quaternion(turn: Array) -> Array:
 
 
 def pelvis_height(person: Person, pose: Pose, curves: Curves, stance: FootStance, xy: Array) -> Array:
-    """Return the height (T,) m of the pelvis origin over ``xy`` (T, 2): as high as the planted legs allow, minus the posture's depth."""
+    """Return the height (T,) m of the pelvis origin over ``xy`` (T, 2): as high as the planted legs allow, minus the
+    posture's depth.
+    """
     tops, lengths = [], []
     for side in SIDES:
         leg = Leg.of(person.body, side)
@@ -143,7 +157,7 @@ def pelvis_height(person: Person, pose: Pose, curves: Curves, stance: FootStance
         tops.append(stance.ankle[side][2] + np.sqrt(np.maximum(reach**2 - across, (0.5 * reach) ** 2)) - hip[:, 2])
         lengths.append(reach)
     weight = np.array([1.0 - curves.raised(side) for side in SIDES])
-    height = -logsumexp(-SHARPNESS * np.array(tops), axis=0, b=weight) / SHARPNESS
+    height = -logsumexp(-_SHARPNESS * np.array(tops), axis=0, b=weight) / _SHARPNESS
     return height - curves["depth"][:, 0] * np.mean(lengths)
 
 
@@ -151,15 +165,22 @@ Height = Callable[[Person, Pose, Curves, FootStance, Array], Array]
 """Says how high (T,) m the pelvis is over ``xy`` (T, 2) m, as `pelvis_height` does."""
 
 
-def stand_on_feet(person: Person, pose: Pose, curves: Curves, stance: FootStance, xy: Array, *, height: Height = pelvis_height) -> Array:
+def stand_on_feet(
+    person: Person, pose: Pose, curves: Curves, stance: FootStance, xy: Array, *, height: Height = pelvis_height
+) -> Array:
     """Return q (T, 46) with the pelvis over ``xy`` (T, 2) m and the legs that hold the planted feet exactly still."""
     q = pose.q.copy()
     q[:, :2], q[:, 2] = xy, height(person, pose, curves, stance, xy)
     frames = q.shape[0]
     for side in SIDES:
         leg, raised = Leg.of(person.body, side), curves.raised(side)[:, None]
-        turn, ankle = np.broadcast_to(stance.foot_turn[side], (frames, 3, 3)), np.broadcast_to(stance.ankle[side], (frames, 3))
+        turn, ankle = (
+            np.broadcast_to(stance.foot_turn[side], (frames, 3, 3)),
+            np.broadcast_to(stance.ankle[side], (frames, 3)),
+        )
         planted = leg.solve(pose.pelvis_turn, q[:, :3], turn, ankle)
         free = np.concatenate([np.radians(curves[f"{side}_leg"]), np.zeros((frames, 1))], axis=1)
-        q[:, [7 + c for c in leg.columns]] = (1 - raised) * planted + raised * free + 4 * raised * (1 - raised) * CLEARANCE
+        q[:, [7 + c for c in leg.columns]] = (
+            (1 - raised) * planted + raised * free + 4 * raised * (1 - raised) * CLEARANCE
+        )
     return q

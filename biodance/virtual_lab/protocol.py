@@ -22,12 +22,14 @@ FIELDS: dict[str, tuple[float, ...]] = {
     "shift": (0.5,),
 }
 """Every field of a posture with its value in "stand"."""
-STANCES = ("parallel", "right_forward")
+_STANCES = ("parallel", "right_forward")
 
 
 @dataclass(frozen=True)
 class ProtocolPosture:
-    """One posture: ``values`` by field (degrees; depth as a fraction, lean in m, shift as a share); ``raised`` feet ("right", "left")."""
+    """One posture: ``values`` by field (degrees; depth as a fraction, lean in m, shift as a share); ``raised`` feet
+    ("right", "left").
+    """
 
     name: str
     values: dict[str, tuple[float, ...]]
@@ -36,7 +38,9 @@ class ProtocolPosture:
 
 @dataclass(frozen=True)
 class ProtocolStep:
-    """Go to a posture in ``move`` s and hold it for ``hold`` s, or go there and back ``cycles`` times, ``period`` s each."""
+    """Go to a posture in ``move`` s and hold it for ``hold`` s, or go there and back ``cycles`` times, ``period`` s
+    each.
+    """
 
     to: ProtocolPosture
     move: float = 1.0
@@ -145,7 +149,8 @@ def _posture(path: Path, name: str, given: Any, known: dict[str, ProtocolPosture
         values["shift"] = (0.0,) if "right" in raised else (1.0,)
     if not 0 <= values["shift"][0] <= 1 or not 0 <= values["depth"][0] <= 0.6:
         raise BiodanceError(
-            f"{path}: posture {name!r}: shift must be in 0..1 and depth in 0..0.6, found {values['shift']}, {values['depth']}."
+            f"{path}: posture {name!r}: shift must be in 0..1 and depth in 0..0.6, found {values['shift']}, "
+            f"{values['depth']}."
         )
     return ProtocolPosture(name, values, frozenset(raised))
 
@@ -156,8 +161,8 @@ def _trial(path: Path, number: int, given: Any, postures: dict[str, ProtocolPost
     name, role, stance = str(given["name"]), str(given.get("role", "fit")), str(given.get("stance", "parallel"))
     if role not in ROLES:
         raise UnknownName.of(f"role of trial {name!r} in {path}", role, ROLES)
-    if stance not in STANCES:
-        raise UnknownName.of(f"stance of trial {name!r} in {path}", stance, STANCES)
+    if stance not in _STANCES:
+        raise UnknownName.of(f"stance of trial {name!r} in {path}", stance, _STANCES)
     lead = _numbers(path, f"{name}.lead", given.get("lead", 1.0), 1)[0]
     steps = tuple(_step(path, name, step, postures) for step in given.get("steps", []))
     _check_feet(path, name, steps)
@@ -175,7 +180,8 @@ def _check_feet(path: Path, trial: str, steps: tuple[ProtocolStep, ...]) -> None
         if step.to.raised != up and (step.cycles or (up and step.to.raised)):
             raise BiodanceError(
                 f"{path}: trial {trial!r}, step {number} to {step.to.name!r} changes which foot is up "
-                f"{'within a cycle' if step.cycles else 'without putting the other one down'}. Put a step with both feet down before it."
+                f"{'within a cycle' if step.cycles else 'without putting the other one down'}. Put a step with both "
+                f"feet down before it."
             )
         up = step.to.raised
 
@@ -190,7 +196,8 @@ def _step(path: Path, trial: str, given: Any, postures: dict[str, ProtocolPostur
     seconds = {k: _numbers(path, f"{trial}.{k}", given[k], 1)[0] for k in ("move", "hold", "period") if k in given}
     if any(value < 0.25 for key, value in seconds.items() if key != "hold") or seconds.get("hold", 0.0) < 0:
         raise BiodanceError(
-            f"{path}: trial {trial!r}, step to {given['to']!r}: {seconds}; a person needs at least 0.25 s for a move or a cycle."
+            f"{path}: trial {trial!r}, step to {given['to']!r}: {seconds}; a person needs at least 0.25 s for a move "
+            f"or a cycle."
         )
     cycles = given.get("cycles", 0)
     if not isinstance(cycles, int) or cycles < 0:

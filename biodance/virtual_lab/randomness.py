@@ -15,8 +15,8 @@ def stream(seed: int, *purpose: str) -> np.random.Generator:
 def smooth_noise(rng: np.random.Generator, time: Array, *, columns: int, cutoff: float) -> Array:
     """Return smooth random curves (T, columns) of zero mean and unit expected standard deviation.
 
-    ``time`` (T,) s, equidistant; ``cutoff`` Hz: the amplitude spectrum falls as exp(-(f / cutoff)²), so all derivatives exist. The
-    number of draws depends on the duration and the cutoff, not on the sampling rate.
+    ``time`` (T,) s, equidistant; ``cutoff`` Hz: the amplitude spectrum falls as exp(-(f / cutoff)²), so all derivatives
+    exist. The number of draws depends on the duration and the cutoff, not on the sampling rate.
     """
     duration = 2.0 * (time[-1] - time[0]) + 1.0
     frequency = np.arange(1, int(np.ceil(3.0 * cutoff * duration)) + 1) / duration

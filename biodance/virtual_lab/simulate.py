@@ -19,7 +19,7 @@ from biodance.virtual_lab.truth import truth
 
 TRUTH = "truth"
 """Name of the folder inside a simulated session that holds the truth."""
-LEGAL = {"mass": (30.0, 200.0, "kg"), "stature": (1.2, 2.2, "m")}
+_LEGAL = {"mass": (30.0, 200.0, "kg"), "stature": (1.2, 2.2, "m")}
 
 
 def simulate_session(
@@ -33,8 +33,8 @@ def simulate_session(
 ) -> Path:
     """Write a simulated session into ``out`` (made here, must be empty or absent) and return that folder.
 
-    ``subject`` mass kg, stature m, sex. ``seed`` is the person: the same seed is the same body on every ``visit``. ``loads`` are carried on
-    top of the subject's mass. The same arguments write the same bytes.
+    ``subject`` mass kg, stature m, sex. ``seed`` is the person: the same seed is the same body on every ``visit``.
+    ``loads`` are carried on top of the subject's mass. The same arguments write the same bytes.
 
     Raises
     ------
@@ -45,7 +45,9 @@ def simulate_session(
     """
     plan = protocol if isinstance(protocol, Protocol) else read_protocol(protocol)
     _check(subject, out)
-    person = make_person(subject, seed, tolerances=visit.tolerances, loads=loads, session=visit.number, joint_shifts=visit.joint_shifts)
+    person = make_person(
+        subject, seed, tolerances=visit.tolerances, loads=loads, session=visit.number, joint_shifts=visit.joint_shifts
+    )
     instruments = set_up(person, visit)
     out.mkdir(parents=True, exist_ok=True)
     performances = []
@@ -66,19 +68,28 @@ def simulate_session(
 
 
 def _check(subject: Subject, out: Path) -> None:
-    for name, (low, high, unit) in LEGAL.items():
+    for name, (low, high, unit) in _LEGAL.items():
         value = getattr(subject, name)
         if not low <= value <= high:
-            raise BiodanceError(f"Simulated subject: {name} = {value:g} {unit}; the virtual body covers {low:g} to {high:g} {unit}.")
+            raise BiodanceError(
+                f"Simulated subject: {name} = {value:g} {unit}; the virtual body covers {low:g} to {high:g} {unit}."
+            )
     if subject.sex not in ("F", "M"):
-        raise BiodanceError(f"Simulated subject: sex = {subject.sex!r}; legal are 'F' and 'M', whose proportions differ.")
+        raise BiodanceError(
+            f"Simulated subject: sex = {subject.sex!r}; legal are 'F' and 'M', whose proportions differ."
+        )
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise BiodanceError(f"{out}: exists and is not an empty folder; nothing was written. Choose another --out.")
 
 
 def session_toml(person: Person, protocol: Protocol, mass: float) -> str:
     """Return what an analyst would have written down about the session."""
-    lines = ["[subject]", f"mass_kg = {float(mass)}", f"height_m = {float(person.subject.stature)}", f'sex = "{person.subject.sex}"']
+    lines = [
+        "[subject]",
+        f"mass_kg = {float(mass)}",
+        f"height_m = {float(person.subject.stature)}",
+        f'sex = "{person.subject.sex}"',
+    ]
     if np.isfinite(person.subject.age):
         lines.append(f"age = {float(person.subject.age)}")
     for trial in protocol.trials:

@@ -1,4 +1,6 @@
-"""The true size and skeleton of a virtual person: 16 segments, 39 joint angles - more than any model that reads the recording has."""
+"""The true size and skeleton of a virtual person: 16 segments, 39 joint angles - more than any model that reads the
+recording has.
+"""
 
 from dataclasses import dataclass
 
@@ -8,8 +10,8 @@ from biodance.body.body import Joint
 from biodance.records import Array, Subject
 from biodance.virtual_lab.randomness import stream
 
-FEMALE = {"thigh": 0.2354, "shank": 0.2410, "pelvis": 0.0640, "lumbar": 0.0776, "thorax": 0.2000, "head": 0.1509}
-MALE = {"thigh": 0.2441, "shank": 0.2446, "pelvis": 0.0525, "lumbar": 0.0853, "thorax": 0.1887, "head": 0.1571}
+_FEMALE = {"thigh": 0.2354, "shank": 0.2410, "pelvis": 0.0640, "lumbar": 0.0776, "thorax": 0.2000, "head": 0.1509}
+_MALE = {"thigh": 0.2441, "shank": 0.2446, "pelvis": 0.0525, "lumbar": 0.0853, "thorax": 0.1887, "head": 0.1571}
 FEMALE_ARM = {"upper_arm": 0.1559, "forearm": 0.1534, "hand": 0.0441}
 MALE_ARM = {"upper_arm": 0.1565, "forearm": 0.1599, "hand": 0.0452}
 BREADTHS = {
@@ -32,8 +34,8 @@ UPRIGHT_CHAIN = ("ankle_height", "shank", "thigh", "pelvis", "lumbar", "thorax",
 
 @dataclass(frozen=True)
 class Proportions:
-    """``size`` m by name (the keys of this module's tables); ``centre_shift`` (16, 3) m moves the joint centres off the ideal anatomy,
-    ``axis_tilt`` (16, 3) rad turns the joint axes off it; rows in the order of ``skeleton.SEGMENTS``.
+    """``size`` m by name (the keys of this module's tables); ``centre_shift`` (16, 3) m moves the joint centres off the
+    ideal anatomy, ``axis_tilt`` (16, 3) rad turns the joint axes off it; rows in the order of ``skeleton.SEGMENTS``.
     """
 
     size: dict[str, float]
@@ -48,11 +50,12 @@ class Proportions:
 def draw_proportions(subject: Subject, seed: int, *, length_sd: float, centre_sd: float, tilt_sd: float) -> Proportions:
     """Draw a person's true proportions: the upright chain from sole to vertex adds up to the stature exactly.
 
-    ``length_sd`` relative standard deviation of every length; ``centre_sd`` m and ``tilt_sd`` rad per axis for joint centres and axes.
+    ``length_sd`` relative standard deviation of every length; ``centre_sd`` m and ``tilt_sd`` rad per axis for joint
+    centres and axes.
     """
     rng = stream(seed, "proportions")
     female = subject.sex == "F"
-    mean = (FEMALE if female else MALE) | (FEMALE_ARM if female else MALE_ARM) | BREADTHS
+    mean = (_FEMALE if female else _MALE) | (FEMALE_ARM if female else MALE_ARM) | BREADTHS
     size = {name: fraction * subject.stature * (1 + length_sd * rng.normal()) for name, fraction in mean.items()}
     stretch = subject.stature / sum(size[name] for name in UPRIGHT_CHAIN)
     size |= {name: size[name] * stretch for name in UPRIGHT_CHAIN} | {"stature": subject.stature}
@@ -60,8 +63,14 @@ def draw_proportions(subject: Subject, seed: int, *, length_sd: float, centre_sd
 
 
 ARM_AND_LEG = ("upper_arm", "forearm", "hand", "thigh", "shank", "foot")
-TRUE_SEGMENTS = ("pelvis", "lumbar", "thorax", "head", *(f"{side}_{part}" for side in ("right", "left") for part in ARM_AND_LEG))
-X, Y, Z = np.eye(3)
+TRUE_SEGMENTS = (
+    "pelvis",
+    "lumbar",
+    "thorax",
+    "head",
+    *(f"{side}_{part}" for side in ("right", "left") for part in ARM_AND_LEG),
+)
+_X, _Y, _Z = np.eye(3)
 
 LIMITS_DEGREES = {
     "hip_flexion": (-25, 125),
@@ -89,21 +98,23 @@ LIMITS_DEGREES = {
     "wrist_flexion": (-70, 80),
     "wrist_deviation": (-25, 40),
 }
-"""Hard anatomical ranges, young adults (Norkin & White, AAOS/AMA tables); dorsiflexion as in the weight-bearing lunge."""
+"""Hard anatomical ranges, young adults (Norkin & White, AAOS/AMA tables); dorsiflexion as in the weight-bearing
+lunge.
+"""
 
 TrueChain = tuple[tuple[str, Array], ...]
 ROTATIONS: dict[str, TrueChain] = {
-    "lumbar": (("flexion", -Z), ("bending", X), ("rotation", Y)),
-    "thorax": (("flexion", -Z), ("bending", X), ("rotation", Y)),
-    "neck": (("flexion", -Z), ("bending", X), ("rotation", Y)),
-    "hip": (("flexion", Z), ("adduction", X), ("rotation", Y)),
-    "knee": (("flexion", -Z),),
-    "ankle": (("dorsiflexion", Z), ("inversion", X)),
-    "clavicle": (("elevation", -X), ("protraction", Y)),
-    "shoulder": (("flexion", Z), ("adduction", X), ("rotation", Y)),
-    "elbow": (("flexion", Z),),
-    "forearm": (("pronation", Y),),
-    "wrist": (("flexion", Z), ("deviation", X)),
+    "lumbar": (("flexion", -_Z), ("bending", _X), ("rotation", _Y)),
+    "thorax": (("flexion", -_Z), ("bending", _X), ("rotation", _Y)),
+    "neck": (("flexion", -_Z), ("bending", _X), ("rotation", _Y)),
+    "hip": (("flexion", _Z), ("adduction", _X), ("rotation", _Y)),
+    "knee": (("flexion", -_Z),),
+    "ankle": (("dorsiflexion", _Z), ("inversion", _X)),
+    "clavicle": (("elevation", -_X), ("protraction", _Y)),
+    "shoulder": (("flexion", _Z), ("adduction", _X), ("rotation", _Y)),
+    "elbow": (("flexion", _Z),),
+    "forearm": (("pronation", _Y),),
+    "wrist": (("flexion", _Z), ("deviation", _X)),
 }
 """Rotations of every joint in order, axes for the right side; on the left the x and y axes change sign."""
 
@@ -128,7 +139,9 @@ class _Builder:
         self.joints: list[Joint] = []
 
     def add(self, joint: str, segment: str, parent: int, place: Array, *, side: str = "") -> int:
-        """Append one anatomical joint (a chain of rotations) at ``place`` (3,) m in the parent's frame; return its last index."""
+        """Append one anatomical joint (a chain of rotations) at ``place`` (3,) m in the parent's frame; return its
+        last index.
+        """
         rotations = ROTATIONS[joint]
         row = TRUE_SEGMENTS.index(segment) if segment else -1
         for k, (motion, axis) in enumerate(rotations):
@@ -151,17 +164,17 @@ def build_joints(size: Proportions) -> tuple[Joint, ...]:
     build, stature = _Builder(size), size["stature"]
     for side in ("right", "left"):
         hip = build.add("hip", f"{side}_thigh", -1, on_side(np.array([0, 0, size["hips"] / 2]), side), side=side)
-        knee = build.add("knee", f"{side}_shank", hip, -size["thigh"] * Y, side=side)
-        build.add("ankle", f"{side}_foot", knee, -size["shank"] * Y, side=side)
+        knee = build.add("knee", f"{side}_shank", hip, -size["thigh"] * _Y, side=side)
+        build.add("ankle", f"{side}_foot", knee, -size["shank"] * _Y, side=side)
     lumbar = build.add("lumbar", "lumbar", -1, np.array([-0.012 * stature, size["pelvis"], 0]))
     thorax = build.add("thorax", "thorax", lumbar, np.array([0.004 * stature, size["lumbar"], 0]))
-    build.add("neck", "head", thorax, size["thorax"] * Y)
+    build.add("neck", "head", thorax, size["thorax"] * _Y)
     for side in ("right", "left"):
         sternum = np.array([0.025 * stature, size["thorax"] - 0.042 * stature, 0.012 * stature])
         shoulder = np.array([0.0, size["thorax"] - size["shoulder_drop"], size["shoulders"] / 2])
         clavicle = build.add("clavicle", "", thorax, on_side(sternum, side), side=side)
         arm = build.add("shoulder", f"{side}_upper_arm", clavicle, on_side(shoulder - sternum, side), side=side)
-        elbow = build.add("elbow", "", arm, -size["upper_arm"] * Y, side=side)
+        elbow = build.add("elbow", "", arm, -size["upper_arm"] * _Y, side=side)
         forearm = build.add("forearm", f"{side}_forearm", elbow, np.zeros(3), side=side)
-        build.add("wrist", f"{side}_hand", forearm, -size["forearm"] * Y, side=side)
+        build.add("wrist", f"{side}_hand", forearm, -size["forearm"] * _Y, side=side)
     return tuple(build.joints)

@@ -1,8 +1,10 @@
-"""How far reality is from the ideal in the virtual laboratory, everywhere between the bone and the file: the truth that is drawn from.
+"""How far reality is from the ideal in the virtual laboratory, everywhere between the bone and the file: the truth that
+is drawn from.
 
-Numbers, units and sources are the rows "virtual" of ``anthropometry/uncertainty/sizes.csv``. "Prototype" there is the set of sizes with
-which synthetic sessions behaved like real ones; sensor numbers are from makers' sheets and from in-situ measurements. Every tolerance can
-be set to zero alone (``dataclasses.replace``); ``PERFECT`` has all of them at zero.
+Numbers, units and sources are the rows "virtual" of ``anthropometry/uncertainty/sizes.csv``. "Prototype" there is the
+set of sizes with which synthetic sessions behaved like real ones; sensor numbers are from makers' sheets and from
+in-situ measurements. Every tolerance can be set to zero alone (``dataclasses.replace``); ``PERFECT`` has all of them at
+zero.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -59,6 +61,10 @@ PERFECT = LabTolerances(**{f.name: 0.0 for f in fields(LabTolerances)})
 
 
 def instruments_perfect(tolerances: LabTolerances = REALISTIC) -> LabTolerances:
-    """Return the tolerances with a perfect plate, perfect cameras and bone-fixed markers, but an unchanged person and motion."""
-    from_skin_on = [f.name for f in fields(LabTolerances)][list(LabTolerances.__dataclass_fields__).index("marker_placement") :]
+    """Return the tolerances with a perfect plate, perfect cameras and bone-fixed markers, but an unchanged person
+    and motion.
+    """
+    from_skin_on = [f.name for f in fields(LabTolerances)][
+        list(LabTolerances.__dataclass_fields__).index("marker_placement") :
+    ]
     return replace(tolerances, **dict.fromkeys(from_skin_on, 0.0))

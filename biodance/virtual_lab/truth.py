@@ -1,4 +1,6 @@
-"""The truth of a virtual session as one JSON document: in the 16 true segments, and merged to the 12 segments of the reading model."""
+"""The truth of a virtual session as one JSON document: in the 16 true segments, and merged to the 12 segments of the
+reading model.
+"""
 
 from dataclasses import asdict
 from typing import Any
@@ -30,7 +32,10 @@ def _joint_centres(body: Body) -> dict[str, dict[str, Any]]:
     carried = {index: segment for segment, index in zip(TRUE_SEGMENTS, body.segment_joint, strict=True)}
     for joint in body.joints:
         if joint.parent in carried:
-            centres[joint.name.rsplit("_", 1)[0]] = {"segment": carried[joint.parent], "place_m": joint.translation.tolist()}
+            centres[joint.name.rsplit("_", 1)[0]] = {
+                "segment": carried[joint.parent],
+                "place_m": joint.translation.tolist(),
+            }
     return centres
 
 
@@ -59,9 +64,17 @@ def truth(person: Person, protocol: str, instruments: Instruments, performances:
         },
         "habits": asdict(person.habits),
         "tolerances": asdict(instruments.visit.tolerances),
-        "instruments": {"tilt": instruments.tilt.tolist(), "plates": [_plate(p.corners, p) for p in instruments.plates]},
+        "instruments": {
+            "tilt": instruments.tilt.tolist(),
+            "plates": [_plate(p.corners, p) for p in instruments.plates],
+        },
         "trials": [
-            {"name": p.plan.name, "role": p.plan.role, "duration_s": p.plan.duration, "balance_error_m": p.balance_error}
+            {
+                "name": p.plan.name,
+                "role": p.plan.role,
+                "duration_s": p.plan.duration,
+                "balance_error_m": p.balance_error,
+            }
             for p in performances
         ],
     }
@@ -80,27 +93,38 @@ def _plate(corners: Array, plate: Any) -> dict[str, Any]:
 
 
 def _static_pose(person: Person, instruments: Instruments, performances: list[Performance]) -> dict[str, Any] | None:
-    """Return where the 12 true frames were in the middle of the static trial (cameras' axes, marker time); None without such a trial."""
+    """Return where the 12 true frames were in the middle of the static trial (cameras' axes, marker time); None
+    without such a trial.
+    """
     static = next((p for p in performances if p.plan.role == "static"), None)
     if static is None:
         return None
     time = round(0.5 * static.plan.duration, 2)
     frames = poses_12(person, static.motion(np.array([time])).q[0])
     tilt = instruments.tilt
-    segments = [{"name": n, "rotation": (tilt @ turn).tolist(), "position_m": (tilt @ at).tolist()} for n, (turn, at) in frames.items()]
+    segments = [
+        {"name": n, "rotation": (tilt @ turn).tolist(), "position_m": (tilt @ at).tolist()}
+        for n, (turn, at) in frames.items()
+    ]
     return {"trial": static.plan.name, "time_s": time, "segments_12": segments}
 
 
 def sip_in_frames(document: dict[str, Any], rotation: Array, position: Array, *, key: str = "segments_12") -> Sip:
-    """Return the true parameters of the 12 segments in ANOTHER model's frames: what a perfect identification of that model would find.
+    """Return the true parameters of the 12 segments in ANOTHER model's frames: what a perfect identification of that
+    model would find.
 
-    ``document`` is a truth; ``rotation`` (12, 3, 3), ``position`` (12, 3) m are the lab poses of the other model's segments, in the same
-    order, at the marker time ``document["static_pose"]["time_s"]`` of the static trial; ``key`` "segments_12" or "segments_12_with_loads".
-    Joint centres and axes differ between truth and model, so the numbers do; the body is the same.
+    ``document`` is a truth; ``rotation`` (12, 3, 3), ``position`` (12, 3) m are the lab poses of the other model's
+    segments, in the same order, at the marker time ``document["static_pose"]["time_s"]`` of the static trial; ``key``
+    "segments_12" or "segments_12_with_loads". Joint centres and axes differ between truth and model, so the numbers do;
+    the body is the same.
     """
     phi = []
-    for segment, pose, turn, place in zip(document[key], document["static_pose"]["segments_12"], rotation, position, strict=True):
-        own = np.array([segment["mass_kg"], *(segment["mass_kg"] * np.array(segment["com_m"])), *segment["inertia_kgm2"]])
+    for segment, pose, turn, place in zip(
+        document[key], document["static_pose"]["segments_12"], rotation, position, strict=True
+    ):
+        own = np.array(
+            [segment["mass_kg"], *(segment["mass_kg"] * np.array(segment["com_m"])), *segment["inertia_kgm2"]]
+        )
         there = turn.T @ np.array(pose["rotation"]), turn.T @ (np.array(pose["position_m"]) - place)
         phi.append(parameters_of_inertia(place_inertia(of_parameters(own), *there)))
     flat = np.concatenate(phi)

@@ -30,7 +30,9 @@ def main(picture: Path) -> None:
         axes.spines[["top", "right"]].set_visible(False)
         if channel > 2:
             axes.set_xlabel("time, s", fontsize=8)
-    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=3, fontsize=8, frameon=False)
+    figure.legend(
+        *figure.axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=3, fontsize=8, frameon=False
+    )
     figure.savefig(picture, dpi=130)
 
 

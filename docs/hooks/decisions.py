@@ -28,8 +28,12 @@ def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: 
 def by_topic(folder: Path) -> dict[str, list[Path]]:
     """Return the records of every topic, newest first."""
     topics: dict[str, list[Path]] = {}
-    for path in sorted((p for p in folder.glob("*.md") if RECORD.fullmatch(p.name)), key=lambda p: p.name, reverse=True):
-        topic = next(line.partition(":")[2].strip() for line in path.read_text().splitlines() if line.startswith("Topic:"))
+    for path in sorted(
+        (p for p in folder.glob("*.md") if RECORD.fullmatch(p.name)), key=lambda p: p.name, reverse=True
+    ):
+        topic = next(
+            line.partition(":")[2].strip() for line in path.read_text().splitlines() if line.startswith("Topic:")
+        )
         topics.setdefault(topic, []).append(path)
     return dict(sorted(topics.items()))
 
@@ -39,5 +43,7 @@ def contents(folder: Path) -> str:
     lines: list[str] = []
     for topic, paths in by_topic(folder).items():
         lines += ["", f"## {topic}", ""]
-        lines += [f"- {path.name[:10]} [{path.read_text().splitlines()[0].removeprefix('# ')}]({path.name})" for path in paths]
+        lines += [
+            f"- {path.name[:10]} [{path.read_text().splitlines()[0].removeprefix('# ')}]({path.name})" for path in paths
+        ]
     return "\n".join(lines) + "\n"

@@ -8,7 +8,9 @@ from mkdocs.exceptions import Abort
 
 LOADED = (
     re.compile(r"<(?:script|img|iframe|source|video)\b[^>]*\bsrc=[\"']?((?:https?:)?//[^\"'\s>]+)"),
-    re.compile(r"<link\b(?=[^>]*\brel=[\"']?(?:stylesheet|preconnect|preload|icon|manifest))[^>]*\bhref=[\"']?((?:https?:)?//[^\"'\s>]+)"),
+    re.compile(
+        r"<link\b(?=[^>]*\brel=[\"']?(?:stylesheet|preconnect|preload|icon|manifest))[^>]*\bhref=[\"']?((?:https?:)?//[^\"'\s>]+)"
+    ),
     re.compile(r"url\([\"']?((?:https?:)?//[^\"')]+)"),
     re.compile(r"@import\s+[\"']((?:https?:)?//[^\"']+)"),
 )
@@ -17,8 +19,16 @@ LOADED = (
 
 def on_post_build(*, config: MkDocsConfig) -> None:
     """Stop the build if a page is not complete by itself."""
-    found = [f"{path}: {address}" for path in sorted(Path(config.site_dir).rglob("*.*ml")) for address in fetched(path.read_text())]
-    found += [f"{path}: {address}" for path in sorted(Path(config.site_dir).rglob("*.css")) for address in fetched(path.read_text())]
+    found = [
+        f"{path}: {address}"
+        for path in sorted(Path(config.site_dir).rglob("*.*ml"))
+        for address in fetched(path.read_text())
+    ]
+    found += [
+        f"{path}: {address}"
+        for path in sorted(Path(config.site_dir).rglob("*.css"))
+        for address in fetched(path.read_text())
+    ]
     if found:
         raise Abort(f"{len(found)} times something would be loaded over the network: " + "; ".join(found[:5]))
 

@@ -1,4 +1,5 @@
-"""The page of the API reference: one entry for each public name of the front door, and one for each contract of a family.
+"""The page of the API reference: one entry for each public name of the front door, and one for each contract of a
+family.
 
 The names come from the package itself, so that the page cannot name what does not exist, nor forget what does.
 """
@@ -55,5 +56,7 @@ def page() -> str:
 
 
 def entry(name: str, thing: Any) -> str:
-    """Return what tells mkdocstrings to write about one name: under its public name, from the module that defines it."""
+    """Return what tells mkdocstrings to write about one name: under its public name, from the module that defines
+    it.
+    """
     return f"::: {thing.__module__}.{thing.__qualname__}\n    options:\n      heading: {name}\n"

@@ -28,7 +28,10 @@ def on_files(files: Files, *, config: MkDocsConfig) -> Files:
     for script in scripts():
         files.append(File.generated(config, f"tutorials/{script.stem}.md", content=page(script)))
     entry = next(item for item in config.nav or () if "Tutorials" in item)
-    entry["Tutorials"] = ["tutorials/index.md", *({short(script): f"tutorials/{script.stem}.md"} for script in scripts())]
+    entry["Tutorials"] = [
+        "tutorials/index.md",
+        *({short(script): f"tutorials/{script.stem}.md"} for script in scripts()),
+    ]
     return files
 
 

@@ -30,10 +30,18 @@ def main(picture: Path) -> None:
     runs += [(right, "seeded start", name, seeded_series(body, name, starts=1)) for name in RIGHT]
     for axes, title, name, series in runs:
         print(f"{title}, {RIGHT[name]}:", " ".join(f"{value:.3g}" for value in series.condition))
-        axes.semilogy(np.arange(1, 7), np.minimum(series.condition, 1e4), marker=marks[name], linewidth=1, label=f"min {RIGHT[name]}")
+        axes.semilogy(
+            np.arange(1, 7),
+            np.minimum(series.condition, 1e4),
+            marker=marks[name],
+            linewidth=1,
+            label=f"min {RIGHT[name]}",
+        )
         axes.set(xlabel="motion number", title=f"from the {title}", ylim=(1, 1.5e4))
     for motion, values in PRINTED.items():
-        left.plot([motion] * len(values), values, "ko", markersize=4, label="printed in the paper" if motion == 1 else "_")
+        left.plot(
+            [motion] * len(values), values, "ko", markersize=4, label="printed in the paper" if motion == 1 else "_"
+        )
     left.set(ylabel="cond(W_b), cut at 10 000")
     left.legend(frameon=False, fontsize=7)
     right.legend(frameon=False, fontsize=7)

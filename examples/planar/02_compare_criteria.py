@@ -28,7 +28,11 @@ def main(picture: Path) -> None:
         share = found.sd_after[i, columns] / found.sd_before[columns]
         axes.bar(np.arange(len(columns)) + 0.11 * (i - 3), share, width=0.1, label=name.replace("_", " "))
     axes.set_xticks(range(len(columns)), names, fontsize=7)
-    axes.set(ylabel="sd after / sd in the table", yscale="log", title="After one motion of 2 s, 25 Hz, noise 1 N and 1 N·m per sample")
+    axes.set(
+        ylabel="sd after / sd in the table",
+        yscale="log",
+        title="After one motion of 2 s, 25 Hz, noise 1 N and 1 N·m per sample",
+    )
     figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=8)
     figure.savefig(picture, dpi=120)
 

@@ -34,7 +34,9 @@ class Comparison:
     def __post_init__(self) -> None:
         count = len(self.names)
         object.__setattr__(self, "score", frozen_array(self.score, (count, count), "Comparison.score"))
-        object.__setattr__(self, "sd_after", frozen_array(self.sd_after, (count, len(self.sd_before)), "Comparison.sd_after"))
+        object.__setattr__(
+            self, "sd_after", frozen_array(self.sd_after, (count, len(self.sd_before)), "Comparison.sd_after")
+        )
 
     @property
     def lost(self) -> Array:

@@ -19,7 +19,9 @@ Criterion = Callable[[Array, Target], tuple[float, Array]]
 
 
 def block_condition(triangle: Array, columns: tuple[int, ...]) -> tuple[float, Array]:
-    """Return cond = sqrt(largest / smallest eigenvalue of the block) and its gradient (p, p), zero outside the block."""
+    """Return cond = sqrt(largest / smallest eigenvalue of the block) and its gradient (p, p), zero outside the
+    block.
+    """
     value, vector = spectrum(triangle, columns)
     cond = float(np.sqrt(value[0] / value[-1]))
     high, low = vector[:, 0], vector[:, -1]

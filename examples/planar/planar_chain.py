@@ -57,7 +57,9 @@ def planar_chain(*, ranges: str = "frontal") -> Body:
             Joint(f"q{i + 1}", i - 1, np.array([0.0, 0.0, 1.0]), np.eye(3), np.array([length, 0.0, 0.0]), segment=i)
             for i, length in enumerate((0.0, *LENGTHS[:2]))
         ),
-        sip=Sip(segments, np.concatenate([_rod(m, length) for m, length in zip(MASSES, LENGTHS, strict=True)]), _spread()),
+        sip=Sip(
+            segments, np.concatenate([_rod(m, length) for m, length in zip(MASSES, LENGTHS, strict=True)]), _spread()
+        ),
         limits=JointLimits(lower, upper, free, -free, free),
         markers=SegmentMarkers((), (), np.empty((0, 3)), np.empty(0)),
         boxes=boxes,
@@ -65,8 +67,10 @@ def planar_chain(*, ranges: str = "frontal") -> Body:
         root="fixed",
         gravity=PLANAR_GRAVITY,
         notes=(
-            "Link lengths 0.8 m and 0.2 m are the paper's (eq. 13); masses, centres of mass and inertias are assumed (Winter 2009, rods).",
-            f"Joint ranges {ranges!r} are assumed: the paper does not print them. No speed and no torque limit, as in the paper.",
+            "Link lengths 0.8 m and 0.2 m are the paper's (eq. 13); masses, centres of mass and inertias are assumed "
+            "(Winter 2009, rods).",
+            f"Joint ranges {ranges!r} are assumed: the paper does not print them. No speed and no torque limit, as in "
+            f"the paper.",
         ),
     )
 

@@ -58,7 +58,9 @@ def planar_base(body: Body) -> BaseParameters:
 def planar_problem(body: Body, name: str, *, rate: float = DESIGN_RATE) -> Excitation:
     """Return the design problem of the criterion ``name`` on the planar chain, sampled at ``rate`` Hz."""
     aim = target(body, planar_base(body))
-    return Excitation(body, rest_to_rest(DURATION, via=VIA, rate=rate), PLANAR_CHANNELS, aim, criterion(name), PLANAR_GRAVITY)
+    return Excitation(
+        body, rest_to_rest(DURATION, via=VIA, rate=rate), PLANAR_CHANNELS, aim, criterion(name), PLANAR_GRAVITY
+    )
 
 
 def paper_series(body: Body, name: str, *, motions: int = MOTIONS) -> Series:
@@ -89,7 +91,9 @@ def compared(body: Body, *, seed: int = 0) -> Comparison:
     """Return all criteria compared on one motion of the chain from mid-range to mid-range, from one seeded start."""
     middle = (body.limits.lower + body.limits.upper) / 2
     inner = np.random.default_rng(seed).uniform(body.limits.lower, body.limits.upper, (VIA, len(middle)))
-    return compare_criteria(lambda name: planar_problem(body, name), (np.vstack([middle, inner, middle]),), movable=MOVABLE)
+    return compare_criteria(
+        lambda name: planar_problem(body, name), (np.vstack([middle, inner, middle]),), movable=MOVABLE
+    )
 
 
 def _series(body: Body, name: str, starts: list[list[Array]]) -> Series:
@@ -99,7 +103,10 @@ def _series(body: Body, name: str, starts: list[list[Array]]) -> Series:
     history = judged = np.zeros((problem.target.prior_factor.shape[0],) * 2)
     points, condition = [], []
     for tries in starts:
-        found = [within_ranges(ranges, design(problem, start, history, movable=MOVABLE, iterations=ITERATIONS)) for start in tries]
+        found = [
+            within_ranges(ranges, design(problem, start, history, movable=MOVABLE, iterations=ITERATIONS))
+            for start in tries
+        ]
         best = min(found, key=lambda p: problem.criterion(problem.extend(history, p), problem.target)[0])
         history, judged = problem.extend(history, best), judge.extend(judged, best)
         points.append(best)

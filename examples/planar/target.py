@@ -1,4 +1,6 @@
-"""What a movement is to reveal: which parameters, of which segments, with which weights and which knowledge beforehand."""
+"""What a movement is to reveal: which parameters, of which segments, with which weights and which knowledge
+beforehand.
+"""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal

@@ -73,12 +73,16 @@ class Excitation:
         steps = STEP * np.eye(kinds * joints).reshape(kinds * joints, kinds, 1, joints)
         ahead, behind = (self.rows(*np.moveaxis(states + sign * steps, 1, 0)) for sign in (1, -1))
         W = (ahead[0] + behind[0]) / 2
-        by_state = 2 * np.einsum("itcp,tcp->it", (ahead - behind) / (2 * STEP), W @ slope).reshape(kinds, joints, frames)
+        by_state = 2 * np.einsum("itcp,tcp->it", (ahead - behind) / (2 * STEP), W @ slope).reshape(
+            kinds, joints, frames
+        )
         matrices = (self.basis.position, self.basis.velocity, self.basis.acceleration)
         return value, sum((m.T @ g.T for m, g in zip(matrices, by_state, strict=True)), np.zeros_like(points))
 
 
-def design(problem: Excitation, start: Array, history: Array, *, movable: slice = ALL_POINTS, iterations: int = 200) -> Array:
+def design(
+    problem: Excitation, start: Array, history: Array, *, movable: slice = ALL_POINTS, iterations: int = 200
+) -> Array:
     """Return points (k, joints) rad that minimise the criterion within the joint ranges, from ``start`` (k, joints).
 
     Only the ``movable`` points move, the others (ends that are given) stay. The optimiser sees the ranges at every
@@ -90,7 +94,11 @@ def design(problem: Excitation, start: Array, history: Array, *, movable: slice 
     rows = np.einsum("nk,ij->nikj", samples, np.eye(joints)).reshape(len(samples) * joints, -1)
     given = (problem.basis.position[::EVERY] @ start).ravel() - rows @ start[movable].ravel()
     low, high = (np.tile(limit, len(samples)) - given for limit in (limits.lower, limits.upper))
-    ranges = {"type": "ineq", "fun": lambda x: np.concatenate([rows @ x - low, high - rows @ x]), "jac": lambda _: np.vstack([rows, -rows])}
+    ranges = {
+        "type": "ineq",
+        "fun": lambda x: np.concatenate([rows @ x - low, high - rows @ x]),
+        "jac": lambda _: np.vstack([rows, -rows]),
+    }
 
     def points(x: Array) -> Array:
         moved = start.copy()
@@ -101,7 +109,9 @@ def design(problem: Excitation, start: Array, history: Array, *, movable: slice 
         value, gradient = problem.value_and_gradient(points(x), history)
         return value, gradient[movable].ravel()
 
-    found = minimize(judge, start[movable].ravel(), jac=True, method="SLSQP", constraints=[ranges], options={"maxiter": iterations})
+    found = minimize(
+        judge, start[movable].ravel(), jac=True, method="SLSQP", constraints=[ranges], options={"maxiter": iterations}
+    )
     candidates = [within_ranges(problem, p) for p in (points(found.x), start)]
     return min(candidates, key=lambda p: problem.value_and_gradient(p, history)[0])
 

@@ -1,8 +1,8 @@
 """FAMILY: one model format per file, found automatically; other packages join by the entry points ``biodance.exports``.
 
 
-A member is a module or object of the form `ModelFormat`; it writes the joints of the body, its inertial parameters and, where the format
-knows them, markers, limits and boxes. All lengths in m, angles in rad, masses in kg.
+A member is a module or object of the form `ModelFormat`; it writes the joints of the body, its inertial parameters and,
+where the format knows them, markers, limits and boxes. All lengths in m, angles in rad, masses in kg.
 """
 
 import inspect
@@ -18,7 +18,7 @@ from biodance.body.solids import SegmentSolids
 from biodance.discovery import Chosen, Family, missing_of
 from biodance.errors import BiodanceError, FileRefused
 
-ROUNDING = 1e-9
+_ROUNDING = 1e-9
 """Share of a pseudo-inertia's largest eigenvalue by which its smallest may be negative from rounding alone."""
 
 
@@ -33,9 +33,9 @@ class ModelFormat(Protocol):
     def text(self, body: Body, source: str) -> str:
         """Return the whole file; ``source`` is one line that says where the parameters come from.
 
-        A binary format has ``data(body, source)``, which returns bytes, instead. A format that shows the shapes of segments takes
-        ``solids`` as a third argument, a closed mesh by segment; if it keeps them in files of their own, ``beside(body, solids)`` returns
-        those by their path beside the file.
+        A binary format has ``data(body, source)``, which returns bytes, instead. A format that shows the shapes of
+        segments takes ``solids`` as a third argument, a closed mesh by segment; if it keeps them in files of their own,
+        ``beside(body, solids)`` returns those by their path beside the file.
         """
 
 
@@ -45,31 +45,43 @@ def _lacking(member: object) -> tuple[str, ...]:
     return tuple(name for name in missing if name != "text" or not hasattr(member, "data"))
 
 
-FAMILY: Family[ModelFormat] = Family("model format", "biodance.exports", __name__, "", _lacking, lambda one: one.FORMAT)
+_FAMILY: Family[ModelFormat] = Family(
+    "model format", "biodance.exports", __name__, "", _lacking, lambda one: one.FORMAT
+)
 
 
 def formats(chosen: Chosen[ModelFormat] = None) -> Mapping[str, ModelFormat]:
     """Return the formats by name; ``chosen`` names choose from the family, objects join it."""
-    return FAMILY.choose(chosen)
+    return _FAMILY.choose(chosen)
 
 
 def refuse_impossible(body: Body) -> None:
-    """Raise BiodanceError if a segment's parameters belong to no mass distribution (pseudo-inertia not positive, no mass)."""
+    """Raise BiodanceError if a segment's parameters belong to no mass distribution (pseudo-inertia not positive, no
+    mass).
+    """
     for name in body.segments:
         phi = body.sip.of(name)
         if not np.isfinite(phi).all():
-            raise BiodanceError(f"Segment {name}: an inertial parameter is not a number, so no model can be written. Identify again.")
-        if phi[0] <= 0:
-            raise BiodanceError(f"Segment {name}: a mass of {phi[0]:g} kg cannot exist, so no model is written. Masses must be positive.")
-        value = np.linalg.eigvalsh(pseudo_inertia(phi)[0])
-        if value[0] < -ROUNDING * value[-1]:
             raise BiodanceError(
-                f"Segment {name}: no body has this mass, centre and inertia (pseudo-inertia eigenvalue {value[0]:.3g}, must be >= 0), so "
+                f"Segment {name}: an inertial parameter is not a number, so no model can be written. Identify again."
+            )
+        if phi[0] <= 0:
+            raise BiodanceError(
+                f"Segment {name}: a mass of {phi[0]:g} kg cannot exist, so no model is written. Masses must be "
+                f"positive."
+            )
+        value = np.linalg.eigvalsh(pseudo_inertia(phi)[0])
+        if value[0] < -_ROUNDING * value[-1]:
+            raise BiodanceError(
+                f"Segment {name}: no body has this mass, centre and inertia (pseudo-inertia eigenvalue "
+                f"{value[0]:.3g}, must be >= 0), so "
                 "no model is written. Use physically consistent parameters."
             )
 
 
-def write_model(body: Body, path: str | Path, *, format: str | ModelFormat, source: str = "", solids: SegmentSolids | None = None) -> Path:
+def write_model(
+    body: Body, path: str | Path, *, format: str | ModelFormat, source: str = "", solids: SegmentSolids | None = None
+) -> Path:
     """Write ``body`` as a model file and return the path; ``format`` is the name of one, or an object that writes it.
 
     ``solids`` a closed mesh by segment (m, in its axes) for the formats that show shapes (osim, glb).
@@ -84,7 +96,7 @@ def write_model(body: Body, path: str | Path, *, format: str | ModelFormat, sour
         The file, or one that belongs beside it, exists (nothing is overwritten), or cannot be written.
     """
     path = Path(path)
-    (kind,) = (FAMILY.choose([format]) if isinstance(format, str) else FAMILY.judged([format])).values()
+    (kind,) = (_FAMILY.choose([format]) if isinstance(format, str) else _FAMILY.judged([format])).values()
     refuse_impossible(body)
     _write_new(path, _content(kind, body, source, solids))
     for name, content in _beside(kind, body, solids).items():
@@ -116,4 +128,6 @@ def _write_new(path: Path, content: bytes) -> None:
     except FileExistsError:
         raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.") from None
     except OSError as error:
-        raise FileRefused(f"{path}: cannot be written ({error.strerror or error}). Choose a place where you may write.") from error
+        raise FileRefused(
+            f"{path}: cannot be written ({error.strerror or error}). Choose a place where you may write."
+        ) from error

@@ -16,8 +16,8 @@ WORLD = -1
 
 @dataclass(frozen=True, eq=False)
 class Hinge:
-    """One degree of freedom of a compound joint: index ``joint`` in ``Body.joints``; ``axis`` (3,) unit vector and ``place`` (3,) m of a
-    point on it, both in the frame of the CHILD segment at zero angles.
+    """One degree of freedom of a compound joint: index ``joint`` in ``Body.joints``; ``axis`` (3,) unit vector and
+    ``place`` (3,) m of a point on it, both in the frame of the CHILD segment at zero angles.
     """
 
     joint: int
@@ -29,8 +29,9 @@ class Hinge:
 class Branch:
     """How ``segment`` hangs on ``parent`` (an index, -1 = the world).
 
-    ``rotation`` (3, 3) parent_R_segment and ``translation`` (3,) m of the segment's origin in the parent's frame, both at zero angles;
-    ``hinges`` from the parent outwards: the segment turns by the product of their rotations, the first one leftmost.
+    ``rotation`` (3, 3) parent_R_segment and ``translation`` (3,) m of the segment's origin in the parent's frame, both
+    at zero angles; ``hinges`` from the parent outwards: the segment turns by the product of their rotations, the first
+    one leftmost.
     """
 
     segment: int
@@ -52,7 +53,9 @@ def segment_tree(body: Body) -> tuple[Branch, ...]:
     used = [hinge.joint for branch in branches for hinge in branch.hinges]
     twice = {body.joints[j].name for j in used if used.count(j) > 1}
     if twice:
-        raise BiodanceError(f"{body.name}: two segments share the joint {min(twice)}. Give the link behind it a segment of its own.")
+        raise BiodanceError(
+            f"{body.name}: two segments share the joint {min(twice)}. Give the link behind it a segment of its own."
+        )
     return branches
 
 

@@ -1,8 +1,8 @@
 """bioMod (version 4), the model format of biorbd and bioptim.
 
-biorbd turns segments about their own x, y or z only, so that every degree of freedom is a segment without mass, named as the joint, whose
-x axis lies along the joint's axis; the segment with the mass follows it, back in the body's own frame. The root moves by translations
-x y z and rotations x y z (body-fixed) in the lab frame, z up.
+biorbd turns segments about their own x, y or z only, so that every degree of freedom is a segment without mass, named
+as the joint, whose x axis lies along the joint's axis; the segment with the mass follows it, back in the body's own
+frame. The root moves by translations x y z and rotations x y z (body-fixed) in the lab frame, z up.
 """
 
 import numpy as np
@@ -26,7 +26,8 @@ def text(body: Body, source: str) -> str:
         turn = _x_along(joint.axis)
         limits = f"rangesQ {row([body.limits.lower[i], body.limits.upper[i]])}"
         lines += _segment(
-            joint.name, [*_parent(body, joint.parent), *_placed(joint.rotation @ turn, joint.translation), "rotations x", limits]
+            joint.name,
+            [*_parent(body, joint.parent), *_placed(joint.rotation @ turn, joint.translation), "rotations x", limits],
         )
         if joint.segment >= 0:
             back = [f"parent {joint.name}", *_placed(turn.T, np.zeros(3))]

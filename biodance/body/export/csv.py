@@ -1,7 +1,8 @@
 """Tidy CSV: one number a row, with unit, standard deviation, frame and source; for spreadsheets, R and pandas.
 
-The ten standard parameters of every segment (mass, first_moment_*, inertia_* about the joint) are the record and read back exactly; the
-centre of mass (com_*) and the inertia about it (central_inertia_*) are derived, with standard deviations to first order.
+The ten standard parameters of every segment (mass, first_moment_*, inertia_* about the joint) are the record and read
+back exactly; the centre of mass (com_*) and the inertia about it (central_inertia_*) are derived, with standard
+deviations to first order.
 """
 
 import csv
@@ -18,9 +19,9 @@ from biodance.records import Array, Sip
 FORMAT = "csv"
 SUFFIX = ".csv"
 HEADER = ("segment", "quantity", "value", "unit", "sd", "frame", "source")
-TENSOR = ("xx", "xy", "yy", "xz", "yz", "zz")
-STANDARD = ("mass", *(f"first_moment_{a}" for a in "xyz"), *(f"inertia_{t}" for t in TENSOR))
-DERIVED = (*(f"com_{a}" for a in "xyz"), *(f"central_inertia_{t}" for t in TENSOR))
+_TENSOR = ("xx", "xy", "yy", "xz", "yz", "zz")
+STANDARD = ("mass", *(f"first_moment_{a}" for a in "xyz"), *(f"inertia_{t}" for t in _TENSOR))
+DERIVED = (*(f"com_{a}" for a in "xyz"), *(f"central_inertia_{t}" for t in _TENSOR))
 JOINT_FRAME = "segment axes (x anterior, y up, z right), about the proximal joint centre"
 COM_FRAME = "segment axes (x anterior, y up, z right), about the centre of mass"
 
@@ -42,7 +43,8 @@ def text(body: Body, source: str) -> str:
 
 
 def read_sip(path: str | Path) -> Sip:
-    """Return the parameters of a file that ``text`` wrote; the covariance is diagonal, since the table holds standard deviations only.
+    """Return the parameters of a file that ``text`` wrote; the covariance is diagonal, since the table holds standard
+    deviations only.
 
     Raises
     ------
@@ -84,5 +86,7 @@ def _derived(phi: Array) -> Array:
 def _derived_sd(phi: Array, covariance: Array) -> Array:
     """Return (9,) standard deviations of the derived quantities, propagated by central differences."""
     step = 1e-6 * np.maximum(np.abs(phi), 1e-6)
-    slope = np.stack([(_derived(phi + h) - _derived(phi - h)) / (2 * s) for h, s in zip(np.diag(step), step, strict=True)], axis=1)
+    slope = np.stack(
+        [(_derived(phi + h) - _derived(phi - h)) / (2 * s) for h, s in zip(np.diag(step), step, strict=True)], axis=1
+    )
     return np.sqrt(np.maximum(np.diag(slope @ covariance @ slope.T), 0.0))

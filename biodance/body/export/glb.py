@@ -1,7 +1,9 @@
-"""glTF 2.0 binary (.glb): the solids of all segments and the markers on them, standing, for viewers, slides and the web.
+"""glTF 2.0 binary (.glb): the solids of all segments and the markers on them, standing, for viewers, slides and the
+web.
 
-Units m, y up, facing x. Every segment is a node that hangs on its parent's, so that the file can be animated; ``extras`` of the scene
-say where the parameters come from, those of a segment its mass and centre of mass. Format: registry.khronos.org/glTF.
+Units m, y up, facing x. Every segment is a node that hangs on its parent's, so that the file can be animated;
+``extras`` of the scene say where the parameters come from, those of a segment its mass and centre of mass. Format:
+registry.khronos.org/glTF.
 """
 
 import numpy as np
@@ -13,7 +15,7 @@ from biodance.errors import BiodanceError
 
 FORMAT = "glb"
 SUFFIX = ".glb"
-COLOURS = {"left": (0, 114, 178, 255), "right": (213, 94, 0, 255), "": (150, 150, 150, 255)}
+_COLOURS = {"left": (0, 114, 178, 255), "right": (213, 94, 0, 255), "": (150, 150, 150, 255)}
 """Red, green, blue, opacity by the side that a segment's name begins with (Okabe and Ito: told apart by everybody)."""
 MARKER = 0.007
 """m: radius of a marker."""
@@ -44,11 +46,13 @@ def data(body: Body, source: str, solids: SegmentSolids | None = None) -> bytes:
         above = WORLD_NODE if branch.parent == WORLD else body.segments[branch.parent]
         mesh = solids[name].copy() if name in solids else trimesh.Trimesh()
         side = next((side for side in ("left", "right") if name.startswith(side)), "")
-        mesh.visual = trimesh.visual.ColorVisuals(mesh, face_colors=COLOURS[side])
+        mesh.visual = trimesh.visual.ColorVisuals(mesh, face_colors=_COLOURS[side])
         mesh.metadata = {"mass_kg": float(body.sip.of(name)[0]), "com_m": body.sip.com[branch.segment].tolist()}
         scene.add_geometry(mesh, node_name=name, geom_name=name, parent_node_name=above, transform=place)
     for name, segment, position in zip(body.markers.names, body.markers.segment, body.markers.position, strict=True):
         place = np.eye(4)
         place[:3, 3] = position
-        scene.add_geometry(ball, node_name=name, geom_name="marker", parent_node_name=body.segments[segment], transform=place)
+        scene.add_geometry(
+            ball, node_name=name, geom_name="marker", parent_node_name=body.segments[segment], transform=place
+        )
     return bytes(scene.export(file_type="glb"))

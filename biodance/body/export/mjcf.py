@@ -37,7 +37,14 @@ def _body(parent: Element, body: Body, branch: Branch) -> Element:
     if branch.parent == WORLD and body.n_root:
         add(element, "freejoint", name="root")
     for hinge in branch.hinges:
-        joint = add(element, "joint", name=body.joints[hinge.joint].name, type="hinge", axis=row(hinge.axis), pos=row(hinge.place))
+        joint = add(
+            element,
+            "joint",
+            name=body.joints[hinge.joint].name,
+            type="hinge",
+            axis=row(hinge.axis),
+            pos=row(hinge.place),
+        )
         low, high = body.limits.lower[hinge.joint], body.limits.upper[hinge.joint]
         if low < high:
             joint.set("range", row([low, high]))

@@ -1,9 +1,10 @@
 """OpenSim 4 model (.osim): bodies, custom joints, coordinates with ranges, markers; no muscles.
 
-OpenSim's ground has y up, as the .trc and .mot files that ``lab`` writes. The free root has six coordinates, in the order and with the
-signs that OpenSim's own gait models use: <root>_tilt about z, _list about x, _rotation about y (body-fixed, in this order), _tx, _ty, _tz.
-A body with a fixed root keeps the frame of its first joint, z up. Segments are shown as their boxes, or, with ``solids``, as meshes in
-the folder Geometry beside the model, where OpenSim looks for them.
+OpenSim's ground has y up, as the .trc and .mot files that ``lab`` writes. The free root has six coordinates, in the
+order and with the signs that OpenSim's own gait models use: <root>_tilt about z, _list about x, _rotation about y
+(body-fixed, in this order), _tx, _ty, _tz. A body with a fixed root keeps the frame of its first joint, z up. Segments
+are shown as their boxes, or, with ``solids``, as meshes in the folder Geometry beside the model, where OpenSim looks
+for them.
 """
 
 from xml.etree.ElementTree import Element
@@ -54,7 +55,11 @@ def text(body: Body, source: str, solids: SegmentSolids | None = None) -> str:
 
 def beside(body: Body, solids: SegmentSolids) -> dict[str, bytes]:
     """Return the meshes (STL, m) by their path beside the model."""
-    return {f"{GEOMETRY}/{_mesh_file(body, name)}": bytes(solids[name].export(file_type="stl")) for name in body.segments if name in solids}
+    return {
+        f"{GEOMETRY}/{_mesh_file(body, name)}": bytes(solids[name].export(file_type="stl"))
+        for name in body.segments
+        if name in solids
+    }
 
 
 def _mesh_file(body: Body, segment: str) -> str:
@@ -139,9 +144,13 @@ def _axes(body: Body, branch: Branch) -> Array:
     """Return three independent axes (3, 3), rows, the hinges' first; refuse what a custom joint cannot hold."""
     name = body.segments[branch.segment]
     if len(branch.hinges) > 3:
-        raise BiodanceError(f"Segment {name} has {len(branch.hinges)} axes in one joint; an OpenSim custom joint holds three rotations.")
+        raise BiodanceError(
+            f"Segment {name} has {len(branch.hinges)} axes in one joint; an OpenSim custom joint holds three rotations."
+        )
     if any(np.linalg.norm(hinge.place) > 1e-9 for hinge in branch.hinges):
-        raise BiodanceError(f"The axes of the joint of {name} do not meet in its origin; an OpenSim custom joint cannot hold them.")
+        raise BiodanceError(
+            f"The axes of the joint of {name} do not meet in its origin; an OpenSim custom joint cannot hold them."
+        )
     axes = [hinge.axis for hinge in branch.hinges]
     while len(axes) < 3:
         spanned = np.array(axes).reshape(-1, 3)

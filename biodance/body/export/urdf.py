@@ -1,6 +1,7 @@
 """URDF: one link per degree of freedom, signed axes; read by pinocchio, ROS and most robotics tools.
 
-The root link is free: readers add the free-flyer themselves. Links between the axes of one anatomical joint have no inertia.
+The root link is free: readers add the free-flyer themselves. Links between the axes of one anatomical joint have no
+inertia.
 """
 
 from xml.etree.ElementTree import Element
@@ -17,7 +18,9 @@ SUFFIX = ".urdf"
 
 
 def roll_pitch_yaw(rotation: Array) -> Array:
-    """Return (3,) rad with ``rotation = Rz(yaw) Ry(pitch) Rx(roll)``; exact also at pitch = +-90 deg, where yaw is set to zero."""
+    """Return (3,) rad with ``rotation = Rz(yaw) Ry(pitch) Rx(roll)``; exact also at pitch = +-90 deg, where yaw is
+    set to zero.
+    """
     across = np.hypot(rotation[0, 0], rotation[1, 0])
     pitch = np.arctan2(-rotation[2, 0], across)
     if across < 1e-9:

@@ -1,4 +1,6 @@
-"""The 12-segment, 23-degree-of-freedom human: from stature, mass and sex alone, and the assembly of a Body on any skeleton."""
+"""The 12-segment, 23-degree-of-freedom human: from stature, mass and sex alone, and the assembly of a Body on any
+skeleton.
+"""
 
 import numpy as np
 
@@ -18,11 +20,14 @@ COM_SIGMAS = 3.0
 
 
 LUMBAR_HEIGHT = 0.112 / 1.755
-"""Stature: height over the hip centres of the lumbar joint from which ``boxes.csv`` measures the trunk (ANSUR II man of 1.755 m)."""
+"""Stature: height over the hip centres of the lumbar joint from which ``boxes.csv`` measures the trunk (ANSUR II man
+of 1.755 m).
+"""
 
 
 def shape_boxes(skeleton: Skeleton) -> Array:
-    """Return the boxes (12, 2, 3) m of ``boxes.csv`` at the person's stature: lower and upper corners in the segment frames.
+    """Return the boxes (12, 2, 3) m of ``boxes.csv`` at the person's stature: lower and upper corners in the segment
+    frames.
 
     The trunk's box ends at the vertex wherever this skeleton has its trunk joint.
     """
@@ -35,7 +40,9 @@ def shape_boxes(skeleton: Skeleton) -> Array:
 
 
 def com_boxes(sip: Sip, skeleton: Skeleton, boxes: Array) -> Array:
-    """Return where the CoM may be, (12, 2, 3) m: three prior standard deviations around the prior CoM, inside the shape box."""
+    """Return where the CoM may be, (12, 2, 3) m: three prior standard deviations around the prior CoM, inside the
+    shape box.
+    """
     half = COM_SIGMAS * np.array([com_sd(segment, skeleton) for segment in SEGMENTS])
     around = np.stack([sip.com - half, sip.com + half], axis=1)
     return np.clip(around, boxes[:, :1], boxes[:, 1:])
@@ -55,10 +62,14 @@ ADULT = (18.0, 65.0)
 """years: the ages that the usual table speaks for."""
 
 
-def human(subject: Subject, *, table: str = Settings.table, markers: str = "plug_in_gait", gravity: float = STANDARD_GRAVITY) -> Body:
-    """Return a generic person of the subject's stature, mass and sex, with the markers of a marker set at their usual places.
+def human(
+    subject: Subject, *, table: str = Settings.table, markers: str = "plug_in_gait", gravity: float = STANDARD_GRAVITY
+) -> Body:
+    """Return a generic person of the subject's stature, mass and sex, with the markers of a marker set at their usual
+    places.
 
-    For a person who was measured use `scale`: generic lengths miss by centimetres, and the wand markers have no usual place.
+    For a person who was measured use `scale`: generic lengths miss by centimetres, and the wand markers have no usual
+    place.
 
     Parameters
     ----------
@@ -98,7 +109,10 @@ def human(subject: Subject, *, table: str = Settings.table, markers: str = "plug
     """
     subject.require("mass", "stature")
     skeleton = generic_skeleton(reference(table, subject), subject)
-    note = f"Segment lengths: table {table} at stature {subject.stature:.3f} m; nobody was measured. Markers: usual places of {markers}."
+    note = (
+        f"Segment lengths: table {table} at stature {subject.stature:.3f} m; nobody was measured. Markers: usual "
+        f"places of {markers}."
+    )
     worn = generic_markers(skeleton, read_marker_set(markers))
     return assemble(subject, skeleton, table=table, markers=worn, notes=(note,), gravity=gravity)
 
@@ -133,16 +147,22 @@ def _prior_notes(subject: Subject, table: str) -> tuple[str, ...]:
     joint = trunk_joint(table)
     sex = {"F": "woman", "M": "man"}[subject.sex]
     notes = [
-        f"Prior SIP: {table} for a {sex} of {subject.mass:.2f} kg, standard deviations from the spread of tables; trunk joint at {joint}."
+        f"Prior SIP: {table} for a {sex} of {subject.mass:.2f} kg, standard deviations from the spread of tables; "
+        f"trunk joint at {joint}."
     ]
     if table in measured_whole() and not (np.isnan(subject.age) or ADULT[0] <= subject.age <= ADULT[1]):
         groups = {study for sex in ("F", "M") for study, group in studies(sex).items() if group in ("child", "older")}
-        notes.append(f"Table {table} is of young adults, the subject is {subject.age:.0f} years old; consider {', '.join(sorted(groups))}.")
+        notes.append(
+            f"Table {table} is of young adults, the subject is {subject.age:.0f} years old; consider "
+            f"{', '.join(sorted(groups))}."
+        )
     return tuple(notes)
 
 
 def generic_markers(skeleton: Skeleton, marker_set: MarkerSet) -> SegmentMarkers:
-    """Return the markers of a set at their usual places (offset times normaliser); markers without a usual place are left out."""
+    """Return the markers of a set at their usual places (offset times normaliser); markers without a usual place are
+    left out.
+    """
     shoulders = np.mean([skeleton.origins["right_shoulder"], skeleton.origins["left_shoulder"]], axis=0)
     labels, segments, positions, weights = [], [], [], []
     for marker in marker_set.markers:
@@ -157,7 +177,11 @@ def generic_markers(skeleton: Skeleton, marker_set: MarkerSet) -> SegmentMarkers
 
 def normaliser(skeleton: Skeleton, name: str, segment: str) -> float:
     """Return a normaliser of the marker sets, m, on the marker's own side."""
-    sizes = {"asis_width": skeleton.asis_width, "stature": skeleton.stature, "trunk_length": skeleton.lengths["trunk_head"]}
+    sizes = {
+        "asis_width": skeleton.asis_width,
+        "stature": skeleton.stature,
+        "trunk_length": skeleton.lengths["trunk_head"],
+    }
     if name in sizes:
         return sizes[name]
     kind = name.removesuffix("_length").replace("forearm", "forearm_hand")

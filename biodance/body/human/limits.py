@@ -29,13 +29,17 @@ _ANDERSON = {
 def joint_limits(subject: Subject, *, within: Range = "anatomical") -> JointLimits:
     """Return the limits of the 23 joints of a person.
 
-    ``within="anatomical"`` is what a healthy adult's joint allows (for inverse kinematics), ``"comfortable"`` what he or she reaches
-    without effort (for designed motions). Speed 4 rad/s (Bonnet 2016). Torques: hip flexion, knee and ankle dorsiflexion from Anderson 2007
-    (C1 * mass * g * stature) by sex and age; all others from ``joints_23.csv`` in proportion to body mass, times the same age factor
-    (mean over Anderson's six torques against 18-25 years). Unknown age counts as 25.
+    ``within="anatomical"`` is what a healthy adult's joint allows (for inverse kinematics), ``"comfortable"`` what he
+    or she reaches without effort (for designed motions). Speed 4 rad/s (Bonnet 2016). Torques: hip flexion, knee and
+    ankle dorsiflexion from Anderson 2007 (C1 * mass * g * stature) by sex and age; all others from ``joints_23.csv`` in
+    proportion to body mass, times the same age factor (mean over Anderson's six torques against 18-25 years). Unknown
+    age counts as 25.
     """
     table = read_table("human", "joints_23")
-    low, high = {"anatomical": ("range_min_deg", "range_max_deg"), "comfortable": ("comfort_min_deg", "comfort_max_deg")}[within]
+    low, high = {
+        "anatomical": ("range_min_deg", "range_max_deg"),
+        "comfortable": ("comfort_min_deg", "comfort_max_deg"),
+    }[within]
     word = {"F": "woman", "M": "man"}[subject.sex]
     ranges = np.radians([row_numbers(row, f"{low} {high}") for row in table.rows])
     velocity = [float(row["velocity_rad_s"]) for row in table.rows]
@@ -52,12 +56,16 @@ def joint_limits(subject: Subject, *, within: Range = "anatomical") -> JointLimi
 
 
 def peak_torque(anderson: AnthropometricTable, subject: Subject, joint: str, direction: str) -> float:
-    """Return the largest isometric torque, N·m > 0: C1 * mass * g * stature, C1 linear in age between 25, 60 and 70 years."""
+    """Return the largest isometric torque, N·m > 0: C1 * mass * g * stature, C1 linear in age between 25, 60 and 70
+    years.
+    """
     return _coefficient(anderson, subject, joint, direction) * subject.mass * STANDARD_GRAVITY * subject.stature
 
 
 def age_factor(anderson: AnthropometricTable, subject: Subject) -> float:
-    """Return the strength at the subject's age against 18-25 years, mean over Anderson's six torques of the same sex."""
+    """Return the strength at the subject's age against 18-25 years, mean over Anderson's six torques of the same
+    sex.
+    """
     ratios = [
         _coefficient(anderson, subject, joint, direction) / _groups(anderson, subject.sex, joint, direction)[0]
         for joint, direction in _ANDERSON
@@ -76,51 +84,67 @@ def _coefficient(anderson: AnthropometricTable, subject: Subject, joint: str, di
 
 
 HAND_TURN = np.radians(120.0)
-"""rad either way: the model has no pronation, so with a straight elbow a turning hand is seen as a turning shoulder; a narrower limit makes
-the arm jump to the other set of angles that reaches the same hand (seen in a real walk)."""
+"""rad either way: the model has no pronation, so with a straight elbow a turning hand is seen as a turning shoulder; a
+narrower limit makes the arm jump to the other set of angles that reaches the same hand (seen in a real walk).
+"""
 LOADED_ANKLE = np.radians(40.0)
-"""rad: dorsiflexion under body weight with a bent knee, as on stairs and in squats (weight-bearing lunge, Bennell et al. 1998); the tables
-give the unloaded joint's 20 to 25 deg."""
-BEYOND = np.radians(25.0)
-"""rad: how far a joint of the model may pass the anatomical range of the joint whose name it has: trunk and girdle bend in many places
-where the model has one joint, marker sets turn the axes, and skin slides."""
+"""rad: dorsiflexion under body weight with a bent knee, as on stairs and in squats (weight-bearing lunge, Bennell et
+al. 1998); the tables give the unloaded joint's 20 to 25 deg.
+"""
+_BEYOND = np.radians(25.0)
+"""rad: how far a joint of the model may pass the anatomical range of the joint whose name it has: trunk and girdle bend
+in many places where the model has one joint, marker sets turn the axes, and skin slides.
+"""
 HELD = ("_knee_flexion", "_elbow_flexion", "_shoulder_rotation")
-"""Ends of the names of joints that do not go further: hinges, and the shoulder's turn, which is as wide as the hand's."""
-SPARE = np.radians(5.0)
+"""Ends of the names of joints that do not go further: hinges, and the shoulder's turn, which is as wide as the
+hand's.
+"""
+_SPARE = np.radians(5.0)
 """rad: how far a joint range is widened beyond the angle of the static trial."""
 
 
 def widen_limits(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:
-    """Return the limits for tracking: counted from this person's upright pelvis, the static posture ``SPARE`` inside them, the shoulder
-    turning as far as the hand does, the ankle bending as far as under load, and all but knees, elbows and that turn by ``BEYOND`` more. The
-    notes name what this posture changed.
+    """Return the limits for tracking: counted from this person's upright pelvis, the static posture ``SPARE`` inside
+    them, the shoulder turning as far as the hand does, the ankle bending as far as under load, and all but knees,
+    elbows and that turn by ``BEYOND`` more. The notes name what this posture changed.
 
-    Clinical ranges of hip and trunk count from upright standing, ISB angles from the plane of the pelvis markers, which stands tilted.
+    Clinical ranges of hip and trunk count from upright standing, ISB angles from the plane of the pelvis markers, which
+    stands tilted.
     """
     angle, limits = q[body.nq - len(body.joints) :], body.limits
     tilt = standing_tilt(q)
-    shift = np.array([tilt * (joint.name.endswith("_hip_flexion") - float(joint.name == "trunk_flexion")) for joint in body.joints])
+    shift = np.array(
+        [tilt * (joint.name.endswith("_hip_flexion") - float(joint.name == "trunk_flexion")) for joint in body.joints]
+    )
     limits = replace(limits, lower=limits.lower + np.minimum(shift, 0.0), upper=limits.upper + np.maximum(shift, 0.0))
     turning, ankle = (
-        np.array([joint.name.endswith(end) for joint in body.joints]) for end in ("_shoulder_rotation", "_ankle_dorsiflexion")
+        np.array([joint.name.endswith(end) for joint in body.joints])
+        for end in ("_shoulder_rotation", "_ankle_dorsiflexion")
     )
     loaded = np.where(ankle, np.maximum(limits.upper, LOADED_ANKLE), limits.upper)
-    limits = replace(limits, lower=np.where(turning, -HAND_TURN, limits.lower), upper=np.where(turning, HAND_TURN, loaded))
-    free = BEYOND * np.array([not joint.name.endswith(HELD) for joint in body.joints])
+    limits = replace(
+        limits, lower=np.where(turning, -HAND_TURN, limits.lower), upper=np.where(turning, HAND_TURN, loaded)
+    )
+    free = _BEYOND * np.array([not joint.name.endswith(HELD) for joint in body.joints])
     limits = replace(limits, lower=limits.lower - free, upper=limits.upper + free)
-    lower, upper = np.minimum(limits.lower, angle - SPARE), np.maximum(limits.upper, angle + SPARE)
+    lower, upper = np.minimum(limits.lower, angle - _SPARE), np.maximum(limits.upper, angle + _SPARE)
     notes = tuple(
         f"Range of {joint.name} widened to {np.degrees(lower[i]):.0f} .. {np.degrees(upper[i]):.0f} deg: "
         f"{np.degrees(angle[i]):.0f} deg when standing."
         for i, joint in enumerate(body.joints)
         if lower[i] < limits.lower[i] or upper[i] > limits.upper[i]
     )
-    tilted = f"Pelvis markers stand tilted {np.degrees(tilt):.0f} deg forwards: ranges of hip and trunk flexion are widened by as much."
+    tilted = (
+        f"Pelvis markers stand tilted {np.degrees(tilt):.0f} deg forwards: ranges of hip and trunk flexion are "
+        f"widened by as much."
+    )
     return replace(limits, lower=lower, upper=upper), (tilted, *notes)
 
 
 def with_tracking_limits(body: Body) -> Body:
-    """Return a body of which no static trial is known, with the limits for tracking counted from the neutral posture."""
+    """Return a body of which no static trial is known, with the limits for tracking counted from the neutral
+    posture.
+    """
     return replace(body, limits=widen_limits(body, body.neutral)[0])
 
 

@@ -1,7 +1,9 @@
-"""The human of one subject: joint centres, segment lengths, constant joint tilts and every marker from the static trial.
+"""The human of one subject: joint centres, segment lengths, constant joint tilts and every marker from the static
+trial.
 
-The static posture is reached exactly by the body: whatever the joints cannot do (a knee has no varus, an ankle no torsion, an elbow no
-carrying angle) becomes a constant tilt of that joint, so that in the static trial every marker and joint centre has residual zero.
+The static posture is reached exactly by the body: whatever the joints cannot do (a knee has no varus, an ankle no
+torsion, an elbow no carrying angle) becomes a constant tilt of that joint, so that in the static trial every marker and
+joint centre has residual zero.
 """
 
 from dataclasses import dataclass, replace
@@ -20,7 +22,7 @@ from biodance.body.tables.reference import proportion
 from biodance.records import Array, Subject, Trial
 from biodance.settings import STANDARD_GRAVITY, Hip
 
-ANKLE_HEIGHT = (0.04, 0.12)
+_ANKLE_HEIGHT = (0.04, 0.12)
 """m: an ankle centre so high over z = 0 of the lab is taken to stand on that floor."""
 TILT = {"knee": 15.0, "elbow": 25.0, "ankle": 40.0}
 """deg: larger constant tilts of a joint point to a misplaced marker."""
@@ -36,8 +38,9 @@ LENGTH_RATIO = {
 
 @dataclass(frozen=True, eq=False)
 class Scaling:
-    """All that a scaled body is made of: the standing posture, its measures, the joint centres, the ``table`` of masses,
-    ``gravity`` m/s². With other ``centres`` (``dataclasses.replace``) it makes the body of the same person with joints elsewhere.
+    """All that a scaled body is made of: the standing posture, its measures, the joint centres, the ``table`` of
+    masses, ``gravity`` m/s². With other ``centres`` (``dataclasses.replace``) it makes the body of the same person with
+    joints elsewhere.
     """
 
     subject: Subject
@@ -49,7 +52,9 @@ class Scaling:
     gravity: float = STANDARD_GRAVITY
 
     def body(self) -> tuple[Body, Array]:
-        """Return the scaled body and its posture q (30,) in the static trial, at which all calibrated markers are met exactly."""
+        """Return the scaled body and its posture q (30,) in the static trial, at which all calibrated markers are
+        met exactly.
+        """
         frames = segment_frames(self.centres)
         skeleton = static_skeleton(frames, self.posture, self.sizes, self.subject)
         doubts = _doubts(skeleton, self.subject)
@@ -64,8 +69,9 @@ class Scaling:
 def measure_static(subject: Subject, static: Trial, *, hip: Hip | None = None, table: str | None = None) -> Scaling:
     """Return what the static trial says about the body of a subject; what is None is as ``static.settings`` have it.
 
-    ``hip``: "harrington" (regressions on the pelvis markers) or "davis" (plug-in gait). ``table`` gives masses, CoM, inertias and where the
-    trunk joint lies between mid hip and mid shoulder. ``notes`` of the body say what was measured, assumed, contradicted and warned about.
+    ``hip``: "harrington" (regressions on the pelvis markers) or "davis" (plug-in gait). ``table`` gives masses, CoM,
+    inertias and where the trunk joint lies between mid hip and mid shoulder. ``notes`` of the body say what was
+    measured, assumed, contradicted and warned about.
 
     Raises
     ------
@@ -81,7 +87,9 @@ def measure_static(subject: Subject, static: Trial, *, hip: Hip | None = None, t
     posture = standing(static)
     sizes = measures(posture, static, subject)
     lengths = reference(table, subject).lengths
-    centres = static_centres(posture.landmarks, sizes, hip=hip, trunk_fraction=lengths["pelvis"] / lengths["trunk_head"])
+    centres = static_centres(
+        posture.landmarks, sizes, hip=hip, trunk_fraction=lengths["pelvis"] / lengths["trunk_head"]
+    )
     notes = (f"Scaled on static trial {static.name}; hip centres: {hip}.", *posture.notes, *sizes.notes, *centres.notes)
     return Scaling(subject, table, posture, sizes, centres, notes, static.settings.gravity)
 
@@ -131,7 +139,10 @@ def calibrated_markers(frames: SegmentFrames, posture: StaticPosture) -> Segment
     worn = [marker for marker in posture.marker_set.markers if marker.label in posture.points]
     local = [frames.rotation[m.segment].T @ (posture.points[m.label] - frames.origin[m.segment]) for m in worn]
     return SegmentMarkers(
-        tuple(m.label for m in worn), tuple(SEGMENTS.index(m.segment) for m in worn), np.array(local), np.array([m.weight for m in worn])
+        tuple(m.label for m in worn),
+        tuple(SEGMENTS.index(m.segment) for m in worn),
+        np.array(local),
+        np.array([m.weight for m in worn]),
     )
 
 
@@ -144,13 +155,23 @@ def static_skeleton(frames: SegmentFrames, posture: StaticPosture, sizes: Measur
     shoulders = (frames.origin["right_upper_arm"] + frames.origin["left_upper_arm"]) / 2
     origins = {"trunk": local("pelvis", frames.origin["trunk_head"])}
     cut = {segment: local(segment, frames.cut) for segment in ("pelvis", "trunk_head")}
-    lengths = {"pelvis": float(np.linalg.norm(cut["pelvis"])), "trunk_head": float(np.linalg.norm(shoulders - frames.origin["pelvis"]))}
+    lengths = {
+        "pelvis": float(np.linalg.norm(cut["pelvis"])),
+        "trunk_head": float(np.linalg.norm(shoulders - frames.origin["pelvis"])),
+    }
     turns: dict[str, Array] = {}
     height: dict[str, float] = {}
     behind: dict[str, float] = {}
     for side in SIDES:
-        thigh, shank, foot, arm, forearm = (f"{side}_{kind}" for kind in ("thigh", "shank", "foot", "upper_arm", "forearm_hand"))
-        for joint, parent, child in (("hip", "pelvis", thigh), ("knee", thigh, shank), ("ankle", shank, foot), ("elbow", arm, forearm)):
+        thigh, shank, foot, arm, forearm = (
+            f"{side}_{kind}" for kind in ("thigh", "shank", "foot", "upper_arm", "forearm_hand")
+        )
+        for joint, parent, child in (
+            ("hip", "pelvis", thigh),
+            ("knee", thigh, shank),
+            ("ankle", shank, foot),
+            ("elbow", arm, forearm),
+        ):
             origins[f"{side}_{joint}"] = local(parent, frames.origin[child])
         origins[f"{side}_shoulder"] = local("trunk_head", frames.origin[arm])
         for segment, end in ((thigh, "knee"), (shank, "ankle"), (arm, "elbow")):
@@ -170,12 +191,14 @@ def _turn(frames: SegmentFrames, parent: str, child: str) -> Array:
     return turn(0, np.arcsin(relative[2, 1]))
 
 
-def _foot(frames: SegmentFrames, posture: StaticPosture, sizes: Measures, subject: Subject, side: str) -> tuple[float, float, float]:
+def _foot(
+    frames: SegmentFrames, posture: StaticPosture, sizes: Measures, subject: Subject, side: str
+) -> tuple[float, float, float]:
     """Return foot length, height of the ankle over the sole, and how far the heel lies behind the ankle, m."""
     place, ankle = posture.landmarks, frames.origin[f"{side}_foot"]
     heel, toe = (frames.rotation[f"{side}_foot"].T @ (place[f"{side}_{end}"] - ankle) for end in ("heel", "toe"))
     length = float(toe[0] - heel[0]) / proportion("heel_to_toe_marker", subject.sex)
-    standing_on_zero = ANKLE_HEIGHT[0] < ankle[2] < ANKLE_HEIGHT[1]
+    standing_on_zero = _ANKLE_HEIGHT[0] < ankle[2] < _ANKLE_HEIGHT[1]
     height = float(ankle[2]) if standing_on_zero else proportion("ankle_height", subject.sex) * subject.stature
     return length, height, float(-heel[0]) - sizes.marker_radius
 
@@ -188,7 +211,9 @@ def static_posture(body: Body, frames: SegmentFrames) -> Array:
     for joint in body.joints:
         group = joint.name.rsplit("_", 1)[0]
         angles.setdefault(group, []).append(joint)
-    q = np.concatenate([frames.origin["pelvis"], Rotation.from_matrix(frames.rotation["pelvis"]).as_quat(), np.zeros(len(body.joints))])
+    q = np.concatenate(
+        [frames.origin["pelvis"], Rotation.from_matrix(frames.rotation["pelvis"]).as_quat(), np.zeros(len(body.joints))]
+    )
     for group in JOINTS:
         chain = angles[group]
         child = body.segments[chain[-1].segment]
@@ -209,17 +234,27 @@ def _parent(segment: str) -> str:
 
 
 def chain_angles(relative: Array, axes: Array) -> Array:
-    """Return the angles, rad, about the signed axes (n, 3) of a joint whose product of rotations is ``relative`` (3, 3).
+    """Return the angles, rad, about the signed axes (n, 3) of a joint whose product of rotations is ``relative`` (3,
+    3).
 
     One axis: any. Two: z then x. Three: z then x then y.
     """
     if len(axes) == 1:
-        spin = np.array([relative[2, 1] - relative[1, 2], relative[0, 2] - relative[2, 0], relative[1, 0] - relative[0, 1]]) / 2
+        spin = (
+            np.array(
+                [relative[2, 1] - relative[1, 2], relative[0, 2] - relative[2, 0], relative[1, 0] - relative[0, 1]]
+            )
+            / 2
+        )
         return np.array([np.arctan2(axes[0] @ spin, (np.trace(relative) - 1) / 2)])
     if len(axes) == 2:
         angles = [np.arctan2(relative[1, 0], relative[0, 0]), np.arctan2(relative[2, 1], relative[2, 2])]
     else:
-        angles = [np.arctan2(-relative[0, 1], relative[1, 1]), np.arcsin(relative[2, 1]), np.arctan2(-relative[2, 0], relative[2, 2])]
+        angles = [
+            np.arctan2(-relative[0, 1], relative[1, 1]),
+            np.arcsin(relative[2, 1]),
+            np.arctan2(-relative[2, 0], relative[2, 2]),
+        ]
     return axes.sum(axis=1) * np.array(angles)
 
 
@@ -230,7 +265,8 @@ def _doubts(skeleton: Skeleton, subject: Subject) -> list[str]:
         low, high = (ratio * subject.stature for ratio in LENGTH_RATIO.get(kind_of(segment), (0.0, 1.0)))
         if not low < skeleton.lengths[segment] < high:
             notes.append(
-                f"Warning: {segment} is {skeleton.lengths[segment]:.3f} m long, {low:.2f} to {high:.2f} m would be usual at "
+                f"Warning: {segment} is {skeleton.lengths[segment]:.3f} m long, {low:.2f} to {high:.2f} m would be "
+                f"usual at "
                 f"{subject.stature:.2f} m: check its markers, and the stature."
             )
         other = segment.replace("right_", "left_")
@@ -240,5 +276,8 @@ def _doubts(skeleton: Skeleton, subject: Subject) -> list[str]:
     for joint, rotation in skeleton.turns.items():
         tilt = np.degrees(np.arccos((np.trace(rotation) - 1) / 2))
         if tilt > TILT[joint.split("_")[1]]:
-            notes.append(f"Warning: {joint} stands {tilt:.0f} deg away from its axes: check the markers beside it and the wand above it.")
+            notes.append(
+                f"Warning: {joint} stands {tilt:.0f} deg away from its axes: check the markers beside it and the wand "
+                f"above it."
+            )
     return notes

@@ -36,11 +36,12 @@ def side_of(segment: str) -> float:
 class Skeleton:
     """The sizes of one person, m.
 
-    ``lengths`` by segment: thigh, shank, upper_arm, forearm_hand (to the wrist) between joint centres, foot heel to toe tip, pelvis mid hip
-    centres to the cut, trunk_head mid hip to mid shoulder centres. ``origins`` by joint: (3,) m in the parent segment's frame.
-    ``turns`` by joint: (3, 3) constant rotation parent_R_child at zero angle (varus, tibial torsion, carrying angle), identity if absent.
-    ``cut`` by segment, pelvis and trunk_head: (3,) m in its frame, where the table of masses cuts one from the other, if not at the joint.
-    ``ankle_height`` m over the sole and ``heel_behind_ankle`` m by side. ``asis_width``, ``stature`` m.
+    ``lengths`` by segment: thigh, shank, upper_arm, forearm_hand (to the wrist) between joint centres, foot heel to toe
+    tip, pelvis mid hip centres to the cut, trunk_head mid hip to mid shoulder centres. ``origins`` by joint: (3,) m in
+    the parent segment's frame. ``turns`` by joint: (3, 3) constant rotation parent_R_child at zero angle (varus, tibial
+    torsion, carrying angle), identity if absent. ``cut`` by segment, pelvis and trunk_head: (3,) m in its frame, where
+    the table of masses cuts one from the other, if not at the joint. ``ankle_height`` m over the sole and
+    ``heel_behind_ankle`` m by side. ``asis_width``, ``stature`` m.
     """
 
     lengths: Mapping[str, float]
@@ -54,7 +55,9 @@ class Skeleton:
 
 
 def generic_skeleton(reference: Reference, subject: Subject) -> Skeleton:
-    """Return the skeleton of the table's reference person at the subject's stature, with the widths of ``proportions.csv``."""
+    """Return the skeleton of the table's reference person at the subject's stature, with the widths of
+    ``proportions.csv``.
+    """
     stature, sex = subject.stature, subject.sex
     scale = stature / reference.stature
     kinds = {kind: scale * reference.lengths[kind] for kind in KINDS}

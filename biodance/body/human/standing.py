@@ -14,7 +14,11 @@ WINDOW = 0.5
 """s: length of the quietest part of the static trial that is averaged."""
 NEEDED = (
     *("right_asis", "left_asis", "mid_psis"),
-    *(f"{side}_{place}" for side in ("right", "left") for place in ("knee_lateral", "ankle_lateral", "heel", "toe", "acromion")),
+    *(
+        f"{side}_{place}"
+        for side in ("right", "left")
+        for place in ("knee_lateral", "ankle_lateral", "heel", "toe", "acromion")
+    ),
     *(f"{side}_{place}" for side in ("right", "left") for place in ("elbow_lateral", "wrist_radial", "wrist_ulnar")),
 )
 """Landmarks without which no 12-segment body can be placed."""
@@ -22,7 +26,8 @@ NEEDED = (
 
 @dataclass(frozen=True, eq=False)
 class StaticPosture:
-    """Markers of the set (canonical labels) in one standing posture: ``points`` label -> (3,) m, lab frame; ``landmarks`` name -> (3,) m.
+    """Markers of the set (canonical labels) in one standing posture: ``points`` label -> (3,) m, lab frame;
+    ``landmarks`` name -> (3,) m.
 
     ``notes`` say which frames were averaged and which markers come from elsewhere in the trial or are missing.
     """
@@ -34,19 +39,24 @@ class StaticPosture:
 
 
 def standing(static: Trial) -> StaticPosture:
-    """Return the posture of a static trial: the median over its quietest half second, or over all frames for a marker not seen then.
+    """Return the posture of a static trial: the median over its quietest half second, or over all frames for a marker
+    not seen then.
 
     Raises
     ------
     TrialRefused
-        There are no markers, no recognised marker set, or a landmark that the body needs is missing in every frame; all are named.
+        There are no markers, no recognised marker set, or a landmark that the body needs is missing in every frame; all
+        are named.
     """
     where = f"Static trial {static.name}"
     if static.markers is None:
-        raise TrialRefused(f"{where}: it has no markers, so no body can be scaled on it. Record the person standing still.")
+        raise TrialRefused(
+            f"{where}: it has no markers, so no body can be scaled on it. Record the person standing still."
+        )
     if not static.marker_set:
         raise TrialRefused(
-            f"{where}: its {len(static.markers.names)} labels are of no known marker set. Label them as in anthropometry/marker_sets, "
+            f"{where}: its {len(static.markers.names)} labels are of no known marker set. Label them as in "
+            f"anthropometry/marker_sets, "
             "or describe your own set in a TOML file of that form "
             "and give it with --markers FILE, or say [markers] file or map in session.toml."
         )
@@ -72,14 +82,18 @@ def standing(static: Trial) -> StaticPosture:
 
 
 def quietest(markers: Markers) -> NDArray[np.bool_]:
-    """Return (T,) True for the ``WINDOW`` s in which the markers move least while most of them are seen; all frames of a shorter trial."""
+    """Return (T,) True for the ``WINDOW`` s in which the markers move least while most of them are seen; all frames
+    of a shorter trial.
+    """
     frames = markers.time.size
     length = frames if frames < 3 else round(WINDOW * markers.rate)
     if frames <= max(length, 2):
         return np.ones(frames, dtype=bool)
     step = np.linalg.norm(np.diff(markers.xyz, axis=0), axis=2)
     unseen = np.isnan(step)
-    cost = np.where(unseen, 0.0, step).sum(axis=1) + 0.1 * unseen.sum(axis=1)  # an unseen marker costs as much as one moving 0.1 m a frame
+    cost = np.where(unseen, 0.0, step).sum(axis=1) + 0.1 * unseen.sum(
+        axis=1
+    )  # an unseen marker costs as much as one moving 0.1 m a frame
     total = np.convolve(cost, np.ones(max(length - 1, 1)), mode="valid")
     start = int(np.argmin(total))
     return np.isin(np.arange(frames), np.arange(start, start + length))
@@ -94,7 +108,10 @@ def _landmarks(points: Mapping[str, Array], marker_set: MarkerSet) -> dict[str, 
 def _refuse_missing(landmarks: Mapping[str, Array], marker_set: MarkerSet, where: str) -> None:
     absent = [name for name in NEEDED if name not in landmarks]
     if absent:
-        labels = [" or ".join("+".join(labels) for labels in marker_set.landmarks.get(name, ())) or "none in this set" for name in absent]
+        labels = [
+            " or ".join("+".join(labels) for labels in marker_set.landmarks.get(name, ())) or "none in this set"
+            for name in absent
+        ]
         listed = ", ".join(f"{name.replace('_', ' ')} ({label})" for name, label in zip(absent, labels, strict=True))
         raise TrialRefused(
             f"{where}: no frame shows these landmarks of the set {marker_set.name}: {listed}. "

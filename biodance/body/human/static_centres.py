@@ -6,7 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import JointError
-from biodance.body.human.joint_centres import chord, davis_hip, elbow, harrington_hip, pelvis_frame, shoulder, unit, wrist
+from biodance.body.human.joint_centres import (
+    chord,
+    davis_hip,
+    elbow,
+    harrington_hip,
+    pelvis_frame,
+    shoulder,
+    unit,
+    wrist,
+)
 from biodance.body.human.measures import Measures
 from biodance.body.tables.error_sizes import error_size
 from biodance.records import Array
@@ -25,11 +34,12 @@ Places = Mapping[str, Array]
 class Centres:
     """Where the joints of a standing person are, lab frame.
 
-    ``place`` joint -> (3,) m: hips, knees, ankles, trunk, shoulders, elbows, and the wrists, where the forearms end. ``right`` of knees and
-    elbows -> (3,) m, along the flexion axis to the person's right; ``axis_sd`` -> rad, how far that axis may be turned about the bone;
-    ``lateral`` -> (3,) m, the lateral marker. ``pelvis`` (3, 3) lab_R_pelvis; ``across`` side -> (3,) m, horizontal, to the right of the
-    foot; ``cut``: at which fraction of the way from mid hip to mid shoulder the table cuts pelvis from trunk; ``notes`` what was assumed;
-    ``errors`` of the joints that a movement placed.
+    ``place`` joint -> (3,) m: hips, knees, ankles, trunk, shoulders, elbows, and the wrists, where the forearms end.
+    ``right`` of knees and elbows -> (3,) m, along the flexion axis to the person's right; ``axis_sd`` -> rad, how far
+    that axis may be turned about the bone; ``lateral`` -> (3,) m, the lateral marker. ``pelvis`` (3, 3) lab_R_pelvis;
+    ``across`` side -> (3,) m, horizontal, to the right of the foot; ``cut``: at which fraction of the way from mid hip
+    to mid shoulder the table cuts pelvis from trunk; ``notes`` what was assumed; ``errors`` of the joints that a
+    movement placed.
     """
 
     place: Places
@@ -46,8 +56,8 @@ class Centres:
 def static_centres(mark: Places, sizes: Measures, *, hip: Hip, trunk_fraction: float) -> Centres:
     """Return the joint centres from the landmarks ``mark`` name -> (3,) m.
 
-    Hip: regressions. Knee, ankle, elbow: middle of lateral and medial marker, or the constructions of plug-in gait. Trunk: on the line from
-    mid hip to mid shoulder, at ``trunk_fraction`` of it, where the table cuts the trunk.
+    Hip: regressions. Knee, ankle, elbow: middle of lateral and medial marker, or the constructions of plug-in gait.
+    Trunk: on the line from mid hip to mid shoulder, at ``trunk_fraction`` of it, where the table cuts the trunk.
     """
     pelvis, hips = hip_centres(mark, sizes, hip=hip)
     middle = (hips["right"] + hips["left"]) / 2
@@ -58,7 +68,11 @@ def static_centres(mark: Places, sizes: Measures, *, hip: Hip, trunk_fraction: f
     for side, sign in SIGN.items():
         knee, note = knee_centre(mark, sizes, hips[side], pelvis[:, 2], side)
         notes += [note] if note else []
-        place |= {f"{side}_hip": hips[side], f"{side}_knee": knee, f"{side}_ankle": ankle_centre(mark, sizes, knee, side)}
+        place |= {
+            f"{side}_hip": hips[side],
+            f"{side}_knee": knee,
+            f"{side}_ankle": ankle_centre(mark, sizes, knee, side),
+        }
         place[f"{side}_shoulder"] = shoulders[side]
         place[f"{side}_elbow"], place[f"{side}_wrist"] = arm_centres(mark, sizes, shoulders[side], side)
         for joint, otherwise in (("knee", "line of march" if note else "thigh marker"), ("elbow", "straight arm")):
@@ -87,7 +101,9 @@ def hip_centres(place: Places, sizes: Measures, *, hip: Hip) -> tuple[Array, dic
 
 
 def shoulder_centres(place: Places, sizes: Measures, mid_hip: Array) -> dict[str, Array]:
-    """Return the shoulder centres by side, m: chord from the jugular notch, or straight under the acromion where that has no marker."""
+    """Return the shoulder centres by side, m: chord from the jugular notch, or straight under the acromion where
+    that has no marker.
+    """
     right, left = place["right_acromion"], place["left_acromion"]
     if all(name in place for name in ("c7", "t10", "jugular_notch", "xiphoid")):
         up = (place["c7"] + place["jugular_notch"]) - (place["t10"] + place["xiphoid"])
@@ -104,10 +120,11 @@ def shoulder_centres(place: Places, sizes: Measures, mid_hip: Array) -> dict[str
 
 
 def knee_centre(place: Places, sizes: Measures, hip: Array, pelvis_right: Array, side: str) -> tuple[Array, str]:
-    """Return the knee centre, m, and what had to be assumed: the middle of the epicondyles, or a chord with the thigh marker.
+    """Return the knee centre, m, and what had to be assumed: the middle of the epicondyles, or a chord with the thigh
+    marker.
 
-    A thigh marker that would turn the knee's axis further than ``AXIS_TOLERANCE`` from square to the line of march (mean of pelvis and
-    foot) was not placed for plug-in gait: the axis is then taken square to that line.
+    A thigh marker that would turn the knee's axis further than ``AXIS_TOLERANCE`` from square to the line of march
+    (mean of pelvis and foot) was not placed for plug-in gait: the axis is then taken square to that line.
     """
     lateral = place[f"{side}_knee_lateral"]
     if f"{side}_knee_medial" in place:
@@ -124,13 +141,17 @@ def knee_centre(place: Places, sizes: Measures, hip: Array, pelvis_right: Array,
     if abs(angle) <= AXIS_TOLERANCE:
         return centre, ""
     return usual, (
-        f"Warning: the {side} thigh marker would turn the knee's axis {abs(angle):.0f} deg from square to the line of march, "
-        "so the axis is taken as square. Place the marker in the frontal plane of the thigh, or add a medial knee marker."
+        f"Warning: the {side} thigh marker would turn the knee's axis {abs(angle):.0f} deg from square to the line of "
+        f"march, "
+        "so the axis is taken as square. Place the marker in the frontal plane of the thigh, or add a medial knee "
+        "marker."
     )
 
 
 def ankle_centre(place: Places, sizes: Measures, knee: Array, side: str) -> Array:
-    """Return the ankle centre, m: middle of the malleoli, or chord with the shank marker, or with the knee's axis without either."""
+    """Return the ankle centre, m: middle of the malleoli, or chord with the shank marker, or with the knee's axis
+    without either.
+    """
     lateral = place[f"{side}_ankle_lateral"]
     if f"{side}_ankle_medial" in place:
         return np.asarray((lateral + place[f"{side}_ankle_medial"]) / 2)
@@ -139,11 +160,12 @@ def ankle_centre(place: Places, sizes: Measures, knee: Array, side: str) -> Arra
 
 
 def arm_centres(place: Places, sizes: Measures, shoulder_at: Array, side: str) -> tuple[Array, Array]:
-    """Return elbow and wrist centre, m: the elbow in the middle of its epicondyle markers, or by the plug-in-gait construction.
+    """Return elbow and wrist centre, m: the elbow in the middle of its epicondyle markers, or by the plug-in-gait
+    construction.
 
-    The wrist is the middle of its two markers, unless they are so much farther apart than the wrist is wide that they sit on a bar behind
-    it; then the plug-in-gait construction. (Mean plug-in-gait static of 9 adults: with a bar, the finger marker would be 5 cm behind the
-    hand; with markers on the styloids, 2 cm, as thick as a hand is.)
+    The wrist is the middle of its two markers, unless they are so much farther apart than the wrist is wide that they
+    sit on a bar behind it; then the plug-in-gait construction. (Mean plug-in-gait static of 9 adults: with a bar, the
+    finger marker would be 5 cm behind the hand; with markers on the styloids, 2 cm, as thick as a hand is.)
     """
     lateral, radial, ulnar = (place[f"{side}_{name}"] for name in ("elbow_lateral", "wrist_radial", "wrist_ulnar"))
     middle = (radial + ulnar) / 2
@@ -158,8 +180,8 @@ def arm_centres(place: Places, sizes: Measures, shoulder_at: Array, side: str) -
 
 @dataclass(frozen=True, eq=False)
 class SegmentFrames:
-    """Segment frames in the lab: ``rotation`` segment -> (3, 3) lab_R_segment, ``origin`` segment -> (3,) m (the proximal joint centre);
-    ``ends`` side_wrist -> (3,) m; ``cut`` (3,) m where the table cuts pelvis from trunk.
+    """Segment frames in the lab: ``rotation`` segment -> (3, 3) lab_R_segment, ``origin`` segment -> (3,) m (the
+    proximal joint centre); ``ends`` side_wrist -> (3,) m; ``cut`` (3,) m where the table cuts pelvis from trunk.
     """
 
     rotation: Places
@@ -171,9 +193,10 @@ class SegmentFrames:
 def segment_frames(centres: Centres) -> SegmentFrames:
     """Return the 12 segment frames.
 
-    Pelvis: ISB axes, origin in the middle of the hip centres. trunk_head: y along the line from mid hip to mid shoulder. Thigh, upper
-    arm: y to the proximal joint, z in the plane of the flexion axis. Shank, forearm: y to the proximal joint, flexed about the parent's
-    z and tilted by a constant varus. Foot: flat on the ground, x from heel to toe.
+    Pelvis: ISB axes, origin in the middle of the hip centres. trunk_head: y along the line from mid hip to mid
+    shoulder. Thigh, upper arm: y to the proximal joint, z in the plane of the flexion axis. Shank, forearm: y to the
+    proximal joint, flexed about the parent's z and tilted by a constant varus. Foot: flat on the ground, x from heel to
+    toe.
     """
     at = centres.place
     hips, shoulders = ((at[f"right_{joint}"] + at[f"left_{joint}"]) / 2 for joint in ("hip", "shoulder"))
@@ -186,7 +209,13 @@ def segment_frames(centres: Centres) -> SegmentFrames:
             (("upper_arm", "forearm_hand"), ("shoulder", "elbow", "wrist")),
         ):
             limb = (f"{side}_{names[0]}", f"{side}_{names[1]}")
-            _chain(rotation, origin, limb, tuple(at[f"{side}_{joint}"] for joint in joints), centres.right[f"{side}_{joints[1]}"])
+            _chain(
+                rotation,
+                origin,
+                limb,
+                tuple(at[f"{side}_{joint}"] for joint in joints),
+                centres.right[f"{side}_{joints[1]}"],
+            )
         origin[f"{side}_foot"] = at[f"{side}_ankle"]
         rotation[f"{side}_foot"] = frame_yz(UP, centres.across[side])
     ends = {f"{side}_wrist": at[f"{side}_wrist"] for side in SIGN}
@@ -200,8 +229,16 @@ def frame_yz(up: Array, right: Array) -> Array:
     return np.stack([x, y, np.cross(x, y)], axis=1)
 
 
-def _chain(rotation: dict[str, Array], origin: dict[str, Array], names: tuple[str, str], centres: tuple[Array, ...], right: Array) -> None:
-    """Fill in the two segments of a limb: the second flexes about z of the first and is tilted about its own x (varus)."""
+def _chain(
+    rotation: dict[str, Array],
+    origin: dict[str, Array],
+    names: tuple[str, str],
+    centres: tuple[Array, ...],
+    right: Array,
+) -> None:
+    """Fill in the two segments of a limb: the second flexes about z of the first and is tilted about its own x
+    (varus).
+    """
     (upper, lower), (top, middle, end) = names, centres
     rotation[upper], origin[upper], origin[lower] = frame_yz(top - middle, right), top, middle
     direction = rotation[upper].T @ unit(middle - end)

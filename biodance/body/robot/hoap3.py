@@ -1,7 +1,8 @@
-"""The HOAP-3 humanoid robot of the paper: 12 segments, 21 joints, 7.9 kg, built from the maker's own geometry and mass table.
+"""The HOAP-3 humanoid robot of the paper: 12 segments, 21 joints, 7.9 kg, built from the maker's own geometry and mass
+table.
 
-Segment frames are the manual's modified Denavit-Hartenberg frames, except pelvis (ISB: x forwards, y up, z right) and trunk (x forwards,
-y left, z up). At zero angles the legs are straight and the arms point forwards.
+Segment frames are the manual's modified Denavit-Hartenberg frames, except pelvis (ISB: x forwards, y up, z right) and
+trunk (x forwards, y left, z up). At zero angles the legs are straight and the arms point forwards.
 """
 
 import numpy as np
@@ -13,38 +14,55 @@ from biodance.body.robot.prior import robot_covariance
 from biodance.body.tables.anthropometry import TableRow, read_table, row_numbers
 from biodance.records import Array, Sip
 
-SEGMENTS = (
+_SEGMENTS = (
     "pelvis", "right_thigh", "right_shank", "right_foot", "left_thigh", "left_shank", "left_foot", "trunk_head",
     "right_upper_arm", "right_forearm_hand", "left_upper_arm", "left_forearm_hand",
 )  # fmt: skip
-CARRIES = {"hip_pitch": "thigh", "knee_pitch": "shank", "ankle_roll": "foot", "shoulder_yaw": "upper_arm", "elbow_pitch": "forearm_hand"}
+CARRIES = {
+    "hip_pitch": "thigh",
+    "knee_pitch": "shank",
+    "ankle_roll": "foot",
+    "shoulder_yaw": "upper_arm",
+    "elbow_pitch": "forearm_hand",
+}
 """The last joint before each segment."""
-SPEED = 1.0
+_SPEED = 1.0
 """rad/s, the limit that Bonnet 2016 used for this robot."""
 LEG_BASE, ARM_BASE = np.array([-0.035, -0.055, 0.0]), np.array([-0.035, 0.0, 0.125])
-"""m: where the legs start in the pelvis (ISB axes) and the arms in the trunk (x forwards, y left, z up); Fujitsu manual, table 6.1-2."""
-SHOULDER = 0.111
+"""m: where the legs start in the pelvis (ISB axes) and the arms in the trunk (x forwards, y left, z up); Fujitsu
+manual, table 6.1-2.
+"""
+_SHOULDER = 0.111
 """m, from the middle to either shoulder."""
-ANKLE_HEIGHT, SOLE_AHEAD, SOLE_WIDE = 0.040, (-0.040, 0.068), 0.036
+_ANKLE_HEIGHT, SOLE_AHEAD, SOLE_WIDE = 0.040, (-0.040, 0.068), 0.036
 """m: sole under the ankle, from heel to toe, half its width about its middle line."""
-COM_SD = 0.010
+_COM_SD = 0.010
 """m, prior standard deviation of every centre of mass; the others in `robot_prior`."""
 
 
 def hoap3() -> Body:
-    """Return the robot in configuration B (no battery, no wireless card): free-flyer root, nq = 28, nv = 27, no markers."""
+    """Return the robot in configuration B (no battery, no wireless card): free-flyer root, nq = 28, nv = 27, no
+    markers.
+    """
     joints = _joints()
     turns = _zero_posture(joints)
-    lumps = [_lump(read_table("robots", "hoap3_segments").row(segment=name), turns[name]) for name in SEGMENTS]
+    lumps = [_lump(read_table("robots", "hoap3_segments").row(segment=name), turns[name]) for name in _SEGMENTS]
     rows = [read_table("robots", "hoap3_joints").row(joint=joint.name) for joint in joints]
     boxes = np.array(
-        [row_numbers(read_table("robots", "hoap3_boxes").row(segment=s), "x_min y_min z_min x_max y_max z_max") for s in SEGMENTS]
+        [
+            row_numbers(read_table("robots", "hoap3_boxes").row(segment=s), "x_min y_min z_min x_max y_max z_max")
+            for s in _SEGMENTS
+        ]
     ).reshape(-1, 2, 3)
     return Body(
         "HOAP-3",
-        SEGMENTS,
+        _SEGMENTS,
         joints,
-        Sip(SEGMENTS, np.concatenate([inertial_parameters(lump) for lump in lumps]), robot_covariance(lumps, [COM_SD] * len(lumps))),
+        Sip(
+            _SEGMENTS,
+            np.concatenate([inertial_parameters(lump) for lump in lumps]),
+            robot_covariance(lumps, [_COM_SD] * len(lumps)),
+        ),
         _limits(rows),
         SegmentMarkers((), (), np.empty((0, 3)), np.empty(0)),
         boxes,
@@ -62,16 +80,29 @@ def _joints() -> tuple[Joint, ...]:
         name = row["joint"]
         side, _, kind = name.partition("_")
         if name == "waist_pitch":
-            joints.append(Joint(name, -1, np.array([0.0, 1.0, 0.0]), UPRIGHT.T, np.zeros(3), SEGMENTS.index("trunk_head"), "bend forwards"))
+            joints.append(
+                Joint(
+                    name,
+                    -1,
+                    np.array([0.0, 1.0, 0.0]),
+                    UPRIGHT.T,
+                    np.zeros(3),
+                    _SEGMENTS.index("trunk_head"),
+                    "bend forwards",
+                )
+            )
             continue
         a, alpha, d, theta = (float(row[column]) for column in ("a_m", "alpha_deg", "d_m", "theta_deg"))
         tilt = turn(0, np.radians(alpha))
         rotation, translation = tilt @ turn(2, np.radians(theta)), np.array([a, 0.0, reach])
-        parent, reach = len(joints) - 1, d  # the length d lies behind this joint's axis: its frame stays at the proximal end
+        parent, reach = (
+            len(joints) - 1,
+            d,
+        )  # the length d lies behind this joint's axis: its frame stays at the proximal end
         if kind in ("hip_yaw", "shoulder_pitch"):
             parent, base, place = _base(kind, side, joints)
             rotation, translation = base @ rotation, place + base @ translation
-        carried = SEGMENTS.index(f"{side}_{CARRIES[kind]}") if kind in CARRIES else -1
+        carried = _SEGMENTS.index(f"{side}_{CARRIES[kind]}") if kind in CARRIES else -1
         joints.append(Joint(name, parent, z, rotation, translation, carried))
     return tuple(joints)
 
@@ -83,7 +114,7 @@ def _base(kind: str, side: str, joints: list[Joint]) -> tuple[int, Array, Array]
     if kind == "hip_yaw":
         return -1, tilt @ turn(2, np.pi / 2), LEG_BASE
     waist = next(i for i, joint in enumerate(joints) if joint.name == "waist_pitch")
-    return waist, tilt, ARM_BASE + tilt @ (z * (SHOULDER if side == "left" else -SHOULDER))
+    return waist, tilt, ARM_BASE + tilt @ (z * (_SHOULDER if side == "left" else -_SHOULDER))
 
 
 def _zero_posture(joints: tuple[Joint, ...]) -> dict[str, Array]:
@@ -93,7 +124,7 @@ def _zero_posture(joints: tuple[Joint, ...]) -> dict[str, Array]:
     for joint in joints:
         chain.append((UPRIGHT if joint.parent < 0 else chain[joint.parent]) @ joint.rotation)
         if joint.segment >= 0:
-            turns[SEGMENTS[joint.segment]] = chain[-1]
+            turns[_SEGMENTS[joint.segment]] = chain[-1]
     return turns
 
 
@@ -107,7 +138,7 @@ def _lump(row: TableRow, turn: Array) -> RigidInertia:
 
 def _limits(rows: list[TableRow]) -> JointLimits:
     low, high, torque = np.array([row_numbers(row, "lower_deg upper_deg torque_nm") for row in rows]).T
-    return JointLimits(np.radians(low), np.radians(high), np.full(len(rows), SPEED), -torque, torque)
+    return JointLimits(np.radians(low), np.radians(high), np.full(len(rows), _SPEED), -torque, torque)
 
 
 def _sole(side: str) -> Foot:
@@ -115,4 +146,4 @@ def _sole(side: str) -> Foot:
     middle = 0.005 if side == "right" else -0.005
     heel, toe = SOLE_AHEAD
     corners = [(heel, -SOLE_WIDE), (heel, SOLE_WIDE), (toe, SOLE_WIDE), (toe, -SOLE_WIDE)]
-    return Foot(SEGMENTS.index(f"{side}_foot"), np.array([[-ANKLE_HEIGHT, middle + y, z] for z, y in corners]))
+    return Foot(_SEGMENTS.index(f"{side}_foot"), np.array([[-_ANKLE_HEIGHT, middle + y, z] for z, y in corners]))

@@ -1,4 +1,6 @@
-"""How well a robot's maker knows its inertial parameters: standard deviations of a data sheet, for robots whose data come without any."""
+"""How well a robot's maker knows its inertial parameters: standard deviations of a data sheet, for robots whose data
+come without any.
+"""
 
 import numpy as np
 
@@ -10,7 +12,7 @@ RELATIVE_MASS_SD, RELATIVE_INERTIA_SD = 0.15, 0.30
 """Of every segment: covers, cables and cards come and go (judgement; Bonnet 2016 finds 0.4 kg of 8 kg in all)."""
 POINT = 1e-6
 """m: links with a smaller radius of gyration are point masses, as some files write them."""
-COM_SD = 0.2
+_COM_SD = 0.2
 """m of CoM per m of radius of gyration: 10 mm for the links of HOAP-3."""
 
 
@@ -21,7 +23,9 @@ def robot_covariance(lumps: list[RigidInertia], com_sd: list[float]) -> Array:
         size = RELATIVE_INERTIA_SD * np.trace(lump.inertia) / lump.mass / 3
         jacobian = parameter_jacobian(lump)
         block = slice(10 * i, 10 * i + 10)
-        out[block, block] = jacobian @ np.diag([RELATIVE_MASS_SD * lump.mass, *[com] * 3, *[size] * 6]) ** 2 @ jacobian.T
+        out[block, block] = (
+            jacobian @ np.diag([RELATIVE_MASS_SD * lump.mass, *[com] * 3, *[size] * 6]) ** 2 @ jacobian.T
+        )
     return out
 
 
@@ -31,11 +35,17 @@ def is_point(lump: RigidInertia) -> bool:
 
 
 def extended(lump: RigidInertia, box: Array) -> RigidInertia:
-    """Return the lump, or in place of a point mass one that fills its ``box`` (2, 3) m: what is left out is not known exactly."""
+    """Return the lump, or in place of a point mass one that fills its ``box`` (2, 3) m: what is left out is not
+    known exactly.
+    """
     square = np.square(box[1] - box[0])
-    return RigidInertia(lump.mass, lump.com, lump.mass / 12 * np.diag(square.sum() - square)) if is_point(lump) else lump
+    return (
+        RigidInertia(lump.mass, lump.com, lump.mass / 12 * np.diag(square.sum() - square)) if is_point(lump) else lump
+    )
 
 
 def com_deviation(lump: RigidInertia) -> float:
-    """Return the standard deviation m, per axis, of the centre of mass of a lump of which only the data sheet is known."""
-    return float(COM_SD * np.sqrt(np.trace(lump.inertia) / (2 * lump.mass)))
+    """Return the standard deviation m, per axis, of the centre of mass of a lump of which only the data sheet is
+    known.
+    """
+    return float(_COM_SD * np.sqrt(np.trace(lump.inertia) / (2 * lump.mass)))

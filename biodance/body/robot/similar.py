@@ -1,8 +1,9 @@
-"""Bodies that move alike: lengths times L, masses times M, time times sqrt(L), so that the same angles are the same movement (Froude 1861).
+"""Bodies that move alike: lengths times L, masses times M, time times sqrt(L), so that the same angles are the same
+movement (Froude 1861).
 
-Under gravity two bodies of the same shape and mass distribution move alike where times go with the square root of lengths: angles,
-friction and balance are then the same, forces go with M, moments with M L, speeds of joints with 1 / sqrt(L). So a dance may be designed
-for a body of convenient size and danced, exactly, by its small or large likeness.
+Under gravity two bodies of the same shape and mass distribution move alike where times go with the square root of
+lengths: angles, friction and balance are then the same, forces go with M, moments with M L, speeds of joints with 1 /
+sqrt(L). So a dance may be designed for a body of convenient size and danced, exactly, by its small or large likeness.
 """
 
 from dataclasses import dataclass, replace
@@ -27,7 +28,9 @@ class Likeness:
 
 
 def likeness(body: Body, to: Likeness) -> Body:
-    """Return the body of the same shape and angles, with all lengths, masses, strengths and speeds changed by the factors of ``to``."""
+    """Return the body of the same shape and angles, with all lengths, masses, strengths and speeds changed by the
+    factors of ``to``.
+    """
     length, mass, limits = to.length, to.mass, body.limits
     units: Array = mass * np.tile([1.0, *[length] * 3, *[length**2] * 6], len(body.segments))
     return replace(

@@ -10,11 +10,12 @@ from biodance.body.solids import read_mesh
 from biodance.errors import FileRefused
 from biodance.records import Array
 
-PACKAGE = "package://"
+_PACKAGE = "package://"
 
 
 def mesh_file(urdf: Path, name: str) -> Path:
-    """Return the file that a mesh's ``filename`` means: a path beside the URDF, or ``package://NAME/PATH`` in a folder above it.
+    """Return the file that a mesh's ``filename`` means: a path beside the URDF, or ``package://NAME/PATH`` in a folder
+    above it.
 
     The package is looked for by its name in all folders that hold the URDF, and as one of these folders itself.
 
@@ -24,23 +25,27 @@ def mesh_file(urdf: Path, name: str) -> Path:
         There is no such file; the message says where it was looked for.
     """
     plain = name.removeprefix("file://").removeprefix("model://")
-    if not name.startswith(PACKAGE):
+    if not name.startswith(_PACKAGE):
         places = [urdf.parent / plain]
     else:
-        package, _, rest = name.removeprefix(PACKAGE).partition("/")
+        package, _, rest = name.removeprefix(_PACKAGE).partition("/")
         above = urdf.resolve().parents
-        places = [folder / package / rest for folder in above] + [folder / rest for folder in above if folder.name == package]
+        places = [folder / package / rest for folder in above] + [
+            folder / rest for folder in above if folder.name == package
+        ]
     for place in places:
         if place.is_file():
             return place
     raise FileRefused(
-        f"the mesh {name!r} is not where {urdf} says. Put it beside the URDF, or below a folder {urdf.resolve().parent} is in"
+        f"the mesh {name!r} is not where {urdf} says. Put it beside the URDF, or below a folder "
+        f"{urdf.resolve().parent} is in"
     )
 
 
 @lru_cache(maxsize=256)
 def mesh_hull(path: Path, scale: tuple[float, float, float]) -> Array:
-    """Return the corners (K, 3) m of the convex hull of a mesh file times ``scale`` m per unit; of a flat mesh, all its corners.
+    """Return the corners (K, 3) m of the convex hull of a mesh file times ``scale`` m per unit; of a flat mesh, all its
+    corners.
 
     Raises
     ------
@@ -56,18 +61,21 @@ def mesh_hull(path: Path, scale: tuple[float, float, float]) -> Array:
     return np.asarray(corners)
 
 
-FLAT = 0.0005
+_FLAT = 0.0005
 """m: corners of a foot of boxes this near to the plane of its sole belong to it."""
 LAYER = 0.002
 """m: corners of a mesh this near to its lowest plane belong to the sole; meshes have rounded edges."""
-STEEPEST = 0.5
+_STEEPEST = 0.5
 """Cosine of the largest angle between a sole and the ground at zero joint angles."""
 CORNERS = 12
-"""A sole keeps at most so many corners: those that leave it largest. All lie on the true outline, so that support is never overrated."""
+"""A sole keeps at most so many corners: those that leave it largest. All lie on the true outline, so that support is
+never overrated.
+"""
 
 
 def sole_outline(where: str, boxes: list[Array], hulls: list[Array], axes: Array) -> Array:
-    """Return the sole (P, 3) m of a foot, counter-clockwise from above: the face of its shapes that lies lowest and nearest to horizontal.
+    """Return the sole (P, 3) m of a foot, counter-clockwise from above: the face of its shapes that lies lowest and
+    nearest to horizontal.
 
     Parameters
     ----------
@@ -87,9 +95,11 @@ def sole_outline(where: str, boxes: list[Array], hulls: list[Array], axes: Array
 
     (ahead, up, right), corners = axes, np.concatenate([*boxes, *hulls])
     down = _down(boxes, hulls, up)
-    if -down @ up < STEEPEST:
-        raise FileRefused(f"{where} has no face that points to the ground at zero joint angles. Give it a collision <box>.")
-    low = corners[corners @ down > (corners @ down).max() - (LAYER if hulls else FLAT)]
+    if -down @ up < _STEEPEST:
+        raise FileRefused(
+            f"{where} has no face that points to the ground at zero joint angles. Give it a collision <box>."
+        )
+    low = corners[corners @ down > (corners @ down).max() - (LAYER if hulls else _FLAT)]
     flat = np.stack([low @ ahead, -(low @ right)], axis=1)  # x forwards, y left: counter-clockwise is from above
     try:
         outline = ConvexHull(flat).vertices
@@ -105,7 +115,9 @@ def match_faces(one: Array, other: Array) -> tuple[Array, Array]:
 
 
 def _down(boxes: list[Array], hulls: list[Array], up: Array) -> Array:
-    """Return the outward normal (3,) of the face that is nearest to horizontal; of meshes, of the largest face within the limit."""
+    """Return the outward normal (3,) of the face that is nearest to horizontal; of meshes, of the largest face
+    within the limit.
+    """
     from scipy.spatial import ConvexHull, QhullError
 
     if not hulls:
@@ -120,7 +132,7 @@ def _down(boxes: list[Array], hulls: list[Array], up: Array) -> Array:
     edges = points[hull.simplices]
     area = np.linalg.norm(np.cross(edges[:, 1] - edges[:, 0], edges[:, 2] - edges[:, 0]), axis=1) / 2
     alike = normals @ normals.T > np.cos(np.radians(2.0))
-    face = np.where(-normals @ up > STEEPEST, alike @ area, 0.0)
+    face = np.where(-normals @ up > _STEEPEST, alike @ area, 0.0)
     best = int(np.argmax(face))
     mean = (alike[best] * area) @ normals
     return np.asarray(mean / np.linalg.norm(mean)) if face[best] > 0 else np.asarray(normals[np.argmax(-normals @ up)])
@@ -134,7 +146,9 @@ def _normals(corners: Array) -> Array:
 
 
 def _largest(flat: Array, outline: list[int]) -> list[int]:
-    """Return at most `CORNERS` indices of a convex ``outline`` into ``flat`` (K, 2): again and again the one that matters least goes."""
+    """Return at most `CORNERS` indices of a convex ``outline`` into ``flat`` (K, 2): again and again the one that
+    matters least goes.
+    """
     while len(outline) > CORNERS:
         here, before, after = flat[outline], flat[np.roll(outline, 1)], flat[np.roll(outline, -1)]
         (ax, ay), (bx, by) = (here - before).T, (after - before).T

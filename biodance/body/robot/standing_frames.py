@@ -1,8 +1,8 @@
 """The same body in other segment frames: a robot's root and feet in the axes of a person who stands.
 
-Whoever designs a dance wants root and feet with x forwards, y up, z right while the feet are flat (ISB, as in the human body). Frames
-of robots lie as their makers like; they are turned here, and what is written in them (parameters with covariance, boxes, soles, markers,
-joints that hang on them) is turned along, so that it is the same robot.
+Whoever designs a dance wants root and feet with x forwards, y up, z right while the feet are flat (ISB, as in the human
+body). Frames of robots lie as their makers like; they are turned here, and what is written in them (parameters with
+covariance, boxes, soles, markers, joints that hang on them) is turned along, so that it is the same robot.
 """
 
 from dataclasses import replace
@@ -19,7 +19,8 @@ LEANS = np.cos(np.radians(30.0))
 
 
 def standing_frames(body: Body) -> Body:
-    """Return ``body`` with its feet in ISB axes: y along the sole's normal, x forwards at zero angles, origin where the last two axes meet.
+    """Return ``body`` with its feet in ISB axes: y along the sole's normal, x forwards at zero angles, origin where the
+    last two axes meet.
 
     The root must be in ISB axes already (`urdf.read_urdf` sees to it).
 
@@ -35,12 +36,15 @@ def standing_frames(body: Body) -> Body:
         if not up[1] > LEANS:
             away = np.degrees(np.arccos(np.clip(up[1], -1, 1)))
             raise BiodanceError(
-                f"{body.name}: at zero joint angles the {side} sole faces {away:.0f} degrees away from the ground; the feet must be flat "
+                f"{body.name}: at zero joint angles the {side} sole faces {away:.0f} degrees away from the ground; "
+                f"the feet must be flat "
                 "within 30 degrees. Give the joints zeros at which the robot stands."
             )
         ahead = np.array([1.0, 0.0, 0.0]) - up[0] * up
         ahead /= np.linalg.norm(ahead)
-        body = reframed(body, foot.segment, turn.T @ np.stack([ahead, up, np.cross(ahead, up)], axis=1), _ankle(body, foot.segment))
+        body = reframed(
+            body, foot.segment, turn.T @ np.stack([ahead, up, np.cross(ahead, up)], axis=1), _ankle(body, foot.segment)
+        )
     return body
 
 
@@ -52,9 +56,11 @@ def sole_normal(foot: Foot) -> Array:
 
 
 def reframed(body: Body, segment: int, turn: Array, shift: Array) -> Body:
-    """Return the body with the frame of one segment turned by ``turn`` (3, 3) = old_R_new, its origin at ``shift`` (3,) m in the old one.
+    """Return the body with the frame of one segment turned by ``turn`` (3, 3) = old_R_new, its origin at ``shift`` (3,)
+    m in the old one.
 
-    For segments on a joint the shift must lie along the joint's axis. The lab pose of a root that is turned changes by the same turn.
+    For segments on a joint the shift must lie along the joint's axis. The lab pose of a root that is turned changes by
+    the same turn.
     """
     carrier = body.segment_joint[segment]
     joints = []
@@ -68,7 +74,8 @@ def reframed(body: Body, segment: int, turn: Array, shift: Array) -> Body:
     ten, table = slice(10 * segment, 10 * segment + 10), np.eye(body.sip.phi.size)
     table[ten, ten] = reframed_parameters(turn, shift)
     feet = {
-        side: replace(foot, outline=(foot.outline - shift) @ turn) if foot.segment == segment else foot for side, foot in body.feet.items()
+        side: replace(foot, outline=(foot.outline - shift) @ turn) if foot.segment == segment else foot
+        for side, foot in body.feet.items()
     }
     on = (np.array(body.markers.segment, dtype=int) == segment)[:, None]
     place = np.where(on, (body.markers.position - shift) @ turn, body.markers.position)
@@ -87,7 +94,9 @@ def reframed(body: Body, segment: int, turn: Array, shift: Array) -> Body:
 
 
 def reframed_parameters(turn: Array, shift: Array) -> Array:
-    """Return the map (10, 10) of a segment's parameters into a frame with axes ``turn`` (3, 3) = old_R_new and origin ``shift`` (3,) m."""
+    """Return the map (10, 10) of a segment's parameters into a frame with axes ``turn`` (3, 3) = old_R_new and
+    origin ``shift`` (3,) m.
+    """
     move = np.eye(4)
     move[:3, :3], move[:3, 3] = turn.T, -turn.T @ shift
     return np.asarray(np.linalg.lstsq(PSEUDO_INERTIA, np.kron(move, move) @ PSEUDO_INERTIA, rcond=None)[0])
@@ -108,7 +117,9 @@ def _turn_at_zero(body: Body, segment: int) -> Array:
 
 
 def _ankle(body: Body, segment: int) -> Array:
-    """Return the point (3,) m, in the segment's frame, on the axis of its joint that is nearest to the axis before it."""
+    """Return the point (3,) m, in the segment's frame, on the axis of its joint that is nearest to the axis before
+    it.
+    """
     last = body.joints[body.segment_joint[segment]]
     if last.parent < 0:
         return np.zeros(3)

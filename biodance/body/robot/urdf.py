@@ -1,7 +1,8 @@
-"""A robot from its URDF file: links to segments, fixed joints merged, limits from the file, soles under the links that are named as feet.
+"""A robot from its URDF file: links to segments, fixed joints merged, limits from the file, soles under the links that
+are named as feet.
 
-The root's frame is turned to x forwards, y up, z right (as the human pelvis) where the file has z up (ROS REP 103) or x backwards. All
-other segments keep the frames of their links, so that a file that biodance wrote comes back as it was.
+The root's frame is turned to x forwards, y up, z right (as the human pelvis) where the file has z up (ROS REP 103) or x
+backwards. All other segments keep the frames of their links, so that a file that biodance wrote comes back as it was.
 """
 
 from dataclasses import dataclass, field, replace
@@ -22,8 +23,8 @@ from biodance.records import Array, Sip
 
 @dataclass
 class _Carrier:
-    """A link that moves, while all that is fixed to it is gathered: its ``joint`` index, ``lumps``, ``shapes`` and ``hulls`` in its frame,
-    and why meshes could not be read.
+    """A link that moves, while all that is fixed to it is gathered: its ``joint`` index, ``lumps``, ``shapes`` and
+    ``hulls`` in its frame, and why meshes could not be read.
     """
 
     link: str
@@ -42,15 +43,16 @@ class _Carrier:
 def read_urdf(path: str | Path, *, feet: tuple[str, str]) -> Body:
     """Return the robot of a URDF file as a Body with a free root; ``feet`` the links of its right and its left foot.
 
-    Links without mass carry no segment. Prior standard deviations: those of a data sheet (`robot_prior`). Speeds, ranges and efforts are
-    the file's. No markers.
+    Links without mass carry no segment. Prior standard deviations: those of a data sheet (`robot_prior`). Speeds,
+    ranges and efforts are the file's. No markers.
 
     Raises
     ------
     UnknownName
         A foot is no link of the file.
     FileRefused
-        The file says something that a body cannot be, or lacks something; the message names the link or joint and what would be legal.
+        The file says something that a body cannot be, or lacks something; the message names the link or joint and what
+        would be legal.
     """
     file = read_urdf_file(path)
     for foot in feet:
@@ -59,10 +61,16 @@ def read_urdf(path: str | Path, *, feet: tuple[str, str]) -> Body:
     joints, limits, carriers, owner = _tree(file)
     heavy = [carrier for carrier in carriers if carrier.lumps]
     if not carriers[0].lumps:
-        raise FileRefused(f"{file.path}: the root link {carriers[0].link} has no mass, nor has what is fixed to it. Give it an <inertial>.")
+        raise FileRefused(
+            f"{file.path}: the root link {carriers[0].link} has no mass, nor has what is fixed to it. Give it an "
+            f"<inertial>."
+        )
     for foot in feet:
         if owner[foot] not in heavy or owner[foot] is carriers[0]:
-            raise FileRefused(f"{file.path}: the foot {foot} has no mass or belongs to the root. Name the links that stand on the ground.")
+            raise FileRefused(
+                f"{file.path}: the foot {foot} has no mass or belongs to the root. Name the links that stand on the "
+                f"ground."
+            )
     body = _body(file, joints, limits, heavy)
     return _standing(file, body, {side: owner[foot] for side, foot in zip(("right", "left"), feet, strict=True)})
 
@@ -99,7 +107,8 @@ def _body(file: UrdfFile, joints: list[Joint], limits: JointLimits, heavy: list[
 def _tree(file: UrdfFile) -> tuple[list[Joint], JointLimits, list[_Carrier], dict[str, _Carrier]]:
     """Return joints, limits, the links that move and, of every link, the one that carries it.
 
-    A joint is followed by all that hangs on it, as pinocchio's algorithms need it; joints on one link keep the order of the file.
+    A joint is followed by all that hangs on it, as pinocchio's algorithms need it; joints on one link keep the order of
+    the file.
     """
     first = _Carrier(_root(file), -1, [])
     owner, frame = {first.link: first}, {first.link: (np.eye(3), np.zeros(3))}
@@ -118,11 +127,15 @@ def _tree(file: UrdfFile) -> tuple[list[Joint], JointLimits, list[_Carrier], dic
         waiting = [*_on(file, c.child), *waiting]
     lost = [name for name in file.links if name not in owner]
     if lost:
-        raise FileRefused(f"{file.path}: the link {lost[0]} does not hang on the root {first.link}. Correct the joints above it.")
+        raise FileRefused(
+            f"{file.path}: the link {lost[0]} does not hang on the root {first.link}. Correct the joints above it."
+        )
     for name, link in file.links.items():
         (turn, place), carrier = frame[name], owner[name]
         if link.lump is not None:
-            carrier.lumps.append(RigidInertia(link.lump.mass, turn @ link.lump.com + place, turn @ link.lump.inertia @ turn.T))
+            carrier.lumps.append(
+                RigidInertia(link.lump.mass, turn @ link.lump.com + place, turn @ link.lump.inertia @ turn.T)
+            )
         carrier.shapes += [corners @ turn.T + place for corners in link.shapes]
         carrier.hulls += [corners @ turn.T + place for corners in link.hulls]
         carrier.unread += link.unread
@@ -135,7 +148,10 @@ def _root(file: UrdfFile) -> str:
     children = {connection.child for connection in file.connections}
     roots = [name for name in file.links if name not in children]
     if len(roots) != 1:
-        raise FileRefused(f"{file.path}: {len(roots)} links have no parent ({', '.join(roots) or 'a ring'}); a robot has exactly one root.")
+        raise FileRefused(
+            f"{file.path}: {len(roots)} links have no parent ({', '.join(roots) or 'a ring'}); a robot has exactly "
+            f"one root."
+        )
     if len(children) < len(file.connections):
         raise FileRefused(f"{file.path}: a link is the child of two joints; a body is a tree without rings.")
     return roots[0]
@@ -146,7 +162,9 @@ def _on(file: UrdfFile, link: str) -> list[Connection]:
 
 
 def _box(carrier: _Carrier, lump: RigidInertia) -> Array:
-    """Return the box (2, 3) m around the shapes of a segment; without any, a box with its moments of inertia about its axes."""
+    """Return the box (2, 3) m around the shapes of a segment; without any, a box with its moments of inertia about
+    its axes.
+    """
     corners = carrier.corners
     if corners.size:
         return np.stack([corners.min(axis=0), corners.max(axis=0)])
@@ -160,7 +178,9 @@ def _notes(file: UrdfFile, heavy: list[_Carrier], points: list[str]) -> tuple[st
     turning = [c.name for c in file.connections if c.kind == "continuous"]
     notes = [f"No boxes in the file, taken from the inertia instead: {', '.join(guessed)}."] if guessed else []
     notes += [f"Continuous joints are used within half a turn to either side: {', '.join(turning)}."] if turning else []
-    notes += [f"Point masses in the file, of which the boxes say how sure they are: {', '.join(points)}."] if points else []
+    notes += (
+        [f"Point masses in the file, of which the boxes say how sure they are: {', '.join(points)}."] if points else []
+    )
     return tuple(notes)
 
 
@@ -171,7 +191,8 @@ def _standing(file: UrdfFile, body: Body, feet: dict[str, _Carrier]) -> Body:
     axis = int(np.argmax(np.abs(below)))
     if axis == 0 or below[axis] > 0:
         raise FileRefused(
-            f"{file.path}: at zero joint angles the feet are at {np.round(below, 3)} m from the root; the root must have x forwards and "
+            f"{file.path}: at zero joint angles the feet are at {np.round(below, 3)} m from the root; the root must "
+            f"have x forwards and "
             "y or z up, and the robot must stand upright at zero angles."
         )
     up, ahead = np.eye(3)[axis], np.eye(3)[0]
@@ -182,7 +203,8 @@ def _standing(file: UrdfFile, body: Body, feet: dict[str, _Carrier]) -> Body:
     right, left = (float(place[side][1] @ sideways) for side in ("right", "left"))
     if not right > left:
         raise FileRefused(
-            f"{file.path}: {feet['right'].link} stands left of {feet['left'].link}; name the right foot first, then the left one."
+            f"{file.path}: {feet['right'].link} stands left of {feet['left'].link}; name the right foot first, then "
+            f"the left one."
         )
     standing = replace(body, feet={side: Foot(body.segment_index(feet[side].link), soles[side]) for side in feet})
     turn = np.stack([ahead, up, sideways], axis=1)
@@ -190,20 +212,26 @@ def _standing(file: UrdfFile, body: Body, feet: dict[str, _Carrier]) -> Body:
 
 
 def _backwards(feet: dict[str, _Carrier], place: dict[str, tuple[Array, Array]], sideways: Array) -> bool:
-    """Whether the root's x axis points backwards (iCub): seen along it the right foot is on the left, and the names say right and left."""
+    """Whether the root's x axis points backwards (iCub): seen along it the right foot is on the left, and the names
+    say right and left.
+    """
     crossed = float((place["right"][1] - place["left"][1]) @ sideways) < 0
     right, left = (feet[side].link.lower() for side in ("right", "left"))
     pairs = (("right", "left"), ("r_", "l_"), ("_r", "_l"))
     return crossed and any(one in right and right.replace(one, other) == left for one, other in pairs)
 
 
-def _soles(file: UrdfFile, feet: dict[str, _Carrier], place: dict[str, tuple[Array, Array]], up: Array, ahead: Array) -> dict[str, Array]:
+def _soles(
+    file: UrdfFile, feet: dict[str, _Carrier], place: dict[str, tuple[Array, Array]], up: Array, ahead: Array
+) -> dict[str, Array]:
     """Return the outlines (P, 3) m of both soles in the frames of the feet."""
     soles = {}
     for side, carrier in feet.items():
         if not carrier.corners.size:
             why = f"of its meshes {carrier.unread[0]}" if carrier.unread else "it has no shape"
-            raise FileRefused(f"{file.path}: the {side} foot {carrier.link} shows no sole, since {why}. Give it a collision <box>.")
+            raise FileRefused(
+                f"{file.path}: the {side} foot {carrier.link} shows no sole, since {why}. Give it a collision <box>."
+            )
         turn, _ = place[side]
         axes = np.stack([ahead, up, np.cross(ahead, up)]) @ turn
         soles[side] = sole_outline(f"{file.path}: the foot {carrier.link}", carrier.shapes, carrier.hulls, axes)

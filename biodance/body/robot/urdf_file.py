@@ -1,7 +1,8 @@
 """What a URDF file says: links and joints, checked and in SI units, with nothing left out in silence.
 
-Read are <link> (inertial, collision and visual boxes, cylinders, spheres and meshes) and <joint> (revolute, continuous, fixed) with their
-placements and limits. Transmissions, sensors and colours do not matter here. Format: wiki.ros.org/urdf/XML.
+Read are <link> (inertial, collision and visual boxes, cylinders, spheres and meshes) and <joint> (revolute, continuous,
+fixed) with their placements and limits. Transmissions, sensors and colours do not matter here. Format:
+wiki.ros.org/urdf/XML.
 """
 
 from dataclasses import dataclass
@@ -15,17 +16,17 @@ from biodance.body.robot.sole import mesh_file, mesh_hull
 from biodance.errors import FileRefused
 from biodance.records import Array
 
-KINDS = ("revolute", "continuous", "fixed")
+_KINDS = ("revolute", "continuous", "fixed")
 """Types of joints that a body can have."""
-TURN = np.pi
+_TURN = np.pi
 """rad: range of a continuous joint to either side."""
 
 
 @dataclass(frozen=True, eq=False)
 class Link:
-    """One link: ``lump`` in the link's frame, None without mass; of its collision (else visual) shapes, in the link's frame: ``shapes``
-    corners (8, 3) m of the boxes around those that are no meshes, ``hulls`` corners (K, 3) m of the convex hulls of those that are;
-    ``unread`` why a mesh could not be read.
+    """One link: ``lump`` in the link's frame, None without mass; of its collision (else visual) shapes, in the link's
+    frame: ``shapes`` corners (8, 3) m of the boxes around those that are no meshes, ``hulls`` corners (K, 3) m of the
+    convex hulls of those that are; ``unread`` why a mesh could not be read.
     """
 
     name: str
@@ -37,8 +38,8 @@ class Link:
 
 @dataclass(frozen=True, eq=False)
 class Connection:
-    """One joint: ``rotation`` (3, 3) and ``translation`` (3,) m of the child's frame in the parent's; ``axis`` (3,) unit vector in the
-    child's; ``lower``, ``upper`` rad, ``velocity`` rad/s, ``effort`` N·m (all 0 for a fixed one).
+    """One joint: ``rotation`` (3, 3) and ``translation`` (3,) m of the child's frame in the parent's; ``axis`` (3,)
+    unit vector in the child's; ``lower``, ``upper`` rad, ``velocity`` rad/s, ``effort`` N·m (all 0 for a fixed one).
     """
 
     name: str
@@ -70,19 +71,26 @@ def read_urdf_file(path: str | Path) -> UrdfFile:
     Raises
     ------
     FileRefused
-        The file cannot be read, is no URDF, or a link or joint lacks a value or has one that is not legal; the message names it.
+        The file cannot be read, is no URDF, or a link or joint lacks a value or has one that is not legal; the message
+        names it.
     """
     path = Path(path)
     try:
         text = path.read_bytes()
     except OSError as error:
-        raise FileRefused(f"{path}: cannot be read ({error.strerror or error}). Give the path of a URDF file.") from error
+        raise FileRefused(
+            f"{path}: cannot be read ({error.strerror or error}). Give the path of a URDF file."
+        ) from error
     if b"<!DOCTYPE" in text or b"<!ENTITY" in text:
-        raise FileRefused(f"{path}: declares XML entities, which a robot does not need and which can do harm. Remove the DOCTYPE.")
+        raise FileRefused(
+            f"{path}: declares XML entities, which a robot does not need and which can do harm. Remove the DOCTYPE."
+        )
     try:
         root = fromstring(text)
     except ParseError as error:
-        raise FileRefused(f"{path}: is not XML ({error}). Give a URDF file; xacro files must be expanded first.") from error
+        raise FileRefused(
+            f"{path}: is not XML ({error}). Give a URDF file; xacro files must be expanded first."
+        ) from error
     if root.tag != "robot":
         raise FileRefused(f"{path}: its first element is <{root.tag}>, expected <robot>. Give a URDF file.")
     links = [_link(path, element) for element in root.findall("link")]
@@ -90,7 +98,8 @@ def read_urdf_file(path: str | Path) -> UrdfFile:
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice or not links:
         raise FileRefused(
-            f"{path}: {f'the link {twice[0]} occurs twice' if twice else 'has no <link>'}; every link needs a name of its own."
+            f"{path}: {f'the link {twice[0]} occurs twice' if twice else 'has no <link>'}; every link needs a name of "
+            f"its own."
         )
     joints = tuple(_connection(path, element, set(names)) for element in root.findall("joint"))
     return UrdfFile(path, root.get("name") or path.stem, dict(zip(names, links, strict=True)), joints)
@@ -132,7 +141,8 @@ def _lump(path: Path, inertial: Element | None, what: str) -> RigidInertia | Non
     mass, tensor = inertial.find("mass"), inertial.find("inertia")
     if mass is None or tensor is None:
         raise FileRefused(
-            f"{path}: the inertial of {what} lacks <{'mass' if mass is None else 'inertia'}>. Complete it, or remove <inertial>."
+            f"{path}: the inertial of {what} lacks <{'mass' if mass is None else 'inertia'}>. Complete it, or remove "
+            f"<inertial>."
         )
     value = _number(path, mass, "value", what)
     if value < 0:
@@ -155,7 +165,9 @@ def _shapes(path: Path, elements: list[Element], what: str) -> tuple[Array, ...]
             half = _row(path, shape, "size", what) / 2
         elif shape.tag in ("cylinder", "sphere"):
             radius = _number(path, shape, "radius", what)
-            half = np.array([radius, radius, radius if shape.tag == "sphere" else _number(path, shape, "length", what) / 2])
+            half = np.array(
+                [radius, radius, radius if shape.tag == "sphere" else _number(path, shape, "length", what) / 2]
+            )
         else:
             raise FileRefused(f"{path}: {what} has the shape <{shape.tag}>; legal are box, cylinder, sphere and mesh.")
         turn, place = placement(path, element, what)
@@ -165,7 +177,9 @@ def _shapes(path: Path, elements: list[Element], what: str) -> tuple[Array, ...]
 
 
 def mesh_hulls(path: Path, elements: list[Element], what: str, unread: list[str]) -> tuple[Array, ...]:
-    """Return the corners (K, 3) m of the convex hulls of all shapes that are meshes; what cannot be read is said in ``unread``."""
+    """Return the corners (K, 3) m of the convex hulls of all shapes that are meshes; what cannot be read is said in
+    ``unread``.
+    """
     found = []
     for element in elements:
         mesh = element.find("geometry/mesh")
@@ -183,9 +197,10 @@ def mesh_hulls(path: Path, elements: list[Element], what: str, unread: list[str]
 def _connection(path: Path, element: Element, links: set[str]) -> Connection:
     name, kind = element.get("name") or "", element.get("type") or ""
     what = f"joint {name!r}"
-    if kind not in KINDS:
+    if kind not in _KINDS:
         raise FileRefused(
-            f"{path}: {what} is of type {kind!r}; a body has revolute, continuous and fixed joints. Make it fixed, or remove it."
+            f"{path}: {what} is of type {kind!r}; a body has revolute, continuous and fixed joints. Make it fixed, or "
+            f"remove it."
         )
     if element.find("mimic") is not None:
         raise FileRefused(f"{path}: {what} mimics another joint, which a body cannot. Make it fixed.")
@@ -198,7 +213,9 @@ def _connection(path: Path, element: Element, links: set[str]) -> Connection:
         ends.append(link)
     rotation, translation = placement(path, element, what)
     if kind == "fixed":
-        return Connection(name, kind, ends[0], ends[1], rotation, translation, np.array([1.0, 0.0, 0.0]), 0.0, 0.0, 0.0, 0.0)
+        return Connection(
+            name, kind, ends[0], ends[1], rotation, translation, np.array([1.0, 0.0, 0.0]), 0.0, 0.0, 0.0, 0.0
+        )
     given = element.find("axis")
     axis = _row(path, given, "xyz", what) if given is not None else np.array([1.0, 0.0, 0.0])
     length = float(np.linalg.norm(axis))
@@ -212,14 +229,21 @@ def _limits(path: Path, element: Element, kind: str, what: str) -> tuple[float, 
     """Return lower, upper, velocity and effort of a joint that moves."""
     limit = element.find("limit")
     if limit is None:
-        raise FileRefused(f"{path}: {what} has no <limit>; give lower and upper (rad), velocity (rad/s) and effort (N·m).")
-    lower, upper = (-TURN, TURN) if kind == "continuous" else (_number(path, limit, key, what) for key in ("lower", "upper"))
+        raise FileRefused(
+            f"{path}: {what} has no <limit>; give lower and upper (rad), velocity (rad/s) and effort (N·m)."
+        )
+    lower, upper = (
+        (-_TURN, _TURN) if kind == "continuous" else (_number(path, limit, key, what) for key in ("lower", "upper"))
+    )
     velocity, effort = (_number(path, limit, key, what) for key in ("velocity", "effort"))
     if not lower <= upper:
         raise FileRefused(f"{path}: the range of {what} is {lower:g} to {upper:g} rad; lower must not exceed upper.")
     for key, value, unit in (("velocity", velocity, "rad/s"), ("effort", effort, "N·m")):
         if not value > 0:
-            raise FileRefused(f"{path}: the {key} of {what} is {value:g} {unit}, with which it cannot move; give what its motor can do.")
+            raise FileRefused(
+                f"{path}: the {key} of {what} is {value:g} {unit}, with which it cannot move; give what its motor can "
+                f"do."
+            )
     return lower, upper, velocity, effort
 
 

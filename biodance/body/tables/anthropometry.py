@@ -17,14 +17,18 @@ TableRow = Mapping[str, str]
 
 @dataclass(frozen=True, eq=False)
 class AnthropometricTable:
-    """One table: ``rows`` as text by column name; ``provenance``: title, source, doi, page, population, n, sex, units, sd, sha256 ..."""
+    """One table: ``rows`` as text by column name; ``provenance``: title, source, doi, page, population, n, sex,
+    units, sd, sha256 ...
+    """
 
     name: str
     rows: tuple[TableRow, ...]
     provenance: Mapping[str, Any]
 
     def where(self, **wanted: str) -> tuple[TableRow, ...]:
-        """Return the rows whose columns equal the wanted texts, for example ``where(segment="foot", sex="F")``; may be empty."""
+        """Return the rows whose columns equal the wanted texts, for example ``where(segment="foot", sex="F")``; may
+        be empty.
+        """
         return tuple(row for row in self.rows if all(row[column] == text for column, text in wanted.items()))
 
     def row(self, **wanted: str) -> TableRow:
@@ -38,7 +42,9 @@ class AnthropometricTable:
         found = self.where(**wanted)
         if len(found) != 1:
             column, text = next(iter(wanted.items()))
-            raise UnknownName.of(f"{column} of table {self.name} (with {wanted})", text, sorted({row[column] for row in self.rows}))
+            raise UnknownName.of(
+                f"{column} of table {self.name} (with {wanted})", text, sorted({row[column] for row in self.rows})
+            )
         return found[0]
 
 
@@ -49,7 +55,8 @@ def row_numbers(row: TableRow, columns: str) -> tuple[float, ...]:
 
 @functools.cache
 def read_table(family: str, name: str) -> AnthropometricTable:
-    """Read ``anthropometry/<family>/<name>.csv`` and its provenance, for example ``read_table("segments", "de_leva_1996")``.
+    """Read ``anthropometry/<family>/<name>.csv`` and its provenance, for example ``read_table("segments",
+    "de_leva_1996")``.
 
     Raises
     ------

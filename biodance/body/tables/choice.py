@@ -1,4 +1,6 @@
-"""Choose a table of segment inertial parameters: a shipped one or a study by its name, a user's own by the path of its .csv file."""
+"""Choose a table of segment inertial parameters: a shipped one or a study by its name, a user's own by the path of
+its .csv file.
+"""
 
 from collections.abc import Callable, Mapping
 
@@ -41,8 +43,8 @@ def table_names(sex: str) -> tuple[str, ...]:
 
 
 def measured_whole() -> tuple[str, ...]:
-    """Return the shipped tables of whole bodies for both sexes (``measured_whole`` in their .toml): one laid every CoM on the line
-    between the joint centres, the other measured where it lies.
+    """Return the shipped tables of whole bodies for both sexes (``measured_whole`` in their .toml): one laid every CoM
+    on the line between the joint centres, the other measured where it lies.
     """
     shipped = FAMILY.shipped()
     return tuple(table.name for table in tables() if table.name in shipped and table.provenance.get("measured_whole"))
@@ -57,8 +59,9 @@ def trunk_joint(table: str) -> str:
 
 
 def reference(table: str, subject: Subject) -> Reference:
-    """Return the reference person of one table: ``de_leva_1996``, ``dumas_2018``, ``winter_2009``, ``zatsiorsky_2002`` (men), a study of
-    segment masses, for example ``pavol_2002`` (older adults) or ``jensen_1986_12y``, or a user's own by its path.
+    """Return the reference person of one table: ``de_leva_1996``, ``dumas_2018``, ``winter_2009``, ``zatsiorsky_2002``
+    (men), a study of segment masses, for example ``pavol_2002`` (older adults) or ``jensen_1986_12y``, or a user's own
+    by its path.
 
     Raises
     ------
@@ -71,13 +74,16 @@ def reference(table: str, subject: Subject) -> Reference:
     if table in studies(subject.sex):
         return study(table, subject)
     if not table.endswith(FAMILY.suffix) and table not in table_names(subject.sex) and table != "zatsiorsky_2002":
-        raise UnknownName.of(f"table of segment inertial parameters for sex {subject.sex}", table, table_names(subject.sex))
+        raise UnknownName.of(
+            f"table of segment inertial parameters for sex {subject.sex}", table, table_names(subject.sex)
+        )
     found = read_segment_table(table)
     if found.layout == "model":
         return completed(found, subject, reference(str(found.provenance.get("completed_by", BASE)), subject))
     if found.layout not in LAYOUTS or LAYOUTS[found.layout](subject).table != table:
         raise BiodanceError(
-            f"{table}: the layout {found.layout!r} is that of a published table. Write the rows in the segments of the model and "
+            f"{table}: the layout {found.layout!r} is that of a published table. Write the rows in the segments of "
+            f"the model and "
             'layout = "model", or no layout.'
         )
     return LAYOUTS[found.layout](subject)

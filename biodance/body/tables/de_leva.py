@@ -1,7 +1,7 @@
 """The ten parts of de Leva 1996 in the frames of the model, and all tables that use their places.
 
-The trunk joint is the navel (omphalion): lower trunk = pelvis; middle trunk, upper trunk and head = trunk_head; forearm and straight
-hand = forearm_hand.
+The trunk joint is the navel (omphalion): lower trunk = pelvis; middle trunk, upper trunk and head = trunk_head; forearm
+and straight hand = forearm_hand.
 """
 
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 
 from biodance.body.inertia import RigidInertia, combine_inertias
-from biodance.body.tables.reference import Reference, Sex, normalised, proportion
+from biodance.body.tables.reference import Reference, Sex, normalised_person, proportion
 from biodance.body.tables.segment_data import SegmentTable, read_segment_table
 from biodance.records import Subject
 
@@ -57,18 +57,24 @@ def lengths(sex: Sex) -> dict[str, float]:
         "upper_arm": "upper_arm",
         "forearm_hand": "forearm",
     }
-    return {kind: length(row, sex) for kind, row in rows.items()} | {"foot": proportion("foot_length", sex) * de_leva_stature(sex)}
+    return {kind: length(row, sex) for kind, row in rows.items()} | {
+        "foot": proportion("foot_length", sex) * de_leva_stature(sex)
+    }
 
 
 def joined(table: str, height: float, sex: Sex, lumps: Mapping[str, RigidInertia]) -> Reference:
     """Return the reference person of ten parts given at stature ``height`` m at de Leva's places."""
     scale = height / de_leva_stature(sex)
     own = {kind: scale * value for kind, value in lengths(sex).items()}
-    return normalised(table, height, own, {kind: combine_inertias(*(lumps[part] for part in names)) for kind, names in PARTS.items()})
+    return normalised_person(
+        table, height, own, {kind: combine_inertias(*(lumps[part] for part in names)) for kind, names in PARTS.items()}
+    )
 
 
 def parts(sex: Sex) -> dict[str, RigidInertia]:
-    """Return the ten parts of the reference person: mass fraction, CoM m in the model's segment frame, inertia in that unit of mass."""
+    """Return the ten parts of the reference person: mass fraction, CoM m in the model's segment frame, inertia in
+    that unit of mass.
+    """
     middle, upper = length("middle_trunk", sex), length("upper_trunk", sex)
     neck = middle + upper + length("trunk_2", sex) - length("trunk", sex)  # cervicale lies higher than suprasternale
     return {
@@ -100,10 +106,14 @@ def _down(segment: str, sex: Sex, top: float) -> RigidInertia:
 
 
 def _foot(sex: Sex) -> RigidInertia:
-    """Return the foot: long axis forwards, CoM on the heel-toe line at 0.6 of the ankle's height under the ankle joint."""
+    """Return the foot: long axis forwards, CoM on the heel-toe line at 0.6 of the ankle's height under the ankle
+    joint.
+    """
     mass, size, fraction = _sizes("foot", sex)
     radii = np.array(_table().values("foot", "gyration", "longitudinal sagittal transverse", sex=sex)) * size
     forward = (fraction - proportion("heel_behind_ankle", sex)) * size
     return RigidInertia(
-        mass, np.array([forward, -0.6 * proportion("ankle_height", sex) * de_leva_stature(sex), 0.0]), mass * np.diag(radii**2)
+        mass,
+        np.array([forward, -0.6 * proportion("ankle_height", sex) * de_leva_stature(sex), 0.0]),
+        mass * np.diag(radii**2),
     )

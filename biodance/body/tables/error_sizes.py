@@ -24,7 +24,9 @@ def error_size(quantity: str, target: str, *, state: str = "any", whose: str = "
     UnknownName
         The table has no such row.
     """
-    return float(read_table("uncertainty", "sizes").row(quantity=quantity, target=target, state=state, whose=whose)["sd"])
+    return float(
+        read_table("uncertainty", "sizes").row(quantity=quantity, target=target, state=state, whose=whose)["sd"]
+    )
 
 
 def joint_size(quantity: str, joint: str) -> float:

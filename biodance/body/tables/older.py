@@ -1,4 +1,5 @@
-"""Tables that give less than a full inertia: Winter 2009, the Zatsiorsky regressions, and the studies of segment masses.
+"""Tables that give less than a full inertia: Winter 2009, the Zatsiorsky regressions, and the studies of segment
+masses.
 
 What a table lacks is taken from another one, and said here. All are evaluated at the subject's own mass and stature.
 """
@@ -7,14 +8,16 @@ import numpy as np
 
 from biodance.body.inertia import RigidInertia, combine_inertias
 from biodance.body.tables import de_leva, dumas
-from biodance.body.tables.reference import Reference, normalised, proportion
+from biodance.body.tables.reference import Reference, normalised_person, proportion
 from biodance.body.tables.segment_data import read_segment_table
 from biodance.errors import UnknownName
 from biodance.records import Subject
 
 
 def winter(subject: Subject) -> Reference:
-    """Return Winter 2009 at the subject's stature; longitudinal radii from de Leva 1996, trunk shape and joint (L5/S1) from Dumas 2018."""
+    """Return Winter 2009 at the subject's stature; longitudinal radii from de Leva 1996, trunk shape and joint
+    (L5/S1) from Dumas 2018.
+    """
     sex, height, table = subject.sex, subject.stature, read_segment_table("winter_2009")
     shape = dumas.dumas(subject)
     scale = height / shape.stature
@@ -28,10 +31,14 @@ def winter(subject: Subject) -> Reference:
     )
     names = ("pelvis", "abdomen", "thorax", "head_neck")
     pelvis, *upper = (
-        _with_mass(part, table.value(name, "mass", sex=sex), scale) for part, name in zip(dumas.trunk_parts(sex), names, strict=True)
+        _with_mass(part, table.value(name, "mass", sex=sex), scale)
+        for part, name in zip(dumas.trunk_parts(sex), names, strict=True)
     )
-    return normalised(
-        "winter_2009", height, lengths, {"pelvis": pelvis, "trunk_head": combine_inertias(*upper), "foot": _winter_foot(subject), **lumps}
+    return normalised_person(
+        "winter_2009",
+        height,
+        lengths,
+        {"pelvis": pelvis, "trunk_head": combine_inertias(*upper), "foot": _winter_foot(subject), **lumps},
     )
 
 
@@ -39,7 +46,9 @@ def _winter_limb(kind: str, subject: Subject) -> RigidInertia:
     mass, fraction, radius = _winter_sizes(kind, subject)
     size = read_segment_table("winter_2009").value(kind, "length", sex=subject.sex) * subject.stature
     across = (radius * size) ** 2
-    return RigidInertia(mass, np.array([0.0, -fraction * size, 0.0]), mass * np.diag([across, _along(kind, subject), across]))
+    return RigidInertia(
+        mass, np.array([0.0, -fraction * size, 0.0]), mass * np.diag([across, _along(kind, subject), across])
+    )
 
 
 def _winter_sizes(kind: str, subject: Subject) -> tuple[float, float, float]:
@@ -70,17 +79,19 @@ def _with_mass(lump: RigidInertia, mass: float, scale: float) -> RigidInertia:
 
 
 def zatsiorsky(subject: Subject) -> Reference:
-    """Return the regressions of Zatsiorsky 2002 on mass and stature, men; CoM and lengths from de Leva 1996, whose landmarks are joints.
+    """Return the regressions of Zatsiorsky 2002 on mass and stature, men; CoM and lengths from de Leva 1996, whose
+    landmarks are joints.
 
     Raises
     ------
     UnknownName
-        The subject is a woman: the only transcription found of the women's coefficients is wrong (a foot of negative mass, a body of
-        60.6 kg for 65 kg), so it is not shipped.
+        The subject is a woman: the only transcription found of the women's coefficients is wrong (a foot of negative
+        mass, a body of 60.6 kg for 65 kg), so it is not shipped.
     """
     if subject.sex == "F":
         raise UnknownName(
-            "Table zatsiorsky_2002 holds the regressions for men only: the coefficients found for women give a foot of negative mass. "
+            "Table zatsiorsky_2002 holds the regressions for men only: the coefficients found for women give a foot "
+            "of negative mass. "
             "Choose de_leva_1996 (the same women, without regression) or dumas_2018."
         )
     scale = subject.stature / de_leva.de_leva_stature("M")
@@ -92,7 +103,8 @@ def zatsiorsky(subject: Subject) -> Reference:
         lumps[part] = RigidInertia(mass, scale * lump.com, inertia)
         if mass <= 0 or 2 * max(moments) > sum(moments) or min(moments) <= 0:
             raise UnknownName(
-                f"Table zatsiorsky_2002 gives no possible {part} for {subject.mass:.1f} kg and {subject.stature:.2f} m: "
+                f"Table zatsiorsky_2002 gives no possible {part} for {subject.mass:.1f} kg and {subject.stature:.2f} "
+                f"m: "
                 "its regressions hold for men of 50 to 90 kg. Choose de_leva_1996."
             )
     return de_leva.joined("zatsiorsky_2002", subject.stature, "M", lumps)
@@ -111,15 +123,24 @@ def study(name: str, subject: Subject) -> Reference:
     """
     masses = study_masses(name, subject)
     base = de_leva.de_leva(subject)
-    lumps = {kind: RigidInertia(mass, base.segments[kind].com, mass * base.segments[kind].inertia) for kind, mass in masses.items()}
-    return normalised(name, base.stature, base.lengths, lumps)
+    lumps = {
+        kind: RigidInertia(mass, base.segments[kind].com, mass * base.segments[kind].inertia)
+        for kind, mass in masses.items()
+    }
+    return normalised_person(name, base.stature, base.lengths, lumps)
 
 
 def study_masses(name: str, subject: Subject) -> dict[str, float]:
-    """Return the mass fraction of each kind of segment in one study; the trunk over the joint with the head is what remains."""
+    """Return the mass fraction of each kind of segment in one study; the trunk over the joint with the head is what
+    remains.
+    """
     numbers = read_segment_table("mass_studies").numbers
-    part = {segment: one.value for (which, segment, sex, *_), one in numbers.items() if (which, sex) == (name, subject.sex)}
-    limbs = {kind: part[kind] for kind in ("thigh", "shank", "foot", "upper_arm")} | {"forearm_hand": part["forearm"] + part["hand"]}
+    part = {
+        segment: one.value for (which, segment, sex, *_), one in numbers.items() if (which, sex) == (name, subject.sex)
+    }
+    limbs = {kind: part[kind] for kind in ("thigh", "shank", "foot", "upper_arm")} | {
+        "forearm_hand": part["forearm"] + part["hand"]
+    }
     above = 1.0 - 2 * sum(limbs.values())
     own = de_leva.parts(subject.sex)
     head = part.get("head", own["head"].mass)

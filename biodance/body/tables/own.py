@@ -1,19 +1,20 @@
 """A table in the segments and frames of the model itself: a user's own study (DXA, scan), complete or not.
 
-Segments are pelvis, thigh, shank, foot, trunk_head, upper_arm and forearm_hand (right side; one of two); CoM and radii of gyration are in
-the segment frame (x anterior, y up, z right, origin at the proximal joint, for the pelvis the middle of the hip centres), radii about the
-CoM. Lengths are those of `Reference`. What the table leaves out comes from another table at the person's stature.
+Segments are pelvis, thigh, shank, foot, trunk_head, upper_arm and forearm_hand (right side; one of two); CoM and radii
+of gyration are in the segment frame (x anterior, y up, z right, origin at the proximal joint, for the pelvis the middle
+of the hip centres), radii about the CoM. Lengths are those of `Reference`. What the table leaves out comes from another
+table at the person's stature.
 """
 
 import numpy as np
 
 from biodance.body.inertia import RigidInertia, inertial_parameters, smallest_eigenvalues
-from biodance.body.tables.reference import COUNT, KINDS, Reference, normalised
+from biodance.body.tables.reference import COUNT, KINDS, Reference, normalised_person
 from biodance.body.tables.segment_data import SegmentTable
 from biodance.errors import FileRefused
 from biodance.records import Array, Subject
 
-AXES = "xyz"
+_AXES = "xyz"
 FULL = 0.02
 """How far the masses of a complete table may sum from the whole body, as a share."""
 
@@ -24,23 +25,27 @@ def completed(table: SegmentTable, subject: Subject, base: Reference) -> Referen
     Raises
     ------
     FileRefused
-        A segment that the model does not have, no row for the person's sex, masses that are no whole body, or a segment that cannot exist.
+        A segment that the model does not have, no row for the person's sex, masses that are no whole body, or a segment
+        that cannot exist.
     """
     known = {key[1] for key in table.numbers if key[2] == subject.sex}
     strange = sorted({key[1] for key in table.numbers} - set(KINDS))
     if strange:
         raise FileRefused(f"{table.name}: {strange[0]!r} is not a segment of the model. Legal: {', '.join(KINDS)}.")
     if not known:
-        raise FileRefused(f"{table.name}: holds no row for sex {subject.sex}. Add rows, or write FM where they hold for both.")
+        raise FileRefused(
+            f"{table.name}: holds no row for sex {subject.sex}. Add rows, or write FM where they hold for both."
+        )
     lengths = {kind: _length(table, kind, subject, base) for kind in KINDS}
     masses = _masses(table, subject, base)
     lumps = {kind: _lump(table, kind, subject, base, lengths[kind], masses[kind]) for kind in KINDS}
     for kind, lump in lumps.items():
         if smallest_eigenvalues(inertial_parameters(lump))[0] <= 0:
             raise FileRefused(
-                f"{table.name}: no body has the radii of gyration given for {kind} (each moment at most the sum of the others)."
+                f"{table.name}: no body has the radii of gyration given for {kind} (each moment at most the sum of "
+                f"the others)."
             )
-    return normalised(table.name, subject.stature, lengths, lumps)
+    return normalised_person(table.name, subject.stature, lengths, lumps)
 
 
 def _length(table: SegmentTable, kind: str, subject: Subject, base: Reference) -> float:
@@ -51,7 +56,9 @@ def _length(table: SegmentTable, kind: str, subject: Subject, base: Reference) -
 
 
 def _masses(table: SegmentTable, subject: Subject, base: Reference) -> dict[str, float]:
-    """Return the share of the body mass of one segment of each kind; segments that are not given share what the others leave."""
+    """Return the share of the body mass of one segment of each kind; segments that are not given share what the
+    others leave.
+    """
     given = {kind: found for kind in KINDS if (found := table.find(kind, "mass", sex=subject.sex))}
     share = {kind: one.of(subject) / (subject.mass if one.unit == "kg" else 1.0) for kind, one in given.items()}
     total = sum(COUNT[kind] * value for kind, value in share.items())
@@ -59,18 +66,21 @@ def _masses(table: SegmentTable, subject: Subject, base: Reference) -> dict[str,
     if (not rest and abs(total - 1) > FULL) or (rest and not 0 <= total < 1) or min(share.values(), default=1.0) <= 0:
         raise FileRefused(
             f"{table.name}: the masses given are {100 * total:.1f} % of the body (two of each limb), expected "
-            f"{'less than 100' if rest else f'100 within {100 * FULL:.0f}'} %. Give the mass of one limb, in kg or as share of the body."
+            f"{'less than 100' if rest else f'100 within {100 * FULL:.0f}'} %. Give the mass of one limb, in kg or as "
+            f"share of the body."
         )
     left = (1 - total) / sum(COUNT[kind] * value for kind, value in rest.items()) if rest else 0.0
     return share | {kind: left * value for kind, value in rest.items()}
 
 
-def _lump(table: SegmentTable, kind: str, subject: Subject, base: Reference, length: float, mass: float) -> RigidInertia:
+def _lump(
+    table: SegmentTable, kind: str, subject: Subject, base: Reference, length: float, mass: float
+) -> RigidInertia:
     """Return one segment: the base table's, stretched to ``length`` m, with the CoM and radii that the table gives."""
     stretch = length / base.lengths[kind]
     com, inertia = np.array(base.segments[kind].com) * stretch, np.array(base.segments[kind].inertia) * stretch**2
     wider = np.ones(3)
-    for i, axis in enumerate(AXES):
+    for i, axis in enumerate(_AXES):
         place, radius = (_metres(table, kind, quantity, axis, subject, length) for quantity in ("com", "gyration"))
         com[i] = com[i] if place is None else place
         wider[i] = 1.0 if radius is None else abs(radius) / np.sqrt(inertia[i, i])

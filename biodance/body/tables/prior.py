@@ -1,4 +1,6 @@
-"""The prior segment inertial parameters of a person: a table scaled to the skeleton, with the spread between tables as a covariance."""
+"""The prior segment inertial parameters of a person: a table scaled to the skeleton, with the spread between tables
+as a covariance.
+"""
 
 import functools
 from collections.abc import Iterable
@@ -26,9 +28,9 @@ _AXES = ("sagittal", "longitudinal", "transverse")
 class Spread:
     """Standard deviations of one kind of segment.
 
-    ``mass`` relative; ``com`` (3,) in units of the length; ``radii`` (3,) relative, of the radii of gyration about x, y, z;
-    ``products`` (3,) of xy, xz, yz of the inertia per unit mass, in units of the length squared. The length is the segment's own; for
-    pelvis and trunk_head it is mid hip to mid shoulder.
+    ``mass`` relative; ``com`` (3,) in units of the length; ``radii`` (3,) relative, of the radii of gyration about x,
+    y, z; ``products`` (3,) of xy, xz, yz of the inertia per unit mass, in units of the length squared. The length is
+    the segment's own; for pelvis and trunk_head it is mid hip to mid shoulder.
     """
 
     mass: float
@@ -39,7 +41,9 @@ class Spread:
 
 @functools.cache
 def table_spread(kind: str) -> Spread:
-    """Return the standard deviations of one kind of segment (pelvis, thigh, shank, foot, trunk_head, upper_arm, forearm_hand)."""
+    """Return the standard deviations of one kind of segment (pelvis, thigh, shank, foot, trunk_head, upper_arm,
+    forearm_hand).
+    """
     tables = (*((name, who) for name in ("de_leva_1996", "dumas_2018") for who in (WOMAN, MAN)), ("winter_2009", MAN))
     people = [reference(*table) for table in tables]
     units = [_in_lengths(person, kind) for person in people]
@@ -60,9 +64,17 @@ def _sd(values: Iterable[Array]) -> Array:
 
 
 def _with_own(kind: str, who: Subject) -> list[str]:
-    """Return the studies of living adults; for the trunk only those that cut the pelvis themselves (Zatsiorsky's data are de Leva's)."""
-    living = [name for name, group in studies(who.sex).items() if group in LIVING and name != "zatsiorsky_seluyanov_1979"]
-    return [name for name in living if kind not in ("pelvis", "trunk_head") or name in ("chen_2011", "ma_2011", "pavol_2002")]
+    """Return the studies of living adults; for the trunk only those that cut the pelvis themselves (Zatsiorsky's
+    data are de Leva's).
+    """
+    living = [
+        name for name, group in studies(who.sex).items() if group in LIVING and name != "zatsiorsky_seluyanov_1979"
+    ]
+    return [
+        name
+        for name in living
+        if kind not in ("pelvis", "trunk_head") or name in ("chen_2011", "ma_2011", "pavol_2002")
+    ]
 
 
 def _in_lengths(person: Reference, kind: str) -> RigidInertia:
@@ -104,16 +116,21 @@ def prior(reference: Reference, skeleton: Skeleton, subject: Subject) -> Sip:
     jacobian = np.zeros((10 * len(lumps), 10 * len(lumps)))
     for i, lump in enumerate(lumps):
         jacobian[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] = parameter_jacobian(lump)
-    others = tuple(scaled_lumps(reference_of(name, subject), skeleton, subject) for name in measured_whole() if name != reference.table)
+    others = tuple(
+        scaled_lumps(reference_of(name, subject), skeleton, subject)
+        for name in measured_whole()
+        if name != reference.table
+    )
     covariance = jacobian @ primitive_covariance(lumps, skeleton, others) @ jacobian.T
     return Sip(SEGMENTS, np.concatenate([inertial_parameters(lump) for lump in lumps]), (covariance + covariance.T) / 2)
 
 
 def scaled_lumps(reference: Reference, skeleton: Skeleton, subject: Subject) -> tuple[RigidInertia, ...]:
-    """Return the 12 segments of the reference person at the subject's mass and segment lengths, each in its segment frame.
+    """Return the 12 segments of the reference person at the subject's mass and segment lengths, each in its segment
+    frame.
 
-    The pelvis of the table is upright; it is turned so that its long axis points from the mid hip to where the table cuts the trunk. The
-    trunk above the cut keeps its place in the person, also where the joint lies elsewhere.
+    The pelvis of the table is upright; it is turned so that its long axis points from the mid hip to where the table
+    cuts the trunk. The trunk above the cut keeps its place in the person, also where the joint lies elsewhere.
     """
     lumps = []
     for segment in SEGMENTS:
@@ -136,11 +153,15 @@ def _upright_to(point: Array) -> Array:
 
 
 def disagreement(lumps: tuple[RigidInertia, ...], other: tuple[RigidInertia, ...]) -> Array:
-    """Return how the limbs of another table differ, (120,) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] (kg, m, m²): one standard deviation.
+    """Return how the limbs of another table differ, (120,) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] (kg, m, m²): one
+    standard deviation.
 
     Zero for pelvis and trunk, which tables divide at different heights.
     """
-    rows = [np.zeros(10) if s in TRUNK else _primitives(b) - _primitives(a) for s, a, b in zip(SEGMENTS, lumps, other, strict=True)]
+    rows = [
+        np.zeros(10) if s in TRUNK else _primitives(b) - _primitives(a)
+        for s, a, b in zip(SEGMENTS, lumps, other, strict=True)
+    ]
     return np.concatenate(rows)
 
 
@@ -148,10 +169,14 @@ def _primitives(lump: RigidInertia) -> Array:
     return np.array([lump.mass, *lump.com, *(lump.inertia[i, j] / lump.mass for i, j in TENSOR)])
 
 
-def primitive_covariance(lumps: tuple[RigidInertia, ...], skeleton: Skeleton, others: tuple[tuple[RigidInertia, ...], ...]) -> Array:
-    """Return the covariance (120, 120) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] of all segments (kg, m, m²); ``others`` other tables'.
+def primitive_covariance(
+    lumps: tuple[RigidInertia, ...], skeleton: Skeleton, others: tuple[tuple[RigidInertia, ...], ...]
+) -> Array:
+    """Return the covariance (120, 120) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] of all segments (kg, m, m²); ``others``
+    other tables'.
 
-    The variance of ``primitive_sd`` is divided: what the disagreement of the tables explains moves together, the rest on its own.
+    The variance of ``primitive_sd`` is divided: what the disagreement of the tables explains moves together, the rest
+    on its own.
     """
     ways = np.array([disagreement(lumps, other) for other in others]).reshape(-1, 10 * len(lumps))
     variance = np.concatenate([primitive_sd(s, lump, skeleton) for s, lump in zip(SEGMENTS, lumps, strict=True)]) ** 2
@@ -169,7 +194,9 @@ def primitive_covariance(lumps: tuple[RigidInertia, ...], skeleton: Skeleton, ot
 
 
 def com_sd(segment: str, skeleton: Skeleton) -> Array:
-    """Return the standard deviations (3,) m of a segment's CoM in its joint frame: tables, people and misplaced joint centres."""
+    """Return the standard deviations (3,) m of a segment's CoM in its joint frame: tables, people and misplaced
+    joint centres.
+    """
     length = skeleton.lengths["trunk_head" if segment == "pelvis" else segment]
     return np.hypot(table_spread(kind_of(segment)).com * length, error_size("joint_centre", "other", state="before"))
 
@@ -182,7 +209,9 @@ def primitive_sd(segment: str, lump: RigidInertia, skeleton: Skeleton) -> Array:
     tensor = [
         2 * own[i, i] * kind.radii[i]
         if i == j
-        else np.hypot(products[i, j] * length**2, error_size("product_floor", "inertia") * np.sqrt(own[i, i] * own[j, j]))
+        else np.hypot(
+            products[i, j] * length**2, error_size("product_floor", "inertia") * np.sqrt(own[i, i] * own[j, j])
+        )
         for i, j in TENSOR
     ]
     return np.array([kind.mass * lump.mass, *com_sd(segment, skeleton), *tensor])

@@ -1,8 +1,9 @@
 """FAMILY: tables of segment parameters, one tidy .csv each with a .toml of its provenance beside it.
 
-One row is one number: ``segment, sex, quantity, axis, value, unit``; further columns may be left out or empty: ``study`` and ``group`` (a
-file of several studies), ``per_kg`` and ``per_m`` (a regression: value + per_kg * mass + per_m * stature), ``sd``, ``n``, ``correlation``,
-``landmarks``. Found in ``anthropometry/segments``, by the entry points ``biodance.segment_tables``, or by the path of a user's own file.
+One row is one number: ``segment, sex, quantity, axis, value, unit``; further columns may be left out or empty:
+``study`` and ``group`` (a file of several studies), ``per_kg`` and ``per_m`` (a regression: value + per_kg * mass +
+per_m * stature), ``sd``, ``n``, ``correlation``, ``landmarks``. Found in ``anthropometry/segments``, by the entry
+points ``biodance.segment_tables``, or by the path of a user's own file.
 """
 
 import csv
@@ -27,12 +28,12 @@ REQUIRED = ("segment", "sex", "quantity", "axis", "value", "unit")
 OPTIONAL = ("study", "group", "per_kg", "per_m", "sd", "n", "correlation", "landmarks")
 SEXES = ("F", "M", "FM")
 ALONG = ("sagittal", "transverse", "longitudinal")
-TENSOR = ("xx", "yy", "zz", "xy", "xz", "yz")
-LEGAL: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+_TENSOR = ("xx", "yy", "zz", "xy", "xz", "yz")
+_LEGAL: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "mass": (("",), ("body_mass", "kg")),
     "length": (("",), ("m", "stature")),
     "com": (("longitudinal", "x", "y", "z"), ("length", "m")),
-    "gyration": ((*ALONG, "transverse_proximal", "x", "y", "z", *TENSOR), ("length", "m")),
+    "gyration": ((*ALONG, "transverse_proximal", "x", "y", "z", *_TENSOR), ("length", "m")),
     "inertia": (ALONG, ("kg m2",)),
 }
 """The legal axes and units of every quantity; a unit such as ``length`` means a fraction of it."""
@@ -40,7 +41,9 @@ LEGAL: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 
 @dataclass(frozen=True)
 class Number:
-    """One number: ``value`` in ``unit``; ``per_kg``, ``per_m`` its regression on body mass and stature; ``sd`` NaN where not printed."""
+    """One number: ``value`` in ``unit``; ``per_kg``, ``per_m`` its regression on body mass and stature; ``sd`` NaN
+    where not printed.
+    """
 
     value: float
     unit: str
@@ -58,8 +61,9 @@ Key = tuple[str, str, str, str, str]
 
 @dataclass(frozen=True, eq=False)
 class SegmentTable:
-    """One table: ``numbers`` by study (""), segment, sex ("F" or "M"), quantity and axis; ``groups`` of its studies (adult, child ...) by
-    study and sex; ``layout`` says how its segments lie in the model (`segment_tables.LAYOUTS`); ``provenance`` the .toml.
+    """One table: ``numbers`` by study (""), segment, sex ("F" or "M"), quantity and axis; ``groups`` of its studies
+    (adult, child ...) by study and sex; ``layout`` says how its segments lie in the model (`segment_tables.LAYOUTS`);
+    ``provenance`` the .toml.
     """
 
     name: str
@@ -77,7 +81,9 @@ class SegmentTable:
         found = self.find(segment, quantity, axis, sex=sex, study=study)
         if found is None:
             legal = sorted({" ".join((s, q, a)).strip() for _, s, x, q, a in self.numbers if x == sex})
-            raise UnknownName.of(f"number of table {self.name} for sex {sex}", f"{segment} {quantity} {axis}".strip(), legal)
+            raise UnknownName.of(
+                f"number of table {self.name} for sex {sex}", f"{segment} {quantity} {axis}".strip(), legal
+            )
         return found
 
     def value(self, segment: str, quantity: str, axis: str = "", *, sex: str) -> float:
@@ -104,13 +110,15 @@ def read_segment_table(name_or_path: str | Path) -> SegmentTable:
     UnknownName
         There is no table of that name; the message lists all.
     BiodanceError
-        The file is missing, is not of this form, or its numbers are not those that its .toml describes (sha256); the message names the
-        row, the value and what would be legal.
+        The file is missing, is not of this form, or its numbers are not those that its .toml describes (sha256); the
+        message names the row, the value and what would be legal.
     """
     path = FAMILY.locate(name_or_path)
     own = str(name_or_path).endswith(FAMILY.suffix)
     if not path.is_file():
-        raise FileRefused(f"{path}: there is no such table. Check the path; tables known by name are {', '.join(FAMILY.files())}.")
+        raise FileRefused(
+            f"{path}: there is no such table. Check the path; tables known by name are {', '.join(FAMILY.files())}."
+        )
     beside = path.with_suffix(".toml")
     stamps = tuple(one.stat().st_mtime_ns if one.is_file() else 0 for one in (path, beside))
     return _read(str(name_or_path), path, own, stamps)
@@ -122,7 +130,8 @@ def _read(name: str, path: Path, own: bool, _stamps: tuple[int, ...]) -> Segment
     beside = path.with_suffix(".toml")
     if not beside.is_file() and not own:
         raise FileRefused(
-            f"{path}: has no {beside.name} beside it, which says where its numbers come from. Write it, or move the table away."
+            f"{path}: has no {beside.name} beside it, which says where its numbers come from. Write it, or move the "
+            f"table away."
         )
     provenance = read_toml(beside) if beside.is_file() else {}
     _refuse_changed(path, provenance)
@@ -132,7 +141,9 @@ def _read(name: str, path: Path, own: bool, _stamps: tuple[int, ...]) -> Segment
         for sex in row["sex"]:
             key = (row["study"], row["segment"], sex, row["quantity"], row["axis"])
             if key in numbers:
-                raise FileRefused(f"{path}, row {line}: {' '.join(filter(None, key))} stands twice. Remove one of the two rows.")
+                raise FileRefused(
+                    f"{path}, row {line}: {' '.join(filter(None, key))} stands twice. Remove one of the two rows."
+                )
             numbers[key] = _number(path, line, row)
             groups[row["study"], sex] = row["group"]
     if not numbers:
@@ -158,11 +169,15 @@ def _rows(path: Path) -> list[tuple[int, dict[str, str]]]:
     unknown = [name for name in columns if name not in (*REQUIRED, *OPTIONAL)]
     if absent or unknown:
         what = f"lacks the column {absent[0]!r}" if absent else f"has the unknown column {unknown[0]!r}"
-        raise FileRefused(f"{path}: the table {what}. Legal are {', '.join(REQUIRED)}, and optional {', '.join(OPTIONAL)}.")
+        raise FileRefused(
+            f"{path}: the table {what}. Legal are {', '.join(REQUIRED)}, and optional {', '.join(OPTIONAL)}."
+        )
     found = []
     for line, cells in enumerate(reader, start=2):
         if None in cells or None in cells.values():
-            raise FileRefused(f"{path}, row {line}: has not {len(columns)} cells as the header has. Correct its commas.")
+            raise FileRefused(
+                f"{path}, row {line}: has not {len(columns)} cells as the header has. Correct its commas."
+            )
         row = dict.fromkeys(OPTIONAL, "") | {name: str(cell).strip() for name, cell in cells.items()}
         _check(path, line, row)
         found.append((line, row))
@@ -172,8 +187,8 @@ def _rows(path: Path) -> list[tuple[int, dict[str, str]]]:
 def _check(path: Path, line: int, row: Mapping[str, str]) -> None:
     """Refuse a row with an illegal word."""
     _legal(path, line, "sex", row["sex"], SEXES)
-    _legal(path, line, "quantity", row["quantity"], tuple(LEGAL))
-    axes, units = LEGAL[row["quantity"]]
+    _legal(path, line, "quantity", row["quantity"], tuple(_LEGAL))
+    axes, units = _LEGAL[row["quantity"]]
     _legal(path, line, f"axis of {row['quantity']}", row["axis"], axes)
     _legal(path, line, f"unit of {row['quantity']}", row["unit"], units)
     if not row["segment"]:
@@ -182,7 +197,9 @@ def _check(path: Path, line: int, row: Mapping[str, str]) -> None:
 
 def _legal(path: Path, line: int, what: str, value: str, legal: tuple[str, ...]) -> None:
     if value not in legal:
-        raise FileRefused(f"{path}, row {line}: the {what} is {value!r}. Legal: {', '.join(name or '(empty)' for name in legal)}.")
+        raise FileRefused(
+            f"{path}, row {line}: the {what} is {value!r}. Legal: {', '.join(name or '(empty)' for name in legal)}."
+        )
 
 
 def _number(path: Path, line: int, row: Mapping[str, str]) -> Number:
@@ -195,10 +212,14 @@ def _number(path: Path, line: int, row: Mapping[str, str]) -> Number:
             except ValueError:
                 found[name] = math.nan
             if not math.isfinite(found[name]):
-                raise FileRefused(f"{path}, row {line}: the {name} of {row['segment']} is {row[name]!r}, expected a number.")
+                raise FileRefused(
+                    f"{path}, row {line}: the {name} of {row['segment']} is {row[name]!r}, expected a number."
+                )
     regression = "per_kg" in found or "per_m" in found
     if row["quantity"] in ("mass", "length") and found["value"] <= 0 and not regression:
-        raise FileRefused(f"{path}, row {line}: the {row['quantity']} of {row['segment']} is {row['value']}, expected more than 0.")
+        raise FileRefused(
+            f"{path}, row {line}: the {row['quantity']} of {row['segment']} is {row['value']}, expected more than 0."
+        )
     if found.get("sd", 0.0) < 0:
         raise FileRefused(f"{path}, row {line}: the sd of {row['segment']} is {row['sd']}, expected 0 or more.")
     return Number(unit=row["unit"], **found)

@@ -93,10 +93,14 @@ class Limit(ABC):
 
     @abstractmethod
     def check(self, motion: CheckedMotion) -> Remaining:
-        """Return what is left in every sample of ``motion``, by code that shares nothing with `margins`: for the judge."""
+        """Return what is left in every sample of ``motion``, by code that shares nothing with `margins`: for the
+        judge.
+        """
 
     def hold_reserve(self, stance: Stance) -> float:
-        """Return the share of the scale that a held posture keeps in reserve, for the moves that begin and end there."""
+        """Return the share of the scale that a held posture keeps in reserve, for the moves that begin and end
+        there.
+        """
         return 0.06
 
     def resized(self, length: float) -> "Limit":
@@ -132,7 +136,9 @@ def lacking(candidate: object) -> tuple[str, ...]:
     return (*lacks, *(sorted(getattr(kind, "__abstractmethods__", ())) if inspect.isabstract(kind) else ()))
 
 
-FAMILY: Family[Limit | type[Limit]] = Family("limit of a dance", "biodance.limits", __name__, "LIMIT", lacking, lambda kind: kind.name)
+_FAMILY: Family[Limit | type[Limit]] = Family(
+    "limit of a dance", "biodance.limits", __name__, "LIMIT", lacking, lambda kind: kind.name
+)
 
 
 def family() -> tuple[Limit, ...]:
@@ -143,7 +149,7 @@ def family() -> tuple[Limit, ...]:
     BiodanceError
         A file of the folder or an entry point is no limit; the sentence says which and what to do.
     """
-    return join_limits(FAMILY.members().values(), ())
+    return join_limits(_FAMILY.members().values(), ())
 
 
 def join_limits(limits: Iterable[Limit | type[Limit]], more: Iterable[Limit | type[Limit]]) -> tuple[Limit, ...]:
@@ -157,7 +163,9 @@ def join_limits(limits: Iterable[Limit | type[Limit]], more: Iterable[Limit | ty
     found: dict[str, Limit] = {}
     for one in (*limits, *more):
         if lacks := lacking(one):
-            raise BiodanceError(f"{one!r}: lacks {', '.join(lacks)}, so it is no limit of a dance. See biodance.dance.limits.Limit.")
+            raise BiodanceError(
+                f"{one!r}: lacks {', '.join(lacks)}, so it is no limit of a dance. See biodance.dance.limits.Limit."
+            )
         found[one.name] = one() if isinstance(one, type) else one
     return tuple(found[name] for name in sorted(found))
 

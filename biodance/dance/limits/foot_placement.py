@@ -1,4 +1,6 @@
-"""Planted feet stay where they are: the legs, solved in closed form, must reach them with the knee not quite straight."""
+"""Planted feet stay where they are: the legs, solved in closed form, must reach them with the knee not quite
+straight.
+"""
 
 from dataclasses import dataclass
 
@@ -11,7 +13,7 @@ from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State
 from biodance.motion.kinematics import poses
 
-STILL = 1e-6
+_STILL = 1e-6
 """m, rad: how far a planted foot may be from where it stands: rounding."""
 
 
@@ -51,12 +53,12 @@ class FootPlacement(Limit):
         moved = np.linalg.norm(motion.pose.position[:, segments] - motion.stance.ankle[sides], axis=2)
         turned = np.abs(motion.pose.rotation[:, segments] - UPRIGHT).max(axis=(2, 3), initial=0.0)
         off = np.maximum(moved, turned)
-        left = STILL - off
+        left = _STILL - off
         for k, side in enumerate(sides):
             if leg := _measured(motion.body, SIDES[side], np.radians(self.least_knee)):
                 thigh, longest = leg
                 reach = longest - np.linalg.norm(motion.pose.position[:, thigh] - motion.stance.ankle[side], axis=1)
-                left[:, k] = np.where(off[:, k] > STILL, np.minimum(left[:, k], reach), reach)
+                left[:, k] = np.where(off[:, k] > _STILL, np.minimum(left[:, k], reach), reach)
         return Remaining(left, tuple(SIDES[side] for side in sides))
 
 

@@ -23,7 +23,9 @@ class Friction(Limit):
         """Return the horizontal force that is left along x and y, (T, 2) N."""
         force, slopes = state.wrench[:, :3], state.wrench_slopes
         sign = np.sign(force[:, :2])[None, :, :, None]
-        return Margins(self.mu * force[:, 2:] - np.abs(force[:, :2]), self.mu * slopes[:, :, 2:3] - sign * slopes[:, :, :2])
+        return Margins(
+            self.mu * force[:, 2:] - np.abs(force[:, :2]), self.mu * slopes[:, :, 2:3] - sign * slopes[:, :, :2]
+        )
 
     def check(self, motion: CheckedMotion) -> Remaining:
         """Return the horizontal force that is left, (T, 2) N, of the regressor's wrench."""

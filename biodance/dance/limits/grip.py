@@ -41,7 +41,9 @@ class Grip(Limit):
             return NOTHING
         palms = [palm(motion.body, SIDES[side]) for side in holding]
         place = motion.pose.points([segment for segment, _ in palms], np.array([local for _, local in palms]))
-        return Remaining(self.loose - np.linalg.norm(place - held[holding], axis=2), tuple(f"{SIDES[side]}_hand" for side in holding))
+        return Remaining(
+            self.loose - np.linalg.norm(place - held[holding], axis=2), tuple(f"{SIDES[side]}_hand" for side in holding)
+        )
 
 
 LIMIT = Grip

@@ -20,11 +20,16 @@ class JointTorque(Limit):
         of two, (T, 4 joints): as the feet share the load, and as that one bears all of it.
         """
         parts = [self._of(state)] + ([self._of(state.alone)] if state.stance.over is not None else [])
-        return Margins(np.concatenate([part.value for part in parts], axis=1), np.concatenate([part.slopes for part in parts], axis=2))
+        return Margins(
+            np.concatenate([part.value for part in parts], axis=1),
+            np.concatenate([part.slopes for part in parts], axis=2),
+        )
 
     def _of(self, state: State) -> Margins:
         limits, torque = state.chain.body.limits, state.torque
-        value = np.concatenate([torque - self.share * limits.torque_lower, self.share * limits.torque_upper - torque], axis=1)
+        value = np.concatenate(
+            [torque - self.share * limits.torque_lower, self.share * limits.torque_upper - torque], axis=1
+        )
         return Margins(value, np.concatenate([state.torque_slopes, -state.torque_slopes], axis=2))
 
     def check(self, motion: CheckedMotion) -> Remaining:

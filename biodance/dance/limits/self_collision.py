@@ -17,11 +17,11 @@ from biodance.records import Array
 
 SAMPLES = np.linspace(0.0, 1.0, 33)
 """Places on the axis of a capsule that are held against a box in each round of the search."""
-ROUNDS = 6
+_ROUNDS = 6
 """Of the search, which leaves a sixteenth of the line each time."""
-ENOUGH = 0.05
+_ENOUGH = 0.05
 """m: a distance above it is given as what is certain."""
-POINTS = 5
+_POINTS = 5
 """Points on the axis of a capsule for the first look."""
 
 
@@ -35,7 +35,10 @@ class SelfCollision(Limit):
     def margins(self, state: State) -> Margins:
         """Return the distances (T, pairs) m between surfaces, less the gap."""
         near, far = (part(state, self.gap + FAR * self.scale) for part in (_capsules, _boxes))
-        return Margins(np.concatenate([near.value, far.value], axis=1) - self.gap, np.concatenate([near.slopes, far.slopes], axis=2))
+        return Margins(
+            np.concatenate([near.value, far.value], axis=1) - self.gap,
+            np.concatenate([near.slopes, far.slopes], axis=2),
+        )
 
     def check(self, motion: CheckedMotion) -> Remaining:
         """Return the distances (T, pairs) m between surfaces by coal, less the gap; a large one is a lower bound."""
@@ -58,7 +61,9 @@ def _capsules(state: State, near: float) -> Margins:
     value = distance - solids.radius[first] - solids.radius[second]
     slopes, close = np.zeros((1, *value.shape, state.chain.size)), (value < near).any(axis=0)
     normal = (apart / distance[..., None])[:, close]
-    slopes[0][:, close] = state.along(first[close], here[:, close], normal) - state.along(second[close], there[:, close], normal)
+    slopes[0][:, close] = state.along(first[close], here[:, close], normal) - state.along(
+        second[close], there[:, close], normal
+    )
     return Margins(value, slopes)
 
 
@@ -102,7 +107,9 @@ def outside(point: Array, half: Array) -> tuple[Array, Array]:
     depth = _depth(over)
     nearest_side = np.eye(3)[np.argmax(over, axis=-1)]
     free = depth[..., None] > 0
-    return depth, np.where(free, np.maximum(over, 0.0) / np.where(free, depth[..., None], 1.0), nearest_side) * np.sign(point)
+    return depth, np.where(free, np.maximum(over, 0.0) / np.where(free, depth[..., None], 1.0), nearest_side) * np.sign(
+        point
+    )
 
 
 def _depth(over: Array) -> Array:
@@ -120,7 +127,7 @@ def deepest(ends: Array, half: Array) -> Array:
     enclose the minimum.
     """
     start, width = np.zeros(ends.shape[:2]), np.ones(ends.shape[:2])
-    for _ in range(ROUNDS):
+    for _ in range(_ROUNDS):
         share = start + width * SAMPLES[:, None, None]
         best = np.argmin(_depth(np.abs(_on(ends[None], share)) - half), axis=0)
         start = np.clip(start + width * (best - 1) / (len(SAMPLES) - 1), 0.0, 1.0)
@@ -137,10 +144,14 @@ def solid_distances(body: Body, pose: Poses) -> tuple[Array, list[str]]:
     limbs = list(zip(solids.first, solids.second, strict=True))
     boxes = list(zip(solids.limb, solids.box, strict=True))
     out = np.stack(
-        [*(_limbs_at_least(solids, pose, *pair) for pair in limbs), *(_box_at_least(body, solids, pose, *pair) for pair in boxes)], axis=1
+        [
+            *(_limbs_at_least(solids, pose, *pair) for pair in limbs),
+            *(_box_at_least(body, solids, pose, *pair) for pair in boxes),
+        ],
+        axis=1,
     )
     shapes = _Shapes(body, solids)
-    for t, k in zip(*np.nonzero(out < ENOUGH), strict=True):
+    for t, k in zip(*np.nonzero(out < _ENOUGH), strict=True):
         i, j = (limbs + boxes)[k]
         out[t, k] = shapes.distance(pose, t, i, j, box=k >= len(limbs))
     return out, [f"{body.segments[i]} - {body.segments[j]}" for i, j in limbs + boxes]
@@ -149,8 +160,8 @@ def solid_distances(body: Body, pose: Poses) -> tuple[Array, list[str]]:
 def _axis(solids: Solids, pose: Poses, segment: int) -> tuple[Array, float]:
     """Return points (T, K, 3) m on the axis of a capsule and half the way between them, m."""
     a, b = solids.axis[segment]
-    points = a + np.linspace(0, 1, POINTS)[:, None] * (b - a)
-    return pose.points([segment] * POINTS, points), float(np.linalg.norm(b - a)) / (POINTS - 1) / 2
+    points = a + np.linspace(0, 1, _POINTS)[:, None] * (b - a)
+    return pose.points([segment] * _POINTS, points), float(np.linalg.norm(b - a)) / (_POINTS - 1) / 2
 
 
 def _limbs_at_least(solids: Solids, pose: Poses, i: int, j: int) -> Array:
@@ -185,7 +196,9 @@ class _Shapes:
             self.boxes.append((coal.Box(*(high - low)), (low + high) / 2))
 
     def distance(self, pose: Poses, t: int, limb: int, other: int, *, box: bool) -> float:
-        """Return the distance m of a limb's capsule from another one or from the box of another segment in frame ``t``."""
+        """Return the distance m of a limb's capsule from another one or from the box of another segment in frame
+        ``t``.
+        """
         solid, middle = self.boxes[other] if box else (self.capsules[other], self.turns[other][1])
         own = np.eye(3) if box else self.turns[other][0]
         first, second = ((pose.rotation[t, s], pose.position[t, s]) for s in (limb, other))
@@ -194,4 +207,6 @@ class _Shapes:
             self.coal.Transform3s(second[0] @ own, second[1] + second[0] @ middle),
         )
         found = self.coal.DistanceResult()
-        return float(self.coal.distance(self.capsules[limb], places[0], solid, places[1], self.coal.DistanceRequest(), found))
+        return float(
+            self.coal.distance(self.capsules[limb], places[0], solid, places[1], self.coal.DistanceRequest(), found)
+        )

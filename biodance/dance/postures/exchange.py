@@ -30,7 +30,10 @@ def exchange(blocks: Blocks, stances: tuple[Stance, ...], pool: list[list[Postur
     every: dict[str, list[Posture]] = {kind: [] for kind in kinds}
     for kind, found in zip(kinds, pool, strict=True):
         every[kind] += [posture for posture in found if posture not in every[kind]]
-    grams = {kind: np.eye(3) - np.einsum("pni,pnj->pnij", *[np.array([p.up for p in found])] * 2) for kind, found in every.items()}
+    grams = {
+        kind: np.eye(3) - np.einsum("pni,pnj->pnij", *[np.array([p.up for p in found])] * 2)
+        for kind, found in every.items()
+    }
     like = {kind: alike(np.array([p.x for p in found])) for kind, found in every.items()}
     taken: dict[str, list[int]] = {kind: [] for kind in every}
     for kind, found in zip(kinds, pool, strict=True):
@@ -105,7 +108,7 @@ FLIP = np.array([1.0, 1.0, -1.0])
 SIDEWAYS = ("_bending", "_rotation")
 """Ends of the names of middle joints that change their sense; those in pairs have the anatomical sense on both sides.
 """
-SAME = 1e-9
+_SAME = 1e-9
 """m, kg, rad, N·m: differences between the sides that are rounding."""
 
 
@@ -124,9 +127,14 @@ def symmetric(body: Body) -> bool:
         return False
     across, sense = _joints(names)
     other = [segments.index(counterpart(name)) for name in segments]
-    places, axes, turns = (np.array([getattr(joint, name) for joint in body.joints]) for name in ("translation", "axis", "rotation"))
+    places, axes, turns = (
+        np.array([getattr(joint, name) for joint in body.joints]) for name in ("translation", "axis", "rotation")
+    )
     pairs: list[tuple[Array, Array]] = [
-        (np.sort([sense * limits.lower[across], sense * limits.upper[across]], axis=0), np.array([limits.lower, limits.upper])),
+        (
+            np.sort([sense * limits.lower[across], sense * limits.upper[across]], axis=0),
+            np.array([limits.lower, limits.upper]),
+        ),
         (
             np.sort([sense * limits.torque_lower[across], sense * limits.torque_upper[across]], axis=0),
             np.array([limits.torque_lower, limits.torque_upper]),
@@ -138,13 +146,15 @@ def symmetric(body: Body) -> bool:
         (FLIP * body.sip.com[other], body.sip.com),
         (np.sort(FLIP * body.boxes[other], axis=1), body.boxes),
     ]
-    return all(np.allclose(image, own, rtol=0.0, atol=SAME) for image, own in pairs)
+    return all(np.allclose(image, own, rtol=0.0, atol=_SAME) for image, own in pairs)
 
 
 def _joints(names: list[str]) -> tuple[list[int], Array]:
     """Return for every joint the index of the one whose angle it has in the image, and the sense (n,) of that angle."""
     middle = [counterpart(name) == name for name in names]
-    sense = np.array([-1.0 if alone and name.endswith(SIDEWAYS) else 1.0 for alone, name in zip(middle, names, strict=True)])
+    sense = np.array(
+        [-1.0 if alone and name.endswith(SIDEWAYS) else 1.0 for alone, name in zip(middle, names, strict=True)]
+    )
     return [names.index(counterpart(name)) for name in names], sense
 
 
@@ -153,7 +163,11 @@ def image_feet(here: Stance, stances: tuple[Stance, ...]) -> int | None:
     there is none.
     """
     free = np.isnan(here.hands[::-1])
-    alike = (k for k, there in enumerate(stances) if there.name == ACROSS.get(here.name) and np.array_equal(np.isnan(there.hands), free))
+    alike = (
+        k
+        for k, there in enumerate(stances)
+        if there.name == ACROSS.get(here.name) and np.array_equal(np.isnan(there.hands), free)
+    )
     return next(alike, None)
 
 

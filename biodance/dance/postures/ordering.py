@@ -87,7 +87,8 @@ def support_sequence(body: Body, plan: Plan) -> tuple[Stance, ...]:
     names = [name for name, _ in plan.blocks]
     if "seated" in names and len(names) > 1:
         raise BiodanceError(
-            f"Plan {plan.name}: blocks {', '.join(names)} mix sitting and standing, and nobody can be planned onto a stool; "
+            f"Plan {plan.name}: blocks {', '.join(names)} mix sitting and standing, and nobody can be planned onto a "
+            f"stool; "
             "make two plans, one seated and one standing."
         )
     doubles = [name for name in names if name in ("parallel", "right_forward")] or ["parallel"]
@@ -95,7 +96,9 @@ def support_sequence(body: Body, plan: Plan) -> tuple[Stance, ...]:
     for name, count in plan.blocks:
         if name in doubles and "left" in plan.alone:
             feet = _double(body, plan, name)
-        target = seat(body, share=plan.share) if name == "seated" else feet.on(*SINGLE[name]) if name in SINGLE else feet
+        target = (
+            seat(body, share=plan.share) if name == "seated" else feet.on(*SINGLE[name]) if name in SINGLE else feet
+        )
         out += [*(weight_shifts(out[-1], target) if out else ()), *[target] * count]
     if len(out[-1].planted) == 1:
         out.append(_over(out[-1], out[-1].planted[0]))

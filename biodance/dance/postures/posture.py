@@ -12,7 +12,15 @@ import numpy as np
 from biodance.body.body import UPRIGHT
 from biodance.dance.limits import CheckedMotion, Limit
 from biodance.dance.problem.chain import ROOT, Chain
-from biodance.dance.problem.excitation import Blocks, effort, smooth_condition, static_grams, total, upright_slopes, uprights
+from biodance.dance.problem.excitation import (
+    Blocks,
+    effort,
+    smooth_condition,
+    static_grams,
+    total,
+    upright_slopes,
+    uprights,
+)
 from biodance.dance.problem.nlp import Evaluation, NonlinearProgramme, Objective, free_coordinates, minimise
 from biodance.dance.problem.stance import Stance, stance_words
 from biodance.dance.problem.state import State, close_legs
@@ -51,7 +59,9 @@ def initial_guess(chain: Chain, stance: Stance, rng: np.random.Generator) -> Arr
         x[2] = stance.seat
         return x
     reach = min(float(leg.length(np.radians(rng.uniform(15, 110)))) for leg in chain.legs)
-    above = UPRIGHT @ np.mean([leg.hip for leg in chain.legs], axis=0)  # of a person's hips: zero, the root is in their middle
+    above = UPRIGHT @ np.mean(
+        [leg.hip for leg in chain.legs], axis=0
+    )  # of a person's hips: zero, the root is in their middle
     x[:3] = [*(stance.centre - [0.02, 0.0]), stance.ankle[0, 2] + 0.97 * reach] - above
     x[3:6] = rng.normal([0.0, 0.0, -0.2], [0.25, 0.25, 0.4])
     return x
@@ -62,7 +72,7 @@ def anyhow(state: State) -> tuple[float, Array]:
     return 0.0, np.zeros((3, *state.x.shape))
 
 
-ITERATIONS = 30
+_ITERATIONS = 30
 MILD = 0.3
 """Share of the neighbours' joint angles that a posture in between keeps: it is a rest."""
 
@@ -95,7 +105,7 @@ def intermediate_posture(
     begin = initial_guess(chain, stance, rng)
     begin[3:] = mild * neighbours[:, 3:].mean(axis=0)
     for _ in range(ATTEMPTS):
-        found = solve(chain, stance, begin, Near(begin), limits, iterations=ITERATIONS)
+        found = solve(chain, stance, begin, Near(begin), limits, iterations=_ITERATIONS)
         if found.violation <= KEPT:
             return found
         tried.append(begin)
@@ -115,11 +125,13 @@ def refuse(chain: Chain, stance: Stance, begin: list[Array], limits: tuple[Limit
             if posture.violation <= KEPT:
                 what = describe(State(chain, stance, posture.x[None], *np.zeros((2, 1, chain.size))), limit)
                 raise BiodanceError(
-                    f"No posture {stance_words(stance)} keeps all limits; there would be one without the limit on {what}. "
+                    f"No posture {stance_words(stance)} keeps all limits; there would be one without the limit on "
+                    f"{what}. "
                     "Widen that limit, or leave this stance out of the protocol."
                 )
     raise BiodanceError(
-        f"No posture {stance_words(stance)} keeps all limits, whichever of them is left out. Leave this stance out of the protocol."
+        f"No posture {stance_words(stance)} keeps all limits, whichever of them is left out. Leave this stance out of "
+        f"the protocol."
     )
 
 
@@ -152,7 +164,9 @@ class Exciting:
         return value + 10 * self.blocks.simplicity * hard, by + 10 * self.blocks.simplicity * slopes
 
 
-def solve(chain: Chain, stance: Stance, begin: Array, objective: Objective, limits: tuple[Limit, ...], *, iterations: int) -> Posture:
+def solve(
+    chain: Chain, stance: Stance, begin: Array, objective: Objective, limits: tuple[Limit, ...], *, iterations: int
+) -> Posture:
     """Return the posture on the feet ``stance`` that is best for ``objective`` near ``begin`` (n,) and keeps those of
     the ``limits`` that count at rest.
     """

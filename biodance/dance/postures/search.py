@@ -13,7 +13,17 @@ import numpy as np
 
 from biodance.dance.limits import Limit
 from biodance.dance.postures.exchange import criterion, exchange, image_feet, mirror_posture, mirror_vectors, symmetric
-from biodance.dance.postures.posture import ATTEMPTS, KEPT, Exciting, Posture, anyhow, initial_guess, posture_at, refuse, solve
+from biodance.dance.postures.posture import (
+    ATTEMPTS,
+    KEPT,
+    Exciting,
+    Posture,
+    anyhow,
+    initial_guess,
+    posture_at,
+    refuse,
+    solve,
+)
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import Blocks, static_grams
 from biodance.dance.problem.stance import Stance
@@ -38,7 +48,13 @@ class Postures:
 
 
 def find_postures(
-    chain: Chain, blocks: Blocks, stances: tuple[Stance, ...], limits: tuple[Limit, ...], *, seed: int, workers: Executor
+    chain: Chain,
+    blocks: Blocks,
+    stances: tuple[Stance, ...],
+    limits: tuple[Limit, ...],
+    *,
+    seed: int,
+    workers: Executor,
 ) -> Postures:
     """Return one posture per entry of ``stances`` that keeps the ``limits``, together the most exciting for all first
     moments.
@@ -53,7 +69,10 @@ def find_postures(
     possible = {name: task.result() for name, task in checked.items()}
     tasks = [workers.submit(search.run, run) for run in range(RUNS)]
     pool = [[p for part in parts for p in part] for parts in zip(*(task.result() for task in tasks), strict=True)]
-    kept = [[p for p in found if p.violation <= KEPT] or [replace(possible[s.name])] for s, found in zip(stances, pool, strict=True)]
+    kept = [
+        [p for p in found if p.violation <= KEPT] or [replace(possible[s.name])]
+        for s, found in zip(stances, pool, strict=True)
+    ]
     kept = search.with_images(kept, kept)
     chosen = exchange(blocks, stances, kept)
     for n, (sharpness, iterations) in enumerate((*FRESH, *POLISH)):
@@ -65,13 +84,17 @@ def find_postures(
         kept = [[new, *rest] if new.violation <= KEPT else rest for new, rest in zip(found, kept, strict=True)]
         kept = search.with_images(kept, [[new] for new in found])
         before = [[old, *(p for p in rest if p is not old)] for old, rest in zip(chosen, kept, strict=True)]
-        chosen = min((exchange(blocks, stances, pool) for pool in (kept, before)), key=lambda some: _price(blocks, some))
+        chosen = min(
+            (exchange(blocks, stances, pool) for pool in (kept, before)), key=lambda some: _price(blocks, some)
+        )
     return Postures(np.array([p.x for p in chosen]), stances, criterion(blocks, chosen), float(blocks.weight.sum()))
 
 
 def _price(blocks: Blocks, chosen: list[Posture]) -> float:
     """Return the criterion and, where simplicity counts, how hard the postures are to take, kg."""
-    return criterion(blocks, chosen) + blocks.simplicity * float(blocks.weight.sum() * np.mean([p.hard for p in chosen]))
+    return criterion(blocks, chosen) + blocks.simplicity * float(
+        blocks.weight.sum() * np.mean([p.hard for p in chosen])
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +129,10 @@ class _Search:
             goal = image_feet(here, self.stances)
             if goal is not None:
                 there = self.stances[goal]
-                images = (replace(p, x=mirror_posture(self.chain, p.x, here, there), up=mirror_vectors(body, p.up)) for p in some)
+                images = (
+                    replace(p, x=mirror_posture(self.chain, p.x, here, there), up=mirror_vectors(body, p.up))
+                    for p in some
+                )
                 out[goal] += [image for image in images if image.violation <= KEPT]
         return out
 
@@ -121,7 +147,9 @@ class _Search:
                 search.append(posture)
         return out
 
-    def sweep(self, now: list[Posture], begin: list[Array], order: list[int], sharpness: int, iterations: int) -> list[Posture]:
+    def sweep(
+        self, now: list[Posture], begin: list[Array], order: list[int], sharpness: int, iterations: int
+    ) -> list[Posture]:
         """Return the postures of the places ``order``, found one after the other from ``begin`` while all others are
         held, by place.
         """

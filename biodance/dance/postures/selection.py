@@ -20,9 +20,9 @@ from biodance.identification.posterior import prior_factor
 from biodance.motion.regressor import regressor
 from biodance.records import Array
 
-FORCE, MOMENT = 8.0, 4.0
+_FORCE, _MOMENT = 8.0, 4.0
 """N, N·m: error of one independent sample of the wrench of a person (residual of the paper: 7.8 N, 4.3 N·m)."""
-RATE = 4.0
+_RATE = 4.0
 """Hz: independent samples per second of moving."""
 
 
@@ -71,7 +71,9 @@ def choose(chain: Chain, x: Array, stances: tuple[str, ...], plan: Plan) -> Choi
 
 
 def _cost(plan: Plan, stance: str, last: dict[str, int]) -> float:
-    """Return the seconds of one more posture; feet that were not used yet cost two moves through postures in between."""
+    """Return the seconds of one more posture; feet that were not used yet cost two moves through postures in
+    between.
+    """
     return plan.move + plan.hold + (2 * plan.move if stance not in last else 0.0)
 
 
@@ -83,11 +85,13 @@ def learned(belief: Array, rows: Array) -> Array:
 
 
 class _Told:
-    """What standing in a posture and going there tells: rows of the regressor, whitened by the error and by the table."""
+    """What standing in a posture and going there tells: rows of the regressor, whitened by the error and by the
+    table.
+    """
 
     def __init__(self, chain: Chain, x: Array, stances: tuple[str, ...], move: float, S: Array) -> None:
         self.chain, self.x, self.stances, self.S = chain, x, stances, S
-        samples = rest_to_rest(move, via=0, rate=RATE)
+        samples = rest_to_rest(move, via=0, rate=_RATE)
         self.parts = [part[1:-1] for part in (samples.position, samples.velocity, samples.acceleration)]
         self.still = self._white(x[:, None], *np.zeros((2, len(x), 1, x.shape[1])))
         self.ways: dict[int, dict[int, Array]] = {}
@@ -97,7 +101,9 @@ class _Told:
         on the same feet.
         """
         if origin is None:
-            origin = next((p for p, stance in enumerate(self.stances) if stance == self.stances[goal] and p != goal), goal)
+            origin = next(
+                (p for p, stance in enumerate(self.stances) if stance == self.stances[goal] and p != goal), goal
+            )
         if origin not in self.ways:
             goals = [p for p, stance in enumerate(self.stances) if stance == self.stances[origin]]
             ends = np.stack([np.broadcast_to(self.x[origin], self.x[goals].shape), self.x[goals]], axis=1)
@@ -107,5 +113,8 @@ class _Told:
     def _white(self, x: Array, v: Array, a: Array) -> Array:
         """Return the rows (G, 6 T, k) of G stretches of T samples."""
         flat = [part.reshape(-1, x.shape[2]) for part in (x, v, a)]
-        W = regressor(self.chain.body, self.chain.motion(np.arange(len(flat[0])) / RATE, *flat)) / np.repeat([FORCE, MOMENT], 3)[:, None]
+        W = (
+            regressor(self.chain.body, self.chain.motion(np.arange(len(flat[0])) / _RATE, *flat))
+            / np.repeat([_FORCE, _MOMENT], 3)[:, None]
+        )
         return W.reshape(len(x), -1, W.shape[2]) @ self.S

@@ -22,7 +22,7 @@ from biodance.motion.regressor import GRAVITY
 from biodance.records import Array, Motion
 
 ROOT = 6
-TURNS = ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+_TURNS = ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 """Axes of turn, drop and tilt in the root's frame (up, forward, right), in the order of rotation."""
 SIDES = ("right", "left")
 
@@ -35,7 +35,9 @@ class Chain:
 
     def __post_init__(self) -> None:
         if not self.body.n_root or set(SIDES) - set(self.body.feet):
-            raise BiodanceError(f"{self.body.name}: a dance needs a body with a free root and two feet; this one has none.")
+            raise BiodanceError(
+                f"{self.body.name}: a dance needs a body with a free root and two feet; this one has none."
+            )
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what goes to other processes: all but what pinocchio computes in, which takes longer to send than to
@@ -84,7 +86,7 @@ class Chain:
     @cached_property
     def axes(self) -> Array:
         """(n, 3) axis of each rotating coordinate in its link's frame; zero for the three slides."""
-        return np.concatenate([np.zeros((3, 3)), TURNS, [joint.axis for joint in self.body.joints]])
+        return np.concatenate([np.zeros((3, 3)), _TURNS, [joint.axis for joint in self.body.joints]])
 
     @cached_property
     def model(self) -> Any:
@@ -95,7 +97,7 @@ class Chain:
         slides = (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ)
         for k, slide in enumerate(slides):
             model.addJoint(k, slide(), none, f"root_slide_{k}")
-        for k, axis in enumerate(TURNS):
+        for k, axis in enumerate(_TURNS):
             place = pin.SE3(UPRIGHT.copy(), np.zeros(3)) if k == 0 else none
             model.addJoint(3 + k, pin.JointModelRevoluteUnaligned(np.array(axis)), place, f"root_turn_{k}")
         for joint in self.body.joints:
@@ -103,7 +105,9 @@ class Chain:
             parent = ROOT if joint.parent < 0 else ROOT + joint.parent + 1
             model.addJoint(parent, pin.JointModelRevoluteUnaligned(np.array(joint.axis)), place, joint.name)
         for name, carrier in zip(self.body.segments, self.carriers, strict=True):
-            model.appendBodyToJoint(carrier + 1, pin.Inertia.FromDynamicParameters(np.array(self.body.sip.of(name))), none)
+            model.appendBodyToJoint(
+                carrier + 1, pin.Inertia.FromDynamicParameters(np.array(self.body.sip.of(name))), none
+            )
         return model
 
     @property
@@ -119,7 +123,7 @@ class Chain:
 
     def root_rotation(self, x: Array) -> Array:
         """Return lab_R_root (T, 3, 3) of coordinates (T, n)."""
-        turn, drop, tilt = (axis_rotation(np.array(axis), x[:, 3 + k]) for k, axis in enumerate(TURNS))
+        turn, drop, tilt = (axis_rotation(np.array(axis), x[:, 3 + k]) for k, axis in enumerate(_TURNS))
         return UPRIGHT @ turn @ drop @ tilt
 
     def plant(self, x: Array, planted: tuple[int, ...], ankle: Array) -> Array:
@@ -129,7 +133,9 @@ class Chain:
         out, turn = x.copy(), self.root_rotation(x)
         flat = np.broadcast_to(UPRIGHT, turn.shape)
         for side in planted:
-            out[:, self.leg_columns[side]] = self.legs[side].solve(turn, x[:, :3], flat, np.broadcast_to(ankle[side], (len(x), 3)))
+            out[:, self.leg_columns[side]] = self.legs[side].solve(
+                turn, x[:, :3], flat, np.broadcast_to(ankle[side], (len(x), 3))
+            )
         return out
 
     def motion(self, time: Array, x: Array, rate: Array, rate2: Array) -> Motion:
@@ -137,11 +143,11 @@ class Chain:
         from scipy.spatial.transform import Rotation
 
         turn = self.root_rotation(x)
-        drop, tilt = (axis_rotation(np.array(TURNS[k]), x[:, 3 + k]) for k in (1, 2))
+        drop, tilt = (axis_rotation(np.array(_TURNS[k]), x[:, 3 + k]) for k in (1, 2))
         spin = np.zeros((len(x), 3))
         spin2 = np.zeros((len(x), 3))
         for k, onward in enumerate((drop, tilt, None)):
-            axis = np.array(TURNS[k])
+            axis = np.array(_TURNS[k])
             spin2 = spin2 + axis * rate2[:, 3 + k, None] + np.cross(spin, axis * rate[:, 3 + k, None])
             spin = spin + axis * rate[:, 3 + k, None]
             if onward is not None:

@@ -3,8 +3,10 @@ the motion.
 
 First moments count at rest, inertias in motion. Effort is how hard a posture is to take and to remember; three terms
 over the joints, angles in units of half the joint's range:
-- few joints at once: mean of sqrt(r² + e²) - e, r the angle from standing (a smooth absolute value: what need not move stays);
-- symmetric pairs: mean of (right - left)² over the pairs of joints, the same movement on both sides being one thing to do;
+- few joints at once: mean of sqrt(r² + e²) - e, r the angle from standing (a smooth absolute value: what need not move
+  stays);
+- symmetric pairs: mean of (right - left)² over the pairs of joints, the same movement on both sides being one thing to
+  do;
 - no discomfort: mean of c⁸, c the angle from standing over the way to the stop on that side.
 """
 
@@ -44,7 +46,12 @@ def smooth_condition(gram: Array, *, sharpness: int) -> tuple[Array, Array]:
     value, vector = _spectrum(gram)
     high, low = (value / value[..., -1:]) ** sharpness, (value[..., :1] / value) ** sharpness
     cond = np.sqrt(value[..., -1] / value[..., 0] * (high.mean(axis=-1) * low.mean(axis=-1)) ** (1 / sharpness))
-    by = 0.5 * cond[..., None] * (high / high.sum(axis=-1, keepdims=True) - low / low.sum(axis=-1, keepdims=True)) / value
+    by = (
+        0.5
+        * cond[..., None]
+        * (high / high.sum(axis=-1, keepdims=True) - low / low.sum(axis=-1, keepdims=True))
+        / value
+    )
     return cond, (vector * by[..., None, :]) @ np.swapaxes(vector, -1, -2)
 
 
@@ -72,7 +79,9 @@ def excitation_blocks(body: Body) -> Blocks:
     """
     columns = structural_base(body).columns
     first, second = (
-        tuple([c % 10 - low for c in columns if c // 10 == i and low <= c % 10 < high] for i in range(len(body.segments)))
+        tuple(
+            [c % 10 - low for c in columns if c // 10 == i and low <= c % 10 < high] for i in range(len(body.segments))
+        )
         for low, high in ((1, 4), (4, 10))
     )
     return Blocks(first, second, np.array(body.sip.mass))
@@ -82,7 +91,9 @@ Measure = Callable[[Array], tuple[Array, Array]]
 """Says of Gram matrices (..., k, k) how badly conditioned they are (...), and the gradient (..., k, k)."""
 
 
-def total(weight: Array, grams: Array, pick: tuple[list[int], ...], *, measure: Measure = condition) -> tuple[float, Array]:
+def total(
+    weight: Array, grams: Array, pick: tuple[list[int], ...], *, measure: Measure = condition
+) -> tuple[float, Array]:
     """Return sum_i M_i cond(W_bi) and its gradient by the Gram matrices (N, k, k); segments without weight or columns
     do not count.
     """
@@ -179,7 +190,7 @@ def dynamic_slopes(state: State, segments: list[int], slope: Array) -> Array:
     return np.stack([dx, dv, da])
 
 
-SOFT = 0.05
+_SOFT = 0.05
 """e: angles below a twentieth of half the range are not worth saving."""
 SIDE, STOP = 0.25, 1.0
 """Worth of the second and the third term beside the first."""
@@ -198,8 +209,8 @@ def effort(state: State) -> tuple[float, Array]:
     away = (angle - scale.rest) / scale.half
     way = np.where(angle > scale.rest, scale.upward, scale.downward)
     near = (angle - scale.rest) / way
-    root = np.sqrt(away**2 + SOFT**2)
-    value = (root - SOFT + STOP * near**8) @ counts
+    root = np.sqrt(away**2 + _SOFT**2)
+    value = (root - _SOFT + STOP * near**8) @ counts
     by = counts * (away / root / scale.half + 8 * STOP * near**7 / way)
     for right, left in scale.pairs:
         if counts[right] and counts[left]:

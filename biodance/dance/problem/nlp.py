@@ -159,19 +159,24 @@ class Solution:
 
 
 WEIGHT = 100.0
-NEAR = 1.5
+_NEAR = 1.5
 """Margins (in their scale) larger than this cannot become active within one step."""
 
 
 def minimise(
-    evaluate: Callable[[Array], Point], start: Array, *, iterations: int = 30, radius: float = 0.3, tolerance: float = 1e-3
+    evaluate: Callable[[Array], Point],
+    start: Array,
+    *,
+    iterations: int = 30,
+    radius: float = 0.3,
+    tolerance: float = 1e-3,
 ) -> Solution:
     """Return a local minimum from ``start``; f and c should be scaled so that 1 is a large amount."""
     y, n = start.copy(), start.size
     point, hessian = evaluate(y), np.eye(n)
     count = 0
     for count in range(1, iterations + 1):  # noqa: B007
-        rows = np.flatnonzero(point.margins < NEAR)
+        rows = np.flatnonzero(point.margins < _NEAR)
         gradient, jacobian = point.slopes(rows)
         step, price = quadratic_step(hessian, gradient, jacobian, point.margins[rows], radius)
         predicted = -(gradient @ step) + WEIGHT * (worst(point.margins) - worst(point.margins[rows] + jacobian @ step))
@@ -198,7 +203,9 @@ def worst(margins: Array) -> float:
     return max(0.0, -float(margins.min(initial=0.0)))
 
 
-def quadratic_step(hessian: Array, gradient: Array, jacobian: Array, margins: Array, radius: float) -> tuple[Array, Array]:
+def quadratic_step(
+    hessian: Array, gradient: Array, jacobian: Array, margins: Array, radius: float
+) -> tuple[Array, Array]:
     """Return the step d (n,) and the prices (m,) of the margins: min d'Hd/2 + g'd + t + t²/2, Jd + t/weight >= -c, |d|
     <= radius.
     """
@@ -226,7 +233,9 @@ def quadratic_step(hessian: Array, gradient: Array, jacobian: Array, margins: Ar
 
 
 def update(hessian: Array, step: Array, change: Array) -> Array:
-    """Return the BFGS update, damped after Powell so that it stays positive definite; the identity where it would not."""
+    """Return the BFGS update, damped after Powell so that it stays positive definite; the identity where it would
+    not.
+    """
     curved = hessian @ step
     bend = float(step @ curved)
     if bend < 1e-14:

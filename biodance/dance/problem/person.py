@@ -1,10 +1,9 @@
 """What one person can and may do: reduced range, strength and speed, one side, no standing on one leg, only seated.
 
-    reason = "stroke in March, left side"      for the record
-    max_speed_deg_s = 120                      no joint turns faster
-    stand_alone_on = ["right"]                 legs on which the person may stand alone; [] = never; without it: both
-    seated = false                             true: only protocols on a stool
-    hold_frame = ["right"]                     hands that stay on the grips of a walking frame on the plate; without it: none
+    reason = "stroke in March, left side"      for the record max_speed_deg_s = 120                      no joint turns
+    faster stand_alone_on = ["right"]                 legs on which the person may stand alone; [] = never; without it:
+    both seated = false                             true: only protocols on a stool hold_frame = ["right"]
+    hands that stay on the grips of a walking frame on the plate; without it: none
 
     [range_deg]                                what a joint reaches, degrees
     left_shoulder_flexion = [0, 70]
@@ -30,7 +29,7 @@ from biodance.dance.problem.plan import Plan, finite_number, table
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import read_toml
 
-KEYS = ("reason", "max_speed_deg_s", "stand_alone_on", "seated", "hold_frame", "range_deg", "range_share", "strength")
+_KEYS = ("reason", "max_speed_deg_s", "stand_alone_on", "seated", "hold_frame", "range_deg", "range_share", "strength")
 SIDES = ("right", "left")
 Shares = tuple[tuple[str, float], ...]
 
@@ -71,8 +70,8 @@ def read_person(path: str | Path) -> PersonLimits:
     path = Path(path)
     raw = read_toml(path)
     for key in raw:
-        if key not in KEYS:
-            raise UnknownName.of(f"key of {path}", key, KEYS)
+        if key not in _KEYS:
+            raise UnknownName.of(f"key of {path}", key, _KEYS)
     ranges = []
     for key, value in table(path, raw, "range_deg").items():
         if not isinstance(value, list) or len(value) != 2:
@@ -81,18 +80,26 @@ def read_person(path: str | Path) -> PersonLimits:
         ranges.append((key, low, high))
     legs, seated = raw.get("stand_alone_on", list(SIDES)), raw.get("seated", False)
     if not isinstance(legs, list) or not isinstance(seated, bool):
-        raise BiodanceError(f"{path}: stand_alone_on must be a list of legs and seated true or false, found {legs!r} and {seated!r}.")
+        raise BiodanceError(
+            f"{path}: stand_alone_on must be a list of legs and seated true or false, found {legs!r} and {seated!r}."
+        )
     for leg in legs:
         if leg not in SIDES:
             raise UnknownName.of(f"leg in stand_alone_on of {path}", str(leg), SIDES)
     hands = raw.get("hold_frame", [])
     if not isinstance(hands, list) or any(hand not in SIDES for hand in hands):
         raise BiodanceError(f'{path}: hold_frame = {hands!r}; expected a list of hands, "right" and "left".')
-    speed = math.radians(finite_number(path, "max_speed_deg_s", raw["max_speed_deg_s"])) if "max_speed_deg_s" in raw else math.inf
+    speed = (
+        math.radians(finite_number(path, "max_speed_deg_s", raw["max_speed_deg_s"]))
+        if "max_speed_deg_s" in raw
+        else math.inf
+    )
     if not speed > 0:
         raise BiodanceError(f"{path}: max_speed_deg_s = {raw['max_speed_deg_s']!r}; it must be positive.")
     shares, strengths = (_shares(path, table(path, raw, name), name) for name in ("range_share", "strength"))
-    return PersonLimits(tuple(ranges), shares, strengths, speed, tuple(legs), seated, str(raw.get("reason", "")), tuple(hands))
+    return PersonLimits(
+        tuple(ranges), shares, strengths, speed, tuple(legs), seated, str(raw.get("reason", "")), tuple(hands)
+    )
 
 
 def _shares(path: Path, raw: dict[str, object], name: str) -> Shares:
@@ -112,10 +119,13 @@ def fit_to_person(body: Body, plan: Plan, person: PersonLimits) -> tuple[Body, P
     UnknownName
         A key names no joint of this body.
     BiodanceError
-        A range lies outside the joint's own, or nothing of the protocol is left; the message names the constraint that forbids it.
+        A range lies outside the joint's own, or nothing of the protocol is left; the message names the constraint that
+        forbids it.
     """
     if person.seated and not plan.seated:
-        raise BiodanceError(f"Protocol {plan.name}: is danced standing and this person must sit (seated = true). Use --protocol chair.")
+        raise BiodanceError(
+            f"Protocol {plan.name}: is danced standing and this person must sit (seated = true). Use --protocol chair."
+        )
     kept = tuple(block for block in plan.blocks if _allowed(block[0], person))
     if not kept:
         raise BiodanceError(
@@ -123,7 +133,8 @@ def fit_to_person(body: Body, plan: Plan, person: PersonLimits) -> tuple[Body, P
             f"{' and '.join(person.stand_alone_on) or 'neither leg'} (stand_alone_on). Use another protocol."
         )
     notes = tuple(
-        f"The {count} postures in {stance.replace('_', ' ')} support are left out: the person may not stand alone on that leg."
+        f"The {count} postures in {stance.replace('_', ' ')} support are left out: the person may not stand alone on "
+        f"that leg."
         for stance, count in plan.blocks
         if not _allowed(stance, person)
     )
@@ -149,7 +160,11 @@ def limit_body(body: Body, person: PersonLimits) -> JointLimits:
     for key, share in person.strengths:
         strength[joints(body, key)] *= share
     return JointLimits(
-        lower, upper, np.minimum(limits.velocity, person.max_speed), strength * limits.torque_lower, strength * limits.torque_upper
+        lower,
+        upper,
+        np.minimum(limits.velocity, person.max_speed),
+        strength * limits.torque_lower,
+        strength * limits.torque_upper,
     )
 
 
@@ -172,7 +187,8 @@ def _check_range(body: Body, joint: int, low: float, high: float) -> None:
     if not low <= high or low > own[1] or high < own[0]:
         given, usual = (f"{math.degrees(a):.0f} to {math.degrees(b):.0f} degrees" for a, b in ((low, high), own))
         raise BiodanceError(
-            f"Limits: {body.joints[joint].name} from {given} has nothing in common with a healthy joint's {usual}. Correct range_deg."
+            f"Limits: {body.joints[joint].name} from {given} has nothing in common with a healthy joint's {usual}. "
+            f"Correct range_deg."
         )
 
 

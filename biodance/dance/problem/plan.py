@@ -5,16 +5,14 @@ A person's reduced range, strength or speed go into ``body.limits`` and a person
 blocks out of the plan (`person.fitted`), so that whoever designs needs the two records only. The file is TOML; the
 shipped ones are in ``protocols/dances``:
 
-    name = "short"
-    description = "what it is for, one sentence"
-    move_s = 2.0                 seconds from posture to posture
-    hold_s = 1.5                 seconds of standing still in each
-    forward_m = 0.2              how far the right foot stands in front in "right_forward"
-    share_of_support = 0.6       short for the share under [limits.balance]
-    budget_s = 115               the postures that inform most per second are danced until the time is used up; without it: all
-    simplicity = 0.0             the performer's term: 0 = excitation only; 1 = a simple dance is worth as much as an exciting one
-    other_weight = 1.0           emphasis of the segments that [weights] does not name
-    ranges = "comfortable"       what joints may use: what is reached without effort, or "anatomical": all that a healthy joint allows
+    name = "short" description = "what it is for, one sentence" move_s = 2.0                 seconds from posture to
+    posture hold_s = 1.5                 seconds of standing still in each forward_m = 0.2              how far the
+    right foot stands in front in "right_forward" share_of_support = 0.6       short for the share under
+    [limits.balance] budget_s = 115               the postures that inform most per second are danced until the time is
+    used up; without it: all simplicity = 0.0             the performer's term: 0 = excitation only; 1 = a simple dance
+    is worth as much as an exciting one other_weight = 1.0           emphasis of the segments that [weights] does not
+    name ranges = "comfortable"       what joints may use: what is reached without effort, or "anatomical": all that a
+    healthy joint allows
 
     [postures]                   how many postures on which feet, in the order of the dance
     parallel = 15                both feet side by side
@@ -46,7 +44,7 @@ from biodance.errors import BiodanceError, UnknownName
 from biodance.library import locate, read_toml
 from biodance.records import Array
 
-STANCES = ("parallel", "right_forward", "single_right", "single_left", "seated")
+_STANCES = ("parallel", "right_forward", "single_right", "single_left", "seated")
 """Foot configurations: both feet side by side, right foot in front, on the right leg, on the left leg (paper Table I),
 on a stool.
 """
@@ -84,10 +82,13 @@ class Plan:
     def __post_init__(self) -> None:
         names = [name for name, _ in self.blocks]
         for name in names:
-            if name not in STANCES:
-                raise UnknownName.of("stance", name, STANCES)
+            if name not in _STANCES:
+                raise UnknownName.of("stance", name, _STANCES)
         if not names or len(set(names)) < len(names) or any(count < 1 for _, count in self.blocks):
-            raise BiodanceError(f"Plan {self.name}: blocks {self.blocks}; expected at least one, each stance once, with 1 posture or more.")
+            raise BiodanceError(
+                f"Plan {self.name}: blocks {self.blocks}; expected at least one, each stance once, with 1 posture or "
+                f"more."
+            )
         if self.ranges not in get_args(Range):
             raise UnknownName.of(f"range of joints in plan {self.name}", self.ranges, get_args(Range))
         self._check()
@@ -106,7 +107,9 @@ class Plan:
             raise BiodanceError(f"Plan {self.name}: budget = {self.budget:g} s; it must be positive (inf: no limit).")
         factors = [self.other_weight, *(factor for _, factor in self.weights)]
         if not all(np.isfinite(f) and f >= 0 for f in factors) or not any(factors):
-            raise BiodanceError(f"Plan {self.name}: weights {factors}; expected numbers >= 0, at least one of them positive.")
+            raise BiodanceError(
+                f"Plan {self.name}: weights {factors}; expected numbers >= 0, at least one of them positive."
+            )
 
     @property
     def count(self) -> int:
@@ -138,7 +141,7 @@ class Plan:
         return np.array([named.get(name, self.other_weight) for name in segments])
 
 
-NUMBERS = {
+_NUMBERS = {
     "move_s": "move",
     "hold_s": "hold",
     "forward_m": "forward",
@@ -147,9 +150,9 @@ NUMBERS = {
     "other_weight": "other_weight",
 }
 """Key of the file: field of the Plan."""
-SHORT = {"share_of_support": ("balance", "share")}
+_SHORT = {"share_of_support": ("balance", "share")}
 """Key of the file: limit and its number."""
-KEYS = ("name", "description", "postures", "limits", "weights", "ranges", *NUMBERS, *SHORT)
+_KEYS = ("name", "description", "postures", "limits", "weights", "ranges", *_NUMBERS, *_SHORT)
 
 
 def read_plan(name_or_path: str | Path) -> Plan:
@@ -168,16 +171,25 @@ def read_plan(name_or_path: str | Path) -> Plan:
         path = locate("protocols/dances", str(name_or_path))
     raw = read_toml(path)
     for key in raw:
-        if key not in KEYS:
-            raise UnknownName.of(f"key of {path}", key, KEYS)
+        if key not in _KEYS:
+            raise UnknownName.of(f"key of {path}", key, _KEYS)
     words = {"ranges": str(raw["ranges"])} if "ranges" in raw else {}
-    fields: dict[str, Any] = words | {field: finite_number(path, key, raw[key]) for key, field in NUMBERS.items() if key in raw}
+    fields: dict[str, Any] = words | {
+        field: finite_number(path, key, raw[key]) for key, field in _NUMBERS.items() if key in raw
+    }
     counts = table(path, raw, "postures")
     for stance, count in counts.items():
         if not isinstance(count, int) or isinstance(count, bool):
             raise BiodanceError(f"{path}: postures.{stance} = {count!r}; expected a whole number of postures.")
-    weights = {name: finite_number(path, f"weights.{name}", value) for name, value in table(path, raw, "weights").items()}
-    plan = Plan(str(raw.get("name", path.stem)), str(raw.get("description", "")), tuple(counts.items()), weights=tuple(weights.items()))
+    weights = {
+        name: finite_number(path, f"weights.{name}", value) for name, value in table(path, raw, "weights").items()
+    }
+    plan = Plan(
+        str(raw.get("name", path.stem)),
+        str(raw.get("description", "")),
+        tuple(counts.items()),
+        weights=tuple(weights.items()),
+    )
     return replace(plan, limits=_limits(path, raw), **fields)
 
 
@@ -185,10 +197,13 @@ def _limits(path: Path, raw: dict[str, Any]) -> tuple[Limit, ...]:
     """Return all limits with the numbers that the file gives them."""
     given = table(path, raw, "limits")
     found = {
-        name: {key: finite_number(path, f"limits.{name}.{key}", value) for key, value in table(path, given, name, of="limits.").items()}
+        name: {
+            key: finite_number(path, f"limits.{name}.{key}", value)
+            for key, value in table(path, given, name, of="limits.").items()
+        }
         for name in given
     }
-    for short, (name, key) in SHORT.items():
+    for short, (name, key) in _SHORT.items():
         if short in raw and key in found.get(name, {}):
             raise BiodanceError(f"{path}: {short} and limits.{name}.{key} say the same; keep one of them.")
         if short in raw:

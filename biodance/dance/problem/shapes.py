@@ -13,7 +13,13 @@ from biodance.records import Array
 BOXES = ("pelvis", "trunk_head")
 _KINDS = {
     *(("foot", "shank"), ("foot", "thigh"), ("forearm_hand", "thigh"), ("forearm_hand", "forearm_hand")),  # the paper's
-    *(("forearm_hand", "shank"), ("forearm_hand", "upper_arm"), ("shank", "shank"), ("foot", "foot"), ("upper_arm", "thigh")),
+    *(
+        ("forearm_hand", "shank"),
+        ("forearm_hand", "upper_arm"),
+        ("shank", "shank"),
+        ("foot", "foot"),
+        ("upper_arm", "thigh"),
+    ),
     *(("shank", "thigh"), ("forearm_hand", "foot")),
 }
 
@@ -24,7 +30,12 @@ def capsule_pairs(body: Body) -> list[tuple[int, int]]:
     """
     kinds = [s.removeprefix("right_").removeprefix("left_") for s in body.segments]
     side = [s.split("_")[0] for s in body.segments]
-    near = {("shank", "thigh"), ("foot", "shank"), ("foot", "thigh"), ("forearm_hand", "upper_arm")}  # only the opposite side
+    near = {
+        ("shank", "thigh"),
+        ("foot", "shank"),
+        ("foot", "thigh"),
+        ("forearm_hand", "upper_arm"),
+    }  # only the opposite side
     pairs = []
     for i, j in combinations(range(len(kinds)), 2):
         for pair in ((kinds[i], kinds[j]), (kinds[j], kinds[i])):
@@ -89,11 +100,11 @@ def palm(body: Body, side: str) -> tuple[int, Array]:
     return segment, np.array([(low[0] + high[0]) / 2, 0.85 * low[1], (low[2] + high[2]) / 2])
 
 
-NEAR = 2
+_NEAR = 2
 """Segments away along the tree: closer limbs are neighbours, or neighbours of the same segment."""
-POINTS = np.linspace(0.0, 1.0, 41)
+_POINTS = np.linspace(0.0, 1.0, 41)
 """Places on a limb's axis at which it is held against others at zero angles."""
-LEAST = 0.01
+_LEAST = 0.01
 """Half length of a capsule in a cube, in its radius: a line of no length has no direction."""
 Pairs = list[tuple[int, int]]
 
@@ -106,7 +117,7 @@ def capsule(body: Body, segment: int) -> tuple[Array, float]:
     half, centre = (high - low) / 2, (high + low) / 2
     axis = int(np.argmax(half))
     radius = float(np.sort(half)[0])
-    reach = max(half[axis] - radius, LEAST * radius) * np.eye(3)[axis]
+    reach = max(half[axis] - radius, _LEAST * radius) * np.eye(3)[axis]
     return np.array([centre - reach, centre + reach]), radius
 
 
@@ -118,7 +129,7 @@ def tree_pairs(body: Body) -> tuple[Pairs, Pairs, tuple[str, ...]]:
     boxes = [i for i in range(len(above)) if i == 0 or above.count(i) > 1]
     legs = {k for foot in body.feet.values() for k in _up(above, foot.segment)}
     limbs = [i for i in range(len(above)) if i not in boxes]
-    solid = [(i, j) for i, j in combinations(limbs, 2) if _apart(above, i, j) > NEAR]
+    solid = [(i, j) for i, j in combinations(limbs, 2) if _apart(above, i, j) > _NEAR]
     walls = [(i, j) for i in limbs if i not in legs for j in boxes if above[i] != j]
     axes = {i: _axis_at_zero(body, i) for i in limbs}
     free = [pair for pair in solid if _limbs_gap(body, axes, *pair) > 0]
@@ -155,7 +166,7 @@ def _axis_at_zero(body: Body, segment: int) -> Array:
     from biodance.motion.kinematics import poses
 
     (a, b), _ = capsule(body, segment)
-    return poses(body, body.neutral[None]).points([segment] * len(POINTS), a + POINTS[:, None] * (b - a))[0]
+    return poses(body, body.neutral[None]).points([segment] * len(_POINTS), a + _POINTS[:, None] * (b - a))[0]
 
 
 def _limbs_gap(body: Body, axes: dict[int, Array], i: int, j: int) -> float:

@@ -13,7 +13,7 @@ from scipy.interpolate import BSpline
 from biodance.errors import BiodanceError
 from biodance.records import Array, frozen_array
 
-DEGREE = 5
+_DEGREE = 5
 """Order six: continuous up to the fourth derivative."""
 
 
@@ -44,17 +44,21 @@ def rest_to_rest(duration: float, *, via: int = 2, rate: float = 50.0) -> Basis:
         The duration or the rate is not positive, or there are fewer than two samples.
     """
     if duration <= 0 or rate <= 0 or duration * rate < 1:
-        raise BiodanceError(f"A transition of {duration:g} s at {rate:g} Hz has no samples; give a longer duration or a higher rate.")
+        raise BiodanceError(
+            f"A transition of {duration:g} s at {rate:g} Hz has no samples; give a longer duration or a higher rate."
+        )
     time = np.linspace(0.0, duration, round(duration * rate) + 1)
     return basis_at(time, duration, via=via)
 
 
 def basis_at(time: Array, duration: float, *, via: int = 2) -> Basis:
-    """Return the basis of a rest-to-rest transition of ``duration`` s at the instants ``time`` (n,) in [0, duration]."""
+    """Return the basis of a rest-to-rest transition of ``duration`` s at the instants ``time`` (n,) in [0,
+    duration].
+    """
     count = via + 6  # two ends with position, velocity and acceleration each, and the via points
-    inner = np.linspace(0, duration, count - DEGREE + 1)[1:-1]
-    knots = np.concatenate([np.zeros(DEGREE + 1), inner, np.full(DEGREE + 1, duration)])
-    spline = BSpline(knots, np.eye(count), DEGREE)
+    inner = np.linspace(0, duration, count - _DEGREE + 1)[1:-1]
+    knots = np.concatenate([np.zeros(_DEGREE + 1), inner, np.full(_DEGREE + 1, duration)])
+    spline = BSpline(knots, np.eye(count), _DEGREE)
     stops = np.array([0.0, duration])
     through = np.linspace(0, duration, via + 2)
     conditions = np.concatenate([spline(through), spline(stops, nu=1), spline(stops, nu=2)])

@@ -8,13 +8,13 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.records import Array, frozen_array
 
-WIDTH = 0.12
+_WIDTH = 0.12
 """Distance between the ankles, fraction of stature (about 1.3 times the width of the hips)."""
-STRIP, CLEAR = 0.1, 1.25
+STRIP, _CLEAR = 0.1, 1.25
 """Of the width of a sole: how much the reduced supports of both feet and of one overlap at least; of its inner half:
 room between feet.
 """
-FORWARD = 0.2
+_FORWARD = 0.2
 """m: how far the right foot stands in front (paper III.D, human subject)."""
 SINGLE = {"single_right": (0,), "single_left": (1,)}
 STOOL = np.array([[-0.15, -0.2], [0.25, -0.2], [0.25, 0.2], [-0.15, 0.2]])
@@ -23,7 +23,7 @@ their middle.
 """
 HANGING = 0.08
 """m between the ground and the soles of hanging legs on a stool."""
-GRIP = (0.18, 0.28, 0.50)
+_GRIP = (0.18, 0.28, 0.50)
 """Grips of a walking frame: m ahead of the heels' line, m to the side, and height over stature (crease of the wrist, as
 they are set).
 """
@@ -111,11 +111,22 @@ class Stance:
     def on(self, *planted: int) -> "Stance":
         """Return the stance with only these feet on the ground."""
         apart = "parallel" if self.ankle[0, 0] == self.ankle[1, 0] else "right_forward"
-        return replace(self, planted=planted, over=None, name=apart if len(planted) == 2 else ("single_right", "single_left")[planted[0]])
+        return replace(
+            self,
+            planted=planted,
+            over=None,
+            name=apart if len(planted) == 2 else ("single_right", "single_left")[planted[0]],
+        )
 
 
 def stance(
-    body: Body, name: str, *, left: float = 0.0, right: float = 0.0, planted: tuple[int, ...] = (0, 1), share: float = 1.0
+    body: Body,
+    name: str,
+    *,
+    left: float = 0.0,
+    right: float = 0.0,
+    planted: tuple[int, ...] = (0, 1),
+    share: float = 1.0,
 ) -> Stance:
     """Return a stance with the ankles ``left`` and ``right`` m ahead of the lab origin, side by side at the person's
     width.
@@ -135,14 +146,17 @@ def holding(feet: Stance, body: Body, hands: tuple[str, ...]) -> Stance:
     grips, stature = np.full((2, 3), np.nan), stature_of(body)
     for side, name in enumerate(("right", "left")):
         if name in hands:
-            grips[side] = [GRIP[0], (-GRIP[1], GRIP[1])[side], GRIP[2] * stature]
+            grips[side] = [_GRIP[0], (-_GRIP[1], _GRIP[1])[side], _GRIP[2] * stature]
     return replace(feet, hands=grips)
 
 
 def seat(body: Body, *, share: float = 1.0) -> Stance:
     """Return the stance of a person on a stool, hips over the lab origin, feet hanging above the ground."""
     feet = stance(body, "seated", planted=(), share=share)
-    legs = [np.linalg.norm(body.joints[body.joint_index(f"{side}_ankle_dorsiflexion")].translation) for side in ("right", "left")]
+    legs = [
+        np.linalg.norm(body.joints[body.joint_index(f"{side}_ankle_dorsiflexion")].translation)
+        for side in ("right", "left")
+    ]
     return replace(feet, props=STOOL, seat=float(max(legs) + feet.ankle[:, 2].max()) + HANGING)
 
 
@@ -155,12 +169,12 @@ def apart(body: Body, share: float) -> float:
     """
     sideways = body.feet["right"].outline[:, 2]
     outer, inner = float(sideways.max()), -float(sideways.min())
-    usual = max(WIDTH * stature_of(body), hip_width(body))
+    usual = max(_WIDTH * stature_of(body), hip_width(body))
     if share >= 1.0:
         return usual
     middle, wide = (outer - inner) / 2, outer + inner
     widest = 2 * (share * outer - middle + (share / 2 - STRIP) * wide) / (1 - share)
-    return min(usual, max(widest, CLEAR * 2 * inner))
+    return min(usual, max(widest, _CLEAR * 2 * inner))
 
 
 def hip_width(body: Body) -> float:
@@ -191,7 +205,7 @@ def under(first: Stance, second: Stance) -> Stance:
     return replace(second, over=None) if np.array_equal(first.ankle, second.ankle) else second.on(1)
 
 
-FEET = {
+_FEET = {
     "parallel": "with both feet side by side",
     "right_forward": "with the right foot in front",
     "single_right": "on the right leg alone",
@@ -203,4 +217,4 @@ FEET = {
 def stance_words(stance: Stance) -> str:
     """Return where the feet are, in words, and on which of them the weight is where it must be over one."""
     weight = "" if stance.over is None else f", the weight on the {('right', 'left')[stance.over]} one"
-    return FEET[stance.name] + weight
+    return _FEET[stance.name] + weight

@@ -20,7 +20,7 @@ from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.stance import Stance
 from biodance.records import Array
 
-Index = list[int] | NDArray[np.intp]
+_Index = list[int] | NDArray[np.intp]
 
 
 def spatial_cross(a: Array, b: Array) -> Array:
@@ -84,13 +84,15 @@ class State:
     @cached_property
     def acceleration(self) -> Array:
         """(T, n, 6) A_k of every link."""
-        return self.chain.ancestors @ (self.twists * self.a[:, :, None] + spatial_cross(self.velocity, self.twists) * self.v[:, :, None])
+        return self.chain.ancestors @ (
+            self.twists * self.a[:, :, None] + spatial_cross(self.velocity, self.twists) * self.v[:, :, None]
+        )
 
-    def placed(self, segment: Index, local: Array) -> Array:
+    def placed(self, segment: _Index, local: Array) -> Array:
         """Return positions (T, K, 3) m of points ``local`` (K, 3) of the segments (K)."""
         return np.asarray((self.rotation[:, segment] @ local[:, :, None])[..., 0] + self.position[:, segment])
 
-    def along(self, segment: Index, place: Array, direction: Array) -> Array:
+    def along(self, segment: _Index, place: Array, direction: Array) -> Array:
         """Return (T, K, n) derivative by x of the places (T, K, 3) m, fixed in the segments (K), along directions (T,
         K, 3).
         """
@@ -180,7 +182,7 @@ class State:
         return slopes[:, :, ROOT:]
 
 
-TINY = 1e-30
+_TINY = 1e-30
 """Step of the complex-step derivative: exact to machine precision."""
 
 
@@ -190,9 +192,13 @@ def foot_forces(total: Array, stance: Stance) -> tuple[Array, Array]:
     """
     if len(stance.planted) == 1:
         chosen = np.eye(2)[stance.planted[0]]
-        return total[:, None] * chosen[:, None], np.broadcast_to(chosen[:, None, None] * np.eye(6), (len(total), 2, 6, 6))
-    stepped = total[:, None] + 1j * TINY * np.eye(6)
-    derivative = np.swapaxes(_share(stepped.reshape(-1, 6), stance.sole_centres).reshape(len(total), 6, 2, 6).imag / TINY, 1, 2)
+        return total[:, None] * chosen[:, None], np.broadcast_to(
+            chosen[:, None, None] * np.eye(6), (len(total), 2, 6, 6)
+        )
+    stepped = total[:, None] + 1j * _TINY * np.eye(6)
+    derivative = np.swapaxes(
+        _share(stepped.reshape(-1, 6), stance.sole_centres).reshape(len(total), 6, 2, 6).imag / _TINY, 1, 2
+    )
     return _share(total, stance.sole_centres), np.swapaxes(derivative, 2, 3)
 
 

@@ -58,7 +58,9 @@ class Checkpoint:
 
 @cache
 def code() -> str:
-    """Return a hash of the source of all `ROOMS`: parts that older code found do not fit those that newer code finds."""
+    """Return a hash of the source of all `ROOMS`: parts that older code found do not fit those that newer code
+    finds.
+    """
     rooms = Path(biodance.__file__).parent
     files = sorted(file for room in ROOMS for file in (rooms / room).rglob("*.py"))
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()

@@ -31,15 +31,15 @@ RESERVE = 0.04
 """Share of every limit's scale that is kept in reserve for the instants in between."""
 BETWEEN = 0.004
 """The same where a move is judged, for what is between those instants."""
-THIRDS = np.array([0.20987654, 0.79012346])
+_THIRDS = np.array([0.20987654, 0.79012346])
 """Of the way at one and two thirds of the time, for least jerk (10 s³ - 15 s⁴ + 6 s⁵)."""
-ATTEMPTS = ((0.2, 1.0, (14, 8, 8)), (0.0, 0.2, (40, 12, 12)))
+_ATTEMPTS = ((0.2, 1.0, (14, 8, 8)), (0.0, 0.2, (40, 12, 12)))
 """Spread (rad) of the via points' start about the straight move, share of excitation in the objective, and iterations
 of the rounds: after each the worst instants are added and the reserve grows by a quarter.
 """
 CENTRE = 0.1
 """Worth of 1 dm² of mean squared distance of the zero-moment point from the middle, beside log cond."""
-LITTLE = 0.01
+_LITTLE = 0.01
 """s·(rad/s²)², information on every inertia that is supposed before the first move."""
 HOPELESS = 0.5
 """Violation after a round, in scales, with which a start is given up; so is one whose limits cannot even be kept
@@ -75,9 +75,11 @@ class Task:
 
     def straight(self) -> Array:
         """Return the via points (2, n) of the smoothest move."""
-        return np.asarray(self.ends[0] + THIRDS[:, None] * (self.ends[1] - self.ends[0]))
+        return np.asarray(self.ends[0] + _THIRDS[:, None] * (self.ends[1] - self.ends[0]))
 
-    def problem(self, via: Array, free: list[int], time: Array, *, reserve: float, objective: Objective) -> NonlinearProgramme:
+    def problem(
+        self, via: Array, free: list[int], time: Array, *, reserve: float, objective: Objective
+    ) -> NonlinearProgramme:
         """Return the problem of the via points of the ``free`` coordinates at instants ``time`` s, the others as in
         ``via`` (2, n).
         """
@@ -90,7 +92,9 @@ class Task:
         least = [max(reserve, limit.move_reserve) if reserve > BETWEEN else reserve for limit in kept]
         bell = np.where([limit.tapers for limit in kept], (4 * way * (1 - way))[:, None], 1.0)
         share = np.array(least) * bell
-        return NonlinearProgramme(self.chain, self.stance, parts @ points, parts[:, :, 1:3], free, kept, objective, share)
+        return NonlinearProgramme(
+            self.chain, self.stance, parts @ points, parts[:, :, 1:3], free, kept, objective, share
+        )
 
     def grid(self, rate: float) -> Array:
         """Return the instants (T,) s between the ends at about ``rate`` Hz, of a long move fewer."""
@@ -144,7 +148,11 @@ class MoveObjective:
         segments = [i for i in self.task.segments if picks[i] and weight[i] > 0]
         if not self.share or not segments:
             return value, slope
-        grams = self.history + dynamic_grams(state, list(range(len(weight)))) * self.task.stretch / GRID + LITTLE * np.eye(6)
+        grams = (
+            self.history
+            + dynamic_grams(state, list(range(len(weight)))) * self.task.stretch / GRID
+            + _LITTLE * np.eye(6)
+        )
         chosen = np.zeros(len(weight))
         chosen[segments] = self.share * weight[segments] / weight[segments].sum()
         found, by = total(chosen, grams, picks, measure=_logarithm)
@@ -176,7 +184,7 @@ def find_move(task: Task, history: Array, *, rng: np.random.Generator) -> Move:
     violates least.
     """
     best = None
-    for spread, share, rounds in ATTEMPTS:
+    for spread, share, rounds in _ATTEMPTS:
         via, time, objective = task.straight(), task.grid(GRID), MoveObjective(task, history, share)
         via[:, task.excited] += rng.normal(0, spread, (2, len(task.excited)))
         for k, iterations in enumerate(rounds):
@@ -194,7 +202,9 @@ def find_move(task: Task, history: Array, *, rng: np.random.Generator) -> Move:
     return best
 
 
-def _improved(task: Task, via: Array, time: Array, objective: MoveObjective, iterations: int, reserve: float) -> tuple[Array, float]:
+def _improved(
+    task: Task, via: Array, time: Array, objective: MoveObjective, iterations: int, reserve: float
+) -> tuple[Array, float]:
     """Return the via points found from ``via`` (2, n), and by how much they violate the limits with their ``reserve``
     at ``time`` s.
     """

@@ -15,7 +15,7 @@ SLOWER = (1.0, 1.4)
 """Factors on the duration of a move, one after the other."""
 DETOURS = 2
 """Postures in between that are tried."""
-SPARE = 0.5
+_SPARE = 0.5
 """Share of what a limit's check forgives (`Limit.rounding`) that a way leaves, because the check of the whole dance
 sees other instants of the same way.
 """
@@ -59,8 +59,10 @@ def _doubted(task: Task, way: Way) -> str:
     """Return the limit that the way breaks by the independent check, "" if it breaks none."""
     rows = np.array([task.ends[0], *way.stops, task.ends[1]])
     feet, body = (task.stance,) * len(rows), task.chain.body
-    margins = verify(body, Dance("way", body, rows, feet, np.zeros(len(rows)), way.via, way.duration, feet[1:], 0), task.limits)
-    spare = {limit.name: SPARE * limit.rounding for limit in task.limits}
+    margins = verify(
+        body, Dance("way", body, rows, feet, np.zeros(len(rows)), way.via, way.duration, feet[1:], 0), task.limits
+    )
+    spare = {limit.name: _SPARE * limit.rounding for limit in task.limits}
     wrong = [margin.limit for margin in margins if not margin.worst >= spare.get(margin.limit, 0.0)]
     return wrong[0] if wrong else ""
 

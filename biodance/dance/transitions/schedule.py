@@ -22,13 +22,13 @@ from biodance.dance.transitions.planner import Way, find_way
 from biodance.errors import BiodanceError
 from biodance.records import Array
 
-ENDS = (1, 0, 1)
+_ENDS = (1, 0, 1)
 """Which end of a move that cannot be made is exchanged: where it goes to, where it comes from, the new one where it
 goes to again.
 """
 REST = (0.0, 0.6, 0.15)
 """Share of their neighbours' joint angles that postures in between keep in these attempts (`between.MILD` at first)."""
-STARTS, SHARPNESS, ITERATIONS = 6, 8, 20
+STARTS, _SHARPNESS, _ITERATIONS = 6, 8, 20
 """Of the search for another posture: starts, sharpness of the condition number, iterations."""
 FEWER = 4
 """Postures that may be left out, one after the other, as long as half of those on the same feet are left."""
@@ -51,7 +51,10 @@ class _Search:
         chain, ends = work.chain, list(pairwise(course.x))
         feet = [under(first, second) for first, second in pairwise(course.stances)]
         self.work, self.attempt, self.found = work, attempt, dict(known)
-        self.tasks = [Task(chain, work.blocks, f, np.array(e), work.plan.move, work.plan.limits) for f, e in zip(feet, ends, strict=True)]
+        self.tasks = [
+            Task(chain, work.blocks, f, np.array(e), work.plan.move, work.plan.limits)
+            for f, e in zip(feet, ends, strict=True)
+        ]
         nothing = np.zeros((len(chain.body.segments), 6, 6))
         self.queue: dict[tuple[int, ...], list[int]] = {task.stance.planted: [] for task in self.tasks}
         self.history: dict[tuple[int, ...], Array] = dict.fromkeys(self.queue, nothing)
@@ -70,7 +73,12 @@ class _Search:
             for future in wait(running, return_when=FIRST_COMPLETED).done:
                 k, way = running.pop(future), future.result()
                 self.work.ledger.put(
-                    self._name(k), via=way.via, duration=way.duration, stops=way.stops, gram=way.gram, limit=np.array(way.limit)
+                    self._name(k),
+                    via=way.via,
+                    duration=way.duration,
+                    stops=way.stops,
+                    gram=way.gram,
+                    limit=np.array(way.limit),
                 )
                 self._accept(k, way)
                 self._advance(self.tasks[k].stance.planted, running)
@@ -110,18 +118,24 @@ def replan(work: DesignContext, course: Course) -> tuple[Course, list[Way], tupl
         A move cannot be made whatever postures it joins; the message names it and the limit it breaks.
     """
     found, notes, first = schedule(work, course, {}), list[str](), course
-    for attempt in range(1, len(ENDS) + FEWER + 1):
+    for attempt in range(1, len(_ENDS) + FEWER + 1):
         bad = [k for k, way in enumerate(found) if way.limit]
         if not bad:
             break
-        if attempt <= len(ENDS):
-            places = sorted({k + ENDS[attempt - 1] for k in bad})
-            course, known = _exchanged(work, course, places, attempt), {k: w for k, w in enumerate(found) if not {k, k + 1} & {*places}}
+        if attempt <= len(_ENDS):
+            places = sorted({k + _ENDS[attempt - 1] for k in bad})
+            course, known = (
+                _exchanged(work, course, places, attempt),
+                {k: w for k, w in enumerate(found) if not {k, k + 1} & {*places}},
+            )
             notes += [_said(course, place, "exchanged for another one", _limit(found, place)) for place in places]
         else:
             place = _spare(course, bad[0], found[bad[0]], first)
             notes.append(_said(course, place, "left out", found[bad[0]].limit))
-            course, known = _without(course, place), {k - (k >= place): w for k, w in enumerate(found) if k not in (place - 1, place)}
+            course, known = (
+                _without(course, place),
+                {k - (k >= place): w for k, w in enumerate(found) if k not in (place - 1, place)},
+            )
         found = schedule(work, course, {k: w for k, w in known.items() if not w.limit}, attempt)
     for k, way in enumerate(found):
         if way.limit:
@@ -137,7 +151,9 @@ def _exchanged(work: DesignContext, course: Course, places: list[int], attempt: 
             x[place] = _another(work, course, place, np.random.default_rng([work.seed, 4, attempt, place]))
         else:
             near, seed = _neighbours(x, place), [work.seed, 5, attempt, place]
-            x[place] = intermediate_posture(work.chain, course.stances[place], near, work.plan.limits, seed=seed, mild=REST[attempt - 1]).x
+            x[place] = intermediate_posture(
+                work.chain, course.stances[place], near, work.plan.limits, seed=seed, mild=REST[attempt - 1]
+            ).x
         course = replace(course, x=x)
     return course
 
@@ -150,11 +166,18 @@ def _another(work: DesignContext, course: Course, place: int, rng: np.random.Gen
     pairs = zip(course.stances, course.x, range(len(course.x)), strict=True)
     others = [posture_at(chain, s, x) for s, x, k in pairs if s.over is None and k != place]
     grams = static_grams(np.array([p.up for p in others]).reshape(-1, len(chain.body.segments), 3))
-    objective = Exciting(blocks, grams, 0.1 * float(blocks.weight.sum()) / (len(others) + 1), SHARPNESS)
+    objective = Exciting(blocks, grams, 0.1 * float(blocks.weight.sum()) / (len(others) + 1), _SHARPNESS)
     starts = [initial_guess(chain, stance, rng) for _ in range(STARTS)]
-    tasks = [work.workers.submit(solve, chain, stance, begin, objective, work.plan.limits, iterations=ITERATIONS) for begin in starts]
+    tasks = [
+        work.workers.submit(solve, chain, stance, begin, objective, work.plan.limits, iterations=_ITERATIONS)
+        for begin in starts
+    ]
     found = [task.result() for task in tasks]
-    same = [x for s, x, k in zip(course.stances, course.x, range(len(course.x)), strict=True) if s.name == stance.name and k != place]
+    same = [
+        x
+        for s, x, k in zip(course.stances, course.x, range(len(course.x)), strict=True)
+        if s.name == stance.name and k != place
+    ]
     kept = [p for p in found if p.violation <= KEPT and not alike(np.array([p.x, *same]))[0, 1:].any()]
     return min(kept, key=lambda posture: criterion(blocks, [*others, posture])).x if kept else course.x[place]
 
@@ -187,14 +210,20 @@ def _limit(found: list[Way], place: int) -> str:
 def _said(course: Course, place: int, what: str, limit: str) -> str:
     number = sum(stance.over is None for stance in course.stances[: place + 1])
     stance, limit = course.stances[place], limit.replace("_", " ")
-    which = f"Posture {number} ({stance_words(stance)})" if stance.over is None else f"The posture in between after posture {number}"
+    which = (
+        f"Posture {number} ({stance_words(stance)})"
+        if stance.over is None
+        else f"The posture in between after posture {number}"
+    )
     return f"{which} was {what}: a move to or from it would have exceeded the limit on {limit}."
 
 
 def _impossible(course: Course, k: int, way: Way) -> str:
     first, second = course.stances[k], course.stances[k + 1]
     return (
-        f"The move from posture {k + 1} to {k + 2} of {len(course.stances)} ({first.name} to {second.name}) cannot be made: "
-        f"{way.limit.replace('_', ' ')} is exceeded even slowly, by way of a posture in between, and with other postures at its ends. "
+        f"The move from posture {k + 1} to {k + 2} of {len(course.stances)} ({first.name} to {second.name}) cannot be "
+        f"made: "
+        f"{way.limit.replace('_', ' ')} is exceeded even slowly, by way of a posture in between, and with other "
+        f"postures at its ends. "
         "Leave these feet out of the protocol, or widen that limit."
     )

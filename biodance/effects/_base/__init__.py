@@ -1,1 +1,3 @@
-"""What effects are made of: the contract of the family (Case, Effect, DiscreteEffect), and what several causes share."""
+"""What effects are made of: the contract of the family (Case, Effect, DiscreteEffect), and what several causes
+share.
+"""

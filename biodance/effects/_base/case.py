@@ -1,4 +1,6 @@
-"""One tracked trial as the effects see it: what was measured, how the body moved, and which wrench that motion needs."""
+"""One tracked trial as the effects see it: what was measured, how the body moved, and which wrench that motion
+needs.
+"""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,15 +20,17 @@ if TYPE_CHECKING:
 
 OF_MOTION = ("regressor", "segments", "poses", "marker_columns", "measured_markers", "marker_residual", "memory")
 """What a case computes once from body, motion and markers, whatever the forces and the parameters."""
-ALIKE = 0.3
-"""Share of a segment's mass by which it may change before the answers to changes of the geometry are computed again: they are that much
-wrong at most, in causes whose sizes are uncertain to a tenth anyway; computing them is half of all work.
+_ALIKE = 0.3
+"""Share of a segment's mass by which it may change before the answers to changes of the geometry are computed again:
+they are that much wrong at most, in causes whose sizes are uncertain to a tenth anyway; computing them is half of all
+work.
 """
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A prepared ``trial`` (plates at marker times) with the ``motion`` of ``body`` in it and the parameters ``phi`` (10N,) in use.
+    """A prepared ``trial`` (plates at marker times) with the ``motion`` of ``body`` in it and the parameters ``phi``
+    (10N,) in use.
 
     ``session_time`` (T,) runs from 0 at the start of the session to 1 at its end, for causes that grow with time.
     """
@@ -42,7 +46,9 @@ class Case:
         object.__setattr__(self, "phi", frozen_array(self.phi, (10 * len(self.body.segments),), "Case.phi"))
         object.__setattr__(self, "session_time", frozen_array(self.session_time, (frames,), "Case.session_time"))
         if self.trial.wrench.time.size != frames:
-            raise TrialRefused(f"Trial {self.trial.name}: {frames} frames of motion, other samples of force; prepare the trial first.")
+            raise TrialRefused(
+                f"Trial {self.trial.name}: {frames} frames of motion, other samples of force; prepare the trial first."
+            )
 
     @cached_property
     def regressor(self) -> Array:
@@ -56,8 +62,8 @@ class Case:
 
     @cached_property
     def predicted(self) -> Array:
-        """(T, 6) N, N·m wrench about the lab origin that the motion needs. Candidate causes are built from this one, never from the
-        measured wrench: columns of measured channels reproduce any residual exactly.
+        """(T, 6) N, N·m wrench about the lab origin that the motion needs. Candidate causes are built from this one,
+        never from the measured wrench: columns of measured channels reproduce any residual exactly.
         """
         return self.regressor @ self.phi
 
@@ -87,7 +93,9 @@ class Case:
 
     @cached_property
     def marker_residual(self) -> Array:
-        """(K, 3) m mean over time of measured minus model marker, in the axes of the marker's segment; zero for a marker never seen."""
+        """(K, 3) m mean over time of measured minus model marker, in the axes of the marker's segment; zero for a
+        marker never seen.
+        """
         columns = list(self.marker_columns)
         segment = [self.body.markers.segment[c] for c in columns]
         apart = self.measured_markers - self.poses.points(segment, self.body.markers.position[columns])
@@ -97,7 +105,9 @@ class Case:
 
     @cached_property
     def memory(self) -> dict[str, object]:
-        """What was computed of the motion and the markers and serves again, by name; nothing that depends on forces or parameters."""
+        """What was computed of the motion and the markers and serves again, by name; nothing that depends on forces
+        or parameters.
+        """
         return {}
 
     @cached_property
@@ -115,7 +125,9 @@ class Case:
         raise UnknownName.of("force plate of this trial", name, [plate.name for plate in self.trial.plates])
 
     def predicted_on(self, plate: Plate) -> Array:
-        """Return the predicted wrench (T, 6) of one plate about its centre, lab axes: its share of the vertical force times the whole."""
+        """Return the predicted wrench (T, 6) of one plate about its centre, lab axes: its share of the vertical
+        force times the whole.
+        """
         total = self.trial.wrench.value[:, 2]
         safe = np.where(np.abs(total) > 1.0, total, 1.0)
         share = np.where(np.abs(total) > 1.0, plate.wrench.value[:, 2] / safe, 1.0 / len(self.trial.plates))
@@ -130,10 +142,12 @@ class Case:
         return self._known(replace(self, trial=changed_trial), *OF_MOTION, "predicted", "geometry")
 
     def with_parameters(self, phi: Array) -> "Case":
-        """Return the case with the parameters ``phi`` (10N,) in use; what moved joints would do stays while the masses are `ALIKE`."""
+        """Return the case with the parameters ``phi`` (10N,) in use; what moved joints would do stays while the
+        masses are `ALIKE`.
+        """
         known = self.__dict__.get("geometry")
         before, now = (np.asarray(p)[::10] for p in (self.phi if known is None else known.phi, phi))
-        same = bool(np.all(np.abs(now - before) <= ALIKE * np.abs(before)))
+        same = bool(np.all(np.abs(now - before) <= _ALIKE * np.abs(before)))
         return self._known(replace(self, phi=phi), *OF_MOTION, *(("geometry",) if same else ()))
 
     def _known(self, other: "Case", *names: str) -> "Case":

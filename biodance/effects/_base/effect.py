@@ -2,11 +2,14 @@
 
 The author of an effect writes its parameters and ONE of two methods; the other one is derived:
 
-- linear in its parameters: ``columns(case)``, what one unit of each parameter adds to the MEASURED wrench; ``transform`` adds them;
-- otherwise: ``transform(case, theta)``, the case that this cause would have produced; ``columns`` is its central difference at zero.
+- linear in its parameters: ``columns(case)``, what one unit of each parameter adds to the MEASURED wrench;
+  ``transform`` adds them;
+- otherwise: ``transform(case, theta)``, the case that this cause would have produced; ``columns`` is its central
+  difference at zero.
 
-What the markers say about a cause is optional: ``marker_columns`` (a change of their mean residual) or ``shown`` (a size by themselves).
-Causes that are found by a check instead of a fit (units, labels, clipping ...) are ``DiscreteEffect``.
+What the markers say about a cause is optional: ``marker_columns`` (a change of their mean residual) or ``shown`` (a
+size by themselves). Causes that are found by a check instead of a fit (units, labels, clipping ...) are
+``DiscreteEffect``.
 """
 
 from dataclasses import dataclass, replace
@@ -31,7 +34,9 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Effect:
-    """One cause at one ``target``: a segment, a channel (``Fz``), a pair (``Fz->My``), a plate and axis (``plate1:x``), or "" for none."""
+    """One cause at one ``target``: a segment, a channel (``Fz``), a pair (``Fz->My``), a plate and axis
+    (``plate1:x``), or "" for none.
+    """
 
     target: str = ""
     name: ClassVar[str] = ""
@@ -39,7 +44,9 @@ class Effect:
     separated_by: ClassVar[str] = ""
     """The movement that tells this cause from its look-alikes, in words for the analyst."""
     placed: ClassVar[bool] = False
-    """Whether joints that a movement placed (`motion.functional_joints`) have taken up a part of this cause before anybody looks."""
+    """Whether joints that a movement placed (`motion.functional_joints`) have taken up a part of this cause before
+    anybody looks.
+    """
     advice: ClassVar[str] = ""
     """What to do in the laboratory to settle it, and how it is mended."""
 
@@ -73,7 +80,9 @@ class Effect:
         return np.array([parameter.typical for parameter in self.parameters])
 
     def columns(self, case: Case) -> Array:
-        """Return (T, 6, p): what one unit of each parameter adds to the measured wrench minus the predicted one, about the lab origin."""
+        """Return (T, 6, p): what one unit of each parameter adds to the measured wrench minus the predicted one,
+        about the lab origin.
+        """
         steps = 1e-3 * np.diag(self.typical)
         return np.stack([(self.added(case, s) - self.added(case, -s)) / (2 * s.max()) for s in steps], axis=2)
 
@@ -84,37 +93,44 @@ class Effect:
         return case.with_added(self.plate_of(case), self.columns(case) @ np.asarray(theta, dtype=float))
 
     def added(self, case: Case, theta: Array) -> Array:
-        """Return (T, 6): what ``transform`` adds to measured minus predicted wrench; overridden only where that is quicker."""
+        """Return (T, 6): what ``transform`` adds to measured minus predicted wrench; overridden only where that is
+        quicker.
+        """
         return self.transform(case, np.asarray(theta, dtype=float)).residual - case.residual
 
     def local(self, case: Case) -> Array | None:
-        """Return (T, 6, k): what one unit of each of k parameters of this trial alone adds, for a cause that comes and goes; None for the
-        others. The k parameters follow one another in time, as many for each of `parameters`.
+        """Return (T, 6, k): what one unit of each of k parameters of this trial alone adds, for a cause that comes and
+        goes; None for the others. The k parameters follow one another in time, as many for each of `parameters`.
         """
         return None
 
     def marker_columns(self, case: Case) -> Array | None:
-        """Return (K, 3, p) m per unit: what one unit adds to ``case.marker_residual``; None where the markers say nothing."""
+        """Return (K, 3, p) m per unit: what one unit adds to ``case.marker_residual``; None where the markers say
+        nothing.
+        """
         return None
 
     def shown(self, *cases: Case) -> Array | None:
-        """Return (p,) the size that the markers of all ``cases`` show by themselves, without any force, NaN for a parameter that they do
-        not show; None where they say nothing.
+        """Return (p,) the size that the markers of all ``cases`` show by themselves, without any force, NaN for a
+        parameter that they do not show; None where they say nothing.
         """
         return None
 
     def removed(self, case: Case, theta: Array) -> Array:
-        """Return (T, 6): what this cause of size ``theta`` (p,) has added to what ``case`` measured, about the lab origin.
+        """Return (T, 6): what this cause of size ``theta`` (p,) has added to what ``case`` measured, about the lab
+        origin.
 
-        By default what it adds to the prediction; a cause that distorts time or frequency undoes itself in what was measured, because
-        it distorts the person's other errors and loads as well.
+        By default what it adds to the prediction; a cause that distorts time or frequency undoes itself in what was
+        measured, because it distorts the person's other errors and loads as well.
         """
         return self.added(case, theta)
 
     def corrected(self, case: Case, theta: Array) -> Case:
-        """Return the case without this cause of size ``theta`` (p,): what would have been measured, or the body that moves right.
+        """Return the case without this cause of size ``theta`` (p,): what would have been measured, or the body that
+        moves right.
 
-        By default the plates lose what was ``removed``; a cause in the body returns another body and its motion instead.
+        By default the plates lose what was ``removed``; a cause in the body returns another body and its motion
+        instead.
         """
         return case.with_added(self.plate_of(case), -self.removed(case, theta))
 
@@ -123,7 +139,9 @@ class Effect:
         return True
 
     def reported(self, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
-        """Return name, value, standard deviation and unit of what a report prints for ``theta`` (p,) with ``sd`` (p,)."""
+        """Return name, value, standard deviation and unit of what a report prints for ``theta`` (p,) with ``sd``
+        (p,).
+        """
         return tuple((p.name, float(t), float(s), p.unit) for p, t, s in zip(self.parameters, theta, sd, strict=True))
 
     def plate_of(self, case: Case):  # type: ignore[no-untyped-def]

@@ -1,4 +1,6 @@
-"""Checks that run before any statistics: a cause that a look at the recording settles is named here, and never fitted."""
+"""Checks that run before any statistics: a cause that a look at the recording settles is named here, and never
+fitted.
+"""
 
 import re
 from abc import ABC, abstractmethod
@@ -11,9 +13,9 @@ from biodance.records import Session
 
 @dataclass(frozen=True)
 class Gate:
-    """One check: ``check`` what was looked at, ``ok``, ``text`` one plain sentence of what was seen; where it is not well the cause:
-    ``effect`` and ``target`` as in the family, and the ``size`` of its ``quantity`` in ``unit`` (NaN = no number); ``advice`` how the
-    effect is mended (filled in by `gates`).
+    """One check: ``check`` what was looked at, ``ok``, ``text`` one plain sentence of what was seen; where it is not
+    well the cause: ``effect`` and ``target`` as in the family, and the ``size`` of its ``quantity`` in ``unit`` (NaN =
+    no number); ``advice`` how the effect is mended (filled in by `gates`).
     """
 
     check: str
@@ -29,14 +31,18 @@ class Gate:
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """What the checks look at: the ``session`` as read, and the tracked ``cases`` (none where no body could be scaled)."""
+    """What the checks look at: the ``session`` as read, and the tracked ``cases`` (none where no body could be
+    scaled).
+    """
 
     session: Session
     cases: tuple[Case, ...] = ()
 
 
 class DiscreteEffect(ABC):
-    """One cause that is there or not; the checks that find it are its ``look``, and a file without it is refused when it is found."""
+    """One cause that is there or not; the checks that find it are its ``look``, and a file without it is refused
+    when it is found.
+    """
 
     name: ClassVar[str] = ""
     separated_by: ClassVar[str] = ""
@@ -60,8 +66,8 @@ Found = tuple[str, str, str]
 
 
 def decided(session: Session, patterns: dict[str, str]) -> tuple[Found, ...]:
-    """Return each different decision of a session once: ``patterns`` are regular expressions by what they speak of (``corners``); a group
-    in the expression is the number. The target is the plate's name and what, or only what.
+    """Return each different decision of a session once: ``patterns`` are regular expressions by what they speak of
+    (``corners``); a group in the expression is the number. The target is the plate's name and what, or only what.
     """
     found: dict[tuple[str, str], Found] = {}
     for trial in session.trials:
@@ -78,7 +84,9 @@ def decided(session: Session, patterns: dict[str, str]) -> tuple[Found, ...]:
 
 
 def overruled(session: Session, patterns: dict[str, str], *, check: str, effect: str) -> tuple[Gate, ...]:
-    """Return a failed ``check`` for each different decision that the reader took against the files, with ``effect`` as its cause."""
+    """Return a failed ``check`` for each different decision that the reader took against the files, with ``effect``
+    as its cause.
+    """
     return tuple(
         Gate(check, False, sentence, effect, target, float(number) if number else float("nan"))
         for target, sentence, number in decided(session, patterns)

@@ -1,6 +1,8 @@
-"""Causes in the body's geometry: what a moved joint or marker changes in the tracked posture, the wrench and the markers' residuals.
+"""Causes in the body's geometry: what a moved joint or marker changes in the tracked posture, the wrench and the
+markers' residuals.
 
-Computed at 25 Hz or more (the low-pass leaves nothing above 10 Hz) and interpolated; one factorisation per frame serves all causes.
+Computed at 25 Hz or more (the low-pass leaves nothing above 10 Hz) and interpolated; one factorisation per frame serves
+all causes.
 """
 
 from dataclasses import dataclass
@@ -20,9 +22,9 @@ from biodance.records import Array, Index
 if TYPE_CHECKING:
     from biodance.effects._base.case import Case
 
-RATE = 25.0
+_RATE = 25.0
 """Hz, at least, of the frames in which the answer is computed."""
-ENDS = 10
+_ENDS = 10
 """Frames at each end of the trial that are all computed."""
 MEANS = 60
 """Frames, about, over which the mean marker residual is taken: it changes slowly."""
@@ -32,10 +34,10 @@ MEANS = 60
 class Geometry:
     """What a trial says about its body's geometry.
 
-    ``time`` (F,) s of the chosen frames, ``wanted`` (T,) s of all; ``answer`` of the posture; ``matter`` P, Q, S (F, 9, nv) per unit of
-    every coordinate; ``direct`` (F, 9, N, 3) per metre of every segment; ``turns`` (F, N, 3, nv) rad of the segments per unit of every
-    coordinate; ``seen`` (F, K) 1 where a marker was seen; ``phi`` (10N,) the parameters of the matter;
-    ``smoothed`` the low-pass of the motion.
+    ``time`` (F,) s of the chosen frames, ``wanted`` (T,) s of all; ``answer`` of the posture; ``matter`` P, Q, S (F, 9,
+    nv) per unit of every coordinate; ``direct`` (F, 9, N, 3) per metre of every segment; ``turns`` (F, N, 3, nv) rad of
+    the segments per unit of every coordinate; ``seen`` (F, K) 1 where a marker was seen; ``phi`` (10N,) the parameters
+    of the matter; ``smoothed`` the low-pass of the motion.
     """
 
     time: Array
@@ -56,12 +58,15 @@ class Geometry:
         moved = np.zeros((frames, count, 3, count, 3))
         moved[:, range(count), :, range(count)] = np.moveaxis(answer.pose.rotation[:, list(answer.segment)], 1, 0)
         posture = answer.follow(answer.marker_slopes())
-        return Changes(self._wrench(self.matter @ posture), self._residual(posture, moved.reshape(frames, count, 3, -1)))
+        return Changes(
+            self._wrench(self.matter @ posture), self._residual(posture, moved.reshape(frames, count, 3, -1))
+        )
 
     @cached_property
     def joint_changes(self) -> "Changes":
-        """What one metre does at every anatomical joint, P = 4 per joint: its centre along the three axes of the segment nearer to the
-        root, all else kept in the neutral posture; and that segment longer towards the joint, all beyond it carried along.
+        """What one metre does at every anatomical joint, P = 4 per joint: its centre along the three axes of the
+        segment nearer to the root, all else kept in the neutral posture; and that segment longer towards the joint, all
+        beyond it carried along.
         """
         answer, slopes, direct, moved = self.answer, [], [], []
         hanging = below(answer.body)
@@ -78,8 +83,9 @@ class Geometry:
         return wrench_of(nine, self.time, self.wanted, smoothed=self.smoothed, gravity=self.answer.body.gravity)
 
     def _residual(self, posture: Array, moved: Array) -> Array:
-        """Return the change (K, 3, P) m of the mean marker residual (measured less model, segment axes) when the model's markers move by
-        ``moved`` (F, K, 3, P) m at fixed posture and the posture changes by ``posture`` (F, nv, P).
+        """Return the change (K, 3, P) m of the mean marker residual (measured less model, segment axes) when the
+        model's markers move by ``moved`` (F, K, 3, P) m at fixed posture and the posture changes by ``posture`` (F, nv,
+        P).
         """
         answer, few = self.answer, slice(None, None, max(1, len(self.time) // MEANS))
         segment, (frames, count) = list(answer.segment), answer.weight[few].shape
@@ -97,8 +103,8 @@ class Geometry:
 
 @dataclass(frozen=True, eq=False)
 class Changes:
-    """Per metre of P changes in the body's geometry: of the wrench (T, 6, P) about the lab origin that the tracked motion needs, and of the
-    mean marker residual (K, 3, P), measured less model in segment axes.
+    """Per metre of P changes in the body's geometry: of the wrench (T, 6, P) about the lab origin that the tracked
+    motion needs, and of the mean marker residual (K, 3, P), measured less model in segment axes.
     """
 
     wrench: Array
@@ -125,7 +131,9 @@ def geometry(case: "Case") -> Geometry:
     seen = np.asarray(np.isfinite(measured).all(axis=2), dtype=float)
     weight = seen * body.markers.weight[columns]
     apart = weight[..., None] * np.where(seen[..., None] > 0, markers - measured, 0.0)
-    answer = PostureAnswer(body, pose, case.motion.q[every, body.nq - len(body.joints) :], segment, markers, apart, weight)
+    answer = PostureAnswer(
+        body, pose, case.motion.q[every, body.nq - len(body.joints) :], segment, markers, apart, weight
+    )
     com = pose.points(list(range(len(body.segments))), centres_of(case.phi))
     place, turn = jacobian(body, pose, list(range(len(body.segments))), com)
     shape = (len(com), len(body.segments), 3, body.nv)
@@ -146,8 +154,8 @@ def geometry(case: "Case") -> Geometry:
 
 def _frames(count: int, rate: float) -> Index:
     """Return the frames at RATE or more, and all of them at both ends, where a coarse spline would err."""
-    chosen = np.arange(count) % max(1, int(rate / RATE + 1e-6)) == 0
-    chosen[:ENDS] = chosen[-ENDS:] = True
+    chosen = np.arange(count) % max(1, int(rate / _RATE + 1e-6)) == 0
+    chosen[:_ENDS] = chosen[-_ENDS:] = True
     return np.flatnonzero(chosen)
 
 

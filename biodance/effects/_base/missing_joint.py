@@ -1,6 +1,8 @@
-"""A joint that the body has and the model lacks: tracked again with it, to see how it moves and what that changes in the wrench.
+"""A joint that the body has and the model lacks: tracked again with it, to see how it moves and what that changes in
+the wrench.
 
-The author of such a cause writes the body with the joint (``loosened``) and the angle that everybody moves it by (``natural``).
+The author of such a cause writes the body with the joint (``loosened``) and the angle that everybody moves it by
+(``natural``).
 """
 
 from abc import ABC, abstractmethod
@@ -25,16 +27,16 @@ from biodance.motion.smoothing import smooth
 from biodance.motion.track import track
 from biodance.records import Array, Markers
 
-RATE = 25.0
+_RATE = 25.0
 """Hz, at least: the low-pass leaves nothing that needs more."""
 
-SLACK = 0.05
+_SLACK = 0.05
 """Weight of markers that are not to be relied on, as a share of their own."""
 
 
 class MissingJoint(Effect, ABC):
-    """A joint that turns by an angle (rad rms per axis, the first parameter) in the course of time that its markers show; the second
-    parameter is what the wrench shows beyond that.
+    """A joint that turns by an angle (rad rms per axis, the first parameter) in the course of time that its markers
+    show; the second parameter is what the wrench shows beyond that.
     """
 
     natural: ClassVar[float] = 0.0
@@ -51,7 +53,9 @@ class MissingJoint(Effect, ABC):
         return ("",) if cls.loosened(case) is not None else ()
 
     def columns(self, case: Case) -> Array:
-        """Return (T, 6, 2) the wrench that the joint's motion adds, per radian: of the angle shown, and of more than that."""
+        """Return (T, 6, 2) the wrench that the joint's motion adds, per radian: of the angle shown, and of more than
+        that.
+        """
         found = _movement(case, self)
         if found is None:
             return np.zeros((case.motion.time.size, 6, 2))
@@ -65,24 +69,30 @@ class MissingJoint(Effect, ABC):
         return np.stack([nearer, np.zeros_like(nearer)], axis=2)
 
     def shown(self, *cases: Case) -> Array:
-        """Return (2,) rad: the angle in all ``cases`` that is left when the natural one is taken off (squares of independent movements add
-        up), and NaN for what only the wrench can show.
+        """Return (2,) rad: the angle in all ``cases`` that is left when the natural one is taken off (squares of
+        independent movements add up), and NaN for what only the wrench can show.
         """
         found = [(case.motion.time.size, _movement(case, self)) for case in cases]
-        square = sum(frames * one.angle**2 for frames, one in found if one is not None) / sum(frames for frames, _ in found)
+        square = sum(frames * one.angle**2 for frames, one in found if one is not None) / sum(
+            frames for frames, _ in found
+        )
         return np.array([np.sqrt(max(square - self.natural**2, 0.0)), np.nan])
 
     def corrected(self, case: Case, theta: Array) -> Case:
         """Return the trial tracked with the body that has the joint."""
         body = self.loosened(case)
-        return case if body is None else replace(case, body=body, motion=track(body, case.trial), phi=_parameters(case, body))
+        return (
+            case
+            if body is None
+            else replace(case, body=body, motion=track(body, case.trial), phi=_parameters(case, body))
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class Movement:
-    """A trial tracked with the joint, at ``time`` (F,) s: ``loose`` (F, 6, 10N') regressor of the ``body`` with it, ``stiff`` (F, 6, 10N)
-    of the one without; ``markers`` (K, 3) m by which the model's markers come nearer on average, in segment axes; ``angle`` rad rms of the
-    joint's axes.
+    """A trial tracked with the joint, at ``time`` (F,) s: ``loose`` (F, 6, 10N') regressor of the ``body`` with it,
+    ``stiff`` (F, 6, 10N) of the one without; ``markers`` (K, 3) m by which the model's markers come nearer on average,
+    in segment axes; ``angle`` rad rms of the joint's axes.
     """
 
     time: Array
@@ -112,7 +122,9 @@ def _movement(case: Case, effect: MissingJoint) -> Movement | None:
 
 @dataclass(frozen=True, eq=False)
 class _Slow:
-    """A trial at about `RATE`: ``markers`` low-passed, postures ``q`` (F, nq) as tracked, and the regressor (F, 6, 10N) of them."""
+    """A trial at about `RATE`: ``markers`` low-passed, postures ``q`` (F, nq) as tracked, and the regressor (F, 6,
+    10N) of them.
+    """
 
     markers: Markers
     q: Array
@@ -123,7 +135,7 @@ class _Slow:
 def _slow(case: Case) -> _Slow:
     """Return the trial at about `RATE`, as it was tracked."""
     if "slow" not in case.memory:
-        every = slice(None, None, max(1, int(case.motion.rate / RATE + 1e-6)))
+        every = slice(None, None, max(1, int(case.motion.rate / _RATE + 1e-6)))
         markers, time = case.trial.markers, case.motion.time[every]
         assert markers is not None
         usual = motion_filter(case.trial.settings)
@@ -148,12 +160,16 @@ def _tracked(case: Case, body: Body) -> Movement:
 
 
 def _markers(case: Case, body: Body, loose: Array, stiff: Array) -> Array:
-    """Return (K, 3) m: the mean step of the model's markers from the postures without to those with the joint, in segment axes."""
+    """Return (K, 3) m: the mean step of the model's markers from the postures without to those with the joint, in
+    segment axes.
+    """
     columns = list(case.marker_columns)
     places, markers = case.body.markers, body.markers
     before, after = poses(case.body, stiff), poses(body, loose)
     segment = [places.segment[c] for c in columns]
-    step = after.points([markers.segment[c] for c in columns], markers.position[columns]) - before.points(segment, places.position[columns])
+    step = after.points([markers.segment[c] for c in columns], markers.position[columns]) - before.points(
+        segment, places.position[columns]
+    )
     return np.asarray(np.einsum("tkij,tki->kj", before.rotation[:, segment], step) / len(step))
 
 
@@ -165,8 +181,8 @@ def _parameters(case: Case, body: Body) -> Array:
 
 
 def share_of_body(body: Body, segment: str, *, top: Array, bottom: Array) -> Array:
-    """Return the ten parameters (10,) of a part of the trunk between ``bottom`` and ``top`` (3,) m, by its name in de Leva's table (mean of
-    women and men), in the frame of the two points; masses in proportion to the body's.
+    """Return the ten parameters (10,) of a part of the trunk between ``bottom`` and ``top`` (3,) m, by its name in de
+    Leva's table (mean of women and men), in the frame of the two points; masses in proportion to the body's.
     """
     table = read_segment_table("de_leva_1996")
     rows = [
@@ -190,6 +206,8 @@ def shoulders(body: Body) -> Array | None:
 
 
 def doubting(body: Body, names: Iterable[str]) -> Body:
-    """Return the body whose markers ``names`` hardly count: what they show is not this joint, but skin or another joint."""
-    weight = np.where(np.isin(body.markers.names, list(names)), SLACK, 1.0) * body.markers.weight
+    """Return the body whose markers ``names`` hardly count: what they show is not this joint, but skin or another
+    joint.
+    """
+    weight = np.where(np.isin(body.markers.names, list(names)), _SLACK, 1.0) * body.markers.weight
     return replace(body, markers=replace(body.markers, weight=weight))

@@ -1,7 +1,7 @@
 """A mass on a spring and a damper that rides on a moving point: what it adds to the wrench.
 
-Relative to the point, x'' + 2 damping w x' + w² x = -a with w = 2 pi frequency and a the point's acceleration; gravity only sets the place
-of rest. The ground then carries m (a + x'') instead of m a, at the place c + x instead of c.
+Relative to the point, x'' + 2 damping w x' + w² x = -a with w = 2 pi frequency and a the point's acceleration; gravity
+only sets the place of rest. The ground then carries m (a + x'') instead of m a, at the place c + x instead of c.
 """
 
 import numpy as np
@@ -13,22 +13,27 @@ from biodance.records import Array
 
 
 def relative_motion(acceleration: Array, rate: float, *, frequency: float, damping: float) -> tuple[Array, Array]:
-    """Return x (T, n) m and x'' (T, n) m/s² of the mass, exact for an ``acceleration`` (T, n) m/s² that is linear between samples.
+    """Return x (T, n) m and x'' (T, n) m/s² of the mass, exact for an ``acceleration`` (T, n) m/s² that is linear
+    between samples.
 
-    ``rate`` Hz; ``frequency`` Hz and ``damping`` (1 = critical) of the free mass, which starts at rest on the moving point.
+    ``rate`` Hz; ``frequency`` Hz and ``damping`` (1 = critical) of the free mass, which starts at rest on the moving
+    point.
     """
     w = 2 * np.pi * frequency
     system = (np.array([[0, 1], [-w * w, -2 * damping * w]]), np.array([[0], [-1]]), np.eye(2), np.zeros((2, 1)))
     A, B, C, D, _ = cont2discrete(system, 1 / rate, method="foh")
     numerators, denominator = ss2tf(A, B, C, D)
     place, speed = (
-        lfilter(b, denominator, acceleration, axis=0, zi=lfilter_zi(b, denominator)[:, None] * acceleration[:1])[0] for b in numerators
+        lfilter(b, denominator, acceleration, axis=0, zi=lfilter_zi(b, denominator)[:, None] * acceleration[:1])[0]
+        for b in numerators
     )
     return place, -acceleration - w * w * place - 2 * damping * w * speed
 
 
 def point_motion(case: Case, segment: int, local: Array) -> tuple[Array, Array]:
-    """Return place (T, 3) m and acceleration (T, 3) m/s² of the point ``local`` (3,) m of a segment, lab frame, without gravity."""
+    """Return place (T, 3) m and acceleration (T, 3) m/s² of the point ``local`` (3,) m of a segment, lab frame,
+    without gravity.
+    """
     move = case.segments
     arm = move.rotation[:, segment] @ local
     omega, alpha = move.angular_velocity[:, segment], move.angular_acceleration[:, segment]
@@ -37,6 +42,8 @@ def point_motion(case: Case, segment: int, local: Array) -> tuple[Array, Array]:
 
 
 def riding_wrench(place: Array, acceleration: Array, moved: tuple[Array, Array], *, gravity: Array) -> Array:
-    """Return (T, 6) per kilogram about the lab origin: what the relative motion ``moved`` (x, x'') adds at a point (T, 3)."""
+    """Return (T, 6) per kilogram about the lab origin: what the relative motion ``moved`` (x, x'') adds at a point
+    (T, 3).
+    """
     x, relative = moved
     return np.concatenate([relative, cross(place, relative) + cross(x, acceleration - gravity)], axis=1)

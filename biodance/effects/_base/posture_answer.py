@@ -1,9 +1,9 @@
 """How the tracked posture answers to a change of the body's geometry, exactly to first order, without tracking again.
 
-The tracked posture makes the cost C = 1/2 sum w |p - m|² stationary. When the geometry changes by a parameter, so does the gradient g, and
-the posture follows by dq = -H^-1 dg (implicit function theorem), with H the exact second derivatives (docs/derivations.md, "Answer of the
-posture"). The coordinates are the lab-frame tangent of ``twins.jacobian``: root place, root turn, angles. H is inverted once per frame and
-serves every cause.
+The tracked posture makes the cost C = 1/2 sum w |p - m|² stationary. When the geometry changes by a parameter, so does
+the gradient g, and the posture follows by dq = -H^-1 dg (implicit function theorem), with H the exact second
+derivatives (docs/derivations.md, "Answer of the posture"). The coordinates are the lab-frame tangent of
+``twins.jacobian``: root place, root turn, angles. H is inverted once per frame and serves every cause.
 """
 
 from dataclasses import dataclass
@@ -19,13 +19,15 @@ from biodance.records import Array
 AT_LIMIT = 5e-3
 """rad: a joint so near to a limit that its markers push it against is held there."""
 RIDGE = 1e-7
-"""Added to H's diagonal in units of the marker weight (angles: times 0.01 m²), so that open coordinates stay where they are."""
+"""Added to H's diagonal in units of the marker weight (angles: times 0.01 m²), so that open coordinates stay where
+they are.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class PostureAnswer:
-    """F frames of a tracked body: ``pose``; ``angles`` (F, n) rad; ``segment`` (K) and ``markers`` (F, K, 3) m of the model; ``apart``
-    (F, K, 3) m weight times (model less measured), zero where hidden; ``weight`` (F, K).
+    """F frames of a tracked body: ``pose``; ``angles`` (F, n) rad; ``segment`` (K) and ``markers`` (F, K, 3) m of the
+    model; ``apart`` (F, K, 3) m weight times (model less measured), zero where hidden; ``weight`` (F, K).
     """
 
     body: Body
@@ -44,7 +46,9 @@ class PostureAnswer:
     @cached_property
     def axes(self) -> Array:
         """(F, 3 + n, 3) axes of all turns, lab frame: those of the root (if it is free), then the joints."""
-        joints = np.stack([self.pose.joint_rotation[:, j] @ joint.axis for j, joint in enumerate(self.body.joints)], axis=1)
+        joints = np.stack(
+            [self.pose.joint_rotation[:, j] @ joint.axis for j, joint in enumerate(self.body.joints)], axis=1
+        )
         root = np.broadcast_to(np.eye(3)[: self.body.n_root // 2], (len(joints), self.body.n_root // 2, 3))
         return np.concatenate([root, joints], axis=1)
 
@@ -61,7 +65,9 @@ class PostureAnswer:
         H = np.swapaxes(self.tangent.reshape(wide.shape), 1, 2) @ wide
         turns = slice(self.body.n_root // 2, None)
         H[:, turns, turns] += self._bending()
-        size = np.maximum(self.weight.sum(axis=1), 1e-3)[:, None] * np.where(np.arange(self.body.nv) < self.body.n_root // 2, 1.0, 0.01)
+        size = np.maximum(self.weight.sum(axis=1), 1e-3)[:, None] * np.where(
+            np.arange(self.body.nv) < self.body.n_root // 2, 1.0, 0.01
+        )
         held = self._held()
         H[:, held] = H[:, :, held] = 0.0
         diagonal = np.einsum("fii->fi", H)
@@ -71,12 +77,14 @@ class PostureAnswer:
         return np.asarray(inverse)
 
     def _bending(self) -> Array:
-        """Return (F, 3 + n, 3 + n): the part of H by which residuals bend the cost: a_i . (X_j - tr X_j) a_j for i above j, with X_j the
-        sum of w (p - o_j) (p - m)' over what hangs on j.
+        """Return (F, 3 + n, 3 + n): the part of H by which residuals bend the cost: a_i . (X_j - tr X_j) a_j for i
+        above j, with X_j the sum of w (p - o_j) (p - m)' over what hangs on j.
         """
         root = self.body.n_root // 2
         hangs = np.concatenate([np.ones((root, len(self.segment))), self.hangs])
-        origin = np.concatenate([np.repeat(self.pose.root_position[:, None], root, axis=1), self.pose.joint_position], axis=1)
+        origin = np.concatenate(
+            [np.repeat(self.pose.root_position[:, None], root, axis=1), self.pose.joint_position], axis=1
+        )
         pull = hangs @ self.apart
         outer = (self.markers[..., :, None] * self.apart[..., None, :]).reshape(*self.apart.shape[:2], 9)
         X = (hangs @ outer).reshape(*pull.shape[:2], 3, 3) - origin[..., :, None] * pull[..., None, :]
@@ -101,7 +109,9 @@ class PostureAnswer:
         return table
 
     def _held(self) -> NDArray[np.bool_]:
-        """Return (nv,) True where a joint rests against a limit for most of the trial: single frames would only make the answer jump."""
+        """Return (nv,) True where a joint rests against a limit for most of the trial: single frames would only make
+        the answer jump.
+        """
         slope = np.einsum("fkiv,fki->fv", self.tangent, self.apart)[:, self.body.n_root :]
         low, high = self.angles <= self.body.limits.lower + AT_LIMIT, self.angles >= self.body.limits.upper - AT_LIMIT
         pressed = (low & (slope > 0)) | (high & (slope < 0))
@@ -112,7 +122,9 @@ class PostureAnswer:
         return -self.inverse @ slope
 
     def marker_slopes(self) -> Array:
-        """Return (F, nv, 3K): the gradient's change per metre of every model marker's place in the axes of its segment."""
+        """Return (F, nv, 3K): the gradient's change per metre of every model marker's place in the axes of its
+        segment.
+        """
         turn = self.pose.rotation[:, list(self.segment)]
         pushed = np.moveaxis(self.tangent * self.weight[:, :, None, None], 3, 1)
         turning = np.concatenate([np.ones((self.body.n_root // 2, len(self.segment))), self.hangs])
@@ -121,8 +133,8 @@ class PostureAnswer:
         return np.asarray(np.einsum("fvki,fkij->fvkj", pushed, turn, optimize=True).reshape(*pushed.shape[:2], -1))
 
     def joint_slopes(self, chain: tuple[int, ...], centre: Array, carried: Array) -> Array:
-        """Return (F, nv, P): the gradient's change when the common origin of the joints ``chain`` moves by ``centre`` and all that hangs
-        on them by ``carried`` (F, 3, P) m, lab frame.
+        """Return (F, nv, P): the gradient's change when the common origin of the joints ``chain`` moves by ``centre``
+        and all that hangs on them by ``carried`` (F, 3, P) m, lab frame.
         """
         on, root = self.hangs[chain[-1]] > 0, self.body.n_root // 2
         pushed = np.swapaxes((self.tangent[:, on] * self.weight[:, on, None, None]).sum(axis=1), 1, 2) @ carried

@@ -1,4 +1,5 @@
-"""The bytes of AMTI NetForce's .bsf files, version 100 (ADC counts) and 105 (engineering units); little-endian, imperial units throughout.
+"""The bytes of AMTI NetForce's .bsf files, version 100 (ADC counts) and 105 (engineering units); little-endian,
+imperial units throughout.
 
 Layout: NetForce manual, appendix B, as read by the Biomechanical ToolKit (version 100) and BMC's AMTIbsf (version 105).
 """
@@ -18,17 +19,23 @@ from biodance.records import Array
 def _layout(text: str) -> Any:
     """Return the packed little-endian record of ``name type [count]`` entries between commas."""
     entries = [entry.split() for entry in text.split(",")]
-    return np.dtype([(name, kind if kind[0] == "S" else "<" + kind, *map(int, count)) for name, kind, *count in entries])
+    return np.dtype(
+        [(name, kind if kind[0] == "S" else "<" + kind, *map(int, count)) for name, kind, *count in entries]
+    )
 
 
 MAIN = _layout(
-    "version i4, size i4, plates i4, instruments i4, name S100, date S12, birth S12, weight f8, height f8, sex S4, trials i4, seconds f8, "
-    "zero_method i4, weight_method i4, delay i4, trigger_method i4, trigger_channel i4, before i4, after i4, trigger_value f8, gap S4, "
+    "version i4, size i4, plates i4, instruments i4, name S100, date S12, birth S12, weight f8, height f8, sex S4, "
+    "trials i4, seconds f8, "
+    "zero_method i4, weight_method i4, delay i4, trigger_method i4, trigger_channel i4, before i4, after i4, "
+    "trigger_value f8, gap S4, "
     "rate i4, protocol S150, test S200, comments S150, description S150, examiner S100, gap2 S2, metric i4"
 )
 INSTRUMENT = _layout(
-    "size i4, serial i4, layout i4, model S20, channels i4, indices i4 4, length f4, width f4, offset f4 3, sensitivity f4 32, "
-    "numbers i4 32, turn f4 16, distance f4 3, gain f4 32, excitation f4 32, counts_per_volt f4 32, timing f4 5, zero i4 32, rate i4, "
+    "size i4, serial i4, layout i4, model S20, channels i4, indices i4 4, length f4, width f4, offset f4 3, "
+    "sensitivity f4 32, "
+    "numbers i4 32, turn f4 16, distance f4 3, gain f4 32, excitation f4 32, counts_per_volt f4 32, timing f4 5, zero "
+    "i4 32, rate i4, "
     "trigger f4, end f4"
 )
 SAMPLE = {100: np.dtype("<i2"), 105: np.dtype("<f8")}
@@ -39,7 +46,9 @@ MOST_PLATES, MOST_CHANNELS, FASTEST = 16, 32, 100_000
 
 @dataclass(frozen=True, eq=False)
 class BsfPlate:
-    """One plate: ``load`` (S, 6) N, N·m applied to it, plate axes; ``size`` (x, y) m; ``offset``, ``distance`` (3,) m from the header."""
+    """One plate: ``load`` (S, 6) N, N·m applied to it, plate axes; ``size`` (x, y) m; ``offset``, ``distance`` (3,)
+    m from the header.
+    """
 
     model: str
     serial: int
@@ -51,7 +60,9 @@ class BsfPlate:
 
 @dataclass(frozen=True, eq=False)
 class BsfContent:
-    """What a .bsf file holds: ``version``, ``rate`` Hz, ``main`` header record, ``plates``, and the other instruments' channel count."""
+    """What a .bsf file holds: ``version``, ``rate`` Hz, ``main`` header record, ``plates``, and the other
+    instruments' channel count.
+    """
 
     version: int
     rate: float
@@ -66,7 +77,8 @@ def parse_bsf(content: bytes, path: Path) -> BsfContent:
     Raises
     ------
     FileRefused
-        The bytes are no .bsf file of version 100 or 105, the sizes contradict each other, or a plate has no calibration.
+        The bytes are no .bsf file of version 100 or 105, the sizes contradict each other, or a plate has no
+        calibration.
     """
     main = _main_header(content, path)
     version, rate = int(main["version"]), int(main["rate"])
@@ -79,7 +91,8 @@ def parse_bsf(content: bytes, path: Path) -> BsfContent:
     for i, header in enumerate(headers[: int(main["plates"])]):
         if channels[i] != 6:
             raise FileRefused(
-                f"{path}: plate {i + 1} has {channels[i]} channels, legal are 6 (Fx to Mz). Export the trial as text instead."
+                f"{path}: plate {i + 1} has {channels[i]} channels, legal are 6 (Fx to Mz). Export the trial as text "
+                f"instead."
             )
         block = data[:, first[i] : first[i] + 6].astype(float)
         factor = _counts_to_pounds(header, i + 1, path) if version == 100 else np.ones(6)
@@ -91,11 +104,14 @@ def _main_header(content: bytes, path: Path) -> Any:
     """Return the main header after checking every count in it."""
     if len(content) < MAIN.itemsize:
         raise FileRefused(
-            f"{path}: has {len(content)} bytes, the header of a .bsf file alone has {MAIN.itemsize}. The file is cut off: copy it again."
+            f"{path}: has {len(content)} bytes, the header of a .bsf file alone has {MAIN.itemsize}. The file is cut "
+            f"off: copy it again."
         )
     main = np.frombuffer(content, MAIN, 1)[0]
     if int(main["version"]) not in SAMPLE:
-        raise FileRefused(f"{path}: is no .bsf file of version 100 or 105 (it says {int(main['version'])}). Check what the file is.")
+        raise FileRefused(
+            f"{path}: is no .bsf file of version 100 or 105 (it says {int(main['version'])}). Check what the file is."
+        )
     legal = {
         "number of plates": (int(main["plates"]), 1, MOST_PLATES),
         "number of other instruments": (int(main["instruments"]), 0, MOST_PLATES),
@@ -104,9 +120,13 @@ def _main_header(content: bytes, path: Path) -> Any:
     }
     for what, (value, low, high) in legal.items():
         if not low <= value <= high:
-            raise FileRefused(f"{path}: the {what} is {value}, legal are {low} to {high}. The file is damaged: export it again.")
+            raise FileRefused(
+                f"{path}: the {what} is {value}, legal are {low} to {high}. The file is damaged: export it again."
+            )
     if not 0 < float(main["seconds"]) < 1e6:
-        raise FileRefused(f"{path}: the trial lasts {float(main['seconds']):g} s. The file is damaged: export it again.")
+        raise FileRefused(
+            f"{path}: the trial lasts {float(main['seconds']):g} s. The file is damaged: export it again."
+        )
     return main
 
 
@@ -115,11 +135,17 @@ def _instruments(content: bytes, main: Any, path: Path) -> tuple[list[Any], int]
     at, headers = 4 + int(main["size"]), []
     for number in range(int(main["plates"]) + int(main["instruments"])):
         if at + INSTRUMENT.itemsize > len(content):
-            raise FileRefused(f"{path}: ends inside the header of instrument {number + 1}. The file is cut off: copy it again.")
-        header = np.frombuffer(content, INSTRUMENT, 1, offset=at)[0]
-        if not INSTRUMENT.itemsize <= int(header["size"]) <= 10 * INSTRUMENT.itemsize or not 1 <= int(header["channels"]) <= MOST_CHANNELS:
             raise FileRefused(
-                f"{path}: the header of instrument {number + 1} says {int(header['size'])} bytes and {int(header['channels'])} "
+                f"{path}: ends inside the header of instrument {number + 1}. The file is cut off: copy it again."
+            )
+        header = np.frombuffer(content, INSTRUMENT, 1, offset=at)[0]
+        if (
+            not INSTRUMENT.itemsize <= int(header["size"]) <= 10 * INSTRUMENT.itemsize
+            or not 1 <= int(header["channels"]) <= MOST_CHANNELS
+        ):
+            raise FileRefused(
+                f"{path}: the header of instrument {number + 1} says {int(header['size'])} bytes and "
+                f"{int(header['channels'])} "
                 f"channels. Export it again."
             )
         headers.append(header)
@@ -132,24 +158,31 @@ def _data(content: bytes, samples: int, channels: int, kind: Any, start: int, he
     need, found = samples * channels * kind.itemsize, len(content) - start
     if found != need or not samples:
         raise FileRefused(
-            f"{path}: {found} bytes follow the {headers + 1} headers, {samples} samples of {channels} channels need {need}. The "
+            f"{path}: {found} bytes follow the {headers + 1} headers, {samples} samples of {channels} channels need "
+            f"{need}. The "
             f"file is cut off or "
             "damaged: copy or export it again."
         )
     data = np.frombuffer(content, kind, samples * channels, offset=start).reshape(samples, channels)
     if not np.isfinite(data).all():
         raise FileRefused(
-            f"{path}: sample {int(np.argwhere(np.logical_not(np.isfinite(data)))[0][0]) + 1} is not a number. Export it again."
+            f"{path}: sample {int(np.argwhere(np.logical_not(np.isfinite(data)))[0][0]) + 1} is not a number. Export "
+            f"it again."
         )
     return data
 
 
 def _counts_to_pounds(header: Any, number: int, path: Path) -> Array:
-    """Return the factors (6,) from ADC counts to lbf and in·lbf: 1e6 / (sensitivity * gain * excitation * counts per volt)."""
-    product = np.prod([header[name][:6].astype(float) for name in ("sensitivity", "gain", "excitation", "counts_per_volt")], axis=0)
+    """Return the factors (6,) from ADC counts to lbf and in·lbf: 1e6 / (sensitivity * gain * excitation * counts per
+    volt).
+    """
+    product = np.prod(
+        [header[name][:6].astype(float) for name in ("sensitivity", "gain", "excitation", "counts_per_volt")], axis=0
+    )
     if not np.isfinite(product).all() or (product == 0).any():
         raise FileRefused(
-            f"{path}: plate {number} holds ADC counts but a calibration value is 0. Enter the calibration in NetForce and save again."
+            f"{path}: plate {number} holds ADC counts but a calibration value is 0. Enter the calibration in NetForce "
+            f"and save again."
         )
     return MICROVOLT / product
 

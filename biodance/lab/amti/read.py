@@ -12,7 +12,7 @@ from biodance.lab.plain_text import read_bytes, sha256
 from biodance.lab.plates.corners import LONGEST_SIDE, SHORTEST_SIDE
 from biodance.lab.plates.parameters import INCH, POUND
 from biodance.lab.plates.signs import DEEPEST, gravity_sign, sensor_below
-from biodance.lab.plates.wrench import moved
+from biodance.lab.plates.wrench import about_reference
 from biodance.lab.plates.zero import find_baseline
 from biodance.records import Array, Plate, Role, Source, Trial, Wrench
 from biodance.settings import STANDARD_GRAVITY
@@ -23,23 +23,32 @@ OWN_ZERO = 5.0  # N: an unloaded reading up to here is what the maker's own zero
 
 
 def amti_plate(
-    number: int, channels: Array, *, rate: float, size: tuple[float, float], centre: Array, vector: Array, said: tuple[str, ...]
+    number: int,
+    channels: Array,
+    *,
+    rate: float,
+    size: tuple[float, float],
+    centre: Array,
+    vector: Array,
+    said: tuple[str, ...],
 ) -> tuple[Plate, tuple[str, ...]]:
     """Return the plate with the ground's wrench on the subject, and warnings.
 
-    ``channels`` (S, 6) N, N·m: the load ON the plate in plate axes (z down) about the sensor origin; ``rate`` Hz; ``size`` (x, y) m;
-    ``centre`` (3,) m of its surface in the lab frame; ``vector`` (3,) m from the sensor origin to the surface centre in plate axes.
+    ``channels`` (S, 6) N, N·m: the load ON the plate in plate axes (z down) about the sensor origin; ``rate`` Hz;
+    ``size`` (x, y) m; ``centre`` (3,) m of its surface in the lab frame; ``vector`` (3,) m from the sensor origin to
+    the surface centre in plate axes.
     """
     channels, zeroed = _zeroed(channels, rate)
     below, placed = sensor_below(vector, PLATE_UPRIGHT)
-    wrench = moved(channels, below)
+    wrench = about_reference(channels, below)
     sign = 1 if gravity_sign(wrench, PLATE_UPRIGHT, rate) > 0 else -1
     force = sign * wrench[:, :3] @ PLATE_UPRIGHT.T
     moment = sign * wrench[:, 3:] @ PLATE_UPRIGHT.T + np.cross(centre, force)
     half = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * np.array(size) / 2
     corners = np.column_stack([half, np.zeros(4)]) @ PLATE_UPRIGHT.T + centre
     directions = (
-        "Lab frame = plate frame turned about x: x stays, y and z (down) are reversed, so that z points up; origin at the first surface.",
+        "Lab frame = plate frame turned about x: x stays, y and z (down) are reversed, so that z points up; origin at "
+        "the first surface.",
         "Sign: the file holds the load on the plate; turned round to the ground's action on the subject."
         if sign < 0
         else "Sign: the weight shows that the file holds the reaction, not the load on the plate; it was kept.",
@@ -50,7 +59,9 @@ def amti_plate(
 
 
 def _zeroed(channels: Array, rate: float) -> tuple[Array, str]:
-    """Return the channels with the reading of the empty plate taken off where it is more than the maker's own zero leaves."""
+    """Return the channels with the reading of the empty plate taken off where it is more than the maker's own zero
+    leaves.
+    """
     zero = find_baseline(channels[:, 2], zero=None, rate=rate)
     if zero.stop <= zero.start:
         return channels, "Zero: the maker's own was kept; the plate is never seen unloaded."
@@ -61,19 +72,20 @@ def _zeroed(channels: Array, rate: float) -> tuple[Array, str]:
     return channels - empty, f"Zero: {where}; that mean was subtracted from every channel."
 
 
-LIGHTEST, HEAVIEST = 10.0, 300.0  # kg
+_LIGHTEST, HEAVIEST = 10.0, 300.0  # kg
 
 
 def read_bsf(path: str | Path, *, role: Role = "fit") -> Trial:
     """Read a NetForce .bsf file, version 100 or 105, as a trial without markers.
 
-    The wrench is the ground's action ON the subject in N, N·m about the lab origin: the centre of the first plate's surface, x as the
-    plate's x, z up.
+    The wrench is the ground's action ON the subject in N, N·m about the lab origin: the centre of the first plate's
+    surface, x as the plate's x, z up.
 
     Raises
     ------
     FileRefused
-        The file is missing, damaged or cut off, has another version, or a plate has no calibration or an impossible size.
+        The file is missing, damaged or cut off, has another version, or a plate has no calibration or an impossible
+        size.
     """
     path = Path(path)
     content = read_bytes(path)
@@ -85,7 +97,13 @@ def read_bsf(path: str | Path, *, role: Role = "fit") -> Trial:
             centre = centre + PLATE_UPRIGHT @ plate.distance
             warnings.append(_placed(plate, number))
         done, said = amti_plate(
-            number, plate.load, rate=bsf.rate, size=plate.size, centre=centre, vector=plate.offset, said=(_unit_said(bsf, plate),)
+            number,
+            plate.load,
+            rate=bsf.rate,
+            size=plate.size,
+            centre=centre,
+            vector=plate.offset,
+            said=(_unit_said(bsf, plate),),
         )
         plates.append(done)
         warnings += said
@@ -94,26 +112,36 @@ def read_bsf(path: str | Path, *, role: Role = "fit") -> Trial:
         history.append(f"{bsf.other_channels} channels of other instruments were not read.")
     source = Source(path, sha256(content), f"AMTI .bsf {bsf.version}", analog_rate=bsf.rate)
     return Trial(
-        path.stem, role, None, tuple(plates), source, measurements=_measurements(bsf.main), history=tuple(history), warnings=tuple(warnings)
+        path.stem,
+        role,
+        None,
+        tuple(plates),
+        source,
+        measurements=_measurements(bsf.main),
+        history=tuple(history),
+        warnings=tuple(warnings),
     )
 
 
 def read_amti_ascii(path: str | Path, *, role: Role = "fit") -> Trial:
-    """Read a text export of one AMTI plate; what the text does not say stands in a small TOML file of the same name beside it.
+    """Read a text export of one AMTI plate; what the text does not say stands in a small TOML file of the same name
+    beside it.
 
     The wrench is as in `read_bsf`.
 
     Raises
     ------
     FileRefused
-        The file is missing or no table of numbers, or order, units, rate or plate size are said nowhere; the message shows the TOML to
-        write.
+        The file is missing or no table of numbers, or order, units, rate or plate size are said nowhere; the message
+        shows the TOML to write.
     """
     path = Path(path)
     text = parse_amti_text(path)
     load = text.load if text.load_on_plate else -text.load
     vector = np.array([0.0, 0.0, -text.sensor_depth])
-    plate, warnings = amti_plate(1, load, rate=text.rate, size=text.size, centre=np.zeros(3), vector=vector, said=text.said)
+    plate, warnings = amti_plate(
+        1, load, rate=text.rate, size=text.size, centre=np.zeros(3), vector=vector, said=text.said
+    )
     source = Source(path, sha256(read_bytes(path)), "AMTI text", analog_rate=text.rate)
     history = (f"AMTI text export, {text.rate:g} Hz.",)
     return Trial(path.stem, role, None, (plate,), source, history=history, warnings=warnings)
@@ -122,21 +150,29 @@ def read_amti_ascii(path: str | Path, *, role: Role = "fit") -> Trial:
 def _refuse_nonsense(plate: BsfPlate, number: int, path: Path) -> None:
     if not SHORTEST_SIDE <= min(plate.size) <= max(plate.size) <= LONGEST_SIDE:
         raise FileRefused(
-            f"{path}: plate {number} is {plate.size[0]:.3g} x {plate.size[1]:.3g} m, legal are sides of {SHORTEST_SIDE:g} to "
+            f"{path}: plate {number} is {plate.size[0]:.3g} x {plate.size[1]:.3g} m, legal are sides of "
+            f"{SHORTEST_SIDE:g} to "
             f"{LONGEST_SIDE:g} m. "
             "Enter the plate's size in NetForce and save again."
         )
     if not np.abs(plate.offset).max() <= DEEPEST:
         raise FileRefused(
-            f"{path}: the sensor of plate {number} is said to lie {np.abs(plate.offset).max():.3g} m off. Correct its offset in NetForce."
+            f"{path}: the sensor of plate {number} is said to lie {np.abs(plate.offset).max():.3g} m off. Correct its "
+            f"offset in NetForce."
         )
 
 
 def _placed(plate: BsfPlate, number: int) -> str:
     if not plate.distance.any():
-        return f"Plate {number}: the file says no distance to the plate before it, so both lie at one place. Enter it in NetForce."
+        return (
+            f"Plate {number}: the file says no distance to the plate before it, so both lie at one place. Enter "
+            f"it in NetForce."
+        )
     away: Array = PLATE_UPRIGHT @ plate.distance
-    return f"Plate {number} was put ({', '.join(f'{d:.3g}' for d in away)}) m from the plate before it, as the file says. Check that."
+    return (
+        f"Plate {number} was put ({', '.join(f'{d:.3g}' for d in away)}) m from the plate before it, as the file "
+        f"says. Check that."
+    )
 
 
 def _unit_said(bsf: BsfContent, plate: BsfPlate) -> str:
@@ -151,5 +187,5 @@ def _measurements(main: Any) -> dict[str, float]:
         mass, height = mass * POUND / STANDARD_GRAVITY, height * INCH
     elif height > 3:
         height /= 100
-    found = {"Bodymass": mass} if LIGHTEST <= mass <= HEAVIEST else {}
+    found = {"Bodymass": mass} if _LIGHTEST <= mass <= HEAVIEST else {}
     return found | ({"Height": height} if 0.5 <= height <= 2.5 else {})

@@ -1,4 +1,6 @@
-"""Text exports of an AMTI plate: columns of numbers, explained by a header line or a TOML file beside them, never by a guess."""
+"""Text exports of an AMTI plate: columns of numbers, explained by a header line or a TOML file beside them, never by
+a guess.
+"""
 
 import re
 from dataclasses import dataclass
@@ -15,13 +17,15 @@ from biodance.lab.plates.signs import DEEPEST
 from biodance.library import read_toml
 from biodance.records import CHANNELS, Array
 
-KEYS = ("columns", "force_unit", "moment_unit", "rate_hz", "plate_size_m", "sensor_depth_m", "acts_on")
-EVEN = 0.02  # share by which a time step may differ from the others (times are often rounded to ms)
+_KEYS = ("columns", "force_unit", "moment_unit", "rate_hz", "plate_size_m", "sensor_depth_m", "acts_on")
+_EVEN = 0.02  # share by which a time step may differ from the others (times are often rounded to ms)
 
 
 @dataclass(frozen=True, eq=False)
 class AmtiText:
-    """``load`` (S, 6) N, N·m as written, plate axes; ``rate`` Hz; ``size`` (x, y) m; ``sensor_depth`` m below the surface."""
+    """``load`` (S, 6) N, N·m as written, plate axes; ``rate`` Hz; ``size`` (x, y) m; ``sensor_depth`` m below the
+    surface.
+    """
 
     load: Array
     rate: float
@@ -45,16 +49,25 @@ def parse_amti_text(path: Path) -> AmtiText:
     columns, units = _header_columns(header)
     columns = given.get("columns", columns)
     if not isinstance(columns, list):
-        raise FileRefused(f"{beside}: columns must name the columns, such as {list(CHANNELS)}; it is {columns!r}. Correct it.")
+        raise FileRefused(
+            f"{beside}: columns must name the columns, such as {list(CHANNELS)}; it is {columns!r}. Correct it."
+        )
     force_unit = given.get("force_unit", units.get("Fz"))
     moment_unit = given.get("moment_unit", units.get("Mz"))
     rate = given.get("rate_hz", _rate(values, columns))
     size = given.get("plate_size_m")
-    found = {"columns": columns or None, "force_unit": force_unit, "moment_unit": moment_unit, "rate_hz": rate, "plate_size_m": size}
+    found = {
+        "columns": columns or None,
+        "force_unit": force_unit,
+        "moment_unit": moment_unit,
+        "rate_hz": rate,
+        "plate_size_m": size,
+    }
     lacking = [key for key, value in found.items() if value is None]
     if lacking:
         raise FileRefused(
-            f"{path}: does not say {', '.join(lacking)}. Write the file {beside.name} beside it and correct what is not "
+            f"{path}: does not say {', '.join(lacking)}. Write the file {beside.name} beside it and correct what is "
+            f"not "
             f"so:\n{_example(values, found)}"
         )
     _refuse_nonsense(found, given, values, beside if given else path)
@@ -87,12 +100,16 @@ def _table(text: str, path: Path) -> tuple[list[str], Array]:
             header = cells
         elif row is None or (rows and len(row) != len(rows[0])):
             expected = f"{len(rows[0])} numbers" if rows else "numbers"
-            raise FileRefused(f"{path}, line {number}: {line.strip()[:60]!r} is not a row of {expected}. Correct or export the file again.")
+            raise FileRefused(
+                f"{path}, line {number}: {line.strip()[:60]!r} is not a row of {expected}. Correct or export the file "
+                f"again."
+            )
         else:
             rows.append(row)
     if len(rows) < 2 or len(rows[0]) < 6:
         raise FileRefused(
-            f"{path}: holds {len(rows)} rows of {len(rows[0]) if rows else 0} numbers; a plate needs at least 2 rows of 6. Check the file."
+            f"{path}: holds {len(rows)} rows of {len(rows[0]) if rows else 0} numbers; a plate needs at least 2 rows "
+            f"of 6. Check the file."
         )
     return header, np.array(rows)
 
@@ -107,7 +124,9 @@ def _numbers(cells: list[str]) -> list[float] | None:
 
 
 def _header_columns(header: list[str]) -> tuple[list[str], dict[str, str]]:
-    """Return column names and units from a header such as ``Time (s), Fx (N), ...``; nothing unless all six channels are named."""
+    """Return column names and units from a header such as ``Time (s), Fx (N), ...``; nothing unless all six channels
+    are named.
+    """
     columns, units = [], {}
     for cell in header:
         match = re.match(r"\s*\"?([A-Za-z]+)[^\[(]*(?:[\[(]\s*([^\])]+)[\])])?", cell)
@@ -125,7 +144,7 @@ def _rate(values: Array, columns: list[str]) -> float | None:
         return None
     time = values[:, columns.index("time_s")]
     step = (time[-1] - time[0]) / (time.size - 1)
-    even = step > 0 and np.abs(time - time[0] - step * np.arange(time.size)).max() <= max(EVEN * step, 0.0005)
+    even = step > 0 and np.abs(time - time[0] - step * np.arange(time.size)).max() <= max(_EVEN * step, 0.0005)
     return round(1 / step, 3) if even else None
 
 
@@ -135,8 +154,8 @@ def _given(beside: Path) -> dict[str, Any]:
         given = read_toml(beside)
     except BiodanceError as error:
         raise FileRefused(str(error)) from error
-    if strange := sorted(set(given) - set(KEYS)):
-        raise FileRefused(f"{beside}: {', '.join(strange)} is no key of this file. Legal are {', '.join(KEYS)}.")
+    if strange := sorted(set(given) - set(_KEYS)):
+        raise FileRefused(f"{beside}: {', '.join(strange)} is no key of this file. Legal are {', '.join(_KEYS)}.")
     return given
 
 
@@ -146,11 +165,11 @@ def _refuse_nonsense(found: dict[str, Any], given: dict[str, Any], values: Array
     numbers = [found["rate_hz"], given.get("sensor_depth_m", 0.0), *(size if isinstance(size, list) else [None])]
     is_number = [isinstance(n, int | float) and not isinstance(n, bool) for n in numbers]
     faults = {
-        f"columns must name {values.shape[1]} columns, with each of {', '.join(CHANNELS)} once (others: time_s, skip)": len(columns)
-        != values.shape[1]
-        or any(columns.count(c) != 1 for c in CHANNELS),
+        f"columns must name {values.shape[1]} columns, with each of {', '.join(CHANNELS)} once "
+        "(others: time_s, skip)": len(columns) != values.shape[1] or any(columns.count(c) != 1 for c in CHANNELS),
         f"force_unit must be one of {', '.join(FORCE)}": plain_unit(str(found["force_unit"])) not in FORCE,
-        "moment_unit must be a force times a length, such as Nm, Nmm, inlbf": plain_unit(str(found["moment_unit"])) not in MOMENT,
+        "moment_unit must be a force times a length, such as Nm, Nmm, inlbf": plain_unit(str(found["moment_unit"]))
+        not in MOMENT,
         "rate_hz must be a positive number": not is_number[0] or not 0 < numbers[0] <= 100_000,
         f"sensor_depth_m must be from 0 to {DEEPEST:g}": not is_number[1] or not 0 <= numbers[1] <= DEEPEST,
         f"plate_size_m must be two sides (x, y) of {SHORTEST_SIDE:g} to {LONGEST_SIDE:g}": len(numbers) != 4
@@ -160,7 +179,9 @@ def _refuse_nonsense(found: dict[str, Any], given: dict[str, Any], values: Array
     }
     for fault, is_so in faults.items():
         if is_so:
-            raise FileRefused(f"{where}: {fault}; it is {given.get(fault.split()[0], found.get(fault.split()[0]))!r}. Correct it.")
+            raise FileRefused(
+                f"{where}: {fault}; it is {given.get(fault.split()[0], found.get(fault.split()[0]))!r}. Correct it."
+            )
 
 
 def _example(values: Array, found: dict[str, Any]) -> str:

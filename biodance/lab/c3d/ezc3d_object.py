@@ -1,7 +1,7 @@
 """Trials to and from the objects of ezc3d, for those who work with that library.
 
-Both ways lead through a C3D file in a temporary folder: the object that comes out is what ezc3d reads of a file that biodance wrote, the
-trial that comes out passed the same door, with the same decisions and refusals, as any recording.
+Both ways lead through a C3D file in a temporary folder: the object that comes out is what ezc3d reads of a file that
+biodance wrote, the trial that comes out passed the same door, with the same decisions and refusals, as any recording.
 """
 
 import tempfile
@@ -24,9 +24,11 @@ if TYPE_CHECKING:
 
 
 def to_ezc3d(trial: Trial) -> "ezc3d.c3d":
-    """Return a trial as an ``ezc3d.c3d`` object: mm, N, N·mm, float32; z up; force plates as TYPE 2 about their surface centres.
+    """Return a trial as an ``ezc3d.c3d`` object: mm, N, N·mm, float32; z up; force plates as TYPE 2 about their surface
+    centres.
 
-    The force in a plate's axes is the ground's action on the subject, so that ezc3d's ``extract_forceplat_data`` gives the reaction.
+    The force in a plate's axes is the ground's action on the subject, so that ezc3d's ``extract_forceplat_data`` gives
+    the reaction.
 
     Raises
     ------
@@ -60,7 +62,9 @@ def from_ezc3d(file: "ezc3d.c3d", *, name: str = "trial", role: Role = "fit", su
         try:
             deepcopy(file).write(str(path))  # writing changes the lists of labels
         except (ArithmeticError, LookupError, TypeError, ValueError, RuntimeError, OSError) as error:
-            raise FileRefused(f"{name}: ezc3d cannot write this object ({error}). Give an object that it could save as a file.") from error
+            raise FileRefused(
+                f"{name}: ezc3d cannot write this object ({error}). Give an object that it could save as a file."
+            ) from error
         trial = read_c3d(path, role=role, subject=subject)
     return replace(trial, source=replace(trial.source, path=Path(f"{name}.c3d"), format="ezc3d object"))
 

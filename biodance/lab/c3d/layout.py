@@ -1,7 +1,8 @@
 """Decide how many points, channels, samples and frames the data section of a C3D file holds.
 
-The numbers stand in the header, in the parameters and, as the last witness, in the length of the file. Where they contradict each
-other, only a reading that fills the file to its last block is believed; if there is none, or more than one, the file is refused.
+The numbers stand in the header, in the parameters and, as the last witness, in the length of the file. Where they
+contradict each other, only a reading that fills the file to its last block is believed; if there is none, or more than
+one, the file is refused.
 """
 
 import math
@@ -14,15 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.errors import FileRefused
-from biodance.lab.c3d.parameters import C3D_BLOCK, RESAVE, Header, Parameters, Value
+from biodance.lab.c3d.parameters import C3D_BLOCK, RESAVE, Header, Parameters, ParameterValue
 
 CLIPPED = 65535
-"""What the 16-bit frame numbers hold in a recording that is longer; the full number then stands in the TRIAL group or LONG_FRAMES."""
+"""What the 16-bit frame numbers hold in a recording that is longer; the full number then stands in the TRIAL group
+or LONG_FRAMES.
+"""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Data section: byte ``start``, counts of points, channels, analog samples per frame and frames, rates in Hz (NaN = none).
+    """Data section: byte ``start``, counts of points, channels, analog samples per frame and frames, rates in Hz (NaN =
+    none).
 
     ``scale`` turns integer points into file units; ``gain`` (C,) and ``offset`` (C,) turn analog numbers into units:
     ``(number - offset) * gain``; ``notes`` say in sentences what was decided.
@@ -46,7 +50,9 @@ class Layout:
 
 
 def parameter_numbers(parameters: Parameters, group: str, name: str) -> NDArray[Any]:
-    """Return a numeric parameter flattened to (n,), continued in NAME2, NAME3 ... beyond 255 entries; empty if missing or text."""
+    """Return a numeric parameter flattened to (n,), continued in NAME2, NAME3 ... beyond 255 entries; empty if
+    missing or text.
+    """
     found = parameters.get(group, {})
     family = [found[name + tail] for tail in ("", *map(str, range(2, 100))) if name + tail in found]
     arrays = [np.ravel(value, order="F") for value in family if isinstance(value, np.ndarray)]
@@ -56,7 +62,9 @@ def parameter_numbers(parameters: Parameters, group: str, name: str) -> NDArray[
 def texts(parameters: Parameters, group: str, name: str) -> list[str]:
     """Return a text parameter, continued in NAME2, NAME3 ... beyond 255 entries; empty if missing or numeric."""
     found = parameters.get(group, {})
-    family: list[Value] = [found[name + tail] for tail in ("", *map(str, range(2, 100))) if name + tail in found]
+    family: list[ParameterValue] = [
+        found[name + tail] for tail in ("", *map(str, range(2, 100))) if name + tail in found
+    ]
     return [text for value in family if isinstance(value, list) for text in value]
 
 
@@ -72,7 +80,8 @@ def read_layout(size: int, header: Header, parameters: Parameters, where: str) -
     Raises
     ------
     FileRefused
-        The file is cut off, holds no data, or its header, parameters and length contradict each other without a decision.
+        The file is cut off, holds no data, or its header, parameters and length contradict each other without a
+        decision.
     """
     notes: list[str] = []
     scale = _agreed_scale(header, parameters, where)
@@ -92,7 +101,8 @@ def _agreed_scale(header: Header, parameters: Parameters, where: str) -> float:
     scale = float(written[0]) if written.size else header.scale
     if not (math.isclose(scale, header.scale, rel_tol=1e-6) or (scale < 0 and header.scale < 0)):
         raise FileRefused(
-            f"{where}: the header's scale is {header.scale:g}, POINT:SCALE is {scale:g}: the points' size is not known. {RESAVE}"
+            f"{where}: the header's scale is {header.scale:g}, POINT:SCALE is {scale:g}: the points' size is not "
+            f"known. {RESAVE}"
         )
     return header.scale
 
@@ -126,7 +136,9 @@ def _field(parameters: Parameters, name: str) -> float:
 
 
 def _analog_counts(header: Header, parameters: Parameters) -> list[tuple[int, int]]:
-    """Return the believable pairs (channels, samples per frame): those that at most one of the file's statements contradicts."""
+    """Return the believable pairs (channels, samples per frame): those that at most one of the file's statements
+    contradicts.
+    """
     used, values, samples = scalar(parameters, "ANALOG", "USED"), header.analog_values, header.analog_samples
     ratio = scalar(parameters, "ANALOG", "RATE") / (scalar(parameters, "POINT", "RATE") or math.nan)
     ratio = round(ratio) if math.isfinite(ratio) and ratio > 0.5 else math.nan
@@ -137,7 +149,15 @@ def _analog_counts(header: Header, parameters: Parameters) -> list[tuple[int, in
     channels = _distinct([used, *(values / s for s in (samples, ratio) if s > 0 and values % s == 0)])
     rows = _distinct([samples, ratio, *(values / c for c in channels if c and values % c == 0)])
     votes = {
-        (c, s): sum(w for w in (c != used and not math.isnan(used), s != samples, s != ratio and not math.isnan(ratio), c * s != values))
+        (c, s): sum(
+            w
+            for w in (
+                c != used and not math.isnan(used),
+                s != samples,
+                s != ratio and not math.isnan(ratio),
+                c * s != values,
+            )
+        )
         for c, s in product(channels, rows)
         if c * s > 0
     }
@@ -146,9 +166,15 @@ def _analog_counts(header: Header, parameters: Parameters) -> list[tuple[int, in
     return none + [pair for pair, against in votes.items() if against == least and against <= 1]
 
 
-def _counts(size: int, header: Header, parameters: Parameters, word: int, where: str, notes: list[str]) -> tuple[int, int, int, int, int]:
-    """Return (start byte, points, channels, samples per frame, frames); says in ``notes`` when statements had to be overruled."""
-    starts = _distinct([header.data_start, (scalar(parameters, "POINT", "DATA_START") or math.nan) * C3D_BLOCK - C3D_BLOCK])
+def _counts(
+    size: int, header: Header, parameters: Parameters, word: int, where: str, notes: list[str]
+) -> tuple[int, int, int, int, int]:
+    """Return (start byte, points, channels, samples per frame, frames); says in ``notes`` when statements had to be
+    overruled.
+    """
+    starts = _distinct(
+        [header.data_start, (scalar(parameters, "POINT", "DATA_START") or math.nan) * C3D_BLOCK - C3D_BLOCK]
+    )
     points = _distinct([header.points, scalar(parameters, "POINT", "USED")])
     analog, frames = _analog_counts(header, parameters), _frame_counts(header, parameters)
     readings = [(s, p, c, n, f) for s, p, (c, n), f in product(starts, points, analog, frames)]
@@ -160,7 +186,8 @@ def _counts(size: int, header: Header, parameters: Parameters, word: int, where:
     readings = [reading for reading in readings if 4 * reading[1] + reading[2] * reading[3] > 0]
     if not readings:
         raise FileRefused(
-            f"{where}: the file declares no frame, or neither points nor analog channels, or analog counts that contradict. {RESAVE}"
+            f"{where}: the file declares no frame, or neither points nor analog channels, or analog counts that "
+            f"contradict. {RESAVE}"
         )
     fitting = [reading for reading in readings if rest(reading) >= 0]
     if not fitting:
@@ -172,16 +199,22 @@ def _counts(size: int, header: Header, parameters: Parameters, word: int, where:
         return fitting[0]
     if len(full) != 1:
         raise FileRefused(
-            f"{where}: header and parameters contradict each other (points {points}, channels and samples per frame {analog}, "
+            f"{where}: header and parameters contradict each other (points {points}, channels and samples per frame "
+            f"{analog}, "
             f"frames {frames}, data from byte {starts}) and the file's length does not decide. {RESAVE}"
         )
     start, p, c, n, f = full[0]
-    notes.append(f"Header and parameters disagree; the file's length decides: {p} points, {c} channels x {n} samples, {f} frames.")
+    notes.append(
+        f"Header and parameters disagree; the file's length decides: {p} points, {c} channels x {n} samples, {f} "
+        f"frames."
+    )
     return full[0]
 
 
 def _all_told_twice(header: Header, parameters: Parameters) -> bool:
-    """Return whether header and parameters both tell every count, without contradiction: then bytes behind the data are padding."""
+    """Return whether header and parameters both tell every count, without contradiction: then bytes behind the data
+    are padding.
+    """
     points = not header.points or "USED" in parameters.get("POINT", {})
     channels = scalar(parameters, "ANALOG", "USED")
     analog = (header.analog_values > 0) == (channels > 0)
@@ -189,14 +222,18 @@ def _all_told_twice(header: Header, parameters: Parameters) -> bool:
 
 
 def _rates(header: Header, parameters: Parameters, samples: int, notes: list[str]) -> tuple[float, float]:
-    """Return point and analog rate in Hz; the value that two of header, POINT:RATE and ANALOG:RATE / samples tell, NaN if none is > 0."""
+    """Return point and analog rate in Hz; the value that two of header, POINT:RATE and ANALOG:RATE / samples tell,
+    NaN if none is > 0.
+    """
     analog = scalar(parameters, "ANALOG", "RATE")
     witnesses = {"POINT:RATE": scalar(parameters, "POINT", "RATE"), "the header": header.rate}
     witnesses["ANALOG:RATE / samples per frame"] = analog / samples if samples else math.nan
     told = {name: rate for name, rate in witnesses.items() if math.isfinite(rate) and rate > 0}
     if not told:
         return math.nan, math.nan
-    agreeing = {name: sum(math.isclose(rate, other, rel_tol=1e-3) for other in told.values()) for name, rate in told.items()}
+    agreeing = {
+        name: sum(math.isclose(rate, other, rel_tol=1e-3) for other in told.values()) for name, rate in told.items()
+    }
     best = max(told, key=lambda name: agreeing[name])
     if min(agreeing.values()) < len(told) or len(told) < 2:
         heard = ", ".join(f"{name} {rate:g}" for name, rate in witnesses.items() if not math.isnan(rate))
@@ -204,14 +241,17 @@ def _rates(header: Header, parameters: Parameters, samples: int, notes: list[str
     return told[best], told[best] * samples if samples else math.nan
 
 
-def _analog_transform(parameters: Parameters, channels: int, unsigned: bool, where: str) -> tuple[NDArray[Any], NDArray[Any]]:
+def _analog_transform(
+    parameters: Parameters, channels: int, unsigned: bool, where: str
+) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return gain (C,) and offset (C,) of the analog channels."""
     general, gain, offset = (parameter_numbers(parameters, "ANALOG", name) for name in ("GEN_SCALE", "SCALE", "OFFSET"))
     needed = {"GEN_SCALE": (general, min(1, channels)), "SCALE": (gain, channels), "OFFSET": (offset, channels)}
     for name, (values, count) in needed.items():
         if values.size < count or not np.all(np.isfinite(values[:count])):
             raise FileRefused(
-                f"{where}: ANALOG:{name} has {values.size} usable values for {channels} channels: the numbers have no scale. {RESAVE}"
+                f"{where}: ANALOG:{name} has {values.size} usable values for {channels} channels: the numbers have no "
+                f"scale. {RESAVE}"
             )
     gain = gain[:channels] * (general[0] if channels else 1.0)
     offset = np.array(offset[:channels], dtype=float)
@@ -225,10 +265,16 @@ def _first_frame(header: Header, parameters: Parameters, frames: int, notes: lis
     if int(first) == header.first_frame if math.isfinite(first) else spans:
         return header.first_frame
     if not math.isfinite(first):
-        notes.append(f"The first frame's number, {header.first_frame} in the header, does not fit its last one, {header.last_frame}.")
+        notes.append(
+            f"The first frame's number, {header.first_frame} in the header, does not fit its last one, "
+            f"{header.last_frame}."
+        )
         return header.first_frame
     last = _field(parameters, "ACTUAL_END_FIELD")
     if last - first + 1 == frames and header.last_frame - header.first_frame + 1 != frames:
         return int(first)
-    notes.append(f"The first frame is {header.first_frame} in the header and {first:g} in TRIAL:ACTUAL_START_FIELD; the header's is taken.")
+    notes.append(
+        f"The first frame is {header.first_frame} in the header and {first:g} in TRIAL:ACTUAL_START_FIELD; the "
+        f"header's is taken."
+    )
     return header.first_frame

@@ -1,4 +1,6 @@
-"""Read the numbers of a C3D file whose layout is known; where they smell of a misread, ezc3d judges in a child process."""
+"""Read the numbers of a C3D file whose layout is known; where they smell of a misread, ezc3d judges in a child
+process.
+"""
 
 import io
 import subprocess
@@ -20,9 +22,9 @@ Numbers = tuple[NDArray[Any], NDArray[Any]]
 def read_numbers(content: bytes, layout: Layout) -> Numbers:
     """Return the points and analog values of the data section.
 
-    A frame holds x, y, z and a word of residual and cameras for each point, then the analog samples, channel fastest; all 32-bit floats
-    or all 16-bit integers. A point was not seen if its residual is negative, a coordinate is no finite number, or all three are zero.
-    Source: C3D user guide, "3D point data" and "analog data".
+    A frame holds x, y, z and a word of residual and cameras for each point, then the analog samples, channel fastest;
+    all 32-bit floats or all 16-bit integers. A point was not seen if its residual is negative, a coordinate is no
+    finite number, or all three are zero. Source: C3D user guide, "3D point data" and "analog data".
     """
     words = layout.frames * (4 * layout.points + layout.channels * layout.samples)
     size = 4 if layout.floating else 2
@@ -47,7 +49,7 @@ def read_numbers(content: bytes, layout: Layout) -> Numbers:
     return points, analog
 
 
-PATIENCE = 60.0
+_PATIENCE = 60.0
 """s after which the child is given up."""
 READ = """
 import sys, warnings
@@ -64,11 +66,13 @@ numpy.save(sys.stdout.buffer, analogs[0].T.astype("f4"))
 
 
 def second_opinion(path: Path, numbers: Numbers, layout: Layout) -> str:
-    """Return "confirmed" if ezc3d reads the same numbers, "refuted" if it reads others, else why it does not read the file.
+    """Return "confirmed" if ezc3d reads the same numbers, "refuted" if it reads others, else why it does not read the
+    file.
 
-    ezc3d finds the layout on its own, so it also judges ours. Where header and parameters disagree it believes one of them without looking
-    at the length of the file, as biodance does: no judgement. Left out are analog channels that ezc3d 1.7.2 is known to read wrong: those
-    with a negative OFFSET, whose sign it loses, and unsigned integers, which it takes for signed ones.
+    ezc3d finds the layout on its own, so it also judges ours. Where header and parameters disagree it believes one of
+    them without looking at the length of the file, as biodance does: no judgement. Left out are analog channels that
+    ezc3d 1.7.2 is known to read wrong: those with a negative OFFSET, whose sign it loses, and unsigned integers, which
+    it takes for signed ones.
 
     Parameters
     ----------
@@ -80,9 +84,11 @@ def second_opinion(path: Path, numbers: Numbers, layout: Layout) -> str:
         How biodance understood the data section.
     """
     try:
-        child = subprocess.run([sys.executable, "-c", READ, str(path)], capture_output=True, timeout=PATIENCE, check=False)
+        child = subprocess.run(
+            [sys.executable, "-c", READ, str(path)], capture_output=True, timeout=_PATIENCE, check=False
+        )
     except subprocess.TimeoutExpired:
-        return f"ezc3d gives no answer within {PATIENCE:g} s"
+        return f"ezc3d gives no answer within {_PATIENCE:g} s"
     except OSError as error:
         return f"ezc3d cannot be started ({error.strerror})"
     if child.returncode < 0:
@@ -93,7 +99,10 @@ def second_opinion(path: Path, numbers: Numbers, layout: Layout) -> str:
     with io.BytesIO(child.stdout) as answer:
         points, analog = np.load(answer).astype(float), np.load(answer).astype(float)
     if layout.notes and (points.shape, analog.shape) != (numbers[0].shape, _shape(numbers[1], len(points))):
-        return f"ezc3d believes the other of the two ({points.shape[1]} points, {analog.shape[1]} channels, {len(points)} frames)"
+        return (
+            f"ezc3d believes the other of the two ({points.shape[1]} points, {analog.shape[1]} channels, "
+            f"{len(points)} frames)"
+        )
     return "confirmed" if _same_points(numbers[0], points) and _same_analog(numbers[1], analog, layout) else "refuted"
 
 

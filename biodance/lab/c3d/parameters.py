@@ -1,7 +1,8 @@
 """Walk through the header and the parameter section of a C3D file, byte by byte, trusting nothing.
 
-Layout: header of 512 bytes; parameter section of groups and parameters, each ``name length, group id, name, offset to the next record``;
-data section. Three byte orders: Intel (84), DEC (85) and SGI/MIPS (86). Source: C3D user guide (www.c3d.org/docs), "parameter format".
+Layout: header of 512 bytes; parameter section of groups and parameters, each ``name length, group id, name, offset to
+the next record``; data section. Three byte orders: Intel (84), DEC (85) and SGI/MIPS (86). Source: C3D user guide
+(www.c3d.org/docs), "parameter format".
 """
 
 import math
@@ -18,13 +19,13 @@ from biodance.errors import FileRefused
 C3D_BLOCK = 512
 INTEL, DEC, MIPS = 84, 85, 86
 PROCESSORS = {INTEL: "Intel", DEC: "DEC", MIPS: "SGI/MIPS"}
-SCALES, RATES = (1e-9, 1e6), (1e-3, 1e6)
+_SCALES, RATES = (1e-9, 1e6), (1e-3, 1e6)
 """Believable magnitudes of the header's scale and rate (Hz): numbers of the wrong processor type are outside by far."""
 
 RESAVE = "Export the trial again from the recording software, or copy the file again from its source."
 
-Value = NDArray[Any] | list[str]
-Parameters = Mapping[str, Mapping[str, Value]]
+ParameterValue = NDArray[Any] | list[str]
+Parameters = Mapping[str, Mapping[str, ParameterValue]]
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,9 @@ def integers(content: bytes | memoryview, processor: int, kind: str = "u2") -> N
 
 
 def floats(content: bytes | memoryview, processor: int) -> NDArray[Any]:
-    """Return the bytes as 32-bit floats (n,) from the number format of the processor; DEC (VAX F) values are converted to IEEE."""
+    """Return the bytes as 32-bit floats (n,) from the number format of the processor; DEC (VAX F) values are
+    converted to IEEE.
+    """
     if processor != DEC:
         return np.frombuffer(content, dtype=">f4" if processor == MIPS else "<f4")
     words = np.frombuffer(content, dtype="<u2").reshape(-1, 2).astype(np.uint32)
@@ -78,26 +81,33 @@ def read_header(content: bytes, where: str) -> Header:
         raise FileRefused(f"{where}: the file is empty (0 bytes). {RESAVE}")
     if len(content) < 2 * C3D_BLOCK or content[1] != 0x50:
         raise FileRefused(
-            f"{where}: this is not a C3D file: of its {len(content)} bytes the second is not 80 (80, and at least 1024 bytes, expected). "
+            f"{where}: this is not a C3D file: of its {len(content)} bytes the second is not 80 (80, and at least "
+            f"1024 bytes, expected). "
             "Check that the file is a C3D export and not another format with that name."
         )
     start = (content[0] - 1) * C3D_BLOCK
     if start < C3D_BLOCK or start + 4 > len(content):
-        raise FileRefused(f"{where}: the header puts the parameter section into block {content[0]}, outside the file. {RESAVE}")
+        raise FileRefused(
+            f"{where}: the header puts the parameter section into block {content[0]}, outside the file. {RESAVE}"
+        )
     processor = content[start + 3]
     if processor not in PROCESSORS:
-        raise FileRefused(f"{where}: processor type {processor} is unknown (84 Intel, 85 DEC and 86 SGI/MIPS are legal). {RESAVE}")
+        raise FileRefused(
+            f"{where}: processor type {processor} is unknown (84 Intel, 85 DEC and 86 SGI/MIPS are legal). {RESAVE}"
+        )
     words = [int(w) for w in integers(content[:24], processor)]
     scale, rate = (float(floats(content[at : at + 4], processor)[0]) for at in (12, 20))
     data_start = (words[8] - 1) * C3D_BLOCK
     if not start < data_start <= len(content):
         raise FileRefused(
-            f"{where}: the header puts the data into block {words[8]}, but the file has only {len(content) // C3D_BLOCK} blocks: "
+            f"{where}: the header puts the data into block {words[8]}, but the file has only "
+            f"{len(content) // C3D_BLOCK} blocks: "
             f"it is damaged or was cut off. {RESAVE}"
         )
-    if not (SCALES[0] < abs(scale) < SCALES[1] and (rate == 0 or RATES[0] < rate < RATES[1])):
+    if not (_SCALES[0] < abs(scale) < _SCALES[1] and (rate == 0 or RATES[0] < rate < RATES[1])):
         raise FileRefused(
-            f"{where}: read as {PROCESSORS[processor]} numbers, the header has a scale of {scale:g} and a rate of {rate:g} Hz, "
+            f"{where}: read as {PROCESSORS[processor]} numbers, the header has a scale of {scale:g} and a rate of "
+            f"{rate:g} Hz, "
             f"which no lab has: it is damaged or its processor type is wrong. {RESAVE}"
         )
     return Header(processor, words[1], words[2], words[3], words[4], scale, words[9], rate, start, data_start)
@@ -106,8 +116,8 @@ def read_header(content: bytes, where: str) -> Header:
 def read_parameters(content: bytes, header: Header, where: str) -> Parameters:
     """Return all parameters as ``parameters[GROUP][NAME]``, names in upper case as the standard asks.
 
-    Text is a list of stripped strings; numbers are arrays with the dimensions of the file, first dimension fastest (so that
-    ``CORNERS[i, j, plate]`` is coordinate i of corner j), a scalar has shape (1,).
+    Text is a list of stripped strings; numbers are arrays with the dimensions of the file, first dimension fastest (so
+    that ``CORNERS[i, j, plate]`` is coordinate i of corner j), a scalar has shape (1,).
 
     Raises
     ------
@@ -115,7 +125,7 @@ def read_parameters(content: bytes, header: Header, where: str) -> Parameters:
         A record reaches beyond the section, overlaps the next one or skips bytes: a damaged section cannot be trusted.
     """
     names: dict[int, str] = {}
-    records: list[tuple[int, str, Value]] = []
+    records: list[tuple[int, str, ParameterValue]] = []
     at = header.parameter_start + 4
     while at + 2 <= header.data_start and content[at] != 0 and content[at + 1] != 0:
         at, group, name, value = _record(content[: header.data_start], at, header.processor, where)
@@ -125,18 +135,22 @@ def read_parameters(content: bytes, header: Header, where: str) -> Parameters:
             records.append((group, name, value))
         if at == 0:
             break
-    groups: dict[str, dict[str, Value]] = {name: {} for name in names.values()}
+    groups: dict[str, dict[str, ParameterValue]] = {name: {} for name in names.values()}
     for group, name, value in records:
         if group not in names:
-            raise FileRefused(f"{where}: parameter {name} belongs to group number {group}, which the file does not define. {RESAVE}")
+            raise FileRefused(
+                f"{where}: parameter {name} belongs to group number {group}, which the file does not define. {RESAVE}"
+            )
         if name in groups[names[group]]:
             raise FileRefused(f"{where}: parameter {names[group]}:{name} is there twice. {RESAVE}")
         groups[names[group]][name] = value
     return MappingProxyType({name: MappingProxyType(group) for name, group in groups.items()})
 
 
-def _record(section: bytes, at: int, processor: int, where: str) -> tuple[int, int, str, Value | None]:
-    """Return position of the next record (0 = none), group number, name and value (None = a group) of the record at ``at``."""
+def _record(section: bytes, at: int, processor: int, where: str) -> tuple[int, int, str, ParameterValue | None]:
+    """Return position of the next record (0 = none), group number, name and value (None = a group) of the record at
+    ``at``.
+    """
     length, group = (int(byte) for byte in np.frombuffer(section[at : at + 2], dtype=np.int8))
     body = at + 2 + abs(length)
     name = section[at + 2 : body].decode("utf-8", "replace").strip().upper()
@@ -144,7 +158,7 @@ def _record(section: bytes, at: int, processor: int, where: str) -> tuple[int, i
     if body + 3 > len(section):
         raise damaged
     offset = int(integers(section[body : body + 2], processor)[0])
-    value: Value | None = None
+    value: ParameterValue | None = None
     end = body + 2
     if group > 0:
         value, end = _value(section, body + 2, processor, damaged)
@@ -157,7 +171,7 @@ def _record(section: bytes, at: int, processor: int, where: str) -> tuple[int, i
     return following, abs(group), name, value
 
 
-def _value(section: bytes, at: int, processor: int, damaged: FileRefused) -> tuple[Value, int]:
+def _value(section: bytes, at: int, processor: int, damaged: FileRefused) -> tuple[ParameterValue, int]:
     """Return the value of the parameter whose type byte is at ``at``, and the position after it."""
     kind = int(np.frombuffer(section[at : at + 1], dtype=np.int8)[0])
     first = at + 2 + (section[at + 1] if at + 1 < len(section) else 255)

@@ -1,4 +1,6 @@
-"""Which points of a C3D file are markers on the subject: not model outputs, not unlabelled points, not another person's."""
+"""Which points of a C3D file are markers on the subject: not model outputs, not unlabelled points, not another
+person's.
+"""
 
 from dataclasses import dataclass
 
@@ -11,7 +13,9 @@ from biodance.lab.c3d.raw import RawC3d, model_outputs, split_label, unlabelled
 
 @dataclass(frozen=True)
 class MarkerLabels:
-    """The chosen points: ``columns`` in the file, their ``names``, what was decided (``history``), what is suspicious (``warnings``)."""
+    """The chosen points: ``columns`` in the file, their ``names``, what was decided (``history``), what is
+    suspicious (``warnings``).
+    """
 
     columns: tuple[int, ...]
     names: tuple[str, ...]
@@ -39,7 +43,9 @@ def marker_labels(raw: RawC3d, *, subject: str | None) -> MarkerLabels:
     columns = [i for i in range(len(raw.labels)) if i not in set(outputs)]
     if outputs:
         shown = ", ".join(raw.labels[i] for i in outputs[:3])
-        history.append(f"{len(outputs)} points are results of a model in the recording software, not markers: {shown} ...")
+        history.append(
+            f"{len(outputs)} points are results of a model in the recording software, not markers: {shown} ..."
+        )
     nameless = set(columns) & set(unlabelled(raw.labels))
     if nameless:
         history.append(f"{len(nameless)} unlabelled points are left out.")
@@ -62,16 +68,24 @@ def _of_subject(raw: RawC3d, columns: list[int], subject: str | None, history: l
         return columns
     match = next((name for name in known if name.casefold() == chosen.casefold()), None)
     if match is None and known:
-        raise FileRefused(f"{raw.path}: has no subject {chosen!r}. Its subjects are {', '.join(known)}. Name one of them.")
+        raise FileRefused(
+            f"{raw.path}: has no subject {chosen!r}. Its subjects are {', '.join(known)}. Name one of them."
+        )
     if not prefixes:
         return columns
     own = [i for i in columns if split_label(raw.labels[i])[0] in ("" if len(prefixes) == 1 else match, match)]
-    history.append(f"Markers of subject {match!r} taken, the prefix removed; {len(columns) - len(own)} points of others left out.")
+    history.append(
+        f"Markers of subject {match!r} taken, the prefix removed; {len(columns) - len(own)} points of others left out."
+    )
     return own
 
 
-def _without_repeats(raw: RawC3d, columns: list[int], history: list[str], warnings: list[str]) -> tuple[list[int], list[str]]:
-    """Return columns and names without repeated names: an unseen or equal repetition goes, a different one keeps both apart by number."""
+def _without_repeats(
+    raw: RawC3d, columns: list[int], history: list[str], warnings: list[str]
+) -> tuple[list[int], list[str]]:
+    """Return columns and names without repeated names: an unseen or equal repetition goes, a different one keeps
+    both apart by number.
+    """
     places: dict[str, list[int]] = {}
     for column in columns:
         places.setdefault(split_label(raw.labels[column])[1], []).append(column)
@@ -80,14 +94,20 @@ def _without_repeats(raw: RawC3d, columns: list[int], history: list[str], warnin
         different: list[int] = []
         for column in sorted(same, key=lambda c: -int(np.isfinite(raw.points[:, c, 0]).sum())):
             unseen = not np.isfinite(raw.points[:, column]).any()
-            if not different or not (unseen or np.array_equal(raw.points[:, column], raw.points[:, different[0]], equal_nan=True)):
+            if not different or not (
+                unseen or np.array_equal(raw.points[:, column], raw.points[:, different[0]], equal_nan=True)
+            ):
                 different.append(column)
         if len(same) > len(different):
             history.append(f"Label {name} occurs {len(same)} times; repetitions that are empty or equal are left out.")
         if len(different) > 1:
             warnings.append(
-                f"Label {name} is given to {len(different)} different points, so neither is taken for {name}: they are called {name}#1, "
+                f"Label {name} is given to {len(different)} different points, so neither is taken for {name}: they "
+                f"are called {name}#1, "
                 f"{name}#2 ... Correct the labels in the recording software."
             )
-        kept |= {column: name if len(different) == 1 else f"{name}#{n}" for n, column in enumerate(sorted(different), start=1)}
+        kept |= {
+            column: name if len(different) == 1 else f"{name}#{n}"
+            for n, column in enumerate(sorted(different), start=1)
+        }
     return sorted(kept), [kept[column] for column in sorted(kept)]

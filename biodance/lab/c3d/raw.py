@@ -1,4 +1,6 @@
-"""What a C3D file says, in its own units and axes: bytes made safe, markers and model outputs told apart, nothing interpreted yet."""
+"""What a C3D file says, in its own units and axes: bytes made safe, markers and model outputs told apart, nothing
+interpreted yet.
+"""
 
 import hashlib
 import re
@@ -33,9 +35,11 @@ def split_label(label: str) -> tuple[str, str]:
 
 
 def model_outputs(labels: Sequence[str], parameters: Parameters) -> tuple[int, ...]:
-    """Return the columns that hold results of a model: listed in a group of POINT, named like one (``LKneeAngles``), or bone axes.
+    """Return the columns that hold results of a model: listed in a group of POINT, named like one (``LKneeAngles``), or
+    bone axes.
 
-    The axes of a bone are four points whose names differ in the last letter: origin, anterior, lateral, proximal (``PELO``, ``PELA`` ...).
+    The axes of a bone are four points whose names differ in the last letter: origin, anterior, lateral, proximal
+    (``PELO``, ``PELA`` ...).
     """
     declared = {group.upper() for group in texts(parameters, "POINT", "TYPE_GROUPS")[::2]} - {"MARKERS", "LABELS"}
     listed = {label for group in declared | set(GROUPS) for label in texts(parameters, "POINT", group)}
@@ -62,11 +66,12 @@ LEAP = 1.0
 class RawC3d:
     """One C3D file as stored.
 
-    ``points`` (T, K, 3) in file units and file axes, NaN = not seen; ``rate`` Hz, NaN = none; ``first_frame`` number of the first frame;
-    ``analog`` (S, C) scaled as the file says, ``(number - OFFSET) * SCALE * GEN_SCALE``; ``analog_rate`` Hz, NaN = none;
-    ``analog_units`` (C) as written ("" = none). ``parameters[GROUP][NAME]`` (upper case): arrays with the file's own dimensions, first
-    dimension fastest, or lists of stripped strings. ``reader`` names who agrees on the numbers, "biodance" or "biodance, ezc3d";
-    ``warnings`` say where the file contradicts itself or smells of a misread, and how that was decided.
+    ``points`` (T, K, 3) in file units and file axes, NaN = not seen; ``rate`` Hz, NaN = none; ``first_frame`` number of
+    the first frame; ``analog`` (S, C) scaled as the file says, ``(number - OFFSET) * SCALE * GEN_SCALE``;
+    ``analog_rate`` Hz, NaN = none; ``analog_units`` (C) as written ("" = none). ``parameters[GROUP][NAME]`` (upper
+    case): arrays with the file's own dimensions, first dimension fastest, or lists of stripped strings. ``reader``
+    names who agrees on the numbers, "biodance" or "biodance, ezc3d"; ``warnings`` say where the file contradicts itself
+    or smells of a misread, and how that was decided.
     """
 
     path: Path
@@ -85,7 +90,8 @@ class RawC3d:
 
 
 def read_raw(path: str | Path) -> RawC3d:
-    """Read the bytes of a C3D file (Intel, DEC, SGI/MIPS; integer and float) without interpreting units, axes or plates.
+    """Read the bytes of a C3D file (Intel, DEC, SGI/MIPS; integer and float) without interpreting units, axes or
+    plates.
 
     Raises
     ------
@@ -96,7 +102,9 @@ def read_raw(path: str | Path) -> RawC3d:
     try:
         content = path.read_bytes()
     except IsADirectoryError as error:
-        raise FileRefused(f"{path}: this is a folder, not a C3D file. Name one file, or inspect the folder as a session.") from error
+        raise FileRefused(
+            f"{path}: this is a folder, not a C3D file. Name one file, or inspect the folder as a session."
+        ) from error
     except FileNotFoundError as error:
         raise FileRefused(f"{path}: there is no such file. Check the path.") from error
     except OSError as error:
@@ -126,23 +134,35 @@ def read_raw(path: str | Path) -> RawC3d:
     )
 
 
-def _smells(numbers: Numbers, labels: tuple[str, ...], layout: Layout, parameters: Parameters, path: Path) -> tuple[tuple[str, ...], str]:
-    """Have suspicious numbers judged by a second reader; return what it says and who agrees; refuse the file if it reads others."""
+def _smells(
+    numbers: Numbers, labels: tuple[str, ...], layout: Layout, parameters: Parameters, path: Path
+) -> tuple[tuple[str, ...], str]:
+    """Have suspicious numbers judged by a second reader; return what it says and who agrees; refuse the file if it
+    reads others.
+    """
     no_markers = {*model_outputs(labels, parameters), *unlabelled(labels)}
     leaps = _leaps(numbers[0][:, [column for column in range(layout.points) if column not in no_markers]], parameters)
     if not leaps and not layout.notes:
         return (), "biodance"
     opinion = second_opinion(path, numbers, layout)
-    smell = f"Markers jump by more than {LEAP:g} m between two frames in {leaps} places" if leaps else "Header and parameters disagree"
+    smell = (
+        f"Markers jump by more than {LEAP:g} m between two frames in {leaps} places"
+        if leaps
+        else "Header and parameters disagree"
+    )
     if opinion == "refuted":
-        raise FileRefused(f"{path}: {smell[0].lower()}{smell[1:]}, and ezc3d reads other numbers than biodance. {RESAVE}")
+        raise FileRefused(
+            f"{path}: {smell[0].lower()}{smell[1:]}, and ezc3d reads other numbers than biodance. {RESAVE}"
+        )
     if opinion == "confirmed":
         return (f"{smell}; ezc3d finds the same numbers.",), "biodance, ezc3d"
     return (f"{smell}; {opinion}, so only biodance has read these numbers.",), "biodance"
 
 
 def _leaps(points: Array, parameters: Parameters) -> int:
-    """Return how often a marker moves by more than a metre between two frames in which it is seen; 0 if the unit is not known."""
+    """Return how often a marker moves by more than a metre between two frames in which it is seen; 0 if the unit is
+    not known.
+    """
     try:
         metre = 1.0 / metres_per_unit(parameters, points, where="")[0]
     except FileRefused:

@@ -17,7 +17,8 @@ from biodance.records import Array, Markers, Plate, Role, Source, Trial
 
 
 def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None) -> Trial:
-    """Read one C3D file: markers in m with z up (time starts at 0), force plates as ground-on-subject wrenches about the lab origin.
+    """Read one C3D file: markers in m with z up (time starts at 0), force plates as ground-on-subject wrenches about
+    the lab origin.
 
     Parameters
     ----------
@@ -36,8 +37,8 @@ def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None
     Raises
     ------
     FileRefused
-        The file is missing, damaged or contradicts itself; holds several subjects and none was chosen; its unit of length or its rate is
-        not known.
+        The file is missing, damaged or contradicts itself; holds several subjects and none was chosen; its unit of
+        length or its rate is not known.
 
     References
     ----------
@@ -64,7 +65,9 @@ def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None
         role=role,
         markers=markers,
         plates=plates,
-        source=Source(raw.path, raw.sha256, "C3D", raw.rate if markers is not None else math.nan, raw.analog_rate, raw.first_frame),
+        source=Source(
+            raw.path, raw.sha256, "C3D", raw.rate if markers is not None else math.nan, raw.analog_rate, raw.first_frame
+        ),
         marker_set=marker_set.name if marker_set is not None else "",
         measurements=measures,
         history=(*_read(raw), *labels.history, *unit_history, *turn_history, *_gaps(markers), *measure_history),
@@ -88,7 +91,11 @@ def file_frame(raw: RawC3d, *, subject: str | None = None) -> tuple[float, Array
 
 def _read(raw: RawC3d) -> tuple[str, ...]:
     rate = f" at {raw.rate:g} Hz" if math.isfinite(raw.rate) else ""
-    analog = f", {raw.analog.shape[1]} analog channels at {raw.analog_rate:g} Hz" if raw.analog.size else ", no analog channels"
+    analog = (
+        f", {raw.analog.shape[1]} analog channels at {raw.analog_rate:g} Hz"
+        if raw.analog.size
+        else ", no analog channels"
+    )
     frames = f"{len(raw.points)} frames{rate} from frame {raw.first_frame} on"
     return (f"Read {frames}, {raw.points.shape[1]} points{analog}.",)
 
@@ -98,7 +105,10 @@ def _markers(raw: RawC3d, labels: MarkerLabels, points: Array) -> Markers | None
     if not labels.columns or not np.isfinite(points).any():
         return None
     if not math.isfinite(raw.rate) and len(points) > 1:
-        raise FileRefused(f"{raw.path}: the frame rate is 0, so its {len(points)} frames have no time. Write POINT:RATE and read it again.")
+        raise FileRefused(
+            f"{raw.path}: the frame rate is 0, so its {len(points)} frames have no time. Write POINT:RATE and read it "
+            f"again."
+        )
     return Markers(labels.names, np.arange(len(points)) / (raw.rate if math.isfinite(raw.rate) else 1.0), points)
 
 

@@ -1,7 +1,9 @@
-"""Results inside a copy of the recording they come from, so that the software of the laboratory shows them beside the markers.
+"""Results inside a copy of the recording they come from, so that the software of the laboratory shows them beside the
+markers.
 
-The copy is written by ezc3d, in a child process: it keeps every group of the original, which biodance's own writer does not know. Our
-own reader then has to find the original numbers in it, else nothing is written. Run as a program this file is that child.
+The copy is written by ezc3d, in a child process: it keeps every group of the original, which biodance's own writer does
+not know. Our own reader then has to find the original numbers in it, else nothing is written. Run as a program this
+file is that child.
 """
 
 import json
@@ -22,12 +24,12 @@ from biodance.lab.c3d.read import file_frame
 from biodance.lab.c3d.write import FileValue
 from biodance.records import Array, frozen_array
 
-PATIENCE = 300.0
+_PATIENCE = 300.0
 """s after which the child is given up."""
-NEAR = 0.1
+_NEAR = 0.1
 """s: an event that the file has already within this time is not written again."""
 Kind = Literal["ANGLES", "FORCES", "MOMENTS", "MODELED_MARKERS"]
-UNITS = {"ANGLES": ("ANGLE_UNITS", "deg"), "FORCES": ("FORCE_UNITS", "N"), "MOMENTS": ("MOMENT_UNITS", "Nm")}
+_UNITS = {"ANGLES": ("ANGLE_UNITS", "deg"), "FORCES": ("FORCE_UNITS", "N"), "MOMENTS": ("MOMENT_UNITS", "Nm")}
 PER_SI = {"deg": 180 / np.pi, "rad": 1.0, "N": 1.0, "Nm": 1.0, "Nmm": 1000.0}
 """How many of a file's unit one SI unit is."""
 
@@ -36,8 +38,9 @@ PER_SI = {"deg": 180 / np.pi, "rad": 1.0, "N": 1.0, "Nm": 1.0, "Nmm": 1000.0}
 class Output:
     """One result over the frames of the trial, as C3D stores it: a point with three components.
 
-    ``label`` of the point; ``kind`` the parameter of POINT that lists it; ``value`` (T, 3) rad, N, N·m or m, NaN = none; ``about`` what the
-    three components are. ``turns`` True for vectors of the lab frame, which are written in the file's axes.
+    ``label`` of the point; ``kind`` the parameter of POINT that lists it; ``value`` (T, 3) rad, N, N·m or m, NaN =
+    none; ``about`` what the three components are. ``turns`` True for vectors of the lab frame, which are written in the
+    file's axes.
     """
 
     label: str
@@ -52,7 +55,9 @@ class Output:
 
 @dataclass(frozen=True)
 class Event:
-    """One event: ``time`` s from the first frame of the recording, ``context`` "Right", "Left" or "General", ``label`` "Foot Strike" ..."""
+    """One event: ``time`` s from the first frame of the recording, ``context`` "Right", "Left" or "General",
+    ``label`` "Foot Strike" ...
+    """
 
     time: float
     context: str
@@ -70,14 +75,16 @@ def write_results_c3d(
 ) -> Path:
     """Write a copy of the C3D file ``original`` that holds ``outputs`` and ``events`` besides, and return its path.
 
-    Points, analog values and parameters of the original stay as they are. Positions are in the file's unit of length, angles, forces and
-    moments in the units that POINT declares (without any: deg, N, N·m); ``BIODANCE:LABELS``, ``UNITS`` and ``COMPONENTS`` say of every
-    output what it is, and ``parameters`` are added to that group. ``subject`` names the person where the file holds several.
+    Points, analog values and parameters of the original stay as they are. Positions are in the file's unit of length,
+    angles, forces and moments in the units that POINT declares (without any: deg, N, N·m); ``BIODANCE:LABELS``,
+    ``UNITS`` and ``COMPONENTS`` say of every output what it is, and ``parameters`` are added to that group. ``subject``
+    names the person where the file holds several.
 
     Raises
     ------
     FileRefused
-        The original cannot be read, has other frames or has such labels already; ezc3d cannot copy it; or ``path`` exists.
+        The original cannot be read, has other frames or has such labels already; ezc3d cannot copy it; or ``path``
+        exists.
     """
     path, original = Path(path), Path(original)
     if path.exists():
@@ -97,7 +104,11 @@ def write_results_c3d(
     question = {
         "labels": said["LABELS"],
         "kinds": [o.kind for o in outputs],
-        "units": dict(v for kind, v in UNITS.items() if kind in {o.kind for o in outputs} and not texts(raw.parameters, "POINT", v[0])),
+        "units": dict(
+            v
+            for kind, v in _UNITS.items()
+            if kind in {o.kind for o in outputs} and not texts(raw.parameters, "POINT", v[0])
+        ),
         "events": [[event.time + first, event.context, event.label] for event in events],
         "parameters": {name: np.asarray(value).tolist() for name, value in said.items()},
     }
@@ -113,19 +124,25 @@ def _refuse_unfitting(raw: RawC3d, outputs: Sequence[Output]) -> None:
     for output in outputs:
         if len(output.value) != len(raw.points):
             raise FileRefused(
-                f"{raw.path}: has {len(raw.points)} frames, {output.label} has {len(output.value)}. Give the trial's own file."
+                f"{raw.path}: has {len(raw.points)} frames, {output.label} has {len(output.value)}. Give the trial's "
+                f"own file."
             )
         if output.label in raw.labels:
-            raise FileRefused(f"{raw.path}: has a point {output.label} already. Give the recording as it was before results were written.")
+            raise FileRefused(
+                f"{raw.path}: has a point {output.label} already. Give the recording as it was before results were "
+                f"written."
+            )
     if not raw.rate > 0:
-        raise FileRefused(f"{raw.path}: has no frame rate, so results have no place in it. Export the trial with its markers.")
+        raise FileRefused(
+            f"{raw.path}: has no frame rate, so results have no place in it. Export the trial with its markers."
+        )
 
 
 def _unit(raw: RawC3d, output: Output) -> str:
     """Return the unit that the file declares for such results, if it is one we know, else our own."""
     if output.kind == "MODELED_MARKERS":
         return next(iter(texts(raw.parameters, "POINT", "UNITS")), "mm")
-    name, own = UNITS[output.kind]
+    name, own = _UNITS[output.kind]
     declared = next(iter(texts(raw.parameters, "POINT", name)), own).replace(".", "").replace(" ", "")
     return declared if declared in PER_SI else own
 
@@ -140,7 +157,9 @@ def _run(original: Path, made: Path, question: Mapping[str, Any]) -> None:
     """Have the child write the copy; whatever goes wrong in it refuses the file."""
     words = [sys.executable, "-m", "biodance.lab.c3d.results", str(original), str(made)]
     try:
-        child = subprocess.run(words, input=json.dumps(question).encode(), capture_output=True, timeout=PATIENCE, check=False)
+        child = subprocess.run(
+            words, input=json.dumps(question).encode(), capture_output=True, timeout=_PATIENCE, check=False
+        )
     except (subprocess.TimeoutExpired, OSError) as error:
         raise FileRefused(
             f"{original}: ezc3d gives no copy of it ({error}). Export the trial again from the recording software."
@@ -148,7 +167,9 @@ def _run(original: Path, made: Path, question: Mapping[str, Any]) -> None:
     if child.returncode:
         lines = child.stderr.decode(errors="replace").strip().splitlines()
         why = lines[-1] if child.returncode > 0 and lines else f"it crashes, code {child.returncode}"
-        raise FileRefused(f"{original}: ezc3d cannot copy it ({why}). Export the trial again from the recording software.")
+        raise FileRefused(
+            f"{original}: ezc3d cannot copy it ({why}). Export the trial again from the recording software."
+        )
 
 
 def _refuse_changed(raw: RawC3d, made: Path) -> None:
@@ -162,7 +183,10 @@ def _refuse_changed(raw: RawC3d, made: Path) -> None:
         == (raw.labels, raw.analog_labels, raw.rate, raw.first_frame)
     )
     if not same:
-        raise FileRefused(f"{raw.path}: the copy that ezc3d wrote holds other numbers, so it was thrown away. Export csv or mot instead.")
+        raise FileRefused(
+            f"{raw.path}: the copy that ezc3d wrote holds other numbers, so it was thrown away. Export csv or mot "
+            f"instead."
+        )
 
 
 def _placed(content: bytes, path: Path) -> Path:
@@ -172,7 +196,9 @@ def _placed(content: bytes, path: Path) -> Path:
     except FileExistsError:
         raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.") from None
     except OSError as error:
-        raise FileRefused(f"{path}: cannot be written ({error.strerror or error}). Choose a place where you may write.") from error
+        raise FileRefused(
+            f"{path}: cannot be written ({error.strerror or error}). Choose a place where you may write."
+        ) from error
     return path
 
 
@@ -200,7 +226,9 @@ def _copy(original: str, made: str, question: dict[str, Any]) -> None:
 
 
 def _gathered(group: dict[str, Any], name: str) -> list[str]:
-    """Return a list of texts with its continuations NAME2, NAME3 ..., which are taken out of the group: ezc3d writes them anew."""
+    """Return a list of texts with its continuations NAME2, NAME3 ..., which are taken out of the group: ezc3d writes
+    them anew.
+    """
     rest = [text for tail in range(2, 100) for text in group.pop(f"{name}{tail}", {"value": []})["value"]]
     return [*group[name]["value"], *rest]
 
@@ -226,7 +254,7 @@ def _add_events(file: Any, events: list[Any]) -> None:
     elif events and group:
         del file["parameters"]["EVENT"]  # a group without any event, often without the parameters that events need
     for time, context, label in events:
-        if not any(abs(time - when) < NEAR and (context, label) == (side, name) for when, side, name in known):
+        if not any(abs(time - when) < _NEAR and (context, label) == (side, name) for when, side, name in known):
             file.add_event([float(time // 60), float(time % 60)], context=context, label=label, description="biodance")
 
 

@@ -9,7 +9,7 @@ from biodance.lab.c3d.layout import parameter_numbers, texts
 from biodance.lab.c3d.parameters import Parameters
 from biodance.records import Array
 
-METRES = {"mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "m": 1.0, "in": 0.0254}
+_METRES = {"mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "m": 1.0, "in": 0.0254}
 SPELLINGS = {
     "mm": ("mm", "millimeter", "millimeters", "millimetre", "millimetres"),
     "cm": ("cm", "centimeter", "centimeters", "centimetre", "centimetres"),
@@ -19,20 +19,26 @@ SPELLINGS = {
 }
 GUESSES = ("mm", "cm", "m")
 PERSON = 1.5
-"""m, the largest extent of the markers on a person: about 0.9 m for legs alone, up to 2.3 m with arms spread or raised."""
+"""m, the largest extent of the markers on a person: about 0.9 m for legs alone, up to 2.3 m with arms spread or
+raised.
+"""
 
 PLATE = 0.6
 """m, the longest side of a force plate: 0.4 m to 1.2 m in the makers' sheets."""
 
 BELIEVABLE = (0.05, 4.75)
-"""Extents, m, that a declared unit may give: the markers on a hand, a person who lies or leaps; outside it is overruled."""
+"""Extents, m, that a declared unit may give: the markers on a hand, a person who lies or leaps; outside it is
+overruled.
+"""
 
 
-def metres_per_unit(parameters: Parameters, points: Array, *, where: str) -> tuple[float, tuple[str, ...], tuple[str, ...]]:
+def metres_per_unit(
+    parameters: Parameters, points: Array, *, where: str
+) -> tuple[float, tuple[str, ...], tuple[str, ...]]:
     """Return the length of one file unit in metres, history and warnings.
 
-    ``points`` (T, K, 3) are the markers in file units. A missing or unknown unit, and one that would make the person or the plates smaller
-    than 5 cm or larger than 4.75 m, is decided by sense among mm, cm and m, and said so.
+    ``points`` (T, K, 3) are the markers in file units. A missing or unknown unit, and one that would make the person or
+    the plates smaller than 5 cm or larger than 4.75 m, is decided by sense among mm, cm and m, and said so.
 
     Raises
     ------
@@ -42,16 +48,17 @@ def metres_per_unit(parameters: Parameters, points: Array, *, where: str) -> tup
     written = next(iter(texts(parameters, "POINT", "UNITS")), "")
     unit = next((unit for unit, spellings in SPELLINGS.items() if written.strip(" .").casefold() in spellings), "")
     size, expected, what = _size(parameters, points)
-    if unit and (math.isnan(size) or BELIEVABLE[0] <= size * METRES[unit] <= BELIEVABLE[1]):
-        return METRES[unit], (f"Lengths are in {unit} (POINT:UNITS).",), ()
+    if unit and (math.isnan(size) or BELIEVABLE[0] <= size * _METRES[unit] <= BELIEVABLE[1]):
+        return _METRES[unit], (f"Lengths are in {unit} (POINT:UNITS).",), ()
     if math.isnan(size):
         raise FileRefused(
-            f"{where}: POINT:UNITS is {written!r} and neither markers nor plates tell the unit of length (mm, cm or m). "
+            f"{where}: POINT:UNITS is {written!r} and neither markers nor plates tell the unit of length (mm, cm or "
+            f"m). "
             "Write the unit into the file and read it again."
         )
-    guess = min(GUESSES, key=lambda name: abs(math.log(size * METRES[name] / expected)))
+    guess = min(GUESSES, key=lambda name: abs(math.log(size * _METRES[name] / expected)))
     said = f"POINT:UNITS is {written!r}; {what} of {size:.4g} can only be in {guess}, so lengths are in {guess}."
-    return METRES[guess], (said,), (said + " Check the sizes in the report.",)
+    return _METRES[guess], (said,), (said + " Check the sizes in the report.",)
 
 
 def _size(parameters: Parameters, points: Array) -> tuple[float, float, str]:

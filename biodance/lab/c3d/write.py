@@ -15,15 +15,15 @@ from biodance.records import Array, Markers, frozen_array
 FileValue = str | Sequence[str] | ArrayLike
 FileParameters = Mapping[str, Mapping[str, FileValue]]
 
-MOST = 255
+_MOST = 255
 """The longest dimension of a parameter: one byte tells it."""
 
 
 def parameter_section(groups: FileParameters) -> bytes:
     """Return the section: 4 bytes of header, every group with its parameters, padded to whole blocks.
 
-    Text becomes a character array, whole numbers within 16 bits become integers, other numbers 32-bit floats; arrays keep their
-    dimensions, first one fastest. Lists of more than 255 strings or numbers continue in NAME2, NAME3 ...
+    Text becomes a character array, whole numbers within 16 bits become integers, other numbers 32-bit floats; arrays
+    keep their dimensions, first one fastest. Lists of more than 255 strings or numbers continue in NAME2, NAME3 ...
 
     Raises
     ------
@@ -38,8 +38,11 @@ def parameter_section(groups: FileParameters) -> bytes:
                 records.append(_record(f"{name}{part + 1}" if part else name, number, tail + piece))
     body = b"".join(records) + b"\0\0"
     blocks = -(-(len(body) + 4) // C3D_BLOCK)
-    if blocks > MOST:
-        raise BiodanceError(f"The parameters need {blocks} blocks of 512 bytes, a C3D file has room for {MOST}. Store fewer parameters.")
+    if blocks > _MOST:
+        raise BiodanceError(
+            f"The parameters need {blocks} blocks of 512 bytes, a C3D file has room for {_MOST}. Store fewer "
+            f"parameters."
+        )
     return (bytes([1, 0x50, blocks, INTEL]) + body).ljust(blocks * C3D_BLOCK, b"\0")
 
 
@@ -52,19 +55,21 @@ def _record(name: str, group: int, data: bytes) -> bytes:
 def _pieces(value: FileValue, what: str) -> list[tuple[bytes, bytes]]:
     """Return (type and dimensions, data) of a value, in pieces of at most 255 entries."""
     if isinstance(value, str):
-        raw = value.encode()[:MOST]
+        raw = value.encode()[:_MOST]
         return [(bytes([0xFF, 1, len(raw)]), raw)]
     if isinstance(value, Sequence) and all(isinstance(entry, str) for entry in value):
-        rows = [str(entry).encode()[:MOST] for entry in value]
+        rows = [str(entry).encode()[:_MOST] for entry in value]
         width = max((len(row) for row in rows), default=0)
-        parts = [rows[i : i + MOST] for i in range(0, len(rows), MOST)] or [[]]
+        parts = [rows[i : i + _MOST] for i in range(0, len(rows), _MOST)] or [[]]
         return [(bytes([0xFF, 2, width, len(part)]), b"".join(row.ljust(width) for row in part)) for part in parts]
     array = np.asarray(value)
-    if array.dtype.kind not in "iuf" or array.ndim > 7 or (array.ndim > 1 and max(array.shape) > MOST):
-        raise BiodanceError(f"Parameter {what} has values of type {array.dtype} and shape {array.shape}; text or numbers are legal.")
+    if array.dtype.kind not in "iuf" or array.ndim > 7 or (array.ndim > 1 and max(array.shape) > _MOST):
+        raise BiodanceError(
+            f"Parameter {what} has values of type {array.dtype} and shape {array.shape}; text or numbers are legal."
+        )
     if array.ndim <= 1:
         flat = np.atleast_1d(array)
-        return [_number_piece(flat[i : i + MOST]) for i in range(0, flat.size, MOST)] or [_number_piece(flat)]
+        return [_number_piece(flat[i : i + _MOST]) for i in range(0, flat.size, _MOST)] or [_number_piece(flat)]
     return [_number_piece(array)]
 
 
@@ -75,27 +80,28 @@ def _number_piece(array: np.ndarray[Any, Any]) -> tuple[bytes, bytes]:
     return bytes([2 if whole else 4, len(shape)]) + shape, data
 
 
-MM = 1000.0
+_MM = 1000.0
 CHANNEL_KINDS = {1: "FFFLLM", 2: "FFFMMM", 3: "FFFFFFFF", 4: "VVVVVV"}
 """What each channel of a plate TYPE holds: force N, length m, moment N·m or volt."""
-NAMES = {
+_NAMES = {
     1: ("Fx", "Fy", "Fz", "Px", "Py", "Mz"),
     2: ("Fx", "Fy", "Fz", "Mx", "My", "Mz"),
     3: ("Fx12", "Fx34", "Fy14", "Fy23", "Fz1", "Fz2", "Fz3", "Fz4"),
     4: ("V1", "V2", "V3", "V4", "V5", "V6"),
 }
-DISK = {"F": (1.0, "N"), "L": (MM, "mm"), "M": (MM, "Nmm"), "V": (1.0, "V")}
+DISK = {"F": (1.0, "N"), "L": (_MM, "mm"), "M": (_MM, "Nmm"), "V": (1.0, "V")}
 
 
 @dataclass(frozen=True, eq=False)
 class PlateRecording:
     """What one force plate recorded, as its amplifier gives it.
 
-    ``type`` 1, 2, 3 or 4 (C3D force platform TYPE); ``corners`` (4, 3) m in the lab frame, in the order of the standard (+x+y, -x+y, -x-y,
-    +x-y of the plate frame); ``origin`` (3,) m in the plate frame: TYPE 1, 2, 4 from the sensor's origin to the centre of the surface,
-    TYPE 3 half the sensor distances and the depth; ``channels`` (S, C): TYPE 1 Fx Fy Fz N, Px Py m, Mz N·m; TYPE 2 Fx Fy Fz N, Mx My Mz
-    N·m; TYPE 3 Fx12 Fx34 Fy14 Fy23 Fz1..4 N; TYPE 4 six V. Signs are stored as given. ``calibration`` (6, 6), TYPE 4 only: F =
-    calibration @ V, three rows of N/V and three of N·m/V. ``labels`` of the channels; without any, ``Fx1`` and so on.
+    ``type`` 1, 2, 3 or 4 (C3D force platform TYPE); ``corners`` (4, 3) m in the lab frame, in the order of the standard
+    (+x+y, -x+y, -x-y, +x-y of the plate frame); ``origin`` (3,) m in the plate frame: TYPE 1, 2, 4 from the sensor's
+    origin to the centre of the surface, TYPE 3 half the sensor distances and the depth; ``channels`` (S, C): TYPE 1 Fx
+    Fy Fz N, Px Py m, Mz N·m; TYPE 2 Fx Fy Fz N, Mx My Mz N·m; TYPE 3 Fx12 Fx34 Fy14 Fy23 Fz1..4 N; TYPE 4 six V. Signs
+    are stored as given. ``calibration`` (6, 6), TYPE 4 only: F = calibration @ V, three rows of N/V and three of N·m/V.
+    ``labels`` of the channels; without any, ``Fx1`` and so on.
     """
 
     type: int
@@ -116,7 +122,10 @@ class PlateRecording:
             "labels": tuple(self.labels),
         }
         if (self.type == 4) != (self.calibration is not None):
-            raise BiodanceError(f"A plate of TYPE {self.type} has calibration {self.calibration}; TYPE 4 needs one, no other may have one.")
+            raise BiodanceError(
+                f"A plate of TYPE {self.type} has calibration {self.calibration}; TYPE 4 needs one, no other may have "
+                f"one."
+            )
         if self.calibration is not None:
             values["calibration"] = frozen_array(self.calibration, (6, 6), "PlateRecording.calibration")
         if self.labels and len(self.labels) != count:
@@ -135,12 +144,13 @@ def write_c3d(
     first_frame: int = 1,
     prefix: str = "",
 ) -> None:
-    """Write markers (lab frame, m, NaN = not seen) and plates as a C3D file that all readers give back to float32 precision.
+    """Write markers (lab frame, m, NaN = not seen) and plates as a C3D file that all readers give back to float32
+    precision.
 
-    ``analog_rate`` Hz is a whole multiple of the markers' rate; ``markers=None`` writes plates alone. A single frame has no rate of its
-    own: it takes ``analog_rate`` over its samples. ``prefix`` is put before every label
-    (``Subject:``). ``parameters[GROUP][NAME]`` are added as they stand, in the units of the file (PROCESSING: Bodymass kg, Height mm), and
-    overrule what this function would write, for example ``{"FORCE_PLATFORM": {"ZERO": [1, 100]}}``.
+    ``analog_rate`` Hz is a whole multiple of the markers' rate; ``markers=None`` writes plates alone. A single frame
+    has no rate of its own: it takes ``analog_rate`` over its samples. ``prefix`` is put before every label
+    (``Subject:``). ``parameters[GROUP][NAME]`` are added as they stand, in the units of the file (PROCESSING: Bodymass
+    kg, Height mm), and overrule what this function would write, for example ``{"FORCE_PLATFORM": {"ZERO": [1, 100]}}``.
 
     Raises
     ------
@@ -150,10 +160,16 @@ def write_c3d(
     path = Path(path)
     samples = _samples(path, markers, plates, analog_rate)
     points = _points(markers, len(plates[0].channels) if markers is None and plates else 0)
-    analog = np.concatenate([_on_disk(plate) for plate in plates], axis=1) if plates else np.empty((len(points) * samples, 0))
+    analog = (
+        np.concatenate([_on_disk(plate) for plate in plates], axis=1)
+        if plates
+        else np.empty((len(points) * samples, 0))
+    )
     if not np.isfinite(analog).all():
         row, column = np.argwhere(~np.isfinite(analog))[0]
-        raise BiodanceError(f"{path}: analog channel {column + 1} is not finite at sample {row}; a C3D file holds finite numbers only.")
+        raise BiodanceError(
+            f"{path}: analog channel {column + 1} is not finite at sample {row}; a C3D file holds finite numbers only."
+        )
     rate = markers.rate if markers is not None and markers.time.size > 1 else analog_rate / max(samples, 1)
     if not (np.isfinite(rate) and rate > 0):
         raise BiodanceError(f"{path}: the rate would be {rate:g} Hz; give analog_rate > 0.")
@@ -169,7 +185,11 @@ def write_c3d(
     groups["POINT"]["DATA_START"] = 2 + len(parameter_section(groups)) // C3D_BLOCK
     section = parameter_section(groups)
     header = _header(points, analog, samples, first_frame, rate, 2 + len(section) // C3D_BLOCK)
-    data = np.concatenate([points.reshape(len(points), -1), analog.reshape(len(points), -1)], axis=1).astype("<f4").tobytes()
+    data = (
+        np.concatenate([points.reshape(len(points), -1), analog.reshape(len(points), -1)], axis=1)
+        .astype("<f4")
+        .tobytes()
+    )
     try:
         with open(path, "xb") as stream:
             stream.write(header + section + data + bytes(-len(data) % C3D_BLOCK))
@@ -189,10 +209,13 @@ def _samples(path: Path, markers: Markers | None, plates: Sequence[PlateRecordin
     frames = markers.time.size if markers is not None else min(lengths)
     samples = round(min(lengths) / frames) if frames else 0
     if len(lengths) > 1 or samples < 1 or lengths != {samples * frames}:
-        raise BiodanceError(f"{path}: plates have {sorted(lengths)} samples for {frames} frames; a whole number per frame is needed.")
+        raise BiodanceError(
+            f"{path}: plates have {sorted(lengths)} samples for {frames} frames; a whole number per frame is needed."
+        )
     if markers is not None and markers.time.size > 1 and not np.isclose(analog_rate, samples * markers.rate, rtol=1e-4):
         raise BiodanceError(
-            f"{path}: analog rate {analog_rate:g} Hz and {samples} samples per frame do not fit the markers' rate {markers.rate:g} Hz."
+            f"{path}: analog rate {analog_rate:g} Hz and {samples} samples per frame do not fit the markers' rate "
+            f"{markers.rate:g} Hz."
         )
     return samples
 
@@ -202,7 +225,7 @@ def _points(markers: Markers | None, frames: int) -> Array:
     if markers is None:
         return np.empty((frames, 0, 4))
     points = np.zeros((*markers.seen.shape, 4))
-    points[..., :3] = np.where(markers.seen[..., None], MM * markers.xyz, 0.0)
+    points[..., :3] = np.where(markers.seen[..., None], _MM * markers.xyz, 0.0)
     points[..., 3] = np.where(markers.seen, 0.0, -1.0)
     return points
 
@@ -234,7 +257,9 @@ def _point_group(markers: Markers | None, prefix: str, rate: float, frames: int)
 
 def _analog_group(plates: Sequence[PlateRecording], rate: float) -> dict[str, FileValue]:
     labels = [
-        label for number, plate in enumerate(plates, start=1) for label in plate.labels or [f"{name}{number}" for name in NAMES[plate.type]]
+        label
+        for number, plate in enumerate(plates, start=1)
+        for label in plate.labels or [f"{name}{number}" for name in _NAMES[plate.type]]
     ]
     count = len(labels)
     return {
@@ -258,13 +283,13 @@ def _plate_group(plates: Sequence[PlateRecording]) -> dict[str, FileValue]:
         channel[:size, index] = np.arange(first, first + size)
         first += size
         if plate.calibration is not None:
-            matrix[:, :, index] = plate.calibration * np.repeat([1.0, MM], 3)[:, None]
+            matrix[:, :, index] = plate.calibration * np.repeat([1.0, _MM], 3)[:, None]
     group: dict[str, FileValue] = {
         "USED": count,
         "TYPE": np.array([plate.type for plate in plates], dtype=int),
         "ZERO": np.array([1, 0]),
-        "CORNERS": np.reshape([MM * plate.corners.T for plate in plates], (count, 3, 4)).transpose(1, 2, 0),
-        "ORIGIN": np.reshape([MM * plate.origin for plate in plates], (count, 3)).T,
+        "CORNERS": np.reshape([_MM * plate.corners.T for plate in plates], (count, 3, 4)).transpose(1, 2, 0),
+        "ORIGIN": np.reshape([_MM * plate.origin for plate in plates], (count, 3)).T,
         "CHANNEL": channel,
     }
     return group | ({"CAL_MATRIX": matrix} if any(plate.calibration is not None for plate in plates) else {})

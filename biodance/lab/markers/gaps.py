@@ -1,9 +1,11 @@
-"""Gaps in marker trajectories: report them, bridge the short ones, fill from the rigid segment, leave the rest. Nothing is extrapolated.
+"""Gaps in marker trajectories: report them, bridge the short ones, fill from the rigid segment, leave the rest. Nothing
+is extrapolated.
 
-- Short: a cubic spline between the two ends, whose positions and slopes come from a parabola through the last six frames on each side.
-- Longer: the other markers of the same segment carry the marker across. Those are chosen whose distance to it hardly changes in the
-  recording; the prediction from the frame before the gap and that from the frame after it are blended (Kabsch 1976,
-  doi:10.1107/S0567739476001873, for the rotation).
+- Short: a cubic spline between the two ends, whose positions and slopes come from a parabola through the last six
+  frames on each side.
+- Longer: the other markers of the same segment carry the marker across. Those are chosen whose distance to it hardly
+  changes in the recording; the prediction from the frame before the gap and that from the frame after it are blended
+  (Kabsch 1976, doi:10.1107/S0567739476001873, for the rotation).
 - Whatever is left stays NaN: the kinematics give it no weight.
 """
 
@@ -17,7 +19,7 @@ from biodance.records import Array, Markers
 
 FLANK = 6
 """Seen frames that each side of a short gap must have."""
-CARRIERS = 5
+_CARRIERS = 5
 """At most so many neighbours carry a marker across a gap; at least three are needed."""
 RIGID = 0.01
 """m: a neighbour carries a marker if their distance has a smaller standard deviation than this."""
@@ -27,7 +29,9 @@ CLOSURE = 0.02
 
 @dataclass(frozen=True)
 class MarkerGaps:
-    """How often a marker was not seen: ``percent`` of all frames, ``longest`` gap in s (the ends of the recording count)."""
+    """How often a marker was not seen: ``percent`` of all frames, ``longest`` gap in s (the ends of the recording
+    count).
+    """
 
     label: str
     percent: float
@@ -36,7 +40,9 @@ class MarkerGaps:
 
 @dataclass(frozen=True)
 class Gap:
-    """Frames ``start`` to ``stop`` (excluded) of one marker that were not seen; ``how`` it was dealt with, one plain sentence."""
+    """Frames ``start`` to ``stop`` (excluded) of one marker that were not seen; ``how`` it was dealt with, one plain
+    sentence.
+    """
 
     label: str
     start: int
@@ -50,7 +56,8 @@ def report_gaps(markers: Markers) -> tuple[MarkerGaps, ...]:
         MarkerGaps(
             label,
             100.0 * float(np.mean(hidden)) if hidden.size else 0.0,
-            max((stop - start for start, stop in runs(hidden)), default=0) * (1 / markers.rate if markers.time.size > 1 else 0.0),
+            max((stop - start for start, stop in runs(hidden)), default=0)
+            * (1 / markers.rate if markers.time.size > 1 else 0.0),
         )
         for label, hidden in zip(markers.names, ~markers.seen.T, strict=True)
     )
@@ -59,8 +66,9 @@ def report_gaps(markers: Markers) -> tuple[MarkerGaps, ...]:
 def fill_gaps(markers: Markers, segments: Mapping[str, str], *, short: float = 0.2) -> tuple[Markers, tuple[Gap, ...]]:
     """Return the markers with their gaps filled where that is safe, and every gap with the way it was dealt with.
 
-    ``segments`` label -> segment; markers without one are only bridged. Gaps up to ``short`` s are bridged by a spline, longer ones and
-    those without six seen frames on both sides are filled from at least three other markers of the segment that were seen throughout.
+    ``segments`` label -> segment; markers without one are only bridged. Gaps up to ``short`` s are bridged by a spline,
+    longer ones and those without six seen frames on both sides are filled from at least three other markers of the
+    segment that were seen throughout.
     """
     xyz = markers.xyz.copy()
     hidden = {label: runs(~seen) for label, seen in zip(markers.names, markers.seen.T, strict=True)}
@@ -68,7 +76,11 @@ def fill_gaps(markers: Markers, segments: Mapping[str, str], *, short: float = 0
     later: list[Gap] = []
     for column, (label, found) in enumerate(hidden.items()):
         for start, stop in found:
-            bridge = _bridge(markers.time, markers.xyz[:, column], start, stop) if (stop - start) <= short * markers.rate + 1e-9 else None
+            bridge = (
+                _bridge(markers.time, markers.xyz[:, column], start, stop)
+                if (stop - start) <= short * markers.rate + 1e-9
+                else None
+            )
             if bridge is None:
                 later.append(Gap(label, start, stop))
             else:
@@ -93,14 +105,18 @@ def _bridge(time: Array, xyz: Array, start: int, stop: int) -> Array | None:
     ends = []
     for side, edge in ((before, start - 1), (after, stop)):
         offset = time[side] - time[edge]
-        place, slope, _ = np.linalg.lstsq(np.stack([np.ones(FLANK), offset, offset**2], axis=1), xyz[side], rcond=None)[0]
+        place, slope, _ = np.linalg.lstsq(np.stack([np.ones(FLANK), offset, offset**2], axis=1), xyz[side], rcond=None)[
+            0
+        ]
         ends.append((time[edge], place, slope))
     knots, places, slopes = zip(*ends, strict=True)
     return CubicHermiteSpline(knots, places, slopes)(time[start:stop])
 
 
 def _carry(markers: Markers, gap: Gap, segments: Mapping[str, str]) -> tuple[Array | None, str]:
-    """Return the positions (n, 3) of a marker over its gap from its segment, or None; and the sentence that says which and why."""
+    """Return the positions (n, 3) of a marker over its gap from its segment, or None; and the sentence that says
+    which and why.
+    """
     if gap.start == 0 or gap.stop == markers.time.size:
         return None, "left unseen: it reaches the end of the recording, and nothing is extrapolated"
     carriers = _carriers(markers, gap, segments)
@@ -111,14 +127,19 @@ def _carry(markers: Markers, gap: Gap, segments: Mapping[str, str]) -> tuple[Arr
     forward, backward = (_move(others[edge], others, own[edge]) for edge in (0, -1))
     closure = max(np.linalg.norm(forward[-1] - own[-1]), np.linalg.norm(backward[0] - own[0]))
     if closure > CLOSURE:
-        return None, f"left unseen: {', '.join(carriers)} predict it with an error of {1000 * closure:.0f} mm across the gap"
+        return (
+            None,
+            f"left unseen: {', '.join(carriers)} predict it with an error of {1000 * closure:.0f} mm across the gap",
+        )
     part = np.linspace(0.0, 1.0, len(own))[:, None]
     blend = (1 - part) * forward + part * backward
     return blend[1:-1], f"filled from {', '.join(carriers)} ({1000 * closure:.0f} mm off across the gap)"
 
 
 def _carriers(markers: Markers, gap: Gap, segments: Mapping[str, str]) -> list[str]:
-    """Return the labels on the same segment, seen from before to after the gap, whose distance to the marker varies least."""
+    """Return the labels on the same segment, seen from before to after the gap, whose distance to the marker varies
+    least.
+    """
     own = markers[gap.label]
     spread = {}
     for label in markers.names:
@@ -126,8 +147,12 @@ def _carriers(markers: Markers, gap: Gap, segments: Mapping[str, str]) -> list[s
         if same and not np.isnan(markers[label][gap.start - 1 : gap.stop + 1]).any():
             distance = np.linalg.norm(markers[label] - own, axis=1)
             spread[label] = float(np.nanstd(distance))
-    rigid = sorted((label for label, value in spread.items() if value < RIGID), key=spread.__getitem__)[:CARRIERS]
-    return rigid if len(rigid) >= 3 and _spans_a_plane(np.stack([markers[label][gap.start - 1] for label in rigid])) else []
+    rigid = sorted((label for label, value in spread.items() if value < RIGID), key=spread.__getitem__)[:_CARRIERS]
+    return (
+        rigid
+        if len(rigid) >= 3 and _spans_a_plane(np.stack([markers[label][gap.start - 1] for label in rigid]))
+        else []
+    )
 
 
 def _spans_a_plane(points: Array) -> bool:
@@ -136,7 +161,9 @@ def _spans_a_plane(points: Array) -> bool:
 
 
 def _move(reference: Array, moved: Array, point: Array) -> Array:
-    """Return where ``point`` (3,) goes (n, 3) when the cluster ``reference`` (K, 3) goes to ``moved`` (n, K, 3) rigidly (Kabsch)."""
+    """Return where ``point`` (3,) goes (n, 3) when the cluster ``reference`` (K, 3) goes to ``moved`` (n, K, 3)
+    rigidly (Kabsch).
+    """
     middle, middles = reference.mean(axis=0), moved.mean(axis=1)
     u, _, vt = np.linalg.svd(np.einsum("nki,kj->nij", moved - middles[:, None], reference - middle))
     u[:, :, 2] *= np.linalg.det(u @ vt)[:, None]

@@ -8,7 +8,7 @@ from biodance.errors import BiodanceError
 from biodance.library import read_toml
 
 SIDES = ("right", "left")
-SEGMENTS = (
+_SEGMENTS = (
     "pelvis",
     *(f"{side}_{part}" for side in SIDES for part in ("thigh", "shank", "foot")),
     "trunk_head",
@@ -17,7 +17,17 @@ SEGMENTS = (
 """The 12 segments that a marker can sit on."""
 
 SIDED_LANDMARKS = (
-    *("asis", "psis", "hip_centre", "knee_lateral", "knee_medial", "ankle_lateral", "ankle_medial", "thigh_wand", "shank_wand"),
+    *(
+        "asis",
+        "psis",
+        "hip_centre",
+        "knee_lateral",
+        "knee_medial",
+        "ankle_lateral",
+        "ankle_medial",
+        "thigh_wand",
+        "shank_wand",
+    ),
     *("heel", "toe", "toe_lateral", "toe_medial"),
     *("acromion", "elbow_lateral", "elbow_medial", "wrist_radial", "wrist_ulnar", "hand"),
 )
@@ -44,7 +54,9 @@ NORMALISERS = (
     *("asis_width", "foot_length", "thigh_length", "shank_length", "upper_arm_length", "forearm_length"),
     *("trunk_length", "stature"),
 )
-"""Body measures in m: joint centre to joint centre for the limbs, heel to toe tip for the foot, mid shoulder to mid hip for the trunk."""
+"""Body measures in m: joint centre to joint centre for the limbs, heel to toe tip for the foot, mid shoulder to mid
+hip for the trunk.
+"""
 
 ORIGINS = ("segment", "mid_shoulder")
 MARKER_KEYS = ("segment", "weight", "offset", "normaliser", "origin")
@@ -69,8 +81,8 @@ def parse_marker_set(path: Path) -> Contents:
     Raises
     ------
     BiodanceError
-        The file is missing, is not TOML or breaks a rule: unknown key, segment, landmark, normaliser or label, a marker without
-        segment, an offset without normaliser, a negative weight.
+        The file is missing, is not TOML or breaks a rule: unknown key, segment, landmark, normaliser or label, a marker
+        without segment, an offset without normaliser, a negative weight.
     """
     table = read_toml(path)
     _legal(path, "key", tuple(table), FILE_KEYS)
@@ -82,23 +94,31 @@ def parse_marker_set(path: Path) -> Contents:
         raise BiodanceError(f"{path}: the set has no marker. Write one line per marker under [markers].")
     required = tuple(_labels(path, "required", table.get("required", []), markers))
     if not required:
-        raise BiodanceError(f"{path}: 'required' is empty, so every file would be taken for this set. List the labels that must be there.")
+        raise BiodanceError(
+            f"{path}: 'required' is empty, so every file would be taken for this set. List the labels that must be "
+            f"there."
+        )
     aliases = table.get("aliases", {})
     _labels(path, "[aliases]", list(aliases.values()), markers)
     twice = [alias for alias in aliases if alias in markers]
     if twice:
-        raise BiodanceError(f"{path}: {', '.join(twice)} stands under [aliases] and under [markers]. Keep one of the two.")
+        raise BiodanceError(
+            f"{path}: {', '.join(twice)} stands under [aliases] and under [markers]. Keep one of the two."
+        )
     landmarks = table.get("landmarks", {})
     _legal(path, "landmark", tuple(landmarks), LANDMARKS)
     chosen = {name: _alternatives(path, name, value, markers) for name, value in landmarks.items()}
-    return Contents(str(table.get("description", "")), str(table.get("source", "")), required, dict(aliases), markers, chosen)
+    return Contents(
+        str(table.get("description", "")), str(table.get("source", "")), required, dict(aliases), markers, chosen
+    )
 
 
 def parse_map(path: Path) -> Contents:
-    """Read ``[markers] map`` of a session.toml: which label of the recordings is which landmark, or merely sits on which segment.
+    """Read ``[markers] map`` of a session.toml: which label of the recordings is which landmark, or merely sits on
+    which segment.
 
-    Several labels on a landmark of the midline are its mean, and both posterior iliac spines together are ``mid_psis``. Landmarks of the
-    pelvis must be in a recording (the first label, without one); the others may be left out.
+    Several labels on a landmark of the midline are its mean, and both posterior iliac spines together are ``mid_psis``.
+    Landmarks of the pelvis must be in a recording (the first label, without one); the others may be left out.
 
     Raises
     ------
@@ -108,16 +128,23 @@ def parse_map(path: Path) -> Contents:
     table = read_toml(path).get("markers")
     given = table.get("map") if isinstance(table, dict) else None
     if not isinstance(given, dict) or not given:
-        raise BiodanceError(f'{path}: [markers] has no map. Write map = {{LABEL = "left_asis", ...}}, one label per landmark.')
+        raise BiodanceError(
+            f'{path}: [markers] has no map. Write map = {{LABEL = "left_asis", ...}}, one label per landmark.'
+        )
     markers: dict[str, dict[str, Any]] = {}
     landmarks: dict[str, tuple[tuple[str, ...], ...]] = {}
     for label, place in given.items():
-        if place not in (*LANDMARKS, *SEGMENTS):
-            legal = f"landmarks {', '.join(LANDMARKS)}; segments {', '.join(SEGMENTS)}"
-            raise BiodanceError(f"{path}: [markers] map says {label} = {place!r}, which is no landmark and no segment. Legal are {legal}.")
+        if place not in (*LANDMARKS, *_SEGMENTS):
+            legal = f"landmarks {', '.join(LANDMARKS)}; segments {', '.join(_SEGMENTS)}"
+            raise BiodanceError(
+                f"{path}: [markers] map says {label} = {place!r}, which is no landmark and no segment. Legal are "
+                f"{legal}."
+            )
         if place in landmarks and place not in MIDLINE:
-            raise BiodanceError(f"{path}: [markers] map gives {place} to {landmarks[place][0][0]} and to {label}. Keep one of the two.")
-        markers[label] = {"segment": place if place in SEGMENTS else segment_of(place)}
+            raise BiodanceError(
+                f"{path}: [markers] map gives {place} to {landmarks[place][0][0]} and to {label}. Keep one of the two."
+            )
+        markers[label] = {"segment": place if place in _SEGMENTS else segment_of(place)}
         if place in LANDMARKS:
             landmarks[place] = ((*landmarks.get(place, ((),))[0], label),)
     if "mid_psis" not in landmarks and {"left_psis", "right_psis"} <= landmarks.keys():
@@ -131,7 +158,7 @@ def segment_of(landmark: str) -> str:
     """Return the segment that a marker on a landmark sits on."""
     side, _, part = landmark.rpartition("_") if landmark.startswith("mid") else landmark.partition("_")
     segment = SEGMENT_OF.get(landmark) or SEGMENT_OF[part]
-    return f"{side}_{segment}" if f"{side}_{segment}" in SEGMENTS else segment
+    return f"{side}_{segment}" if f"{side}_{segment}" in _SEGMENTS else segment
 
 
 def _legal(path: Path, kind: str, found: tuple[str, ...], legal: tuple[str, ...]) -> None:
@@ -146,13 +173,17 @@ def _labels(path: Path, where: str, value: Any, markers: dict[str, dict[str, Any
         raise BiodanceError(f"{path}: {where} is {value!r}, expected a list of marker labels.")
     unknown = [label for label in value if label not in markers]
     if unknown:
-        raise BiodanceError(f"{path}: {where} names {unknown[0]!r}, which is not under [markers]. Add the marker or correct the label.")
+        raise BiodanceError(
+            f"{path}: {where} names {unknown[0]!r}, which is not under [markers]. Add the marker or correct the label."
+        )
     return value
 
 
 def _alternatives(path: Path, name: str, value: Any, markers: dict[str, dict[str, Any]]) -> tuple[tuple[str, ...], ...]:
     if not isinstance(value, list) or not value or not all(isinstance(labels, list) and labels for labels in value):
-        raise BiodanceError(f'{path}: landmark {name} is {value!r}, expected lists of labels, for example [["LPSI", "RPSI"], ["SACR"]].')
+        raise BiodanceError(
+            f'{path}: landmark {name} is {value!r}, expected lists of labels, for example [["LPSI", "RPSI"], ["SACR"]].'
+        )
     return tuple(tuple(_labels(path, f"landmark {name}", labels, markers)) for labels in value)
 
 
@@ -160,8 +191,8 @@ def _marker(path: Path, label: str, fields: Any) -> dict[str, Any]:
     """Check one marker's entry and return the fields of a ``SetMarker``."""
     where = f"{path}: marker {label}"
     if not isinstance(fields, dict) or "segment" not in fields:
-        raise BiodanceError(f"{where} has no segment. Write segment = one of {', '.join(SEGMENTS)}.")
-    for key, legal in (("segment", SEGMENTS), ("normaliser", NORMALISERS), ("origin", ORIGINS)):
+        raise BiodanceError(f"{where} has no segment. Write segment = one of {', '.join(_SEGMENTS)}.")
+    for key, legal in (("segment", _SEGMENTS), ("normaliser", NORMALISERS), ("origin", ORIGINS)):
         if key in fields and fields[key] not in legal:
             raise BiodanceError(f"{where} has the {key} {fields[key]!r}. Legal: {', '.join(legal)}.")
     unknown = [key for key in fields if key not in MARKER_KEYS]
@@ -171,10 +202,14 @@ def _marker(path: Path, label: str, fields: Any) -> dict[str, Any]:
     if not _number(weight) or weight < 0:
         raise BiodanceError(f"{where} has the weight {weight!r}, expected a number >= 0.")
     if ("offset" in fields) != ("normaliser" in fields):
-        raise BiodanceError(f"{where} has an offset without normaliser or a normaliser without offset. Give both or neither.")
+        raise BiodanceError(
+            f"{where} has an offset without normaliser or a normaliser without offset. Give both or neither."
+        )
     offset = fields.get("offset")
     if offset is not None and not (isinstance(offset, list) and len(offset) == 3 and all(_number(x) for x in offset)):
-        raise BiodanceError(f"{where} has the offset {offset!r}, expected three numbers [x, y, z] (anterior, up, right).")
+        raise BiodanceError(
+            f"{where} has the offset {offset!r}, expected three numbers [x, y, z] (anterior, up, right)."
+        )
     return {**fields, "weight": float(weight), "offset": None if offset is None else tuple(float(x) for x in offset)}
 
 

@@ -1,8 +1,10 @@
-"""Marker sets: which marker sits on which segment and marks which landmark; data files in ``anthropometry/marker_sets``.
+"""Marker sets: which marker sits on which segment and marks which landmark; data files in
+``anthropometry/marker_sets``.
 
-A set is recognised by its labels, never by a count: markers that a lab leaves out are simply not there. A set file names the labels that
-must be there (``required``), other spellings (``aliases``), per marker its segment and weight and, for bodies that nobody has measured, an
-``offset`` in units of a body measure (``normaliser``), and which labels mark which anatomical landmark.
+A set is recognised by its labels, never by a count: markers that a lab leaves out are simply not there. A set file
+names the labels that must be there (``required``), other spellings (``aliases``), per marker its segment and weight
+and, for bodies that nobody has measured, an ``offset`` in units of a body measure (``normaliser``), and which labels
+mark which anatomical landmark.
 """
 
 from collections.abc import Iterable, Mapping
@@ -19,7 +21,7 @@ from biodance.lab.markers.set_file import LANDMARKS, parse_map, parse_marker_set
 from biodance.records import Array, Markers, Trial
 
 FOLDER = "anthropometry/marker_sets"
-FAMILY = DataFamily("marker set", "biodance.marker_sets", FOLDER, ".toml")
+_FAMILY = DataFamily("marker set", "biodance.marker_sets", FOLDER, ".toml")
 MAPS = ("session.toml", "subject.toml")
 """Files whose ``[markers] map`` is a marker set of its own."""
 
@@ -28,9 +30,10 @@ MAPS = ("session.toml", "subject.toml")
 class SetMarker:
     """One marker of a set.
 
-    ``weight`` >= 0 multiplies its squared residual; ``offset`` (3,) times the body measure ``normaliser`` (m) is its place in the segment
-    frame (x anterior, y up, z right) relative to ``origin``: "segment" (the segment's own origin) or "mid_shoulder" (the middle of the two
-    shoulder joint centres). ``offset`` is None where no generic place is known: such a marker exists only once a static trial places it.
+    ``weight`` >= 0 multiplies its squared residual; ``offset`` (3,) times the body measure ``normaliser`` (m) is its
+    place in the segment frame (x anterior, y up, z right) relative to ``origin``: "segment" (the segment's own origin)
+    or "mid_shoulder" (the middle of the two shoulder joint centres). ``offset`` is None where no generic place is
+    known: such a marker exists only once a static trial places it.
     """
 
     label: str
@@ -43,8 +46,9 @@ class SetMarker:
 
 @dataclass(frozen=True)
 class MarkerSet:
-    """A marker set: ``markers``; ``aliases`` label in files -> label of the set; ``landmarks`` name -> alternatives, each the labels whose
-    mean is the landmark; ``required`` labels without which the set is not recognised; ``name`` finds it again with ``read_marker_set``.
+    """A marker set: ``markers``; ``aliases`` label in files -> label of the set; ``landmarks`` name -> alternatives,
+    each the labels whose mean is the landmark; ``required`` labels without which the set is not recognised; ``name``
+    finds it again with ``read_marker_set``.
     """
 
     name: str
@@ -69,8 +73,8 @@ class MarkerSet:
     def match(self, labels: Iterable[str]) -> dict[str, str]:
         """Return ``{label of the set: label in the file}`` for every marker of the set that the file has.
 
-        The exact label wins over an alias, an alias over another letter case; a difference in case only counts where the file has one such
-        label.
+        The exact label wins over an alias, an alias over another letter case; a difference in case only counts where
+        the file has one such label.
         """
         given = tuple(labels)
         folded: dict[str, list[str]] = {}
@@ -87,20 +91,22 @@ class MarkerSet:
 
 
 def read_marker_set(name_or_path: str | Path) -> MarkerSet:
-    """Return a marker set: a shipped or installed one by its name, a user's own by the path of its TOML file (then the path is its name),
-    or by the path of a session.toml that has a ``[markers] map``.
+    """Return a marker set: a shipped or installed one by its name, a user's own by the path of its TOML file (then the
+    path is its name), or by the path of a session.toml that has a ``[markers] map``.
 
     Raises
     ------
     UnknownName
         There is no set of that name.
     BiodanceError
-        The file is missing, is not TOML, or breaks a rule; the message names the file, the entry and what would be legal.
+        The file is missing, is not TOML, or breaks a rule; the message names the file, the entry and what would be
+        legal.
     """
-    path = FAMILY.locate(name_or_path)
+    path = _FAMILY.locate(name_or_path)
     if not path.is_file():
         raise FileRefused(
-            f"{path}: cannot be opened, there is no such marker set. Check the path; sets known by name are {', '.join(FAMILY.files())}."
+            f"{path}: cannot be opened, there is no such marker set. Check the path; sets known by name are "
+            f"{', '.join(_FAMILY.files())}."
         )
     return _read(str(name_or_path), path, path.stat().st_mtime_ns)
 
@@ -121,27 +127,36 @@ def _read(name: str, path: Path, _stamp: int) -> MarkerSet:
 
 
 def recognise(labels: Iterable[str], *, candidates: Iterable[MarkerSet] | None = None) -> MarkerSet | None:
-    """Return the set whose required labels are all among ``labels`` and of which most markers are there; None if there is none.
+    """Return the set whose required labels are all among ``labels`` and of which most markers are there; None if there
+    is none.
 
     ``candidates`` are the sets to choose from, by default all known by name.
     """
     labels = tuple(labels)
-    sets = tuple(read_marker_set(name) for name in FAMILY.files()) if candidates is None else tuple(candidates)
+    sets = tuple(read_marker_set(name) for name in _FAMILY.files()) if candidates is None else tuple(candidates)
     matches = [(marker_set, marker_set.match(labels)) for marker_set in sets]
     complete = [(marker_set, match) for marker_set, match in matches if match.keys() >= set(marker_set.required)]
     return max(complete, key=lambda pair: len(pair[1]))[0] if complete else None
 
 
 def wearing(trial: Trial, marker_set: MarkerSet) -> Trial:
-    """Return the trial with its markers taken as ``marker_set``, which a person chose; with a warning where required labels are absent."""
+    """Return the trial with its markers taken as ``marker_set``, which a person chose; with a warning where required
+    labels are absent.
+    """
     if trial.markers is None or trial.marker_set == marker_set.name:
         return trial
     match = marker_set.match(trial.markers.names)
     absent = [label for label in marker_set.required if label not in match]
     if not absent:
-        said = f"The markers were read as the set {marker_set.name}: {len(match)} of its {len(marker_set.labels)} labels are there."
+        said = (
+            f"The markers were read as the set {marker_set.name}: {len(match)} of its {len(marker_set.labels)} "
+            f"labels are there."
+        )
         return replace(trial, marker_set=marker_set.name, history=(*trial.history, said))
-    warning = f"The markers are not of the chosen set {marker_set.name}: {', '.join(absent)} missing. Choose the set that was worn."
+    warning = (
+        f"The markers are not of the chosen set {marker_set.name}: {', '.join(absent)} missing. Choose the set "
+        f"that was worn."
+    )
     return replace(trial, warnings=(*trial.warnings, warning))
 
 
@@ -157,7 +172,8 @@ def canonical(markers: Markers, marker_set: MarkerSet) -> Markers:
     absent = [label for label in marker_set.required if label not in match]
     if absent:
         raise TrialRefused(
-            f"The markers are not of the set {marker_set.name}: {', '.join(absent)} {'is' if len(absent) == 1 else 'are'} not among them. "
+            f"The markers are not of the set {marker_set.name}: {', '.join(absent)} "
+            f"{'is' if len(absent) == 1 else 'are'} not among them. "
             "Label them, or choose the set that was worn."
         )
     chosen = markers.select(match.values())
@@ -167,8 +183,9 @@ def canonical(markers: Markers, marker_set: MarkerSet) -> Markers:
 def landmark(markers: Markers, marker_set: MarkerSet, name: str) -> Array | None:
     """Return the trajectory (T, 3) m of an anatomical landmark, for example "mid_psis", in the lab frame.
 
-    The first alternative of which every label was recorded is taken, as the mean of its markers; NaN in frames where one of them is not
-    seen. None where the set or the recording does not have this landmark. ``markers`` may have the file's or the set's labels.
+    The first alternative of which every label was recorded is taken, as the mean of its markers; NaN in frames where
+    one of them is not seen. None where the set or the recording does not have this landmark. ``markers`` may have the
+    file's or the set's labels.
 
     Raises
     ------

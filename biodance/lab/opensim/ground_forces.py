@@ -1,7 +1,8 @@
 """Force plates in a table: OpenSim's columns of force, point of application and torque, to and from plates.
 
-A plate is nine columns, ``..force..v{x,y,z}`` N, ``..force..p{x,y,z}`` m and ``..torque..{x,y,z}`` N·m (free moment about the point). The
-wrench about the file's origin is ``[F, p x F + T]``. Where the plate itself lies is not in such a file.
+A plate is nine columns, ``..force..v{x,y,z}`` N, ``..force..p{x,y,z}`` m and ``..torque..{x,y,z}`` N·m (free moment
+about the point). The wrench about the file's origin is ``[F, p x F + T]``. Where the plate itself lies is not in such a
+file.
 """
 
 import re
@@ -15,8 +16,8 @@ from biodance.records import Array, Plate, Wrench
 from biodance.settings import COP_FORCE
 
 FOOT_MARGIN = 0.15  # m, how far a foot reaches beyond its centres of pressure
-FARTHEST = 50.0  # m
-AXES = "xyz"
+_FARTHEST = 50.0  # m
+_AXES = "xyz"
 
 
 def has_plates(columns: tuple[str, ...]) -> bool:
@@ -27,18 +28,21 @@ def has_plates(columns: tuple[str, ...]) -> bool:
 def plates_of(table: TimeTable, *, where: str) -> tuple[tuple[Plate, ...], tuple[str, ...]]:
     """Return the plates of a table, turned to z up and ground on subject, and what was decided about all of them.
 
-    The axis of the mean total force is taken as up: y as OpenSim writes it, or z. A plate that is never loaded (20 N) is left out.
-    Its corners enclose the centres of pressure while loaded plus 0.15 m, since the file does not tell where the plate lies.
+    The axis of the mean total force is taken as up: y as OpenSim writes it, or z. A plate that is never loaded (20 N)
+    is left out. Its corners enclose the centres of pressure while loaded plus 0.15 m, since the file does not tell
+    where the plate lies.
 
     Raises
     ------
     FileRefused
-        ``where`` (the file): no plate columns, a force that is NaN, a point that is NaN under load or farther than 50 m (not in metres).
+        ``where`` (the file): no plate columns, a force that is NaN, a point that is NaN under load or farther than 50 m
+        (not in metres).
     """
     groups = _groups(table.columns)
     if not groups:
         raise FileRefused(
-            f"{where}: holds no force plate: the columns are {', '.join(table.columns[:6])} ... Columns such as ground_force_vx, "
+            f"{where}: holds no force plate: the columns are {', '.join(table.columns[:6])} ... Columns such as "
+            f"ground_force_vx, "
             "ground_force_px and ground_torque_x are needed."
         )
     raw = {name: _wrench(table, columns, f"{where}, plate {name}") for name, columns in groups.items()}
@@ -46,7 +50,9 @@ def plates_of(table: TimeTable, *, where: str) -> tuple[tuple[Plate, ...], tuple
     history: list[str] = []
     if not table.has_equal_steps:
         time, raw = _equal_steps(table.time, raw)
-        history.append(f"The time steps are not equal: the forces were interpolated linearly to {1 / (time[1] - time[0]):.6g} Hz.")
+        history.append(
+            f"The time steps are not equal: the forces were interpolated linearly to {1 / (time[1] - time[0]):.6g} Hz."
+        )
     turn, sign, decided = _upright(np.sum([value[:, :3].mean(axis=0) for value in raw.values()], axis=0))
     history += decided
     plates = []
@@ -55,16 +61,21 @@ def plates_of(table: TimeTable, *, where: str) -> tuple[tuple[Plate, ...], tuple
         cop = wrench.cop(height=_height(table, groups[name], turn), threshold=COP_FORCE)
         if np.isnan(cop).all():
             history.append(
-                f"Plate {number} ({name}) is never loaded above {COP_FORCE:g} N and was left out: the file does not say where it lies."
+                f"Plate {number} ({name}) is never loaded above {COP_FORCE:g} N and was left out: the file does not "
+                f"say where it lies."
             )
             continue
-        corners = "The file does not say where the plate lies: its corners enclose the centres of pressure under load with 0.15 m to spare."
+        corners = (
+            "The file does not say where the plate lies: its corners enclose the centres of pressure under "
+            "load with 0.15 m to spare."
+        )
         plates.append(Plate(f"plate{number}", 0, _rectangle(cop), wrench, (f"Columns of {name}.", *decided, corners)))
     return tuple(plates), tuple(history)
 
 
 def table_of(plates: tuple[Plate, ...], *, name: str = "ground_reactions") -> TimeTable:
-    """Return the plates as OpenSim's columns, y up; force and torque stand at the fixed centre of each plate, so that nothing is NaN.
+    """Return the plates as OpenSim's columns, y up; force and torque stand at the fixed centre of each plate, so that
+    nothing is NaN.
 
     Columns are ``ground_force_1_vx`` ... in N, ``ground_force_1_px`` ... in m, ``ground_torque_1_x`` ... in N·m.
     """
@@ -73,14 +84,20 @@ def table_of(plates: tuple[Plate, ...], *, name: str = "ground_reactions") -> Ti
     for i, plate in enumerate(plates, start=1):
         point = np.broadcast_to(plate.centre, (plate.wrench.time.size, 3))
         torque = plate.wrench.moment - np.cross(point, plate.wrench.force)
-        columns += [f"ground_{kind}_{i}_{part}{axis}" for kind, part in (("force", "v"), ("force", "p"), ("torque", "")) for axis in AXES]
+        columns += [
+            f"ground_{kind}_{i}_{part}{axis}"
+            for kind, part in (("force", "v"), ("force", "p"), ("torque", ""))
+            for axis in _AXES
+        ]
         values += [part @ Y_UP_TO_Z_UP for part in (plate.wrench.force, point, torque)]
     time = plates[0].wrench.time if plates else np.empty(0)
     return TimeTable(name, tuple(columns), time, np.hstack(values) if values else np.empty((0, 0)))
 
 
 def _groups(columns: tuple[str, ...]) -> dict[str, dict[str, str]]:
-    """Return per plate its columns by part (``vx`` ... ``pz``, and ``mx`` ... where there is a torque), in the file's order."""
+    """Return per plate its columns by part (``vx`` ... ``pz``, and ``mx`` ... where there is a torque), in the
+    file's order.
+    """
     found: dict[str, dict[str, str]] = {}
     for column in columns:
         match = re.fullmatch(r"(.*?)_?([vpmt]?)_?([xyz])", column.strip(), flags=re.IGNORECASE)
@@ -90,27 +107,37 @@ def _groups(columns: tuple[str, ...]) -> dict[str, dict[str, str]]:
         torque = plate != match[1] or match[2].lower() in ("m", "t")
         part = "m" if torque else match[2].lower()
         found.setdefault(plate, {})[part + match[3].lower()] = column
-    needed = [part + axis for part in "vp" for axis in AXES]
+    needed = [part + axis for part in "vp" for axis in _AXES]
     return {plate: parts for plate, parts in found.items() if all(part in parts for part in needed)}
 
 
 def _wrench(table: TimeTable, columns: dict[str, str], where: str) -> Array:
     """Return force and moment (T, 6) about the file's origin, in the file's axes."""
     force, point, torque = (
-        np.stack([table[columns[part + a]] if part + a in columns else np.zeros(table.time.size) for a in AXES], axis=1) for part in "vpm"
+        np.stack(
+            [table[columns[part + a]] if part + a in columns else np.zeros(table.time.size) for a in _AXES], axis=1
+        )
+        for part in "vpm"
     )
     torque = np.where(np.isnan(torque) & (force == 0).all(axis=1)[:, None], 0.0, torque)
     if (bad := np.isnan(force) | np.isnan(torque)).any():
-        raise FileRefused(f"{where}: the force or torque is NaN at {table.time[bad.any(axis=1)][0]:g} s. Export the forces without gaps.")
+        raise FileRefused(
+            f"{where}: the force or torque is NaN at {table.time[bad.any(axis=1)][0]:g} s. Export the forces without "
+            f"gaps."
+        )
     loaded = np.linalg.norm(force, axis=1) > 0
     if (bad := np.isnan(point).any(axis=1) & loaded).any():
         raise FileRefused(
-            f"{where}: the point of application is NaN at {table.time[bad][0]:g} s although there is a force. Export it again."
+            f"{where}: the point of application is NaN at {table.time[bad][0]:g} s although there is a force. Export "
+            f"it again."
         )
     point = np.where(loaded[:, None], point, 0.0)
     under_load = np.linalg.norm(force, axis=1) >= COP_FORCE
-    if under_load.any() and (far := float(np.median(np.abs(point[under_load]).max(axis=1)))) > FARTHEST:
-        raise FileRefused(f"{where}: the point of application lies {far:.0f} m from the origin; it must be in metres. Export it in metres.")
+    if under_load.any() and (far := float(np.median(np.abs(point[under_load]).max(axis=1)))) > _FARTHEST:
+        raise FileRefused(
+            f"{where}: the point of application lies {far:.0f} m from the origin; it must be in metres. Export it in "
+            f"metres."
+        )
     return np.hstack([force, np.cross(point, force) + torque])
 
 
@@ -137,7 +164,7 @@ def _upright(mean_force: Array) -> tuple[Array, float, list[str]]:
 
 def _height(table: TimeTable, columns: dict[str, str], turn: Array) -> float:
     """Return the median height (m, z up) of the points of application under load; 0 if there is no load."""
-    force, point = (np.stack([table[columns[part + axis]] for axis in AXES], axis=1) for part in "vp")
+    force, point = (np.stack([table[columns[part + axis]] for axis in _AXES], axis=1) for part in "vp")
     loaded = np.linalg.norm(force, axis=1) >= COP_FORCE
     return float(np.median((point[loaded] @ turn.T)[:, 2])) if loaded.any() else 0.0
 

@@ -1,7 +1,9 @@
-"""Tables over time as text: the .mot and .sto files of OpenSim (forces of the plates, joint coordinates, anything with a time column).
+"""Tables over time as text: the .mot and .sto files of OpenSim (forces of the plates, joint coordinates, anything with
+a time column).
 
-A name, header rows ``key=value`` up to ``endheader``, a row of column labels (the first is ``time``), then numbers. What the columns
-mean is not said in the file, apart from ``inDegrees``; ``ground_forces.py`` knows the columns of force plates.
+A name, header rows ``key=value`` up to ``endheader``, a row of column labels (the first is ``time``), then numbers.
+What the columns mean is not said in the file, apart from ``inDegrees``; ``ground_forces.py`` knows the columns of force
+plates.
 """
 
 import re
@@ -22,8 +24,9 @@ JITTER = 0.2  # how far a time may lie from equal steps, as part of a step: writ
 class TimeTable:
     """A table over time: ``columns`` (C) labels, ``time`` (T,) s, ``values`` (T, C) in the file's units.
 
-    ``in_degrees`` says that rotational coordinates are in degrees (the file's ``inDegrees``); which columns are rotations only the model
-    knows. ``name`` is the first row of the file. ``warnings`` are what a person should look at.
+    ``in_degrees`` says that rotational coordinates are in degrees (the file's ``inDegrees``); which columns are
+    rotations only the model knows. ``name`` is the first row of the file. ``warnings`` are what a person should look
+    at.
     """
 
     name: str
@@ -36,7 +39,12 @@ class TimeTable:
     def __post_init__(self) -> None:
         time = frozen_array(self.time, (None,), "Table.time")
         values = frozen_array(self.values, (time.size, len(self.columns)), "Table.values")
-        for field, value in (("columns", tuple(self.columns)), ("time", time), ("values", values), ("warnings", tuple(self.warnings))):
+        for field, value in (
+            ("columns", tuple(self.columns)),
+            ("time", time),
+            ("values", values),
+            ("warnings", tuple(self.warnings)),
+        ):
             object.__setattr__(self, field, value)
         if len(set(self.columns)) != len(self.columns):
             raise BiodanceError(f"Table {self.name}: a column label occurs twice in {', '.join(self.columns)}.")
@@ -60,7 +68,8 @@ def read_mot(path: str | Path) -> TimeTable:
     Raises
     ------
     FileRefused
-        No ``endheader``, no ``time`` column, rows of the wrong length, a cell that is no number, a time that does not increase.
+        No ``endheader``, no ``time`` column, rows of the wrong length, a cell that is no number, a time that does not
+        increase.
     """
     path = Path(path)
     header, labels, body = _parts(path)
@@ -72,13 +81,19 @@ def read_mot(path: str | Path) -> TimeTable:
         at = int(np.argmax(np.isnan(time))) if np.isnan(time).any() else int(np.argmax(np.diff(time) <= 0)) + 1
         raise FileRefused(f"{path}: the time does not increase at row {body[at][0]} ({time[at]:g} s). Export it again.")
     announced = header.get("nrows", header.get("datarows", ""))
-    warnings = [f"The header announces {announced} rows, the file holds {len(table)}."] if _differs(announced, len(table)) else []
+    warnings = (
+        [f"The header announces {announced} rows, the file holds {len(table)}."]
+        if _differs(announced, len(table))
+        else []
+    )
     degrees = header.get("indegrees", "no").lower() in ("yes", "true", "1")
     return TimeTable(header.get("", path.stem), tuple(labels[1:]), time, table[:, 1:], degrees, tuple(warnings))
 
 
 def columns_of(path: str | Path) -> tuple[str, ...]:
-    """Return the column labels of a .mot or .sto file without ``time``; raises FileRefused as `read_mot` does for a wrong header."""
+    """Return the column labels of a .mot or .sto file without ``time``; raises FileRefused as `read_mot` does for a
+    wrong header.
+    """
     return tuple(_parts(Path(path))[1][1:])
 
 
@@ -96,7 +111,8 @@ def write_mot(path: str | Path, table: TimeTable) -> Path:
     if not np.isfinite(table.values).all():
         row, column = np.argwhere(~np.isfinite(table.values))[0]
         raise TrialRefused(
-            f"{path}: column {table.columns[column]} is {table.values[row, column]} at {table.time[row]:g} s, and the format allows finite "
+            f"{path}: column {table.columns[column]} is {table.values[row, column]} at {table.time[row]:g} s, and the "
+            f"format allows finite "
             "numbers only. Fill the gap or leave the column out."
         )
     header = [
@@ -118,7 +134,9 @@ def write_mot(path: str | Path, table: TimeTable) -> Path:
 
 
 def _parts(path: Path) -> tuple[dict[str, str], list[str], list[tuple[int, str]]]:
-    """Return the header (keys in lower case, the name of the table under ""), the column labels, and the numbered rows below them."""
+    """Return the header (keys in lower case, the name of the table under ""), the column labels, and the numbered
+    rows below them.
+    """
     rows = read_text(path).splitlines()
     start = next((i for i, row in enumerate(rows[:LONGEST_HEADER]) if row.strip().lower() == "endheader"), None)
     if start is None:

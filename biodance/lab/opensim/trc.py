@@ -1,8 +1,9 @@
 """Marker trajectories as text: the .trc file of OpenSim, OpenCap and Motion Analysis.
 
-Five header rows (PathFileType; two rows of names and values; marker labels, one every three columns; X1 Y1 Z1 ...), then one row per
-frame with number, time and coordinates, separated by tabs; an empty cell means that the marker was not seen. OpenSim holds the files
-with y up; the recording itself is asked (see ``vertical.py``) because Motion Analysis writes the same file with z up.
+Five header rows (PathFileType; two rows of names and values; marker labels, one every three columns; X1 Y1 Z1 ...),
+then one row per frame with number, time and coordinates, separated by tabs; an empty cell means that the marker was not
+seen. OpenSim holds the files with y up; the recording itself is asked (see ``vertical.py``) because Motion Analysis
+writes the same file with z up.
 """
 
 import re
@@ -17,7 +18,7 @@ from biodance.lab.plain_text import cells, decode, parse_number, read_bytes, sha
 from biodance.lab.vertical import Y_UP_TO_Z_UP, body_is_tall_along_z
 from biodance.records import Array, Markers, Role, Source, Trial
 
-METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+_METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 HEADER_ROWS = 4
 WIDEST = 50.0  # m, between the markers of one frame
 TIME_COLUMN_ROUNDING = 1e-3  # s, some programs write three decimals
@@ -31,7 +32,8 @@ def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:
     Raises
     ------
     FileRefused
-        Not a .trc file, a header without rate, unit or labels, a cell that is no number, rows of the wrong length, time running back.
+        Not a .trc file, a header without rate, unit or labels, a cell that is no number, rows of the wrong length, time
+        running back.
     """
     path = Path(path)
     content = read_bytes(path)
@@ -42,16 +44,19 @@ def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:
     unit = _unit(header, path)
     if (announced := header.get("NumFrames", "")).isdigit() and int(announced) != numbers.size:
         warnings.append(f"The header announces {announced} frames, the file holds {numbers.size}.")
-    if (spread := _spread(values) * METRES[unit]) > WIDEST:
+    if (spread := _spread(values) * _METRES[unit]) > WIDEST:
         raise FileRefused(
-            f"{path}: the markers of one frame lie {spread:.0f} m apart in the unit {unit!r} of the header. Correct the unit."
+            f"{path}: the markers of one frame lie {spread:.0f} m apart in the unit {unit!r} of the header. Correct "
+            f"the unit."
         )
-    time, xyz, timing = _equal_steps(numbers, raw_time, values * METRES[unit], _rate(header, path), path)
+    time, xyz, timing = _equal_steps(numbers, raw_time, values * _METRES[unit], _rate(header, path), path)
     warnings += timing
     history = [f"Coordinates were read in {unit} and turned into m."]
     xyz[(xyz == 0).all(axis=2)] = np.nan
     if body_is_tall_along_z(xyz):
-        warnings.append("The markers are tallest along z: the file was taken as z up, although .trc files are y up by convention.")
+        warnings.append(
+            "The markers are tallest along z: the file was taken as z up, although .trc files are y up by convention."
+        )
     else:
         xyz = xyz @ Y_UP_TO_Z_UP.T
         history.append("The file is y up (OpenSim): turned by 90 degrees about x to z up.")
@@ -69,7 +74,8 @@ def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:
 
 
 def write_trc(path: str | Path, markers: Markers) -> Path:
-    """Write markers as OpenSim expects them: millimetres, y up, an empty cell where a marker was not seen; return the path.
+    """Write markers as OpenSim expects them: millimetres, y up, an empty cell where a marker was not seen; return the
+    path.
 
     Raises
     ------
@@ -85,9 +91,10 @@ def write_trc(path: str | Path, markers: Markers) -> Path:
     steps = np.diff(markers.time)
     if steps.size and np.ptp(steps) > 1e-3 / rate:
         raise TrialRefused(
-            f"{path}: the time steps vary from {steps.min():g} to {steps.max():g} s, a .trc file holds one rate. Resample first."
+            f"{path}: the time steps vary from {steps.min():g} to {steps.max():g} s, a .trc file holds one rate. "
+            f"Resample first."
         )
-    xyz = markers.xyz @ Y_UP_TO_Z_UP / METRES["mm"]
+    xyz = markers.xyz @ Y_UP_TO_Z_UP / _METRES["mm"]
     count, frames = len(markers.names), markers.time.size
     header = [
         f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
@@ -112,25 +119,36 @@ def write_trc(path: str | Path, markers: Markers) -> Path:
 def _header(rows: list[str], path: Path) -> dict[str, str]:
     """Return the names and values of the second and third row."""
     if not rows or not rows[0].lstrip().startswith("PathFileType"):
-        raise FileRefused(f"{path}: does not begin with 'PathFileType', so it is not a .trc file. Export the markers again.")
+        raise FileRefused(
+            f"{path}: does not begin with 'PathFileType', so it is not a .trc file. Export the markers again."
+        )
     if len(rows) <= HEADER_ROWS:
-        raise FileRefused(f"{path}: ends after {len(rows)} rows; a .trc file has five header rows and the frames. Export it again.")
-    names, values = ([cell for cell in cells(row) if cell] for row in rows[1:3])  # some writers put two tabs between values
+        raise FileRefused(
+            f"{path}: ends after {len(rows)} rows; a .trc file has five header rows and the frames. Export it again."
+        )
+    names, values = (
+        [cell for cell in cells(row) if cell] for row in rows[1:3]
+    )  # some writers put two tabs between values
     return dict(zip(names, values, strict=False))
 
 
 def _rate(header: dict[str, str], path: Path) -> float:
     rate = parse_number(header.get("DataRate", ""), f"{path}: DataRate")
     if not rate > 0 or not np.isfinite(rate):
-        raise FileRefused(f"{path}: DataRate is {header.get('DataRate')!r}; it must be the frames per second, above 0. Correct the header.")
+        raise FileRefused(
+            f"{path}: DataRate is {header.get('DataRate')!r}; it must be the frames per second, above 0. Correct the "
+            f"header."
+        )
     return rate
 
 
 def _unit(header: dict[str, str], path: Path) -> str:
     unit = header.get("Units", "").lower()
     unit = {"meters": "m", "metres": "m", "millimeters": "mm", "millimetres": "mm"}.get(unit, unit)
-    if unit not in METRES:
-        raise FileRefused(f"{path}: Units is {header.get('Units')!r}; legal are {', '.join(METRES)}. Correct the third row.")
+    if unit not in _METRES:
+        raise FileRefused(
+            f"{path}: Units is {header.get('Units')!r}; legal are {', '.join(_METRES)}. Correct the third row."
+        )
     return unit
 
 
@@ -160,13 +178,17 @@ def _table(rows: list[str], count: int, path: Path) -> tuple[NDArray[np.int64], 
         found = cells(line)
         if not any(found) or not re.fullmatch(r"\d+(\.0*)?", found[0]):
             if any(found) and (table or line_number > HEADER_ROWS + 2):
-                raise FileRefused(f"{path}: row {line_number} does not begin with a frame number ({found[0]!r}). Export the file again.")
+                raise FileRefused(
+                    f"{path}: row {line_number} does not begin with a frame number ({found[0]!r}). Export the file "
+                    f"again."
+                )
             continue
         if len(found) > width and not any(found[width:]):
             found = found[:width]
         if len(found) > width or ("\t" not in line and len(found) < width):
             raise FileRefused(
-                f"{path}: row {line_number} holds {len(found)} cells, {width} are expected for {count} markers. Export it again."
+                f"{path}: row {line_number} holds {len(found)} cells, {width} are expected for {count} markers. "
+                f"Export it again."
             )
         found += [""] * (width - len(found))
         table.append([parse_number(cell, f"{path}, row {line_number}") for cell in found])
@@ -177,26 +199,37 @@ def _table(rows: list[str], count: int, path: Path) -> tuple[NDArray[np.int64], 
 
 
 def _spread(values: Array) -> float:
-    """Return the median over the frames of the largest extent of the marker cloud (T, K, 3), in its own unit; 0 if nothing is seen."""
+    """Return the median over the frames of the largest extent of the marker cloud (T, K, 3), in its own unit; 0 if
+    nothing is seen.
+    """
     seen = values[np.logical_not(np.isnan(values).all(axis=(1, 2)))]
     return float(np.median(np.max(np.nanmax(seen, axis=1) - np.nanmin(seen, axis=1), axis=1))) if len(seen) else 0.0
 
 
-def _equal_steps(number_of: NDArray[np.int64], raw: Array, xyz: Array, declared: float, path: Path) -> tuple[Array, Array, list[str]]:
-    """Return time (T,) with equal steps and the coordinates on it, NaN where the file leaves a frame out, and the warnings."""
+def _equal_steps(
+    number_of: NDArray[np.int64], raw: Array, xyz: Array, declared: float, path: Path
+) -> tuple[Array, Array, list[str]]:
+    """Return time (T,) with equal steps and the coordinates on it, NaN where the file leaves a frame out, and the
+    warnings.
+    """
     if np.isnan(raw).any() or np.any(np.diff(raw) <= 0):
         frame = int(np.argmax(np.isnan(raw))) if np.isnan(raw).any() else int(np.argmax(np.diff(raw) <= 0)) + 1
-        raise FileRefused(f"{path}: the time column does not increase at frame {frame + 1} ({raw[frame]:g} s). Export the file again.")
+        raise FileRefused(
+            f"{path}: the time column does not increase at frame {frame + 1} ({raw[frame]:g} s). Export the file again."
+        )
     if raw.size == 1:
         return raw, xyz, []
     duration = raw[-1] - raw[0]
     for place in (number_of - number_of[0], np.rint((raw - raw[0]) * declared).astype(int)):
         step = duration / place[-1] if place[-1] > 0 else np.inf
-        if np.all(np.diff(place) > 0) and np.all(np.abs(raw - raw[0] - step * place) < 0.25 * step + TIME_COLUMN_ROUNDING):
+        if np.all(np.diff(place) > 0) and np.all(
+            np.abs(raw - raw[0] - step * place) < 0.25 * step + TIME_COLUMN_ROUNDING
+        ):
             break
     else:
         raise FileRefused(
-            f"{path}: the time column has no equal steps and does not fit the DataRate of {declared:g} Hz. Correct the rate in the header "
+            f"{path}: the time column has no equal steps and does not fit the DataRate of {declared:g} Hz. Correct "
+            f"the rate in the header "
             "or export the file again."
         )
     warnings = []

@@ -7,25 +7,28 @@ from biodance.records import Array
 
 SHORTEST_SIDE, LONGEST_SIDE = 0.2, 2.0  # m
 NOT_CLOSED, CROOKED = 0.02, 0.005  # m: refused from here on; worth a sentence from here on
-STEEPEST = 0.7  # the plate's normal must have at least this vertical share (45 degrees)
+_STEEPEST = 0.7  # the plate's normal must have at least this vertical share (45 degrees)
 SWAPS = {(0, 1, 3, 2): "3 and 4 (or 1 and 2)", (0, 2, 1, 3): "2 and 3 (or 1 and 4)"}
-UNITS = {"m": 1.0, "mm": 0.001}
+_UNITS = {"m": 1.0, "mm": 0.001}
 
 
 def corners_in_lab(corners: Array, *, metres: float, turn: Array) -> tuple[Array, tuple[str, ...]]:
-    """Return the corners (4, 3) in m in the lab frame after checking that they are a lying rectangle of 0.2-2 m, and what was decided.
+    """Return the corners (4, 3) in m in the lab frame after checking that they are a lying rectangle of 0.2-2 m, and
+    what was decided.
 
-    ``corners`` in file units and axes, ``metres`` the file's length unit in m, ``turn`` (3, 3) from file axes to the lab. Corners
-    that have an impossible size in the file's unit are taken as m or mm where that gives a legal one.
+    ``corners`` in file units and axes, ``metres`` the file's length unit in m, ``turn`` (3, 3) from file axes to the
+    lab. Corners that have an impossible size in the file's unit are taken as m or mm where that gives a legal one.
 
     Raises
     ------
     TrialRefused
-        The corners are garbage, out of order (a bow-tie), no rectangle, of impossible size, or the surface is steeper than 45 degrees.
+        The corners are garbage, out of order (a bow-tie), no rectangle, of impossible size, or the surface is steeper
+        than 45 degrees.
     """
     if not np.isfinite(corners).all() or np.abs(corners).max() > 1e6:
         raise TrialRefused(
-            f"CORNERS hold values up to {np.abs(corners).max():.3g}, which is no place in a laboratory. Enter the corners again."
+            f"CORNERS hold values up to {np.abs(corners).max():.3g}, which is no place in a laboratory. Enter the "
+            f"corners again."
         )
     if np.ptp(corners, axis=0).max() == 0:
         raise TrialRefused(f"all four CORNERS are {_point(corners[0])}. Enter the corners in the lab frame.")
@@ -37,16 +40,20 @@ def corners_in_lab(corners: Array, *, metres: float, turn: Array) -> tuple[Array
     skew = _skew(lab)
     if gap > NOT_CLOSED or skew > NOT_CLOSED:
         raise TrialRefused(
-            f"CORNERS are no rectangle: opposite sides differ by {1000 * gap:.0f} mm and the angles by {1000 * skew:.0f} mm at "
+            f"CORNERS are no rectangle: opposite sides differ by {1000 * gap:.0f} mm and the angles by "
+            f"{1000 * skew:.0f} mm at "
             f"a side's end "
             f"(legal: {1000 * NOT_CLOSED:.0f} mm). Measure the corners again."
         )
     if gap > CROOKED or skew > CROOKED:
-        decisions.append(f"CORNERS deviate from a rectangle by {1000 * max(gap, skew):.0f} mm; the best-fitting axes were used.")
+        decisions.append(
+            f"CORNERS deviate from a rectangle by {1000 * max(gap, skew):.0f} mm; the best-fitting axes were used."
+        )
     axes = plate_axes(lab)
-    if abs(axes[2, 2]) < STEEPEST:
+    if abs(axes[2, 2]) < _STEEPEST:
         raise TrialRefused(
-            f"CORNERS make a surface {np.degrees(np.arccos(abs(axes[2, 2]))):.0f} degrees steep (legal: up to 45). Check "
+            f"CORNERS make a surface {np.degrees(np.arccos(abs(axes[2, 2]))):.0f} degrees steep (legal: up to 45). "
+            f"Check "
             f"corners and lab axes."
         )
     return lab, tuple(decisions)
@@ -55,7 +62,8 @@ def corners_in_lab(corners: Array, *, metres: float, turn: Array) -> tuple[Array
 def plate_axes(corners: Array) -> Array:
     """Return lab_R_plate (3, 3) from corners (4, 3) in the order +x+y, -x+y, -x-y, +x-y of the plate axes.
 
-    x and y are the mean directions of opposite sides, made orthogonal without preferring one; z = x × y (it points down on most plates).
+    x and y are the mean directions of opposite sides, made orthogonal without preferring one; z = x × y (it points down
+    on most plates).
     """
     x = corners[0] + corners[3] - corners[1] - corners[2]
     y = corners[0] + corners[1] - corners[2] - corners[3]
@@ -80,14 +88,19 @@ def half_sides(corners: Array) -> Array:
 def _unit(corners: Array, metres: float) -> tuple[float, list[str]]:
     """Return the metres per unit of the corners: the file's own, or m or mm where only that gives a legal size."""
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)
-    fits = [name for name, unit in UNITS.items() if unit * sides.min() >= SHORTEST_SIDE and unit * sides.max() <= LONGEST_SIDE]
-    if any(np.isclose(UNITS[name], metres) for name in fits) or len(fits) != 1:
+    fits = [
+        name
+        for name, unit in _UNITS.items()
+        if unit * sides.min() >= SHORTEST_SIDE and unit * sides.max() <= LONGEST_SIDE
+    ]
+    if any(np.isclose(_UNITS[name], metres) for name in fits) or len(fits) != 1:
         return metres, []
     said = (
-        f"CORNERS would be {sides.max() * metres:.4g} m long in the file's unit; they were taken as {fits[0]}, the only unit "
+        f"CORNERS would be {sides.max() * metres:.4g} m long in the file's unit; they were taken as {fits[0]}, the "
+        f"only unit "
         f"that fits a plate."
     )
-    return UNITS[fits[0]], [said]
+    return _UNITS[fits[0]], [said]
 
 
 def _refuse_disorder(lab: Array) -> None:
@@ -99,12 +112,14 @@ def _refuse_disorder(lab: Array) -> None:
         fixed = lab[list(order)]
         if np.linalg.norm(fixed[0] - fixed[1] + fixed[2] - fixed[3]) < NOT_CLOSED:
             raise TrialRefused(
-                f"CORNERS are out of order: the outline is a bow-tie; corners {which} are exchanged. The legal order is +x+y, "
+                f"CORNERS are out of order: the outline is a bow-tie; corners {which} are exchanged. The legal order "
+                f"is +x+y, "
                 f"-x+y, -x-y, +x-y "
                 "of the plate axes. Correct FORCE_PLATFORM:CORNERS."
             )
     raise TrialRefused(
-        f"CORNERS {', '.join(_point(p) for p in lab)} m are no rectangle: the outline crosses itself. Enter the corners in the order "
+        f"CORNERS {', '.join(_point(p) for p in lab)} m are no rectangle: the outline crosses itself. Enter the "
+        f"corners in the order "
         "+x+y, -x+y, -x-y, +x-y of the plate axes."
     )
 
@@ -120,7 +135,9 @@ def _refuse_size(lab: Array, corners: Array) -> None:
 
 
 def _skew(lab: Array) -> float:
-    """Return by how many metres the end of a side misses its place because the angle at the corner is not a right one (the worst)."""
+    """Return by how many metres the end of a side misses its place because the angle at the corner is not a right
+    one (the worst).
+    """
     sides = np.roll(lab, -1, axis=0) - lab
     lengths = np.linalg.norm(sides, axis=1)
     cosines = np.abs(np.sum(sides * np.roll(sides, -1, axis=0), axis=1)) / (lengths * np.roll(lengths, -1))

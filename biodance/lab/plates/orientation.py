@@ -1,4 +1,6 @@
-"""Turn a plate's reading into the lab frame: side of the sensor, axes, load or reaction; feet and weight are the witnesses."""
+"""Turn a plate's reading into the lab frame: side of the sensor, axes, load or reaction; feet and weight are the
+witnesses.
+"""
 
 import numpy as np
 
@@ -11,19 +13,20 @@ from biodance.records import Array, Markers, Plate, Wrench
 
 LOW = 0.15  # m above the surface: markers of a standing foot, ankle included
 BESIDE = 0.15  # m beyond the edge
-FRAMES = 200
+_FRAMES = 200
 
 
 def distance_to_feet(cop: Array, time: Array, corners: Array, markers: Markers) -> float | None:
-    """Return the median distance in m between the centre of pressure and the feet on the plate; None if no foot is seen on it.
+    """Return the median distance in m between the centre of pressure and the feet on the plate; None if no foot is seen
+    on it.
 
-    ``cop`` (S, 2) m in the lab frame at ``time`` (S,) s, NaN while unloaded; ``corners`` (4, 3) m. The feet are all markers within 0.15 m
-    over the surface and 0.15 m around the plate; the distance is to the nearest straight line between two of them, so it is near 0
-    between two feet.
+    ``cop`` (S, 2) m in the lab frame at ``time`` (S,) s, NaN while unloaded; ``corners`` (4, 3) m. The feet are all
+    markers within 0.15 m over the surface and 0.15 m around the plate; the distance is to the nearest straight line
+    between two of them, so it is near 0 between two feet.
     """
     if markers.time.size == 0 or not np.isfinite(cop).any():
         return None
-    frames = np.unique(np.linspace(0, markers.time.size - 1, FRAMES).round().astype(int))
+    frames = np.unique(np.linspace(0, markers.time.size - 1, _FRAMES).round().astype(int))
     at = np.clip(np.searchsorted(time, markers.time[frames]), 0, time.size - 1)
     centre, reach = corners.mean(axis=0), float(np.linalg.norm(half_sides(corners))) + BESIDE
     distances = []
@@ -48,11 +51,13 @@ UNDER_THE_FOOT, NOT_UNDER = 0.06, 0.15  # m from the feet: believed; contradicte
 Said = tuple[str, ...]
 
 
-def oriented(reading: PlateReading, time: Array, *, markers: Markers | None, alone: bool, otherwise: int) -> tuple[Plate, Said]:
+def oriented(
+    reading: PlateReading, time: Array, *, markers: Markers | None, alone: bool, otherwise: int
+) -> tuple[Plate, Said]:
     """Return the plate with the ground's wrench ON the subject about the lab origin, and warnings.
 
-    ``time`` (S,) s; ``markers`` are asked where the feet are; ``alone`` says that no other plate is loaded, so that the sway of a
-    standing person can be used; ``otherwise`` (+1 or -1) is the sign for a plate that never carries anything.
+    ``time`` (S,) s; ``markers`` are asked where the feet are; ``alone`` says that no other plate is loaded, so that the
+    sway of a standing person can be used; ``otherwise`` (+1 or -1) is the sign for a plate that never carries anything.
 
     Raises
     ------
@@ -85,20 +90,24 @@ def oriented(reading: PlateReading, time: Array, *, markers: Markers | None, alo
 
 
 def _in_lab(wrench: Array, axes: Array, sign: int, centre: Array) -> Array:
-    """Return the wrench about the lab origin; a mirrored ``axes`` (determinant -1) turns moments the other way round than forces."""
+    """Return the wrench about the lab origin; a mirrored ``axes`` (determinant -1) turns moments the other way round
+    than forces.
+    """
     force = sign * wrench[:, :3] @ axes.T
     moment = sign * np.linalg.det(axes) * wrench[:, 3:] @ axes.T
     return np.hstack([force, moment + np.cross(centre, force)])
 
 
 def _unmirrored(reading: PlateReading, time: Array, axes: Array, markers: Markers | None) -> tuple[Array, str]:
-    """Return the axes of a plate whose corners run the wrong way round: its z points down, so x or y must be turned too.
+    """Return the axes of a plate whose corners run the wrong way round: its z points down, so x or y must be turned
+    too.
 
-    The markers say which; without markers both stay as the corners have them, so the lab frame of such a file is a mirror image, in which
-    forces, centre of pressure and weight still fit together.
+    The markers say which; without markers both stay as the corners have them, so the lab frame of such a file is a
+    mirror image, in which forces, centre of pressure and weight still fit together.
     """
     why = (
-        "CORNERS make the plate's z point up, but the sway of the standing person shows that its z points down: the corners "
+        "CORNERS make the plate's z point up, but the sway of the standing person shows that its z points down: the "
+        "corners "
         "run the wrong way round"
     )
     choices = {"y": axes * [1, -1, -1], "x": axes * [-1, 1, -1]}
@@ -107,34 +116,54 @@ def _unmirrored(reading: PlateReading, time: Array, axes: Array, markers: Marker
         good = [name for name, distance in found.items() if distance is not None and distance <= UNDER_THE_FOOT]
         if len(good) == 1:
             return choices[good[0]], f"{why}; {good[0]} was turned, which puts the load under the feet."
-        raise TrialRefused(f"{why}, and the foot markers do not tell which axis to turn. Correct FORCE_PLATFORM:CORNERS.")
-    return axes * [
-        1,
-        1,
-        -1,
-    ], f"{why}; x and y were kept as the corners have them. Check the corner order before joining this file with markers."
+        raise TrialRefused(
+            f"{why}, and the foot markers do not tell which axis to turn. Correct FORCE_PLATFORM:CORNERS."
+        )
+    return (
+        axes
+        * [
+            1,
+            1,
+            -1,
+        ],
+        f"{why}; x and y were kept as the corners have them. Check the corner order before joining this file with "
+        f"markers.",
+    )
 
 
-def _under_feet(reading: PlateReading, wrench: Array, time: Array, axes: Array, markers: Markers) -> tuple[Array, Said, Said]:
-    """Return the axes after asking the foot markers: as they are, or by quarter turns where only that puts the load under them."""
+def _under_feet(
+    reading: PlateReading, wrench: Array, time: Array, axes: Array, markers: Markers
+) -> tuple[Array, Said, Said]:
+    """Return the axes after asking the foot markers: as they are, or by quarter turns where only that puts the load
+    under them.
+    """
     distance = _distance(reading, time, axes, markers)
     if distance is None:
         return axes, (), ()
     if distance <= NOT_UNDER:
-        return axes, (f"The centre of pressure lies {1000 * distance:.0f} mm (median) from the feet that the markers show.",), ()
+        return (
+            axes,
+            (f"The centre of pressure lies {1000 * distance:.0f} mm (median) from the feet that the markers show.",),
+            (),
+        )
     turns = {90 * k: axes @ _quarter_turns(k) for k in (1, 2, 3)}
     found = {angle: _distance(reading, time, turned, markers) for angle, turned in turns.items()}
     good = [angle for angle, d in found.items() if d is not None and d <= UNDER_THE_FOOT]
     number = reading.plate.number
     if len(good) == 1 and all(d is None or d > NOT_UNDER for angle, d in found.items() if angle != good[0]):
         said = (
-            f"The load lies {distance:.2f} m from the feet that the markers show, and under them when the corners are counted "
+            f"The load lies {distance:.2f} m from the feet that the markers show, and under them when the corners are "
+            f"counted "
             f"from another one: the plate "
             f"axes were turned by {good[0]} degrees."
         )
         return turns[good[0]], (said,), (f"Plate {number}: {said} Correct the order of FORCE_PLATFORM:CORNERS.",)
     said = f"The load lies {distance:.2f} m (median) from the feet that the markers show"
-    return axes, (f"{said}.",), (f"Plate {number}: {said}: check CORNERS, ORIGIN and whether a foot without markers stood there.",)
+    return (
+        axes,
+        (f"{said}.",),
+        (f"Plate {number}: {said}: check CORNERS, ORIGIN and whether a foot without markers stood there.",),
+    )
 
 
 def _distance(reading: PlateReading, time: Array, axes: Array, markers: Markers) -> float | None:
@@ -157,7 +186,9 @@ def _sway_said(reading: PlateReading, agrees: bool) -> tuple[str, Said]:
 
 
 def _upwards_said(reading: PlateReading) -> tuple[str, Said]:
-    """Return the sentence about a plate whose z points up, and a warning where the maker's own axes have z down (eight channels)."""
+    """Return the sentence about a plate whose z points up, and a warning where the maker's own axes have z down
+    (eight channels).
+    """
     said = "CORNERS make the plate's z point up; the file's axes were used as they are"
     if reading.plate.type not in (3, 7):
         return f"{said}.", ()
@@ -170,6 +201,7 @@ def _sign_said(sign: int, otherwise: int) -> str:
         taken = "reaction" if otherwise > 0 else "load"
         return f"Never loaded, so gravity cannot tell the sign; taken as the {taken}."
     return (
-        f"Sign: the file holds the {'reaction on the subject; kept' if sign > 0 else 'load on the plate; turned round'} (the "
+        f"Sign: the file holds the "
+        f"{'reaction on the subject; kept' if sign > 0 else 'load on the plate; turned round'} (the "
         f"weight must point up)."
     )

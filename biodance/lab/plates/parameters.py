@@ -1,4 +1,6 @@
-"""What the FORCE_PLATFORM group of a C3D file says about each plate, and the units of its channels; nothing computed yet."""
+"""What the FORCE_PLATFORM group of a C3D file says about each plate, and the units of its channels; nothing computed
+yet.
+"""
 
 import re
 from collections.abc import Mapping
@@ -14,16 +16,21 @@ from biodance.settings import STANDARD_GRAVITY
 
 CHANNELS_OF_TYPE = {1: 6, 2: 6, 3: 8, 4: 6, 5: 8, 6: 12, 7: 8}
 MATRIX_OF_TYPE = {4: (6, 6), 5: (6, 8), 6: (12, 12), 7: (8, 8)}
-NAMES_OF_TYPE = {8: "not defined", 11: "a Kistler split-belt treadmill", 12: "a Kistler split-belt treadmill", 21: "AMTI stairs"}
+NAMES_OF_TYPE = {
+    8: "not defined",
+    11: "a Kistler split-belt treadmill",
+    12: "a Kistler split-belt treadmill",
+    21: "AMTI stairs",
+}
 
 
 @dataclass(frozen=True, eq=False)
 class PlateParameters:
     """One plate as the file describes it, in file units and file axes.
 
-    ``number`` from 1; ``type`` the C3D TYPE; ``channels`` columns of the analog data, from 0; ``corners`` (4, 3); ``origin`` (3,);
-    ``calibration`` (rows, columns), output = calibration @ channels, None where the type has none; ``polynomial`` (2, 6) Kistler's
-    correction of the centre of pressure in millimetres, None = none.
+    ``number`` from 1; ``type`` the C3D TYPE; ``channels`` columns of the analog data, from 0; ``corners`` (4, 3);
+    ``origin`` (3,); ``calibration`` (rows, columns), output = calibration @ channels, None where the type has none;
+    ``polynomial`` (2, 6) Kistler's correction of the centre of pressure in millimetres, None = none.
     """
 
     number: int
@@ -51,7 +58,10 @@ def count_plates(raw: RawC3d) -> tuple[int, tuple[str, ...]]:
         return types, (f"FORCE_PLATFORM:USED is missing; TYPE lists {types} plates, which were read.",)
     declared = int(used[0]) if np.isfinite(used[0]) and 0 <= used[0] <= 255 else 0
     if declared != used[0]:
-        return 0, (f"FORCE_PLATFORM:USED is {used[0]:g}, legal is a whole number from 0 to 255; no plate was read. Correct the file.",)
+        return 0, (
+            f"FORCE_PLATFORM:USED is {used[0]:g}, legal is a whole number from 0 to 255; no plate was read. Correct "
+            f"the file.",
+        )
     if declared < types:
         return declared, (f"FORCE_PLATFORM:USED says {declared} plates, TYPE lists {types}; {declared} were read.",)
     return declared, ()
@@ -96,21 +106,28 @@ def _channels(listed: Array, kind: int, available: int) -> tuple[int, ...]:
     """Return the columns (from 0) of the plate's channels after checking their number and range."""
     need = CHANNELS_OF_TYPE[kind]
     if listed.size < need:
-        raise TrialRefused(f"CHANNEL lists {listed.size} channels, TYPE {kind} needs {need}. Correct the file or export it again.")
+        raise TrialRefused(
+            f"CHANNEL lists {listed.size} channels, TYPE {kind} needs {need}. Correct the file or export it again."
+        )
     used = listed[:need]
     bad = [f"{c:g}" for c in used if c != round(c) or not 1 <= c <= available]
     if bad:
         raise TrialRefused(
-            f"CHANNEL names analog channel {', '.join(bad)}, but the file holds {available} channels (legal: 1 to {available}). "
+            f"CHANNEL names analog channel {', '.join(bad)}, but the file holds {available} channels (legal: 1 to "
+            f"{available}). "
             f"Export it again."
         )
     if len(set(used)) < need:
-        raise TrialRefused(f"CHANNEL names an analog channel twice: {', '.join(f'{c:g}' for c in used)}. Correct the file.")
+        raise TrialRefused(
+            f"CHANNEL names an analog channel twice: {', '.join(f'{c:g}' for c in used)}. Correct the file."
+        )
     return tuple(int(c) - 1 for c in used)
 
 
 def _calibration(group: Mapping[str, Any], kind: int, number: int) -> Array | None:
-    """Return the plate's CAL_MATRIX (stored column by column unless MATRIX_STORE says BYROW), None for types without one."""
+    """Return the plate's CAL_MATRIX (stored column by column unless MATRIX_STORE says BYROW), None for types without
+    one.
+    """
     if kind not in MATRIX_OF_TYPE:
         return None
     rows, columns = MATRIX_OF_TYPE[kind]
@@ -127,13 +144,16 @@ def _calibration(group: Mapping[str, Any], kind: int, number: int) -> Array | No
     matrix = (matrix.T if by_row and shape[0] == shape[1] else matrix)[:rows, :columns]
     if not matrix.any(axis=1).all():
         raise TrialRefused(
-            f"CAL_MATRIX holds a row of zeros; legal is a full {rows} x {columns} matrix. Enter the calibration sheet again."
+            f"CAL_MATRIX holds a row of zeros; legal is a full {rows} x {columns} matrix. Enter the calibration sheet "
+            f"again."
         )
     return matrix
 
 
 def _polynomial(group: Mapping[str, Any], number: int) -> Array | None:
-    """Return Kistler's FPCOPPOLY (2, 6) of the plate, stored as 2 x 6 or 6 x 2; None if the file has none or only zeros."""
+    """Return Kistler's FPCOPPOLY (2, 6) of the plate, stored as 2 x 6 or 6 x 2; None if the file has none or only
+    zeros.
+    """
     stored = _numbers(group, "FPCOPPOLY")
     if stored.size < 12 * number:
         return None
@@ -145,7 +165,9 @@ def _polynomial(group: Mapping[str, Any], number: int) -> Array | None:
 
 
 def _numbers(group: Mapping[str, Any], name: str, *, keep: bool = False) -> Array:
-    """Return a parameter as floats, flat in the file's order (``keep``: with its dimensions); empty if missing or text."""
+    """Return a parameter as floats, flat in the file's order (``keep``: with its dimensions); empty if missing or
+    text.
+    """
     value = group.get(name)
     if not isinstance(value, np.ndarray) or value.dtype.kind not in "iufb":
         return np.empty(0)
@@ -159,26 +181,31 @@ def _of_plate(group: Mapping[str, Any], name: str, shape: tuple[int, ...], numbe
     block = values[size * (number - 1) : size * number]
     if not size or block.size < size:
         held = values.size // size if size else 0
-        raise TrialRefused(f"FORCE_PLATFORM:{name} holds values for {held} plates, none for this one. Correct USED or export it again.")
+        raise TrialRefused(
+            f"FORCE_PLATFORM:{name} holds values for {held} plates, none for this one. Correct USED or export it again."
+        )
     if not np.isfinite(block).all():
-        raise TrialRefused(f"FORCE_PLATFORM:{name} holds a value that is not a number. Correct the file or export it again.")
+        raise TrialRefused(
+            f"FORCE_PLATFORM:{name} holds a value that is not a number. Correct the file or export it again."
+        )
     return block.reshape(shape, order="F")
 
 
 POUND, KILOGRAM_FORCE, INCH = 4.4482216152605, STANDARD_GRAVITY, 0.0254
 FORCE = {
-    "n": 1.0, "newton": 1.0, "newtons": 1.0, "nt": 1.0, "kn": 1000.0, "lbf": POUND, "lb": POUND, "lbs": POUND, "pound": POUND,
+    "n": 1.0, "newton": 1.0, "newtons": 1.0, "nt": 1.0, "kn": 1000.0, "lbf": POUND, "lb": POUND, "lbs": POUND,
+    "pound": POUND,
     "pounds": POUND, "kgf": KILOGRAM_FORCE, "kp": KILOGRAM_FORCE,
 }  # fmt: skip
-LENGTH = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": INCH, "inch": INCH, "inches": INCH, "ft": 12 * INCH}
-MOMENT = {force + length: f * s for force, f in FORCE.items() for length, s in LENGTH.items()} | {
-    length + force: f * s for force, f in FORCE.items() for length, s in LENGTH.items() if force != "n"
+_LENGTH = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": INCH, "inch": INCH, "inches": INCH, "ft": 12 * INCH}
+MOMENT = {force + length: f * s for force, f in FORCE.items() for length, s in _LENGTH.items()} | {
+    length + force: f * s for force, f in FORCE.items() for length, s in _LENGTH.items() if force != "n"
 }
 """N·m per unit, for unit texts without blanks and signs: ``nmm``, ``inlb``, ``lbfft`` ..."""
 CONTENT = {1: "FFFLLM", 2: "FFFMMM", 3: "FFFFFFFF", 4: "FFFMMM", 5: "FFFMMM", 6: "F" * 12, 7: "F" * 8}
 """What each channel (after the calibration matrix) holds: F force, M moment, L length."""
-TABLES = {"F": FORCE, "M": MOMENT, "L": LENGTH}
-WORDS = {"F": "force", "M": "moment", "L": "length"}
+TABLES = {"F": FORCE, "M": MOMENT, "L": _LENGTH}
+_WORDS = {"F": "force", "M": "moment", "L": "length"}
 
 
 def plain_unit(text: str) -> str:
@@ -186,17 +213,22 @@ def plain_unit(text: str) -> str:
     return re.sub(r"[\s.\-*·⋅/_()]", "", text).lower()
 
 
-def unit_factors(plate: PlateParameters, units: tuple[str, ...], *, metres: float) -> tuple[tuple[float, ...], tuple[str, ...]]:
-    """Return the factor to SI of each channel of a plate (after the calibration matrix) and what was decided about the units.
+def unit_factors(
+    plate: PlateParameters, units: tuple[str, ...], *, metres: float
+) -> tuple[tuple[float, ...], tuple[str, ...]]:
+    """Return the factor to SI of each channel of a plate (after the calibration matrix) and what was decided about the
+    units.
 
-    ``units`` are the texts of the plate's channels, ``metres`` is the length unit of the file in m. The output of a calibration matrix is
-    in N and N times the file's length unit, as C3D demands. A unit that is missing or makes no sense for the channel is taken as N, N
-    times the file's length unit, or the file's length unit, and said.
+    ``units`` are the texts of the plate's channels, ``metres`` is the length unit of the file in m. The output of a
+    calibration matrix is in N and N times the file's length unit, as C3D demands. A unit that is missing or makes no
+    sense for the channel is taken as N, N times the file's length unit, or the file's length unit, and said.
     """
     content = CONTENT[plate.type]
     assumed = {"F": 1.0, "M": metres, "L": metres}
     if plate.type in MATRIX_OF_TYPE:
-        return tuple(assumed[c] for c in content), (f"Units: channels in {_listed(units)} times CAL_MATRIX give N and N x {metres:g} m.",)
+        return tuple(assumed[c] for c in content), (
+            f"Units: channels in {_listed(units)} times CAL_MATRIX give N and N x {metres:g} m.",
+        )
     factors, strange = [], {}
     for kind, unit in zip(content, units, strict=True):
         known = TABLES[kind].get(plain_unit(unit))
@@ -206,7 +238,7 @@ def unit_factors(plate: PlateParameters, units: tuple[str, ...], *, metres: floa
     said = [f"Units: {_listed(units)}."]
     for kind, unit in strange.items():
         taken = {"F": "N", "M": f"N x {metres:g} m", "L": f"{metres:g} m"}[kind]
-        said.append(f"Unit {unit!r} of a {WORDS[kind]} channel says nothing; it was taken as {taken}.")
+        said.append(f"Unit {unit!r} of a {_WORDS[kind]} channel says nothing; it was taken as {taken}.")
     return tuple(factors), tuple(said)
 
 

@@ -1,4 +1,6 @@
-"""The force plates of a C3D file: one wrench per plate, ground on subject, about the lab origin, in SI. Every decision is a sentence."""
+"""The force plates of a C3D file: one wrench per plate, ground on subject, about the lab origin, in SI. Every
+decision is a sentence.
+"""
 
 import numpy as np
 
@@ -20,32 +22,46 @@ ReadPlates = tuple[tuple[Plate, ...], tuple[str, ...]]
 
 
 def read_plates(
-    raw: RawC3d, *, metres: float, turn: Array | None = None, markers: Markers | None = None, body_mass: float | None = None
+    raw: RawC3d,
+    *,
+    metres: float,
+    turn: Array | None = None,
+    markers: Markers | None = None,
+    body_mass: float | None = None,
 ) -> ReadPlates:
     """Return the force plates of a C3D file and the warnings about them.
 
-    Each ``Plate.wrench`` is the ground's action ON the subject about the LAB origin at the analog rate, zero taken off, in N and N·m.
+    Each ``Plate.wrench`` is the ground's action ON the subject about the LAB origin at the analog rate, zero taken off,
+    in N and N·m.
 
-    ``metres`` is the file's length unit in m (0.001 for mm); ``turn`` (3, 3) leads from the file's axes to the lab frame (z up; None =
-    they are the same); ``markers`` (m, lab frame) set the clock and say where the feet are; ``body_mass`` kg is compared with the weight
-    on the plates. A plate that cannot be trusted is left out with a warning that says why; nothing is raised. The method per TYPE is in
-    ``plate_types``.
+    ``metres`` is the file's length unit in m (0.001 for mm); ``turn`` (3, 3) leads from the file's axes to the lab
+    frame (z up; None = they are the same); ``markers`` (m, lab frame) set the clock and say where the feet are;
+    ``body_mass`` kg is compared with the weight on the plates. A plate that cannot be trusted is left out with a
+    warning that says why; nothing is raised. The method per TYPE is in ``plate_types``.
     """
     count, warnings = count_plates(raw)
     if not count:
         return (), warnings
     if raw.analog.shape[0] == 0 or not raw.analog_rate > 0:
         lacks = "holds no analog samples" if raw.analog.shape[0] == 0 else f"has the analog rate {raw.analog_rate:g}"
-        return (), (*warnings, f"The file declares {count} force plates but {lacks}: no plate was read. Export it with the analog data.")
+        return (), (
+            *warnings,
+            f"The file declares {count} force plates but {lacks}: no plate was read. Export it with the analog data.",
+        )
     readings, refused = _readings(raw, count, metres, np.eye(3) if turn is None else turn)
     plates, said = _oriented(readings, _time(raw, markers), markers)
     return plates, (*warnings, *refused, *said, *_weight_said(plates, markers, body_mass))
 
 
 def total_wrench(plates: tuple[Plate, ...]) -> Wrench:
-    """Return the summed wrench of plates that share one time base; TrialRefused without plates or with different time bases."""
+    """Return the summed wrench of plates that share one time base; TrialRefused without plates or with different
+    time bases.
+    """
     if not plates or any(not np.array_equal(p.wrench.time, plates[0].wrench.time) for p in plates):
-        raise TrialRefused("The total wrench needs at least one plate and one time base for all of them. Read the plates from one file.")
+        raise TrialRefused(
+            "The total wrench needs at least one plate and one time base for all of them. Read the plates from one "
+            "file."
+        )
     return Wrench(plates[0].wrench.time, np.sum([p.wrench.value for p in plates], axis=0))
 
 
@@ -61,7 +77,9 @@ def _readings(raw: RawC3d, count: int, metres: float, turn: Array) -> tuple[list
 
 
 def _oriented(readings: list[PlateReading], time: Array, markers: Markers | None) -> ReadPlates:
-    """Return the plates in the lab frame; an unloaded plate takes the sign of the majority, +1 (reaction) if nobody stood on any."""
+    """Return the plates in the lab frame; an unloaded plate takes the sign of the majority, +1 (reaction) if nobody
+    stood on any.
+    """
     axes = [plate_axes(r.corners) for r in readings]
     signs = [gravity_sign(r.at_surface(a)[0], a, r.rate) for r, a in zip(readings, axes, strict=True)]
     # the sign belongs to the plate's z: a plate whose z points the other way has the other sign

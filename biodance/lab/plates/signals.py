@@ -1,4 +1,6 @@
-"""One plate's channels in SI with their zero taken off: the wrench about the sensor, still in plate axes and with the recorded sign."""
+"""One plate's channels in SI with their zero taken off: the wrench about the sensor, still in plate axes and with
+the recorded sign.
+"""
 
 from dataclasses import dataclass
 
@@ -11,9 +13,9 @@ from biodance.lab.plates.parameters import CONTENT, PlateParameters, unit_factor
 from biodance.lab.plates.signs import DEEPEST, loaded_samples, sensor_below
 from biodance.lab.plates.wrench import (
     FOUR_SENSORS,
+    about_reference,
     calibrated,
     centre_of_pressure,
-    moved,
     polynomial_corrected,
     sensor_wrench,
     surface_vector,
@@ -21,7 +23,7 @@ from biodance.lab.plates.wrench import (
 from biodance.lab.plates.zero import find_baseline
 from biodance.records import Array
 
-EDGE = 0.02  # m by which a centre of pressure may lie beyond the edge
+_EDGE = 0.02  # m by which a centre of pressure may lie beyond the edge
 INSIDE = 0.8  # share of the loaded samples that must lie on the plate
 STILLEST = 0.0015  # m: nobody's centre of pressure stays this close to the plate's centre
 FARTHEST_ORIGIN, CLOSEST_SENSORS = 2.0, 0.05  # m
@@ -30,10 +32,12 @@ MOMENT_UNITS = (1.0, 1000.0, 0.001)
 
 @dataclass(frozen=True, eq=False)
 class PlateReading:
-    """A plate before its directions are decided: ``sensor`` (S, 6) N, N·m about the sensor origin, plate axes, sign as recorded.
+    """A plate before its directions are decided: ``sensor`` (S, 6) N, N·m about the sensor origin, plate axes, sign as
+    recorded.
 
-    ``vector`` (3,) m from there to the centre of the surface as the file says; ``corners`` (4, 3) m lab; ``rate`` Hz of the samples;
-    ``empty`` (3,) N is the force that the empty plate read and that was subtracted, plate axes, sign as recorded.
+    ``vector`` (3,) m from there to the centre of the surface as the file says; ``corners`` (4, 3) m lab; ``rate`` Hz of
+    the samples; ``empty`` (3,) N is the force that the empty plate read and that was subtracted, plate axes, sign as
+    recorded.
     """
 
     plate: PlateParameters
@@ -46,12 +50,15 @@ class PlateReading:
     empty: Array
 
     def at_surface(self, axes: Array) -> tuple[Array, tuple[str, ...]]:
-        """Return the wrench (S, 6) about the centre of the surface in plate axes, and what was decided, for lab_R_plate ``axes``."""
+        """Return the wrench (S, 6) about the centre of the surface in plate axes, and what was decided, for
+        lab_R_plate ``axes``.
+        """
         return _at_surface(self.plate, self.sensor, self.vector, axes)
 
 
 def read_plate_signals(raw: RawC3d, plate: PlateParameters, *, metres: float, turn: Array) -> PlateReading:
-    """Return the reading of one plate of a C3D file; ``metres`` is the file's length unit, ``turn`` (3, 3) leads from file axes to the lab.
+    """Return the reading of one plate of a C3D file; ``metres`` is the file's length unit, ``turn`` (3, 3) leads from
+    file axes to the lab.
 
     Raises
     ------
@@ -64,13 +71,17 @@ def read_plate_signals(raw: RawC3d, plate: PlateParameters, *, metres: float, tu
     _refuse_gaps(channels, plate)
     units = tuple(raw.analog_units[c] for c in plate.channels)
     factors, unit_said = unit_factors(plate, units, metres=metres)
-    vertical = (calibrated(plate, channels) * factors)[:, [k for k, kind in enumerate(CONTENT[plate.type]) if kind == "F"]]
+    vertical = (calibrated(plate, channels) * factors)[
+        :, [k for k, kind in enumerate(CONTENT[plate.type]) if kind == "F"]
+    ]
     zero = find_baseline(_vertical(plate, vertical), zero=zero_window(raw), rate=raw.analog_rate)
     offsets = _offsets(plate, channels, zero.start, zero.stop)
     signals = calibrated(plate, channels - offsets) * factors
     sensor, vector = sensor_wrench(plate, signals, origin), surface_vector(plate, origin)
     empty = sensor_wrench(plate, calibrated(plate, offsets[None]) * factors, origin)[0, :3]
-    sensor, sense, warnings = _moments_in_sense(plate, sensor, vector, corners, rate=raw.analog_rate, unsure=len(unit_said) > 1)
+    sensor, sense, warnings = _moments_in_sense(
+        plate, sensor, vector, corners, rate=raw.analog_rate, unsure=len(unit_said) > 1
+    )
     first = f"TYPE {plate.type}, analog channels {', '.join(str(c + 1) for c in plate.channels)}."
     said = (first, *placed, *origin_said, *unit_said, *sense, zero.said)
     odd = tuple(f"Plate {plate.number}: {sentence}" for sentence in (*placed, *origin_said))
@@ -79,7 +90,7 @@ def read_plate_signals(raw: RawC3d, plate: PlateParameters, *, metres: float, tu
 
 def _at_surface(plate: PlateParameters, sensor: Array, vector: Array, axes: Array) -> tuple[Array, tuple[str, ...]]:
     below, said = sensor_below(vector, axes)
-    wrench = moved(sensor, below)
+    wrench = about_reference(sensor, below)
     if plate.polynomial is None:
         return wrench, (said,)
     return polynomial_corrected(wrench, plate.polynomial), (
@@ -98,10 +109,17 @@ def _origin(plate: PlateParameters, half: Array, metres: float) -> tuple[Array, 
         return plate.origin * metres, ()
     written = ", ".join(f"{c:.4g}" for c in plate.origin)
     if len(fits) == 1:
-        return plate.origin * fits[0], (f"ORIGIN ({written}) makes no sense in the file's unit and was taken in units of {fits[0]:g} m.",)
-    legal = "half distances of the sensors inside the plate, then the depth" if plate.type in FOUR_SENSORS else "sensor to surface centre"
+        return plate.origin * fits[0], (
+            f"ORIGIN ({written}) makes no sense in the file's unit and was taken in units of {fits[0]:g} m.",
+        )
+    legal = (
+        "half distances of the sensors inside the plate, then the depth"
+        if plate.type in FOUR_SENSORS
+        else "sensor to surface centre"
+    )
     raise TrialRefused(
-        f"ORIGIN is ({written}) in units of {metres:g} m, which no plate of {2 * half[0]:.2f} x {2 * half[1]:.2f} m has (legal: "
+        f"ORIGIN is ({written}) in units of {metres:g} m, which no plate of {2 * half[0]:.2f} x {2 * half[1]:.2f} m "
+        f"has (legal: "
         f"{legal}, depth up to "
         f"{DEEPEST:g} m). Enter the values of the maker's sheet."
     )
@@ -111,13 +129,16 @@ def _makes_sense(plate: PlateParameters, origin: Array, half: Array) -> bool:
     if abs(origin[2]) > DEEPEST or np.abs(origin).max() > FARTHEST_ORIGIN:
         return False
     beside = np.abs(origin[:2])
-    return plate.type not in FOUR_SENSORS or bool((beside >= CLOSEST_SENSORS).all() and (beside <= half + EDGE).all())
+    return plate.type not in FOUR_SENSORS or bool((beside >= CLOSEST_SENSORS).all() and (beside <= half + _EDGE).all())
 
 
 def _refuse_gaps(channels: Array, plate: PlateParameters) -> None:
     if not np.isfinite(channels).all():
         sample, column = np.argwhere(np.logical_not(np.isfinite(channels)))[0]
-        raise TrialRefused(f"analog channel {plate.channels[column] + 1} is not a number at sample {sample + 1}. Export the file again.")
+        raise TrialRefused(
+            f"analog channel {plate.channels[column] + 1} is not a number at sample {sample + 1}. Export the file "
+            f"again."
+        )
 
 
 def _vertical(plate: PlateParameters, forces: Array) -> Array:
@@ -128,7 +149,9 @@ def _vertical(plate: PlateParameters, forces: Array) -> Array:
 
 
 def _offsets(plate: PlateParameters, channels: Array, start: int, stop: int) -> Array:
-    """Return the mean of each channel over the window; 0 for an empty window and for the two point channels of TYPE 1."""
+    """Return the mean of each channel over the window; 0 for an empty window and for the two point channels of TYPE
+    1.
+    """
     if stop <= start:
         return np.zeros(channels.shape[1])
     mean = channels[start:stop].mean(axis=0)
@@ -138,7 +161,9 @@ def _offsets(plate: PlateParameters, channels: Array, start: int, stop: int) -> 
 def _moments_in_sense(
     plate: PlateParameters, sensor: Array, vector: Array, corners: Array, *, rate: float, unsure: bool
 ) -> tuple[Array, tuple[str, ...], tuple[str, ...]]:
-    """Return the wrench with moments in N·m, decisions and warnings: the declared unit, or the only one that puts the load on the plate."""
+    """Return the wrench with moments in N·m, decisions and warnings: the declared unit, or the only one that puts
+    the load on the plate.
+    """
     axes, half = plate_axes(corners), half_sides(corners)
     loaded = loaded_samples(sensor, rate)
     if not loaded.any():
@@ -148,19 +173,24 @@ def _moments_in_sense(
     for factor in factors:
         tried = sensor * np.array([1, 1, 1, factor, factor, factor])
         point = centre_of_pressure(_at_surface(plate, tried, vector, axes)[0][loaded])
-        on_it = float((np.abs(point) <= half + EDGE).all(axis=1).mean())
+        on_it = float((np.abs(point) <= half + _EDGE).all(axis=1).mean())
         lives = float(np.percentile(np.abs(centre_of_pressure(tried[loaded])).max(axis=1), 90)) > STILLEST
         share[factor] = (on_it, on_it >= INSIDE and lives)
     good = [factor for factor in factors if share[factor][1]]
     if not share[1.0][1] and len(good) == 1:
-        said = f"The moments put the load on the plate only when taken {good[0]:g} times as large as the file's units say; that was done."
+        said = (
+            f"The moments put the load on the plate only when taken {good[0]:g} times as large as the file's "
+            f"units say; that was done."
+        )
         return sensor * np.array([1, 1, 1, *3 * good]), (said,), (f"Plate {plate.number}: {said} Check the units.",)
     inside = share[1.0][0]
     if inside >= INSIDE:
         return sensor, (f"The centre of pressure lies on the plate in {100 * inside:.0f} % of the loaded samples.",), ()
     said = f"The centre of pressure lies on the plate in only {100 * inside:.0f} % of the loaded samples"
     if unsure:
-        raise TrialRefused(f"{said.lower()} and the file does not say the units. Write ANALOG:UNITS (N, Nmm) and export again.")
+        raise TrialRefused(
+            f"{said.lower()} and the file does not say the units. Write ANALOG:UNITS (N, Nmm) and export again."
+        )
     return (
         sensor,
         (f"{said}.",),

@@ -1,7 +1,8 @@
-"""From the channels of a force plate to a wrench, one formula per C3D TYPE; all in plate axes, signs as the file has them.
+"""From the channels of a force plate to a wrench, one formula per C3D TYPE; all in plate axes, signs as the file has
+them.
 
-Sources: C3D user guide, FORCE_PLATFORM (TYPE 1-4, ORIGIN, CAL_MATRIX); Visual3D documentation, force platform types 5-7; Kistler 9287
-manual (moments of an eight-channel plate; correction polynomial of the centre of pressure).
+Sources: C3D user guide, FORCE_PLATFORM (TYPE 1-4, ORIGIN, CAL_MATRIX); Visual3D documentation, force platform types
+5-7; Kistler 9287 manual (moments of an eight-channel plate; correction polynomial of the centre of pressure).
 """
 
 import numpy as np
@@ -12,7 +13,7 @@ from biodance.settings import COP_FORCE
 
 EIGHT_CHANNELS, TWELVE_CHANNELS = (3, 7), (6,)
 FOUR_SENSORS = EIGHT_CHANNELS + TWELVE_CHANNELS
-FARTHEST = 1.5  # m: a centre of pressure farther away has no meaning
+_FARTHEST = 1.5  # m: a centre of pressure farther away has no meaning
 
 
 def calibrated(plate: PlateParameters, channels: Array) -> Array:
@@ -21,21 +22,26 @@ def calibrated(plate: PlateParameters, channels: Array) -> Array:
 
 
 def sensor_wrench(plate: PlateParameters, signals: Array, origin: Array) -> Array:
-    """Return force and moment (S, 6) N, N·m about the sensor origin from calibrated signals in SI; ``origin`` (3,) m is ORIGIN.
+    """Return force and moment (S, 6) N, N·m about the sensor origin from calibrated signals in SI; ``origin`` (3,) m is
+    ORIGIN.
 
-    TYPE 1 gives forces, a point on the surface and a free moment; its moment is returned about the surface point above the sensor origin
-    (a point farther than 1.5 m away, as an empty plate gives it, counts as 0).
-    TYPE 3 and 7 (four vertical sensors, two pairs each in x and y) and TYPE 6 (three components at four corners) use the sensor distances
+    TYPE 1 gives forces, a point on the surface and a free moment; its moment is returned about the surface point above
+    the sensor origin (a point farther than 1.5 m away, as an empty plate gives it, counts as 0). TYPE 3 and 7 (four
+    vertical sensors, two pairs each in x and y) and TYPE 6 (three components at four corners) use the sensor distances
     a, b in ORIGIN: sensors 1 to 4 lie at (a, b), (-a, b), (-a, -b), (a, -b). TYPE 2, 4 and 5 measure the wrench itself.
     """
     if plate.type in FOUR_SENSORS:
         a, b = np.abs(origin[:2])
         x, y, z = _sums(signals) if plate.type in EIGHT_CHANNELS else _corner_sums(signals)
-        moment = [b * (z[0] + z[1] - z[2] - z[3]), a * (-z[0] + z[1] + z[2] - z[3]), b * (x[1] - x[0]) + a * (y[0] - y[1])]
+        moment = [
+            b * (z[0] + z[1] - z[2] - z[3]),
+            a * (-z[0] + z[1] + z[2] - z[3]),
+            b * (x[1] - x[0]) + a * (y[0] - y[1]),
+        ]
         return np.stack([x[0] + x[1], y[0] + y[1], z[0] + z[1] + z[2] + z[3], *moment], axis=1)
     if plate.type == 1:
         force = signals[:, :3]
-        far = np.abs(signals[:, 3:5]).max(axis=1, keepdims=True) > FARTHEST
+        far = np.abs(signals[:, 3:5]).max(axis=1, keepdims=True) > _FARTHEST
         point = np.where(far, 0.0, signals[:, 3:5])
         turning = np.cross(np.column_stack([point, np.zeros(len(point))]), force)
         turning[:, 2] += signals[:, 5]
@@ -44,14 +50,16 @@ def sensor_wrench(plate: PlateParameters, signals: Array, origin: Array) -> Arra
 
 
 def surface_vector(plate: PlateParameters, origin: Array) -> Array:
-    """Return the vector (3,) m from the point of reference of ``sensor_wrench`` to the centre of the surface, as ORIGIN (3,) m has it."""
+    """Return the vector (3,) m from the point of reference of ``sensor_wrench`` to the centre of the surface, as
+    ORIGIN (3,) m has it.
+    """
     x, y, z = origin
     if plate.type == 1:
         return np.array([x, y, 0.0])
     return np.array([0.0, 0.0, z]) if plate.type in FOUR_SENSORS else np.array([x, y, z])
 
 
-def moved(wrench: Array, vector: Array) -> Array:
+def about_reference(wrench: Array, vector: Array) -> Array:
     """Return the wrench (S, 6) about the point that lies at ``vector`` (3,) m from the old one: M + F x vector."""
     return np.hstack([wrench[:, :3], wrench[:, 3:] + np.cross(wrench[:, :3], vector)])
 
@@ -64,19 +72,22 @@ def centre_of_pressure(wrench: Array) -> Array:
 
 
 def polynomial_corrected(wrench: Array, polynomial: Array) -> Array:
-    """Return the wrench about the surface centre with Kistler's correction of the centre of pressure; force and free moment stay.
+    """Return the wrench about the surface centre with Kistler's correction of the centre of pressure; force and free
+    moment stay.
 
-    ``polynomial`` (2, 6), first row x: dx = (P1 y^4 + P2 y^2 + P3) x^3 + (P4 y^4 + P5 y^2 + P6) x with x, y in mm; dy likewise with x and y
-    exchanged; the correction is subtracted (Kistler 9287C manual, 8.4.3).
+    ``polynomial`` (2, 6), first row x: dx = (P1 y^4 + P2 y^2 + P3) x^3 + (P4 y^4 + P5 y^2 + P6) x with x, y in mm; dy
+    likewise with x and y exchanged; the correction is subtracted (Kistler 9287C manual, 8.4.3).
     """
     point = 1000 * centre_of_pressure(wrench)
-    point[np.abs(point) > 1000 * FARTHEST] = np.nan
+    point[np.abs(point) > 1000 * _FARTHEST] = np.nan
     wrong = np.empty_like(point)
     for i, p in enumerate(polynomial):
         own, other = point[:, i], point[:, 1 - i] ** 2
         wrong[:, i] = (p[0] * other**2 + p[1] * other + p[2]) * own**3 + (p[3] * other**2 + p[4] * other + p[5]) * own
     shift = np.nan_to_num(-wrong / 1000)
-    return np.hstack([wrench[:, :3], wrench[:, 3:] + np.cross(np.column_stack([shift, np.zeros(len(shift))]), wrench[:, :3])])
+    return np.hstack(
+        [wrench[:, :3], wrench[:, 3:] + np.cross(np.column_stack([shift, np.zeros(len(shift))]), wrench[:, :3])]
+    )
 
 
 def _sums(c: Array) -> tuple[tuple[Array, ...], tuple[Array, ...], tuple[Array, ...]]:

@@ -14,7 +14,7 @@ from biodance.records import Role, Trial
 
 NAME = "markers of OpenSim"
 EXTENSIONS = (".trc",)
-PREFERENCE = 10
+_PREFERENCE = 10
 FORCES_BESIDE = ("", "_grf", "_GRF", "_forces", "_ground_forces")
 
 
@@ -31,8 +31,12 @@ def read(path: Path, *, role: Role, subject: str | None = None) -> Trial:
 
 
 def beside(path: Path) -> Path | None:
-    """Return the .mot or .sto file with plate columns that belongs to a .trc file (or should, but is damaged); None if there is none."""
-    for candidate in (path.with_name(f"{path.stem}{ending}{suffix}") for ending in FORCES_BESIDE for suffix in (".mot", ".sto")):
+    """Return the .mot or .sto file with plate columns that belongs to a .trc file (or should, but is damaged); None
+    if there is none.
+    """
+    for candidate in (
+        path.with_name(f"{path.stem}{ending}{suffix}") for ending in FORCES_BESIDE for suffix in (".mot", ".sto")
+    ):
         if candidate.is_file():
             try:
                 if has_plates(columns_of(candidate)):
@@ -43,7 +47,9 @@ def beside(path: Path) -> Path | None:
 
 
 def _with_forces(trial: Trial, path: Path) -> Trial:
-    """Return the trial of a .trc file with the plates of the table beside it; a damaged table is a warning, the markers stay."""
+    """Return the trial of a .trc file with the plates of the table beside it; a damaged table is a warning, the
+    markers stay.
+    """
     try:
         table = read_mot(path)
         plates, said = plates_of(table, where=str(path))

@@ -16,10 +16,11 @@ filter.cutoff = 6
 ```
 
 ``[markers] file = "my_set.toml"`` names the marker set that was worn (a set's name or a file, relative to this one);
-``[markers] map = {LASI = "left_asis", BACK4 = "trunk_head"}`` says it here: which label is which landmark, or sits on which segment.
+``[markers] map = {LASI = "left_asis", BACK4 = "trunk_head"}`` says it here: which label is which landmark, or sits on
+which segment.
 
-A ``subject.toml`` or ``session.toml`` in the folder above (the subject's folder) has the same keys and fills in what the session's own
-file leaves out.
+A ``subject.toml`` or ``session.toml`` in the folder above (the subject's folder) has the same keys and fills in what
+the session's own file leaves out.
 """
 
 from dataclasses import dataclass, field
@@ -59,7 +60,9 @@ class TrialEntry(_Entry):
 
 
 class MarkersEntry(_Entry):
-    """The table ``[markers]``: the ``file`` (or name) of a marker set, or the ``map`` of labels to landmarks and segments."""
+    """The table ``[markers]``: the ``file`` (or name) of a marker set, or the ``map`` of labels to landmarks and
+    segments.
+    """
 
     file: str | None = None
     map: dict[str, str] | None = None
@@ -74,9 +77,9 @@ class _Contents(_Entry):
 
 @dataclass(frozen=True)
 class SessionFile:
-    """What all files of the chain say together: ``subject``, ``trials`` by name or pattern (the innermost file first), ``read`` paths,
-    ``settings`` with what ``[settings]`` changes; ``marker_set`` the name or file of the set that was worn, "" where none is said (see
-    `marker_sets.read_marker_set`).
+    """What all files of the chain say together: ``subject``, ``trials`` by name or pattern (the innermost file first),
+    ``read`` paths, ``settings`` with what ``[settings]`` changes; ``marker_set`` the name or file of the set that was
+    worn, "" where none is said (see `marker_sets.read_marker_set`).
     """
 
     subject: SubjectEntry = field(default_factory=SubjectEntry)
@@ -86,13 +89,17 @@ class SessionFile:
     marker_set: str = ""
 
     def role(self, name: str) -> Role | None:
-        """Return the role of a trial: by its exact name, else by the first pattern that fits; upper and lower case count the same."""
+        """Return the role of a trial: by its exact name, else by the first pattern that fits; upper and lower case
+        count the same.
+        """
         exact = [entry.role for key, entry in self.trials if key.lower() == name.lower()]
         similar = [entry.role for key, entry in self.trials if fnmatchcase(name.lower(), key.lower())]
         return next((role for role in exact + similar if role), None)
 
     def unused(self, names: list[str]) -> list[str]:
-        """Return the keys of ``[trials]`` that fit no trial, each with the closest name: most often a slip of the pen."""
+        """Return the keys of ``[trials]`` that fit no trial, each with the closest name: most often a slip of the
+        pen.
+        """
         said = []
         for key, _ in self.trials:
             if not any(fnmatchcase(name.lower(), key.lower()) for name in names):
@@ -103,7 +110,8 @@ class SessionFile:
 
 
 def read_session_file(folder: Path) -> SessionFile:
-    """Return what ``session.toml`` (and ``subject.toml`` or ``session.toml`` in the folder above) says; empty where there is none.
+    """Return what ``session.toml`` (and ``subject.toml`` or ``session.toml`` in the folder above) says; empty where
+    there is none.
 
     Raises
     ------
@@ -133,7 +141,9 @@ def _settings(paths: list[Path], contents: list[_Contents]) -> Settings:
 
 
 def _marker_set(path: Path, said: MarkersEntry) -> str:
-    """Return the marker set of one file: the name of a known set, the path of a file, the file itself for a map; "" where it says none."""
+    """Return the marker set of one file: the name of a known set, the path of a file, the file itself for a map; ""
+    where it says none.
+    """
     if said.file is not None and said.map is not None:
         raise SessionRefused(f"{path}: [markers] has both file and map. Keep one of the two.")
     if said.map is not None:
@@ -150,7 +160,9 @@ def _read(path: Path) -> _Contents:
 
 
 def _whole_numbers_are_numbers(raw: Any) -> Any:
-    """Return the tables with ``70`` read as ``70.0`` (strict pydantic keeps text and truth values apart from numbers)."""
+    """Return the tables with ``70`` read as ``70.0`` (strict pydantic keeps text and truth values apart from
+    numbers).
+    """
     if isinstance(raw, dict):
         return {key: _whole_numbers_are_numbers(value) for key, value in raw.items()}
     return float(raw) if isinstance(raw, int) and not isinstance(raw, bool) else raw

@@ -1,4 +1,6 @@
-"""One visit of one person: point at the folder, get the subject, the trials with their roles, and what had to be refused or guessed."""
+"""One visit of one person: point at the folder, get the subject, the trials with their roles, and what had to be
+refused or guessed.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -10,7 +12,14 @@ from biodance.lab.markers.sets import read_marker_set
 from biodance.lab.read import read_trial
 from biodance.lab.readers import Reader, extensions
 from biodance.lab.session.file import SessionFile, read_session_file
-from biodance.lab.session.recordings import find_recordings, guess_static, recordings_in, role_by_eclipse, role_by_name, vicon_notes
+from biodance.lab.session.recordings import (
+    find_recordings,
+    guess_static,
+    recordings_in,
+    role_by_eclipse,
+    role_by_name,
+    vicon_notes,
+)
 from biodance.lab.session.subject import identify_subject
 from biodance.lab.vicon import EclipseNotes
 from biodance.lab.weight import is_still, movement
@@ -29,10 +38,11 @@ def read_session(
 ) -> Session:
     """Read the session in a folder: the subject and every trial that can be read.
 
-    Roles come from session.toml, else from the Eclipse notes (.enf), else from the names (static*, cal* = static; squat* = validate;
-    others = fit); without a static by these, the stillest trial is taken. The subject comes from session.toml, .mp, .vsk and the files' own
-    parameters, in this order. A file that cannot be read never stops the session: it stands in ``Session.refused`` with the reason. What
-    was followed, guessed or left aside stands in ``Session.notes``.
+    Roles come from session.toml, else from the Eclipse notes (.enf), else from the names (static*, cal* = static;
+    squat* = validate; others = fit); without a static by these, the stillest trial is taken. The subject comes from
+    session.toml, .mp, .vsk and the files' own parameters, in this order. A file that cannot be read never stops the
+    session: it stands in ``Session.refused`` with the reason. What was followed, guessed or left aside stands in
+    ``Session.notes``.
 
     Parameters
     ----------
@@ -101,7 +111,9 @@ def read_session(
     if not trials:
         raise SessionRefused(_nothing_left(folder, refused, readers))
     trials = _settle_static(trials, file_says, reasons, notes)
-    subject, guesses = identify_subject(file_says.subject, measurements, trials, name=subject_name or folder.resolve().name)
+    subject, guesses = identify_subject(
+        file_says.subject, measurements, trials, name=subject_name or folder.resolve().name
+    )
     read = [f"{path.name} in {path.parent.name} was followed." for path in file_says.read]
     roles = [f"{trial.name} has the role {trial.role}: {reasons[trial.name]}." for trial in trials]
     slips = file_says.unused([file.stem for file in files])
@@ -112,7 +124,9 @@ def _checked(folder: Path) -> Path:
     if not folder.exists():
         raise SessionRefused(f"{folder}: there is no such folder. Check the path.")
     if not folder.is_dir():
-        raise SessionRefused(f"{folder}: is a file; a session is a folder with a static trial and trials. Give the folder.")
+        raise SessionRefused(
+            f"{folder}: is a file; a session is a folder with a static trial and trials. Give the folder."
+        )
     return folder
 
 
@@ -133,22 +147,31 @@ def _with_strikes(trial: Trial, operator: EclipseNotes | None) -> Trial:
     """Return the trial with a warning for every plate that the operator marked as invalid in Eclipse."""
     invalid = [plate for plate, state in (operator.plates if operator else {}).items() if state.lower() == "invalid"]
     said = tuple(
-        f"The operator marked {plate} as invalid in Eclipse: the foot may not have struck that plate cleanly." for plate in invalid
+        f"The operator marked {plate} as invalid in Eclipse: the foot may not have struck that plate cleanly."
+        for plate in invalid
     )
     return replace(trial, warnings=(*trial.warnings, *said)) if said else trial
 
 
-def _settle_static(trials: list[Trial], settings: SessionFile, reasons: dict[str, str], notes: list[str]) -> list[Trial]:
-    """Return the trials with one of them as static where nobody told which; note a static that moves, or that there is none."""
+def _settle_static(
+    trials: list[Trial], settings: SessionFile, reasons: dict[str, str], notes: list[str]
+) -> list[Trial]:
+    """Return the trials with one of them as static where nobody told which; note a static that moves, or that there
+    is none.
+    """
     for trial in trials:
         if trial.role == "static" and trial.markers is not None and not is_still(trial):
-            notes.append(f"{trial.name} is the static trial, but its markers travel {movement(trial.markers):.2f} m. Is it the right file?")
+            notes.append(
+                f"{trial.name} is the static trial, but its markers travel {movement(trial.markers):.2f} m. Is it the "
+                f"right file?"
+            )
     if any(trial.role == "static" for trial in trials):
         return trials
     guess = guess_static([trial for trial in trials if settings.role(trial.source.path.stem) is None])
     if guess is None or guess.markers is None:
         notes.append(
-            "There is no static trial: none is called so, and in none do markers stand still. Record one, or name it in session.toml."
+            "There is no static trial: none is called so, and in none do markers stand still. Record one, or name it "
+            "in session.toml."
         )
         return trials
     frames = guess.markers.time.size
@@ -164,5 +187,7 @@ def _nothing_left(folder: Path, refused: Mapping[str, str], readers: Chosen[Read
         return f"{folder}: none of its {len(refused)} files can be read. The first, {name}: {reason}"
     inside = [part.name for part in sorted(folder.iterdir()) if part.is_dir() and recordings_in(part, readers)]
     if inside:
-        return f"{folder}: holds no recording itself, but these folders do: {', '.join(inside[:8])}. Point at one of them."
+        return (
+            f"{folder}: holds no recording itself, but these folders do: {', '.join(inside[:8])}. Point at one of them."
+        )
     return f"{folder}: holds no recording. Legal are files of the formats {', '.join(extensions(readers))}."

@@ -17,9 +17,11 @@ VALIDATE_WORDS = ("squat", "squats")
 
 
 def role_by_name(name: str) -> Role | None:
-    """Return "static" for static* and cal*, "validate" for squat*, as a word anywhere in the name; None if the name says nothing.
+    """Return "static" for static* and cal*, "validate" for squat*, as a word anywhere in the name; None if the name
+    says nothing.
 
-    Words end where letters end and where upper case begins: ``CB_Static0001``, ``WalkSquat2``; ``calf_raise`` is no calibration.
+    Words end where letters end and where upper case begins: ``CB_Static0001``, ``WalkSquat2``; ``calf_raise`` is no
+    calibration.
     """
     words = [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)]
     if any(word in STATIC_WORDS or word.startswith("static") for word in words):
@@ -35,7 +37,8 @@ def role_by_eclipse(notes: EclipseNotes) -> Role | None:
 
 
 def guess_static(trials: Sequence[Trial]) -> Trial | None:
-    """Return the trial to take as static where nobody said which: of the still ones that with the most markers; None if all move.
+    """Return the trial to take as static where nobody said which: of the still ones that with the most markers; None if
+    all move.
 
     A single frame counts as still: some laboratories keep one frame of the static only.
     """
@@ -50,14 +53,17 @@ def _static_quality(trial: Trial) -> tuple[int, float]:
 
 TEXT = (".txt", ".csv")
 """Extensions that notes and tables for people have, too: there the content decides."""
-PART_FOLDERS = re.compile(r"static|cal|dynamic|trials?|fit|validat|squat|walk|movement|recordings?", flags=re.IGNORECASE)
+PART_FOLDERS = re.compile(
+    r"static|cal|dynamic|trials?|fit|validat|squat|walk|movement|recordings?", flags=re.IGNORECASE
+)
 
 
 def find_recordings(folder: Path, readers: Chosen[Reader] = None) -> tuple[list[Path], list[str]]:
     """Return the recordings of a session, sorted by name, and notes on what was left aside.
 
-    They lie in the folder itself, else in its parts (folders such as ``static`` and ``dynamic``). A table of forces that belongs to a .trc
-    file is no recording of its own; of one trial in several formats the C3D file is taken; text that holds no table of numbers is none.
+    They lie in the folder itself, else in its parts (folders such as ``static`` and ``dynamic``). A table of forces
+    that belongs to a .trc file is no recording of its own; of one trial in several formats the C3D file is taken; text
+    that holds no table of numbers is none.
     """
     files, order = recordings_in(folder, readers), list(extensions(readers))
     if not files:
@@ -75,20 +81,26 @@ def find_recordings(folder: Path, readers: Chosen[Reader] = None) -> tuple[list[
 
 
 def recordings_in(folder: Path, readers: Chosen[Reader] = None) -> list[Path]:
-    """Return the files directly in a folder whose extension or content says that they are recordings, sorted by name."""
+    """Return the files directly in a folder whose extension or content says that they are recordings, sorted by
+    name.
+    """
     legal = extensions(readers)
     files = (path for path in sorted(folder.iterdir()) if not path.is_dir() and not path.name.startswith("."))
     return [path for path in files if path.suffix.lower() in legal and _is_data(path, readers)]
 
 
 def recordings_below(folder: Path, readers: Chosen[Reader] = None) -> list[Path]:
-    """Return the recordings in a folder and all folders below it, sorted by path; tables that belong to a .trc file are left out."""
+    """Return the recordings in a folder and all folders below it, sorted by path; tables that belong to a .trc file
+    are left out.
+    """
     folders = [folder, *(path for path in sorted(folder.rglob("*")) if path.is_dir() and not path.name.startswith("."))]
     return sorted(_without_companions([file for place in folders for file in recordings_in(place, readers)], readers))
 
 
 def vicon_notes(folders: Iterable[Path]) -> tuple[dict[str, EclipseNotes], dict[str, dict[str, float]], dict[str, str]]:
-    """Return the Eclipse notes by trial name (lower case), the measurements (m, kg) by file name, and the refused files with the reason."""
+    """Return the Eclipse notes by trial name (lower case), the measurements (m, kg) by file name, and the refused
+    files with the reason.
+    """
     eclipse: dict[str, EclipseNotes] = {}
     measurements: dict[str, dict[str, float]] = {}
     refused: dict[str, str] = {}

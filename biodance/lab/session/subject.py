@@ -1,4 +1,6 @@
-"""Who is in the session: taken from what was declared (session.toml, Vicon files, recordings), else guessed; every guess is said."""
+"""Who is in the session: taken from what was declared (session.toml, Vicon files, recordings), else guessed; every
+guess is said.
+"""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -20,7 +22,8 @@ SAME_MASS = 0.01  # share by which two declared masses, or statures, may differ
 MASS_ON_PLATES = 0.02  # share by which the plates may differ from the declared mass
 LEGAL_MASS, LEGAL_STATURE = (5.0, 400.0), (0.4, 2.6)
 STATURE_OF_C7, STATURE_OF_HEAD = 0.840, 0.942
-"""Height of the C7 marker, and mean height of four head-band markers, in upright standing as a share of the declared stature.
+"""Height of the C7 marker, and mean height of four head-band markers, in upright standing as a share of the declared
+stature.
 
 Measured on recordings of four people of 1.48 to 1.74 m (C7, sd 0.003) and three of them (head, sd 0.006).
 """
@@ -41,15 +44,18 @@ def identify_subject(
 ) -> tuple[Subject, tuple[str, ...]]:
     """Return the subject and the notes: what was guessed, what contradicts what.
 
-    ``typed`` is the table [subject] of session.toml and comes first; ``files`` are the measurements of .mp and .vsk files by file name, in
-    m and kg; then come the measurements in the trials, the static one first. A mass that nobody declared is read from quiet standing on the
-    plates; a stature from the height of C7 or of the head markers. What cannot be known stays NaN and a note says what to do.
+    ``typed`` is the table [subject] of session.toml and comes first; ``files`` are the measurements of .mp and .vsk
+    files by file name, in m and kg; then come the measurements in the trials, the static one first. A mass that nobody
+    declared is read from quiet standing on the plates; a stature from the height of C7 or of the head markers. What
+    cannot be known stays NaN and a note says what to do.
     """
     ordered = sorted(trials, key=lambda trial: trial.role != "static")
     sources = {**files, **{trial.source.path.name: trial.measurements for trial in ordered}}
     notes: list[str] = []
     mass = _choose("body mass", "kg", [*_typed(typed.mass_kg), *_declared(sources, MASS_NAMES, LEGAL_MASS)], notes)
-    stature = _choose("stature", "m", [*_typed(typed.height_m), *_declared(sources, STATURE_NAMES, LEGAL_STATURE)], notes)
+    stature = _choose(
+        "stature", "m", [*_typed(typed.height_m), *_declared(sources, STATURE_NAMES, LEGAL_STATURE)], notes
+    )
     sex = typed.sex or _declared_sex(sources)
     known = {"mass": math.isfinite(mass), "stature": math.isfinite(stature), "sex": sex is not None}
     on_plates = [Declared(found, trial.name) for trial in ordered if (found := standing_mass(trial)) is not None]
@@ -62,7 +68,9 @@ def identify_subject(
     measures: dict[str, float] = {}
     for values in sources.values():
         measures = {**values, **measures}
-    return Subject(mass, stature, sex, age, typed.name or name, measures, tuple(what for what in known if not known[what])), tuple(notes)
+    return Subject(
+        mass, stature, sex, age, typed.name or name, measures, tuple(what for what in known if not known[what])
+    ), tuple(notes)
 
 
 def declared_mass(measurements: Mapping[str, float]) -> float:
@@ -79,8 +87,12 @@ def _typed(value: float | None) -> list[Declared]:
     return [] if value is None else [Declared(value, "session.toml")]
 
 
-def _declared(sources: Mapping[str, Mapping[str, float]], names: Iterable[str], legal: tuple[float, float]) -> list[Declared]:
-    """Return what the sources declare under one of the names, in order; values outside the legal range count as not declared."""
+def _declared(
+    sources: Mapping[str, Mapping[str, float]], names: Iterable[str], legal: tuple[float, float]
+) -> list[Declared]:
+    """Return what the sources declare under one of the names, in order; values outside the legal range count as not
+    declared.
+    """
     found = []
     for source, values in sources.items():
         lower = {key.lower(): value for key, value in values.items()}
@@ -98,33 +110,45 @@ def _choose(quantity: str, unit: str, declared: list[Declared], notes: list[str]
     other = next((d for d in declared[1:] if abs(d.value - first.value) > SAME_MASS * first.value), None)
     if other:
         notes.append(
-            f"The {quantity} is {first.value:g} {unit} in {first.source} but {other.value:g} {unit} in {other.source}; the first was used. "
+            f"The {quantity} is {first.value:g} {unit} in {first.source} but {other.value:g} {unit} in "
+            f"{other.source}; the first was used. "
             "Are all files of the same person and day?"
         )
     return first.value
 
 
 def _check_mass(mass: float, on_plates: list[Declared], notes: list[str]) -> float:
-    """Return the declared mass, else the one on the plates; note the guess, and what contradicts the mass that is used."""
+    """Return the declared mass, else the one on the plates; note the guess, and what contradicts the mass that is
+    used.
+    """
     if not on_plates:
         if math.isnan(mass):
-            notes.append("The body mass is not known: not declared, and nobody stands still on the plates. Set mass_kg in session.toml.")
+            notes.append(
+                "The body mass is not known: not declared, and nobody stands still on the plates. Set mass_kg in "
+                "session.toml."
+            )
         return mass
     first = on_plates[0]
     if math.isnan(mass):
         mass = first.value
-        notes.append(f"The body mass was not declared: {mass:.2f} kg were read from quiet standing on the plates in {first.source}.")
+        notes.append(
+            f"The body mass was not declared: {mass:.2f} kg were read from quiet standing on the plates in "
+            f"{first.source}."
+        )
     other = next((found for found in on_plates if abs(found.value - mass) > MASS_ON_PLATES * mass), None)
     if other:
         notes.append(
-            f"The plates carry {other.value:.2f} kg in quiet standing in {other.source}, but the body mass is {mass:.2f} kg. Check the "
+            f"The plates carry {other.value:.2f} kg in quiet standing in {other.source}, but the body mass is "
+            f"{mass:.2f} kg. Check the "
             "entry, the plates, whether both feet stand on them, and whether it is the same person."
         )
     return mass
 
 
 def _stature_of_markers(trials: Sequence[Trial], notes: list[str]) -> float:
-    """Return the stature (m) from the height of C7 or the head in the static trial; NaN if neither stands over feet on the floor."""
+    """Return the stature (m) from the height of C7 or the head in the static trial; NaN if neither stands over feet
+    on the floor.
+    """
     for trial in (t for t in trials if t.role == "static"):
         feet = _height(trial, "right_heel", "left_heel", "right_toe", "left_toe")
         for what, names, share in (
@@ -133,9 +157,15 @@ def _stature_of_markers(trials: Sequence[Trial], notes: list[str]) -> float:
         ):
             stature = _height(trial, *names) / share
             if FLOOR[0] <= feet <= FLOOR[1] and LEGAL_STATURE[0] <= stature <= LEGAL_STATURE[1]:
-                notes.append(f"The stature was not declared: {stature:.2f} m were guessed from the height of {what} in {trial.name}.")
+                notes.append(
+                    f"The stature was not declared: {stature:.2f} m were guessed from the height of {what} in "
+                    f"{trial.name}."
+                )
                 return stature
-    notes.append("The stature is not known: it is not declared and no upright static trial tells it. Set height_m in session.toml.")
+    notes.append(
+        "The stature is not known: it is not declared and no upright static trial tells it. Set height_m in "
+        "session.toml."
+    )
     return math.nan
 
 
@@ -146,7 +176,11 @@ def _height(trial: Trial, *landmarks: str) -> float:
     marker_set = read_marker_set(trial.marker_set)
     found = [landmark(trial.markers, marker_set, name) for name in landmarks]
     heights = [points[:, 2][np.isfinite(points[:, 2])] for points in found if points is not None]
-    return float(np.mean([np.median(h) for h in heights])) if len(heights) == len(found) and all(map(np.size, heights)) else math.nan
+    return (
+        float(np.mean([np.median(h) for h in heights]))
+        if len(heights) == len(found) and all(map(np.size, heights))
+        else math.nan
+    )
 
 
 def _declared_sex(sources: Mapping[str, Mapping[str, float]]) -> Literal["F", "M"] | None:
@@ -160,7 +194,11 @@ def _declared_sex(sources: Mapping[str, Mapping[str, float]]) -> Literal["F", "M
 def _likely_sex(stature: float, notes: list[str]) -> Literal["F", "M"]:
     """Return "M" from 1.70 m on and "F" below, which is right for most adults, and say so."""
     sex: Literal["F", "M"] = "M" if stature >= TALLER_IS_MALE else "F"
-    basis = f"a stature of {stature:.2f} m is more frequent among" if math.isfinite(stature) else "without a stature taken as"
+    basis = (
+        f"a stature of {stature:.2f} m is more frequent among"
+        if math.isfinite(stature)
+        else "without a stature taken as"
+    )
     people = "men" if sex == "M" else "women"
     notes.append(f"The sex is not given: {basis} {people}, so tables for {sex} are used. Set sex in session.toml.")
     return sex

@@ -1,8 +1,9 @@
 """Which frames are fully measured: every foot that may touch the ground stands on a force plate.
 
-A foot MAY touch where one point of its sole is low over a surface and slow. Surfaces are the plates, the floor, and every height at which a
-foot rested elsewhere in this trial (stairs, boxes). All rules err towards touching. A frame is measured if every foot that may touch
-lies over plates with its whole sole; over a plate that is higher than everything around it, what sticks out hangs in the air.
+A foot MAY touch where one point of its sole is low over a surface and slow. Surfaces are the plates, the floor, and
+every height at which a foot rested elsewhere in this trial (stairs, boxes). All rules err towards touching. A frame is
+measured if every foot that may touch lies over plates with its whole sole; over a plate that is higher than everything
+around it, what sticks out hangs in the air.
 """
 
 from collections import Counter
@@ -12,37 +13,50 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.motion.contact.footing import Footing, Surfaces, cop_outside, dilate, find_surfaces, footing, resting, speeds
+from biodance.motion.contact.footing import (
+    Footing,
+    Surfaces,
+    cop_outside,
+    dilate,
+    find_surfaces,
+    footing,
+    resting,
+    speeds,
+)
 from biodance.motion.contact.soles import FEET, Soles
 from biodance.motion.dynamics import distribute
 from biodance.records import Array, Trial, Wrench
 from biodance.settings import ContactRules
 
-Mask = NDArray[np.bool_]
+_Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
 class Contact:
     """Ground contact of a trial; feet are ordered right, left, plates as in the trial.
 
-    ``time`` (T,) s; ``touching`` (T, 2) True where a foot may touch anything; ``on_plate`` (T, 2, P) True where a part of a touching foot
-    is over a plate; ``measured`` (T,) True where the plates measure all that the ground does; ``cop_outside`` (T, P) m, distance of a
-    plate's centre of pressure from the soles on it (0 = inside), NaN = hardly loaded; ``notes`` how many frames remain, and why no others.
+    ``time`` (T,) s; ``touching`` (T, 2) True where a foot may touch anything; ``on_plate`` (T, 2, P) True where a part
+    of a touching foot is over a plate; ``measured`` (T,) True where the plates measure all that the ground does;
+    ``cop_outside`` (T, P) m, distance of a plate's centre of pressure from the soles on it (0 = inside), NaN = hardly
+    loaded; ``notes`` how many frames remain, and why no others.
     """
 
     time: Array
-    touching: Mask
-    on_plate: Mask
-    measured: Mask
+    touching: _Mask
+    on_plate: _Mask
+    measured: _Mask
     cop_outside: Array
     notes: tuple[str, ...]
 
 
-def ground_contact(trial: Trial, soles: Soles, *, mass: float = float("nan"), rules: ContactRules | None = None) -> Contact:
+def ground_contact(
+    trial: Trial, soles: Soles, *, mass: float = float("nan"), rules: ContactRules | None = None
+) -> Contact:
     """Return the ground contact of a prepared trial.
 
-    ``mass`` kg of the body, NaN = unknown: a foot that rests away from all known heights while the plates carry at least nine tenths of
-    the weight is held in the air; without the mass it counts as standing on something. ``rules`` None: those of ``trial.settings``.
+    ``mass`` kg of the body, NaN = unknown: a foot that rests away from all known heights while the plates carry at
+    least nine tenths of the weight is held in the air; without the mass it counts as standing on something. ``rules``
+    None: those of ``trial.settings``.
 
     Raises
     ------
@@ -53,9 +67,16 @@ def ground_contact(trial: Trial, soles: Soles, *, mass: float = float("nan"), ru
     """
     rules = rules or trial.settings.contact
     if not trial.plates:
-        raise TrialRefused(f"Trial {trial.name}: no force plate was recorded, so no frame is measured. Record with the plates on.")
-    if any(plate.wrench.time.shape != soles.time.shape or not np.allclose(plate.wrench.time, soles.time) for plate in trial.plates):
-        raise BiodanceError(f"Trial {trial.name}: the plates and the feet have different times. Prepare the trial first.")
+        raise TrialRefused(
+            f"Trial {trial.name}: no force plate was recorded, so no frame is measured. Record with the plates on."
+        )
+    if any(
+        plate.wrench.time.shape != soles.time.shape or not np.allclose(plate.wrench.time, soles.time)
+        for plate in trial.plates
+    ):
+        raise BiodanceError(
+            f"Trial {trial.name}: the plates and the feet have different times. Prepare the trial first."
+        )
     force = np.stack([plate.wrench.force[:, 2] for plate in trial.plates], axis=1)
     largest = float(np.nanmax(force.sum(axis=1), initial=0.0))
     load, pressed = (force > max(rules.force, share * largest) for share in (rules.loaded, rules.pressed))
@@ -71,7 +92,7 @@ def ground_contact(trial: Trial, soles: Soles, *, mass: float = float("nan"), ru
     return Contact(soles.time, touching, place.on_plate, measured, outside, notes)
 
 
-def _touching(soles: Soles, speed: Array, surfaces: Surfaces, rules: ContactRules) -> Mask:
+def _touching(soles: Soles, speed: Array, surfaces: Surfaces, rules: ContactRules) -> _Mask:
     """Return (T, 2) where a foot may touch: low and slow, or not seen, widened in time."""
     height = soles.outline[..., 2] - surfaces.offset
     near = np.abs(height[..., None] - np.array(surfaces.levels)).min(axis=-1) < rules.height
@@ -82,9 +103,9 @@ def _touching(soles: Soles, speed: Array, surfaces: Surfaces, rules: ContactRule
     return dilate(found, frames) | unseen
 
 
-def _faults(trial: Trial, place: Footing, touching: Mask, rests: Mask, load: Mask) -> list[tuple[str, Mask]]:
+def _faults(trial: Trial, place: Footing, touching: _Mask, rests: _Mask, load: _Mask) -> list[tuple[str, _Mask]]:
     """Return every reason why frames are not fully measured, with its frames (T,)."""
-    faults: list[tuple[str, Mask]] = [
+    faults: list[tuple[str, _Mask]] = [
         ("no plate is loaded", np.logical_not(load.any(axis=1))),
         ("a plate's force is unknown", np.logical_not(np.isfinite(trial.wrench.value).all(axis=1))),
     ]
@@ -92,32 +113,47 @@ def _faults(trial: Trial, place: Footing, touching: Mask, rests: Mask, load: Mas
         apart = touching[:, foot] & ~place.covered[:, foot]
         hidden = place.unseen[:, foot]
         faults.append((f"the {side} foot was not seen", hidden))
-        faults.append((f"the {side} foot may touch the ground beside the plates", apart & ~hidden & (place.share[:, foot] == 0)))
-        faults.append((f"the {side} foot may stand partly on a plate, partly beside it", apart & ~hidden & (place.share[:, foot] > 0)))
+        faults.append(
+            (f"the {side} foot may touch the ground beside the plates", apart & ~hidden & (place.share[:, foot] == 0))
+        )
+        faults.append(
+            (
+                f"the {side} foot may stand partly on a plate, partly beside it",
+                apart & ~hidden & (place.share[:, foot] > 0),
+            )
+        )
     for index, plate in enumerate(trial.plates):
         on = place.on_plate[:, :, index]
         faults.append((f"{plate.name} is loaded but no foot is over it", load[:, index] & ~on.any(axis=1)))
         for foot, side in enumerate(FEET):
             alone = on[:, foot] & (place.on_plate[:, foot].sum(axis=1) == 1)
-            faults.append((f"the {side} foot rests on {plate.name}, which reads nothing", alone & rests[:, foot] & ~load[:, index]))
+            faults.append(
+                (
+                    f"the {side} foot rests on {plate.name}, which reads nothing",
+                    alone & rests[:, foot] & ~load[:, index],
+                )
+            )
     return faults
 
 
-def _notes(measured: Mask, faults: list[tuple[str, Mask]]) -> tuple[str, ...]:
+def _notes(measured: _Mask, faults: list[tuple[str, _Mask]]) -> tuple[str, ...]:
     counts = Counter({text: int(mask.sum()) for text, mask in faults if mask.any()})
     first = f"{int(measured.sum())} of {measured.size} frames are fully measured by the plates."
     return (first, *(f"Left out, {count} of {measured.size}: {text}." for text, count in counts.most_common()))
 
 
-def _cop_notes(trial: Trial, outside: Array, measured: Mask, rules: ContactRules) -> tuple[str, ...]:
-    """Return a sentence for every plate whose centre of pressure lies outside the soles on it, as a median over the measured frames."""
+def _cop_notes(trial: Trial, outside: Array, measured: _Mask, rules: ContactRules) -> tuple[str, ...]:
+    """Return a sentence for every plate whose centre of pressure lies outside the soles on it, as a median over the
+    measured frames.
+    """
     notes = []
     for index, plate in enumerate(trial.plates):
         distance = outside[measured, index]
         distance = distance[~np.isnan(distance)]
         if distance.size and np.median(distance) > rules.outside:
             notes.append(
-                f"{plate.name}: the centre of pressure lies {1000 * np.median(distance):.0f} mm outside the foot on it (median). "
+                f"{plate.name}: the centre of pressure lies {1000 * np.median(distance):.0f} mm outside the foot on "
+                f"it (median). "
                 "Check the plate's place and the signs of its channels."
             )
     return tuple(notes)
@@ -126,8 +162,8 @@ def _cop_notes(trial: Trial, outside: Array, measured: Mask, rules: ContactRules
 def foot_wrenches(trial: Trial, contact: Contact, soles: Soles) -> tuple[Wrench, Wrench]:
     """Return the measured wrenches (right, left): each plate goes to the foot on it, or is distributed between both.
 
-    Plates under no foot go to the foot that is nearer to their centre of pressure. The sum is the trial's total wrench; only where
-    ``contact.measured`` is it all that acts on the feet.
+    Plates under no foot go to the foot that is nearer to their centre of pressure. The sum is the trial's total wrench;
+    only where ``contact.measured`` is it all that acts on the feet.
     """
     parts = []
     for index, plate in enumerate(trial.plates):

@@ -1,4 +1,6 @@
-"""Soles on surfaces: the heights on which the feet stand, what lies over which plate, how far a pressure is from a sole."""
+"""Soles on surfaces: the heights on which the feet stand, what lies over which plate, how far a pressure is from a
+sole.
+"""
 
 from dataclasses import dataclass
 from itertools import combinations
@@ -15,31 +17,34 @@ if TYPE_CHECKING:
     pass
 
 
-Mask = NDArray[np.bool_]
+_Mask = NDArray[np.bool_]
 RIM = 0.005
 """m of the outline's edge that carry nothing: a sole is rounded, and broadest above the ground."""
 REACH = 0.09
 """m: a foot within this height of a plate is over that plate and not over one of another step."""
-HALF = 0.3
+_HALF = 0.3
 """Share of the sole that must be over a raised plate."""
-RAISED = 0.05
+_RAISED = 0.05
 """m that a plate stands out of everything around it to count as raised."""
 
 
 @dataclass(frozen=True, eq=False)
 class Footing:
-    """Feet (right, left) on plates: ``on_plate`` (T, 2, P) a part of a touching foot is over the plate; ``share`` (T, 2) of the sole over
-    plates of its height; ``covered`` (T, 2) nothing of the foot can touch anything but plates; ``unseen`` (T, 2) not seen.
+    """Feet (right, left) on plates: ``on_plate`` (T, 2, P) a part of a touching foot is over the plate; ``share`` (T,
+    2) of the sole over plates of its height; ``covered`` (T, 2) nothing of the foot can touch anything but plates;
+    ``unseen`` (T, 2) not seen.
     """
 
-    on_plate: Mask
+    on_plate: _Mask
     share: Array
-    covered: Mask
-    unseen: Mask
+    covered: _Mask
+    unseen: _Mask
 
 
 def inside(plate: Plate, points: Array) -> Array:
-    """Return how far points (..., 3) m are inside the plate seen from above: distance to the nearest edge, negative outside."""
+    """Return how far points (..., 3) m are inside the plate seen from above: distance to the nearest edge, negative
+    outside.
+    """
     corners = plate.corners[:, :2]
     edges = np.roll(corners, -1, axis=0) - corners
     turn = np.sign(np.sum(corners[:, 0] * np.roll(corners[:, 1], -1) - corners[:, 1] * np.roll(corners[:, 0], -1)))
@@ -50,7 +55,7 @@ def inside(plate: Plate, points: Array) -> Array:
     return distance
 
 
-def footing(plates: tuple[Plate, ...], soles: Soles, surfaces: "Surfaces", touching: Mask) -> Footing:
+def footing(plates: tuple[Plate, ...], soles: Soles, surfaces: "Surfaces", touching: _Mask) -> Footing:
     """Return which plates the touching feet (T, 2) are over, and whether they can touch anything else."""
     samples = _samples(soles)
     low = (soles.outline[..., 2] - surfaces.offset).min(axis=2)
@@ -62,15 +67,17 @@ def footing(plates: tuple[Plate, ...], soles: Soles, surfaces: "Surfaces", touch
         over = (inside(plate, samples) >= 0) & (np.abs(low - plate.height) < REACH)[..., None]
         on_plate[..., index] = over.any(axis=-1) & touching
         anywhere |= over
-        if any(abs(height - plate.height) < RAISED for height in surfaces.bare):
+        if any(abs(height - plate.height) < _RAISED for height in surfaces.bare):
             raised &= ~over.any(axis=-1)
     share = anywhere.mean(axis=-1)
-    covered = (share == 1) | (raised & (share >= HALF))
+    covered = (share == 1) | (raised & (share >= _HALF))
     return Footing(on_plate, share, covered & ~unseen, unseen)
 
 
 def _samples(soles: Soles) -> Array:
-    """Return points (T, 2, S, 3) m all over the soles without their rim: the outline and the middles of all its chords."""
+    """Return points (T, 2, S, 3) m all over the soles without their rim: the outline and the middles of all its
+    chords.
+    """
     centre = soles.centre[:, :, None]
     outwards = (soles.outline - centre) * np.array([1.0, 1.0, 0.0])
     length = np.linalg.norm(outwards, axis=-1, keepdims=True)
@@ -79,8 +86,9 @@ def _samples(soles: Soles) -> Array:
     return np.concatenate([narrow, np.stack(middles, axis=2)], axis=2)
 
 
-def cop_outside(plates: tuple[Plate, ...], soles: Soles, place: Footing, pressed: Mask) -> Array:
-    """Return the distance (T, P) m of every plate's centre of pressure from the soles on it; 0 inside, NaN without foot or not ``pressed``.
+def cop_outside(plates: tuple[Plate, ...], soles: Soles, place: Footing, pressed: _Mask) -> Array:
+    """Return the distance (T, P) m of every plate's centre of pressure from the soles on it; 0 inside, NaN without foot
+    or not ``pressed``.
 
     With both feet on a plate, the area between them counts as inside.
     """
@@ -98,7 +106,8 @@ def cop_outside(plates: tuple[Plate, ...], soles: Soles, place: Footing, pressed
 def distance_to_hull(point: Array, points: Array) -> Array:
     """Return the distance (n,) of each ``point`` (n, 2) from the convex hull of its ``points`` (n, P, 2); 0 inside.
 
-    A point is outside if all others are seen from it within half a turn; then the nearest of all chords between them is the hull's edge.
+    A point is outside if all others are seen from it within half a turn; then the nearest of all chords between them is
+    the hull's edge.
     """
     towards = points - point[:, None]
     angle = np.sort(np.arctan2(towards[..., 1], towards[..., 0]), axis=1)
@@ -125,8 +134,8 @@ CARRIED = 0.9
 
 @dataclass(frozen=True, eq=False)
 class Surfaces:
-    """``offset`` (2, P) m: height of each point of each sole above the ground in standing; ``levels`` m: heights on which a foot can stand;
-    ``bare`` m: those of them that are not plates, the floor first; ``notes`` what was found.
+    """``offset`` (2, P) m: height of each point of each sole above the ground in standing; ``levels`` m: heights on
+    which a foot can stand; ``bare`` m: those of them that are not plates, the floor first; ``notes`` what was found.
     """
 
     offset: Array
@@ -143,7 +152,9 @@ def speeds(soles: Soles) -> Array:
 
 
 def resting(speed: Array, time: Array, *, still: float, lasting: float) -> _Mask2:
-    """Return (T, 2) where a foot rests: all its points slower than ``still`` m/s for at least ``lasting`` s (or the whole trial)."""
+    """Return (T, 2) where a foot rests: all its points slower than ``still`` m/s for at least ``lasting`` s (or the
+    whole trial).
+    """
     slow = np.asarray((speed < still).all(axis=2))
     least = 1 if time.size < 2 else min(time.size, int(np.ceil(lasting / np.median(np.diff(time)))))
     found = np.zeros_like(slow)
@@ -163,7 +174,9 @@ def dilate(mask: _Mask2, frames: int) -> _Mask2:
 
 
 def find_surfaces(trial: Trial, soles: Soles, rests: _Mask2, load: _Mask2, *, weight: float) -> Surfaces:
-    """Return the surfaces of a trial; ``rests`` (T, 2), ``load`` (T, plates) True where loaded, ``weight`` N (NaN = unknown)."""
+    """Return the surfaces of a trial; ``rests`` (T, 2), ``load`` (T, plates) True where loaded, ``weight`` N (NaN =
+    unknown).
+    """
     plates = sorted({round(plate.height, 3) for plate in trial.plates})
     offset = _offsets(trial, soles, rests, load)
     low = (soles.outline[..., 2] - offset).min(axis=2)
@@ -188,7 +201,10 @@ def find_surfaces(trial: Trial, soles: Soles, rests: _Mask2, load: _Mask2, *, we
             notes.append(f"The {side} foot rests in the air ({lifted} times): the plates carry the weight meanwhile.")
     lowest = float(np.nanmin(low, initial=plates[0]))
     if lowest < min([*bare, plates[0]]) - SAME_LEVEL:
-        notes.append(f"A foot goes down to {lowest:z.2f} m: the floor is at least that far below the lowest plate ({plates[0]:z.2f} m).")
+        notes.append(
+            f"A foot goes down to {lowest:z.2f} m: the floor is at least that far below the lowest plate "
+            f"({plates[0]:z.2f} m)."
+        )
         bare.append(lowest)
     bare = sorted({min([*bare, plates[0]]), *bare})
     return Surfaces(offset, tuple(sorted({*plates, *bare})), tuple(bare), tuple(notes))
@@ -197,13 +213,16 @@ def find_surfaces(trial: Trial, soles: Soles, rests: _Mask2, load: _Mask2, *, we
 def _over(trial: Trial, centre: Array, load: _Mask2) -> bool:
     """Return whether a resting sole's ``centre`` (n, 3) is over a plate that is loaded meanwhile."""
     middle = np.median(centre, axis=0)
-    return any(bool(inside(plate, middle) > 0) and bool(load[:, index].any()) for index, plate in enumerate(trial.plates))
+    return any(
+        bool(inside(plate, middle) > 0) and bool(load[:, index].any()) for index, plate in enumerate(trial.plates)
+    )
 
 
 def _offsets(trial: Trial, soles: Soles, rests: _Mask2, load: _Mask2) -> Array:
     """Return the standing height (2, P) m of each point: low percentile while the foot rests on a loaded plate.
 
-    A foot that never does takes the other's; if neither does, its lowest resting (or lowest) height is taken for the lowest plate's.
+    A foot that never does takes the other's; if neither does, its lowest resting (or lowest) height is taken for the
+    lowest plate's.
     """
     found = np.full(soles.outline.shape[1:3], np.nan)
     for foot in range(2):

@@ -12,17 +12,19 @@ from biodance.records import Array, Markers, Motion, frozen_array
 
 FEET = ("right", "left")
 OUTLINE = np.array([[0.0, 0.17], [0.0, -0.17], [0.6, -0.21], [1.0, -0.23], [1.25, 0.0], [1.0, 0.23], [0.6, 0.21]])
-"""(P, 2) outline of a sole, in units of the horizontal distance from the heel to the toe marker: forwards from the heel marker, and to the
-left. From foot length 0.152, breadth 0.055 and heel breadth 0.040 of stature (Winter 2009; ANSUR II 2012) and a distance of the
-markers of 0.121 of stature."""
+"""(P, 2) outline of a sole, in units of the horizontal distance from the heel to the toe marker: forwards from the heel
+marker, and to the left. From foot length 0.152, breadth 0.055 and heel breadth 0.040 of stature (Winter 2009; ANSUR II
+2012) and a distance of the markers of 0.121 of stature.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Soles:
-    """Outlines of both soles: ``time`` (T,) s; ``outline`` (T, 2, P, 3) m, lab frame, right foot first, P points around the sole.
+    """Outlines of both soles: ``time`` (T,) s; ``outline`` (T, 2, P, 3) m, lab frame, right foot first, P points around
+    the sole.
 
-    The heights are those of the markers or of the body's sole; the contact finds out how far they are above the ground in standing. NaN =
-    not seen.
+    The heights are those of the markers or of the body's sole; the contact finds out how far they are above the ground
+    in standing. NaN = not seen.
     """
 
     time: Array
@@ -42,8 +44,8 @@ class Soles:
 def soles_from_markers(markers: Markers, marker_set: MarkerSet) -> Soles:
     """Return the soles from the landmarks heel and toe (second metatarsal head) of each foot.
 
-    Points between the two markers have the height that is interpolated between them; the toes bend, so that the tip has the height of
-    the toe marker.
+    Points between the two markers have the height that is interpolated between them; the toes bend, so that the tip has
+    the height of the toe marker.
 
     Raises
     ------
@@ -54,7 +56,9 @@ def soles_from_markers(markers: Markers, marker_set: MarkerSet) -> Soles:
     for side in FEET:
         heel, toe = (landmark(markers, marker_set, f"{side}_{name}") for name in ("heel", "toe"))
         if heel is None or toe is None:
-            raise TrialRefused(f"The {side} foot has no heel or no toe marker, so its contact with the ground is unknown. Put both on.")
+            raise TrialRefused(
+                f"The {side} foot has no heel or no toe marker, so its contact with the ground is unknown. Put both on."
+            )
         ahead = (toe - heel) * np.array([1.0, 1.0, 0.0])
         to_left = np.stack([-ahead[:, 1], ahead[:, 0], np.zeros(len(ahead))], axis=1)
         rise = (toe - heel) - ahead
@@ -72,7 +76,12 @@ def soles_from_body(body: Body, motion: Motion) -> Soles:
     """
     absent = [side for side in FEET if side not in body.feet]
     if absent or len({body.feet[side].outline.shape for side in FEET}) > 1:
-        raise TrialRefused(f"The body {body.name} lacks two feet with outlines of equally many points, so its ground contact is unknown.")
+        raise TrialRefused(
+            f"The body {body.name} lacks two feet with outlines of equally many points, so its ground contact is "
+            f"unknown."
+        )
     pose = poses(body, motion.q)
-    feet = [pose.points([body.feet[side].segment] * len(body.feet[side].outline), body.feet[side].outline) for side in FEET]
+    feet = [
+        pose.points([body.feet[side].segment] * len(body.feet[side].outline), body.feet[side].outline) for side in FEET
+    ]
     return Soles(motion.time, np.stack(feet, axis=1))

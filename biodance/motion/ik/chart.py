@@ -1,4 +1,6 @@
-"""Ball joints as one rotation, and coordinates that change smoothly whenever the body does: for filters and interpolation."""
+"""Ball joints as one rotation, and coordinates that change smoothly whenever the body does: for filters and
+interpolation.
+"""
 
 from dataclasses import dataclass
 
@@ -11,7 +13,9 @@ from biodance.records import Array, Index
 
 @dataclass(frozen=True, eq=False)
 class Balls:
-    """G ball joints: ``first`` (G,) index of the first of the three joints, ``sign`` (G, 1) of their axes' handedness."""
+    """G ball joints: ``first`` (G,) index of the first of the three joints, ``sign`` (G, 1) of their axes'
+    handedness.
+    """
 
     first: np.ndarray
     sign: Array
@@ -48,8 +52,8 @@ def ball_quaternion(angles: Array, sign: Array) -> Array:
 def ball_angles(quaternion: Array, sign: Array, near: Array, lower: Array, upper: Array) -> Array:
     """Return the Cardan angles (3, G, B) rad of unit quaternions (4, G, B).
 
-    Every rotation has two sets of Cardan angles (and any number of full turns). The one inside ``lower``, ``upper`` (3, G, 1) is taken,
-    if both or none are: the one closer to ``near`` (3, G, B).
+    Every rotation has two sets of Cardan angles (and any number of full turns). The one inside ``lower``, ``upper`` (3,
+    G, 1) is taken, if both or none are: the one closer to ``near`` (3, G, B).
     """
     x, y, z, w = quaternion
     sine = np.clip(2 * (x * z + y * w), -1.0, 1.0)
@@ -77,7 +81,9 @@ def _turned_near(angles: Array, middle: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Smooth:
-    """B postures: ``place`` (3, B) m and ``root`` (4, B) quaternion, (0, B) for a fixed root; ``ball`` (4, G, B); ``angle`` (m, B) rad."""
+    """B postures: ``place`` (3, B) m and ``root`` (4, B) quaternion, (0, B) for a fixed root; ``ball`` (4, G, B);
+    ``angle`` (m, B) rad.
+    """
 
     place: Array
     root: Array
@@ -91,7 +97,9 @@ class Smooth:
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """Maps q to smooth coordinates and back: ``joints`` the ball joints, ``single`` (m,) the others, limits (3, G, 1) rad of the balls."""
+    """Maps q to smooth coordinates and back: ``joints`` the ball joints, ``single`` (m,) the others, limits (3, G,
+    1) rad of the balls.
+    """
 
     joints: Balls
     single: Index
@@ -110,7 +118,9 @@ class Chart:
         return self.joint_count + (7 if self.n_root else 0)
 
     def smooth(self, q: Array) -> Smooth:
-        """Return the smooth coordinates of ``q`` (nq, B), B consecutive frames (signs and full turns are continued along them)."""
+        """Return the smooth coordinates of ``q`` (nq, B), B consecutive frames (signs and full turns are continued
+        along them).
+        """
         angles = q[7:] if self.n_root else q
         root = continuous(q[3:7]) if self.n_root else q[:0]
         ball = continuous(ball_quaternion(self.joints.angles_of(angles), self.joints.sign))
@@ -123,10 +133,14 @@ class Chart:
         return Smooth(stacked[: root[0]], stacked[root[0] : root[1]], ball, stacked[root[1] + count :])
 
     def posture(self, smooth: Smooth, near: Array) -> Array:
-        """Return q (nq, B); quaternions are normalised here; ``near`` (n, B) rad decides between equal sets of Cardan angles."""
+        """Return q (nq, B); quaternions are normalised here; ``near`` (n, B) rad decides between equal sets of
+        Cardan angles.
+        """
         angles = np.empty_like(near)
         angles[self.single] = smooth.angle
-        ball = ball_angles(normalised(smooth.ball), self.joints.sign, self.joints.angles_of(near), self.lower, self.upper)
+        ball = ball_angles(
+            normalised(smooth.ball), self.joints.sign, self.joints.angles_of(near), self.lower, self.upper
+        )
         for k in range(3):
             angles[self.joints.first + k] = ball[k]
         return np.concatenate([smooth.place, normalised(smooth.root), angles]) if self.n_root else angles

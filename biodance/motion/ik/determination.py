@@ -9,16 +9,20 @@ from biodance.body.body import Body
 from biodance.motion.kinematics import poses
 from biodance.records import Array
 
-LEVER = 0.1
+_LEVER = 0.1
 """m, what one radian is compared with: one metre of root translation counts as 10 rad."""
 
 LEAST_MOTION = 0.02
-"""Least share of its lever by which any unit change of posture must move the markers that it carries, for the posture to be determined."""
+"""Least share of its lever by which any unit change of posture must move the markers that it carries, for the
+posture to be determined.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Determination:
-    """Per frame: ``determined`` (T,); ``open_coordinates`` names what the best-seen frame leaves open (empty if it is determined)."""
+    """Per frame: ``determined`` (T,); ``open_coordinates`` names what the best-seen frame leaves open (empty if it
+    is determined).
+    """
 
     determined: NDArray[np.bool_]
     open_coordinates: tuple[str, ...]
@@ -27,9 +31,9 @@ class Determination:
 def determination(body: Body, columns: list[int], seen: NDArray[np.bool_]) -> Determination:
     """Tell for every frame whether the markers seen fix every coordinate of ``body``.
 
-    ``columns`` (K) indices of the markers in ``body.markers``; ``seen`` (T, K). Judged by the marker Jacobian at one general posture, so
-    that the answer depends on the markers and not on the pose: with the weighted Jacobian's columns in units of moved weight and
-    ``LEVER``, its smallest singular value must reach ``LEAST_MOTION``.
+    ``columns`` (K) indices of the markers in ``body.markers``; ``seen`` (T, K). Judged by the marker Jacobian at one
+    general posture, so that the answer depends on the markers and not on the pose: with the weighted Jacobian's columns
+    in units of moved weight and ``LEVER``, its smallest singular value must reach ``LEAST_MOTION``.
     """
     jacobian = _jacobian(body, columns)
     useful = seen & (body.markers.weight[columns] > 0)
@@ -37,12 +41,16 @@ def determination(body: Body, columns: list[int], seen: NDArray[np.bool_]) -> De
     patterns, which = np.unique(useful[first], axis=0, return_inverse=True)
     which = which.ravel()[np.cumsum(first) - 1]
     weight = body.markers.weight[columns] * patterns
-    value = np.concatenate([np.linalg.eigvalsh(_normal(jacobian, weight[i : i + 256]))[:, 0] for i in range(0, len(weight), 256)])
+    value = np.concatenate(
+        [np.linalg.eigvalsh(_normal(jacobian, weight[i : i + 256]))[:, 0] for i in range(0, len(weight), 256)]
+    )
     best = patterns.sum(axis=1).argmax()
     names = ("root x", "root y", "root z", "root rotation x", "root rotation y", "root rotation z")[: body.n_root]
     names += tuple(joint.name for joint in body.joints)
     vague = _open(_normal(jacobian, weight[best : best + 1])[0])
-    return Determination(value[which] >= LEAST_MOTION**2, tuple(name for name, is_open in zip(names, vague, strict=True) if is_open))
+    return Determination(
+        value[which] >= LEAST_MOTION**2, tuple(name for name, is_open in zip(names, vague, strict=True) if is_open)
+    )
 
 
 def _normal(jacobian: Array, weight: Array) -> Array:
@@ -69,12 +77,12 @@ def _jacobian(body: Body, columns: list[int]) -> Array:
     out = np.zeros((len(columns), 3, body.nv))
     if body.n_root:
         out[:, :, :3] = np.eye(3)
-        out[:, :, 3:6] = np.cross(np.eye(3), points[:, None]).transpose(0, 2, 1) / LEVER
+        out[:, :, 3:6] = np.cross(np.eye(3), points[:, None]).transpose(0, 2, 1) / _LEVER
     carried = _carried(body)
     for i, joint in enumerate(body.joints):
         axis = pose.joint_rotation[0, i] @ joint.axis
         moved = carried[i, segment][:, None]
-        out[:, :, body.n_root + i] = moved * np.cross(axis, points - pose.joint_position[0, i]) / LEVER
+        out[:, :, body.n_root + i] = moved * np.cross(axis, points - pose.joint_position[0, i]) / _LEVER
     return out
 
 

@@ -1,8 +1,10 @@
-"""Functional calibration: joint centres and hinge axes from how a person moves, with the static trial's answer as the prior.
+"""Functional calibration: joint centres and hinge axes from how a person moves, with the static trial's answer as the
+prior.
 
-Every choice of the unknowns is a body that meets the static markers exactly. Sought is the most probable one: marker distances over
-postures of the moving trials, each at its own best inverse kinematics, plus the squared distance from the static answer. The postures are
-eliminated frame by frame (variable projection: Golub and Pereyra 1973, DOI 10.1137/0710036; docs/derivations.md).
+Every choice of the unknowns is a body that meets the static markers exactly. Sought is the most probable one: marker
+distances over postures of the moving trials, each at its own best inverse kinematics, plus the squared distance from
+the static answer. The postures are eliminated frame by frame (variable projection: Golub and Pereyra 1973, DOI
+10.1137/0710036; docs/derivations.md).
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,30 +23,34 @@ from biodance.motion.ik.joint_unknowns import HINGES, SIZE, JointUnknowns, own_c
 from biodance.motion.kinematics import chains, jacobian, poses
 from biodance.records import Array, Markers
 
-POSTURES = 150
+_POSTURES = 150
 """Postures taken evenly from all moving trials together."""
-ALIKE = 8.0
-"""s of movement that count as one independent posture, because skin slides with the posture and neighbours err alike. On virtual dances
-the places are the same from 1 to 16 s, their standard deviations are true at 8 s; in real walks of 2 s less than 1 s moves joints by
-decimetres."""
+_ALIKE = 8.0
+"""s of movement that count as one independent posture, because skin slides with the posture and neighbours err alike.
+On virtual dances the places are the same from 1 to 16 s, their standard deviations are true at 8 s; in real walks of 2
+s less than 1 s moves joints by decimetres.
+"""
 EXCITED = 0.3
-"""Share of a joint's prior standard deviation that the movement must remove; below it the static trial's answer is kept, because what
-little the markers say of such a joint is soft tissue."""
+"""Share of a joint's prior standard deviation that the movement must remove; below it the static trial's answer is
+kept, because what little the markers say of such a joint is soft tissue.
+"""
 NO_FIXED_POINT = ("shoulder", "trunk")
-"""Joints of which no fixed point of the trunk gives the centre: what the table says of that is added to their standard deviations, which
-are then those of 12 virtual dances."""
-FAR = 4.5
-"""Standard deviations from the static trial's place beyond which a joint is not believed (5 sessions without fault: 1.5 at most): a marker
-has moved since then, and pulls the joint along."""
-STEPS, SMALLEST = 8, 5e-4
+"""Joints of which no fixed point of the trunk gives the centre: what the table says of that is added to their standard
+deviations, which are then those of 12 virtual dances.
+"""
+_FAR = 4.5
+"""Standard deviations from the static trial's place beyond which a joint is not believed (5 sessions without fault: 1.5
+at most): a marker has moved since then, and pulls the joint along.
+"""
+_STEPS, _SMALLEST = 8, 5e-4
 """Most Gauss-Newton steps; m or rad below which a step ends the search."""
 
 
 @dataclass(frozen=True, eq=False)
 class FunctionalJoints:
-    """``scaling`` with the joints where the movement puts them; joint -> ``moved`` m; hinge -> ``turned`` rad; ``errors`` of the joints
-    that moved; ``kept`` the joints that the movement does not show; ``rms`` m, weighted marker distance before and after; ``notes`` say
-    all this in plain sentences.
+    """``scaling`` with the joints where the movement puts them; joint -> ``moved`` m; hinge -> ``turned`` rad;
+    ``errors`` of the joints that moved; ``kept`` the joints that the movement does not show; ``rms`` m, weighted marker
+    distance before and after; ``notes`` say all this in plain sentences.
     """
 
     scaling: Scaling
@@ -58,8 +64,8 @@ class FunctionalJoints:
 
 @dataclass(frozen=True, eq=False)
 class CalibrationState:
-    """A choice ``theta`` (37,) of the unknowns with its postures ``q`` (T, nq); ``cost``, its ``gradient`` (37,) and ``information``
-    (37, 37), movement and prior together; ``rms`` m, weighted marker distance.
+    """A choice ``theta`` (37,) of the unknowns with its postures ``q`` (T, nq); ``cost``, its ``gradient`` (37,) and
+    ``information`` (37, 37), movement and prior together; ``rms`` m, weighted marker distance.
     """
 
     theta: Array
@@ -83,9 +89,9 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> Functional
     seconds = sum(one.time.size / one.rate for one in trials if one.time.size > 1)
     placed, found = _placed(scaling, postures, seconds)
     joint, far = _farthest(scaling, found)
-    if far <= FAR:
+    if far <= _FAR:
         return placed
-    near, left_out, better = FAR, "", placed
+    near, left_out, better = _FAR, "", placed
     for name in _beside(body, joint):
         try:
             tried, found = _placed(scaling, _without(postures, name), seconds)
@@ -96,10 +102,13 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> Functional
     if not left_out:
         return placed
     note = (
-        f"Warning: the marker {left_out} does not count in placing the joints: with it the {joint.replace('_', ' ')} would lie "
+        f"Warning: the marker {left_out} does not count in placing the joints: with it the {joint.replace('_', ' ')} "
+        f"would lie "
         f"{1e3 * placed.moved[joint]:.0f} mm from the static trial's place. It seems to have moved since that trial."
     )
-    return replace(better, scaling=replace(better.scaling, notes=(*better.scaling.notes, note)), notes=(*better.notes, note))
+    return replace(
+        better, scaling=replace(better.scaling, notes=(*better.scaling.notes, note)), notes=(*better.notes, note)
+    )
 
 
 def _without(postures: Markers, name: str) -> Markers:
@@ -113,7 +122,7 @@ def _placed(scaling: Scaling, postures: Markers, seconds: float) -> tuple[Functi
     """Return the joints that ``postures`` from so many ``seconds`` of movement show, and the unknowns found."""
     skin = error_size("soft_tissue", "marker")
     fresh = evaluate_joints(scaling, postures, np.zeros(SIZE), None, noise=skin)
-    alike = max(1.0, postures.time.size * ALIKE / seconds)
+    alike = max(1.0, postures.time.size * _ALIKE / seconds)
     noise = max(skin, fresh.rms / np.sqrt(3)) * np.sqrt(alike)
     start = evaluate_joints(scaling, postures, np.zeros(SIZE), fresh.q, noise=noise)
     shown = excited(scaling, start)
@@ -133,25 +142,35 @@ def _beside(body: Body, joint: str) -> tuple[str, ...]:
     chain = next(one for one in chains(body) if body.joints[one[0]].name.startswith(f"{joint}_"))
     parent = body.joints[chain[0]].parent
     meet = {0 if parent < 0 else body.joints[parent].segment, body.joints[chain[-1]].segment}
-    return tuple(name for name, segment in zip(body.markers.names, body.markers.segment, strict=True) if segment in meet)
+    return tuple(
+        name for name, segment in zip(body.markers.names, body.markers.segment, strict=True) if segment in meet
+    )
 
 
 def spread_postures(trials: Sequence[Markers], names: tuple[str, ...]) -> Markers:
-    """Return ``POSTURES`` frames, or as many as there are, taken evenly from all trials; NaN where a trial lacks a marker."""
-    parts = [np.stack([one[n] if n in one else np.full((one.time.size, 3), np.nan) for n in names], axis=1) for one in trials]
+    """Return ``POSTURES`` frames, or as many as there are, taken evenly from all trials; NaN where a trial lacks a
+    marker.
+    """
+    parts = [
+        np.stack([one[n] if n in one else np.full((one.time.size, 3), np.nan) for n in names], axis=1) for one in trials
+    ]
     xyz = np.concatenate(parts) if parts else np.empty((0, len(names), 3))
     xyz = xyz[np.isfinite(xyz).any(axis=(1, 2))]
     if not len(xyz):
-        raise TrialRefused("No moving trial shows a marker of the body, so its joints stay where the static trial puts them.")
-    chosen = np.linspace(0, len(xyz), min(POSTURES, len(xyz)), endpoint=False).astype(int)
+        raise TrialRefused(
+            "No moving trial shows a marker of the body, so its joints stay where the static trial puts them."
+        )
+    chosen = np.linspace(0, len(xyz), min(_POSTURES, len(xyz)), endpoint=False).astype(int)
     return Markers(names, np.arange(len(chosen)) / 100.0, xyz[chosen])
 
 
-def evaluate_joints(scaling: Scaling, postures: Markers, theta: Array, guess: Array | None, *, noise: float) -> CalibrationState:
+def evaluate_joints(
+    scaling: Scaling, postures: Markers, theta: Array, guess: Array | None, *, noise: float
+) -> CalibrationState:
     """Return the state at ``theta``: the postures of its body that come nearest to the markers, cost and derivatives.
 
-    ``guess`` (T, nq) where to look for the postures; ``noise`` m per axis, standard deviation of a marker of weight 1 if all postures were
-    independent.
+    ``guess`` (T, nq) where to look for the postures; ``noise`` m per axis, standard deviation of a marker of weight 1
+    if all postures were independent.
     """
     unknowns = JointUnknowns(scaling.centres)
     body, stand = replace(scaling, centres=unknowns.moved(theta)).body()
@@ -187,11 +206,14 @@ def _left_open(coordinates: Array, slope: Array) -> Array:
     transposed = np.swapaxes(coordinates, 1, 2)
     square = transposed @ coordinates
     size = np.einsum("tii->t", square)[:, None, None] / square.shape[1]
-    return np.asarray(slope - coordinates @ np.linalg.solve(square + 1e-9 * size * np.eye(square.shape[1]), transposed @ slope))
+    return np.asarray(
+        slope - coordinates @ np.linalg.solve(square + 1e-9 * size * np.eye(square.shape[1]), transposed @ slope)
+    )
 
 
 def excited(scaling: Scaling, at: CalibrationState) -> NDArray[np.bool_]:
-    """Return (37,) True for the unknowns of the joints of whose standard deviation the movement removes the share ``EXCITED``.
+    """Return (37,) True for the unknowns of the joints of whose standard deviation the movement removes the share
+    ``EXCITED``.
 
     A hinge is judged by its axis.
     """
@@ -207,15 +229,17 @@ def excited(scaling: Scaling, at: CalibrationState) -> NDArray[np.bool_]:
     return out
 
 
-def fit_joints(scaling: Scaling, postures: Markers, start: CalibrationState, shown: NDArray[np.bool_], *, noise: float) -> CalibrationState:
+def fit_joints(
+    scaling: Scaling, postures: Markers, start: CalibrationState, shown: NDArray[np.bool_], *, noise: float
+) -> CalibrationState:
     """Return the minimum over the ``shown`` unknowns: Gauss-Newton, steps halved where the cost would rise."""
     at, chosen = start, np.flatnonzero(shown)
     if not chosen.size:
         return at
-    for _ in range(STEPS):
+    for _ in range(_STEPS):
         step = np.zeros(SIZE)
         step[chosen] = -np.linalg.solve(at.information[np.ix_(chosen, chosen)], at.gradient[chosen])
-        while np.abs(step).max() > SMALLEST:
+        while np.abs(step).max() > _SMALLEST:
             new = evaluate_joints(scaling, postures, at.theta + step, at.q, noise=noise)
             if new.cost < at.cost:
                 break
@@ -226,7 +250,9 @@ def fit_joints(scaling: Scaling, postures: Markers, start: CalibrationState, sho
     return at
 
 
-def _told(scaling: Scaling, start: CalibrationState, found: CalibrationState, shown: NDArray[np.bool_]) -> FunctionalJoints:
+def _told(
+    scaling: Scaling, start: CalibrationState, found: CalibrationState, shown: NDArray[np.bool_]
+) -> FunctionalJoints:
     """Return the result with its notes."""
     deviation = np.sqrt(np.diag(np.linalg.inv(found.information)))
     kept = tuple(joint for joint in JOINTS if not shown[own_centre(joint)].any())
@@ -239,7 +265,9 @@ def _told(scaling: Scaling, start: CalibrationState, found: CalibrationState, sh
         turns = {hinge: f" and {abs(np.degrees(angle)):.0f} deg" for hinge, angle in turned.items()}
         each = [f"{joint.replace('_', ' ')} {1e3 * far:.0f} mm{turns.get(joint, '')}" for joint, far in moved.items()]
         fits = f"{len(found.q)} postures, marker distance {1e3 * start.rms:.1f} -> {1e3 * found.rms:.1f} mm"
-        notes.append(f"Joints placed by movement ({fits}), from the static trial's place, axis turned: {', '.join(each)}.")
+        notes.append(
+            f"Joints placed by movement ({fits}), from the static trial's place, axis turned: {', '.join(each)}."
+        )
     if kept:
         names = ", ".join(joint.replace("_", " ") for joint in kept)
         notes.append(f"Joints that the movement does not show, kept where the static trial puts them: {names}.")

@@ -1,8 +1,9 @@
 """Legs of any robot: six hinges in any order and at any distance between the pelvis and a foot, closed numerically.
 
-The human's legs have a closed form (`legs`); here the angles are found by Newton's method (docs/derivations.md 12 holds for both:
-velocities, accelerations and slopes follow from the closure itself, whichever way the angles were found). Three joints above the fourth
-one, the knee, and two below it: with axes that meet in hip and ankle the reach of the leg is exact, else the shortest of many postures.
+The human's legs have a closed form (`legs`); here the angles are found by Newton's method (docs/derivations.md 12 holds
+for both: velocities, accelerations and slopes follow from the closure itself, whichever way the angles were found).
+Three joints above the fourth one, the knee, and two below it: with axes that meet in hip and ankle the reach of the leg
+is exact, else the shortest of many postures.
 """
 
 from dataclasses import dataclass
@@ -22,19 +23,20 @@ SQUAT = np.radians(60.0)
 """Flexion of the knee in the posture from which all others are found."""
 LOCKED = np.radians(0.3)
 """Flexion of the longest leg."""
-SOFT = 0.0025
+_SOFT = 0.0025
 """Share of the leg's length within which a foot out of reach is drawn towards the hip, smoothly."""
 BENDS = 0.1
 """How much a knee must change the square of the leg's length, in that square."""
-POSTURES = 16
+_POSTURES = 16
 """Postures of hip and ankle in which the length of the leg is judged."""
 
 
 @dataclass(frozen=True, eq=False)
 class GeneralLeg:
-    """One leg: ``columns`` of its six joints in the body; their ``joints``; ``hip`` (3,) m the point nearest to its first three axes, in
-    the root's frame; ``straight`` rad the knee's angle where the leg is longest and ``sense`` +-1 in which it bends; ``length_terms`` (3,
-    K) m² a, b, c with (hip-ankle distance)² = a + b cos(knee) + c sin(knee) in K postures; ``squat`` (6,) rad.
+    """One leg: ``columns`` of its six joints in the body; their ``joints``; ``hip`` (3,) m the point nearest to its
+    first three axes, in the root's frame; ``straight`` rad the knee's angle where the leg is longest and ``sense`` +-1
+    in which it bends; ``length_terms`` (3, K) m² a, b, c with (hip-ankle distance)² = a + b cos(knee) + c sin(knee) in
+    K postures; ``squat`` (6,) rad.
     """
 
     columns: tuple[int, ...]
@@ -73,13 +75,17 @@ class GeneralLeg:
             away = float(lead(joints, bent, squat, np.eye(3), under, scratch()))
         if not away < 1e-9:
             raise BiodanceError(
-                f"{body.name}: the {side} leg does not squat: its fourth joint, {body.joints[columns[KNEE]].name}, must be the knee, with "
-                "three joints of the hip above it and two of the ankle below it. No dance can be designed for other legs."
+                f"{body.name}: the {side} leg does not squat: its fourth joint, {body.joints[columns[KNEE]].name}, "
+                f"must be the knee, with "
+                "three joints of the hip above it and two of the ankle below it. No dance can be designed for other "
+                "legs."
             )
         return cls(columns, joints, hip, straight, sense, terms, squat)
 
     def length(self, knee: Array | float) -> Array:
-        """Return the hip-ankle distance (...) m at knee flexions (...) rad from the straight leg, of the posture where it is least."""
+        """Return the hip-ankle distance (...) m at knee flexions (...) rad from the straight leg, of the posture
+        where it is least.
+        """
         a, b, c = self.length_terms
         angle = self.straight + self.sense * np.asarray(knee)[..., None]
         return np.asarray(np.sqrt(np.min(a + b * np.cos(angle) + c * np.sin(angle), axis=-1)))
@@ -87,17 +93,20 @@ class GeneralLeg:
     def solve(self, pelvis_turn: Array, pelvis: Array, foot_turn: Array, ankle: Array) -> Array:
         """Return the six angles (T, 6) rad in the order of the joints.
 
-        ``pelvis_turn`` (T, 3, 3), ``pelvis`` (T, 3) m: pose of the pelvis; ``foot_turn`` (T, 3, 3), ``ankle`` (T, 3) m: pose of the
-        foot; lab frame. A foot out of reach is drawn towards the hip, smoothly, along the line from the ankle.
+        ``pelvis_turn`` (T, 3, 3), ``pelvis`` (T, 3) m: pose of the pelvis; ``foot_turn`` (T, 3, 3), ``ankle`` (T, 3) m:
+        pose of the foot; lab frame. A foot out of reach is drawn towards the hip, smoothly, along the line from the
+        ankle.
         """
         back = np.swapaxes(pelvis_turn, 1, 2)
         away = (back @ (ankle - pelvis)[:, :, None])[..., 0] - self.hip
         distance = np.linalg.norm(away, axis=1)
         longest = float(self.length(LOCKED))
-        length = soft_limit(distance, longest, SOFT * longest)
+        length = soft_limit(distance, longest, _SOFT * longest)
         place = self.hip + away * (length / distance)[:, None]
         out = np.empty((len(place), 6))
-        close_leg(self.joints, self.squat, np.ascontiguousarray(back @ foot_turn), place, scratch(), out, np.empty(len(place)))
+        close_leg(
+            self.joints, self.squat, np.ascontiguousarray(back @ foot_turn), place, scratch(), out, np.empty(len(place))
+        )
         return out
 
 
@@ -110,7 +119,8 @@ def _path(body: Body, side: str) -> tuple[int, ...]:
     if len(path) != 6:
         names = ", ".join(body.joints[j].name for j in path) or "none"
         raise BiodanceError(
-            f"{body.name}: the {side} leg has {len(path)} joints between the root and {body.segments[body.feet[side].segment]} ({names}); "
+            f"{body.name}: the {side} leg has {len(path)} joints between the root and "
+            f"{body.segments[body.feet[side].segment]} ({names}); "
             "a foot that stands still needs exactly six. Choose the root and the feet so that each leg has six joints."
         )
     return tuple(path)
@@ -128,13 +138,15 @@ def _meeting(rotation: Array, translation: Array, axis: Array) -> Array:
 
 
 def _length_terms(rotation: Array, translation: Array, axis: Array, hip: Array, low: Array, high: Array) -> Array:
-    """Return a, b, c (3, K) of the squared hip-ankle distance, in the middle of the ranges and in K - 1 postures of hip and ankle."""
-    angles = np.random.default_rng(0).uniform(low, high, (POSTURES, 6))
+    """Return a, b, c (3, K) of the squared hip-ankle distance, in the middle of the ranges and in K - 1 postures of
+    hip and ankle.
+    """
+    angles = np.random.default_rng(0).uniform(low, high, (_POSTURES, 6))
     angles[0] = (low + high) / 2
     squares = []
     for knee in (0.0, np.pi / 2, np.pi):
         angles[:, KNEE] = knee
-        turn, place = np.tile(np.eye(3), (POSTURES, 1, 1)), np.zeros((POSTURES, 3))
+        turn, place = np.tile(np.eye(3), (_POSTURES, 1, 1)), np.zeros((_POSTURES, 3))
         for k in range(6):
             place = place + turn @ translation[k]
             turn = turn @ rotation[k] @ axis_rotation(axis[k], angles[:, k])

@@ -1,7 +1,9 @@
-"""Multi-body optimisation: the posture of every frame whose markers come nearest to the measured ones, joint limits respected.
+"""Multi-body optimisation: the posture of every frame whose markers come nearest to the measured ones, joint limits
+respected.
 
-Each frame minimises its weighted squared marker distances by itself (Lu & O'Connor 1999, DOI 10.1016/S0021-9290(98)00158-4); the other
-frames only serve the first guess, and stand in where a frame's own markers leave the posture open.
+Each frame minimises its weighted squared marker distances by itself (Lu & O'Connor 1999, DOI
+10.1016/S0021-9290(98)00158-4); the other frames only serve the first guess, and stand in where a frame's own markers
+leave the posture open.
 """
 
 from dataclasses import dataclass, replace
@@ -35,8 +37,9 @@ class FrameStatus(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class InverseKinematics:
-    """Postures of T frames: ``q`` (T, nq); ``residual`` (T, K) m distance of marker and model, NaN = not seen; ``status`` (T,)
-    ``FrameStatus``; ``slope`` (T,) m, mean marker displacement that some coordinate could still gain; ``steps`` (T,) Newton steps.
+    """Postures of T frames: ``q`` (T, nq); ``residual`` (T, K) m distance of marker and model, NaN = not seen;
+    ``status`` (T,) ``FrameStatus``; ``slope`` (T,) m, mean marker displacement that some coordinate could still gain;
+    ``steps`` (T,) Newton steps.
     """
 
     q: Array
@@ -48,15 +51,17 @@ class InverseKinematics:
 
 
 def solve_ik(body: Body, markers: Markers, *, guess: Array | None = None, tolerance: float = 1e-7) -> InverseKinematics:
-    """Return the posture of ``body`` in every frame of ``markers``, matched by name; a hidden marker (NaN) has no weight in its frame.
+    """Return the posture of ``body`` in every frame of ``markers``, matched by name; a hidden marker (NaN) has no
+    weight in its frame.
 
-    ``guess`` (T, nq) replaces the search for a start (a root that is far off is put right first); ``tolerance`` (m) is the largest
-    ``slope`` of a solved frame.
+    ``guess`` (T, nq) replaces the search for a start (a root that is far off is put right first); ``tolerance`` (m) is
+    the largest ``slope`` of a solved frame.
 
     Raises
     ------
     TrialRefused
-        No frame shows enough markers to determine the posture; the message names the open coordinates and the missing markers.
+        No frame shows enough markers to determine the posture; the message names the open coordinates and the missing
+        markers.
     """
     names = tuple(name for name in body.markers.names if name in markers)
     columns = [body.markers.names.index(name) for name in names]
@@ -70,7 +75,8 @@ def solve_ik(body: Body, markers: Markers, *, guess: Array | None = None, tolera
     leaning = _lean(problem, own, found, open_frames)
     order = np.argsort(np.concatenate([own, open_frames]), kind="stable")
     q, slope, steps = (
-        np.concatenate([a, b])[order] for a, b in ((found.q, leaning.q), (found.slope, leaning.slope), (found.steps, leaning.steps))
+        np.concatenate([a, b])[order]
+        for a, b in ((found.q, leaning.q), (found.slope, leaning.slope), (found.steps, leaning.steps))
     )
     status = np.where(verdict.determined, FrameStatus.SOLVED, FrameStatus.LEANING).astype(np.int8)
     status[slope > tolerance] = FrameStatus.STOPPED
@@ -79,7 +85,9 @@ def solve_ik(body: Body, markers: Markers, *, guess: Array | None = None, tolera
 
 
 def _lean(problem: MarkerProblem, own: Index, found: Minimum, frames: Index) -> Minimum:
-    """Solve ``frames`` with their markers and, at the weight ``LEAN``, all markers of the posture interpolated from the ``own`` frames."""
+    """Solve ``frames`` with their markers and, at the weight ``LEAN``, all markers of the posture interpolated from
+    the ``own`` frames.
+    """
     start = interpolate_postures(problem, own, found.q, frames)
     if not frames.size:
         return Minimum(start, np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.intp))
@@ -94,15 +102,22 @@ def _lean(problem: MarkerProblem, own: Index, found: Minimum, frames: Index) -> 
 def _checked(guess: Array, body: Body, markers: Markers) -> Array:
     guess = np.asarray(guess, dtype=float)
     if guess.shape != (markers.time.size, body.nq) or not np.isfinite(guess).all():
-        raise BiodanceError(f"The guess has shape {guess.shape}; expected ({markers.time.size}, {body.nq}), all finite. Leave it out.")
+        raise BiodanceError(
+            f"The guess has shape {guess.shape}; expected ({markers.time.size}, {body.nq}), all finite. Leave it out."
+        )
     return guess
 
 
 def _too_few(body: Body, markers: Markers, open_coordinates: tuple[str, ...]) -> str:
     best = markers.seen.sum(axis=1).max(initial=0)
-    never = [name for name in body.markers.names if name not in markers or not markers.seen[:, markers.names.index(name)].any()]
+    never = [
+        name
+        for name in body.markers.names
+        if name not in markers or not markers.seen[:, markers.names.index(name)].any()
+    ]
     return (
-        f"No frame shows enough markers for the posture of {body.name}: at best {best} of its {len(body.markers.names)} markers are seen, "
+        f"No frame shows enough markers for the posture of {body.name}: at best {best} of its "
+        f"{len(body.markers.names)} markers are seen, "
         f"which leaves open: {', '.join(open_coordinates)}. Never seen: {', '.join(never) or 'none'}. "
         "Label them, or use a body without those joints."
     )

@@ -1,4 +1,6 @@
-"""The unknowns of a functional calibration: where joints are in the static posture, and how the axes of the hinges turn about the bone."""
+"""The unknowns of a functional calibration: where joints are in the static posture, and how the axes of the hinges
+turn about the bone.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -13,20 +15,24 @@ from biodance.records import Array
 
 HINGES = ("right_knee", "left_knee", "right_elbow", "left_elbow")
 ABOVE = {"knee": "hip", "elbow": "shoulder"}
-TURNS = 3 * len(JOINTS)
-SIZE = TURNS + len(HINGES)
-"""Unknowns: 3 m per joint of ``JOINTS`` (displacement, lab axes, in the static posture), then rad per hinge about the bone above it."""
+_TURNS = 3 * len(JOINTS)
+SIZE = _TURNS + len(HINGES)
+"""Unknowns: 3 m per joint of ``JOINTS`` (displacement, lab axes, in the static posture), then rad per hinge about
+the bone above it.
+"""
 
 
 def centre_sd(joint: str) -> float:
-    """Return the standard deviation (m per axis) of a ``joint``'s centre as the static trial places it, before any movement; of a hinge
-    about the place that its lateral marker and its axis give it.
+    """Return the standard deviation (m per axis) of a ``joint``'s centre as the static trial places it, before any
+    movement; of a hinge about the place that its lateral marker and its axis give it.
     """
     return hinge_sd() if joint in HINGES else joint_size("joint_centre", joint)
 
 
 def hinge_sd() -> float:
-    """Return the standard deviation (m per axis) of the centre of a knee or elbow about where lateral marker and axis place it."""
+    """Return the standard deviation (m per axis) of the centre of a knee or elbow about where lateral marker and
+    axis place it.
+    """
     return error_size("hinge_centre", "hinge", state="before")
 
 
@@ -53,8 +59,8 @@ class JointUnknowns:
         return np.asarray(axis_rotation(self.bone(hinge), theta[[own_turn(hinge)]])[0])
 
     def prior(self, theta: Array) -> tuple[Array, Array]:
-        """Return residuals (37,) in standard deviations and their slope (37, 37): how far joints are from their static places, and knees
-        and elbows from where the lateral marker sees them when the axis turns.
+        """Return residuals (37,) in standard deviations and their slope (37, 37): how far joints are from their static
+        places, and knees and elbows from where the lateral marker sees them when the axis turns.
         """
         residual, slope = np.empty(SIZE), np.zeros((SIZE, SIZE))
         for joint in JOINTS:
@@ -71,8 +77,8 @@ class JointUnknowns:
         return residual, slope
 
     def axis(self, hinge: str, theta: Array) -> tuple[Array, Array]:
-        """Return the unit flexion axis z (3,) of a hinge in the lab, static posture, and its slope (3, 37): square to the bone above, in
-        its plane with ``right``.
+        """Return the unit flexion axis z (3,) of a hinge in the lab, static posture, and its slope (3, 37): square to
+        the bone above, in its plane with ``right``.
         """
         side, joint = hinge.split("_")
         centres = self.moved(theta)
@@ -89,12 +95,13 @@ class JointUnknowns:
         return z, (np.eye(3) - np.outer(z, z)) @ slope / np.linalg.norm(across)
 
     def slope(self, body: Body, stand: Array, pose: Poses, points: Array, theta: Array) -> Array:
-        """Return (T, 3K, 37): how the markers (T, K, 3) m of the ``body`` at ``theta`` move with the unknowns while every joint keeps its
-        turn from the static posture ``stand`` (nq,), where the markers stay. ``pose`` is that of the T frames.
+        """Return (T, 3K, 37): how the markers (T, K, 3) m of the ``body`` at ``theta`` move with the unknowns while
+        every joint keeps its turn from the static posture ``stand`` (nq,), where the markers stay. ``pose`` is that of
+        the T frames.
 
-        A centre that moves by d takes the markers beyond it along by (P - C) d, where P and C carry vectors of the static posture along
-        with the segments above and below; an axis that turns by r turns them about the centre by (P - C) r. That the two axes of the ankle
-        turn with the shank is left out.
+        A centre that moves by d takes the markers beyond it along by (P - C) d, where P and C carry vectors of the
+        static posture along with the segments above and below; an axis that turns by r turns them about the centre by
+        (P - C) r. That the two axes of the ankle turn with the shank is left out.
         """
         rest = poses(body, stand[None]).rotation[0]
         carried = pose.rotation @ np.swapaxes(rest, -1, -2)
@@ -122,4 +129,4 @@ def own_centre(joint: str) -> slice:
 
 def own_turn(hinge: str) -> int:
     """Return the unknown of a hinge's axis."""
-    return TURNS + HINGES.index(hinge)
+    return _TURNS + HINGES.index(hinge)

@@ -1,7 +1,8 @@
 """Exact legs: the six angles that hold a foot at a given pose under a given pelvis, closed form, all frames at once.
 
-The hip is a ball (flexion z, adduction x, rotation y), the knee a hinge, the ankle two crossing hinges. The length hip-ankle gives the
-knee, the direction ankle-hip in the foot's frame gives the ankle, and what rotation is left belongs to the hip.
+The hip is a ball (flexion z, adduction x, rotation y), the knee a hinge, the ankle two crossing hinges. The length
+hip-ankle gives the knee, the direction ankle-hip in the foot's frame gives the ankle, and what rotation is left belongs
+to the hip.
 """
 
 from dataclasses import dataclass
@@ -17,7 +18,9 @@ LEG = ("hip_flexion", "hip_adduction", "hip_rotation", "knee_flexion", "ankle_do
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """One leg of a body: columns of its six angles, sign of the mirrored axes, and the constant placements between its joints."""
+    """One leg of a body: columns of its six angles, sign of the mirrored axes, and the constant placements between
+    its joints.
+    """
 
     columns: tuple[int, ...]
     sign: float
@@ -34,11 +37,22 @@ class Leg:
         index = tuple(body.joint_index(f"{side}_{name}") for name in LEG)
         hip, knee, ankle = (body.joints[index[k]] for k in (0, 3, 4))
         sign = -1.0 if side == "left" else 1.0
-        return cls(index, sign, hip.translation, hip.rotation, knee.translation, knee.rotation, ankle.translation, ankle.rotation)
+        return cls(
+            index,
+            sign,
+            hip.translation,
+            hip.rotation,
+            knee.translation,
+            knee.rotation,
+            ankle.translation,
+            ankle.rotation,
+        )
 
     @staticmethod
     def fits(body: Body, side: str) -> bool:
-        """Return whether the ``side`` leg of a body has the joints of this closed form: names, order, axes, meeting in hip and ankle."""
+        """Return whether the ``side`` leg of a body has the joints of this closed form: names, order, axes, meeting
+        in hip and ankle.
+        """
         names, s = [joint.name for joint in body.joints], -1.0 if side == "left" else 1.0
         index = [names.index(name) if (name := f"{side}_{movement}") in names else -2 for movement in LEG]
         if min(index) < 0 or any(body.joints[j].parent != p for j, p in zip(index, [-1, *index[:-1]], strict=True)):
@@ -69,8 +83,9 @@ class Leg:
     def solve(self, pelvis_turn: Array, pelvis: Array, foot_turn: Array, ankle: Array) -> Array:
         """Return the six angles (T, 6) rad in the order of ``LEG``.
 
-        ``pelvis_turn`` (T, 3, 3), ``pelvis`` (T, 3) m: pose of the pelvis; ``foot_turn`` (T, 3, 3), ``ankle`` (T, 3) m: pose of the
-        foot; lab frame. A foot out of reach is drawn towards the hip, smoothly, along the line from the ankle.
+        ``pelvis_turn`` (T, 3, 3), ``pelvis`` (T, 3) m: pose of the pelvis; ``foot_turn`` (T, 3, 3), ``ankle`` (T, 3) m:
+        pose of the foot; lab frame. A foot out of reach is drawn towards the hip, smoothly, along the line from the
+        ankle.
         """
         hip = pelvis + pelvis_turn @ self.hip
         away = hip - ankle
@@ -87,7 +102,11 @@ class Leg:
         dorsiflexion = np.arctan2(leg[:, 1], leg[:, 0]) - np.arctan2(y, local[:, 0])
         dorsiflexion = (dorsiflexion + np.pi) % (2 * np.pi) - np.pi
         below = self.knee_turn @ bend @ self.ankle_turn
-        below = below @ axis_rotation(np.array([0.0, 0.0, 1.0]), dorsiflexion) @ axis_rotation(np.array([1.0, 0.0, 0.0]), inversion)
+        below = (
+            below
+            @ axis_rotation(np.array([0.0, 0.0, 1.0]), dorsiflexion)
+            @ axis_rotation(np.array([1.0, 0.0, 0.0]), inversion)
+        )
         hip_turn = np.swapaxes(pelvis_turn @ self.hip_turn, 1, 2) @ foot_turn @ np.swapaxes(below, 1, 2)
         flexion, adduction, rotation = _zxy_angles(hip_turn)
         s = self.sign
@@ -95,7 +114,9 @@ class Leg:
 
 
 def soft_limit(value: Array, limit: Array | float, width: float) -> Array:
-    """Return ``value`` unchanged below ``limit - width`` and smoothly (three derivatives) approaching ``limit`` above."""
+    """Return ``value`` unchanged below ``limit - width`` and smoothly (three derivatives) approaching ``limit``
+    above.
+    """
     over = np.maximum(value - (limit - width), 0.0) / width
     return np.where(over > 0, limit - width + width * (over / (1 + over**4) ** 0.25), value)
 

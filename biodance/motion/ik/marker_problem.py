@@ -10,14 +10,14 @@ from biodance.motion.ik.compiled import newton
 from biodance.motion.ik.compiled.chain import MarkerChain, chain_of
 from biodance.records import Array, Index
 
-STEPS = 200
+_STEPS = 200
 """Most Newton steps of a frame."""
 
 
 @dataclass(frozen=True, eq=False)
 class MarkerProblem:
-    """A body against T frames of measured markers: ``segment`` (K) that carries each, ``xyz`` (T, K, 3) m (anything finite where hidden),
-    ``weight`` (T, K) >= 0, zero where hidden; ``tolerance`` m, largest slope of a solved frame.
+    """A body against T frames of measured markers: ``segment`` (K) that carries each, ``xyz`` (T, K, 3) m (anything
+    finite where hidden), ``weight`` (T, K) >= 0, zero where hidden; ``tolerance`` m, largest slope of a solved frame.
     """
 
     body: Body
@@ -31,7 +31,9 @@ class MarkerProblem:
 
 @dataclass(frozen=True, eq=False)
 class Minimum:
-    """What was reached: ``q`` (B, nq); ``cost`` (B,) m²; ``slope`` (B,) m, largest projected gradient; ``steps`` (B,) steps tried."""
+    """What was reached: ``q`` (B, nq); ``cost`` (B,) m²; ``slope`` (B,) m, largest projected gradient; ``steps``
+    (B,) steps tried.
+    """
 
     q: Array
     cost: Array
@@ -44,7 +46,12 @@ class Minimum:
 
     def put(self, frames: Index, part: "Minimum") -> None:
         """Replace some frames."""
-        self.q[frames], self.cost[frames], self.slope[frames], self.steps[frames] = part.q, part.cost, part.slope, part.steps
+        self.q[frames], self.cost[frames], self.slope[frames], self.steps[frames] = (
+            part.q,
+            part.cost,
+            part.slope,
+            part.steps,
+        )
 
 
 def marker_problem(body: Body, columns: list[int], xyz: Array, *, tolerance: float) -> MarkerProblem:
@@ -62,14 +69,18 @@ def marker_problem(body: Body, columns: list[int], xyz: Array, *, tolerance: flo
     )
 
 
-def minimise_markers(problem: MarkerProblem, frames: Index, start: Array, *, steps: int = STEPS) -> Minimum:
-    """Return the minima (F frames) of ``frames`` (F,) reached from the postures ``start`` (F, nq) in at most ``steps`` steps."""
+def minimise_markers(problem: MarkerProblem, frames: Index, start: Array, *, steps: int = _STEPS) -> Minimum:
+    """Return the minima (F frames) of ``frames`` (F,) reached from the postures ``start`` (F, nq) in at most
+    ``steps`` steps.
+    """
     count, joints = len(frames), len(problem.chain.lower)
     q = np.array(start, order="C")
     angles = q[:, q.shape[1] - joints :]
     np.clip(angles, problem.chain.lower, problem.chain.upper, out=angles)
     cost, slope, taken = np.zeros(count), np.full(count, np.inf), np.zeros(count, dtype=np.intp)
-    newton.minimise_frames(problem.chain, problem.xyz, problem.weight, frames, q, problem.tolerance, steps, cost, slope, taken)
+    newton.minimise_frames(
+        problem.chain, problem.xyz, problem.weight, frames, q, problem.tolerance, steps, cost, slope, taken
+    )
     return Minimum(q, cost, slope, taken)
 
 

@@ -12,29 +12,33 @@ from biodance.motion.ik.marker_problem import MarkerProblem, Minimum, better, mi
 from biodance.motion.kinematics import poses
 from biodance.records import Array, Index
 
-OTHERS = 0.01
+_OTHERS = 0.01
 """Weight of the other segments' markers in the root's rigid fit: enough where the root's own markers are hidden."""
 
 
 def guess_postures(problem: MarkerProblem, frames: Index, *, share: float | None = None) -> Array:
-    """Return q (F, nq): the angles at a ``share`` of their range between the limits (None: zero), the root where its markers say."""
+    """Return q (F, nq): the angles at a ``share`` of their range between the limits (None: zero), the root where its
+    markers say.
+    """
     lower, upper = problem.chain.lower, problem.chain.upper
     angles = np.clip(np.zeros(len(lower)), lower, upper)
     if share is not None:
         bounded = np.isfinite(lower) & np.isfinite(upper)
-        angles = np.where(bounded, (1 - share) * np.where(bounded, lower, 0) + share * np.where(bounded, upper, 0), angles)
+        angles = np.where(
+            bounded, (1 - share) * np.where(bounded, lower, 0) + share * np.where(bounded, upper, 0), angles
+        )
     return place_root(problem, frames, np.tile(angles, (len(frames), 1)))
 
 
 def place_root(problem: MarkerProblem, frames: Index, angles: Array) -> Array:
-    """Return q (F, nq) with the ``angles`` (F, n) rad and the root's pose that fits the body, rigid at them, best to its markers: the root
-    segment's before all others.
+    """Return q (F, nq) with the ``angles`` (F, n) rad and the root's pose that fits the body, rigid at them, best to
+    its markers: the root segment's before all others.
     """
     body, xyz = problem.body, problem.xyz[frames]
     if not body.n_root:
         return angles
     model = _markers(body, problem, angles)
-    own = np.where(problem.chain.slot == 0, 1.0, OTHERS) * problem.weight[frames]
+    own = np.where(problem.chain.slot == 0, 1.0, _OTHERS) * problem.weight[frames]
     weight = (own / own.sum(axis=1, keepdims=True))[:, :, None]
     middle, seen = (weight * model).sum(axis=1), (weight * xyz).sum(axis=1)
     cross = np.swapaxes(weight * (model - middle[:, None]), 1, 2) @ (xyz - seen[:, None])
@@ -56,32 +60,40 @@ STRIDES = (64, 16, 4, 1)
 """Every 64th frame is solved from its own markers; then every 16th, 4th and each frame from those around it."""
 
 SHARES = (0.5, None)
-"""First guesses of the angles, as shares of their range (None: zero): a bent body finds straight limbs more often than the reverse."""
+"""First guesses of the angles, as shares of their range (None: zero): a bent body finds straight limbs more often
+than the reverse.
+"""
 
 MORE_SHARES = (0.25, 0.75)
 """Further guesses for doubtful frames, and for all first frames of a short trial."""
 
-SHORT = 640
+_SHORT = 640
 """Frames below which a trial is short: it has too few neighbours to correct a frame that started wrongly."""
 
 NEIGHBOURS = 11
 """Frames whose median fit a frame is compared with."""
 
 DOUBT = (1.5, 0.001)
-"""A frame is doubtful where its RMS distance exceeds the neighbours' median times the first number plus the second (m)."""
+"""A frame is doubtful where its RMS distance exceeds the neighbours' median times the first number plus the second
+(m).
+"""
 
 
 def search(problem: MarkerProblem, frames: Index) -> Minimum:
     """Return the minima (F frames) of ``frames`` (F,), increasing, without any guess."""
     count = len(frames)
-    out = Minimum(np.zeros((count, problem.chart.nq)), np.zeros(count), np.full(count, np.inf), np.zeros(count, dtype=np.intp))
+    out = Minimum(
+        np.zeros((count, problem.chart.nq)), np.zeros(count), np.full(count, np.inf), np.zeros(count, dtype=np.intp)
+    )
     known = np.zeros(0, dtype=np.intp)
     for stride in STRIDES:
         level = np.setdiff1d(np.append(np.arange(0, count, stride), count - 1), known, assume_unique=True)
         if not known.size:
-            found = from_markers(problem, frames[level], SHARES if count > SHORT else (*SHARES, *MORE_SHARES))
+            found = from_markers(problem, frames[level], SHARES if count > _SHORT else (*SHARES, *MORE_SHARES))
         elif level.size:
-            found = minimise_markers(problem, frames[level], interpolate_postures(problem, frames[known], out.q[known], frames[level]))
+            found = minimise_markers(
+                problem, frames[level], interpolate_postures(problem, frames[known], out.q[known], frames[level])
+            )
         else:
             continue
         out.put(level, found)
@@ -93,18 +105,24 @@ def search(problem: MarkerProblem, frames: Index) -> Minimum:
 
 def from_markers(problem: MarkerProblem, frames: Index, shares: tuple[float | None, ...]) -> Minimum:
     """Return the best of the minima reached from the first guesses at the given ``shares`` of the joint ranges."""
-    return reduce(better, [minimise_markers(problem, frames, guess_postures(problem, frames, share=share)) for share in shares])
+    return reduce(
+        better, [minimise_markers(problem, frames, guess_postures(problem, frames, share=share)) for share in shares]
+    )
 
 
 def from_guess(problem: MarkerProblem, frames: Index, guess: Array) -> Minimum:
-    """Return the minima reached from the postures ``guess`` (F, nq), each root first put where the markers say if that is nearer."""
+    """Return the minima reached from the postures ``guess`` (F, nq), each root first put where the markers say if
+    that is nearer.
+    """
     moved = place_root(problem, frames, guess[:, guess.shape[1] - len(problem.chain.lower) :])
     own, other = (minimise_markers(problem, frames, q, steps=0) for q in (guess, moved))
     return retry(problem, frames, minimise_markers(problem, frames, better(own, other).q))
 
 
 def retry(problem: MarkerProblem, frames: Index, found: Minimum) -> Minimum:
-    """Return ``found`` with the doubtful frames tried again: from their markers, and from the nearest sound frames on both sides."""
+    """Return ``found`` with the doubtful frames tried again: from their markers, and from the nearest sound frames
+    on both sides.
+    """
     rms = np.sqrt(np.maximum(2 * found.cost, 0.0) / problem.weight[frames].sum(axis=1))
     doubtful = rms > DOUBT[0] * median_filter(rms, min(NEIGHBOURS, len(rms)), mode="mirror") + DOUBT[1]
     sound, bad = np.flatnonzero(~doubtful), np.flatnonzero(doubtful)
@@ -120,7 +138,8 @@ def retry(problem: MarkerProblem, frames: Index, found: Minimum) -> Minimum:
 
 
 def interpolate_postures(problem: MarkerProblem, known: Index, q: Array, wanted: Index) -> Array:
-    """Return postures (F, nq) at the frames ``wanted`` (F,) between the postures ``q`` (M, nq) at the frames ``known`` (M,), increasing.
+    """Return postures (F, nq) at the frames ``wanted`` (F,) between the postures ``q`` (M, nq) at the frames ``known``
+    (M,), increasing.
 
     Monotone cubics in smooth coordinates; the first and the last posture are kept outside.
     """

@@ -1,4 +1,6 @@
-"""What the diagnosis found, under keys whose unit is their suffix or stands beside them; channels in the order Fx Fy Fz Mx My Mz."""
+"""What the diagnosis found, under keys whose unit is their suffix or stands beside them; channels in the order Fx Fy
+Fz Mx My Mz.
+"""
 
 from typing import Any
 
@@ -31,7 +33,9 @@ def _finding(one: Finding) -> dict[str, Any]:
     return {
         "effect": one.effect,
         "target": one.target,
-        "parameters": {p.name: {"value": p.value, "sd": p.sd, "unit": p.unit, "ci95": p.interval} for p in one.parameters},
+        "parameters": {
+            p.name: {"value": p.value, "sd": p.sd, "unit": p.unit, "ci95": p.interval} for p in one.parameters
+        },
         "set": [_alias(a) for a in one.set],
         "visible_fraction": one.visible_fraction,
         "gain": _gain(one.gain),
@@ -52,9 +56,12 @@ def _limit(row: Unobservable) -> dict[str, Any]:
 
 
 def foresight_document(found: Foresight) -> dict[str, Any]:
-    """Return what a movement will be able to see; ``separation`` the smallest expected log Bayes factor between two causes it sees."""
+    """Return what a movement will be able to see; ``separation`` the smallest expected log Bayes factor between two
+    causes it sees.
+    """
     pairs = [
-        {"cause": " ".join(p.cause).strip(), "other": " ".join(p.other).strip(), "log_bayes_factor": p.difference} for p in found.confusions
+        {"cause": " ".join(p.cause).strip(), "other": " ".join(p.other).strip(), "log_bayes_factor": p.difference}
+        for p in found.confusions
     ]
     return {
         "limits": [_limit(row) for row in found.limits],
@@ -68,7 +75,10 @@ def _masses(found: Identification | None) -> list[dict[str, Any]] | None:
     if found is None or found.status == "failed":
         return None
     sd = np.sqrt(np.diag(found.sip.covariance)[::10])
-    return [{"name": n, "mass_kg": m, "mass_sd_kg": s} for n, m, s in zip(found.sip.segments, found.sip.mass, sd, strict=True)]
+    return [
+        {"name": n, "mass_kg": m, "mass_sd_kg": s}
+        for n, m, s in zip(found.sip.segments, found.sip.mass, sd, strict=True)
+    ]
 
 
 def diagnosis_document(found: SessionDiagnosis) -> dict[str, Any]:
@@ -78,9 +88,13 @@ def diagnosis_document(found: SessionDiagnosis) -> dict[str, Any]:
         "verdict": one.verdict,
         "findings": [_finding(finding) for finding in one.findings],
         "gates": [
-            {"check": g.check, "ok": g.ok, "text": g.text, "effect": g.effect, "target": g.target, "size": g.size} for g in one.gates
+            {"check": g.check, "ok": g.ok, "text": g.text, "effect": g.effect, "target": g.target, "size": g.size}
+            for g in one.gates
         ],
-        "adequacy": [{"channel": a.channel, "band_hz": a.band_hz, "z": a.z, "trial": a.trial, "around_s": a.second} for a in one.adequacy],
+        "adequacy": [
+            {"channel": a.channel, "band_hz": a.band_hz, "z": a.z, "trial": a.trial, "around_s": a.second}
+            for a in one.adequacy
+        ],
         "unobservable": [_limit(row) for row in one.unobservable],
         "limits": [_limit(row) for row in one.limits],
         "candidates": [_alias(a) for a in one.candidates],

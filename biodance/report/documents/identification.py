@@ -14,7 +14,7 @@ from biodance.identification.validation import ResidualRatio, TrialValidation
 from biodance.motion.comparison import Agreement
 from biodance.pipeline.identification import SessionIdentification
 
-TENSOR = ("xx", "xy", "yy", "xz", "yz", "zz")
+_TENSOR = ("xx", "xy", "yy", "xz", "yz", "zz")
 ASKED = ("mass", "com x", "com y", "com z")
 """Quantities whose shares from the data are averaged into a segment's ``information``."""
 
@@ -67,7 +67,12 @@ def _validation(trial: TrialValidation) -> dict[str, Any]:
 def _gain(found: ResidualRatio | None) -> dict[str, Any] | None:
     if found is None:
         return None
-    return {"force": found.force, "force_ci95": found.force_interval, "moment": found.moment, "moment_ci95": found.moment_interval}
+    return {
+        "force": found.force,
+        "force_ci95": found.force_interval,
+        "moment": found.moment,
+        "moment_ci95": found.moment_interval,
+    }
 
 
 def added_mass_document(search: LoadSearch) -> dict[str, Any] | None:
@@ -118,7 +123,9 @@ def _difference(row: Difference) -> dict[str, Any]:
 
 
 def torques_document(bands: TorqueBands | None) -> dict[str, Any] | None:
-    """Return every joint's largest torque with its interval, over the fully measured frames; None where the feet's wrenches are unknown."""
+    """Return every joint's largest torque with its interval, over the fully measured frames; None where the feet's
+    wrenches are unknown.
+    """
     if bands is None:
         return None
     rows = []
@@ -142,10 +149,10 @@ def torques_document(bands: TorqueBands | None) -> dict[str, Any] | None:
 def identification_document(found: SessionIdentification) -> dict[str, Any]:
     """Return all that identification found.
 
-    CoM in the segment's axes from its proximal joint centre; inertia about the CoM, order xx xy yy xz yz zz; validation moments about
-    ``about_m``, the mean centre of pressure. ``added_mass`` null: no load is announced; ``added_mass_search`` says what was looked for;
-    ``joint_torques`` of one trial with what the
-    parameters leave uncertain (not this trial's own skin and plates); ``differences`` to the reference session, empty without one.
+    CoM in the segment's axes from its proximal joint centre; inertia about the CoM, order xx xy yy xz yz zz; validation
+    moments about ``about_m``, the mean centre of pressure. ``added_mass`` null: no load is announced;
+    ``added_mass_search`` says what was looked for; ``joint_torques`` of one trial with what the parameters leave
+    uncertain (not this trial's own skin and plates); ``differences`` to the reference session, empty without one.
     ``failures`` what could not be computed, with cause and cure; after a failed fit (``status``) there are no segments.
     """
     one = found.identification
@@ -156,8 +163,12 @@ def identification_document(found: SessionIdentification) -> dict[str, Any]:
         "trials": one.trials,
         "frames": one.frames,
         "segments": [_segment(one, name) for name in one.sip.segments] if one.status == "solved" else [],
-        "inertia_order": TENSOR,
-        "base_parameters": {"count": one.base.base.count, "well_known": len(one.base.well_known), "rank": one.base.rank},
+        "inertia_order": _TENSOR,
+        "base_parameters": {
+            "count": one.base.base.count,
+            "well_known": len(one.base.well_known),
+            "rank": one.base.rank,
+        },
         "disturbances": {"kinematics": one.sizes.kinematics, "noise_variance": one.sizes.noise},
         "validation": [_validation(trial) for trial in found.validations],
         "fitted": [_validation(trial) for trial in found.fitted],

@@ -14,7 +14,9 @@ from biodance.report.documents.identification import added_mass_document, agreem
 
 
 def plain_values(value: object) -> Any:
-    """Return ``value`` made of dict, list, str, int, float, bool and None only; a number that is not finite becomes None."""
+    """Return ``value`` made of dict, list, str, int, float, bool and None only; a number that is not finite becomes
+    None.
+    """
     if isinstance(value, Mapping):
         return {str(key): plain_values(item) for key, item in value.items()}
     if isinstance(value, np.ndarray):
@@ -72,7 +74,9 @@ def _trial(result: TrialResult, identified: Agreement | None) -> dict[str, Any]:
         "frames": 0 if trial.markers is None else trial.markers.time.size,
         "rate_hz": None if trial.markers is None else trial.markers.rate,
         "gaps_percent": result.gaps_percent,
-        "gaps": [{"marker": g.label, "percent": g.percent, "longest_s": g.longest} for g in result.gaps if g.percent > 0],
+        "gaps": [
+            {"marker": g.label, "percent": g.percent, "longest_s": g.longest} for g in result.gaps if g.percent > 0
+        ],
         "marker_rms_m": None if fit is None else fit.total_rms,
         "marker_max_m": None if fit is None else fit.total_max,
         "markers": []
@@ -99,7 +103,9 @@ def _mass_check(result: SessionResult) -> dict[str, Any]:
 
 
 def results_document(result: SessionResult, provenance: Provenance) -> dict[str, Any]:
-    """Return all of ``result`` as one JSON document; null where a step was refused or does not exist in this version."""
+    """Return all of ``result`` as one JSON document; null where a step was refused or does not exist in this
+    version.
+    """
     subject, found = result.subject, result.identification
     return {
         "session": result.session.folder.name,
@@ -117,7 +123,14 @@ def results_document(result: SessionResult, provenance: Provenance) -> dict[str,
         "body": {"source": result.body_source, "notes": result.body.notes if result.body else ()},
         "steps": [{"step": s.name, "status": s.status, "reason": s.text} for s in result.steps],
         "checks": [
-            {"what": c.what, "where": c.where, "value": c.value, "limit": c.limit, "inside": c.inside, "advice": c.advice}
+            {
+                "what": c.what,
+                "where": c.where,
+                "value": c.value,
+                "limit": c.limit,
+                "inside": c.inside,
+                "advice": c.advice,
+            }
             for c in result.all_checks
         ],
         "mass_check": _mass_check(result),

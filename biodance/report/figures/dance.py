@@ -1,4 +1,6 @@
-"""Figures of a dance: postures as stick figures (paper Fig. 3), criterion by transition (Fig. 5), ZMP (Fig. 6), expected accuracy."""
+"""Figures of a dance: postures as stick figures (paper Fig. 3), criterion by transition (Fig. 5), ZMP (Fig. 6),
+expected accuracy.
+"""
 
 from typing import TYPE_CHECKING
 
@@ -19,13 +21,15 @@ if TYPE_CHECKING:
     from biodance.dance.expectation import Expectation
     from biodance.dance.metrics import ZmpPath
 
-COLUMNS = 10
+_COLUMNS = 10
 VIEW = np.array([[0.80, -0.60, 0.0], [0.18, 0.24, 0.95]])
 """(2, 3) oblique view from the front, right: lab x, y, z to the page's right and up."""
 
 
 def stick_lines(body: Body, q: Array) -> tuple[Array, tuple[str, ...]]:
-    """Return the line of each bone (P, B, 2, 3) m in postures ``q`` (P, nq), and its side ("right", "left", "middle")."""
+    """Return the line of each bone (P, B, 2, 3) m in postures ``q`` (P, nq), and its side ("right", "left",
+    "middle").
+    """
     pose = poses(body, q)
     lines, sides = [], []
     carrier = body.segment_joint
@@ -54,7 +58,9 @@ def _parent(body: Body, segment: int) -> int:
 
 
 def _tip(body: Body, rotation: Array, position: Array, segment: int) -> Array:
-    """Return the far end (P, 3) of a segment without children: along its box from the joint, toes for a foot, crown for the trunk."""
+    """Return the far end (P, 3) of a segment without children: along its box from the joint, toes for a foot, crown
+    for the trunk.
+    """
     low, high = body.boxes[segment]
     reach = np.where(np.abs(high) > np.abs(low), high, low)
     axis = int(np.argmax(np.abs(reach[:2])))
@@ -64,15 +70,17 @@ def _tip(body: Body, rotation: Array, position: Array, segment: int) -> Array:
 
 
 def postures_figure(body: Body, q: Array, titles: tuple[str, ...]) -> "Figure":
-    """Draw the postures ``q`` (P, nq) in rows of ten, each with its title, all to one scale; right is blue, left red and dashed."""
+    """Draw the postures ``q`` (P, nq) in rows of ten, each with its title, all to one scale; right is blue, left red
+    and dashed.
+    """
     lines, sides = stick_lines(body, q)
     flat = lines @ VIEW.T
     flat = flat - np.stack([flat[..., 0].mean(axis=(1, 2)), np.zeros(len(flat))], axis=1)[:, None, None]
     low, high = flat.min(axis=(0, 1, 2)), flat.max(axis=(0, 1, 2))
-    rows = -(-len(q) // COLUMNS)
+    rows = -(-len(q) // _COLUMNS)
     with look():
-        drawn = figure(rows * FIGURE_WIDTH / COLUMNS * 1.15 * max(1.0, (high[1] - low[1]) / (high[0] - low[0])))
-        panels = drawn.subplots(rows, COLUMNS, squeeze=False).ravel()
+        drawn = figure(rows * FIGURE_WIDTH / _COLUMNS * 1.15 * max(1.0, (high[1] - low[1]) / (high[0] - low[0])))
+        panels = drawn.subplots(rows, _COLUMNS, squeeze=False).ravel()
         for panel in panels:
             panel.set_axis_off()
         for panel, posture, title in zip(panels, flat, titles, strict=False):
@@ -91,7 +99,9 @@ def criterion_figure(values: Array, bound: float, *, what: str = "sum of M cond(
     with look():
         drawn = figure(2.6)
         axes = drawn.subplots()
-        axes.semilogy(np.arange(1, len(values) + 1), values, color=BLUE, marker="o", markersize=3, label="after the transition")
+        axes.semilogy(
+            np.arange(1, len(values) + 1), values, color=BLUE, marker="o", markersize=3, label="after the transition"
+        )
         axes.axhline(bound, color=GREEN, linestyle="--", label=f"bound {bound:.3g}")
         axes.set(xlabel="transition", ylabel=what)
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
@@ -100,7 +110,9 @@ def criterion_figure(values: Array, bound: float, *, what: str = "sum of M cond(
 
 
 def zmp_figure(paths: "Sequence[ZmpPath]") -> "Figure":
-    """Draw the zero-moment point of every move, below on the straight way between the postures, above in the dance; a column a stance."""
+    """Draw the zero-moment point of every move, below on the straight way between the postures, above in the dance;
+    a column a stance.
+    """
     names = list(dict.fromkeys(path.stance.name for path in paths))
     with look():
         drawn = figure(4.0)
@@ -122,13 +134,19 @@ def zmp_figure(paths: "Sequence[ZmpPath]") -> "Figure":
         panels[0, 0].set(xlim=(low[0] - 0.1, high[0] + 0.1), ylim=(low[1] - 0.1, high[1] + 0.1))
         for axes in panels[:, 0]:
             axes.set_ylabel("lab y, m")
-        handles = {label: handle for axes in panels[:, 0] for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+        handles = {
+            label: handle
+            for axes in panels[:, 0]
+            for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+        }
         drawn.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=2)
     return drawn
 
 
 def expectation_figure(expectation: "Expectation") -> "Figure":
-    """Draw the standard deviations of mass and centre of mass that are expected after each duration, as shares of the table's."""
+    """Draw the standard deviations of mass and centre of mass that are expected after each duration, as shares of
+    the table's.
+    """
     kinds = [name.removeprefix("right_") for name in expectation.segments if not name.startswith("left_")]
     colours = (BLACK, ORANGE, SKY, GREEN, BLUE, RED, PINK, GREY)
     with look():
@@ -136,10 +154,20 @@ def expectation_figure(expectation: "Expectation") -> "Figure":
         left, right = drawn.subplots(1, 2, sharex=True, sharey=True)
         for axes, values, title in ((left, expectation.mass, "mass"), (right, expectation.com, "centre of mass")):
             for number, kind in enumerate(kinds):
-                mine = [i for i, name in enumerate(expectation.segments) if name.removeprefix("right_").removeprefix("left_") == kind]
+                mine = [
+                    i
+                    for i, name in enumerate(expectation.segments)
+                    if name.removeprefix("right_").removeprefix("left_") == kind
+                ]
                 share = 100 * (values[:, mine] / values[0, mine]).mean(axis=1)
                 style = ("-", "--", ":")[number // len(colours) % 3]
-                axes.plot(expectation.duration, share, style, color=colours[number % len(colours)], label=kind.replace("_", " "))
+                axes.plot(
+                    expectation.duration,
+                    share,
+                    style,
+                    color=colours[number % len(colours)],
+                    label=kind.replace("_", " "),
+                )
             axes.set(title=title, xlabel="duration of the dance, s", ylim=(0, 105))
         left.set_ylabel("expected sd, % of the table's")
         drawn.legend(*right.get_legend_handles_labels(), loc="outside lower center", ncols=min(len(kinds), 4))

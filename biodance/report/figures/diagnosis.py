@@ -14,22 +14,27 @@ from biodance.report.figures.style import figure, look
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SHOWN = 6.0
+_SHOWN = 6.0
 """s of a kept trial that are drawn."""
 
 
 def left_figure(left: tuple[Residuals, Residuals]) -> "Figure":
-    """Draw measured minus simulated wrench of the first kept trial in six channels: with the body in use, and with the findings."""
+    """Draw measured minus simulated wrench of the first kept trial in six channels: with the body in use, and with
+    the findings.
+    """
     before, after = (one.left[0] for one in left)
     rate, use = left[0].rate[0], left[0].use[0]
     start = int(np.argmax(use))
-    cut = slice(start, start + int(SHOWN * rate))
+    cut = slice(start, start + int(_SHOWN * rate))
     time = np.arange(len(before))[cut] / rate
     with look():
         drawn = figure(3.6)
         grid = drawn.subplots(2, 3, sharex=True)
         for k, axes in enumerate(grid.ravel()):
-            for value, color, style, label in ((before, RED, "--", "as it is"), (after, BLUE, "-", "findings accepted")):
+            for value, color, style, label in (
+                (before, RED, "--", "as it is"),
+                (after, BLUE, "-", "findings accepted"),
+            ):
                 axes.plot(time, np.where(use[cut], value[cut, k], np.nan), color=color, linestyle=style, label=label)
             axes.axhline(0, color=BLACK, linewidth=0.6)
             axes.set_title(f"{CHANNELS[k]} ({'N' if k < 3 else 'N·m'})")
@@ -61,7 +66,9 @@ def adequacy_figure(rows: tuple[Adequacy, ...]) -> "Figure":
 
 
 def limits_figure(rows: tuple[Unobservable, ...]) -> "Figure":
-    """Draw per kind of cause from which size on this session sees it, in typical sizes: the best and the worst of its places."""
+    """Draw per kind of cause from which size on this session sees it, in typical sizes: the best and the worst of
+    its places.
+    """
     kinds: dict[str, list[float]] = {}
     for row in rows:
         kinds.setdefault(row.effect, []).append(row.limit / row.typical)
@@ -78,6 +85,8 @@ def limits_figure(rows: tuple[Unobservable, ...]) -> "Figure":
         axes.set_xlim(0.01, 30)
         axes.set_xticks([0.01, 0.1, 1, 10], ["1 %", "a tenth", "typical size", "ten times"])
         axes.set_yticks(range(len(order)), [name.replace("_", " ") for name in reversed(order)])
-        axes.set_xlabel("smallest size that this session would have seen (line: easiest to hardest place, point: middle)")
+        axes.set_xlabel(
+            "smallest size that this session would have seen (line: easiest to hardest place, point: middle)"
+        )
         axes.grid(axis="y", visible=False)
     return drawn

@@ -24,11 +24,15 @@ LIGHT = 5.0
 
 
 def forest_figure(found: Identification) -> "Figure":
-    """Draw the mass of every segment: table (square) and identified (circle: filled = known, pale = partly known, open = not known)."""
+    """Draw the mass of every segment: table (square) and identified (circle: filled = known, pale = partly known,
+    open = not known).
+    """
     from matplotlib.lines import Line2D
 
     masses = [known for known in found.known if known.quantity == "mass"]
-    groups = [group for group in ([k for k in masses if k.table >= LIGHT], [k for k in masses if k.table < LIGHT]) if group]
+    groups = [
+        group for group in ([k for k in masses if k.table >= LIGHT], [k for k in masses if k.table < LIGHT]) if group
+    ]
     with look():
         drawn = figure(0.9 + 0.36 * len(masses))
         grid = drawn.subplots(len(groups), 1, height_ratios=[len(group) + 1 for group in groups], squeeze=False)
@@ -46,15 +50,17 @@ def forest_figure(found: Identification) -> "Figure":
     return drawn
 
 
-SHOWN = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion", "trunk_flexion", "shoulder_flexion", "elbow_flexion")
+_SHOWN = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion", "trunk_flexion", "shoulder_flexion", "elbow_flexion")
 """Joints drawn, right and left in one axes."""
-COLOURS = {"right": (BLUE, "-"), "left": (RED, "--"), "": (GREY, "-")}
+_COLOURS = {"right": (BLUE, "-"), "left": (RED, "--"), "": (GREY, "-")}
 """Colour and line style of a side: never the colour alone."""
 
 
 def _curve(axes: "Axes", bands: TorqueBands, joint: int, side: str) -> None:
-    colour, style = COLOURS[side]
-    torque, half, table = (np.where(bands.use, column[:, joint], np.nan) for column in (bands.torque, bands.half_width, bands.table))
+    colour, style = _COLOURS[side]
+    torque, half, table = (
+        np.where(bands.use, column[:, joint], np.nan) for column in (bands.torque, bands.half_width, bands.table)
+    )
     axes.fill_between(bands.time, torque - half, torque + half, color=colour, alpha=0.25, linewidth=0)
     axes.plot(bands.time, torque, color=colour, linestyle=style)
     axes.plot(bands.time, table, color=colour, linestyle=":", linewidth=0.9)
@@ -63,8 +69,12 @@ def _curve(axes: "Axes", bands: TorqueBands, joint: int, side: str) -> None:
 def drawn_joints(bands: TorqueBands) -> list[tuple[str, list[tuple[int, str]]]]:
     """Return what is drawn: title, and index and side ("right", "left", "") of the joints in one axes."""
     found = []
-    for kind in SHOWN:
-        named = [(bands.joints.index(name), side) for side in COLOURS if (name := f"{side}_{kind}".lstrip("_")) in bands.joints]
+    for kind in _SHOWN:
+        named = [
+            (bands.joints.index(name), side)
+            for side in _COLOURS
+            if (name := f"{side}_{kind}".lstrip("_")) in bands.joints
+        ]
         if named:
             found.append((kind.replace("_", " "), named))
     return found
@@ -88,8 +98,13 @@ def torque_figure(bands: TorqueBands) -> "Figure":
             axes.set_visible(False)
         for axes in grid[-1]:
             axes.set_xlabel("time (s)")
-        lines: list[Line2D | Patch] = [Line2D([], [], color=c, linestyle=s, label=side) for side, (c, s) in COLOURS.items() if side]
-        lines += [Patch(color=GREY, alpha=0.25, label="95 % interval"), Line2D([], [], color=GREY, linestyle=":", label="with the table")]
+        lines: list[Line2D | Patch] = [
+            Line2D([], [], color=c, linestyle=s, label=side) for side, (c, s) in _COLOURS.items() if side
+        ]
+        lines += [
+            Patch(color=GREY, alpha=0.25, label="95 % interval"),
+            Line2D([], [], color=GREY, linestyle=":", label="with the table"),
+        ]
         drawn.legend(handles=lines, loc="outside upper center", ncols=4)
     return drawn
 
@@ -126,7 +141,9 @@ def _differences(axes: "Axes", trial: TrialValidation, channel: int) -> None:
 
 
 def validation_figure(trial: TrialValidation) -> "Figure":
-    """Draw six channels in two columns (forces left, moments right), each over its differences; grey frames are left out."""
+    """Draw six channels in two columns (forces left, moments right), each over its differences; grey frames are left
+    out.
+    """
     from matplotlib.lines import Line2D
 
     with look():

@@ -24,7 +24,15 @@ def marker_figure(fit: MarkerFit) -> "Figure":
         drawn = figure(2.0)
         axes = drawn.subplots()
         place = np.arange(order.size)
-        axes.bar(place, 1000 * fit.rms[order], width=0.75, color=SKY, edgecolor=BLACK, linewidth=0.5, label="RMS over the trial")
+        axes.bar(
+            place,
+            1000 * fit.rms[order],
+            width=0.75,
+            color=SKY,
+            edgecolor=BLACK,
+            linewidth=0.5,
+            label="RMS over the trial",
+        )
         axes.plot(place, 1000 * fit.max[order], linestyle="", marker="_", color=BLACK, markersize=7, label="largest")
         axes.set_xticks(place, [fit.names[i] for i in order], rotation=90, fontsize=7)
         axes.set_xlim(-0.6, max(order.size, 1) - 0.4)
@@ -35,7 +43,7 @@ def marker_figure(fit: MarkerFit) -> "Figure":
     return drawn
 
 
-AROUND = 200.0
+_AROUND = 200.0
 """mm that the wide view shows around the feet."""
 
 
@@ -60,11 +68,20 @@ def _surroundings(axes: "Axes", standing: QuietStanding) -> None:
         chosen = [i for i, name in enumerate(standing.foot_names) if name.startswith(side)]
         if chosen:
             feet = _turned(standing.feet[chosen], standing)
-            axes.plot(*feet.T, linestyle="", marker=marker, markersize=4, color=SIDE_COLOURS[side][0], label=f"{side} foot markers")
+            axes.plot(
+                *feet.T,
+                linestyle="",
+                marker=marker,
+                markersize=4,
+                color=SIDE_COLOURS[side][0],
+                label=f"{side} foot markers",
+            )
 
 
 def standing_figure(standing: QuietStanding) -> "Figure":
-    """Draw centre of pressure, centre of mass, feet and plates in the subject's own axes; on the right the middle, enlarged."""
+    """Draw centre of pressure, centre of mass, feet and plates in the subject's own axes; on the right the middle,
+    enlarged.
+    """
     with look():
         drawn = figure(3.4)
         wide, near = drawn.subplots(1, 2)
@@ -76,11 +93,13 @@ def standing_figure(standing: QuietStanding) -> "Figure":
             axes.set_xlabel("to the subject's right (mm)" if standing.com.size else "along lab −y (mm)")
         _surroundings(wide, standing)
         shown = _turned(np.concatenate([standing.feet, standing.cop]), standing)
-        (left, back), (right, front) = np.nanmin(shown, axis=0) - AROUND, np.nanmax(shown, axis=0) + AROUND
+        (left, back), (right, front) = np.nanmin(shown, axis=0) - _AROUND, np.nanmax(shown, axis=0) + _AROUND
         wide.set_xlim(left, right)
         wide.set_ylim(back, front)
         wide.set_ylabel("ahead (mm)" if standing.com.size else "along lab x (mm)")
-        reach = 1.4 * max(20.0, *(np.nanmax(np.abs(_turned(p, standing))) for p in (standing.cop, standing.com) if p.size))
+        reach = 1.4 * max(
+            20.0, *(np.nanmax(np.abs(_turned(p, standing))) for p in (standing.cop, standing.com) if p.size)
+        )
         near.set_xlim(-reach, reach)
         near.set_ylim(-reach, reach)
         near.axhline(0.0, color=GREY, linewidth=0.6)
@@ -99,7 +118,14 @@ LEAST = (10.0, 10.0, 10.0, 4.0, 4.0, 4.0)
 def _shade(axes: "Axes", comparison: WrenchComparison) -> None:
     """Hatch the frames that are left out of every number."""
     for first, stop in runs(np.logical_not(comparison.used)):
-        axes.axvspan(comparison.time[first], comparison.time[stop - 1], facecolor="#EDEDED", edgecolor="#C4C4C4", hatch="////", linewidth=0)
+        axes.axvspan(
+            comparison.time[first],
+            comparison.time[stop - 1],
+            facecolor="#EDEDED",
+            edgecolor="#C4C4C4",
+            hatch="////",
+            linewidth=0,
+        )
 
 
 def _curves(axes: "Axes", comparison: WrenchComparison, channel: int) -> None:
@@ -107,7 +133,9 @@ def _curves(axes: "Axes", comparison: WrenchComparison, channel: int) -> None:
     _shade(axes, comparison)
     axes.plot(time, comparison.measured[:, channel], color=BLACK, linestyle="-")
     axes.plot(time, comparison.simulated[:, channel], color=RED, linestyle=(0, (4, 2)))
-    shown = np.concatenate([comparison.measured[:, channel], comparison.simulated[used, channel] if used.any() else np.empty(0)])
+    shown = np.concatenate(
+        [comparison.measured[:, channel], comparison.simulated[used, channel] if used.any() else np.empty(0)]
+    )
     low, high = np.nanmin(shown), np.nanmax(shown)
     half = max(0.56 * (high - low), LEAST[channel] / 2)
     axes.set_ylim((low + high) / 2 - half, (low + high) / 2 + half)
@@ -127,7 +155,9 @@ def _residual(axes: "Axes", comparison: WrenchComparison, channel: int) -> None:
 
 
 def wrench_figure(comparison: WrenchComparison) -> "Figure":
-    """Draw six channels in two columns (forces left, moments right), each over its residual; hatched frames are left out."""
+    """Draw six channels in two columns (forces left, moments right), each over its residual; hatched frames are left
+    out.
+    """
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -146,7 +176,15 @@ def wrench_figure(comparison: WrenchComparison) -> "Figure":
             Line2D([], [], color=RED, linestyle=(0, (4, 2)), label="simulated with the table"),
         ]
         if not comparison.used.all():
-            lines.append(Patch(facecolor="#EDEDED", edgecolor="#C4C4C4", hatch="////", linewidth=0, label="left out: not fully measured"))
+            lines.append(
+                Patch(
+                    facecolor="#EDEDED",
+                    edgecolor="#C4C4C4",
+                    hatch="////",
+                    linewidth=0,
+                    label="left out: not fully measured",
+                )
+            )
         drawn.legend(handles=lines, loc="outside upper center", ncols=3)
         drawn.align_ylabels()
     return drawn

@@ -1,7 +1,8 @@
-"""3-D stills as shaded pictures by pyvista, drawn in a child process: without GL libraries VTK kills the process that draws.
+"""3-D stills as shaded pictures by pyvista, drawn in a child process: without GL libraries VTK kills the process that
+draws.
 
-The child reads stills as JSON from stdin and writes PNGs, as JSON, to stdout. Whatever goes wrong in it, the parent gets None and the
-page takes the drawings of ``still.py`` instead.
+The child reads stills as JSON from stdin and writes PNGs, as JSON, to stdout. Whatever goes wrong in it, the parent
+gets None and the page takes the drawings of ``still.py`` instead.
 """
 
 import json
@@ -22,11 +23,11 @@ from biodance.records import Array
 from biodance.report.figures.still import FORCE_SCALE, RESIDUAL_SCALE, VIEWS, still_figure
 from biodance.report.figures.style import SIDE_COLOURS, svg_address
 
-PATIENCE = 60.0
+_PATIENCE = 60.0
 """Seconds after which the child is given up."""
 
 PIXELS = (1500, 900)
-TILE, COLUMNS = (300, 420), 6
+TILE, _COLUMNS = (300, 420), 6
 """Size of one posture in a sheet of postures, px, and how many stand beside each other."""
 PNG = b"\x89PNG"
 SKIN = 0.3
@@ -47,7 +48,7 @@ def solid_pngs(stills: Sequence[Still], *, sheet: bool = False) -> list[bytes] |
             [sys.executable, "-m", "biodance.report.figures.solid"],
             input=question.encode(),
             capture_output=True,
-            timeout=PATIENCE,
+            timeout=_PATIENCE,
             check=False,
         )
         pictures = [b64decode(text) for text in json.loads(child.stdout)] if child.returncode == 0 else []
@@ -82,9 +83,17 @@ def _record(answer: dict[str, Any]) -> Still:
     }
     found: dict[str, Any] = {}
     for name, value in answer.items():
-        texts = isinstance(value, list) and all(isinstance(entry, str) for entry in value) and name in ("sides", "box_sides")
+        texts = (
+            isinstance(value, list)
+            and all(isinstance(entry, str) for entry in value)
+            and name in ("sides", "box_sides")
+        )
         found[name] = (
-            tuple(value) if texts else np.array(value, dtype=float).reshape(shapes.get(name, -1)) if isinstance(value, list) else value
+            tuple(value)
+            if texts
+            else np.array(value, dtype=float).reshape(shapes.get(name, -1))
+            if isinstance(value, list)
+            else value
         )
     return Still(**found)
 
@@ -121,7 +130,9 @@ def _measured(plotter: Any, still: Still) -> None:
 
 
 def _arrow(plotter: Any, start: Array, along: Array, colour: str, radius: float) -> None:
-    """Draw an arrow with a head of the same size whatever its length; nothing where it is not known or shorter than its head."""
+    """Draw an arrow with a head of the same size whatever its length; nothing where it is not known or shorter than
+    its head.
+    """
     import pyvista as pv
 
     length = float(np.linalg.norm(along))
@@ -129,22 +140,40 @@ def _arrow(plotter: Any, start: Array, along: Array, colour: str, radius: float)
         return
     head = 6 * radius / length
     arrow = pv.Arrow(
-        start, along, tip_length=head, tip_radius=2.5 * radius / length, shaft_radius=radius / length, scale=length, tip_resolution=40
+        start,
+        along,
+        tip_length=head,
+        tip_radius=2.5 * radius / length,
+        shaft_radius=radius / length,
+        scale=length,
+        tip_resolution=40,
     )
     plotter.add_mesh(arrow, color=colour, smooth_shading=False)
 
 
 def _names(plotter: Any, still: Still) -> None:
-    """Write left and right beside the ends of the arms: seen from the front, the right arm is on the left of the picture."""
+    """Write left and right beside the ends of the arms: seen from the front, the right arm is on the left of the
+    picture.
+    """
     for side, justified in (("left", "left"), ("right", "right")):
         ends = [end for (_, end), own in zip(still.bones, still.sides, strict=True) if own == side]
         if ends:
             word = f"   {side}   "
-            look = {"font_size": 22, "shape": None, "show_points": False, "always_visible": True, "text_color": SIDE_COLOURS[side][0]}
-            plotter.add_point_labels([ends[-1]], [word], justification_horizontal=justified, justification_vertical="center", **look)
+            look = {
+                "font_size": 22,
+                "shape": None,
+                "show_points": False,
+                "always_visible": True,
+                "text_color": SIDE_COLOURS[side][0],
+            }
+            plotter.add_point_labels(
+                [ends[-1]], [word], justification_horizontal=justified, justification_vertical="center", **look
+            )
 
 
-def _camera(plotter: Any, still: Still, view: tuple[float, float], *, distance: float, height: float | None = None) -> None:
+def _camera(
+    plotter: Any, still: Still, view: tuple[float, float], *, distance: float, height: float | None = None
+) -> None:
     """Look at the middle of the body; ``height`` m: as if it were so high, so that feet stand on one line."""
     points = still.bones.reshape(-1, 3)
     low, high = points.min(axis=0), points.max(axis=0)
@@ -187,9 +216,11 @@ def _draw_sheet(stills: Sequence[Still]) -> bytes:
     """Return the PNG of many postures, each from the front, right, with its title, all to one scale."""
     import pyvista as pv
 
-    columns = min(COLUMNS, len(stills))
+    columns = min(_COLUMNS, len(stills))
     rows = -(-len(stills) // columns)
-    plotter = pv.Plotter(off_screen=True, shape=(rows, columns), window_size=[TILE[0] * columns, TILE[1] * rows], border=False)
+    plotter = pv.Plotter(
+        off_screen=True, shape=(rows, columns), window_size=[TILE[0] * columns, TILE[1] * rows], border=False
+    )
     height = max(float(np.ptp(still.bones[..., 2])) for still in stills)
     for i, still in enumerate(stills):
         plotter.subplot(i // columns, i % columns)

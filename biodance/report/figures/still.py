@@ -58,7 +58,9 @@ def _plates(axes: "Axes3D", still: Still) -> None:
 
 
 def still_figure(still: Still) -> "Figure":
-    """Draw the body, its markers, the plates and the ground force from two sides, all axes to one scale (grid lines in m)."""
+    """Draw the body, its markers, the plates and the ground force from two sides, all axes to one scale (grid lines
+    in m).
+    """
     from matplotlib.lines import Line2D
 
     with look():
@@ -70,7 +72,10 @@ def still_figure(still: Still) -> "Figure":
             _frame(axes, still)
             axes.view_init(elevation, azimuth + np.degrees(np.arctan2(still.forward[1], still.forward[0])))
             axes.set_title(title, y=1.03)
-        handles = [Line2D([], [], color=colour, linestyle=line, linewidth=2.2, label=side) for side, (colour, line) in SIDE_COLOURS.items()]
+        handles = [
+            Line2D([], [], color=colour, linestyle=line, linewidth=2.2, label=side)
+            for side, (colour, line) in SIDE_COLOURS.items()
+        ]
         handles.append(Line2D([], [], linestyle="", marker="o", markersize=3, color=BLACK, label="measured marker"))
         handles.append(Line2D([], [], linestyle="", marker="D", color=GREEN, label="centre of mass"))
         drawn.legend(handles=handles, loc="outside lower center", ncols=5)

@@ -11,7 +11,11 @@ from biodance.display import BLUE, GREY, RED
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SIDE_COLOURS: dict[str, tuple[str, Literal["-", "--"]]] = {"left": (RED, "--"), "right": (BLUE, "-"), "middle": (GREY, "-")}
+SIDE_COLOURS: dict[str, tuple[str, Literal["-", "--"]]] = {
+    "left": (RED, "--"),
+    "right": (BLUE, "-"),
+    "middle": (GREY, "-"),
+}
 """Colour and line style of the body's sides: never the colour alone."""
 
 FIGURE_WIDTH = 7.1
@@ -51,7 +55,9 @@ def figure(height: float, *, width: float = FIGURE_WIDTH) -> "Figure":
 
 
 def svg_address(drawn: "Figure") -> str:
-    """Return ``drawn`` as the address of an image (``data:image/svg+xml``): the same figure gives the same characters."""
+    """Return ``drawn`` as the address of an image (``data:image/svg+xml``): the same figure gives the same
+    characters.
+    """
     stream = BytesIO()
     with look():
         drawn.savefig(stream, format="svg", metadata={"Date": None})

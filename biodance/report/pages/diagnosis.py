@@ -1,4 +1,6 @@
-"""The page of a diagnosis for the analyst: what is wrong, how we know, how big, how sure, what else, what to do, what changes."""
+"""The page of a diagnosis for the analyst: what is wrong, how we know, how big, how sure, what else, what to do,
+what changes.
+"""
 
 import sys
 from dataclasses import dataclass
@@ -14,7 +16,7 @@ from biodance.report.figures.diagnosis import adequacy_figure, left_figure, limi
 from biodance.report.figures.style import svg_address
 from biodance.report.wording import format_number
 
-SHOWN = {"m": (1000.0, "mm", 0), "rad": (57.29578, "°", 1), "s": (1000.0, "ms", 1), "1": (100.0, "%", 1)}
+_SHOWN = {"m": (1000.0, "mm", 0), "rad": (57.29578, "°", 1), "s": (1000.0, "ms", 1), "1": (100.0, "%", 1)}
 """Unit of a parameter: factor, unit and digits that are shown."""
 
 
@@ -35,7 +37,9 @@ def words_of(effect: str) -> Words:
     what, _, rest = text.partition("Signature:")
     signature, _, rest = rest.partition("Look-alikes:")
     alike, _, separated = rest.partition("Separated by")
-    return Words(what.strip(), first_upper(signature.strip()), first_upper(alike.strip()), first_upper(separated.strip()))
+    return Words(
+        what.strip(), first_upper(signature.strip()), first_upper(alike.strip()), first_upper(separated.strip())
+    )
 
 
 def first_upper(text: str) -> str:
@@ -51,7 +55,7 @@ def named(effect: str, target: str) -> str:
 
 def sized(value: float, unit: str) -> str:
     """Return a number with its unit as a person says it: 0.02 m is 20 mm."""
-    factor, name, digits = SHOWN.get(unit, (1.0, unit, 2))
+    factor, name, digits = _SHOWN.get(unit, (1.0, unit, 2))
     if value == float("inf"):
         return "no size"
     return f"{format_number(factor * value, digits)} {name}".strip()
@@ -65,7 +69,7 @@ def estimated(one: Estimate) -> str:
     return f"{sized(one.value, one.unit)} (95 % interval {sized(low, one.unit)} to {sized(high, one.unit)})"
 
 
-CERTAIN = 14.0
+_CERTAIN = 14.0
 """Natural logarithm of a million: above it odds are no longer printed."""
 
 
@@ -76,12 +80,18 @@ def answer(one: Diagnosis) -> str:
     where = ""
     if worst:
         low, high = worst.band_hz
-        where = f"{worst.channel}, movement of {low:g} to {high:g} Hz, most in trial {worst.trial} around {worst.second:.1f} s"
+        where = (
+            f"{worst.channel}, movement of {low:g} to {high:g} Hz, most in trial {worst.trial} around "
+            f"{worst.second:.1f} s"
+        )
     return {
-        "nothing wrong": "Nothing wrong was found: what the simulation misses is what it misses in any session without a fault. "
+        "nothing wrong": "Nothing wrong was found: what the simulation misses is what it misses in any session "
+        "without a fault. "
         "Faults below the sizes at the end of this page would not have been seen.",
-        "named, complete": f"Found: {what}. With it accepted, what is left is no more than in any session without a fault.",
-        "named, incomplete": f"Found: {what}. Something more is wrong that no known cause explains" + (f" ({where})." if where else "."),
+        "named, complete": f"Found: {what}. With it accepted, what is left is no more than in any session without a "
+        f"fault.",
+        "named, incomplete": f"Found: {what}. Something more is wrong that no known cause explains"
+        + (f" ({where})." if where else "."),
         "unexplained": f"Something is wrong that no known cause explains. It shows most in {where}."
         + (f" Part of it looks like {what}, which is not enough." if what else ""),
     }[one.verdict]
@@ -91,7 +101,7 @@ def odds(log_bayes_factor: float) -> str:
     """Return evidence against "nothing wrong" as odds in words."""
     if log_bayes_factor != log_bayes_factor or log_bayes_factor == float("inf"):
         return "a check of the recording shows it"
-    if log_bayes_factor > CERTAIN:
+    if log_bayes_factor > _CERTAIN:
         return "more than a million times as probable as nothing wrong"
     return f"{format_number(2.718281828**log_bayes_factor, 0)} times as probable as nothing wrong"
 
@@ -102,18 +112,22 @@ def diagnosis_section(found: SessionDiagnosis) -> str:
 
     one = found.diagnosis
     failures = Markup("").join(
-        Markup("<p class='look'><strong>Not solved, {}:</strong> {}</p>").format(what, cause) for what, cause in found.failures.items()
+        Markup("<p class='look'><strong>Not solved, {}:</strong> {}</p>").format(what, cause)
+        for what, cause in found.failures.items()
     )
     rows = Markup("").join(
         Markup("<tr><th scope='row'>{}</th><td>{}</td><td>{}</td></tr>").format(
-            named(f.effect, f.target), "; ".join(f"{p.name.replace('_', ' ')} {estimated(p)}" for p in f.parameters), f.advice
+            named(f.effect, f.target),
+            "; ".join(f"{p.name.replace('_', ' ')} {estimated(p)}" for p in f.parameters),
+            f.advice,
         )
         for f in one.findings
     )
     table = Markup("<table><tbody>{}</tbody></table>").format(rows) if one.findings else Markup("")
     return Markup(
         "<section><h2>What the simulation gets wrong</h2><p class='look'><strong>{}</strong></p>{}{}"
-        "<p class='small'>biodance diagnose says how we know, what else it could be and what accepting it changes.</p></section>"
+        "<p class='small'>biodance diagnose says how we know, what else it could be and what accepting it "
+        "changes.</p></section>"
     ).format(answer(one), failures, table)
 
 
@@ -124,12 +138,16 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
 
     one = found.diagnosis
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters.update(number=format_number, sized=sized, estimated=estimated, odds=odds, first_upper=first_upper)
+    environment.filters.update(
+        number=format_number, sized=sized, estimated=estimated, odds=odds, first_upper=first_upper
+    )
     environment.globals.update(named=named, words_of=words_of)
     folder = files("biodance.report") / "templates"
     masses = []
     if found.before and found.accepted:
-        then, now = (dict(zip(one.sip.segments, one.sip.mass.tolist(), strict=True)) for one in (found.before, found.accepted))
+        then, now = (
+            dict(zip(one.sip.segments, one.sip.mass.tolist(), strict=True)) for one in (found.before, found.accepted)
+        )
         masses = [(name.replace("_", " "), then.get(name, float("nan")), mass) for name, mass in now.items()]
     return environment.from_string((folder / "diagnosis.html.j2").read_text(encoding="utf-8")).render(
         style=Markup((folder / "page.css").read_text(encoding="utf-8")),

@@ -13,7 +13,7 @@ from biodance.report.wording import format_number, millimetres
 MARKS = {"known": "●", "partly known": "◐", "cannot be known": "○"}
 LISTED = "Cannot be known"
 """Start of the note whose content the page shows as a table."""
-UNITS = ("N",) * 3 + ("N·m",) * 3
+_UNITS = ("N",) * 3 + ("N·m",) * 3
 
 
 def spaced(name: str) -> str:
@@ -46,7 +46,7 @@ def identification_section(found: SessionIdentification) -> str:
         marks=MARKS,
         gain=found.gain,
         trials=[(trial, "kept") for trial in found.validations] + [(trial, "fitted") for trial in found.fitted],
-        channels=list(zip(CHANNELS, UNITS, strict=True)),
+        channels=list(zip(CHANNELS, _UNITS, strict=True)),
         figures=[(trial, svg_address(validation_figure(trial))) for trial in shown],
         torques=found.torques,
         torque_rows=(torques_document(found.torques) or {}).get("joints", []),

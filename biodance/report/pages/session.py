@@ -17,7 +17,9 @@ STATUS_WORDS = {"ok": "done", "warning": "look here", "refused": "refused"}
 
 
 def check_table(result: SessionResult) -> tuple[list[tuple[str, str]], list[tuple[str, list[Check | None]]]]:
-    """Return the trials' checks as a table: its columns (what, limit), and per trial its name and one check or None a column."""
+    """Return the trials' checks as a table: its columns (what, limit), and per trial its name and one check or None
+    a column.
+    """
     columns = list(dict.fromkeys((check.what, check.limit) for trial in result.trials for check in trial.checks))
     rows = []
     for trial in result.trials:
@@ -44,7 +46,10 @@ class TrialPart:
         """What was decided when the trial was read and prepared, each sentence once."""
         trial = self.result.trial
         plates = [
-            f"{plate.name}: {line}" for plate in trial.plates for line in plate.decisions if not any(line in h for h in trial.history)
+            f"{plate.name}: {line}"
+            for plate in trial.plates
+            for line in plate.decisions
+            if not any(line in h for h in trial.history)
         ]
         return [*trial.history, *plates]
 

@@ -1,15 +1,19 @@
-"""A step of one ball joint, compiled: turn it by a rotation vector and keep its Cardan angles within their limits (see ``ball``)."""
+"""A step of one ball joint, compiled: turn it by a rotation vector and keep its Cardan angles within their limits
+(see ``ball``).
+"""
 
 import numpy as np
 
 from biodance.motion.ik.compiled import compiled
 
-TURN = 2 * np.pi
+_TURN = 2 * np.pi
 
-SMALL = 0.02
-"""rad, step below which the angles follow to first order: Newton's next step corrects the rest, and it costs a fifth of the exact turn."""
+_SMALL = 0.02
+"""rad, step below which the angles follow to first order: Newton's next step corrects the rest, and it costs a fifth
+of the exact turn.
+"""
 
-UPRIGHT = 0.3
+_UPRIGHT = 0.3
 """Cosine of the second angle above which the angles are a good measure of the rotation."""
 
 
@@ -45,13 +49,13 @@ def exponential(x, y, z):
 @compiled
 def near_to(angle, middle):
     """Return ``angle`` plus full turns, within half a turn of ``middle``."""
-    return angle - TURN * np.floor((angle - middle) / TURN + 0.5)
+    return angle - _TURN * np.floor((angle - middle) / _TURN + 0.5)
 
 
 @compiled
 def middle_of(lower, upper, near):
     """Return the middle of a range narrower than a full turn, else ``near``."""
-    return 0.5 * (lower + upper) if upper - lower < TURN else near
+    return 0.5 * (lower + upper) if upper - lower < _TURN else near
 
 
 @compiled
@@ -62,12 +66,18 @@ def beyond(angle, lower, upper):
 
 @compiled
 def angles_of(quaternion, sign, near, lower, upper, out):
-    """Fill ``out`` (3,) with that set of Cardan angles which lies inside the limits; if both or none do, the one closer to ``near``."""
+    """Fill ``out`` (3,) with that set of Cardan angles which lies inside the limits; if both or none do, the one
+    closer to ``near``.
+    """
     x, y, z, w = quaternion
     a = sign * np.arctan2(2 * (x * w - y * z), 1 - 2 * (x * x + y * y))
     b = sign * np.arcsin(min(max(2 * (x * z + y * w), -1.0), 1.0))
     c = sign * np.arctan2(2 * (z * w - x * y), 1 - 2 * (y * y + z * z))
-    m0, m1, m2 = middle_of(lower[0], upper[0], near[0]), middle_of(lower[1], upper[1], near[1]), middle_of(lower[2], upper[2], near[2])
+    m0, m1, m2 = (
+        middle_of(lower[0], upper[0], near[0]),
+        middle_of(lower[1], upper[1], near[1]),
+        middle_of(lower[2], upper[2], near[2]),
+    )
     half = sign * np.pi
     a0, b0, c0 = near_to(a, m0), near_to(b, m1), near_to(c, m2)
     a1, b1, c1 = near_to(half + a, m0), near_to(half - b, m1), near_to(half + c, m2)
@@ -83,10 +93,12 @@ def angles_of(quaternion, sign, near, lower, upper, out):
 
 @compiled
 def hold(rotation, sign, k, lower, upper, out):
-    """Fill ``out`` (3,) with the angles inside the limits that come nearest to ``rotation`` with angle ``k`` held at its limit.
+    """Fill ``out`` (3,) with the angles inside the limits that come nearest to ``rotation`` with angle ``k`` held at
+    its limit.
 
-    The overlap of two unit quaternions is bilinear in the half angles' (cos, sin) of the two angles that remain: E, F, G, H below are the
-    half sums and differences of its four coefficients, and its maximum is where both cosines of sum and difference are largest.
+    The overlap of two unit quaternions is bilinear in the half angles' (cos, sin) of the two angles that remain: E, F,
+    G, H below are the half sums and differences of its four coefficients, and its maximum is where both cosines of sum
+    and difference are largest.
     """
     one, two = (k + 1) % 3, (k + 2) % 3
     if one > two:
@@ -106,18 +118,24 @@ def hold(rotation, sign, k, lower, upper, out):
 
 @compiled
 def turned(angles, step, sign, lower, upper, out):
-    """Fill ``out`` (3,) with the ``angles`` (3,) after a turn by ``step`` (3,) rad, within the limits; return whether one was met.
+    """Fill ``out`` (3,) with the ``angles`` (3,) after a turn by ``step`` (3,) rad, within the limits; return whether
+    one was met.
 
     The rotation vector is written along the three axes in the frame of the first joint, after its angle.
     """
     tilt = np.cos(angles[1])
-    if tilt > UPRIGHT and step[0] * step[0] + step[1] * step[1] + step[2] * step[2] < SMALL * SMALL:
+    if tilt > _UPRIGHT and step[0] * step[0] + step[1] * step[1] + step[2] * step[2] < _SMALL * _SMALL:
         out[1], out[2] = angles[1] + step[1], angles[2] + step[2] / tilt
         out[0] = angles[0] + step[0] - sign * np.sin(angles[1]) * step[2] / tilt
-        if beyond(out[0], lower[0], upper[0]) + beyond(out[1], lower[1], upper[1]) + beyond(out[2], lower[2], upper[2]) == 0:
+        if (
+            beyond(out[0], lower[0], upper[0]) + beyond(out[1], lower[1], upper[1]) + beyond(out[2], lower[2], upper[2])
+            == 0
+        ):
             return False
     sine, cosine = np.sin(sign * angles[0]), np.cos(sign * angles[0])
-    still = exponential(sign * step[0], sign * (cosine * step[1] - sine * step[2]), sign * (sine * step[1] + cosine * step[2]))
+    still = exponential(
+        sign * step[0], sign * (cosine * step[1] - sine * step[2]), sign * (sine * step[1] + cosine * step[2])
+    )
     rotation = product(still, quaternion_of(sign, angles[0], angles[1], angles[2]))
     angles_of(rotation, sign, angles, lower, upper, out)
     worst, which = 0.0, -1

@@ -1,7 +1,8 @@
-"""The marker cost of one frame on a body's tree, compiled (numba): cost, gradient, second derivatives, and the step that they give.
+"""The marker cost of one frame on a body's tree, compiled (numba): cost, gradient, second derivatives, and the step
+that they give.
 
-All that the gradient and the second derivatives by a joint need are four sums over the markers that move with it, with p the model's and
-m the measured place, both from the root's origin (docs/derivations.md 10):
+All that the gradient and the second derivatives by a joint need are four sums over the markers that move with it, with
+p the model's and m the measured place, both from the root's origin (docs/derivations.md 10):
 
     S0 = sum w,   S = sum w p,   A = sum w m,   M = sum w p m'
 
@@ -10,8 +11,8 @@ With the twist t_j = (o_j x a_j, a_j) of joint j (axis a, origin o), i at or bef
     gradient_j = t_j . (S - A, skew M),   H_ij = t_i . momentum_j
     momentum_j = (S0 v + a x S,  A x v + tr(M) a - M a)   with t_j = (v, a)
 
-and with m = p (A = S, M = sum w p p') the Gauss-Newton matrix. Slot 0 is the root, slot i + 1 is joint i; coordinates are the root's
-translation and rotation vector (lab axes), then the joints, as in Pinocchio.
+and with m = p (A = S, M = sum w p p') the Gauss-Newton matrix. Slot 0 is the root, slot i + 1 is joint i; coordinates
+are the root's translation and rotation vector (lab axes), then the joints, as in Pinocchio.
 """
 
 from typing import NamedTuple
@@ -24,20 +25,22 @@ from biodance.motion.ik.chart import balls
 from biodance.motion.ik.compiled import compiled
 from biodance.records import Array
 
-LENGTH = 0.1
-"""m, turns an angle into a typical marker displacement: makes gradients, damping and pivots of different coordinates comparable."""
+_LENGTH = 0.1
+"""m, turns an angle into a typical marker displacement: makes gradients, damping and pivots of different coordinates
+comparable.
+"""
 
-FLAT = 1e-9
+_FLAT = 1e-9
 """A pivot below this fraction of its coordinate's scale counts as zero or negative: the cost is not convex there."""
 
 
 class MarkerChain(NamedTuple):
     """A body and K of its markers as plain arrays.
 
-    ``parent`` (n,) joint before each, -1 the root; ``turn`` (n, 3, 3, 3) with joint rotation = turn[0] + sin turn[1] + (1 - cos) turn[2];
-    ``translation`` (n, 3) m; ``axis`` (n, 3); ``slot`` (K,) and ``local`` (K, 3) m of the markers; ``lower``, ``upper`` (n,) rad; ``path``
-    (nv, depth) the coordinates from the first to each and ``depth`` (nv,) how many come before it; ``ball`` (G,) first joint of every ball
-    joint and ``sign`` (G,) of its axes; ``roots`` 6 or 0.
+    ``parent`` (n,) joint before each, -1 the root; ``turn`` (n, 3, 3, 3) with joint rotation = turn[0] + sin turn[1] +
+    (1 - cos) turn[2]; ``translation`` (n, 3) m; ``axis`` (n, 3); ``slot`` (K,) and ``local`` (K, 3) m of the markers;
+    ``lower``, ``upper`` (n,) rad; ``path`` (nv, depth) the coordinates from the first to each and ``depth`` (nv,) how
+    many come before it; ``ball`` (G,) first joint of every ball joint and ``sign`` (G,) of its axes; ``roots`` 6 or 0.
     """
 
     parent: NDArray[np.int64]
@@ -56,9 +59,10 @@ class MarkerChain(NamedTuple):
 
 
 class Sums(NamedTuple):
-    """What is known at one posture: ``rotation`` (n + 1, 3, 3) and ``origin`` (n + 1, 3) m of every slot and ``twist`` (n + 1, 6) of its
-    coordinate, lab axes from the root's origin; ``below`` (n + 1, 16) the sums S0, S (3), A (3), M (9) over the markers beyond every slot;
-    ``model`` (n + 1, 9) sum w p p', filled where Gauss-Newton needs it; ``factor`` (nv, depth) the matrix or its factors.
+    """What is known at one posture: ``rotation`` (n + 1, 3, 3) and ``origin`` (n + 1, 3) m of every slot and ``twist``
+    (n + 1, 6) of its coordinate, lab axes from the root's origin; ``below`` (n + 1, 16) the sums S0, S (3), A (3), M
+    (9) over the markers beyond every slot; ``model`` (n + 1, 9) sum w p p', filled where Gauss-Newton needs it;
+    ``factor`` (nv, depth) the matrix or its factors.
     """
 
     rotation: Array
@@ -99,7 +103,14 @@ def chain_of(body: Body, segment: list[int], local: Array) -> MarkerChain:
 def sums_of(chain):
     """Return Sums for a chain, to be filled."""
     n, (nv, deep) = chain.parent.shape[0] + 1, chain.path.shape
-    return Sums(np.empty((n, 3, 3)), np.zeros((n, 3)), np.zeros((n, 6)), np.empty((n, 16)), np.empty((n, 9)), np.zeros((nv, deep)))
+    return Sums(
+        np.empty((n, 3, 3)),
+        np.zeros((n, 3)),
+        np.zeros((n, 6)),
+        np.empty((n, 16)),
+        np.empty((n, 9)),
+        np.zeros((nv, deep)),
+    )
 
 
 @compiled
@@ -137,7 +148,9 @@ def place(chain, q, at):
 
 @compiled
 def add_up(chain, xyz, weight, q, at):
-    """Fill the sums of ``at`` for markers xyz (K, 3) m of ``weight`` (K,) at a placed posture q; return the cost, m²."""
+    """Fill the sums of ``at`` for markers xyz (K, 3) m of ``weight`` (K,) at a placed posture q; return the cost,
+    m².
+    """
     S, cost = at.below, 0.0
     S[:] = 0.0
     x, y, z = (q[0], q[1], q[2]) if chain.roots else (0.0, 0.0, 0.0)
@@ -205,7 +218,8 @@ def gradient(chain, at, g):
 
 @compiled
 def hessian(chain, at, seen, cross):
-    """Fill ``at.factor``: row k holds the second derivatives by coordinate k and every coordinate on its path, itself last.
+    """Fill ``at.factor``: row k holds the second derivatives by coordinate k and every coordinate on its path, itself
+    last.
 
     ``seen`` (n + 1, 3) and ``cross`` (n + 1, 9): A and M of every slot for Newton, S and sum w p p' for Gauss-Newton.
     """
@@ -237,12 +251,13 @@ def hessian(chain, at, seen, cross):
 @compiled
 def scale_of(chain, at, i):
     """Return the marker weight that coordinate ``i`` moves and its lever, m."""
-    return at.below[max(i - chain.roots + 1, 0), 0], (1.0 if chain.roots and i < 3 else LENGTH)
+    return at.below[max(i - chain.roots + 1, 0), 0], (1.0 if chain.roots and i < 3 else _LENGTH)
 
 
 @compiled
 def factorise(chain, at, held, damping):
-    """Damp the matrix, take the ``held`` coordinates out of it and replace it by its factors L'DL along the tree, without fill-in.
+    """Damp the matrix, take the ``held`` coordinates out of it and replace it by its factors L'DL along the tree,
+    without fill-in.
 
     Return False where a pivot is flat or negative (Featherstone 2008, table 6.3).
     """
@@ -256,7 +271,7 @@ def factorise(chain, at, held, damping):
     for k in range(held.shape[0] - 1, -1, -1):
         weight, lever = scale_of(chain, at, k)
         row, pivot = H[k], H[k, depth[k]]
-        if pivot <= FLAT * (1.0 if held[k] else weight * lever * lever):
+        if pivot <= _FLAT * (1.0 if held[k] else weight * lever * lever):
             return False
         over = 1.0 / pivot
         for d in range(depth[k] - 1, -1, -1):

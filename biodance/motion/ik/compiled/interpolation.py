@@ -1,4 +1,6 @@
-"""Postures between known postures: monotone cubics in the coordinates of ``chart`` (Fritsch & Butland 1984, DOI 10.1137/0905021)."""
+"""Postures between known postures: monotone cubics in the coordinates of ``chart`` (Fritsch & Butland 1984, DOI
+10.1137/0905021).
+"""
 
 import numpy as np
 
@@ -8,7 +10,9 @@ from biodance.motion.ik.compiled.ball_step import angles_of
 
 @compiled
 def slope_at(before, at, after, one, two):
-    """Return the slope in the middle of three values ``one`` and ``two`` frames apart: zero at a turn, else a weighted harmonic mean."""
+    """Return the slope in the middle of three values ``one`` and ``two`` frames apart: zero at a turn, else a
+    weighted harmonic mean.
+    """
     left, right = (at - before) / one, (after - at) / two
     if left * right <= 0:
         return 0.0
@@ -18,7 +22,9 @@ def slope_at(before, at, after, one, two):
 
 @compiled
 def smooth_at(known, values, k, frame, out):
-    """Fill ``out`` (C,) with the cubic through ``values`` (M, C) at ``frame`` between the ``known`` frames k and k + 1."""
+    """Fill ``out`` (C,) with the cubic through ``values`` (M, C) at ``frame`` between the ``known`` frames k and k +
+    1.
+    """
     last, width = known.shape[0] - 1, float(known[k + 1] - known[k])
     share = (frame - known[k]) / width
     h0, h1 = (1 + 2 * share) * (1 - share) ** 2, share * share * (3 - 2 * share)
@@ -35,7 +41,9 @@ def smooth_at(known, values, k, frame, out):
 
 @compiled
 def posture_of(chain, smooth, near, single, q):
-    """Fill q (nq,) from ``smooth`` coordinates (see ``chart``); ``near`` (nq,) decides between equal sets of Cardan angles."""
+    """Fill q (nq,) from ``smooth`` coordinates (see ``chart``); ``near`` (nq,) decides between equal sets of Cardan
+    angles.
+    """
     first, c = q.shape[0] - chain.parent.shape[0], 0
     if chain.roots:
         for c in range(3):
@@ -57,9 +65,11 @@ def posture_of(chain, smooth, near, single, q):
 
 @compiled
 def interpolate(chain, known, values, q, single, wanted, out):
-    """Fill ``out`` (F, nq) with the postures at the frames ``wanted`` (F,) between the postures q (M, nq) at the frames ``known`` (M,).
+    """Fill ``out`` (F, nq) with the postures at the frames ``wanted`` (F,) between the postures q (M, nq) at the frames
+    ``known`` (M,).
 
-    ``values`` (M, C) their smooth coordinates, ``single`` the joints outside ball joints. Beyond the known frames the nearest one stays.
+    ``values`` (M, C) their smooth coordinates, ``single`` the joints outside ball joints. Beyond the known frames the
+    nearest one stays.
     """
     smooth = np.empty(values.shape[1])
     for f in range(wanted.shape[0]):

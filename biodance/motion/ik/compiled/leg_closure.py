@@ -1,7 +1,9 @@
-"""Six joint angles that hold a foot under a pelvis, compiled: Newton's method from the neighbouring frame (see ``general_legs``).
+"""Six joint angles that hold a foot under a pelvis, compiled: Newton's method from the neighbouring frame (see
+``general_legs``).
 
-All poses are in the pelvis' frame. Each frame starts from the one before it; where that does not converge nearby, the foot is led from a
-known posture of the leg to its goal in small steps, so that the knee bends to the same side in every frame.
+All poses are in the pelvis' frame. Each frame starts from the one before it; where that does not converge nearby, the
+foot is led from a known posture of the leg to its goal in small steps, so that the knee bends to the same side in every
+frame.
 """
 
 from typing import NamedTuple
@@ -13,19 +15,19 @@ from biodance.records import Array
 
 CLOSED = 1e-12
 """Distance (leg lengths) and angle (rad) from the goal at which a foot is there."""
-NEAR = 0.5
+_NEAR = 0.5
 """rad: a larger change of an angle from frame to frame may lead to another solution and is not trusted."""
 LEADS = 8
 """Steps in which a foot is led from the known posture."""
-LONGEST = 0.3
+_LONGEST = 0.3
 """rad: longest step of an angle in one iteration."""
-DAMPING = 1e-2, 1e-14
+_DAMPING = 1e-2, 1e-14
 """Damping of the normal equations per squared distance from the goal, and at the goal itself."""
 
 
 class LegJoints(NamedTuple):
-    """Placements of six joints from the pelvis outwards: ``rotation`` (6, 3, 3), ``translation`` (6, 3) m, ``axis`` (6, 3); ``hip`` (3,) m
-    about which the foot is led; ``size`` m, the length of the leg.
+    """Placements of six joints from the pelvis outwards: ``rotation`` (6, 3, 3), ``translation`` (6, 3) m, ``axis`` (6,
+    3); ``hip`` (3,) m about which the foot is led; ``size`` m, the length of the leg.
     """
 
     rotation: Array
@@ -36,9 +38,9 @@ class LegJoints(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Room for one leg: ``turn`` (3, 3), ``place`` (3,) of the foot, ``origin``, ``direction`` (6, 3) of the axes; ``goal`` (3, 3),
-    ``spot`` (3,) on the way; ``first`` (3, 3), ``begin`` (3,) of the known posture; ``a``, ``b`` (3, 3), ``w`` (3,); ``jacobian``,
-    ``normal`` (6, 6), ``gap``, ``step`` (6,).
+    """Room for one leg: ``turn`` (3, 3), ``place`` (3,) of the foot, ``origin``, ``direction`` (6, 3) of the axes;
+    ``goal`` (3, 3), ``spot`` (3,) on the way; ``first`` (3, 3), ``begin`` (3,) of the known posture; ``a``, ``b`` (3,
+    3), ``w`` (3,); ``jacobian``, ``normal`` (6, 6), ``gap``, ``step`` (6,).
     """
 
     turn: Array
@@ -60,7 +62,23 @@ class Scratch(NamedTuple):
 
 def scratch() -> Scratch:
     """Return room for one leg."""
-    shapes = ((3, 3), (3,), (6, 3), (6, 3), (3, 3), (3,), (3, 3), (3,), (3, 3), (3, 3), (3,), (6, 6), (6, 6), (6,), (6,))
+    shapes = (
+        (3, 3),
+        (3,),
+        (6, 3),
+        (6, 3),
+        (3, 3),
+        (3,),
+        (3, 3),
+        (3,),
+        (3, 3),
+        (3, 3),
+        (3,),
+        (6, 6),
+        (6, 6),
+        (6,),
+        (6,),
+    )
     return Scratch(*(np.zeros(shape) for shape in shapes))
 
 
@@ -141,7 +159,9 @@ def solve_step(s, damping):
 
 @compiled
 def reach_for(leg, angles, turn, place, rounds, s):
-    """Improve ``angles`` (6,) until the foot has the pose ``turn``, ``place``; return how far it is from it in the end."""
+    """Improve ``angles`` (6,) until the foot has the pose ``turn``, ``place``; return how far it is from it in the
+    end.
+    """
     away = np.inf
     for _ in range(rounds):
         place_foot(leg, angles, s)
@@ -156,20 +176,24 @@ def reach_for(leg, angles, turn, place, rounds, s):
         for k in range(6):
             for i in range(3):
                 m, n = (i + 1) % 3, (i + 2) % 3
-                lever = s.direction[k, m] * (s.place[n] - s.origin[k, n]) - s.direction[k, n] * (s.place[m] - s.origin[k, m])
+                lever = s.direction[k, m] * (s.place[n] - s.origin[k, n]) - s.direction[k, n] * (
+                    s.place[m] - s.origin[k, m]
+                )
                 s.jacobian[i, k], s.jacobian[3 + i, k] = lever / leg.size, s.direction[k, i]
-        solve_step(s, DAMPING[0] * square + DAMPING[1])
-        longest = LONGEST
+        solve_step(s, _DAMPING[0] * square + _DAMPING[1])
+        longest = _LONGEST
         for k in range(6):
             longest = max(longest, abs(s.step[k]))
         for k in range(6):
-            angles[k] += s.step[k] * (LONGEST / longest)
+            angles[k] += s.step[k] * (_LONGEST / longest)
     return away
 
 
 @compiled
 def lead(leg, known, angles, turn, place, s):
-    """Fill ``angles`` (6,) for the pose ``turn``, ``place``, led there from the angles ``known``; return how far the foot is from it."""
+    """Fill ``angles`` (6,) for the pose ``turn``, ``place``, led there from the angles ``known``; return how far the
+    foot is from it.
+    """
     for k in range(6):
         angles[k] = known[k]
     place_foot(leg, angles, s)
@@ -198,8 +222,8 @@ def lead(leg, known, angles, turn, place, s):
 
 @compiled
 def close_leg(leg, known, turn, place, s, out, away):
-    """Fill ``out`` (T, 6) with the angles for poses ``turn`` (T, 3, 3), ``place`` (T, 3) of the foot, ``away`` (T,) how far it stays from
-    them.
+    """Fill ``out`` (T, 6) with the angles for poses ``turn`` (T, 3, 3), ``place`` (T, 3) of the foot, ``away`` (T,) how
+    far it stays from them.
     """
     for t in range(len(place)):
         change = np.inf
@@ -210,5 +234,5 @@ def close_leg(leg, known, turn, place, s, out, away):
             change = 0.0
             for k in range(6):
                 change = max(change, abs(out[t, k] - out[t - 1, k]))
-        if not (away[t] < CLOSED and change < NEAR):
+        if not (away[t] < CLOSED and change < _NEAR):
             away[t] = lead(leg, known, out[t], turn[t], place[t], s)

@@ -1,9 +1,11 @@
-"""Minimise the marker cost of frames one by one: projected Newton with damping, on the manifold of postures, compiled (numba).
+"""Minimise the marker cost of frames one by one: projected Newton with damping, on the manifold of postures, compiled
+(numba).
 
-Each frame has its own damping and its own set of joints held at a limit. A frame takes the exact second derivatives where they are
-positive definite and Gauss-Newton's where they are not, so a stationary point that is no minimum is left. Convergence is judged by
-the projected gradient, never by the size of a step or of the change of the cost (Bertsekas 1982, DOI 10.1137/0320018). Ball joints
-step by a rotation vector, so that their Cardan angles' singularity is no obstacle, and by their angles where a limit is met.
+Each frame has its own damping and its own set of joints held at a limit. A frame takes the exact second derivatives
+where they are positive definite and Gauss-Newton's where they are not, so a stationary point that is no minimum is
+left. Convergence is judged by the projected gradient, never by the size of a step or of the change of the cost
+(Bertsekas 1982, DOI 10.1137/0320018). Ball joints step by a rotation vector, so that their Cardan angles' singularity
+is no obstacle, and by their angles where a limit is met.
 """
 
 import numpy as np
@@ -25,16 +27,22 @@ from biodance.motion.ik.compiled.chain import (
 )
 
 STEP_LIMIT = 0.7
-"""rad, largest change of an angle in one step: keeps a step of an ill-determined joint (straight arm, gimbal) inside its model."""
+"""rad, largest change of an angle in one step: keeps a step of an ill-determined joint (straight arm, gimbal) inside
+its model.
+"""
 
 FIRST_DAMPING = 0.1
-"""Damping after the first refused step, in units of the moved marker weight times lever squared; ten times more after each further one."""
+"""Damping after the first refused step, in units of the moved marker weight times lever squared; ten times more
+after each further one.
+"""
 
-NEAR = 0.03
+_NEAR = 0.03
 """m, slope below which the exact second derivatives are tried; farther away Gauss-Newton descends better."""
 
-ROUNDING = 1e-13
-"""A rise of the cost by less than this fraction of the markers' squared distances from their mean is rounding, not a rise."""
+_ROUNDING = 1e-13
+"""A rise of the cost by less than this fraction of the markers' squared distances from their mean is rounding, not a
+rise.
+"""
 
 
 @compiled
@@ -43,12 +51,16 @@ def held_at(chain, q, at, g, held):
     first, roots = q.shape[0] - chain.parent.shape[0], chain.roots
     for i in range(g.shape[0]):
         j = i - roots
-        held[i] = j >= 0 and ((q[first + j] <= chain.lower[j] and g[i] > 0) or (q[first + j] >= chain.upper[j] and g[i] < 0))
+        held[i] = j >= 0 and (
+            (q[first + j] <= chain.lower[j] and g[i] > 0) or (q[first + j] >= chain.upper[j] and g[i] < 0)
+        )
 
 
 @compiled
 def turn_balls(chain, at, g, held, cardan, turning):
-    """Mark the ball joints that step by a rotation vector, all but ``cardan`` and the held, and turn their third axis and gradient so."""
+    """Mark the ball joints that step by a rotation vector, all but ``cardan`` and the held, and turn their third
+    axis and gradient so.
+    """
     for b in range(chain.ball.shape[0]):
         j = chain.ball[b]
         i = chain.roots + j
@@ -75,7 +87,9 @@ def largest_slope(chain, at, g, held):
 
 @compiled
 def displace(chain, q, x, turning, stopped, out):
-    """Fill ``out`` with q moved by the step x (nv,), angles within their limits; mark the ball joints that a limit ``stopped``."""
+    """Fill ``out`` with q moved by the step x (nv,), angles within their limits; mark the ball joints that a limit
+    ``stopped``.
+    """
     roots, first = chain.roots, q.shape[0] - chain.parent.shape[0]
     if roots:
         for c in range(3):
@@ -107,7 +121,9 @@ def shorten(chain, x):
 
 @compiled
 def centred_squares(chain, xyz, weight):
-    """Return the weighted squared distances of the markers from their mean, m² (from the lab's origin for a fixed root)."""
+    """Return the weighted squared distances of the markers from their mean, m² (from the lab's origin for a fixed
+    root).
+    """
     total, square = 0.0, 0.0
     mean = np.zeros(3)
     for k in range(xyz.shape[0]):
@@ -122,11 +138,13 @@ def centred_squares(chain, xyz, weight):
 
 @compiled
 def minimise_frames(chain, xyz, weight, frames, q, tolerance, steps, cost, slope, taken):
-    """Move the postures q (B, nq) to minima for the markers xyz (T, K, 3) m, of ``weight`` (T, K), in ``frames`` (B,); at most ``steps``.
+    """Move the postures q (B, nq) to minima for the markers xyz (T, K, 3) m, of ``weight`` (T, K), in ``frames`` (B,);
+    at most ``steps``.
 
-    Fills ``cost`` (B,) m², ``slope`` (B,) m and ``taken`` (B,) steps. The slope is the largest gradient over the coordinates that no limit
-    holds, divided by the marker weight that the coordinate moves and its lever (1, or LENGTH for an angle): a mean marker displacement
-    that could still be gained; a frame stops where it falls under ``tolerance``.
+    Fills ``cost`` (B,) m², ``slope`` (B,) m and ``taken`` (B,) steps. The slope is the largest gradient over the
+    coordinates that no limit holds, divided by the marker weight that the coordinate moves and its lever (1, or LENGTH
+    for an angle): a mean marker displacement that could still be gained; a frame stops where it falls under
+    ``tolerance``.
     """
     at, nv, nq = sums_of(chain), chain.depth.shape[0], q.shape[1]
     g, x, held, new = np.empty(nv), np.empty(nv), np.zeros(nv, dtype=np.bool_), np.empty(nq)
@@ -145,7 +163,7 @@ def minimise_frames(chain, xyz, weight, frames, q, tolerance, steps, cost, slope
             slope[f], taken[f] = largest_slope(chain, at, g, held), step
             if slope[f] <= tolerance or step == steps:
                 break
-            newton = slope[f] < NEAR and not bent
+            newton = slope[f] < _NEAR and not bent
             if newton:
                 hessian(chain, at, at.below[:, 4:7], at.below[:, 7:])
             else:
@@ -161,7 +179,7 @@ def minimise_frames(chain, xyz, weight, frames, q, tolerance, steps, cost, slope
             if convex:
                 place(chain, new, at)
                 lowered = add_up(chain, seen, w, new, at)
-            better = convex and (lowered <= cost[f] or lowered <= cost[f] + ROUNDING * centred_squares(chain, seen, w))
+            better = convex and (lowered <= cost[f] or lowered <= cost[f] + _ROUNDING * centred_squares(chain, seen, w))
             retreat = False
             for b in range(groups):
                 retreat = retreat or (stopped[b] and not cardan[b])
