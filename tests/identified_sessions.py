@@ -10,7 +10,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from biodance.body.human.human import human
-from biodance.identification.loads import point_mass
+from biodance.identification.loads import compact_load
 from biodance.motion.comparison import compare
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.identification import identify_trials
@@ -50,7 +50,7 @@ def truth(*, load: float = 0.0) -> np.ndarray:
     for name, factor in (("left_thigh", 1.15), ("right_thigh", 1.1), ("trunk_head", 0.89)):
         phi[one.segment_index(name)] *= factor
     phi *= SUBJECT.mass / phi[:, 0].sum()
-    phi[one.segment_index("left_forearm_hand")] += load * point_mass(np.array([0.0, -0.2, 0.02]))
+    phi[one.segment_index("left_forearm_hand")] += load * compact_load(np.array([0.0, -0.2, 0.02]))
     return phi.ravel()
 
 

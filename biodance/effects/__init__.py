@@ -13,11 +13,12 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from biodance.discovery import Chosen, Family
-from biodance.effects._base.case import Case, at_origin, at_point
+from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded, unit_of
 from biodance.errors import UnknownName
 from biodance.records import Session
+from biodance.spatial import wrench_about_origin, wrench_about_point
 
 __all__ = [
     "Case",
@@ -26,14 +27,14 @@ __all__ = [
     "Gate",
     "Parameter",
     "Recorded",
-    "at_origin",
-    "at_point",
     "causes",
     "discrete_effects",
     "effect",
     "effects",
     "gates",
     "unit_of",
+    "wrench_about_origin",
+    "wrench_about_point",
 ]
 
 Cause = Effect | DiscreteEffect

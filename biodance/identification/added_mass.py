@@ -18,7 +18,7 @@ from biodance.body.body import Body
 from biodance.identification.identification import Identification
 from biodance.identification.information import Information
 from biodance.identification.knowledge import SIGMAS
-from biodance.identification.loads import load_moments, point_mass
+from biodance.identification.loads import compact_load, load_moments
 from biodance.identification.posterior import prior_factor
 from biodance.records import Array, Sip
 
@@ -150,7 +150,7 @@ def _suspect(body: Body, i: int, rows: Array, surprise: Array) -> LoadCandidate:
         place = load[1:4] / mass
         slope = np.column_stack([-place / mass, np.eye(3) / mass])
         place_sd = np.sqrt(np.diag(slope @ covariance[:4, :4] @ slope.T))
-    shown = B.T @ (rows @ point_mass(body.boxes[i].mean(axis=0)))
+    shown = B.T @ (rows @ compact_load(body.boxes[i].mean(axis=0)))
     per_kg = 0.5 * float(shown @ inner @ shown)
     wanted = (
         np.log((1 - _THRESHOLD) / _THRESHOLD * len(body.segments))

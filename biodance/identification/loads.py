@@ -6,6 +6,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.records import Array, Sip
+from biodance.spatial import point_mass
 
 _SCALE = 2.0
 """kg: typical size of a load; the answer changes little between half and twice of it."""
@@ -17,13 +18,9 @@ UNDECLARED = 0.25
 """Share of a load's second moment that noise is learned with: 1 kg on every segment, undeclared."""
 
 
-def point_mass(place: Array, radius: float = _RADIUS) -> Array:
-    """Return the ten parameters per kg of a compact load with CoM at ``place`` (3,) m and radius of gyration
-    ``radius`` m.
-    """
-    x, y, z = place
-    r = radius**2
-    return np.array([1.0, x, y, z, y * y + z * z + r, -x * y, x * x + z * z + r, -x * z, -y * z, x * x + y * y + r])
+def compact_load(place: Array) -> Array:
+    """Return the ten parameters per kg of a compact load with CoM at ``place`` (3,) m."""
+    return point_mass(1.0, place, radius=_RADIUS)
 
 
 def load_moments(body: Body, segment: int) -> Array:
@@ -34,7 +31,7 @@ def load_moments(body: Body, segment: int) -> Array:
     margin = _NEAR * (high - low)
     rng = np.random.default_rng(segment)
     place = rng.uniform(low - margin, high + margin, (2000, 3))
-    loads = np.array([point_mass(p) for p in place]) * _SCALE
+    loads = np.array([compact_load(p) for p in place]) * _SCALE
     moment = loads.T @ loads / len(loads)
     value, vector = np.linalg.eigh(moment)
     keep = value > 1e-12 * value.max()

@@ -12,10 +12,9 @@ from biodance.diagnosis.spectrum import SHORTEST_RUN, spectrum, thinned
 from biodance.effects import Case
 from biodance.identification.identification import standing_point
 from biodance.identification.statistics import Fit
-from biodance.lab.filters import runs
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES
 from biodance.pipeline.results import TrialResult
-from biodance.records import Array, Role
+from biodance.records import Array, Role, runs
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.tolerances import REFERENCE_PERSON, Tolerances, shipped
 

@@ -17,9 +17,9 @@ from biodance.body.pinocchio_model import load_pinocchio
 from biodance.errors import BiodanceError
 from biodance.motion.ik.general_legs import GeneralLeg
 from biodance.motion.ik.legs import Leg
-from biodance.motion.kinematics import axis_rotation
 from biodance.motion.regressor import GRAVITY
 from biodance.records import Array, Motion
+from biodance.spatial import axis_rotation
 
 ROOT = 6
 _TURNS = ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))

@@ -16,8 +16,9 @@ from biodance.body.changes import carried_by, neutral_turn
 from biodance.effects._base.moved_matter import MovedMatter, centres_of, moved_matter, wrench_of
 from biodance.effects._base.posture_answer import PostureAnswer
 from biodance.lab.filters import LowPass, motion_filter
-from biodance.motion.kinematics import Poses, SegmentMotion, below, chains, jacobian, skew
+from biodance.motion.kinematics import Poses, SegmentMotion, below, chains, jacobian
 from biodance.records import Array, Index
+from biodance.spatial import skew
 
 if TYPE_CHECKING:
     from biodance.effects._base.case import Case

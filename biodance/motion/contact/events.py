@@ -4,10 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.lab.filters import runs
 from biodance.motion.contact.contact import Contact
 from biodance.motion.contact.soles import FEET
-from biodance.records import Wrench
+from biodance.records import Wrench, runs
 
 _THRESHOLD = 20.0
 """N of vertical force from which a foot counts as down (Zeni et al. 2008, doi:10.1016/j.gaitpost.2007.07.007, use

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.lab.filters import runs
 from biodance.motion.contact.soles import FEET, Soles
-from biodance.records import Array, Plate, Trial
+from biodance.records import Array, Plate, Trial, runs
 
 if TYPE_CHECKING:
     pass

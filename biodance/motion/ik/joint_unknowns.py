@@ -10,8 +10,9 @@ from biodance.body.body import Body
 from biodance.body.human.skeleton import JOINTS
 from biodance.body.human.static_centres import Centres
 from biodance.body.tables.error_sizes import error_size, joint_size
-from biodance.motion.kinematics import Poses, axis_rotation, below, chains, poses, skew
+from biodance.motion.kinematics import Poses, below, chains, poses
 from biodance.records import Array
+from biodance.spatial import axis_rotation, skew
 
 HINGES = ("right_knee", "left_knee", "right_elbow", "left_elbow")
 ABOVE = {"knee": "hip", "elbow": "shoulder"}
