@@ -19,8 +19,8 @@ from biodance.identification.statistics import Fit
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.pipeline.body import body_of
-from biodance.pipeline.results import TrialResult
 from biodance.pipeline.trial import examine_trial, prepare_trial
+from biodance.pipeline.trial_result import TrialResult
 from biodance.records import Array, Session, Subject
 from biodance.virtual_lab.flesh import of_parameters, parameters_of_inertia, place_inertia
 from biodance.virtual_lab.laboratory import LabVisit

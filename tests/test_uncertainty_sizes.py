@@ -9,7 +9,7 @@ import pytest
 from diagnosed_sessions import body, known, looks
 
 import biodance
-from biodance.body.body import JointError
+from biodance.body.parts import JointError
 from biodance.body.tables.anthropometry import read_table
 from biodance.body.tables.error_sizes import error_rows, error_size, joint_size
 from biodance.diagnosis.candidates import candidates

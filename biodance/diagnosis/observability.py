@@ -11,7 +11,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from biodance.body.body import Body, JointError
+from biodance.body.body import Body
+from biodance.body.parts import JointError
 from biodance.diagnosis.candidates import SCALE, Candidate
 from biodance.diagnosis.diagnosis import Unobservable
 from biodance.diagnosis.evidence import smallest

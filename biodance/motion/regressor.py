@@ -16,11 +16,7 @@ from biodance.body.body import Body
 from biodance.body.inertia import TENSOR
 from biodance.motion.kinematics import SegmentMotion, segment_motion
 from biodance.records import Array, Motion, Wrench
-from biodance.settings import STANDARD_GRAVITY
 from biodance.spatial import skew
-
-GRAVITY = np.array([0.0, 0.0, -STANDARD_GRAVITY])
-"""(3,) m/s², lab frame, z up: where no body says otherwise (`Body.gravity`)."""
 
 
 def _inertia_columns(local: Array) -> Array:

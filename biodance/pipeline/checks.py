@@ -5,7 +5,7 @@ The limits, and where they come from, are `biodance.settings.CheckLimits`.
 
 import numpy as np
 
-from biodance.pipeline.results import Check, QuietStanding, TrialResult
+from biodance.pipeline.trial_result import Check, QuietStanding, TrialResult
 from biodance.records import Subject
 from biodance.settings import CheckLimits
 

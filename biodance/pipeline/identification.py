@@ -19,10 +19,10 @@ from biodance.identification.torques import TorqueBands, torque_bands
 from biodance.identification.validation import ResidualRatio, TrialValidation, residual_ratio, validate
 from biodance.motion.comparison import Agreement, compare
 from biodance.motion.contact.contact import foot_wrenches, ground_contact
-from biodance.motion.contact.soles import FEET, soles_from_body
+from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.regressor import predict_wrench
-from biodance.pipeline.results import TrialResult
-from biodance.records import ROLES, Role, Wrench
+from biodance.pipeline.trial_result import TrialResult
+from biodance.records import ROLES, SIDES, Role, Wrench
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -228,7 +228,7 @@ def _torques(found: Identification, results: tuple[TrialResult, ...]) -> TorqueB
                 continue
             soles = soles_from_body(found.body, one.motion)
             feet = foot_wrenches(one.trial, ground_contact(one.trial, soles, mass=found.sip.mass.sum()), soles)
-            ground = {f"{side}_foot": wrench for side, wrench in zip(FEET, feet, strict=True)}
+            ground = {f"{side}_foot": wrench for side, wrench in zip(SIDES, feet, strict=True)}
             return torque_bands(found, one.motion, ground, trial=one.trial.name, use=one.comparison.used)
     return None
 

@@ -13,7 +13,7 @@ from biodance.effects import Case
 from biodance.identification.identification import standing_point
 from biodance.identification.statistics import Fit
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES
-from biodance.pipeline.results import TrialResult
+from biodance.pipeline.trial_result import TrialResult
 from biodance.records import Array, Role, runs
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.tolerances import REFERENCE_PERSON, Tolerances, shipped

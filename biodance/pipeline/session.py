@@ -10,9 +10,10 @@ from biodance.errors import SessionRefused, TrialRefused
 from biodance.pipeline.body import body_of
 from biodance.pipeline.checks import mass_check, standing_check, trial_checks
 from biodance.pipeline.identification import SessionIdentification, can_identify, identify_trials
-from biodance.pipeline.results import QuietStanding, SessionResult, Step, Still, TrialResult
+from biodance.pipeline.results import SessionResult, Still
 from biodance.pipeline.still import load_still, still_of, worst_still
 from biodance.pipeline.trial import attempt, examine_trial, prepare_trial
+from biodance.pipeline.trial_result import QuietStanding, Step, TrialResult
 from biodance.records import Session
 from biodance.settings import StandingRules
 

@@ -12,7 +12,7 @@ from biodance.body.body import Body
 from biodance.lab.markers.sets import landmark, read_marker_set
 from biodance.lab.weight import movement
 from biodance.motion.kinematics import poses
-from biodance.pipeline.results import QuietStanding
+from biodance.pipeline.trial_result import QuietStanding
 from biodance.records import Array, Markers, Motion, Trial, runs
 from biodance.settings import StandingRules
 

@@ -10,13 +10,14 @@ from biodance.records.markers import Markers
 from biodance.records.motion import Motion
 from biodance.records.session import ROLES, Role, Session, Source, Trial
 from biodance.records.sip import Sip
-from biodance.records.subject import Subject
+from biodance.records.subject import SIDES, Subject
 from biodance.records.wrench import Plate, Wrench
 
 __all__ = [
     "CHANNELS",
     "CHANNEL_TITLES",
     "ROLES",
+    "SIDES",
     "Array",
     "Index",
     "Markers",

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.body.body import SegmentMarkers
+from biodance.body.parts import GRAVITY, SegmentMarkers
 from biodance.motion.kinematics import Poses, poses
-from biodance.motion.regressor import GRAVITY
-from biodance.records import Array, Markers
+from biodance.records import SIDES, Array, Markers
 from biodance.virtual_lab.performance import Performance
 from biodance.virtual_lab.person import Person
 from biodance.virtual_lab.protocol import STAND
@@ -92,7 +91,7 @@ def reference_angles(person: Person) -> Array:
     away.
     """
     angles = dict(person.habits.angles)
-    for side in ("right", "left"):
+    for side in SIDES:
         flexion, adduction, rotation, elbow = np.radians(STAND.values[f"{side}_arm"])
         angles |= {f"{side}_shoulder_flexion": flexion, f"{side}_shoulder_adduction": adduction}
         angles |= {f"{side}_shoulder_rotation": rotation, f"{side}_elbow_flexion": elbow}

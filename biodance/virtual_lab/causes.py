@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from biodance.errors import BiodanceError, UnknownName
-from biodance.records import Subject
+from biodance.records import SIDES, Subject
 from biodance.virtual_lab import faults, forces
 from biodance.virtual_lab import instrument_faults as amplifier_faults
 from biodance.virtual_lab import instrument_faults as camera_faults
@@ -169,7 +169,7 @@ def _longer(cause: Hidden, scene: Scene) -> Scene:
     """
     ends = {
         f"{side}_{upper}": f"{side}_{joint}"
-        for side in ("right", "left")
+        for side in SIDES
         for upper, joint in (("thigh", "knee"), ("shank", "ankle"))
     }
     if cause.target not in ends:

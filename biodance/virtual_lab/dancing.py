@@ -13,12 +13,13 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 from scipy.special import logsumexp
 
-from biodance.body.body import UPRIGHT, Body
+from biodance.body.body import Body
+from biodance.body.parts import UPRIGHT
 from biodance.errors import BiodanceError
 from biodance.motion.ik.legs import Leg
 from biodance.motion.kinematics import poses
-from biodance.records import Array, Motion, frozen_array
-from biodance.virtual_lab.choreography import COLUMNS, RAISED, SHIFT, SIDES, WIDTH, Curves
+from biodance.records import SIDES, Array, Motion, frozen_array
+from biodance.virtual_lab.choreography import COLUMNS, RAISED, SHIFT, WIDTH, Curves
 from biodance.virtual_lab.performance import MARGIN, NODE_RATE, Performance, keep_balance
 from biodance.virtual_lab.person import Person
 from biodance.virtual_lab.posing import STRAIGHT, FootStance, Pose, Z, turn_about, upper_body

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from biodance.body.parts import GRAVITY
 from biodance.errors import UnknownName
 from biodance.motion.kinematics import Poses, poses
-from biodance.motion.regressor import GRAVITY
 from biodance.records import Array
 from biodance.virtual_lab.choreography import septic
 from biodance.virtual_lab.merge import CARRIERS, MERGED

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from biodance.body.parts import GRAVITY
 from biodance.body.pinocchio_model import load_pinocchio
-from biodance.motion.regressor import GRAVITY
 from biodance.records import Array, Motion, Wrench
 from biodance.virtual_lab.choreography import Curves, choreograph
 from biodance.virtual_lab.person import Person

@@ -7,7 +7,7 @@ asks.
 
 import numpy as np
 
-from biodance.body.body import SegmentMarkers
+from biodance.body.parts import SegmentMarkers
 from biodance.records import Array
 from biodance.virtual_lab.randomness import stream
 from biodance.virtual_lab.skeleton import TRUE_SEGMENTS, Proportions, on_side

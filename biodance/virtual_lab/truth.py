@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from biodance import __version__
 from biodance.body.body import Body
 from biodance.records import Array, Sip
+from biodance.version import __version__
 from biodance.virtual_lab.flesh import of_parameters, parameters_of_inertia, place_inertia
 from biodance.virtual_lab.laboratory import Instruments
 from biodance.virtual_lab.merge import merged_sip, place_in_12, poses_12

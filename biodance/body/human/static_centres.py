@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.body.body import JointError
 from biodance.body.human.joint_centres import (
     chord,
     davis_hip,
@@ -17,6 +16,7 @@ from biodance.body.human.joint_centres import (
     wrist,
 )
 from biodance.body.human.measures import Measures
+from biodance.body.parts import JointError
 from biodance.body.tables.error_sizes import error_size
 from biodance.records import Array
 from biodance.settings import Hip

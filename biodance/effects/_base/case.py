@@ -4,20 +4,17 @@ needs.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.effects._base.geometry import Geometry, geometry
 from biodance.errors import TrialRefused, UnknownName
+from biodance.lab.filters import motion_filter
 from biodance.motion.kinematics import Poses, SegmentMotion, poses, segment_motion
 from biodance.motion.regressor import regressor_of
 from biodance.records import Array, Motion, Plate, Trial, Wrench, frozen_array
 from biodance.spatial import wrench_about_point
-
-if TYPE_CHECKING:
-    from biodance.effects._base.geometry import Geometry
-
 
 OF_MOTION = ("regressor", "segments", "poses", "marker_columns", "measured_markers", "marker_residual", "memory")
 """What a case computes once from body, motion and markers, whatever the forces and the parameters."""
@@ -112,11 +109,18 @@ class Case:
         return {}
 
     @cached_property
-    def geometry(self) -> "Geometry":
+    def geometry(self) -> Geometry:
         """How posture, wrench and markers answer to changes of the body's geometry."""
-        from biodance.effects._base.geometry import geometry
-
-        return geometry(self)
+        return geometry(
+            self.body,
+            self.motion,
+            self.phi,
+            poses=self.poses,
+            segments=self.segments,
+            columns=self.marker_columns,
+            measured=self.measured_markers,
+            smoothed=motion_filter(self.trial.settings),
+        )
 
     def plate(self, name: str) -> Plate:
         """Return a plate by name; UnknownName lists the trial's plates."""

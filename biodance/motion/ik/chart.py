@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.body.body import NO_SEGMENT, Body
+from biodance.body.body import Body
+from biodance.body.parts import NO_SEGMENT
 from biodance.records import Array, Index
 from biodance.spatial import continuous_quaternion, unit_quaternion
 

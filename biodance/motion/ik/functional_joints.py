@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.body.body import Body, JointError
+from biodance.body.body import Body
 from biodance.body.human.scaling import Scaling
 from biodance.body.human.skeleton import JOINTS
+from biodance.body.parts import JointError
 from biodance.body.tables.error_sizes import error_size
 from biodance.errors import TrialRefused
 from biodance.motion.ik.inverse_kinematics import FrameStatus, solve_ik

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from biodance.display import BLACK, GREEN, GREY, RED, SKY
-from biodance.pipeline.results import MarkerFit, QuietStanding, WrenchComparison
+from biodance.pipeline.trial_result import MarkerFit, QuietStanding, WrenchComparison
 from biodance.records import CHANNELS, Array, runs
 from biodance.report.figures.style import SIDE_COLOURS, figure, look
 

@@ -6,7 +6,8 @@ from importlib.resources import files
 
 from biodance.lab.markers.gaps import MarkerGaps
 from biodance.pipeline.provenance import Provenance
-from biodance.pipeline.results import Check, SessionResult, TrialResult
+from biodance.pipeline.results import SessionResult
+from biodance.pipeline.trial_result import Check, TrialResult
 from biodance.records import CHANNELS
 from biodance.report.figures.session import marker_figure, standing_figure, wrench_figure
 from biodance.report.figures.style import svg_address
