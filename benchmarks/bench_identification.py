@@ -89,7 +89,7 @@ def own_truth(one: TrackedVisit) -> Array:
     """Return the truth about the true joint centres, in the model's axes (the pelvis in the model's frame)."""
     from virtual_visits import _orthogonal
 
-    from biodance.virtual_lab.flesh import of_parameters, parameters_of_inertia, place_inertia
+    from biodance.virtual_lab.person.flesh import of_parameters, parameters_of_inertia, place_inertia
 
     return np.concatenate(
         [

@@ -22,7 +22,7 @@ from biodance.diagnosis.observability import detection_limits
 from biodance.diagnosis.problem import problem
 from biodance.effects import discrete_effects, effects
 from biodance.pipeline.diagnosis import diagnose_session
-from biodance.virtual_lab.causes import parse_cause
+from biodance.virtual_lab.faults.causes import parse_cause
 
 SIGMAS = 1.959964
 

@@ -10,10 +10,9 @@ from biodance.body.body import Body
 from biodance.body.parts import Foot, JointLimits
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import SIDES, Array, Sip, Subject, frozen_array
-from biodance.virtual_lab.flesh import draw_sip, of_parameters, parameters_of_inertia, true_pseudo_inertia
-from biodance.virtual_lab.placement import glue_markers
-from biodance.virtual_lab.randomness import stream
-from biodance.virtual_lab.skeleton import (
+from biodance.virtual_lab.person.flesh import draw_sip, of_parameters, parameters_of_inertia, true_pseudo_inertia
+from biodance.virtual_lab.person.placement import glue_markers
+from biodance.virtual_lab.person.skeleton import (
     LIMITS_DEGREES,
     TRUE_SEGMENTS,
     Proportions,
@@ -21,6 +20,7 @@ from biodance.virtual_lab.skeleton import (
     draw_proportions,
     on_side,
 )
+from biodance.virtual_lab.randomness import stream
 from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.records import SIDES, Array
-from biodance.virtual_lab.protocol import FIELDS, STAND, ProtocolPosture, ProtocolStep, TrialPlan
+from biodance.virtual_lab.movement.protocol import FIELDS, STAND, ProtocolPosture, ProtocolStep, TrialPlan
 from biodance.virtual_lab.randomness import smooth_noise
 
 COLUMNS = {

@@ -10,8 +10,8 @@ from scipy.special import logsumexp
 from biodance.body.parts import UPRIGHT
 from biodance.motion.ik.legs import LEG, Leg, soft_limit
 from biodance.records import SIDES, Array
-from biodance.virtual_lab.choreography import Curves
-from biodance.virtual_lab.person import Person
+from biodance.virtual_lab.movement.choreography import Curves
+from biodance.virtual_lab.person.person import Person
 from biodance.virtual_lab.randomness import smooth_noise
 from biodance.virtual_lab.tolerances import LabTolerances
 

@@ -15,10 +15,18 @@ from scipy.spatial.transform import Rotation
 from biodance.body.parts import GRAVITY
 from biodance.body.pinocchio_model import load_pinocchio
 from biodance.records import Array, Motion, Wrench
-from biodance.virtual_lab.choreography import Curves, choreograph
-from biodance.virtual_lab.person import Person
-from biodance.virtual_lab.posing import FootStance, Height, Pose, pelvis_height, stand_on_feet, take_stance, upper_body
-from biodance.virtual_lab.protocol import TrialPlan
+from biodance.virtual_lab.movement.choreography import Curves, choreograph
+from biodance.virtual_lab.movement.posing import (
+    FootStance,
+    Height,
+    Pose,
+    pelvis_height,
+    stand_on_feet,
+    take_stance,
+    upper_body,
+)
+from biodance.virtual_lab.movement.protocol import TrialPlan
+from biodance.virtual_lab.person.person import Person
 from biodance.virtual_lab.randomness import smooth_noise, stream
 from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances
 

@@ -9,11 +9,11 @@ import numpy as np
 from biodance.body.parts import GRAVITY, SegmentMarkers
 from biodance.motion.kinematics import Poses, poses
 from biodance.records import SIDES, Array, Markers
-from biodance.virtual_lab.performance import Performance
-from biodance.virtual_lab.person import Person
-from biodance.virtual_lab.protocol import STAND
+from biodance.virtual_lab.movement.performance import Performance
+from biodance.virtual_lab.movement.protocol import STAND
+from biodance.virtual_lab.person.person import Person
+from biodance.virtual_lab.person.skeleton import ARM_AND_LEG, TRUE_SEGMENTS
 from biodance.virtual_lab.randomness import smooth_noise, stream
-from biodance.virtual_lab.skeleton import ARM_AND_LEG, TRUE_SEGMENTS
 from biodance.virtual_lab.tolerances import LabTolerances
 
 PULL: dict[str, dict[str, float]] = {

@@ -19,11 +19,11 @@ from biodance.errors import BiodanceError
 from biodance.motion.ik.legs import Leg
 from biodance.motion.kinematics import poses
 from biodance.records import SIDES, Array, Motion, frozen_array
-from biodance.virtual_lab.choreography import COLUMNS, RAISED, SHIFT, WIDTH, Curves
-from biodance.virtual_lab.performance import MARGIN, NODE_RATE, Performance, keep_balance
-from biodance.virtual_lab.person import Person
-from biodance.virtual_lab.posing import STRAIGHT, FootStance, Pose, Z, turn_about, upper_body
-from biodance.virtual_lab.protocol import TrialPlan
+from biodance.virtual_lab.movement.choreography import COLUMNS, RAISED, SHIFT, WIDTH, Curves
+from biodance.virtual_lab.movement.performance import MARGIN, NODE_RATE, Performance, keep_balance
+from biodance.virtual_lab.movement.posing import STRAIGHT, FootStance, Pose, Z, turn_about, upper_body
+from biodance.virtual_lab.movement.protocol import TrialPlan
+from biodance.virtual_lab.person.person import Person
 from biodance.virtual_lab.randomness import smooth_noise, stream
 from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances
 
