@@ -169,7 +169,8 @@ def _performed(person: Person, plan: TrialPlan, session: int, **how: object) -> 
         body.markers.position.tobytes(),
         sorted(how.items(), key=str),
     )
-    return PERFORMANCES.recall(said, lambda: perform(person, plan, session, **how))  # type: ignore[arg-type, return-value]
+    made = PERFORMANCES.recall(said, lambda: perform(person, plan, session, **how))  # type: ignore[arg-type]
+    return made  # type: ignore[return-value]
 
 
 def store(path: Path, value: object) -> None:

@@ -107,7 +107,9 @@ def test_a_hidden_fault_is_named_and_sized(hidden, effect, target, parameter, si
 
 
 def test_two_faults_are_both_named() -> None:
-    both = lambda wrench, session, moving: late(about_plate(offset)(wrench, session, moving), session, moving)  # noqa: E731
+    def both(wrench, session, moving):
+        return late(about_plate(offset)(wrench, session, moving), session, moving)
+
     diagnosis = found(both).diagnosis
     assert {f.effect for f in diagnosis.findings} == {"plate_offset", "time_delay"}
 

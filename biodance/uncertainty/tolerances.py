@@ -126,12 +126,11 @@ def to_toml(found: Tolerances) -> str:
     """Return the tolerances as the text of a TOML file that `read_tolerances` reads."""
     lines = [f'origin = "{found.origin}"', f"threshold = {found.threshold:.4g}"]
     for name in ("energy", "energy_sd"):
-        rows = ", ".join("[" + ", ".join(f"{x:.4g}" for x in row) + "]" for row in getattr(found, name))
-        lines.append(f"{name} = [{rows}]")
+        rows = [f"  [{', '.join(f'{x:.4g}' for x in row)}]," for row in getattr(found, name)]
+        lines += [f"{name} = [", *rows, "]"]
     lines.append("noise = [")
-    lines += [
-        "  [" + ", ".join("[" + ", ".join(f"{x:.5g}" for x in row) + "]" for row in band) + "]," for band in found.noise
-    ]
+    for band in found.noise:
+        lines += ["  [", *(f"    [{', '.join(f'{x:.5g}' for x in row)}]," for row in band), "  ],"]
     lines += ["]", "", "[sizes]"]
     lines += [f'"{key}" = {value:.4g}' for key, value in sorted(found.sizes.items())]
     lines += ["", "[means]"] + [f'"{key}" = {value:.4g}' for key, value in sorted(found.means.items())]

@@ -158,7 +158,8 @@ def turning(state: State, segments: list[int]) -> tuple[Array, Array]:
     """Return angular velocity and acceleration (T, S, 3) of segments in their own frames."""
     links = [state.chain.carriers[i] for i in segments]
     turn = state.rotation[:, segments]
-    return tuple(np.einsum("tsij,tsi->tsj", turn, s[:, links, 3:]) for s in (state.velocity, state.acceleration))  # type: ignore[return-value]
+    w, dw = (np.einsum("tsij,tsi->tsj", turn, s[:, links, 3:]) for s in (state.velocity, state.acceleration))
+    return w, dw
 
 
 def dynamic_grams(state: State, segments: list[int]) -> Array:
