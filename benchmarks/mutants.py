@@ -135,8 +135,8 @@ def refuse_red_tests(copy: Path, mutants: Sequence[Mutant]) -> None:
     tests = dict.fromkeys(test for mutant in mutants for test in mutant.tests)
     code, output = run_tests(copy, tuple(tests))
     if code != ALL_PASSED:
-        named = "\n  ".join(FAILED.findall(output)) or output[-2000:]
-        raise SystemExit(f"These fail without any mutant, so they kill nothing:\n  {named}\nMend them first.")
+        named = "\n  ".join(FAILED.findall(output)) or "(see above)"
+        raise SystemExit(f"{output[-1500:]}\nThese fail without any mutant, so they kill nothing:\n  {named}\nMend them first.")
 
 
 @contextmanager
