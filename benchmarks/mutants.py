@@ -1,7 +1,7 @@
 """Break important lines one at a time and see whether the tests notice: a mutant that no test kills is a line that
 nobody guards.
 
-    python benchmarks/mutants.py [NAME ...] [--jobs 1] [--out mutants] [--again]
+    python benchmarks/mutants.py [NAME ...] [--jobs 1] [--out build/mutants] [--again]
 
 The mutants stand in `benchmarks/mutants.toml`: the exact snippet of one file, what it becomes, the tests that must
 fail. Each job works in its own temporary copy of the checkout, which itself is never touched. The named tests are run
@@ -35,7 +35,7 @@ SAFETY_SECONDS = 10.0
 """s, start of Python included, within which a mutant of the safety of dances must be killed."""
 PATIENCE = 600.0
 """s after which the tests of a mutant are given up."""
-NOT_COPIED = (".git", ".venv", "site", "out", "mutants", "__pycache__", ".*_cache", "*.egg-info")
+NOT_COPIED = (".git", ".venv", "build", "demo", "__pycache__", ".*_cache", "*.egg-info")
 FAILED, ERRORS, ALL_PASSED = re.compile(r"^(?:FAILED|ERROR) (\S+)", re.MULTILINE), (2, 3, 4, 5), 0
 
 
@@ -116,9 +116,7 @@ def _python(copy: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
         "MPLBACKEND": "Agg",
     }
     command, both = [sys.executable, *arguments], os.environ | own
-    return subprocess.run(
-        command, cwd=copy, env=both, capture_output=True, text=True, timeout=PATIENCE, check=False
-    )
+    return subprocess.run(command, cwd=copy, env=both, capture_output=True, text=True, timeout=PATIENCE, check=False)
 
 
 def run_tests(copy: Path, tests: Sequence[str], *options: str) -> tuple[int, str]:
@@ -136,7 +134,9 @@ def refuse_red_tests(copy: Path, mutants: Sequence[Mutant]) -> None:
     code, output = run_tests(copy, tuple(tests))
     if code != ALL_PASSED:
         named = "\n  ".join(FAILED.findall(output)) or "(see above)"
-        raise SystemExit(f"{output[-1500:]}\nThese fail without any mutant, so they kill nothing:\n  {named}\nMend them first.")
+        raise SystemExit(
+            f"{output[-1500:]}\nThese fail without any mutant, so they kill nothing:\n  {named}\nMend them first."
+        )
 
 
 @contextmanager
@@ -202,7 +202,9 @@ def table_of(mutants: Sequence[Mutant], outcomes: dict[str, Outcome]) -> str:
     for mutant in mutants:
         one = outcomes[mutant.name]
         by = f"`{one.by.removeprefix('tests/').split('[')[0]}`" if one.fate == "killed" else f"**{one.fate}**"
-        rows.append(f"| {mutant.name}{' (safety)' if mutant.safety else ''} | {mutant.why} | {by} | {one.seconds:.1f} |")
+        rows.append(
+            f"| {mutant.name}{' (safety)' if mutant.safety else ''} | {mutant.why} | {by} | {one.seconds:.1f} |"
+        )
     return "\n".join(rows)
 
 
@@ -211,7 +213,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("names", nargs="*", help="mutants of the table (all)")
     parser.add_argument("--jobs", type=int, default=1, help="how many side by side (1; timing holds for 1)")
-    parser.add_argument("--out", type=Path, default=Path("mutants"), help="folder that keeps the results")
+    parser.add_argument("--out", type=Path, default=Path("build/mutants"), help="folder that keeps the results")
     parser.add_argument("--again", action="store_true", help="run also those that have a result")
     chosen = parser.parse_args()
     every = read_mutants()
