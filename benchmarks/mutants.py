@@ -139,18 +139,32 @@ def refuse_red_tests(copy: Path, mutants: Sequence[Mutant]) -> None:
         )
 
 
+def broken_files(copy: Path, mutant: Mutant) -> dict[Path, str]:
+    """Return the files of ``copy`` that change, with their new text: the mutant's, and beside a table the file that
+    holds its digest, as of somebody who means the change (otherwise the digest alone would kill every one).
+    """
+    path = copy / mutant.file
+    before = path.read_bytes()
+    changed = {path: broken_text(mutant, before.decode())}
+    beside = path.with_suffix(".toml")
+    if path.suffix == ".csv" and beside.is_file():
+        digests = (hashlib.sha256(content).hexdigest() for content in (before, changed[path].encode()))
+        changed[beside] = beside.read_text(encoding="utf-8").replace(*digests)
+    return changed
+
+
 @contextmanager
 def broken(copy: Path, mutant: Mutant) -> Iterator[None]:
     """Have the mutant's line broken in ``copy``; what numba keeps compiled knows nothing of a broken callee."""
-    path = copy / mutant.file
-    if "/compiled/" in mutant.file:
-        shutil.rmtree(copy / ".numba", ignore_errors=True)
-    text = path.read_text(encoding="utf-8")
-    path.write_text(broken_text(mutant, text), encoding="utf-8")
+    changed = broken_files(copy, mutant)
+    before = {path: path.read_bytes() for path in changed}
+    for path, text in changed.items():
+        path.write_bytes(text.encode())
     try:
         yield
     finally:
-        path.write_text(text, encoding="utf-8")
+        for path, content in before.items():
+            path.write_bytes(content)
         if "/compiled/" in mutant.file:
             shutil.rmtree(copy / ".numba", ignore_errors=True)
 
