@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from diagnosed_sessions import known
 
 from biodance.diagnosis.candidates import Candidate
-from biodance.diagnosis.naming import Round, ScoredCandidate
+from biodance.diagnosis.naming import Round, ScoredCandidate, suspicious
 from biodance.effects import effect
 
 
@@ -34,3 +35,12 @@ def test_nobody_leaves_the_set_because_it_has_many_targets() -> None:
     ranking = Round((scored("plate_gain", 100.0), crowd))
     assert ranking.suspects[0].score - crowd.score > 3.0
     assert [one.effect for one in ranking.set] == ["plate_gain", "plate_crosstalk"]
+
+
+@pytest.mark.parametrize(("evidence", "targets", "named"), [(10.1, 1, True), (9.9, 1, False), (12.0, 30, False)])
+def test_a_cause_is_named_from_a_log_bayes_factor_of_ten_on_and_its_targets_count(
+    evidence: float, targets: int, named: bool
+) -> None:
+    assert known().threshold == 10.0
+    assert suspicious(Round((scored("plate_crosstalk", evidence, targets=targets),)), known()) == named
+    assert not suspicious(Round(()), known())
