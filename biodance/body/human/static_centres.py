@@ -39,7 +39,7 @@ class Centres:
     that axis may be turned about the bone; ``lateral`` -> (3,) m, the lateral marker. ``pelvis`` (3, 3) lab_R_pelvis;
     ``across`` side -> (3,) m, horizontal, to the right of the foot; ``cut``: at which fraction of the way from mid hip
     to mid shoulder the table cuts pelvis from trunk; ``notes`` what was assumed; ``errors`` of the joints that a
-    movement placed.
+    movement placed; ``contradicted`` the joints whose place here the movement contradicts.
     """
 
     place: Places
@@ -51,6 +51,7 @@ class Centres:
     cut: float
     notes: tuple[str, ...]
     errors: tuple[JointError, ...] = ()
+    contradicted: tuple[str, ...] = ()
 
 
 def static_centres(mark: Places, sizes: Measures, *, hip: Hip, trunk_fraction: float) -> Centres:
