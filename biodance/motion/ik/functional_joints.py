@@ -20,6 +20,7 @@ from biodance.body.tables.error_sizes import error_size
 from biodance.errors import TrialRefused
 from biodance.motion.ik.inverse_kinematics import FrameStatus, solve_ik
 from biodance.motion.ik.joint_unknowns import HINGES, SIZE, JointUnknowns, own_centre, own_turn
+from biodance.motion.ik.shown_joints import contradicted, doubted, excited, own_unknowns
 from biodance.motion.kinematics import chains, jacobian, poses
 from biodance.records import Array, Markers
 
@@ -29,15 +30,6 @@ _ALIKE = 8.0
 """s of movement that count as one independent posture, because skin slides with the posture and neighbours err alike.
 On virtual dances the places are the same from 1 to 16 s, their standard deviations are true at 8 s; in real walks of 2
 s less than 1 s moves joints by decimetres.
-"""
-EXCITED = 0.3
-"""Share of a joint's prior standard deviation that the movement must remove; below it the static trial's answer is
-kept, because what little the markers say of such a joint is soft tissue.
-"""
-_GAIN = 10.0
-"""Natural logarithm by which freeing a kept joint must make the markers more probable: the movement then contradicts
-the static trial's place, though it would hardly have shown a joint near it (28 sessions of 14 persons with joints near
-their places: 1.8 at most; a hip 81 mm off, two persons: 53 and 61).
 """
 NO_FIXED_POINT = ("shoulder", "trunk")
 """Joints of which no fixed point of the trunk gives the centre: what the table says of that is added to their standard
@@ -131,13 +123,13 @@ def _placed(scaling: Scaling, postures: Markers, seconds: float) -> tuple[Functi
     alike = max(1.0, postures.time.size * _ALIKE / seconds)
     noise = max(skin, fresh.rms / np.sqrt(3)) * np.sqrt(alike)
     start = evaluate_joints(scaling, postures, np.zeros(SIZE), fresh.q, noise=noise)
-    shown = excited(scaling, start)
+    shown = excited(scaling.centres, start.theta, start.information)
     found = fit_joints(scaling, postures, start, shown, noise=noise)
-    wrong = contradicted(found, shown)
+    wrong = contradicted(found.information, found.gradient, shown)
     if wrong:
-        scaling = replace(scaling, centres=replace(scaling.centres, contradicted=wrong))
+        scaling = replace(scaling, centres=doubted(scaling.centres, wrong))
         for joint in wrong:
-            shown[_own(joint)] = True
+            shown[own_unknowns(joint)] = True
         found = fit_joints(
             scaling, postures, evaluate_joints(scaling, postures, found.theta, found.q, noise=noise), shown, noise=noise
         )
@@ -223,46 +215,6 @@ def _left_open(coordinates: Array, slope: Array) -> Array:
     return np.asarray(
         slope - coordinates @ np.linalg.solve(square + 1e-9 * size * np.eye(square.shape[1]), transposed @ slope)
     )
-
-
-def excited(scaling: Scaling, at: CalibrationState) -> NDArray[np.bool_]:
-    """Return (37,) True for the unknowns of the joints of whose standard deviation the movement removes the share
-    ``EXCITED``.
-
-    A hinge is judged by its axis.
-    """
-    slope = JointUnknowns(scaling.centres).prior(at.theta)[1]
-    before, after = (np.sqrt(np.diag(np.linalg.inv(information))) for information in (slope.T @ slope, at.information))
-    out = np.zeros(SIZE, dtype=bool)
-    for joint in JOINTS:
-        judged = [own_turn(joint)] if joint in HINGES else list(range(SIZE))[own_centre(joint)]
-        out[_own(joint)] = np.linalg.norm(after[judged]) < (1 - EXCITED) * np.linalg.norm(before[judged])
-    return out
-
-
-def _own(joint: str) -> list[int]:
-    """Return the unknowns of a joint: its centre, of a hinge also its axis."""
-    return [*range(SIZE)[own_centre(joint)], *([own_turn(joint)] if joint in HINGES else [])]
-
-
-def contradicted(at: CalibrationState, shown: NDArray[np.bool_]) -> tuple[str, ...]:
-    """Return the joints kept in a fit of the ``shown`` (37,) unknowns that the markers of the state ``at`` contradict:
-    to first order, freeing one makes them more probable by `_GAIN` (natural logarithm) or more.
-
-    A joint that lies far off makes the movement look poor in information about it, so that it would be kept and the
-    joints beside it moved in its place.
-    """
-    free, found = np.flatnonzero(shown), []
-    for joint in JOINTS:
-        own = _own(joint)
-        if shown[own].any():
-            continue
-        shared = np.linalg.solve(at.information[np.ix_(free, free)], at.information[np.ix_(free, own)])
-        left = at.information[np.ix_(own, own)] - at.information[np.ix_(own, free)] @ shared
-        pull = at.gradient[own] - shared.T @ at.gradient[free]
-        if 0.5 * pull @ np.linalg.solve(left, pull) >= _GAIN:
-            found.append(joint)
-    return tuple(found)
 
 
 def fit_joints(
