@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from biodance.diagnosis.adequacy import LIMIT, adequacy
+from biodance.diagnosis.adequacy import LIMIT, adequacy, alarming
 from biodance.diagnosis.candidates import Candidate, local_basis
 from biodance.diagnosis.evidence import Evidence, believe, evidence
 from biodance.diagnosis.model import Model, NamedCause
@@ -40,12 +40,12 @@ def with_passing(naming: Naming, chosen: Chosen[Effect] = None) -> Naming:
 
     It is tried instead of what was named, and beside it; what leaves less is kept.
     """
-    if adequacy(naming.found)[0].z <= LIMIT:
+    if alarming(adequacy(naming.found)) <= LIMIT:
         return naming
     best = naming
     for base, accepted in ((naming.bare, ()), (naming.found, naming.accepted)):
         tried = _with(naming, base, accepted, chosen)
-        if tried is not None and adequacy(tried.found)[0].z < adequacy(best.found)[0].z:
+        if tried is not None and alarming(adequacy(tried.found)) < alarming(adequacy(best.found)):
             best = tried
         if not naming.found.named:
             break
