@@ -217,7 +217,7 @@ print(entry.answer(1.0))
 def test_machine_code_is_made_again_when_another_file_of_the_folder_changes(tmp_path):
     folder = tmp_path / "machine_code_copy"
     folder.mkdir()
-    shutil.copy(Path(biodance.motion.__file__).parent / "compiled" / "__init__.py", folder / "__init__.py")
+    shutil.copy(Path(biodance.motion.__file__).parent / "ik" / "compiled" / "__init__.py", folder / "__init__.py")
     imports = "from machine_code_copy import compiled\nfrom machine_code_copy.inner import twice\n\n"
     (folder / "entry.py").write_text(f"{imports}@compiled\ndef answer(x):\n    return twice(x)\n")
     answers = []
@@ -238,7 +238,7 @@ def test_a_second_process_takes_the_kept_machine_code():
         chain, np.zeros((1, len(chain.slot), 3)), WOMAN.neutral[None].copy(), np.empty((1, len(chain.slot)))
     )
     code = (
-        "from biodance.motion.compiled import newton\nfrom biodance.body.human.human import human\nfrom "
+        "from biodance.motion.ik.compiled import newton\nfrom biodance.body.human.human import human\nfrom "
         "biodance.records import Subject\n"
         "from biodance.motion.ik.compiled.chain import chain_of\nimport numpy as np\nb = human(Subject(58.3, 1.64, "
         "'F', 31.0))\n"

@@ -22,7 +22,7 @@ from biodance.virtual_lab.tolerances import REALISTIC
 
 CALIBRATED = replace(body(), joint_errors=(JointError("right_knee", 0.006, 0.04), JointError("trunk", 0.013, 0.0)))
 TABLE = read_table("uncertainty", "sizes")
-ROOMS = ("body", "motion", "uncertainty", "identify", "diagnose", "virtual_lab", "dance", "pipeline", "effects")
+ROOMS = ("body", "motion", "uncertainty", "identification", "diagnosis", "virtual_lab", "dance", "pipeline", "effects")
 SAYS_A_SIZE = re.compile(
     r"(^|_)(SD|SIDES|SLIDE|HINGE|JOINT_CENTRE|ROOT_CENTRE|TILT|TURN|FLOOR|GAIN|OFFSET|SOFT_TISSUE|FIXED_POINT)(_|$)"
 )
@@ -34,8 +34,8 @@ ELSEWHERE = {
     "virtual_lab/forces.py:FLESH": "springs",
     "body/robot/prior.py:RELATIVE_MASS_SD": "robots: what a data sheet is worth",
     "body/robot/prior.py:RELATIVE_INERTIA_SD": "robots",
-    "body/robot/prior.py:COM_SD": "robots",
-    "body/robot/hoap3.py:COM_SD": "robots",
+    "body/robot/prior.py:_COM_SD": "robots",
+    "body/robot/hoap3.py:_COM_SD": "robots",
     "identification/physical.py:RELATIVE_FLOOR": "share of an eigenvalue",
 }
 """Constants whose names sound like sizes and are none of this table's."""
