@@ -13,7 +13,7 @@ from biodance.diagnosis.adequacy import LIMIT, adequacy, alarming
 from biodance.diagnosis.candidates import Candidate, local_basis
 from biodance.diagnosis.evidence import Evidence, believe, evidence
 from biodance.diagnosis.model import Model, NamedCause
-from biodance.diagnosis.naming import Naming, Round, ScoredCandidate
+from biodance.diagnosis.naming import Naming, Round, ScoredCandidate, needed, stands
 from biodance.discovery import Chosen
 from biodance.effects import Effect, effects
 from biodance.records import Array
@@ -70,7 +70,11 @@ def _with(naming: Naming, base: Model, accepted: tuple[Round, ...], chosen: Chos
     course = belief.mean[-best.white.shape[1] :]
     if not one_sided(order[0].found.mean.reshape(-1, len(best.effect.parameters))):
         return None
-    named = (*base.named, _named(base, best, course, order[0]))
+    touch = _named(base, best, course, order[0])
+    seen = order[0].found
+    if seen.log_bayes_factor - score < needed(base, seen.visible) or not stands(base, touch):
+        return None
+    named = (*base.named, touch)
     model = replace(base, belief=belief, named=named)
     return Naming(naming.first, model, (*accepted, Round(suspects)), naming.screening, naming.first_causes, naming.bare)
 
