@@ -166,7 +166,10 @@ def run(name: str, only: list[str], foreign: int, own: int) -> list[Answer]:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(json.dumps(list(known.values()), indent=1))
             one = known[key]
-            print(f"{key}: {one['verdict']} {one['names']} {one['worst']} z {one['z']:.1f} | {one['headline']}", flush=True)
+            print(
+                f"{key}: {one['verdict']} {one['names']} {one['worst']} z {one['z']:.1f} | {one['headline']}",
+                flush=True,
+            )
     return [Answer(**{k: tuple(v) if isinstance(v, list) else v for k, v in row.items()}) for row in known.values()]
 
 

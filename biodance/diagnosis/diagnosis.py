@@ -239,7 +239,8 @@ class Diagnosis:
     def told(self) -> str:
         """Verdict and names of the causes in one line."""
         causes = ", ".join(f"{one.effect} {one.target}".strip() for one in self.findings)
-        return f"{self.verdict}{f': {causes}' if causes else ''}"
+        part = self.verdict == "nothing wrong" and any(one.level != "note" for one in self.attention[:1])
+        return f"{self.verdict}{' in what could be judged' if part else ''}{f': {causes}' if causes else ''}"
 
     def table(self) -> "pd.DataFrame":
         """Return one row for each parameter of each finding.

@@ -29,8 +29,8 @@ STRANGE = (
 
 
 STANDING = (
-    "Only quiet standing was judged: sway, soft tissue and a plate's zero look alike there, so no cause that has a size "
-    "is named from it. A few squats or steps on the plates tell them apart."
+    "Only quiet standing was judged: sway, soft tissue and a plate's zero look alike there, so no cause that has a "
+    "size is named from it. A few squats or steps on the plates tell them apart."
 )
 
 

@@ -76,28 +76,34 @@ def looked_at(results: tuple[TrialResult, ...]) -> tuple[Look, ...]:
     """
     roles = FITTED_ROLES if looks(results, FITTED_ROLES) else KEPT_ROLES
     moving = looks(results, roles)
-    return moving if sum(map(_seconds, moving)) >= _ENOUGH else looks(results, ("static", *roles))
+    return moving if sum(map(seconds_of, moving)) >= _ENOUGH else looks(results, ("static", *roles))
 
 
 def left_out(results: tuple[TrialResult, ...]) -> tuple[str, ...]:
     """Say of every trial that is not looked at, though it should be, why."""
-    roles, notes = ("static", *FITTED_ROLES), []
-    seen = {look.trial.name: _seconds(look) for look in looks(results, roles)}
+    return tuple(
+        f"{name} was left out{'. ' if why[:1].isupper() else ': '}{why}" if why else f"{name} was left out."
+        for name, why in reasons_left_out(results).items()
+    )
+
+
+def reasons_left_out(results: tuple[TrialResult, ...]) -> dict[str, str]:
+    """Return by name why a trial is not looked at, though it should be."""
+    roles, why = ("static", *FITTED_ROLES), {}
+    seen = {look.trial.name: seconds_of(look) for look in looks(results, roles)}
     for one in results:
-        name = one.trial.name
-        if one.trial.role == "static" or one.trial.role not in roles:
+        if one.trial.role not in FITTED_ROLES:
             continue
-        if name not in seen:
-            notes.append(f"{name} was left out. {' '.join(one.reasons)}".strip())
-        elif seen[name] == 0:
-            notes.append(
-                f"{name} was left out: no {SHORTEST_RUN:g} s in which the plates measure all ground contact without a "
-                f"break."
+        if one.trial.name not in seen:
+            why[one.trial.name] = " ".join(one.reasons)
+        elif seen[one.trial.name] == 0:
+            why[one.trial.name] = (
+                f"no {SHORTEST_RUN:g} s in which the plates measure all ground contact without a break."
             )
-    return tuple(notes)
+    return why
 
 
-def _seconds(look: Look) -> float:
+def seconds_of(look: Look) -> float:
     """Return for how many seconds a trial can be compared, in runs that are long enough."""
     rate = look.motion.rate
     if not np.isfinite(rate):
@@ -121,7 +127,7 @@ def own_tolerances(body: Body, chosen: tuple[Look, ...]) -> Own:
             "sessions of your own "
             "laboratory without fault (biodance.diagnosis.learning) hold for it."
         )
-    standing = tuple(look for look in chosen if look.trial.role == "static" and _seconds(look) > 0)
+    standing = tuple(look for look in chosen if look.trial.role == "static" and seconds_of(look) > 0)
     if standing:
         shaken = unrest(body, standing, standing_point(tuple(map(_fit, chosen))))
         found = replace(found, noise=found.noise + shaken * (REFERENCE_PERSON / body.sip.mass.sum()) ** 2)
@@ -139,7 +145,7 @@ def soft_tissue(chosen: tuple[Look, ...]) -> float:
     """Return the first quartile over markers and moving trials of the RMS distance to the body, m: markers that are
     wrong do not count.
     """
-    moving = [look.motion.residual for look in chosen if look.trial.role != "static" and _seconds(look) > 0]
+    moving = [look.motion.residual for look in chosen if look.trial.role != "static" and seconds_of(look) > 0]
     with np.errstate(invalid="ignore"):
         each = [np.sqrt(np.nanmean(residual**2, axis=0)) for residual in moving if residual.size]
     return float(np.nanquantile(np.concatenate(each), 0.25)) if each else 0.0
