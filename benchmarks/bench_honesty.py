@@ -130,7 +130,7 @@ def answered(key: str, column: str, result: SessionResult, true: set[str], hidde
     missed = sum(judged.missed for judged in one.judged) if hasattr(one, "judged") else missed
     names = tuple(f"{finding.effect} {finding.target}".strip() for finding in one.findings)
     false = tuple(name for name in names if name.split()[0] not in true and name not in true)
-    head = one.attention[0].text if getattr(one, "attention", ()) else one.told
+    head = next((said.text for said in getattr(one, "attention", ()) if said.about == "diagnosis"), one.told)
     worst = one.adequacy[0] if one.adequacy else None
     where = f"{worst.channel} {worst.band_hz[0]:g}-{worst.band_hz[1]:g} Hz" if worst else ""
     seconds = time.process_time() - start

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 
 Verdict = Literal["nothing wrong", "named, complete", "named, incomplete", "unexplained"]
+ABOUT = "diagnosis"
+"""What the one of a diagnosis's sentences is about that says the verdict."""
 LEAST_FORCE, LEAST_MOMENT = 1.0, 0.3
 """N, N·m RMS in one band: what is left below it alarms nobody. 1 N is 0.15 % of an adult's weight, half of what
 plates are accurate to (0.2-0.5 %); 0.3 N·m are 0.4 mm of centre of pressure, where plates in place err by 2-5 mm
@@ -209,6 +211,8 @@ class Diagnosis:
         Sentences for a person, the verdict's first.
     judged : tuple of Judged
         What the verdict rests on.
+    doubt : str
+        Why no cause can be told from what was judged (only standing, markers too far from the body); "" where one can.
 
     Examples
     --------
@@ -228,6 +232,7 @@ class Diagnosis:
     tolerated: tuple[Finding, ...] = ()
     attention: tuple[Attention, ...] = ()
     judged: tuple[Judged, ...] = ()
+    doubt: str = ""
 
     def __repr__(self) -> str:
         return f"Diagnosis({self.told})"
@@ -239,7 +244,8 @@ class Diagnosis:
     def told(self) -> str:
         """Verdict and names of the causes in one line."""
         causes = ", ".join(f"{one.effect} {one.target}".strip() for one in self.findings)
-        part = self.verdict == "nothing wrong" and any(one.level != "note" for one in self.attention[:1])
+        said = [one.level for one in self.attention if one.about == ABOUT]
+        part = self.verdict == "nothing wrong" and said not in ([], ["note"])
         return f"{self.verdict}{' in what could be judged' if part else ''}{f': {causes}' if causes else ''}"
 
     def table(self) -> "pd.DataFrame":

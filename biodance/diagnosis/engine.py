@@ -78,7 +78,7 @@ def diagnose_trials(
     known = tolerances or shipped()
     asked = family(effects)
     put = problem(body, looks, prior=prior, chosen=asked)
-    quiet = not any(moves(case) for case in put.cases)
+    quiet = not any(moves(case) for case, picks in zip(put.cases, put.spectrum.picks, strict=True) if picks)
     if search and not quiet:
         naming = with_passing(name_causes(put, known, asked), asked)
     else:
@@ -98,6 +98,7 @@ def diagnose_trials(
         unobservable=hidden(rows),
         limits=tuple(sorted(rows, key=_relative)),
         notes=(*put.notes, *([STRANGE] if strained else []), *([STANDING] if quiet else [])),
+        doubt="standing alone tells no cause" if quiet else "",
         candidates=tuple(one.alias for one in naming.screening.suspects),
     )
     return Examined(found, naming)

@@ -8,16 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from biodance.diagnosis.adequacy import LIMIT, alarming
-from biodance.diagnosis.diagnosis import Diagnosis, Finding
-from biodance.diagnosis.engine import STANDING
+from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Finding
 from biodance.diagnosis.problem import Look
 from biodance.identification.added_mass import LoadSearch
 from biodance.pipeline.looked_at import reasons_left_out, seconds_of
 from biodance.pipeline.results import Check, SessionResult
 from biodance.records.attention import Attention, Judged, Level, strongest_first
 
-ABOUT = "diagnosis"
-"""What the sentence of the verdict is about."""
 _STATIC = "quiet standing tells nothing beside so much movement"
 _KEPT = "kept to measure what a finding gains"
 _NEVER = "it holds no measured ground contact"
@@ -107,7 +104,6 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
     beside = _beside(judged, outside)
     names = " and ".join(in_words(finding) for finding in one.findings)
     like = " and ".join(in_words(finding) for finding in one.resembles)
-    quiet = STANDING in one.notes
     level: Level = "fail"
     if one.findings:
         rest = f"In {rests_on}, " if rests_on else ""
@@ -118,14 +114,14 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
         text = f"Found: {names}. {more}{_sentence(beside)}"
     elif one.verdict == "nothing wrong":
         level = "warn" if beside else "note"
-        text = f"Nothing wrong in what could be judged ({rests_on}){beside}." if beside or quiet else (
+        text = f"Nothing wrong in what could be judged ({rests_on}){beside}." if beside or one.doubt else (
             f"Nothing wrong was found in {rests_on}. Faults below the sizes that it could have seen stay unseen."
         )  # fmt: skip
     elif not rests_on:
         level, text = "warn", f"Cannot tell whether anything is wrong: nothing could be judged{beside}."
-    elif quiet:
+    elif one.doubt:
         level = "warn"
-        text = f"Cannot tell what differs in {rests_on}: {_where(one)}, and standing alone tells no cause{beside}."
+        text = f"Cannot tell whether anything is wrong in {rests_on}: {_where(one)}, but {one.doubt}{beside}."
     else:
         text = f"Something is wrong in {rests_on} that no known cause explains: {_where(one)}.{_sentence(beside)}"
         text += f" It resembles {like}, which is not enough." if like else ""
@@ -199,12 +195,18 @@ def _level(status: str) -> Level:
 
 def _beside(judged: tuple[Judged, ...], outside: tuple[Check, ...]) -> str:
     """Return what was not judged and which checks failed, to go on a sentence with."""
-    missed = [row for row in judged if row.missed]
-    parts = [f"; {row.trial} was not judged because: {_short(row.why_not)}" for row in missed[:3]]
-    parts += [f"; so were {len(missed) - 3} more"] if len(missed) > 3 else []
-    parts += [f"; check outside its limit: {one.what}, {one.where} ({one.value}, {one.limit})" for one in outside[:3]]
-    parts += [f", and {len(outside) - 3} more"] if len(outside) > 3 else []
-    return "".join(parts)
+    missed: dict[str, list[str]] = {}
+    for row in judged:
+        if row.missed:
+            missed.setdefault(_short(row.why_not), []).append(row.trial)
+    parts = [f"; not judged: {_listed(names)}, because: {why}" for why, names in missed.items()]
+    checks = [f"{one.what}, {one.where} ({one.value}, should be {one.limit})" for one in outside]
+    return "".join(parts) + (f"; outside the limit: {_listed(checks)}" if checks else "")
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Return names as a list in words, the fourth and later ones counted only."""
+    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
 
 
 def _short(reason: str) -> str:

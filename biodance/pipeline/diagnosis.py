@@ -31,6 +31,8 @@ from biodance.uncertainty.tolerances import Tolerances
 if TYPE_CHECKING:
     import pandas as pd
 
+FAR = "its markers move more on the body than where tolerances were learned"
+"""Why no cause is told from a movement whose soft tissue or joints err more than in null sessions."""
 TRIAL_SECONDS = 20.0
 """s: a designed dance is looked at as trials of about this length."""
 
@@ -154,7 +156,8 @@ def _diagnosed(
     )
     if failed:
         return SessionDiagnosis(_by_checks(checks, examined), examined)
-    if examined.named and not own.believed:
+    if not own.believed:
+        examined = replace(examined, diagnosis=replace(examined.diagnosis, doubt=FAR))
         return SessionDiagnosis(_disbelieved(without_names(examined).diagnosis), examined)
     tell("measuring what the findings change")
     return _with_gains(result, examined)
@@ -206,6 +209,8 @@ def _disbelieved(one: Diagnosis) -> Diagnosis:
     not hold here.
     """
     alike = ", ".join(f"{finding.effect} {finding.target}".strip() for finding in one.resembles)
+    if not alike:
+        return one
     return replace(one, notes=(*one.notes, f"What is left resembles {alike}, which is not believed."))
 
 

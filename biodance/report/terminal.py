@@ -7,6 +7,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from biodance.diagnosis.diagnosis import ABOUT
 from biodance.doctor import MachineFinding
 from biodance.pipeline.attention import without_path
 from biodance.pipeline.results import SessionResult
@@ -56,10 +57,10 @@ def print_inspected(records: Sequence[dict[str, Any]], console: Console) -> None
 
 
 def print_attention(found: Sequence[dict[str, Any]], console: Console) -> None:
-    """Print what a person must see, strongest first: the verdict's sentence alone, the others with their place."""
-    for row in found:
+    """Print what a person must see: the verdict's sentence, then the others with their place, strongest first."""
+    for row in sorted(found, key=lambda row: str(row["about"]) != ABOUT):
         one = Attention(row["level"], row["text"], row["trial"], row["about"])
-        if one.about == "diagnosis":
+        if one.about == ABOUT:
             console.print(f"[bold]{escape(one.text)}[/]", soft_wrap=True)
         else:
             console.print(f"look: [bold]{escape(place(one))}[/]: {escape(one.text)}", soft_wrap=True)
@@ -85,7 +86,8 @@ def print_session(result: SessionResult, attention: Sequence[dict[str, Any]], co
 
 def _judged_part(found: dict[str, Any]) -> str:
     """Return what stands beside the verdict where it does not rest on all trials, or a check failed."""
-    return " (in what could be judged)" if found["attention"] and found["attention"][0]["level"] == "warn" else ""
+    said = [row["level"] for row in found["attention"] if row["about"] == ABOUT]
+    return " (in what could be judged)" if found["verdict"] == "nothing wrong" and said != ["note"] else ""
 
 
 def _print_failures(failures: dict[str, str], console: Console) -> None:

@@ -6,9 +6,8 @@ import sys
 from dataclasses import dataclass
 from importlib.resources import files
 
-from biodance.diagnosis.diagnosis import Diagnosis, Estimate
+from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Estimate
 from biodance.effects import discrete_effects, effects
-from biodance.pipeline.attention import ABOUT
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.provenance import Provenance
 from biodance.pipeline.results import SessionResult
