@@ -138,7 +138,7 @@ def _diagnosed(
         why = f"There is nothing to diagnose. {result.body_source} {_reasons(result)}".strip()
         return SessionDiagnosis(_by_checks(checks) if failed else _cannot_tell(checks, why, *result.doubts))
     tell("looking for causes")
-    own = Own(tolerances) if tolerances else own_tolerances(result.body, fitted)
+    own = Own(tolerances) if tolerances else own_tolerances(result.body, fitted, result.session.trials)
     try:
         examined = diagnose_trials(
             result.body,

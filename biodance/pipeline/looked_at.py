@@ -15,8 +15,9 @@ from biodance.identification.statistics import Fit
 from biodance.lab.filters import runs
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES
 from biodance.pipeline.results import TrialResult
-from biodance.records import Array, Role
+from biodance.records import Array, Role, Trial
 from biodance.uncertainty.bands import BANDS
+from biodance.uncertainty.session_noise import added_noise, with_own_noise
 from biodance.uncertainty.tolerances import REFERENCE_PERSON, Tolerances, shipped
 
 
@@ -31,6 +32,8 @@ class Own:
     believed: bool = True
 
 
+_POSTURES = 4
+"""Postures in which the way from marker noise to wrench is computed."""
 _ENOUGH = 10.0
 """s of fully measured movement beside which quiet standing tells nothing more."""
 MORE = 1.6
@@ -111,11 +114,17 @@ def seconds_of(look: Look) -> float:
     return float(sum(stop - start for start, stop in runs(look.use) if stop - start >= SHORTEST_RUN * rate) / rate)
 
 
-def own_tolerances(body: Body, chosen: tuple[Look, ...]) -> Own:
+def own_tolerances(body: Body, chosen: tuple[Look, ...], recorded: tuple[Trial, ...] = ()) -> Own:
     """Return the shipped tolerances as they hold for these recordings: with markers that move more on the body than
-    those of virtual sessions, and with the unrest of a person who stands still where standing is looked at.
+    those of virtual sessions, with the noise of their own cameras and plates as ``recorded`` shows it, and with the
+    unrest of a person who stands still where standing is looked at.
     """
     found, notes = shipped(), []
+    usable_looks = [look for look in chosen if look.motion.q.size]
+    if recorded and usable_looks:
+        middle = np.array([look.motion.q[len(look.motion.q) // 2] for look in usable_looks[:_POSTURES]])
+        added = added_noise(body, recorded, middle, standing_point(tuple(map(_fit, chosen))))
+        found = with_own_noise(found, added, float(body.sip.mass.sum()))
     factor = soft_tissue(chosen) / error_size("marker_distance", "first quartile", state="after")
     if factor > MORE:
         sizes = {key: size * (factor if key.startswith(_SOFT) else 1.0) for key, size in found.sizes.items()}
