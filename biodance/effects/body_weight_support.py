@@ -51,5 +51,9 @@ class BodyWeightSupport(Effect):
         """Return whether the size is positive: a rope pulls."""
         return bool(theta[0] > 0)
 
+    def possible_in(self, case: Case, theta: Array) -> bool:
+        """Return whether the rope carries no more than the person weighs."""
+        return bool(0 < theta[0] <= case.body.sip.mass.sum() * np.linalg.norm(case.body.gravity))
+
 
 EFFECT = BodyWeightSupport

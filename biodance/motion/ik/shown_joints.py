@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.body.human.skeleton import JOINTS, SIDES
+from biodance.body.human.skeleton import JOINTS
 from biodance.body.human.static_centres import Centres
 from biodance.motion.ik.joint_unknowns import HINGES, SIZE, JointUnknowns, own_centre, own_turn
-from biodance.records import Array
+from biodance.records import SIDES, Array, Index
 
 EXCITED = 0.3
 """Share of a joint's prior standard deviation that the movement must remove; below it the static trial's answer is
@@ -58,7 +58,7 @@ def contradicted(information: Array, gradient: Array, shown: NDArray[np.bool_]) 
     """
     free, found = np.flatnonzero(shown), []
     for joint in JOINTS:
-        own = own_unknowns(joint)
+        own: Index = np.array(own_unknowns(joint))
         if shown[own].any():
             continue
         shared = np.linalg.solve(information[np.ix_(free, free)], information[np.ix_(free, own)])
