@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from biodance.lab.markers.sets import _FAMILY as MARKER_SETS
+from biodance.lab.markers.sets import FAMILY as MARKER_SETS
 from biodance.lab.markers.sets import read_marker_set
 
 RENAMED = {label: f"X{i:02d}" for i, label in enumerate(read_marker_set("plug_in_gait").labels)}

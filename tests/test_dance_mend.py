@@ -99,7 +99,7 @@ def test_a_posture_that_no_exchange_helps_is_left_out(course, work, monkeypatch)
         lambda first, second: np.array_equal(first, last) or (len(work_x) == 4 and np.array_equal(second, last)),
     )
     work_x = course.x
-    monkeypatch.setattr(schedule_module, "ENDS", (0,))
+    monkeypatch.setattr(schedule_module, "_ENDS", (0,))
     found, between, notes = replan(work, course)
     assert len(found.x) == len(between) + 1 == 3
     assert not any(np.array_equal(x, last) for x in found.x)

@@ -33,14 +33,14 @@ def test_what_fails_says_why_and_how_to_mend_it(code, why):
 
 
 def test_what_hangs_is_given_up(monkeypatch):
-    monkeypatch.setattr(doctor, "PATIENCE", 0.5)
+    monkeypatch.setattr(doctor, "_PATIENCE", 0.5)
     assert "no answer within 0.5 s" in run_probe(Probe("x", "import time; time.sleep(30)", MEND)).text
 
 
 @pytest.mark.parametrize(("needed", "code"), [(True, NEEDS_A_PERSON), (False, DONE)])
 def test_only_what_is_needed_changes_the_exit_code(needed, code, monkeypatch, capsys):
     found = (MachineFinding("python", True, True, "3.12"), MachineFinding("x", False, needed, MEND))
-    monkeypatch.setattr(doctor, "examine", lambda **_: found)
+    monkeypatch.setattr(doctor, "examine_machine", lambda **_: found)
     assert run(["doctor", "--json"]) == code
     assert json.loads(capsys.readouterr().out)[1] == {"name": "x", "works": False, "needed": needed, "text": MEND}
     assert run(["doctor"]) == code

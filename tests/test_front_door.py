@@ -3,7 +3,6 @@
 import ast
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -40,21 +39,11 @@ def test_a_wrong_name_lists_the_right_ones():
         biodance.read_sesion  # noqa: B018
 
 
-def test_it_opens_quickly_and_loads_nothing_heavy():
-    heavy = "{'numpy', 'scipy', 'pandas', 'matplotlib', 'numba'}"
-    code = (
-        "import sys, time; start = time.perf_counter(); import biodance; took = time.perf_counter() - start; "
-        f"print(took, sorted({heavy} & set(sys.modules)), dir(biodance)[0])"
-    )
-    said = [
-        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-        for _ in range(3)
-    ]
-    assert min(float(one[0]) for one in said) < 0.05
-    assert said[0][1] == "[]"
-    start = time.perf_counter()
-    subprocess.run([sys.executable, "-m", "biodance", "--help"], capture_output=True, check=True)
-    assert time.perf_counter() - start < 2.0  # 0.3 s on an idle machine
+def test_it_loads_nothing_heavy():
+    heavy = "{'numpy', 'scipy', 'pandas', 'matplotlib', 'numba', 'pinocchio', 'cvxpy', 'trimesh', 'pyvista', 'ezc3d'}"
+    code = f"import sys, biodance; print(sorted({heavy} & set(sys.modules)))"
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
+    assert said == "[]"
 
 
 @pytest.mark.parametrize(

@@ -77,7 +77,7 @@ def test_a_file_on_which_ezc3d_crashes_is_read(read):
 )
 def test_a_child_that_dies_hangs_or_fails_costs_nothing(read, monkeypatch, child, said):
     monkeypatch.setattr(second_opinion, "READ", child)
-    monkeypatch.setattr(second_opinion, "PATIENCE", 0.5)
+    monkeypatch.setattr(second_opinion, "_PATIENCE", 0.5)
     assert said in read(jumping()).warnings[0]
 
 

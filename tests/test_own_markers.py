@@ -15,7 +15,7 @@ from biodance.cli import run
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.write import PlateRecording, write_c3d
 from biodance.lab.markers.set_file import _SEGMENTS, LANDMARKS, segment_of
-from biodance.lab.markers.sets import _FAMILY, read_marker_set
+from biodance.lab.markers.sets import FAMILY, read_marker_set
 from biodance.lab.session.read import read_session
 from biodance.pipeline.session import examine
 from biodance.records import Markers
@@ -52,7 +52,7 @@ def folder(tmp_path: Path) -> Path:
 
 def own_file(place: Path) -> Path:
     """Write the set as a user would: plug-in gait with other labels."""
-    text = _FAMILY.files()["plug_in_gait"].read_text()
+    text = FAMILY.files()["plug_in_gait"].read_text()
     text = re.sub(r"^\[aliases\].*?(?=^\[)", "", text, flags=re.MULTILINE | re.DOTALL)
     for label, own in RENAMED.items():
         text = re.sub(rf"\b{label}\b", own, text)

@@ -119,6 +119,6 @@ def test_a_still_survives_the_way_to_the_child(result):
 )
 def test_a_child_without_gl_is_no_crash_and_no_hang(result, monkeypatch, code):
     run = solid.subprocess.run
-    monkeypatch.setattr(solid, "PATIENCE", 1.5)
+    monkeypatch.setattr(solid, "_PATIENCE", 1.5)
     monkeypatch.setattr(solid.subprocess, "run", lambda words, **kind: run([words[0], "-c", code], **kind))
     assert solid_pngs([posture_still(result.body, result.body.neutral, "one")]) is None

@@ -51,7 +51,7 @@ def missing(candidate: object) -> tuple[str, ...]:
     return tuple(lacks)
 
 
-_FAMILY: Family[Cause | type[Cause]] = Family(
+FAMILY: Family[Cause | type[Cause]] = Family(
     "effect", "biodance.effects", __name__, "EFFECT", missing, lambda kind: kind.name
 )
 
@@ -62,7 +62,7 @@ def causes(chosen: Chosen[Cause | type[Cause]] = None) -> Mapping[str, Cause]:
     Names choose from the family (UnknownName for others); objects and classes join what is chosen, the whole family
     where no name is given.
     """
-    found = _FAMILY.choose(chosen)
+    found = FAMILY.choose(chosen)
     return MappingProxyType({name: kind() if isinstance(kind, type) else kind for name, kind in found.items()})
 
 

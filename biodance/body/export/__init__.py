@@ -45,14 +45,14 @@ def _lacking(member: object) -> tuple[str, ...]:
     return tuple(name for name in missing if name != "text" or not hasattr(member, "data"))
 
 
-_FAMILY: Family[ModelFormat] = Family(
+FAMILY: Family[ModelFormat] = Family(
     "model format", "biodance.exports", __name__, "", _lacking, lambda one: one.FORMAT
 )
 
 
 def formats(chosen: Chosen[ModelFormat] = None) -> Mapping[str, ModelFormat]:
     """Return the formats by name; ``chosen`` names choose from the family, objects join it."""
-    return _FAMILY.choose(chosen)
+    return FAMILY.choose(chosen)
 
 
 def refuse_impossible(body: Body) -> None:
@@ -96,7 +96,7 @@ def write_model(
         The file, or one that belongs beside it, exists (nothing is overwritten), or cannot be written.
     """
     path = Path(path)
-    (kind,) = (_FAMILY.choose([format]) if isinstance(format, str) else _FAMILY.judged([format])).values()
+    (kind,) = (FAMILY.choose([format]) if isinstance(format, str) else FAMILY.judged([format])).values()
     refuse_impossible(body)
     _write_new(path, _content(kind, body, source, solids))
     for name, content in _beside(kind, body, solids).items():

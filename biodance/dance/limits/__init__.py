@@ -136,7 +136,7 @@ def lacking(candidate: object) -> tuple[str, ...]:
     return (*lacks, *(sorted(getattr(kind, "__abstractmethods__", ())) if inspect.isabstract(kind) else ()))
 
 
-_FAMILY: Family[Limit | type[Limit]] = Family(
+FAMILY: Family[Limit | type[Limit]] = Family(
     "limit of a dance", "biodance.limits", __name__, "LIMIT", lacking, lambda kind: kind.name
 )
 
@@ -149,7 +149,7 @@ def family() -> tuple[Limit, ...]:
     BiodanceError
         A file of the folder or an entry point is no limit; the sentence says which and what to do.
     """
-    return join_limits(_FAMILY.members().values(), ())
+    return join_limits(FAMILY.members().values(), ())
 
 
 def join_limits(limits: Iterable[Limit | type[Limit]], more: Iterable[Limit | type[Limit]]) -> tuple[Limit, ...]:

@@ -21,7 +21,7 @@ from biodance.lab.markers.set_file import LANDMARKS, parse_map, parse_marker_set
 from biodance.records import Array, Markers, Trial
 
 FOLDER = "anthropometry/marker_sets"
-_FAMILY = DataFamily("marker set", "biodance.marker_sets", FOLDER, ".toml")
+FAMILY = DataFamily("marker set", "biodance.marker_sets", FOLDER, ".toml")
 MAPS = ("session.toml", "subject.toml")
 """Files whose ``[markers] map`` is a marker set of its own."""
 
@@ -102,11 +102,11 @@ def read_marker_set(name_or_path: str | Path) -> MarkerSet:
         The file is missing, is not TOML, or breaks a rule; the message names the file, the entry and what would be
         legal.
     """
-    path = _FAMILY.locate(name_or_path)
+    path = FAMILY.locate(name_or_path)
     if not path.is_file():
         raise FileRefused(
             f"{path}: cannot be opened, there is no such marker set. Check the path; sets known by name are "
-            f"{', '.join(_FAMILY.files())}."
+            f"{', '.join(FAMILY.files())}."
         )
     return _read(str(name_or_path), path, path.stat().st_mtime_ns)
 
@@ -133,7 +133,7 @@ def recognise(labels: Iterable[str], *, candidates: Iterable[MarkerSet] | None =
     ``candidates`` are the sets to choose from, by default all known by name.
     """
     labels = tuple(labels)
-    sets = tuple(read_marker_set(name) for name in _FAMILY.files()) if candidates is None else tuple(candidates)
+    sets = tuple(read_marker_set(name) for name in FAMILY.files()) if candidates is None else tuple(candidates)
     matches = [(marker_set, marker_set.match(labels)) for marker_set in sets]
     complete = [(marker_set, match) for marker_set, match in matches if match.keys() >= set(marker_set.required)]
     return max(complete, key=lambda pair: len(pair[1]))[0] if complete else None

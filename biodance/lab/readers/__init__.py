@@ -42,7 +42,7 @@ class Reader(Protocol):
         """
 
 
-_FAMILY: Family[Reader] = Family(
+FAMILY: Family[Reader] = Family(
     "reader", "biodance.readers", __name__, "", missing_of(Reader), lambda reader: reader.NAME
 )
 
@@ -51,7 +51,7 @@ def readers(chosen: Chosen[Reader] = None) -> tuple[Reader, ...]:
     """Return the readers in the order in which they are asked; ``chosen`` names choose from the family, objects join
     it.
     """
-    return tuple(sorted(_FAMILY.choose(chosen).values(), key=lambda reader: (reader.PREFERENCE, reader.NAME)))
+    return tuple(sorted(FAMILY.choose(chosen).values(), key=lambda reader: (reader.PREFERENCE, reader.NAME)))
 
 
 def extensions(chosen: Chosen[Reader] = None) -> Mapping[str, Reader]:

@@ -8,7 +8,7 @@ from biodance.records import Role, Trial
 
 NAME = "AMTI text"
 EXTENSIONS = (".asc", ".txt", ".csv")
-_PREFERENCE = 90
+PREFERENCE = 90
 """Asked last: any table of numbers looks like this format."""
 NUMBER = r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?"
 ROW = re.compile(rf"\s*{NUMBER}(?:[\s,;]+{NUMBER}){{5,}}[\s,;]*")

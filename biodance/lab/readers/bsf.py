@@ -7,7 +7,7 @@ from biodance.records import Role, Trial
 
 NAME = "AMTI NetForce"
 EXTENSIONS = (".bsf",)
-_PREFERENCE = 30
+PREFERENCE = 30
 VERSIONS = (100, 105)
 
 

@@ -6,7 +6,7 @@ from biodance.records import Role, Trial
 
 NAME = "C3D"
 EXTENSIONS = (".c3d",)
-_PREFERENCE = 0
+PREFERENCE = 0
 KEY = 0x50
 """Second byte of every C3D file."""
 

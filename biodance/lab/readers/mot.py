@@ -12,7 +12,7 @@ from biodance.records import Plate, Role, Source, Trial
 
 NAME = "table of OpenSim"
 EXTENSIONS = (".mot", ".sto")
-_PREFERENCE = 20
+PREFERENCE = 20
 
 
 def sniff(head: bytes) -> bool:

@@ -14,7 +14,7 @@ from biodance.records import Role, Trial
 
 NAME = "markers of OpenSim"
 EXTENSIONS = (".trc",)
-_PREFERENCE = 10
+PREFERENCE = 10
 FORCES_BESIDE = ("", "_grf", "_GRF", "_forces", "_ground_forces")
 
 
