@@ -18,24 +18,42 @@ UNDECLARED = 0.25
 
 
 def point_mass(place: Array, radius: float = _RADIUS) -> Array:
-    """Return the ten parameters per kg of a compact load with CoM at ``place`` (3,) m and radius of gyration
-    ``radius`` m.
+    """Return the ten parameters (..., 10) per kg of a compact load with CoM at ``place`` (..., 3) m and radius of
+    gyration ``radius`` m.
     """
-    x, y, z = place
-    r = radius**2
-    return np.array([1.0, x, y, z, y * y + z * z + r, -x * y, x * x + z * z + r, -x * z, -y * z, x * x + y * y + r])
+    x, y, z = np.moveaxis(np.asarray(place), -1, 0)
+    r, one = radius**2, np.ones_like(x)
+    inertia = (y * y + z * z + r, -x * y, x * x + z * z + r, -x * z, -y * z, x * x + y * y + r)
+    return np.stack([one, x, y, z, *inertia], axis=-1)
 
 
 def load_moments(body: Body, segment: int) -> Array:
     """Return U (10, k): U U' is the second moment of the parameters of a load of typical mass in or near the
     segment's box.
     """
+    loads = _unit_loads(body, segment) * _SCALE
+    return _factor(loads.T @ loads / len(loads))
+
+
+def unit_load(body: Body, segment: int) -> tuple[Array, Array]:
+    """Return mean (10,) and factor G (10, k) of the covariance G G' of the parameters of a load of 1 kg in or near the
+    segment's box.
+    """
+    loads = _unit_loads(body, segment)
+    mean = loads.mean(axis=0)
+    return mean, _factor((loads - mean).T @ (loads - mean) / len(loads))
+
+
+def _unit_loads(body: Body, segment: int) -> Array:
+    """Return the parameters (2000, 10) of loads of 1 kg, placed alike in and near the segment's box."""
     low, high = body.boxes[segment]
     margin = _NEAR * (high - low)
-    rng = np.random.default_rng(segment)
-    place = rng.uniform(low - margin, high + margin, (2000, 3))
-    loads = np.array([point_mass(p) for p in place]) * _SCALE
-    moment = loads.T @ loads / len(loads)
+    place = np.random.default_rng(segment).uniform(low - margin, high + margin, (2000, 3))
+    return point_mass(place)
+
+
+def _factor(moment: Array) -> Array:
+    """Return U (10, k) with U U' = ``moment`` (10, 10), without directions of no size."""
     value, vector = np.linalg.eigh(moment)
     keep = value > 1e-12 * value.max()
     return np.asarray(vector[:, keep] * np.sqrt(value[keep]))
