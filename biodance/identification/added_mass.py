@@ -79,8 +79,9 @@ class LoadSearch:
 
     @property
     def status(self) -> Status:
-        """ "found": announced, no load is improbable, the interval excludes zero and the load is one that the session
-        can see; "none": no load is more probable than one; else, or with `doubts`, "cannot tell".
+        """Whether a load is "found" (announced: none is improbable, the interval of its mass excludes zero and the
+        session can see loads of this size), there is "none" (more probable than one), or one "cannot tell" (between
+        the two, or with `doubts`).
         """
         if self.doubts:
             return "cannot tell"
@@ -129,10 +130,10 @@ def added_mass(
     none = np.array([one.log_none for one in bodies])
     load = np.array([one.log_none + one.log_ratio for one in bodies]) + log_mass_prior(MASSES) - np.log(len(units))
     total = logsumexp(np.append(load.ravel(), none))
-    weight, p_none = np.exp(load - total), float(np.exp(logsumexp(none) - total))
-    found = [_suspect(name, i, bodies, weight[:, i], p_none) for i, name in enumerate(before.segments)]
+    log_none = float(logsumexp(none) - total)
+    found = [_suspect(name, i, bodies, load[:, i] - total, log_none) for i, name in enumerate(before.segments)]
     words = "the table" if reference is None else f"the session with {', '.join(reference.trials)}"
-    return LoadSearch(tuple(sorted(found, key=lambda one: -one.probability)), p_none, words, doubts)
+    return LoadSearch(tuple(sorted(found, key=lambda one: -one.probability)), float(np.exp(log_none)), words, doubts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,28 +149,25 @@ class _Rival:
     log_ratio: Array
 
     @classmethod
-    def of(
-        cls, data: Information, units: tuple[tuple[Array, Array], ...], before: Sip, log_prior: float
-    ) -> "_Rival":
+    def of(cls, data: Information, units: tuple[tuple[Array, Array], ...], before: Sip, log_prior: float) -> "_Rival":
         rows, surprise, evidence = surprised(data, before)
-        views = tuple(
-            LoadView.of(rows[:, 10 * i : 10 * i + 10], surprise, unit) for i, unit in enumerate(units)
-        )
+        views = tuple(LoadView.of(rows[:, 10 * i : 10 * i + 10], surprise, unit) for i, unit in enumerate(units))
         ratio = np.array([view.log_ratio(MASSES) for view in views])
         log_det = evidence + 0.5 * float(surprise @ surprise)
         return cls(log_prior, log_prior + evidence, log_det, views, ratio)
 
 
-def _suspect(segment: str, i: int, bodies: tuple[_Rival, ...], weight: Array, p_none: float) -> LoadCandidate:
-    """Return the hypothesis of a load on segment ``i`` with ``weight`` (rivals, n) of every explanation and mass."""
-    mass, chance = weight.sum(axis=0), float(weight.sum())
-    posterior = LoadPosterior(p_none / (p_none + chance), mass / (p_none + chance))
+def _suspect(segment: str, i: int, bodies: tuple[_Rival, ...], load: Array, none: float) -> LoadCandidate:
+    """Return the hypothesis of a load on segment ``i`` from the log probabilities of it (rivals, n) and of ``none``."""
+    chance = float(logsumexp(load))
+    here = np.exp(load - np.logaddexp(chance, none))
+    posterior = LoadPosterior(float(np.exp(none - np.logaddexp(chance, none))), here.sum(axis=0))
     place, place_sd = np.full(3, np.nan), np.full(3, np.nan)
     if posterior.interval[0] > 0:
-        likely = int(np.argmax(weight.sum(axis=1)))
-        place, place_sd = bodies[likely].views[i].place(weight[likely])
-    bayes = float(np.log(max(chance, 1e-300) / max(p_none, 1e-300)) + np.log(len(bodies[0].views)))
-    return LoadCandidate(segment, posterior, place, place_sd, bayes, chance, _smallest(bodies, i))
+        likely = int(np.argmax(here.sum(axis=1)))
+        place, place_sd = bodies[likely].views[i].place(here[likely])
+    bayes = chance - none + float(np.log(len(bodies[0].views)))
+    return LoadCandidate(segment, posterior, place, place_sd, bayes, float(np.exp(chance)), _smallest(bodies, i))
 
 
 def _smallest(bodies: tuple[_Rival, ...], i: int) -> float:

@@ -112,5 +112,3 @@ def log_mass_prior(masses: Array) -> Array:
     """Return the log probability (n,) of each of ``masses`` (n,) kg, given that there is a load."""
     log = -0.5 * (masses / _USUAL) ** 2 + np.log(np.gradient(masses))
     return np.asarray(log - np.log(np.exp(log).sum()))
-
-

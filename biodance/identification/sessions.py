@@ -42,11 +42,11 @@ class Difference:
 def differences(earlier: Identification, later: Identification) -> tuple[Difference, ...]:
     """Return all differences, later minus earlier, each session with room for what it carries beyond the other.
 
-    Both tables count at the earlier session's declared mass: the later one may hold a load, declared or not, which would
-    be spread over the body. Every segment therefore gets room D for a load, in proportion to the probability that one sits there (`added_mass`, in both
-    directions: a load, a loss); values may differ from those of the two tables of results. The two posteriors share the
-    table P: what both still owe to it is common and cancels. With the covariances C under the prior P + D and A = C (P
-    + D)^-1, Var = C1 + C2 - A1 P A2' - A2 P A1'.
+    Both tables count at the earlier session's declared mass: the later one may hold a load, declared or not, which
+    would be spread over the body. Every segment therefore gets room D for a load, in proportion to the probability that
+    one sits there (`added_mass`, in both directions: a load, a loss); values may differ from those of the two tables of
+    results. The two posteriors share the table P: what both still owe to it is common and cancels. With the covariances
+    C under the prior P + D and A = C (P + D)^-1, Var = C1 + C2 - A1 P A2' - A2 P A1'.
 
     Raises
     ------

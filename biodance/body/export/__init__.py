@@ -45,9 +45,7 @@ def _lacking(member: object) -> tuple[str, ...]:
     return tuple(name for name in missing if name != "text" or not hasattr(member, "data"))
 
 
-FAMILY: Family[ModelFormat] = Family(
-    "model format", "biodance.exports", __name__, "", _lacking, lambda one: one.FORMAT
-)
+FAMILY: Family[ModelFormat] = Family("model format", "biodance.exports", __name__, "", _lacking, lambda one: one.FORMAT)
 
 
 def formats(chosen: Chosen[ModelFormat] = None) -> Mapping[str, ModelFormat]:
