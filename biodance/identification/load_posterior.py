@@ -47,7 +47,7 @@ class LoadPosterior:
         return low, high
 
     def _quantile(self, share: float) -> float:
-        below = self.none + np.cumsum(self.weight)
+        below = self.none + np.cumsum(self.weight) - 0.5 * self.weight
         return float(np.interp(share, np.append(self.none, below), np.append(0.0, MASSES), left=0.0))
 
 

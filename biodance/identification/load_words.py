@@ -16,8 +16,8 @@ def _found(search: LoadSearch) -> str:
     x, y, z = (f"{1000 * value:.0f}" for value in search.best.place)
     also = f" It may also sit on: {', '.join(map(_words, search.set[1:]))}." if search.set[1:] else ""
     return (
-        f"Beyond {search.reference} the subject carries {_size(search)}, {x}, {y}, {z} mm from its proximal joint "
-        f"centre along x (forward), y (up), z (right), the segment upright.{also}"
+        f"Beyond {search.reference} the subject carries {_size(search)}; its centre is {x}, {y}, {z} mm "
+        f"from the segment's proximal joint centre, along its x (forward), y (up) and z (right).{also}"
     )
 
 
