@@ -180,5 +180,5 @@ def _smallest(bodies: tuple[_Rival, ...], i: int) -> float:
         left = logsumexp(none)
         return bool(left - np.logaddexp(left, logsumexp(load + prior)) < np.log(_THRESHOLD))
 
-    at = bisect_left(_TRUE, True, key=announced)
+    at = bisect_left(range(len(_TRUE)), True, key=lambda step: announced(float(_TRUE[step])))
     return float(_TRUE[at]) if at < len(_TRUE) else float("inf")

@@ -38,7 +38,7 @@ class LoadPosterior:
     @property
     def sd(self) -> float:
         """Standard deviation of the load, kg."""
-        return float(np.sqrt(max(self.weight @ MASSES**2 - self.mass**2, 0.0)))
+        return float(np.sqrt(max(float(self.weight @ MASSES**2) - self.mass**2, 0.0)))
 
     @property
     def interval(self) -> tuple[float, float]:
