@@ -19,8 +19,8 @@ from biodance.diagnosis.problem import Look
 from biodance.discovery import Chosen
 from biodance.effects import Case, DiscreteEffect, Effect, Gate, causes, gates
 from biodance.errors import BiodanceError, NotSolved, TrialRefused
-from biodance.identification.added_mass import expect_unloaded
 from biodance.identification.identification import Identification, identify_body, standing_point
+from biodance.identification.rival_bodies import expect_unloaded
 from biodance.pipeline.attention import judged_trials, told
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES, SessionIdentification
 from biodance.pipeline.looked_at import Own, left_out, looked_at, looks, own_tolerances

@@ -113,15 +113,7 @@ def print_identification(found: dict[str, Any], console: Console) -> None:
             f"{name} {' '.join(format_number(x) for x in row[name]['rms'])}" for name in ("table", "identified")
         )
         console.print(f"{escape(row['trial'])}, RMS Fx Fy Fz Mx My Mz: {told}", soft_wrap=True)
-    load = found["added_mass"]
-    if load:
-        low, high = (format_number(x, 2) for x in load["ci95_kg"])
-        console.print(
-            f"added mass: {format_number(load['kg'], 2)} kg ({low} to {high}) on {load['segment']}, beyond "
-            f"{escape(load['reference'])}"
-        )
-    else:
-        console.print(f"added mass: none found beyond {escape(found['added_mass_search']['reference'])}")
+    console.print(f"added mass: {escape(found['added_mass_search']['text'])}", soft_wrap=True)
     for note in found["notes"]:
         console.print(f"note: {escape(note)}", soft_wrap=True)
 

@@ -35,7 +35,7 @@ SHOULDER_PULL = {"shoulder_flexion": 12.0, "shoulder_adduction": 12.0}
 """mm per rad for SHO and RBAK: the shoulder blade slides on the thorax."""
 SWING = {"THI": 9.0, "UPA": 10.0, "TIB": 12.0, "FRM": 14.0}
 """Hz, natural frequency of flesh and marker where muscle lies under the skin: 9 Hz sags by 3 mm under gravity.
-Judgement, set so that fast squats leave residuals of the size of those in Jovic et al. (Table II).
+Judgement, set so that fast squats leave residuals of the size of those in Bonnet et al. (2016, Table II).
 """
 BONY = 16.0
 """Hz, the same where bone lies under the skin: all other markers."""
