@@ -89,7 +89,7 @@ def judge(scenario: Scenario, *, absent: bool = False) -> Score:
         patch("biodance.effects.causes", lambda chosen=None: left if chosen is None else chosen),
         patch("biodance.diagnosis.engine.problem", planned.timed(problem)),
         patch("biodance.diagnosis.naming.candidates", planned.timed(candidates)),
-        patch("biodance.diagnosis.engine.limits", planned.timed(detection_limits)),
+        patch("biodance.diagnosis.engine.detection_limits", planned.timed(detection_limits)),
     ):
         found = diagnose_session(result, effects=left)
     seconds = time.process_time() - start

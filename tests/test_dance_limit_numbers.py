@@ -12,6 +12,7 @@ from biodance.body.body import Body
 from biodance.dance.limits import CheckedMotion, Limit, family
 from biodance.dance.problem.stance import Stance, holding, seat, stance
 from biodance.dance.problem.state import State, close_legs
+from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
 
 FAMILY = {limit.name: limit for limit in family()}
@@ -78,14 +79,16 @@ def test_balance_of_the_weight_over_one_foot_is_that_of_this_foot() -> None:
     assert outside == pytest.approx((-sole, -sole), abs=0.006)
 
 
-def test_joint_torque_a_forearm_held_out_weighs_m_g_l_on_the_elbow() -> None:
+@pytest.mark.parametrize(("low", "high"), [(-1e4, 2.5), (1.5, 1e4)])
+def test_joint_torque_a_forearm_held_out_weighs_m_g_l_on_the_elbow(low: float, high: float) -> None:
+    """Muscles that bend by 2.5 N·m at most have so much left; those that had to bend by 1.5 at least, the rest."""
     x = upright(left_elbow_flexion=np.pi / 2)
     elbow, weight = BODY.joint_index("left_elbow_flexion"), 0.227481 * 9.80665
-    strong = np.full(23, 1e4)
-    torques = {"torque_lower": -strong, "torque_upper": np.where(np.arange(23) == elbow, 2.5, strong)}
+    here, strong = np.arange(23) == elbow, np.full(23, 1e4)
+    torques = {"torque_lower": np.where(here, low, -strong), "torque_upper": np.where(here, high, strong)}
     weak = replace(BODY, limits=replace(BODY.limits, **torques))
     state = State(type(CHAIN)(weak), seat(weak), x, *np.zeros((2, *x.shape)))
-    left = 2.5 - weight
+    left = min(weight - low, high - weight)
     assert FAMILY["joint_torque"].margins(state).value.min() == pytest.approx(left, abs=1e-4)
     assert FAMILY["joint_torque"].check(checked(state)).value.min() == pytest.approx(left, abs=1e-4)
 
@@ -101,6 +104,10 @@ def test_joint_range_and_speed_are_what_is_left_to_the_stops() -> None:
     assert roomy > 0.05
     x[0, 6 + knee] = stop - 0.03
     assert both(FAMILY["joint_range"], x, feet()[0]) == pytest.approx((0.03, 0.03))
+    keeping = replace(FAMILY["joint_range"], keep=1.0)
+    assert both(keeping, x, feet()[0]) == pytest.approx((0.03 - np.pi / 180,) * 2)
+    x[0, 6 + knee] = BODY.limits.lower[knee] + 0.02
+    assert both(FAMILY["joint_range"], x, feet()[0]) == pytest.approx((0.02, 0.02))
     v = np.zeros_like(x)
     v[0, 6 + knee] = -(fast + 0.25)
     assert both(FAMILY["joint_speed"], x, feet()[0], v=v) == pytest.approx((-0.25, -0.25))
@@ -110,6 +117,8 @@ def test_ground_clearance_is_the_height_of_the_lowest_corner() -> None:
     x = upright()
     x[0, 2] += 0.03
     assert both(FAMILY["ground_clearance"], x, feet()[3]) == pytest.approx((0.03, 0.03), abs=1e-6)
+    higher = replace(FAMILY["ground_clearance"], height=0.02)
+    assert both(higher, x, feet()[3]) == pytest.approx((0.01, 0.01), abs=1e-6)
     x[0, 6 + BODY.joint_index("right_ankle_dorsiflexion")] = -0.2  # the toes go down
     lower = 0.03 + 0.067375 - 0.067375 * np.cos(0.2) - 0.19418 * np.sin(0.2)
     assert both(FAMILY["ground_clearance"], x, feet()[3]) == pytest.approx((lower, lower), abs=1e-6)
@@ -167,4 +176,15 @@ def test_self_collision_of_two_shanks_side_by_side_is_the_width_of_the_hips_less
     shanks = found.of.index("right_shank - left_shank")
     assert found.value[0, shanks] == pytest.approx(apart, abs=1e-9)
     assert FAMILY["self_collision"].margins(state).value[0, shanks] == pytest.approx(apart, abs=1e-9)
+    spaced = replace(FAMILY["self_collision"], gap=0.01)
+    assert spaced.check(checked(state)).value[0, shanks] == pytest.approx(apart - 0.01, abs=1e-9)
+    assert spaced.margins(state).value[0, shanks] == pytest.approx(apart - 0.01, abs=1e-9)
     assert min(both(FAMILY["self_collision"], turned, feet()[0])) > max(both(FAMILY["self_collision"], x, feet()[0]))
+
+
+@pytest.mark.parametrize(
+    ("name", "number", "value"), [("friction", "mu", 15.0), ("friction", "mu", 0.0), ("balance", "share", 1.01)]
+)
+def test_a_number_beyond_what_is_legal_is_refused(name: str, number: str, value: float) -> None:
+    with pytest.raises(BiodanceError, match=rf"limits\.{name}\.{number} = {value:g}; legal are"):
+        replace(FAMILY[name], **{number: value})

@@ -3,12 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from diagnosed_sessions import RATE, body, known, looks
 
 from biodance.diagnosis.adequacy import LIMIT, STRAINED, adequacy, strain, verdict
 from biodance.diagnosis.evidence import Belief
 from biodance.diagnosis.naming import built
 from biodance.diagnosis.problem import problem
+from biodance.effects import Gate
 
 
 def test_chance_spreads_more_in_a_short_session() -> None:
@@ -49,3 +51,26 @@ def test_a_strained_body_is_never_complete() -> None:
     assert verdict(1, 1.0, ()) == "named, complete"
     assert verdict(1, 1.0, (), strained=True) == "named, incomplete"
     assert verdict(0, 1.0, (), strained=True) == "unexplained"
+
+
+@pytest.mark.parametrize(
+    ("named", "worst", "expected"),
+    [
+        (0, 4.4, "nothing wrong"),
+        (0, 4.6, "unexplained"),
+        (1, 4.4, "named, complete"),
+        (1, 4.6, "named, incomplete"),
+        (2, 8.9, "named, incomplete"),
+        (2, 9.1, "unexplained"),
+    ],
+)
+def test_the_verdict_turns_at_four_and_a_half_and_at_nine_deviations(named: int, worst: float, expected: str) -> None:
+    """Thirty numbers of a session without fault stay below 4.5 in all but one of ten thousand; 9 is twice that."""
+    assert verdict(named, worst, ()) == expected
+
+
+def test_a_failed_check_is_a_name_too() -> None:
+    failed, passed = (Gate("labels", ok, "Seen.") for ok in (False, True))
+    assert verdict(0, 1.0, (failed,)) == "named, complete"
+    assert verdict(0, 1.0, (passed,)) == "nothing wrong"
+    assert verdict(0, 4.6, (failed, passed)) == "named, incomplete"

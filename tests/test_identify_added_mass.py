@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from identify_trials import noisy_fit, person, smooth_motion
 
-from biodance.identification.added_mass import added_mass, surprised
+from biodance.identification.added_mass import LoadCandidate, LoadSearch, added_mass, surprised
 from biodance.identification.identification import Identification, identify_body, standing_point
 from biodance.identification.learning import learn_noise
 from biodance.identification.loads import compact_load, load_moments, may_carry
@@ -94,3 +94,24 @@ def test_an_undeclared_load_is_not_learned_as_noise() -> None:
         )
     assert slow[1][0] < 3 * slow[0][0]
     assert slow[1][1] > 3 * slow[1][0]
+
+
+def test_without_any_data_a_load_is_as_likely_as_none() -> None:
+    """Four segments are four ways to be wrong: together they have the half that they had before the data."""
+    _, after = visits(50, frames=300)
+    blank = replace(after.data, R=np.zeros_like(after.data.R))
+    found = added_mass(replace(after, data=blank))
+    assert found.p_no_load == pytest.approx(0.5)
+    assert [suspect.probability for suspect in found.suspects] == pytest.approx([0.125] * 4)
+    assert not found.found
+
+
+@pytest.mark.parametrize(
+    ("p_no_load", "mass", "announced"), [(0.051, 2.0, False), (0.049, 2.0, True), (0.0, -1.0, False)]
+)
+def test_a_load_is_announced_below_five_per_cent_and_never_a_negative_one(
+    p_no_load: float, mass: float, announced: bool
+) -> None:
+    nan = np.full(3, np.nan)
+    suspect = LoadCandidate("s1", mass, 0.1, nan, nan, 5.0, 1 - p_no_load, 0.5)
+    assert LoadSearch((suspect,), p_no_load, "the table").found == announced

@@ -2,6 +2,8 @@
 exist.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from random_bodies import random_body, random_motion
@@ -47,6 +49,24 @@ def test_every_inequality_and_equality_holds(seed: int) -> None:
     tied = list(fit.base.well_known)
     if fit.status == "solved":
         np.testing.assert_allclose(fit.base.base.regroup[tied] @ fit.phi, fit.base.value[tied], rtol=1e-4, atol=1e-5)
+
+
+def test_the_inequalities_are_mass_box_and_moments_of_inertia_by_hand() -> None:
+    """Two kilograms in three points: the distances of their CoM from the six walls, and what turning them takes."""
+    places, weights = np.array([[0.3, -0.1, 0.2], [0.1, 0.4, -0.2], [-0.2, 0.1, 0.3]]), np.array([0.5, 0.7, 0.8])
+    com = weights @ places / 2.0
+    products = np.einsum("k,ki,kj->ij", weights, places, places)
+    tensor = np.trace(products) * np.eye(3) - products
+    phi = np.array([2.0, *(2.0 * com), *(tensor[i, j] for i, j in ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)))])
+    body = random_body(np.random.default_rng(0), n_segments=1)
+    low, high = np.array([-0.11, -0.12, -0.13]), np.array([0.21, 0.22, 0.23])
+    A, b = inequalities(replace(body, com_boxes=np.array([[low, high]])))
+    left = A @ phi - b
+    np.testing.assert_allclose(left[:7], [2.0, *(2.0 * (com - low)), *(2.0 * (high - com))])
+    about = [sum(w * np.sum(np.cross(v, p) ** 2) for w, p in zip(weights, places, strict=True)) for v in directions()]
+    np.testing.assert_allclose(A[7:] @ phi, about)
+    least = np.linalg.eigvalsh(body.sip.phi[[[4, 5, 7], [5, 6, 8], [7, 8, 9]]])[0]
+    np.testing.assert_allclose(b, [0.0] * 7 + [0.1 * least] * 100)
 
 
 def least_distance(data, body) -> np.ndarray:

@@ -163,3 +163,34 @@ def test_boxes_that_no_body_can_meet_are_a_failure_with_the_segment() -> None:
     failed = physical_fit(pinned, replace(body, com_boxes=boxes))
     assert failed.status == "failed"
     assert "s2" in failed.cause
+
+
+def test_a_centre_of_mass_outside_its_box_stops_at_the_wall() -> None:
+    """2 kg whose first moment alone is unknown, alike along all axes: the nearest CoM is the one clipped to the box."""
+    body = random_body(np.random.default_rng(0), n_segments=1)
+    round_one = np.array([2.0, 0, 0, 0, 5.0, 0, 5.0, 0, 0, 5.0])
+    factor = 0.1 * np.eye(10)[:, 1:4]
+    believed = round_one + 2.0 * np.array([0, 0.2, -0.3, 0.01, 0, 0, 0, 0, 0, 0])
+    boxes = np.array([[[-0.03, -0.05, -0.02], [0.08, 0.07, 0.09]]])
+    belief = Posterior(Sip(body.segments, round_one, factor @ factor.T), believed, factor, 0.0, 0.0, 1)
+    fit = physical_fit(belief, replace(body, com_boxes=boxes))
+    np.testing.assert_allclose(fit.sip.phi[1:4] / 2.0, [0.08, -0.05, 0.01], atol=1e-5)
+    assert fit.moved.tolist() == [True]
+    assert fit.distance == pytest.approx(2.0 * np.hypot(0.12, 0.25) / 0.1, rel=1e-3)
+
+
+@pytest.mark.parametrize("beyond", [1e-6, 1e-4])
+def test_a_body_that_is_outside_by_more_than_rounding_is_moved_inside(beyond: float) -> None:
+    """A centre of mass a micrometre beyond its box is outside; one a thousandth of that is rounding."""
+    body = random_body(np.random.default_rng(0), n_segments=1)
+    round_one = np.array([2.0, 0, 0, 0, 5.0, 0, 5.0, 0, 0, 5.0])
+    factor = 0.1 * np.eye(10)[:, 1:4]
+
+    def fit_of(com: float) -> PhysicalFit:
+        prior = Sip(body.segments, round_one, factor @ factor.T)
+        belief = Posterior(prior, round_one + 2.0 * com * np.eye(10)[1], factor, 0.0, 0.0, 1)
+        return physical_fit(belief, replace(body, com_boxes=np.array([[[-0.05] * 3, [0.05] * 3]])))
+
+    assert fit_of(0.05 + beyond).moved.all()
+    assert fit_of(0.05 + beyond).sip.phi[1] <= 2.0 * 0.05 + 1e-9
+    assert not fit_of(0.05 + 1e-9).moved.any() or fit_of(0.05 + 1e-9).distance < 1e-4

@@ -9,9 +9,10 @@ from scipy.signal import lfilter
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.information import information
 from biodance.identification.learning import learn_noise
-from biodance.identification.statistics import Fit, layout_for, statistics
+from biodance.identification.statistics import Fit, Statistics, layout_for, statistics
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Motion, Sip, Wrench
+from biodance.uncertainty.bands import Bands
 from biodance.uncertainty.noise import Noise
 
 ABOUT = np.array([0.1, 0.2, 0.0])
@@ -86,3 +87,14 @@ def test_nothing_to_use_is_refused() -> None:
     body, fit = smooth_fit(0, frames=200)
     with pytest.raises(TrialRefused, match="no frame"):
         statistics(body, Fit("t", fit.motion, fit.wrench, np.zeros(200, dtype=bool)), LAYOUT)
+
+
+def test_what_the_parameters_leave_open_counts_as_noise() -> None:
+    """One force of 5 N of which a kilogram explains 2 N: at 2 +- 0.5 kg there are 1 N left and 1 N unknown, 2 N²."""
+    gram = np.zeros((1, 6, 2, 6, 2))
+    gram[0, 2, :, 2, :] = np.outer([2.0, 5.0], [2.0, 5.0])
+    one = Statistics(gram, np.array([1]), layout_for(ABOUT, Bands((0.0, np.inf), np.inf)))
+    sure, unsure = (one.moments(np.array([2.0]), np.array([[sd**2]])) for sd in (0.0, 0.5))
+    np.testing.assert_allclose(np.diag(sure.residual[0]), [0, 0, 1.0, 0, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(np.diag(unsure.residual[0]), [0, 0, 2.0, 0, 0, 0], atol=1e-12)
+    assert unsure.count.tolist() == [1.0]

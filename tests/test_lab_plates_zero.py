@@ -37,6 +37,13 @@ def test_the_offset_is_taken_off(zero, reaction):
         assert "loaded there" in said
 
 
+@pytest.mark.parametrize(("zero", "window"), [((1, 400), (0, 400)), ((3, 14), (2, 14)), ((391, 400), (390, 400))])
+def test_samples_are_counted_from_one_and_the_last_one_counts(zero, window):
+    vertical = np.concatenate([np.full(400, 3.0), np.full(400, 700.0)])
+    found = find_baseline(vertical, zero=zero, rate=RATE)
+    assert (found.start, found.stop) == window
+
+
 @pytest.mark.parametrize("level", [-200.0, 150.0, 60.0])
 def test_a_large_offset_of_either_sign_is_found(level):
     plate, truth, _ = recorded(zero=(1, 0), offset=np.array([0, 0, level, 0, 0, 0]))

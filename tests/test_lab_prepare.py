@@ -125,6 +125,15 @@ def test_unknown_samples_stay_unknown() -> None:
     assert np.array_equal(unknown, np.isnan(ready.wrench.value).all(axis=1))
 
 
+def test_the_chosen_cutoff_is_that_of_the_forces() -> None:
+    """A hum at the cut-off keeps 1 / sqrt(2) of its amplitude of 20 N; at the usual 10 Hz nothing of it is left."""
+    given = trial(rate=200.0, frames=400, hum=20.0)
+    chosen = prepare(replace(given, settings=Settings().changed({"filter.cutoff": 50})))
+    left = [(one.wrench.value - slow(given.markers.time))[100:-100].std() for one in (chosen, prepare(given))]
+    assert left[0] == pytest.approx(10.0, rel=0.01)
+    assert left[1] < 0.05
+
+
 def test_a_cutoff_above_half_the_marker_rate_is_refused() -> None:
     with pytest.raises(TrialRefused, match=r"Trial walk: The cut-off 60 Hz is not below half"):
         prepare(replace(trial(), settings=Settings().changed({"filter.cutoff": 60})))

@@ -56,6 +56,23 @@ def test_every_row_says_what_it_is_and_where_it_was_learned() -> None:
             assert re.search(r"\d{4}|tables|clinic|errors of predicted", row["source"]), row
 
 
+@pytest.mark.parametrize(
+    ("quantity", "target", "state", "expected"),
+    [
+        ("slide", "marker", "any", 0.006),  # Leardini 2005: 3 to 10 mm over a movement of about a radian
+        ("joint_centre", "hip", "before", 0.012),  # Harrington 2007: 5 to 25 mm
+        ("joint_centre", "trunk", "before", 0.040),  # tables cut the trunk 5 to 8 cm apart
+        ("tilt", "knee", "before", 0.07),  # 4 degrees
+        ("axis_turn", "knee medial marker", "before", 0.10),  # Della Croce 1999: 5 to 6 degrees
+    ],
+)
+def test_the_sizes_on_which_every_interval_stands_are_those_of_their_sources(
+    quantity: str, target: str, state: str, expected: float
+) -> None:
+    """A size is not measured by any other test: too small, and all intervals are too short."""
+    assert error_size(quantity, target, state=state) == expected
+
+
 def test_a_size_that_is_not_there_is_refused() -> None:
     assert error_size("joint_centre", "trunk", state="before") == 0.040
     assert error_size("joint_centre", "trunk", state="after") < 0.005

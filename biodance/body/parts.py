@@ -63,12 +63,14 @@ class SegmentMarkers:
 
 class JointError(NamedTuple):
     """How far the anatomical ``joint`` of a body may be from the person's, standard deviations: ``centre`` m per axis,
-    ``axis`` rad of a hinge's flexion axis (0 for other joints).
+    ``axis`` rad of a hinge's flexion axis (0 for other joints); ``contradicted`` where the movement contradicts the
+    place that the static trial gave the joint.
     """
 
     joint: str
     centre: float
     axis: float
+    contradicted: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -120,8 +120,8 @@ def after_calibration(seen: Visibility, body: Body) -> Visibility:
 
 def placing_leaves(error: JointError) -> float:
     """Return the share of a wrong joint centre that placing the joint by movement has left, 0..1."""
-    fixed = fixed_point(error.joint)
-    return float(np.clip((error.centre**2 - fixed**2) / centre_sd(error.joint) ** 2, 0.01, 1.0))
+    fixed, before = fixed_point(error.joint), centre_sd(error.joint, contradicted=error.contradicted)
+    return float(np.clip((error.centre**2 - fixed**2) / before**2, 0.01, 1.0))
 
 
 def detection_limits(seen: Visibility, body: Body, threshold: float) -> tuple[Unobservable, ...]:

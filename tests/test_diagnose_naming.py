@@ -1,0 +1,46 @@
+"""Which causes stand in the set of a finding: those that are nearly as probable as the best one, and no others."""
+
+import numpy as np
+import pytest
+from diagnosed_sessions import known
+
+from biodance.diagnosis.candidates import Candidate
+from biodance.diagnosis.naming import Round, ScoredCandidate, suspicious
+from biodance.effects import effect
+
+
+def scored(name: str, log_bayes_factor: float, *, targets: int = 1) -> ScoredCandidate:
+    """Return a cause with its evidence and what ``targets`` take off it."""
+    cause = Candidate(effect(name), np.zeros((1, 0)), ())
+    return ScoredCandidate(cause, log_bayes_factor, log_bayes_factor - np.log(targets), np.zeros(0), 1.0)
+
+
+def test_a_cause_twenty_times_less_probable_is_not_in_the_set() -> None:
+    """exp(3) = 20: of 100, 98, 96 and 40 (natural logarithms) the first two cannot be told apart."""
+    ranking = Round(
+        (scored("plate_gain", 100.0), scored("lab_tilt", 98.0), scored("body_mass", 96.0), scored("time_delay", 40.0))
+    )
+    assert [one.effect for one in ranking.set] == ["plate_gain", "lab_tilt"]
+
+
+@pytest.mark.parametrize(("second", "together"), [(100.0 - 2.9, True), (100.0 - 3.1, False)])
+def test_the_set_ends_three_behind_the_best(second: float, together: bool) -> None:
+    ranking = Round((scored("plate_gain", 100.0), scored("lab_tilt", second)))
+    assert (len(ranking.set) == 2) == together
+
+
+def test_nobody_leaves_the_set_because_it_has_many_targets() -> None:
+    """Thirty targets cost ln 30 = 3.4, which is more than the set's three: alone they would have been as probable."""
+    crowd = scored("plate_crosstalk", 99.0, targets=30)
+    ranking = Round((scored("plate_gain", 100.0), crowd))
+    assert ranking.suspects[0].score - crowd.score > 3.0
+    assert [one.effect for one in ranking.set] == ["plate_gain", "plate_crosstalk"]
+
+
+@pytest.mark.parametrize(("evidence", "targets", "named"), [(10.1, 1, True), (9.9, 1, False), (12.0, 30, False)])
+def test_a_cause_is_named_from_a_log_bayes_factor_of_ten_on_and_its_targets_count(
+    evidence: float, targets: int, named: bool
+) -> None:
+    assert known().threshold == 10.0
+    assert suspicious(Round((scored("plate_crosstalk", evidence, targets=targets),)), known()) == named
+    assert not suspicious(Round(()), known())
