@@ -13,7 +13,7 @@ _Array = NDArray[np.float64]
 
 
 def cross(a: _Array, b: _Array) -> _Array:
-    """Return the vector products (..., 3); a fifth of the time of numpy's, which serves other lengths too."""
+    """Return the vector products (..., 3); twice as fast as numpy's, which serves other lengths too."""
     out = np.empty(np.broadcast_shapes(a.shape, b.shape), np.result_type(a, b))
     out[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
     out[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
@@ -23,9 +23,14 @@ def cross(a: _Array, b: _Array) -> _Array:
 
 def spatial_cross(a: _Array, b: _Array) -> _Array:
     """Return the products a x b (..., 6) of spatial motion vectors [linear, angular] (Featherstone 2008, eq. 2.33)."""
-    turn_a, turn_b = a[..., 3:], b[..., 3:]
-    linear = cross(turn_a, b[..., :3]) + cross(a[..., :3], turn_b)
-    return np.concatenate([linear, cross(turn_a, turn_b)], axis=-1)
+    vx, vy, vz, wx, wy, wz = np.moveaxis(a, -1, 0)
+    px, py, pz, rx, ry, rz = np.moveaxis(b, -1, 0)
+    out = np.empty(np.broadcast_shapes(a.shape, b.shape), np.result_type(a, b))
+    out[..., 0] = (wy * pz - wz * py) + (vy * rz - vz * ry)
+    out[..., 1] = (wz * px - wx * pz) + (vz * rx - vx * rz)
+    out[..., 2] = (wx * py - wy * px) + (vx * ry - vy * rx)
+    out[..., 3], out[..., 4], out[..., 5] = wy * rz - wz * ry, wz * rx - wx * rz, wx * ry - wy * rx
+    return out
 
 
 def skew(vector: _Array) -> _Array:
