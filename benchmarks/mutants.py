@@ -148,8 +148,8 @@ def broken_files(copy: Path, mutant: Mutant) -> dict[Path, str]:
     changed = {path: broken_text(mutant, before.decode())}
     beside = path.with_suffix(".toml")
     if path.suffix == ".csv" and beside.is_file():
-        digests = (hashlib.sha256(content).hexdigest() for content in (before, changed[path].encode()))
-        changed[beside] = beside.read_text(encoding="utf-8").replace(*digests)
+        old, new = (hashlib.sha256(content).hexdigest() for content in (before, changed[path].encode()))
+        changed[beside] = beside.read_text(encoding="utf-8").replace(old, new)
     return changed
 
 
