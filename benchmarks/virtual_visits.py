@@ -122,7 +122,7 @@ def _make(subject: Subject, protocol: str, seed: int, session: int, load: tuple[
 def _tracked(session: Session) -> tuple[Body, list[TrialResult]]:
     """Return the body of a session and its trials after all steps before identification."""
     read = tuple(prepare_trial(trial) for trial in session.trials)
-    body, _ = body_of(session.subject, read, [])
+    body, _ = body_of(session.subject, read, session.settings, [])
     assert body is not None
     return body, [examine_trial(one, body, mass=session.subject.mass) for one in read]
 
