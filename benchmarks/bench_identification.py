@@ -192,7 +192,7 @@ def pairs(
 
 def subject_of(index: int, catalogue: tuple[int, int], *, tell) -> tuple[Row, list[LoadSearch], Load, list[Load]]:
     """Return all about one subject, from the cache while the code of identification/ is unchanged."""
-    house = Path(biodance.__file__).parent
+    house = Path(biodance.identification.__file__).parent.parent
     code = b"".join(
         path.read_bytes() for room in ("identification", "uncertainty") for path in sorted((house / room).glob("*.py"))
     )

@@ -50,7 +50,7 @@ def gather(
     """Return the statistics, the noise and the disturbances of a visit, from the cache while their code is
     unchanged.
     """
-    folder = Path(biodance.__file__).parent / "identification"
+    folder = Path(biodance.identification.__file__).parent
     room, table = folder.parent / "uncertainty", locate("anthropometry/uncertainty", "sizes", ".csv")
     parts = [*(folder / f"{name}.py" for name in SOURCES), *sorted(room.glob("*.py")), table]
     code = b"".join(path.read_bytes() for path in parts)
