@@ -29,7 +29,7 @@ _UNTOLD = 0.5
 _COARSE, _TRUE = MASSES[::6], np.geomspace(0.05, 25.0, 60)
 """kg: masses over which the smallest load that can be found is integrated and searched."""
 
-Status = Literal["found", "none", "cannot tell"]
+LoadStatus = Literal["found", "none", "cannot tell"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +78,7 @@ class LoadSearch:
     doubts: tuple[str, ...] = ()
 
     @property
-    def status(self) -> Status:
+    def status(self) -> LoadStatus:
         """Whether a load is "found" (announced: none is improbable, the interval of its mass excludes zero and the
         session can see loads of this size), there is "none" (more probable than one), or one "cannot tell" (between
         the two, or with `doubts`).
