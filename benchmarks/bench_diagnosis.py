@@ -1,13 +1,14 @@
 """Hide everything, diagnose, judge: writes docs/benchmarks/diagnosis.md.
 
     python benchmarks/bench_diagnosis.py [--run NAME] [--minutes 30] [--out docs/benchmarks/diagnosis.md] [--prepare]
-                                        [--group null]
+                                        [--group null] [--sample]
 
 Sessions are simulated and tracked once and kept on disk (`hidden_sessions.CACHE`); scores are kept per ``--run``, so
 that a run that was stopped goes on, and the same command may run twice at once: every session is claimed by one of
 them. ``--minutes`` ends the run early (0: only the page is written): the sessions come in an order in which every
 beginning is a sample of the whole, and the page says how many there were. ``--prepare`` only simulates and tracks;
-``--group`` only makes the scores of one group.
+``--group`` only makes the scores of one group; ``--sample`` takes the fixed sample of `hidden_causes.sample` instead of
+the whole list and writes no page but one line for every session.
 """
 
 import argparse
@@ -17,7 +18,7 @@ from pathlib import Path
 from diagnosis_contamination import fault_free
 from diagnosis_page import draw, page
 from diagnosis_scores import Score, judged, stored
-from hidden_causes import everything
+from hidden_causes import everything, sample
 from hidden_sessions import Scenario, examined
 
 
@@ -48,8 +49,9 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("docs/benchmarks/diagnosis.md"))
     parser.add_argument("--prepare", action="store_true")
     parser.add_argument("--group", default="")
+    parser.add_argument("--sample", action="store_true")
     chosen = parser.parse_args()
-    start, scenarios = time.monotonic(), everything()
+    start, scenarios = time.monotonic(), sample() if chosen.sample else everything()
     jobs = [
         (one, absent)
         for one in scenarios
@@ -72,7 +74,7 @@ def main() -> None:
                 flush=True,
             )
         scores += [found] if found else []
-    if not chosen.prepare and scores:
+    if not chosen.prepare and not chosen.sample and scores:
         figure = chosen.out.parents[1] / "figures" / "diagnosis_confusion.png"
         draw(scores, figure)
         lines = page(scores, run=chosen.run, figure="../figures/diagnosis_confusion.png", total=len(jobs))

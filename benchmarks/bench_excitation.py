@@ -38,7 +38,7 @@ from biodance.pipeline.dance import dancer
 from biodance.pipeline.danced import simulate_dance
 from biodance.pipeline.session import examine, identification_of
 from biodance.records import Array, Motion, Subject
-from biodance.virtual_lab.protocol import Protocol, TrialPlan, read_protocol
+from biodance.virtual_lab.movement.protocol import Protocol, TrialPlan, read_protocol
 from biodance.virtual_lab.simulate import simulate_session
 from biodance.virtual_lab.truth import sip_in_frames
 

@@ -32,7 +32,7 @@ from identification_tables import (
 )
 from virtual_visits import CACHE, FRESH, TUNED, TrackedVisit, subjects
 
-import biodance.identification
+import biodance
 from biodance.body.inertia import smallest_eigenvalues
 from biodance.identification.added_mass import LoadSearch, added_mass
 from biodance.identification.identification import Identification, identify_body, standing_point
@@ -89,7 +89,7 @@ def own_truth(one: TrackedVisit) -> Array:
     """Return the truth about the true joint centres, in the model's axes (the pelvis in the model's frame)."""
     from virtual_visits import _orthogonal
 
-    from biodance.virtual_lab.flesh import of_parameters, parameters_of_inertia, place_inertia
+    from biodance.virtual_lab.person.flesh import of_parameters, parameters_of_inertia, place_inertia
 
     return np.concatenate(
         [
@@ -191,10 +191,10 @@ def pairs(
 
 
 def subject_of(index: int, catalogue: tuple[int, int], *, tell) -> tuple[Row, list[LoadSearch], Load, list[Load]]:
-    """Return all about one subject, from the cache while the code of identify/ is unchanged."""
-    house = Path(biodance.identify.__file__).parent.parent
+    """Return all about one subject, from the cache while the code of identification/ is unchanged."""
+    house = Path(biodance.identification.__file__).parent.parent
     code = b"".join(
-        path.read_bytes() for room in ("identify", "uncertainty") for path in sorted((house / room).glob("*.py"))
+        path.read_bytes() for room in ("identification", "uncertainty") for path in sorted((house / room).glob("*.py"))
     )
     path = CACHE / f"subject-{hashlib.sha256(f'{catalogue}-{index}'.encode() + code).hexdigest()[:20]}.pickle"
     if not path.is_file():

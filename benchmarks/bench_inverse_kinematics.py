@@ -20,9 +20,10 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation, RotationSpline
 
-from biodance.body.body import UPRIGHT, Body
+from biodance.body.body import Body
 from biodance.body.export import write_model
 from biodance.body.human.human import human
+from biodance.body.parts import UPRIGHT
 from biodance.lab.opensim.trc import write_trc
 from biodance.motion.ik.inverse_kinematics import solve_ik
 from biodance.motion.kinematics import poses

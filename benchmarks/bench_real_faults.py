@@ -24,8 +24,8 @@ from biodance.lab.plates.parameters import count_plates
 from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.session import examine
-from biodance.virtual_lab.causes import fault_of, parse_cause
-from biodance.virtual_lab.inject import inject
+from biodance.virtual_lab.faults.causes import fault_of, parse_cause
+from biodance.virtual_lab.faults.inject import inject
 
 SESSIONS = ("biomechzoo/HC030A", "biomechzoo/HC032A", "adl_gait")
 FAULTS = (

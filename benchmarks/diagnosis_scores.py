@@ -22,7 +22,7 @@ from biodance.diagnosis.observability import detection_limits
 from biodance.diagnosis.problem import problem
 from biodance.effects import discrete_effects, effects
 from biodance.pipeline.diagnosis import diagnose_session
-from biodance.virtual_lab.causes import parse_cause
+from biodance.virtual_lab.faults.causes import parse_cause
 
 SIGMAS = 1.959964
 
@@ -89,7 +89,7 @@ def judge(scenario: Scenario, *, absent: bool = False) -> Score:
         patch("biodance.effects.causes", lambda chosen=None: left if chosen is None else chosen),
         patch("biodance.diagnosis.engine.problem", planned.timed(problem)),
         patch("biodance.diagnosis.naming.candidates", planned.timed(candidates)),
-        patch("biodance.diagnosis.engine.limits", planned.timed(detection_limits)),
+        patch("biodance.diagnosis.engine.detection_limits", planned.timed(detection_limits)),
     ):
         found = diagnose_session(result, effects=left)
     seconds = time.process_time() - start

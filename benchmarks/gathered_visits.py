@@ -9,7 +9,7 @@ from pathlib import Path
 
 from virtual_visits import CACHE, TrackedVisit, visit
 
-import biodance.identification
+import biodance
 from biodance.identification.identification import Identification, conclude, usable
 from biodance.identification.learning import learn_noise
 from biodance.identification.loads import may_carry
@@ -50,7 +50,7 @@ def gather(
     """Return the statistics, the noise and the disturbances of a visit, from the cache while their code is
     unchanged.
     """
-    folder = Path(biodance.identify.__file__).parent
+    folder = Path(biodance.identification.__file__).parent
     room, table = folder.parent / "uncertainty", locate("anthropometry/uncertainty", "sizes", ".csv")
     parts = [*(folder / f"{name}.py" for name in SOURCES), *sorted(room.glob("*.py")), table]
     code = b"".join(path.read_bytes() for path in parts)

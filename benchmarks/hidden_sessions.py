@@ -29,11 +29,11 @@ from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine
 from biodance.pipeline.trial import Prepared
 from biodance.records import Motion, Trial
-from biodance.virtual_lab.causes import hide, parse_cause
-from biodance.virtual_lab.laboratory import LabVisit
-from biodance.virtual_lab.performance import Performance, perform
-from biodance.virtual_lab.person import Person
-from biodance.virtual_lab.protocol import TrialPlan, read_protocol
+from biodance.virtual_lab.faults.causes import hide, parse_cause
+from biodance.virtual_lab.movement.performance import Performance, perform
+from biodance.virtual_lab.movement.protocol import TrialPlan, read_protocol
+from biodance.virtual_lab.person.person import Person
+from biodance.virtual_lab.recording.laboratory import LabVisit
 from biodance.virtual_lab.simulate import simulate_session
 
 CACHE = Path(os.environ.get("BIODANCE_CACHE", tempfile.gettempdir())) / "biodance_diagnosis"
@@ -91,7 +91,7 @@ def session_folder(scenario: Scenario) -> Path:
             plan = replace(plan, trials=tuple(trial for trial in plan.trials if trial.role != "validate"))
         causes = tuple(parse_cause(text) for text in scenario.hidden)
         visit, loads = hide(causes, subject, plan, seed=scenario.seed, visit=LabVisit(scenario.visit))
-        with patch("biodance.virtual_lab.laboratory.perform", _performed):
+        with patch("biodance.virtual_lab.recording.laboratory.perform", _performed):
             simulate_session(subject, plan, part, seed=scenario.seed, visit=visit, loads=loads)
         try:
             part.rename(folder)
@@ -169,7 +169,8 @@ def _performed(person: Person, plan: TrialPlan, session: int, **how: object) -> 
         body.markers.position.tobytes(),
         sorted(how.items(), key=str),
     )
-    return PERFORMANCES.recall(said, lambda: perform(person, plan, session, **how))  # type: ignore[arg-type, return-value]
+    made = PERFORMANCES.recall(said, lambda: perform(person, plan, session, **how))  # type: ignore[arg-type]
+    return made  # type: ignore[return-value]
 
 
 def store(path: Path, value: object) -> None:

@@ -7,6 +7,7 @@ from gathered_visits import Gathered
 from identification_tables import ARM, LOADS, Load
 from virtual_visits import TrackedVisit
 
+from biodance.body.parts import GRAVITY
 from biodance.identification.added_mass import added_mass
 from biodance.identification.identification import Identification, conclude
 from biodance.identification.learning import learn_noise
@@ -15,10 +16,10 @@ from biodance.identification.mismatch import mismatch
 from biodance.identification.statistics import Fit, Statistics
 from biodance.lab.filters import LowPass, low_pass
 from biodance.motion.kinematics import segment_motion
-from biodance.motion.regressor import GRAVITY, regressor_of
+from biodance.motion.regressor import regressor_of
 from biodance.records import Array, Motion
 from biodance.uncertainty.caution import widened
-from biodance.virtual_lab.merge import MERGED
+from biodance.virtual_lab.recording.merge import MERGED
 
 
 def loads_table(reference: Identification, later: Gathered) -> list[Load]:

@@ -19,15 +19,15 @@ from biodance.identification.statistics import Fit
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.pipeline.body import body_of
-from biodance.pipeline.results import TrialResult
 from biodance.pipeline.trial import examine_trial, prepare_trial
+from biodance.pipeline.trial_result import TrialResult
 from biodance.records import Array, Session, Subject
-from biodance.virtual_lab.flesh import of_parameters, parameters_of_inertia, place_inertia
-from biodance.virtual_lab.laboratory import LabVisit
-from biodance.virtual_lab.merge import MERGED, load_on, merged_sip
-from biodance.virtual_lab.performance import Performance, perform
-from biodance.virtual_lab.person import Person, make_person
-from biodance.virtual_lab.protocol import Protocol, read_protocol
+from biodance.virtual_lab.movement.performance import Performance, perform
+from biodance.virtual_lab.movement.protocol import Protocol, read_protocol
+from biodance.virtual_lab.person.flesh import of_parameters, parameters_of_inertia, place_inertia
+from biodance.virtual_lab.person.person import Person, make_person
+from biodance.virtual_lab.recording.laboratory import LabVisit
+from biodance.virtual_lab.recording.merge import MERGED, load_on, merged_sip
 from biodance.virtual_lab.simulate import simulate_session
 
 CACHE = Path(os.environ.get("BIODANCE_CACHE", Path(tempfile.gettempdir()) / "biodance_visits"))
@@ -122,7 +122,7 @@ def _make(subject: Subject, protocol: str, seed: int, session: int, load: tuple[
 def _tracked(session: Session) -> tuple[Body, list[TrialResult]]:
     """Return the body of a session and its trials after all steps before identification."""
     read = tuple(prepare_trial(trial) for trial in session.trials)
-    body, _ = body_of(session.subject, read, [])
+    body, _ = body_of(session.subject, read, session.settings, [])
     assert body is not None
     return body, [examine_trial(one, body, mass=session.subject.mass) for one in read]
 
@@ -154,7 +154,7 @@ def _orthogonal(mean: Array) -> Array:
 
 
 def _load_place(person: Person, segment: str, frames: Array) -> Array:
-    from biodance.virtual_lab.merge import place_in_12
+    from biodance.virtual_lab.recording.merge import place_in_12
 
     own = place_in_12(person, person.loads[0])[1]
     f = frames[list(MERGED).index(segment)]

@@ -19,6 +19,8 @@ print is checked by the tests.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from biodance.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from biodance.body.body import Body as Body
     from biodance.body.human.human import human as human
@@ -60,8 +62,6 @@ if TYPE_CHECKING:
     from biodance.records import Trial as Trial
     from biodance.records import Wrench as Wrench
     from biodance.settings import Settings as Settings
-
-__version__ = "0.1.0"
 
 HOMES = {
     "body.body": ("Body",),

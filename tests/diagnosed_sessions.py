@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 
 from biodance.body.human.human import human
 from biodance.diagnosis.problem import Look
-from biodance.effects import at_origin
+from biodance.effects import wrench_about_origin
 from biodance.motion.regressor import predict_wrench
 from biodance.records import CHANNELS, Motion, Plate, Source, Subject, Trial, Wrench
 from biodance.uncertainty.bands import BANDS
@@ -81,7 +81,7 @@ def looks(seed: int, *, trials: int = 4, hidden=lambda wrench, time, motion: wre
         share = (k / trials, (k + 1) / trials)
         session = np.linspace(*share, moving.time.size)
         value = hidden(predict_wrench(body(), moving, phi).value, session, moving)
-        value = value + at_origin(noise(rng, moving.time.size), CORNERS.mean(axis=0))
+        value = value + wrench_about_origin(noise(rng, moving.time.size), CORNERS.mean(axis=0))
         plate = Plate("plate1", 2, CORNERS, Wrench(moving.time, value))
         trial = Trial(f"t{k}", "fit", None, (plate,), Source(Path(f"t{k}.c3d"), "", "test"))
         found.append(Look(trial, moving, np.ones(moving.time.size, dtype=bool), *share))

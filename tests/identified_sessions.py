@@ -10,11 +10,12 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from biodance.body.human.human import human
-from biodance.identification.loads import point_mass
+from biodance.identification.loads import compact_load
 from biodance.motion.comparison import compare
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.identification import identify_trials
-from biodance.pipeline.results import SessionResult, TrialResult, WrenchComparison
+from biodance.pipeline.results import SessionResult
+from biodance.pipeline.trial_result import TrialResult, WrenchComparison
 from biodance.records import Motion, Session, Source, Subject, Trial, Wrench
 
 SUBJECT = Subject(62.0, 1.70, "F", 30.0, "S01")
@@ -50,7 +51,7 @@ def truth(*, load: float = 0.0) -> np.ndarray:
     for name, factor in (("left_thigh", 1.15), ("right_thigh", 1.1), ("trunk_head", 0.89)):
         phi[one.segment_index(name)] *= factor
     phi *= SUBJECT.mass / phi[:, 0].sum()
-    phi[one.segment_index("left_forearm_hand")] += load * point_mass(np.array([0.0, -0.2, 0.02]))
+    phi[one.segment_index("left_forearm_hand")] += load * compact_load(np.array([0.0, -0.2, 0.02]))
     return phi.ravel()
 
 

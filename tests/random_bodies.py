@@ -3,7 +3,8 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from biodance.body.body import Body, Joint, JointLimits, SegmentMarkers
+from biodance.body.body import Body
+from biodance.body.parts import Joint, JointLimits, SegmentMarkers
 from biodance.records import Motion, Sip
 
 

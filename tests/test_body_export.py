@@ -9,11 +9,11 @@ import pytest
 from random_bodies import random_body, random_motion
 from scipy.spatial.transform import Rotation
 
-from biodance.body.body import UPRIGHT
 from biodance.body.export import formats, write_model
 from biodance.body.export.csv import STANDARD, read_sip
 from biodance.body.export.urdf import roll_pitch_yaw
 from biodance.body.human.human import human
+from biodance.body.parts import UPRIGHT
 from biodance.errors import BiodanceError, FileRefused, UnknownName
 from biodance.lab.opensim.mot import read_mot, write_mot
 from biodance.motion.dynamics import joint_torques

@@ -10,7 +10,8 @@ import pytest
 from random_bodies import random_motion
 from robots import biped
 
-from biodance.body.body import UPRIGHT, Body
+from biodance.body.body import Body
+from biodance.body.parts import UPRIGHT
 from biodance.body.robot.hoap3 import hoap3
 from biodance.body.robot.similar import Likeness, likeness
 from biodance.body.robot.standing_frames import reframed, sole_normal, standing_frames

@@ -9,9 +9,10 @@ import pytest
 from random_bodies import random_motion
 from robots import biped
 
-from biodance.body.body import UPRIGHT, Body
+from biodance.body.body import Body
 from biodance.body.export import write_model
 from biodance.body.human.human import human
+from biodance.body.parts import UPRIGHT
 from biodance.body.robot.hoap3 import hoap3
 from biodance.body.robot.urdf import read_urdf
 from biodance.errors import BiodanceError, FileRefused, UnknownName

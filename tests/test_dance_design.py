@@ -19,8 +19,9 @@ from biodance.dance.problem.plan import Plan
 from biodance.dance.rehearsal import bearing, rehearse
 from biodance.dance.verify import broken, verify, verify_with
 from biodance.errors import BiodanceError, FileRefused
-from biodance.motion.kinematics import poses, quaternion_matrix
+from biodance.motion.kinematics import poses
 from biodance.records import Subject
+from biodance.spatial import quaternion_matrix
 
 BODY = human(Subject(65.0, 1.75, "F", 33.0))
 PLAN = Plan("small", "", (("parallel", 2), ("single_left", 2)), hold=1.0)

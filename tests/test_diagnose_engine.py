@@ -107,7 +107,9 @@ def test_a_hidden_fault_is_named_and_sized(hidden, effect, target, parameter, si
 
 
 def test_two_faults_are_both_named() -> None:
-    both = lambda wrench, session, moving: late(about_plate(offset)(wrench, session, moving), session, moving)  # noqa: E731
+    def both(wrench, session, moving):
+        return late(about_plate(offset)(wrench, session, moving), session, moving)
+
     diagnosis = found(both).diagnosis
     assert {f.effect for f in diagnosis.findings} == {"plate_offset", "time_delay"}
 
@@ -130,13 +132,13 @@ def test_an_absent_culprit_is_never_complete() -> None:
 
 
 def test_a_load_is_named_with_mass_and_place() -> None:
-    from biodance.identification.loads import point_mass
+    from biodance.identification.loads import compact_load
     from biodance.motion.regressor import predict_wrench
 
     index = body().segment_index("left_forearm_hand")
     place = body().sip.com[index] + [0.0, -0.05, 0.03]
     load = np.zeros(120)
-    load[10 * index : 10 * index + 10] = 2.4 * point_mass(place)
+    load[10 * index : 10 * index + 10] = 2.4 * compact_load(place)
     diagnosis = found(lambda wrench, session, moving: wrench + predict_wrench(body(), moving, load).value).diagnosis
     finding = diagnosis.findings[0]
     assert (finding.effect, finding.target) == ("added_mass", "left_forearm_hand")

@@ -7,7 +7,7 @@ import pytest
 from diagnosed_sessions import body, known, looks
 from scipy.stats import multivariate_normal
 
-from biodance.body.body import JointError
+from biodance.body.parts import JointError
 from biodance.diagnosis.candidates import Candidate, candidates, changes, removed, slopes
 from biodance.diagnosis.evidence import believe, evidence, smallest
 from biodance.diagnosis.learning import Null, learn_tolerances

@@ -10,7 +10,7 @@ from human_cases import human_case
 from random_bodies import random_body
 from scipy.interpolate import CubicSpline
 
-from biodance.effects import Case, Effect, at_origin, at_point, effect, effects
+from biodance.effects import Case, Effect, effect, effects, wrench_about_origin, wrench_about_point
 from biodance.errors import UnknownName
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
@@ -150,4 +150,4 @@ def test_wrong_target_lists_the_legal_ones() -> None:
 
 def test_moving_a_wrench_there_and_back_is_nothing() -> None:
     value, point = CASES[1].predicted, np.array([1.0, -2.0, 0.5])
-    np.testing.assert_allclose(at_origin(at_point(value, point), point), value, atol=1e-9)
+    np.testing.assert_allclose(wrench_about_origin(wrench_about_point(value, point), point), value, atol=1e-9)

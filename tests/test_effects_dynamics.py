@@ -5,11 +5,11 @@ import pytest
 from scipy.integrate import solve_ivp
 from test_effects import CASES
 
+from biodance.body.parts import GRAVITY
 from biodance.effects import effect
 from biodance.effects._base.oscillator import point_motion, relative_motion
 from biodance.effects.filter_mismatch import REFERENCE
 from biodance.effects.plate_hysteresis import memory
-from biodance.motion.regressor import GRAVITY
 
 CASE = CASES[1]
 

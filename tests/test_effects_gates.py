@@ -15,12 +15,12 @@ from biodance.effects import (
     DiscreteEffect,
     Gate,
     Recorded,
-    at_origin,
-    at_point,
     discrete_effects,
     effect,
     effects,
     gates,
+    wrench_about_origin,
+    wrench_about_point,
 )
 from biodance.effects.frame_rate import clock_beside_body
 from biodance.effects.unit_error import FACTORS
@@ -63,7 +63,7 @@ def failed(found: tuple[Gate, ...]) -> list[tuple[str, str]]:
 def on_plate(case: Case, change: Array) -> Case:
     """Return the case whose plate's wrench about its centre is multiplied by ``change`` (6,)."""
     plate = case.trial.plates[0]
-    value = at_origin(at_point(plate.wrench.value, plate.centre) * change, plate.centre)
+    value = wrench_about_origin(wrench_about_point(plate.wrench.value, plate.centre) * change, plate.centre)
     return replace(case, trial=replace(case.trial, plates=(replace(plate, wrench=Wrench(plate.wrench.time, value)),)))
 
 
@@ -135,9 +135,9 @@ def test_a_mirrored_channel_is_named(channel: int, target: str) -> None:
 
 @pytest.mark.parametrize(("channel", "target", "limit"), [(2, "Fz", 710.0), (3, "Mx", 9.0)])
 def test_a_flat_top_is_named_with_its_level(channel: int, target: str, limit: float) -> None:
-    local = at_point(standing(np.random.default_rng(4)), CORNERS.mean(axis=0))
+    local = wrench_about_point(standing(np.random.default_rng(4)), CORNERS.mean(axis=0))
     local[:, channel] = np.clip(local[:, channel], -limit, limit)
-    found = discrete_effects()["clipping"].look(recorded(at_origin(local, CORNERS.mean(axis=0))))
+    found = discrete_effects()["clipping"].look(recorded(wrench_about_origin(local, CORNERS.mean(axis=0))))
     assert failed(found) == [("clipping", target)]
     assert found[0].size == pytest.approx(limit, rel=1e-3)
     assert (found[0].quantity, found[0].unit) == ("limit", "N" if channel < 3 else "N·m")
@@ -153,9 +153,9 @@ def test_coarse_converters_and_empty_plates_do_not_clip() -> None:
 
 @pytest.mark.parametrize("frequency", [50.0, 60.0])
 def test_hum_is_named_with_its_amplitude(frequency: float) -> None:
-    local = at_point(standing(np.random.default_rng(6)), CORNERS.mean(axis=0))
+    local = wrench_about_point(standing(np.random.default_rng(6)), CORNERS.mean(axis=0))
     local[:, 0] += 5 * np.sin(2 * np.pi * frequency * np.arange(len(local)) / 1000)
-    value = at_origin(local, CORNERS.mean(axis=0))
+    value = wrench_about_origin(local, CORNERS.mean(axis=0))
     found = discrete_effects()["mains_hum"].look(recorded(value))
     assert failed(found) == [("mains_hum", "Fx")]
     assert found[0].size == pytest.approx(5, rel=0.05)

@@ -9,10 +9,10 @@ from human_cases import human_case
 from biodance.body.changes import move_joint, move_marker, recentre_joint, shift_matter
 from biodance.body.human.human import human
 from biodance.effects import effect
-from biodance.effects.added_mass import point_mass
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Subject
+from biodance.spatial import point_mass
 
 CASE = human_case()
 INSIDE = slice(60, -60)

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from test_effects import CASES
 
-from biodance.effects import at_origin, at_point, effect
+from biodance.effects import effect
 from biodance.records import CHANNELS
+from biodance.spatial import wrench_about_origin, wrench_about_point
 
 CASE = CASES[1]
 CENTRE = np.array([0.4, 0.2, 0.0])
-HERE = at_point(CASE.predicted, CENTRE)
+HERE = wrench_about_point(CASE.predicted, CENTRE)
 """(T, 6) the predicted wrench about the plate's centre: forces and moments along lab axes."""
 TIME = CASE.motion.time / CASE.motion.time[-1]
 
@@ -19,7 +20,7 @@ TIME = CASE.motion.time / CASE.motion.time[-1]
 def added(name: str, target: str, *theta: float) -> np.ndarray:
     """Return (T, 6) what a cause of size ``theta`` adds to the measured wrench, about the plate's centre."""
     cause = effect(name).at(target, CASE)
-    return at_point(cause.transform(CASE, np.array(theta)).residual - CASE.residual, CENTRE)
+    return wrench_about_point(cause.transform(CASE, np.array(theta)).residual - CASE.residual, CENTRE)
 
 
 def alone(channel: str, value: np.ndarray | float) -> np.ndarray:
@@ -65,7 +66,7 @@ def test_drift_is_negative_at_the_start_and_positive_at_the_end() -> None:
 def test_a_body_mass_declared_too_small_is_positive() -> None:
     """All is in proportion: of a person who weighs as much again the plates measure as much again."""
     mass = float(CASE.phi[::10].sum())
-    close(at_origin(added("body_mass", "", mass), CENTRE), CASE.predicted)
+    close(wrench_about_origin(added("body_mass", "", mass), CENTRE), CASE.predicted)
 
 
 def test_forces_of_a_clock_that_lags_are_late_at_the_end_and_early_at_the_start() -> None:

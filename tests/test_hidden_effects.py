@@ -20,10 +20,10 @@ from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine
 from biodance.records import Subject
-from biodance.virtual_lab.causes import fault_of, hide, parse_cause
-from biodance.virtual_lab.inject import inject
-from biodance.virtual_lab.laboratory import LabVisit
-from biodance.virtual_lab.protocol import read_protocol
+from biodance.virtual_lab.faults.causes import fault_of, hide, parse_cause
+from biodance.virtual_lab.faults.inject import inject
+from biodance.virtual_lab.movement.protocol import read_protocol
+from biodance.virtual_lab.recording.laboratory import LabVisit
 from biodance.virtual_lab.simulate import simulate_session
 
 SUBJECT = Subject(64.0, 1.72, "F", 30.0)

@@ -9,9 +9,10 @@ from identify_trials import noisy_fit, person, smooth_motion
 from biodance.identification.added_mass import LoadCandidate, LoadSearch, added_mass, surprised
 from biodance.identification.identification import Identification, identify_body, standing_point
 from biodance.identification.learning import learn_noise
-from biodance.identification.loads import load_moments, may_carry, point_mass
+from biodance.identification.loads import compact_load, load_moments, may_carry
 from biodance.identification.statistics import layout_for, statistics
 from biodance.records import Sip
+from biodance.spatial import point_mass
 
 PLACE = np.array([0.15, -0.2, 0.2])
 
@@ -24,7 +25,7 @@ def visits(
     body = replace(body, boxes=np.tile([[-0.3] * 3, [0.3] * 3], (4, 1, 1)))
     loaded = truth.copy()
     if segment is not None:
-        loaded[10 * segment : 10 * segment + 10] += mass * point_mass(PLACE)
+        loaded[10 * segment : 10 * segment + 10] += mass * compact_load(PLACE)
     first, second = (
         identify_body(body, (noisy_fit(body, smooth_motion(body, rng, frames=frames), phi, rng),))
         for phi in (truth, loaded)
@@ -70,7 +71,7 @@ def test_surprise_has_unit_variance_when_nothing_was_added() -> None:
 
 
 def test_point_mass_and_its_moments() -> None:
-    np.testing.assert_allclose(point_mass(np.array([0.0, 2.0, 0.0]), 0.0), [1, 0, 2, 0, 4, 0, 0, 0, 0, 4])
+    np.testing.assert_allclose(point_mass(1.0, np.array([0.0, 2.0, 0.0])), [1, 0, 2, 0, 4, 0, 0, 0, 0, 4])
     U = load_moments(person(0)[0], 1)
     assert U.shape[0] == 10
     assert np.sqrt((U @ U.T)[0, 0]) == pytest.approx(2.0)
@@ -85,7 +86,7 @@ def test_an_undeclared_load_is_not_learned_as_noise() -> None:
     motion, slow = smooth_motion(body, rng, frames=1200), []
     for mass in (0.0, 3.0):
         loaded = truth.copy()
-        loaded[10:20] += mass * point_mass(PLACE)
+        loaded[10:20] += mass * compact_load(PLACE)
         fit = noisy_fit(body, motion, loaded, np.random.default_rng(1))
         data = statistics(body, fit, layout_for(standing_point((fit,))))
         slow.append(

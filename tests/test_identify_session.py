@@ -11,7 +11,7 @@ from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.identification import NOISE_ALONE, conclude, identify_body, standing_point
 from biodance.identification.knowledge import knowledge, segment_quantities
 from biodance.identification.learning import learn_noise
-from biodance.identification.loads import may_carry, point_mass
+from biodance.identification.loads import compact_load, may_carry
 from biodance.identification.sessions import differences
 from biodance.identification.statistics import layout_for, statistics
 from biodance.identification.validation import residual_ratio, validate
@@ -126,7 +126,7 @@ def test_a_turned_frame_and_a_shifted_centre_to_first_order() -> None:
     from scipy.spatial.transform import Rotation
 
     from biodance.uncertainty.caution import _shift_slope, _turn_slope
-    from biodance.virtual_lab.flesh import of_parameters, parameters_of_inertia, place_inertia
+    from biodance.virtual_lab.person.flesh import of_parameters, parameters_of_inertia, place_inertia
 
     phi = np.array(person(6)[0].sip.phi[:10])
     J, step = of_parameters(phi), 1e-6
@@ -152,7 +152,7 @@ def test_equal_sessions_do_not_differ() -> None:
     assert np.mean(np.abs(z) < 1.96) > 0.9
     assert all(row.value == 0 and row.p == 1 for row in differences(first, first))
     changed = truth.copy()
-    changed[20:30] += 2.0 * point_mass(np.array([0.15, -0.2, 0.2]))
+    changed[20:30] += 2.0 * compact_load(np.array([0.15, -0.2, 0.2]))
     third = identify_body(body, (noisy_fit(body, smooth_motion(body, rng, frames=1000), changed, rng),))
     for pair, sign in (((first, third), 1), ((third, first), -1)):
         masses = {row.segment: row for row in differences(*pair) if row.quantity == "mass"}

@@ -158,7 +158,8 @@ def test_one_wrong_count_in_the_header_is_outvoted_and_never_shifts_the_numbers(
     try:
         raw = read_raw(save(tmp_path, File(points, analog, header=wrong)))
     except FileRefused as refusal:
-        assert "contradict" in str(refusal) or "disagree" in str(refusal)  # noqa: PT017 - either is right, a wrong number is not
+        # either is right, a wrong number is not
+        assert "contradict" in str(refusal) or "disagree" in str(refusal)  # noqa: PT017
     else:
         np.testing.assert_array_equal(raw.points, points[..., :3])
         np.testing.assert_array_equal(raw.analog, analog)

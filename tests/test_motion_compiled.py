@@ -243,8 +243,8 @@ def test_a_second_process_takes_the_kept_machine_code():
         "from biodance.motion.ik.compiled.chain import chain_of\nimport numpy as np\nb = human(Subject(58.3, 1.64, "
         "'F', 31.0))\n"
         "c = chain_of(b, list(b.markers.segment), b.markers.position)\n"
-        "newton.distances(c, np.zeros((1, len(c.slot), 3)), b.neutral[None].copy(), np.empty((1, len(c.slot))))\n"
-        "print(sum(newton.distances.stats.cache_hits.values()))"
+        "newton.fill_distances(c, np.zeros((1, len(c.slot), 3)), b.neutral[None].copy(), np.empty((1, len(c.slot))))\n"
+        "print(sum(newton.fill_distances.stats.cache_hits.values()))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert int(done.stdout) == 1

@@ -15,12 +15,14 @@ from biodance.body.human.human import human
 from biodance.body.human.limits import joint_limits
 from biodance.body.human.scaling import Scaling, measure_static
 from biodance.body.human.skeleton import JOINTS
+from biodance.diagnosis.observability import placing_leaves
 from biodance.errors import TrialRefused
 from biodance.lab.prepare import prepare
 from biodance.lab.session.read import read_session
 from biodance.motion.ik.functional_joints import evaluate_joints, functional_joints, spread_postures
 from biodance.motion.ik.inverse_kinematics import solve_ik
-from biodance.motion.ik.joint_unknowns import HINGES, SIZE, JointUnknowns, own_centre, own_turn
+from biodance.motion.ik.joint_unknowns import HINGES, SIZE, JointUnknowns, centre_sd, own_centre, own_turn
+from biodance.motion.ik.shown_joints import contradicted, doubted, own_unknowns
 from biodance.motion.kinematics import poses
 from biodance.records import Array, Markers, Source, Subject, Trial
 from biodance.virtual_lab.simulate import simulate_session
@@ -182,3 +184,70 @@ def test_a_marker_that_moved_since_the_static_trial_does_not_pull_the_joints_alo
     for joint in ("right_hip", "right_knee"):
         assert abs(pulled.moved[joint] - clean.moved[joint]) < 0.008
     assert not any("does not count" in note for note in clean.notes)
+
+
+@pytest.mark.parametrize("far", [0.0, 0.08], ids=["where the static trial puts it", "80 mm off"])
+def test_a_hip_that_the_movement_hardly_shows_is_placed_only_where_it_is_contradicted(far: float) -> None:
+    theta = np.zeros(SIZE)
+    theta[own_centre("right_hip")] = [far, 0, 0]
+    found = functional_joints(scaling(), [moving(displaced(theta), share=0.3, seconds=40.0)])
+    off = found.scaling.centres.place["right_hip"] - scaling().centres.place["right_hip"]
+    warned = [note for note in found.notes if "contradicts the static trial about the right hip" in note]
+    errors = {error.joint: error for error in found.scaling.body()[0].joint_errors}
+    if far:
+        np.testing.assert_allclose(off, [far, 0, 0], atol=0.006)
+        assert max(size for joint, size in found.moved.items() if joint != "right_hip") < 0.002
+        assert len(warned) == 1
+        assert "Warning" in warned[0]
+        assert "76 mm" in warned[0]
+        assert errors["right_hip"].contradicted
+        assert not errors["right_knee"].contradicted
+        assert placing_leaves(errors["right_hip"]) < 0.5 * (errors["right_hip"].centre / centre_sd("right_hip")) ** 2
+    else:
+        assert not off.any()
+        assert not warned
+        assert "right_hip" in found.kept
+
+
+def test_one_hip_that_is_contradicted_leaves_the_matter_of_the_pelvis_where_it_is() -> None:
+    theta = np.zeros(SIZE)
+    theta[own_centre("right_hip")] = [0.08, 0, 0]
+    before, q = scaling().body()
+    places = []
+    for wrong in ((), ("right_hip",), ("right_hip", "left_hip")):
+        centres = JointUnknowns(doubted(scaling().centres, wrong)).moved(theta)
+        body, posture = replace(scaling(), centres=centres).body()
+        pose = poses(body, posture[None])
+        places.append(pose.position[0, 0] + pose.rotation[0, 0] @ body.sip.com[0])
+    pose = poses(before, q[None])
+    still = pose.position[0, 0] + pose.rotation[0, 0] @ before.sip.com[0]
+    assert np.linalg.norm(places[1] - still) < 1e-6
+    assert places[0][0] - still[0] > 0.02  # without a doubt the middle of the hips moves, by 40 mm
+    np.testing.assert_allclose(places[2], places[0], atol=1e-12)
+
+
+def test_contradicted_joints_are_those_whose_freedom_lowers_the_cost() -> None:
+    """A quadratic cost, minimised over the joints shown: what freeing a joint gains, by minimising once more."""
+    rng = np.random.default_rng(5)
+    shown = np.zeros(SIZE, dtype=bool)
+    for joint in ("trunk", "right_knee"):
+        shown[own_unknowns(joint)] = True
+    root = rng.normal(size=(2 * SIZE, SIZE))
+    information, pull = root.T @ root, rng.normal(size=SIZE)
+    pull[own_centre("right_hip")] += 40.0
+
+    def least(free: list[int]) -> float:
+        return -0.5 * float(pull[free] @ np.linalg.inv(information[np.ix_(free, free)]) @ pull[free])
+
+    start = list(np.flatnonzero(shown))
+    at = np.zeros(SIZE)
+    at[start] = -np.linalg.inv(information[np.ix_(start, start)]) @ pull[start]
+    gains = {
+        joint: least(start) - least(sorted({*start, *own_unknowns(joint)}))
+        for joint in JOINTS
+        if joint not in ("trunk", "right_knee")
+    }
+    expected = tuple(joint for joint, gain in gains.items() if gain >= 10.0)
+    assert "right_hip" in expected
+    assert len(expected) < len(gains)
+    assert contradicted(information, pull + information @ at, shown) == expected

@@ -10,8 +10,9 @@ import pytest
 from robots import biped
 from scipy.spatial.transform import Rotation
 
-from biodance.body.body import UPRIGHT, Body
+from biodance.body.body import Body
 from biodance.body.human.human import human
+from biodance.body.parts import UPRIGHT
 from biodance.body.robot.hoap3 import hoap3
 from biodance.body.robot.similar import Likeness, likeness
 from biodance.body.robot.standing_frames import standing_frames

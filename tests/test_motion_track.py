@@ -14,9 +14,9 @@ from biodance.motion.kinematics import poses
 from biodance.motion.track import track
 from biodance.records import Markers, Source, Subject, Trial
 from biodance.settings import Settings
-from biodance.virtual_lab.laboratory import Laboratory, LabVisit, perform_in, set_up
-from biodance.virtual_lab.person import make_person
-from biodance.virtual_lab.protocol import read_protocol
+from biodance.virtual_lab.movement.protocol import read_protocol
+from biodance.virtual_lab.person.person import make_person
+from biodance.virtual_lab.recording.laboratory import Laboratory, LabVisit, perform_in, set_up
 from biodance.virtual_lab.simulate import simulate_session
 from biodance.virtual_lab.tolerances import instruments_perfect
 

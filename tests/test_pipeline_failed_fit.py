@@ -16,11 +16,12 @@ from biodance.identification.paper_programme import paper_programme
 from biodance.identification.physical import FailedFit
 from biodance.identification.sessions import differences
 from biodance.identification.streaming import begin
+from biodance.pipeline.attention import session_attention
 from biodance.pipeline.identification import identify_trials
+from biodance.records.attention import Attention
 from biodance.report.documents.identification import identification_document
 from biodance.report.documents.session import plain_values
 from biodance.report.pages.identification import identification_section
-from biodance.report.wording import attention
 
 FORCED = FailedFit("No possible body, by force. Check the scaling.")
 
@@ -96,7 +97,7 @@ def test_the_session_says_it_on_the_page_and_in_the_numbers(failing):
     assert "<figure>" not in page
     result = replace(session_result(), identification=found)
     assert result.needs_a_person
-    assert ("Identification, segments", f"Not solved. {FORCED.cause}") in attention(result)
+    assert Attention("fail", f"Not solved. {FORCED.cause}", "", "identification, segments") in session_attention(result)
 
 
 def test_a_reference_that_failed_is_said_and_not_compared_with(monkeypatch):

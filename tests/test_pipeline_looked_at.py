@@ -10,7 +10,7 @@ from biodance.body.tables.error_sizes import error_size
 from biodance.diagnosis.problem import Look
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.looked_at import UNREST, left_out, looked_at, own_tolerances, soft_tissue, unrest
-from biodance.pipeline.results import Step, TrialResult, WrenchComparison
+from biodance.pipeline.trial_result import Step, TrialResult, WrenchComparison
 from biodance.records import Array, Motion, Role, Wrench
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.tolerances import shipped

@@ -13,10 +13,10 @@ from biodance.errors import TrialRefused
 from biodance.lab.markers.gaps import MarkerGaps
 from biodance.motion.kinematics import poses
 from biodance.pipeline.checks import mass_check, standing_check, trial_checks
-from biodance.pipeline.results import MarkerFit, QuietStanding, Step, TrialResult
 from biodance.pipeline.standing import centre_of_mass, facing, quiet_run, quiet_standing
 from biodance.pipeline.still import bone_lines
 from biodance.pipeline.trial import attempt, marker_fit
+from biodance.pipeline.trial_result import MarkerFit, QuietStanding, Step, TrialResult
 from biodance.records import Markers, Motion, Plate, Subject, Trial, Wrench
 from biodance.settings import CheckLimits
 

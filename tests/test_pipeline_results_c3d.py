@@ -16,7 +16,7 @@ from biodance.motion.contact.soles import soles_from_body
 from biodance.pipeline.results_c3d import results_into_c3d
 from biodance.pipeline.session import examine
 from biodance.records import Subject
-from biodance.virtual_lab.protocol import Protocol, read_protocol
+from biodance.virtual_lab.movement.protocol import Protocol, read_protocol
 from biodance.virtual_lab.simulate import simulate_session
 
 

@@ -10,6 +10,7 @@ from identified_sessions import session_result
 
 from biodance.body.solids import shape_parts
 from biodance.identification.added_mass import added_mass
+from biodance.identification.load_posterior import MASSES, LoadPosterior
 from biodance.motion.kinematics import poses
 from biodance.pipeline.still import load_still, posture_still, worst_still
 from biodance.records import Markers
@@ -58,7 +59,9 @@ def test_a_load_is_drawn_where_it_sits(result):
     search = result.identification.search
     assert search.found
     place = np.array([0.0, -0.2, 0.02])
-    best = replace(search.best, segment="left_forearm_hand", place=place, mass=2.0, sd=0.1)
+    weight = np.exp(-0.5 * ((MASSES - 2.0) / 0.1) ** 2) * np.gradient(MASSES)
+    sure = LoadPosterior(0.0, weight / weight.sum())
+    best = replace(search.best, segment="left_forearm_hand", place=place, posterior=sure)
     still = load_still(result.body, result.trials, replace(search, suspects=(best, *search.suspects[1:])))
     one = result.trials[0]
     pose, segment = (

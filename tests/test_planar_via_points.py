@@ -7,9 +7,9 @@ from random_bodies import random_body
 from target import target
 from via_points import Excitation, design
 
+from biodance.body.parts import GRAVITY
 from biodance.dance.problem.splines import rest_to_rest
 from biodance.identification.base_parameters import structural_base
-from biodance.motion.regressor import GRAVITY
 
 
 def problem(name: str) -> Excitation:

@@ -9,7 +9,7 @@ import pytest
 from diagnosed_sessions import body, known, looks
 
 import biodance
-from biodance.body.body import JointError
+from biodance.body.parts import JointError
 from biodance.body.tables.anthropometry import read_table
 from biodance.body.tables.error_sizes import error_rows, error_size, joint_size
 from biodance.diagnosis.candidates import candidates
@@ -30,8 +30,8 @@ CAUSES = ("plate_gain", "time_delay", "body_mass", "lab_tilt", "plate_position",
 ELSEWHERE = {
     "body/human/scaling.py:TILT": "deg, a warning's threshold",
     "body/human/limits.py:HAND_TURN": "a joint's range",
-    "virtual_lab/laboratory.py:tilt": "a fault that a visit is given, 0 by default",
-    "virtual_lab/forces.py:FLESH": "springs",
+    "virtual_lab/recording/laboratory.py:tilt": "a fault that a visit is given, 0 by default",
+    "virtual_lab/faults/forces.py:FLESH": "springs",
     "body/robot/prior.py:RELATIVE_MASS_SD": "robots: what a data sheet is worth",
     "body/robot/prior.py:RELATIVE_INERTIA_SD": "robots",
     "body/robot/prior.py:_COM_SD": "robots",

@@ -14,8 +14,9 @@ from scipy.spatial.transform import Rotation
 
 from biodance.body.changes import recentre_joint
 from biodance.body.inertia import rigid_inertia
+from biodance.body.parts import GRAVITY
 from biodance.motion.kinematics import chains, poses
-from biodance.motion.regressor import GRAVITY, predict_wrench
+from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion
 from biodance.uncertainty.joints import Centre, Tilt, joint_of
 from biodance.uncertainty.response import Response, derivatives

@@ -14,12 +14,12 @@ import biodance.virtual_lab
 from biodance.errors import BiodanceError, UnknownName
 from biodance.lab.read import read_trial
 from biodance.records import Subject, Trial
-from biodance.virtual_lab.causes import _UNKNOWN, CAUSES, hide, parse_cause
-from biodance.virtual_lab.forces import Spring, swing
-from biodance.virtual_lab.laboratory import FIRST_VISIT, LabVisit
-from biodance.virtual_lab.performance import perform
-from biodance.virtual_lab.person import make_person
-from biodance.virtual_lab.protocol import Protocol, read_protocol
+from biodance.virtual_lab.faults.causes import _UNKNOWN, CAUSES, hide, parse_cause
+from biodance.virtual_lab.faults.forces import Spring, swing
+from biodance.virtual_lab.movement.performance import perform
+from biodance.virtual_lab.movement.protocol import Protocol, read_protocol
+from biodance.virtual_lab.person.person import make_person
+from biodance.virtual_lab.recording.laboratory import FIRST_VISIT, LabVisit
 from biodance.virtual_lab.simulate import simulate_session
 from biodance.virtual_lab.tolerances import instruments_perfect
 

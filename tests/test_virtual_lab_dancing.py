@@ -24,9 +24,9 @@ from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.pipeline.danced import simulate_dance, stretches
 from biodance.records import Subject
-from biodance.virtual_lab.dancing import _JOINTS, Performer, copy_dance
-from biodance.virtual_lab.performance import true_wrench
-from biodance.virtual_lab.person import make_person
+from biodance.virtual_lab.movement.dancing import _JOINTS, Performer, copy_dance
+from biodance.virtual_lab.movement.performance import true_wrench
+from biodance.virtual_lab.person.person import make_person
 from biodance.virtual_lab.tolerances import PERFECT
 
 SUBJECT = Subject(65.0, 1.75, "F", 33.0)

@@ -10,9 +10,9 @@ import pytest
 from biodance.errors import BiodanceError, UnknownName
 from biodance.lab.read import read_trial
 from biodance.records import Subject, Trial
-from biodance.virtual_lab.causes import Hidden, hide, parse_cause
-from biodance.virtual_lab.laboratory import Laboratory, LabVisit
-from biodance.virtual_lab.protocol import read_protocol
+from biodance.virtual_lab.faults.causes import Hidden, hide, parse_cause
+from biodance.virtual_lab.movement.protocol import read_protocol
+from biodance.virtual_lab.recording.laboratory import Laboratory, LabVisit
 from biodance.virtual_lab.simulate import simulate_session
 from biodance.virtual_lab.tolerances import instruments_perfect
 

@@ -12,10 +12,10 @@ from biodance.errors import BiodanceError
 from biodance.lab.c3d.raw import read_raw
 from biodance.lab.read import read_trial
 from biodance.records import Array, Subject, Trial
-from biodance.virtual_lab.causes import fault_of, hide, parse_cause
-from biodance.virtual_lab.inject import inject
-from biodance.virtual_lab.laboratory import Laboratory, LabVisit
-from biodance.virtual_lab.protocol import read_protocol
+from biodance.virtual_lab.faults.causes import fault_of, hide, parse_cause
+from biodance.virtual_lab.faults.inject import inject
+from biodance.virtual_lab.movement.protocol import read_protocol
+from biodance.virtual_lab.recording.laboratory import Laboratory, LabVisit
 from biodance.virtual_lab.simulate import simulate_session
 
 SUBJECT = Subject(60.0, 1.70, "F", 30.0)

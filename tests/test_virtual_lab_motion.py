@@ -5,14 +5,15 @@ motion.
 import numpy as np
 import pytest
 
+from biodance.body.parts import GRAVITY
 from biodance.motion.ik.legs import Leg, soft_limit
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import GRAVITY, predict_wrench
-from biodance.records import Subject
-from biodance.virtual_lab.choreography import SIDES, septic
-from biodance.virtual_lab.performance import perform
-from biodance.virtual_lab.person import AddedLoad, make_person
-from biodance.virtual_lab.protocol import read_protocol
+from biodance.motion.regressor import predict_wrench
+from biodance.records import SIDES, Subject
+from biodance.virtual_lab.movement.choreography import septic
+from biodance.virtual_lab.movement.performance import perform
+from biodance.virtual_lab.movement.protocol import read_protocol
+from biodance.virtual_lab.person.person import AddedLoad, make_person
 
 CENTRE = np.array([0.3, 0.2])
 

@@ -8,11 +8,17 @@ import pytest
 from biodance.errors import BiodanceError, UnknownName
 from biodance.motion.kinematics import poses
 from biodance.records import Subject
-from biodance.virtual_lab.cameras import reference_angles
-from biodance.virtual_lab.flesh import _FEMALE, of_parameters, parameters_of_inertia, place_inertia, true_pseudo_inertia
-from biodance.virtual_lab.merge import MERGED, load_on, merged_sip, place_in_12
-from biodance.virtual_lab.person import AddedLoad, make_person
-from biodance.virtual_lab.skeleton import TRUE_SEGMENTS, UPRIGHT_CHAIN
+from biodance.virtual_lab.person.flesh import (
+    _FEMALE,
+    of_parameters,
+    parameters_of_inertia,
+    place_inertia,
+    true_pseudo_inertia,
+)
+from biodance.virtual_lab.person.person import AddedLoad, make_person
+from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS, UPRIGHT_CHAIN
+from biodance.virtual_lab.recording.cameras import reference_angles
+from biodance.virtual_lab.recording.merge import MERGED, load_on, merged_sip, place_in_12
 from biodance.virtual_lab.tolerances import PERFECT
 
 SUBJECTS = [Subject(45, 1.50, "F"), Subject(65, 1.75, "F"), Subject(80, 1.70, "M"), Subject(110, 1.95, "M")]

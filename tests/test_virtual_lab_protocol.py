@@ -6,7 +6,7 @@ import pytest
 
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import names
-from biodance.virtual_lab.protocol import read_protocol
+from biodance.virtual_lab.movement.protocol import read_protocol
 
 HEAD = """
 name = "mine"

@@ -11,12 +11,12 @@ from biodance.lab.c3d.read import read_c3d
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.records import Subject
-from biodance.virtual_lab.flesh import of_parameters, place_inertia
-from biodance.virtual_lab.laboratory import Laboratory, LabVisit, perform_in, record, set_up
-from biodance.virtual_lab.person import AddedLoad, make_person
-from biodance.virtual_lab.protocol import Protocol, read_protocol
+from biodance.virtual_lab.movement.protocol import Protocol, read_protocol
+from biodance.virtual_lab.person.flesh import of_parameters, place_inertia
+from biodance.virtual_lab.person.person import AddedLoad, make_person
+from biodance.virtual_lab.person.skeleton import small_rotation
+from biodance.virtual_lab.recording.laboratory import Laboratory, LabVisit, perform_in, record, set_up
 from biodance.virtual_lab.simulate import simulate_session
-from biodance.virtual_lab.skeleton import small_rotation
 from biodance.virtual_lab.tolerances import REALISTIC, instruments_perfect
 from biodance.virtual_lab.truth import sip_in_frames
 
@@ -225,7 +225,7 @@ def test_the_generator_does_not_lean_on_what_it_is_to_test():
         "biodance.diagnose",
         "inverse_kinematics",
         "biodance.body.tables.anthropometry",
-        "biodance.body.tables.prior",
+        "biodance.body.human.prior",
     )
     for path in Path(room.__file__).parent.glob("*.py"):
         text = path.read_text()

@@ -8,110 +8,19 @@ no segment.
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from biodance import display
+from biodance.body.parts import GRAVITY, NO_JOINT, NO_SEGMENT, Foot, Joint, JointError, JointLimits, SegmentMarkers
+from biodance.body.pinocchio_model import build
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import Array, Sip, frozen_array
-from biodance.settings import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
     import pandas as pd
     import pinocchio as pin
-
-NO_SEGMENT = -1
-NO_JOINT = -1
-UPRIGHT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-"""(3, 3) lab_R_segment of a neutral upright body facing lab x: x -> lab x, y (up) -> lab z, z (right) -> lab -y."""
-
-
-@dataclass(frozen=True, eq=False)
-class Joint:
-    """One revolute degree of freedom.
-
-    ``parent`` index of the parent joint in ``Body.joints`` (-1: the root); ``axis`` (3,) unit vector in the joint's
-    frame, signed so that the positive angle is the anatomical direction in ``positive``; ``rotation`` (3, 3) and
-    ``translation`` (3,) m place the joint frame in the parent joint's frame at zero angle; ``segment`` index of the
-    segment that turns with this joint, -1 for an intermediate link.
-    """
-
-    name: str
-    parent: int
-    axis: Array
-    rotation: Array
-    translation: Array
-    segment: int = NO_SEGMENT
-    positive: str = ""
-
-    def __post_init__(self) -> None:
-        for name, shape in (("axis", (3,)), ("rotation", (3, 3)), ("translation", (3,))):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), shape, f"joint {self.name}.{name}"))
-        if abs(np.linalg.norm(self.axis) - 1) > 1e-9:
-            raise BiodanceError(f"Joint {self.name}: axis {self.axis} is not a unit vector.")
-
-
-@dataclass(frozen=True, eq=False)
-class SegmentMarkers:
-    """Where each marker sits: ``names`` (K), ``segment`` (K,) index, ``position`` (K, 3) m in the segment frame,
-    ``weight`` (K,) >= 0.
-    """
-
-    names: tuple[str, ...]
-    segment: tuple[int, ...]
-    position: Array
-    weight: Array
-
-    def __post_init__(self) -> None:
-        count = len(self.names)
-        object.__setattr__(self, "position", frozen_array(self.position, (count, 3), "SegmentMarkers.position"))
-        object.__setattr__(self, "weight", frozen_array(self.weight, (count,), "SegmentMarkers.weight"))
-        if len(self.segment) != count:
-            raise BiodanceError(f"SegmentMarkers: {count} names but {len(self.segment)} segment indices.")
-
-
-class JointError(NamedTuple):
-    """How far the anatomical ``joint`` of a body may be from the person's, standard deviations: ``centre`` m per axis,
-    ``axis`` rad of a hinge's flexion axis (0 for other joints).
-    """
-
-    joint: str
-    centre: float
-    axis: float
-
-
-@dataclass(frozen=True, eq=False)
-class JointLimits:
-    """Per joint (n,), along its positive sense: ``lower``, ``upper`` rad; ``velocity`` rad/s > 0;
-    ``torque_lower`` <= 0 <= ``torque_upper`` N·m.
-    """
-
-    lower: Array
-    upper: Array
-    velocity: Array
-    torque_lower: Array
-    torque_upper: Array
-
-    def __post_init__(self) -> None:
-        count = np.size(self.lower)
-        for name in ("lower", "upper", "velocity", "torque_lower", "torque_upper"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (count,), f"JointLimits.{name}"))
-        if np.any(self.lower > self.upper):
-            raise BiodanceError(f"JointLimits: lower > upper at joint {int(np.argmax(self.lower > self.upper))}.")
-
-
-@dataclass(frozen=True, eq=False)
-class Foot:
-    """The sole: ``segment`` index of the foot, ``outline`` (P, 3) m corners in the foot's segment frame,
-    counter-clockwise from above.
-    """
-
-    segment: int
-    outline: Array
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "outline", frozen_array(self.outline, (None, 3), "Foot.outline"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +74,7 @@ class Body:
     root: Literal["free_flyer", "fixed"] = "free_flyer"
     notes: tuple[str, ...] = ()
     joint_errors: tuple[JointError, ...] = ()
-    gravity: Array = field(default_factory=lambda: np.array([0.0, 0.0, -STANDARD_GRAVITY]))
+    gravity: Array = field(default_factory=GRAVITY.copy)
 
     def __post_init__(self) -> None:
         count = len(self.segments)
@@ -295,6 +204,11 @@ class Body:
     @cached_property
     def model(self) -> "pin.Model":
         """Its pinocchio model; never written to. Joint ids are 2 + index in `joints` (1 + index for a fixed root)."""
-        from biodance.body.pinocchio_model import build
-
-        return build(self)
+        return build(
+            self.name,
+            self.joints,
+            self.limits,
+            inertias=tuple(zip(self.segment_joint, self.sip.phi.reshape(-1, 10), strict=True)),
+            gravity=self.gravity,
+            free=bool(self.n_root),
+        )

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from biodance.body.body import Body, Foot, Joint, JointError, JointLimits, SegmentMarkers
+from biodance.body.body import Body
+from biodance.body.parts import Foot, Joint, JointError, JointLimits, SegmentMarkers
 from biodance.errors import BiodanceError, FileRefused
 from biodance.records import Sip
 

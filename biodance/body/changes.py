@@ -4,8 +4,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from biodance.body.body import Body, Joint, JointLimits, SegmentMarkers
+from biodance.body.body import Body
 from biodance.body.inertia import PSEUDO_INERTIA, RigidInertia, inertial_parameters
+from biodance.body.parts import Joint, JointLimits, SegmentMarkers
 from biodance.records import Array, Sip
 
 

@@ -4,12 +4,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from biodance.body.parts import Joint, JointLimits
 from biodance.errors import MissingLibrary
+from biodance.records import Array
 
 if TYPE_CHECKING:
     import pinocchio as pin
-
-    from biodance.body.body import Body
 
 
 def load_pinocchio() -> Any:
@@ -32,18 +32,28 @@ def load_pinocchio() -> Any:
     return pinocchio
 
 
-def build(body: "Body") -> "pin.Model":
-    """Return a pinocchio model with the joints of ``body`` in order and the inertias of ``body.sip``."""
+def build(
+    name: str,
+    joints: tuple[Joint, ...],
+    limits: JointLimits,
+    *,
+    inertias: tuple[tuple[int, Array], ...],
+    gravity: Array,
+    free: bool,
+) -> "pin.Model":
+    """Return a pinocchio model with ``joints`` in order, on a ``free`` root or on the ground; ``gravity`` (3,) m/s².
+
+    ``inertias``: of every segment the index of the joint that carries it (-1: the root) and its ten parameters.
+    """
     pin = load_pinocchio()
     model = pin.Model()
-    model.name = body.name
-    model.gravity.linear = np.array(body.gravity)
+    model.name = name
+    model.gravity.linear = np.array(gravity)
     root = 0
-    if body.n_root:
+    if free:
         root = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")
     ids: list[int] = []
-    limits = body.limits
-    for i, joint in enumerate(body.joints):
+    for i, joint in enumerate(joints):
         parent = root if joint.parent < 0 else ids[joint.parent]
         placement = pin.SE3(np.array(joint.rotation), np.array(joint.translation))
         effort = max(-limits.torque_lower[i], limits.torque_upper[i])
@@ -60,9 +70,7 @@ def build(body: "Body") -> "pin.Model":
                 limits.upper[i] * one,
             )
         )
-    for i, name in enumerate(body.segments):
-        j = body.segment_joint[i]
-        owner = root if j < 0 else ids[j]
-        inertia = pin.Inertia.FromDynamicParameters(np.array(body.sip.of(name)))
-        model.appendBodyToJoint(owner, inertia, pin.SE3.Identity())
+    for carrier, parameters in inertias:
+        inertia = pin.Inertia.FromDynamicParameters(np.array(parameters))
+        model.appendBodyToJoint(root if carrier < 0 else ids[carrier], inertia, pin.SE3.Identity())
     return model

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
-from biodance import __version__
+from biodance.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -79,6 +79,7 @@ def diagnose_command(
     from rich.console import Console
 
     from biodance.pipeline import front
+    from biodance.pipeline.attention import is_well
     from biodance.report.terminal import print_diagnosis
     from biodance.report.write import write_diagnosis
 
@@ -95,4 +96,4 @@ def diagnose_command(
     else:
         print_diagnosis(document, Console())
         sys.stdout.write(f"{folder / 'report.html'}\n")
-    return DONE if document["verdict"] == "nothing wrong" and not document["failures"] else NEEDS_A_PERSON
+    return DONE if is_well(found.diagnosis) and not document["failures"] else NEEDS_A_PERSON

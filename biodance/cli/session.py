@@ -93,7 +93,7 @@ def print_reported(result: "SessionResult", folder: Path, found: "dict[str, Any]
     if json:
         print_json(found)
     else:
-        print_session(result, Console())
+        print_session(result, found["attention"], Console())
         sys.stdout.write(f"{folder / 'report.html'}\n")
     if result.stopped:
         say(f"Stopped by Ctrl-C: {folder} holds the trials that were done, and names the others.")

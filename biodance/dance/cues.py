@@ -11,7 +11,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.errors import BiodanceError
-from biodance.records import Array
+from biodance.records import SIDES, Array
 
 _SMALLEST = 12.0
 """degrees: a smaller change is not called."""
@@ -64,7 +64,7 @@ def cue_sheet(
 ) -> str:
     """Return the cue sheet (Markdown) of postures ``angles`` (P, n) rad of the joints of ``body``.
 
-    ``stances`` (P,) say in words where the feet are; ``planted`` (P,) which feet ("right", "left") stand. ``move`` and
+    ``stances`` (P,) say in words where the feet are; ``planted`` (P,) which feet SIDES stand. ``move`` and
     ``hold`` s.
 
     Raises
@@ -118,7 +118,7 @@ def calls(body: Body, before: Array, after: Array, planted: tuple[str, ...] = ()
 def _split(name: str) -> tuple[str, str]:
     """Return side ("" for the trunk) and movement of a joint."""
     side = name.partition("_")[0]
-    return (side, name.removeprefix(f"{side}_")) if side in ("right", "left") else ("", name)
+    return (side, name.removeprefix(f"{side}_")) if side in SIDES else ("", name)
 
 
 def _is_called(name: str, planted: tuple[str, ...]) -> bool:

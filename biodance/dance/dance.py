@@ -21,7 +21,7 @@ from biodance.dance.problem.splines import basis_at
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State, close_legs
 from biodance.errors import BiodanceError, FileRefused
-from biodance.records import Array, Motion, frozen_array
+from biodance.records import SIDES, Array, Motion, frozen_array
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -128,7 +128,7 @@ class Dance:
         out.insert(
             2,
             "feet",
-            [" and ".join(("right", "left")[foot] for foot in phase.stance.planted) or "none" for phase in held],
+            [" and ".join(SIDES[foot] for foot in phase.stance.planted) or "none" for phase in held],
         )
         return out.set_index(pd.Index([phase.posture for phase in held], name="posture"))
 

@@ -18,9 +18,10 @@ from biodance.body.export import mjcf
 from biodance.dance.dance import Dance
 from biodance.errors import BiodanceError, MissingLibrary
 from biodance.motion.dynamics import distribute, joint_torques
-from biodance.motion.kinematics import poses, quaternion_matrix
+from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion, Wrench
+from biodance.spatial import quaternion_matrix, wrench_of_force
 
 _STEP = 0.00025
 """s, of the simulation: at 1 and 0.5 ms the stiff legs ring on the floor and topple postures that stand at 0.25 and
@@ -227,7 +228,7 @@ def _floor_wrench(mujoco: Any, model: Any, data: Any) -> Array:
         contact = data.contact[i]
         mujoco.mj_contactForce(model, data, i, local)
         force = contact.frame.reshape(3, 3).T @ local[:3]
-        total += np.concatenate([force, np.cross(contact.pos, force)])
+        total += wrench_of_force(force, contact.pos)
     return total
 
 

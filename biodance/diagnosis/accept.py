@@ -13,9 +13,10 @@ from biodance.diagnosis.model import NamedCause
 from biodance.effects import Case
 from biodance.errors import BiodanceError
 from biodance.identification.statistics import Fit
-from biodance.identification.validation import BLOCK_SECONDS, about_point
+from biodance.identification.validation import BLOCK_SECONDS
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array
+from biodance.spatial import wrench_about_point
 from biodance.uncertainty.bands import BANDS
 
 DRAWS = 1000
@@ -59,10 +60,7 @@ class Residuals:
 
 def residuals_of(body: Body, fits: tuple[Fit, ...], about: Array) -> Residuals:
     """Return measured minus predicted wrench of ``body`` in every trial, about ``about`` (3,) m."""
-    left = tuple(
-        about_point(fit.wrench, about).value - about_point(predict_wrench(body, fit.motion), about).value
-        for fit in fits
-    )
+    left = tuple(wrench_about_point(fit.wrench.value - predict_wrench(body, fit.motion).value, about) for fit in fits)
     return Residuals(tuple(f.name for f in fits), left, tuple(f.use for f in fits), tuple(f.motion.rate for f in fits))
 
 

@@ -53,10 +53,25 @@ def unlikely(found: Model) -> Array:
     return np.asarray((np.cbrt(mean / known.energy) - 1 + root**2) / root)
 
 
+def sizes(found: Model) -> Array:
+    """Return (B, 6): root mean square over the time of all trials of what is left, N and N·m, per band and channel."""
+    where = found.problem.spectrum
+    mass = float(found.problem.cases[0].body.sip.mass.sum())
+    left = found.belief.left[: 6 * where.band.size].reshape(-1, 6)
+    frames = max(1, sum(pick.size for picks in where.picks for pick in picks))
+    coloured = np.linalg.inv(found.tolerances.whiteners(mass))
+    return np.sqrt([np.sum((left[where.band == b] @ coloured[b].T) ** 2, axis=0) / frames for b in range(len(BANDS))])
+
+
+def alarming(left: tuple[Adequacy, ...]) -> float:
+    """Return the largest z of the bands in which what is left also matters in N or N·m; 0 without any."""
+    return max((row.z for row in left if row.matters), default=0.0)
+
+
 def adequacy(found: Model) -> tuple[Adequacy, ...]:
     """Return how far every band of every channel is from null sessions, worst first."""
     spectrum, names = found.problem.spectrum, [case.trial.name for case in found.problem.cases]
-    z = unlikely(found)
+    z, size = unlikely(found), sizes(found)
     square = found.belief.left[: 6 * spectrum.band.size].reshape(-1, 6) ** 2
     rows = []
     for b in range(len(z)):
@@ -69,6 +84,7 @@ def adequacy(found: Model) -> tuple[Adequacy, ...]:
                     (BANDS.edges[b], BANDS.edges[b + 1]),
                     float(z[b, c]),
                     names[int(np.argmax(total[:, c]))],
+                    size=float(size[b, c]),
                 )
             )
     worst, *others = sorted(rows, key=lambda row: -row.z)
@@ -113,8 +129,8 @@ def strain(found: Model) -> float:
 
 
 def verdict(named: int, worst: float, gates: "tuple[Gate, ...]", *, strained: bool = False) -> Verdict:
-    """Return the verdict from how many causes were named, the ``worst`` z that is left, the gates, and whether the
-    body is ``strained``.
+    """Return the verdict from how many causes were named, the ``worst`` z that is left where it matters (`alarming`),
+    the gates, and whether the body is ``strained``.
     """
     failed = any(not gate.ok for gate in gates)
     if worst <= LIMIT and not strained:

@@ -11,6 +11,7 @@ import numpy as np
 
 from biodance import display
 from biodance.records import Array, frozen_array
+from biodance.records.attention import Attention, Judged
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,6 +21,14 @@ if TYPE_CHECKING:
 
 
 Verdict = Literal["nothing wrong", "named, complete", "named, incomplete", "unexplained"]
+ABOUT = "diagnosis"
+"""What the one of a diagnosis's sentences is about that says the verdict."""
+LEAST_FORCE, LEAST_MOMENT = 1.0, 0.3
+"""N, N·m RMS in one band: what is left below it alarms nobody. 1 N is 0.15 % of an adult's weight, half of what
+plates are accurate to (0.2-0.5 %); 0.3 N·m are 0.4 mm of centre of pressure, where plates in place err by 2-5 mm
+(Collins 2009, doi:10.1016/j.gaitpost.2008.10.060), and 0.004 N·m/kg in a joint moment, where the smallest
+meaningful differences are some 0.05.
+"""
 _SIGMAS = 1.959964
 """Half width of a 95 % interval in standard deviations."""
 
@@ -134,8 +143,8 @@ class Finding:
 @dataclass(frozen=True)
 class Adequacy:
     """How far the residual that is left in one ``channel`` and band (Hz) is from what sessions without fault show, in
-    their standard deviations; ``trial`` where it is largest, and the ``second`` s of its recording around which (NaN:
-    not looked for).
+    their standard deviations, and its RMS ``size`` over the trials' time (N for forces, N·m for moments); ``trial``
+    where it is largest, and the ``second`` s of its recording around which (NaN: not looked for).
     """
 
     channel: str
@@ -143,6 +152,17 @@ class Adequacy:
     z: float
     trial: str = ""
     second: float = float("nan")
+    size: float = float("inf")
+
+    @property
+    def unit(self) -> str:
+        """N or N·m."""
+        return "N·m" if self.channel.startswith("M") else "N"
+
+    @property
+    def matters(self) -> bool:
+        """Whether it is large enough to change what a laboratory concludes (`LEAST_FORCE`, `LEAST_MOMENT`)."""
+        return self.size >= (LEAST_MOMENT if self.channel.startswith("M") else LEAST_FORCE)
 
 
 @dataclass(frozen=True)
@@ -183,6 +203,16 @@ class Diagnosis:
         For the reader.
     candidates : tuple
         Every cause at the first round, most probable first.
+    resembles : tuple of Finding
+        Poor models of what is wrong: no findings, because too much is left with them, or the movement cannot tell.
+    tolerated : tuple of Finding
+        Causes that are there, and smaller than what matters in any laboratory (`diagnosis.consequence`).
+    attention : tuple of Attention
+        Sentences for a person, the verdict's first.
+    judged : tuple of Judged
+        What the verdict rests on.
+    doubt : str
+        Why no cause can be told from what was judged (only standing, markers too far from the body); "" where one can.
 
     Examples
     --------
@@ -198,6 +228,11 @@ class Diagnosis:
     limits: tuple[Unobservable, ...] = ()
     notes: tuple[str, ...] = ()
     candidates: tuple[Alias, ...] = field(default=())
+    resembles: tuple[Finding, ...] = ()
+    tolerated: tuple[Finding, ...] = ()
+    attention: tuple[Attention, ...] = ()
+    judged: tuple[Judged, ...] = ()
+    doubt: str = ""
 
     def __repr__(self) -> str:
         return f"Diagnosis({self.told})"
@@ -209,7 +244,9 @@ class Diagnosis:
     def told(self) -> str:
         """Verdict and names of the causes in one line."""
         causes = ", ".join(f"{one.effect} {one.target}".strip() for one in self.findings)
-        return f"{self.verdict}{f': {causes}' if causes else ''}"
+        said = [one.level for one in self.attention if one.about == ABOUT]
+        part = self.verdict == "nothing wrong" and said not in ([], ["note"])
+        return f"{self.verdict}{' in what could be judged' if part else ''}{f': {causes}' if causes else ''}"
 
     def table(self) -> "pd.DataFrame":
         """Return one row for each parameter of each finding.

@@ -2,12 +2,13 @@
 not be seen.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.diagnosis.adequacy import STRAINED, adequacy, strain, verdict
+from biodance.diagnosis.adequacy import STRAINED, adequacy, alarming, strain, verdict
+from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.diagnosis import Diagnosis, Estimate, Finding, Unobservable
 from biodance.diagnosis.model import NamedCause
 from biodance.diagnosis.naming import Naming, Round, name_causes, suspicious
@@ -15,7 +16,7 @@ from biodance.diagnosis.observability import detection_limits, hidden, visibilit
 from biodance.diagnosis.passing import with_passing
 from biodance.diagnosis.problem import Look, problem
 from biodance.discovery import Chosen
-from biodance.effects import DiscreteEffect, Effect, Gate
+from biodance.effects import Case, DiscreteEffect, Effect, Gate
 from biodance.effects import effects as family
 from biodance.records import Sip
 from biodance.uncertainty.tolerances import Tolerances, key_of, shipped
@@ -24,6 +25,12 @@ STRANGE = (
     "What the plates measured fits only a body that is more unlike the table than people are. Something that looks "
     "like a body is wrong: "
     "a load that nobody noted, a gain, or the declared mass or stature."
+)
+
+
+STANDING = (
+    "Only quiet standing was judged: sway, soft tissue and a plate's zero look alike there, so no cause that has a "
+    "size is named from it. A few squats or steps on the plates tell them apart."
 )
 
 
@@ -71,21 +78,53 @@ def diagnose_trials(
     known = tolerances or shipped()
     asked = family(effects)
     put = problem(body, looks, prior=prior, chosen=asked)
-    naming = with_passing(name_causes(put, known, asked), asked) if search else name_causes(put, known, asked, rounds=0)
+    quiet = not any(moves(case) for case, picks in zip(put.cases, put.spectrum.picks, strict=True) if picks)
+    if search and not quiet:
+        naming = with_passing(name_causes(put, known, asked), asked)
+    else:
+        naming = name_causes(put, known, asked, rounds=0)
     rows = detection_limits(visibility(naming.first, naming.first_causes), body, known.threshold)
     left, strained = adequacy(naming.found), strain(naming.found) > STRAINED
-    findings = tuple(_finding(one, r, known) for one, r in zip(naming.found.named, naming.accepted, strict=True))
+    every = [(one, _finding(one, r, known)) for one, r in zip(naming.found.named, naming.accepted, strict=True)]
+    findings = tuple(finding for one, finding in every if matters(one.effect, one.theta))
+    told = verdict(len(findings), alarming(left), gates, strained=strained)
     found = Diagnosis(
-        verdict=verdict(len(findings), left[0].z, gates, strained=strained),
-        findings=findings,
+        verdict=told,
+        findings=() if told == "unexplained" else findings,
+        resembles=findings if told == "unexplained" else (),
+        tolerated=tuple(finding for one, finding in every if not matters(one.effect, one.theta)),
         gates=gates,
         adequacy=left,
         unobservable=hidden(rows),
         limits=tuple(sorted(rows, key=_relative)),
-        notes=(*put.notes, *([STRANGE] if strained else [])),
+        notes=(*put.notes, *([STRANGE] if strained else []), *([STANDING] if quiet else [])),
+        doubt="standing alone tells no cause" if quiet else "",
         candidates=tuple(one.alias for one in naming.screening.suspects),
     )
     return Examined(found, naming)
+
+
+def moves(case: Case) -> bool:
+    """Return whether the person of a trial does more than stand: any segment leaves the space of quiet standing
+    (`StandingRules.still`), and the trial is no static one.
+    """
+    place = case.poses.points(list(range(len(case.body.segments))), case.body.sip.com)
+    away = np.sqrt(np.mean(np.sum((place - place.mean(axis=0)) ** 2, axis=2), axis=0))
+    return case.trial.role != "static" and bool(away.max() > case.trial.settings.standing.still)
+
+
+def without_names(examined: Examined, gates: tuple[Gate, ...] = ()) -> Examined:
+    """Return the same session with no cause named: what was named is only what it resembles, and what is left is
+    judged without it.
+    """
+    naming, one = examined.naming, examined.diagnosis
+    bare = replace(naming, found=naming.bare, accepted=())
+    left, strained = adequacy(naming.bare), strain(naming.bare) > STRAINED
+    told = verdict(0, alarming(left), gates, strained=strained)
+    found = replace(
+        one, verdict=told, findings=(), resembles=(*one.findings, *one.resembles), tolerated=(), adequacy=left
+    )
+    return Examined(found, bare)
 
 
 def _relative(row: Unobservable) -> float:

@@ -15,7 +15,7 @@ from biodance.diagnosis.problem import Problem
 from biodance.discovery import Chosen
 from biodance.effects import Effect, effects
 from biodance.records import Array
-from biodance.uncertainty.tolerances import Tolerances
+from biodance.uncertainty.tolerances import Tolerances, key_of
 
 _ROUNDS = 3
 """Causes named at most."""
@@ -30,6 +30,13 @@ HEAVIER = 0.3
 STALE = 0.03
 """Share of the predicted wrench that may change before causes are predicted again: their sizes are then right to
 this share.
+"""
+SURE = 2.0
+"""A name is taken back where its size is less than so many of its standard deviations."""
+SEEN, OVERWHELMING = 0.2, 10.0
+"""Where less than this share of a cause is visible beside all that is no fault, its evidence must be so many times the
+threshold: it rests on the sizes of tolerances. (A gain of Fz of 5 % is visible to 2 %: the rest looks like mass. The
+declared mass still makes it 25 standard deviations.)
 """
 _STEPS = 5
 """Gauss-Newton steps at most."""
@@ -116,7 +123,56 @@ def name_causes(
         ranking = Round(
             tuple(one for one in screen(found, causes) if one.cause.names not in {named_of(n) for n in found.named})
         )
-    return Naming(first, found, tuple(accepted), screening, first_causes, bare)
+    found, kept = held(found, tuple(accepted))
+    return Naming(first, found, kept, screening, first_causes, bare)
+
+
+def held(found: Model, accepted: tuple[Round, ...]) -> tuple[Model, tuple[Round, ...]]:
+    """Return the model and the rounds with only those names that stand beside one another: all sizes are fitted
+    together, the weakest that does not stand is taken back, and the rest fitted again.
+    """
+    while found.named:
+        found = settle(found, found.named)
+        evidence_of = [_beside(found, i) for i in range(len(found.named))]
+        falls = [
+            i
+            for i, one in enumerate(accepted)
+            if evidence_of[i] - _price(one) < needed(found, one.suspects[0].visible)
+            or not stands(found, found.named[i])
+        ]
+        if not falls:
+            break
+        gone = min(falls, key=lambda i: evidence_of[i])
+        found = settle(found, (*found.named[:gone], *found.named[gone + 1 :]))
+        accepted = (*accepted[:gone], *accepted[gone + 1 :])
+    return found, accepted
+
+
+def needed(found: Model, visible: float) -> float:
+    """Return the evidence that a cause needs of which the share ``visible`` is seen."""
+    return found.tolerances.threshold * (1.0 if visible >= SEEN else OVERWHELMING)
+
+
+def stands(found: Model, one: NamedCause) -> bool:
+    """Return whether a cause is possible in this session and its size `SURE` standard deviations from none; these are
+    never less than sessions without fault are alike.
+    """
+    alike = found.tolerances.size(key_of(*named_of(one))) * one.effect.typical / one.effect.typical[0]
+    sd = np.maximum(np.sqrt(np.diag(one.covariance)), alike)
+    sure = bool(np.max(np.abs(one.theta) / sd) >= SURE)
+    return sure and one.effect.possible_in(found.problem.cases[0], one.theta)
+
+
+def _beside(found: Model, index: int) -> float:
+    """Return the log Bayes factor of one named cause beside the others, which take up what they can without it."""
+    others = (*found.named[:index], *found.named[index + 1 :])
+    without = settle(found, others)
+    return found.log_likelihood - _penalty(found) - without.log_likelihood + _penalty(without)
+
+
+def _price(one: Round) -> float:
+    """Return what the first of a round paid for its number of targets."""
+    return one.suspects[0].log_bayes_factor - one.suspects[0].score
 
 
 def suspicious(ranking: Round, tolerances: Tolerances) -> bool:
@@ -213,7 +269,8 @@ def refine(found: Model, ranking: Round) -> tuple[Round, Model]:
         start = NamedCause(one.cause.effect, one.start, np.empty((0, 0)))
         settled = settle(found, (*found.named, start))
         gain = settled.log_likelihood - _penalty(settled) - before
-        bayes = gain if settled.named[-1].effect.possible(settled.named[-1].theta) else -np.inf
+        last = settled.named[-1]
+        bayes = gain if last.effect.possible_in(found.problem.cases[0], last.theta) else -np.inf
         refined.append((replace(one, log_bayes_factor=bayes, score=bayes + one.score - one.log_bayes_factor), settled))
     refined.sort(key=lambda pair: -pair[0].score)
     rest = ranking.suspects[len(near) :]

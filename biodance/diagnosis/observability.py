@@ -11,8 +11,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from biodance.body.body import Body, JointError
+from biodance.body.body import Body
+from biodance.body.parts import JointError
 from biodance.diagnosis.candidates import SCALE, Candidate
+from biodance.diagnosis.consequence import least
 from biodance.diagnosis.diagnosis import Unobservable
 from biodance.diagnosis.evidence import smallest
 from biodance.diagnosis.model import Model
@@ -119,13 +121,13 @@ def after_calibration(seen: Visibility, body: Body) -> Visibility:
 
 def placing_leaves(error: JointError) -> float:
     """Return the share of a wrong joint centre that placing the joint by movement has left, 0..1."""
-    fixed = fixed_point(error.joint)
-    return float(np.clip((error.centre**2 - fixed**2) / centre_sd(error.joint) ** 2, 0.01, 1.0))
+    fixed, before = fixed_point(error.joint), centre_sd(error.joint, contradicted=error.contradicted)
+    return float(np.clip((error.centre**2 - fixed**2) / before**2, 0.01, 1.0))
 
 
 def detection_limits(seen: Visibility, body: Body, threshold: float) -> tuple[Unobservable, ...]:
     """Return from which size on every cause is seen and told from the others, by who looks at ``body`` with its
-    joints where they are.
+    joints where they are; never less than what matters (`consequence.least`).
     """
     targets: dict[str, int] = {}
     for one in seen.causes:
@@ -136,6 +138,7 @@ def detection_limits(seen: Visibility, body: Body, threshold: float) -> tuple[Un
         here = after if one.effect.placed else seen
         limit = here.seen(i, threshold + float(np.log(targets[one.names[0]])))
         first = one.effect.parameters[one.silent.index(False)]
+        limit = max(limit, least(one.effect).get(first.name, 0.0))
         rows.append(Unobservable(*one.names, limit, first.unit, max(limit, here.told(i)), first.typical))
     return tuple(rows)
 

@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from biodance.diagnosis.adequacy import LIMIT, adequacy
+from biodance.diagnosis.adequacy import LIMIT, adequacy, alarming
 from biodance.diagnosis.candidates import Candidate, local_basis
 from biodance.diagnosis.evidence import Evidence, believe, evidence
 from biodance.diagnosis.model import Model, NamedCause
-from biodance.diagnosis.naming import Naming, Round, ScoredCandidate
+from biodance.diagnosis.naming import Naming, Round, ScoredCandidate, needed, stands
 from biodance.discovery import Chosen
 from biodance.effects import Effect, effects
 from biodance.records import Array
@@ -40,12 +40,12 @@ def with_passing(naming: Naming, chosen: Chosen[Effect] = None) -> Naming:
 
     It is tried instead of what was named, and beside it; what leaves less is kept.
     """
-    if adequacy(naming.found)[0].z <= LIMIT:
+    if alarming(adequacy(naming.found)) <= LIMIT:
         return naming
     best = naming
     for base, accepted in ((naming.bare, ()), (naming.found, naming.accepted)):
         tried = _with(naming, base, accepted, chosen)
-        if tried is not None and adequacy(tried.found)[0].z < adequacy(best.found)[0].z:
+        if tried is not None and alarming(adequacy(tried.found)) < alarming(adequacy(best.found)):
             best = tried
         if not naming.found.named:
             break
@@ -70,7 +70,11 @@ def _with(naming: Naming, base: Model, accepted: tuple[Round, ...], chosen: Chos
     course = belief.mean[-best.white.shape[1] :]
     if not one_sided(order[0].found.mean.reshape(-1, len(best.effect.parameters))):
         return None
-    named = (*base.named, _named(base, best, course, order[0]))
+    touch = _named(base, best, course, order[0])
+    seen = order[0].found
+    if seen.log_bayes_factor - score < needed(base, seen.visible) or not stands(base, touch):
+        return None
+    named = (*base.named, touch)
     model = replace(base, belief=belief, named=named)
     return Naming(naming.first, model, (*accepted, Round(suspects)), naming.screening, naming.first_causes, naming.bare)
 

@@ -1,6 +1,6 @@
 """FAMILY: one candidate cause of disagreement per file, found automatically: to extend the model, add one file.
 
-The diagnosis fits these causes. The virtual lab makes its faults by OTHER code (``virtual_lab/faults.py``,
+The diagnosis fits these causes. The virtual lab makes its faults by OTHER code (``virtual_lab/faults/faults.py``,
 ``causes.py``): what is hidden is not made by the formula that finds it. The name of an effect is the name of its file,
 which gives it as ``EFFECT``; the contract is `Effect` for causes that have columns and are fitted, `DiscreteEffect` for
 those that a look at the recording settles before any statistics. Other packages join by the entry points
@@ -13,11 +13,12 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from biodance.discovery import Chosen, Family
-from biodance.effects._base.case import Case, at_origin, at_point
+from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded, unit_of
 from biodance.errors import UnknownName
 from biodance.records import Session
+from biodance.spatial import wrench_about_origin, wrench_about_point
 
 __all__ = [
     "Case",
@@ -26,14 +27,14 @@ __all__ = [
     "Gate",
     "Parameter",
     "Recorded",
-    "at_origin",
-    "at_point",
     "causes",
     "discrete_effects",
     "effect",
     "effects",
     "gates",
     "unit_of",
+    "wrench_about_origin",
+    "wrench_about_point",
 ]
 
 Cause = Effect | DiscreteEffect

@@ -11,12 +11,7 @@ import numpy as np
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.records import Array
-
-
-def point_mass(mass: float, place: Array) -> Array:
-    """Return the ten parameters of a point ``mass`` kg at ``place`` (3,) m in a segment frame."""
-    x, y, z = place
-    return mass * np.array([1, x, y, z, y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y])
+from biodance.spatial import point_mass
 
 
 class AddedMass(Effect):

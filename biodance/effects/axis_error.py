@@ -8,9 +8,10 @@ the plate forwards and to the left.
 
 import numpy as np
 
-from biodance.effects._base.case import Case, at_point
+from biodance.effects._base.case import Case
 from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded, overruled
 from biodance.records import CHANNELS, Array
+from biodance.spatial import wrench_about_point
 
 ALONE = 0.95
 """Share of the vertical force that a plate must carry in the frames that judge it."""
@@ -79,7 +80,7 @@ def on_one_plate(case: Case, name: str) -> tuple[Array, Array] | None:
     alone = (own[:, 2] > ALONE * total) & (own[:, 2] > 0.5 * needed[:, 2]) & np.isfinite(own).all(axis=1)
     if alone.sum() < _SECONDS * case.motion.rate:
         return None
-    measured, needed = (at_point(value[alone], plate.centre) for value in (own, needed))
+    measured, needed = (wrench_about_point(value[alone], plate.centre) for value in (own, needed))
     nuisance = np.stack([np.ones(alone.sum()), needed[:, 2]], axis=1)
     both = np.hstack([measured, needed])
     rest = both - nuisance @ np.linalg.lstsq(nuisance, both, rcond=None)[0]

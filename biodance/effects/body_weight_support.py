@@ -10,6 +10,7 @@ import numpy as np
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.records import Array
+from biodance.spatial import wrench_of_force
 
 ROPE = 2.0
 """m from the harness to the suspension: a ceiling of about 3 m."""
@@ -44,11 +45,15 @@ class BodyWeightSupport(Effect):
         up = np.array([0.0, 0.0, 1.0])
         lift = up - away * (1 - up) / ROPE
         spring = -away[:, 2:] * up
-        return -np.stack([np.concatenate([force, np.cross(point, force)], axis=1) for force in (lift, spring)], axis=2)
+        return -np.stack([wrench_of_force(force, point) for force in (lift, spring)], axis=2)
 
     def possible(self, theta: Array) -> bool:
         """Return whether the size is positive: a rope pulls."""
         return bool(theta[0] > 0)
+
+    def possible_in(self, case: Case, theta: Array) -> bool:
+        """Return whether the rope carries no more than the person weighs."""
+        return bool(0 < theta[0] <= case.body.sip.mass.sum() * np.linalg.norm(case.body.gravity))
 
 
 EFFECT = BodyWeightSupport

@@ -6,9 +6,9 @@ whose noise was set to zero (flat at zero, not at the top). Separated by the his
 
 import numpy as np
 
-from biodance.effects._base.case import at_point
 from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded, unit_of
 from biodance.records import CHANNELS, Array, Trial
+from biodance.spatial import wrench_about_point
 
 _LONGEST = 0.015
 """s that a channel may stay at its extreme value."""
@@ -67,7 +67,7 @@ def clipped(trial: Trial) -> list[tuple[str, float]]:
     """
     found = []
     for plate in trial.plates:
-        channels = at_point(plate.wrench.value, plate.centre)
+        channels = wrench_about_point(plate.wrench.value, plate.centre)
         for k, name in enumerate(CHANNELS):
             level = flat_level(channels[:, k], plate.wrench.rate)
             if level is not None:

@@ -10,6 +10,7 @@ import numpy as np
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.records import Array
+from biodance.spatial import wrench_of_force
 
 _STEP = 0.4
 """s: a hand comes and goes within about a second."""
@@ -43,9 +44,7 @@ class ExternalContact(Effect):
         far = 0.5 * (low + high)
         far[1] = low[1] if index else 0.0
         point = case.poses.points([index], far[None])[:, 0]
-        moment = np.stack([np.cross(point, axis) for axis in np.eye(3)], axis=2)
-        force = np.broadcast_to(np.eye(3), moment.shape)
-        return -np.concatenate([force, moment], axis=1)
+        return -np.stack([wrench_of_force(axis, point) for axis in np.eye(3)], axis=2)
 
     def local(self, case: Case) -> Array | None:
         """Return the contact as a force that comes and goes: hats of `STEP` s to both sides; None for the root, which

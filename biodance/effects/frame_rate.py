@@ -14,9 +14,9 @@ from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded
 from biodance.effects.clipping import clipped
 from biodance.identification.posterior import prior_factor
 from biodance.lab.filters import LowPass, low_pass
-from biodance.motion.kinematics import skew
 from biodance.motion.regressor import predict_wrench, regressor
 from biodance.records import Array, Motion
+from biodance.spatial import skew
 from biodance.uncertainty.caution import widened
 
 BAND = 3.0

@@ -7,9 +7,9 @@ unless it was sampled so slowly that it was folded into the movement.
 
 import numpy as np
 
-from biodance.effects._base.case import at_point
 from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded, unit_of
 from biodance.records import CHANNELS, Array, Trial
+from biodance.spatial import wrench_about_point
 
 MAINS = (50.0, 60.0)
 _LEAST = np.array([2.0, 2.0, 2.0, 0.6, 0.6, 0.6])
@@ -57,7 +57,7 @@ def lines(trial: Trial) -> dict[tuple[str, float], float]:
     for plate in trial.plates:
         if not _fast_enough(plate.wrench.rate, plate.wrench.time.size):
             continue
-        channels = at_point(plate.wrench.value, plate.centre)
+        channels = wrench_about_point(plate.wrench.value, plate.centre)
         for frequency in MAINS:
             amplitude, around = line(channels, plate.wrench.rate, frequency)
             for k, name in enumerate(CHANNELS):

@@ -7,9 +7,10 @@ Separated by movements that change Fz much and by standing at other places of th
 
 import numpy as np
 
-from biodance.effects._base.case import Case, at_origin
+from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.records import CHANNELS, Array
+from biodance.spatial import wrench_about_origin
 
 
 class PlateCrosstalk(Effect):
@@ -35,7 +36,7 @@ class PlateCrosstalk(Effect):
         plate = self.plate_of(case)
         first, _, second = self.target.rpartition(":")[2].partition("->")
         change = case.predicted_on(plate)[:, CHANNELS.index(first), None] * np.eye(6)[CHANNELS.index(second)]
-        return at_origin(change, plate.centre)[:, :, None]
+        return wrench_about_origin(change, plate.centre)[:, :, None]
 
 
 EFFECT = PlateCrosstalk

@@ -7,9 +7,10 @@ recordings before and after.
 
 import numpy as np
 
-from biodance.effects._base.case import Case, at_origin
+from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter, channel_index, plate_channels
 from biodance.records import Array
+from biodance.spatial import wrench_about_origin
 
 
 class PlateDrift(Effect):
@@ -37,7 +38,7 @@ class PlateDrift(Effect):
     def columns(self, case: Case) -> Array:
         """Return session time minus one half in the channel, moved to the lab origin."""
         change = (case.session_time - 0.5)[:, None] * np.eye(6)[channel_index(self.target)]
-        return at_origin(change, self.plate_of(case).centre)[:, :, None]
+        return wrench_about_origin(change, self.plate_of(case).centre)[:, :, None]
 
 
 EFFECT = PlateDrift

@@ -7,9 +7,10 @@ the scale's weight and by differences between channels.
 
 import numpy as np
 
-from biodance.effects._base.case import Case, at_origin
+from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter, channel_index, plate_channels
 from biodance.records import Array
+from biodance.spatial import wrench_about_origin
 
 
 class PlateGain(Effect):
@@ -31,7 +32,7 @@ class PlateGain(Effect):
         """Return the predicted channel itself, moved to the lab origin."""
         plate = self.plate_of(case)
         only = case.predicted_on(plate) * np.eye(6)[channel_index(self.target)]
-        return at_origin(only, plate.centre)[:, :, None]
+        return wrench_about_origin(only, plate.centre)[:, :, None]
 
 
 EFFECT = PlateGain

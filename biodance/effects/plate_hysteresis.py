@@ -8,9 +8,10 @@ unloading in steps with the person standing still between them.
 
 import numpy as np
 
-from biodance.effects._base.case import Case, at_origin
+from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter, channel_index, plate_channels
 from biodance.records import Array
+from biodance.spatial import wrench_about_origin
 
 REVERSAL = np.array([5.0, 5.0, 20.0, 5.0, 5.0, 2.0])
 """N, N·m by which a channel must turn back until the loop is crossed (to 63 %)."""
@@ -37,7 +38,7 @@ class PlateHysteresis(Effect):
         """Return minus the memory of the predicted channel, moved to the lab origin."""
         plate, channel = self.plate_of(case), channel_index(self.target)
         state = memory(case.predicted_on(plate)[:, channel], REVERSAL[channel])
-        return at_origin(-state[:, None] * np.eye(6)[channel], plate.centre)[:, :, None]
+        return wrench_about_origin(-state[:, None] * np.eye(6)[channel], plate.centre)[:, :, None]
 
 
 def memory(load: Array, reversal: float) -> Array:

@@ -7,9 +7,10 @@ Fx a tilted plate. Separated by movements that change Fz (squats) and by an unlo
 
 import numpy as np
 
-from biodance.effects._base.case import Case, at_origin
+from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter, channel_index, plate_channels
 from biodance.records import Array
+from biodance.spatial import wrench_about_origin
 
 
 class PlateOffset(Effect):
@@ -28,7 +29,7 @@ class PlateOffset(Effect):
     def columns(self, case: Case) -> Array:
         """Return one in the channel, moved to the lab origin."""
         unit = np.tile(np.eye(6)[channel_index(self.target)], (case.motion.time.size, 1))
-        return at_origin(unit, self.plate_of(case).centre)[:, :, None]
+        return wrench_about_origin(unit, self.plate_of(case).centre)[:, :, None]
 
 
 EFFECT = PlateOffset

@@ -7,10 +7,10 @@ Separated by lunges, arm swings and the plate's corners measured with markers.
 
 import numpy as np
 
-from biodance.effects._base.case import Case, at_origin
+from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter, axis_vector, plate_axis_targets
-from biodance.motion.kinematics import axis_rotation
 from biodance.records import Array
+from biodance.spatial import axis_rotation, wrench_about_origin
 
 
 class PlateRotation(Effect):
@@ -38,7 +38,7 @@ class PlateRotation(Effect):
         turn = axis_rotation(axis_vector(self.target), np.atleast_1d(theta))[0]
         local = case.predicted_on(plate)
         turned = np.concatenate([local[:, :3] @ turn.T, local[:, 3:] @ turn.T], axis=1)
-        return case.with_added(plate, at_origin(turned - local, plate.centre))
+        return case.with_added(plate, wrench_about_origin(turned - local, plate.centre))
 
 
 EFFECT = PlateRotation

@@ -10,8 +10,8 @@ import numpy as np
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.effects._base.oscillator import point_motion, relative_motion, riding_wrench
-from biodance.effects.added_mass import point_mass
 from biodance.records import Array
+from biodance.spatial import point_mass
 
 _FREQUENCY = 1.5
 """Hz: open vessels of 10 to 30 cm slosh at 1 to 2.5 Hz (w² = pi g / length, deep water)."""

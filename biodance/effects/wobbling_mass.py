@@ -54,5 +54,9 @@ class WobblingMass(Effect):
         """Return whether the size is positive: only a mass that is there wobbles."""
         return bool(theta[0] > 0)
 
+    def possible_in(self, case: Case, theta: Array) -> bool:
+        """Return whether no more wobbles than the segment weighs."""
+        return bool(0 < theta[0] <= case.body.sip.mass[case.body.segment_index(self.target)])
+
 
 EFFECT = WobblingMass

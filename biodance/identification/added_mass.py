@@ -1,49 +1,49 @@
 """Added mass: which segment carries a load, how heavy, where on it, how sure - against an earlier session or against
 the table.
 
-Hypotheses "a load sits on segment s" are compared with "no load" by Bayes factors under one linear Gaussian model: the
-body as known before (the posterior of the reference session, or the table), plus the ten parameters of a load whose
-mass and place inside the segment's box are unknown. The load's prior is the second moment of such loads, so that light
-and heavy ones both fit; its size is then estimated under a wider prior, which does not shrink it; a load is positive.
-The smallest load that the session could have found is computed from its information alone.
+The hypotheses are "no load" and "m kg on segment s" (`load_posterior`), under one linear Gaussian model: the body as
+known before (the posterior of the reference session, or the table) plus the load. What was known before may be wrong by
+more than its standard deviations say (another laboratory's people, a table that cuts the trunk elsewhere), and without
+a reference the declared mass may be wrong or hold the load: these rival explanations (`rivals`) are weighed by their
+evidence together with the load, so that a load is announced only where an odd body cannot do as well.
 """
 
-from dataclasses import dataclass, replace
+from bisect import bisect_left
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
-from scipy.linalg import solve_triangular
-from scipy.stats import norm
+from scipy.special import logsumexp
 
-from biodance.body.body import Body
 from biodance.identification.identification import Identification
 from biodance.identification.information import Information
-from biodance.identification.knowledge import SIGMAS
-from biodance.identification.loads import load_moments, point_mass
-from biodance.identification.posterior import prior_factor
+from biodance.identification.load_posterior import MASSES, LoadPosterior, LoadView, log_mass_prior
+from biodance.identification.loads import unit_load
+from biodance.identification.rival_bodies import expect_unloaded, rivals, surprised
 from biodance.records import Array, Sip
 
-_THRESHOLD = 0.05
-"""p of "no load" below which a load is announced."""
+_THRESHOLD = 0.01
+"""Probability of "no load" below which a load is announced."""
+_UNTOLD = 0.5
+"""Probability of "no load" from which the answer is "none"; between the two limits it cannot be told."""
+_COARSE, _TRUE = MASSES[::6], np.geomspace(0.05, 25.0, 60)
+"""kg: masses over which the smallest load that can be found is integrated and searched."""
 
-
-WIDE = 5.0
-"""How much wider than for a typical load the prior of its size is; the typical one shrinks 2.4 kg on a forearm by
-0.03.
-"""
+LoadStatus = Literal["found", "none", "cannot tell"]
 
 
 @dataclass(frozen=True, eq=False)
 class LoadCandidate:
     """The hypothesis of a load on one segment.
 
-    ``mass`` kg with ``sd``; ``place`` (3,) m of its CoM in the segment's joint frame with ``place_sd`` (3,), NaN where
-    the mass is less than twice its sd; ``log_bayes_factor`` against no load; ``probability`` among all hypotheses;
-    ``smallest`` kg, the load on this segment that this session would find in half of the cases.
+    ``posterior`` of its mass, no load included; ``place`` (3,) m of its CoM in the segment's joint frame with
+    ``place_sd`` (3,), NaN where the interval of the mass holds zero; ``log_bayes_factor`` against no load;
+    ``probability`` among all hypotheses; ``smallest`` kg, the load on this segment that this session would find in half
+    of the cases.
     """
 
     segment: str
-    mass: float
-    sd: float
+    posterior: LoadPosterior
     place: Array
     place_sd: Array
     log_bayes_factor: float
@@ -51,23 +51,49 @@ class LoadCandidate:
     smallest: float
 
     @property
+    def mass(self) -> float:
+        """Expected mass, kg; 0 counts with the probability of no load."""
+        return self.posterior.mass
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation of the mass, kg."""
+        return self.posterior.sd
+
+    @property
     def interval(self) -> tuple[float, float]:
-        """95 % interval of the mass, kg."""
-        return self.mass - SIGMAS * self.sd, self.mass + SIGMAS * self.sd
+        """95 % interval of the mass, kg; it starts at 0 unless no load is less probable than 2.5 %."""
+        return self.posterior.interval
 
 
 @dataclass(frozen=True, eq=False)
 class LoadSearch:
-    """All hypotheses, most probable first; ``p_no_load`` probability that nothing was added; ``reference`` in words."""
+    """All hypotheses, most probable first; ``p_no_load`` probability that nothing was added; ``reference`` in words;
+    ``doubts`` why no load may be stated from this session whatever its data say, () if it may.
+    """
 
     suspects: tuple[LoadCandidate, ...]
     p_no_load: float
     reference: str
+    doubts: tuple[str, ...] = ()
+
+    @property
+    def status(self) -> LoadStatus:
+        """Whether a load is "found" (announced: none is improbable, the interval of its mass excludes zero and the
+        session can see loads of this size), there is "none" (more probable than one), or one "cannot tell" (between
+        the two, or with `doubts`).
+        """
+        if self.doubts:
+            return "cannot tell"
+        if self.p_no_load >= _UNTOLD:
+            return "none"
+        seen = self.best.interval[0] > 0 and self.best.mass >= self.best.smallest
+        return "found" if self.p_no_load < _THRESHOLD and seen else "cannot tell"
 
     @property
     def found(self) -> bool:
         """Whether a load is announced."""
-        return self.p_no_load < _THRESHOLD and self.suspects[0].mass > 0
+        return self.status == "found"
 
     @property
     def best(self) -> LoadCandidate:
@@ -81,12 +107,15 @@ class LoadSearch:
         return tuple(s.segment for s in self.suspects[: int(np.searchsorted(share, 0.95)) + 1])
 
 
-def added_mass(session: Identification, *, reference: Identification | None = None) -> LoadSearch:
+def added_mass(
+    session: Identification, *, reference: Identification | None = None, doubts: tuple[str, ...] = ()
+) -> LoadSearch:
     """Return where and how much mass ``session`` carries beyond ``reference`` (an unloaded session of the same person)
-    or the table.
+    or the table; ``doubts`` why none may be stated.
 
-    Against the table alone, a load on pelvis, trunk or thigh cannot be told from a wrong table or a wrong scale:
-    ``set`` then holds several segments.
+    Which mass the session declares, with the load or without, does not matter: beside a reference the reference's
+    counts, and without one the declared mass may hold the load. Against the table alone, a load on pelvis, trunk or
+    thigh cannot be told from a wrong table or a wrong scale.
 
     Raises
     ------
@@ -94,69 +123,62 @@ def added_mass(session: Identification, *, reference: Identification | None = No
         Nothing was identified from the reference.
     """
     before = session.belief.prior if reference is None else expect_unloaded(reference, session)
-    rows, surprise = surprised(session.data, before)
-    found = [_suspect(session.body, i, rows[:, 10 * i : 10 * i + 10], surprise) for i in range(len(before.segments))]
-    weight = np.array([f.log_bayes_factor for f in found]) - np.log(len(found))
-    top = max(0.0, float(weight.max()))
-    total = np.exp(-top) + np.exp(weight - top).sum()
-    chance = np.exp(weight - top) / total
-    suspects = tuple(replace(found[i], probability=float(chance[i])) for i in np.argsort(-chance))
-    words = "the table" if reference is None else f"the session with {', '.join(reference.trials)}"
-    return LoadSearch(suspects, float(np.exp(-top) / total), words)
-
-
-def expect_unloaded(reference: Identification, session: Identification) -> Sip:
-    """Return what ``reference`` lets expect of the unloaded body in ``session``, with covariance.
-
-    The belief of the reference, moved by what the table itself changed between the sessions (another static trial,
-    other lengths).
-
-    Raises
-    ------
-    NotSolved
-        The reference contradicts every possible body, so its belief is none of a body.
-    """
-    shift = session.belief.prior.phi - reference.belief.prior.phi
-    return Sip(reference.sip.segments, reference.belief.mean + shift, reference.belief.covariance)
-
-
-def surprised(data: Information, before: Sip) -> tuple[Array, Array]:
-    """Return the data's rows (r, p) and what they show beyond ``before`` (r,), whitened by noise and by the uncertainty
-    of ``before``.
-
-    With R phi = y + noise and phi ~ N(before): y - R before has the covariance 1 + R P R'.
-    """
-    A = data.triangle @ prior_factor(before)
-    L = np.linalg.cholesky(np.eye(len(A)) + A @ A.T)
-    both = np.column_stack([data.triangle, data.target - data.triangle @ before.phi])
-    white = solve_triangular(L, both, lower=True)
-    return white[:, :-1], white[:, -1]
-
-
-def _suspect(body: Body, i: int, rows: Array, surprise: Array) -> LoadCandidate:
-    """Return the hypothesis of a load on segment ``i`` whose columns are ``rows`` (r, 10); its probability is filled
-    in later.
-    """
-    U = load_moments(body, i)
-    B = rows @ U
-    S, t = B.T @ B, B.T @ surprise
-    inner, wide = (np.linalg.inv(np.eye(len(S)) / scale**2 + S) for scale in (1.0, WIDE))
-    load, covariance = U @ wide @ t, U @ wide @ U.T
-    mass, sd = float(load[0]), float(np.sqrt(covariance[0, 0]))
-    occam = -0.5 * float(np.linalg.slogdet(np.eye(len(S)) + S)[1])
-    bayes = occam + 0.5 * float(t @ inner @ t) + float(norm.logcdf(mass / sd) + np.log(2.0))
-    place, place_sd = np.full(3, np.nan), np.full(3, np.nan)
-    if mass > 2 * sd:
-        place = load[1:4] / mass
-        slope = np.column_stack([-place / mass, np.eye(3) / mass])
-        place_sd = np.sqrt(np.diag(slope @ covariance[:4, :4] @ slope.T))
-    shown = B.T @ (rows @ point_mass(body.boxes[i].mean(axis=0)))
-    per_kg = 0.5 * float(shown @ inner @ shown)
-    wanted = (
-        np.log((1 - _THRESHOLD) / _THRESHOLD * len(body.segments))
-        - np.log(2.0)
-        - occam
-        - 0.5 * float(np.trace(S @ inner))
+    units = tuple(unit_load(session.body, i) for i in range(len(before.segments)))
+    bodies = tuple(
+        _Rival.of(session.data, units, sip, log) for sip, log in rivals(before, weighed=reference is not None)
     )
-    smallest = float(np.sqrt(max(wanted, 0.0) / per_kg)) if per_kg > 0 else float("inf")
-    return LoadCandidate(body.segments[i], mass, sd, place, place_sd, bayes, 0.0, smallest)
+    none = np.array([one.log_none for one in bodies])
+    load = np.array([one.log_none + one.log_ratio for one in bodies]) + log_mass_prior(MASSES) - np.log(len(units))
+    total = logsumexp(np.append(load.ravel(), none))
+    log_none = float(logsumexp(none) - total)
+    found = [_suspect(name, i, bodies, load[:, i] - total, log_none) for i, name in enumerate(before.segments)]
+    words = "the table" if reference is None else f"the session with {', '.join(reference.trials)}"
+    return LoadSearch(tuple(sorted(found, key=lambda one: -one.probability)), float(np.exp(log_none)), words, doubts)
+
+
+@dataclass(frozen=True, eq=False)
+class _Rival:
+    """One explanation of the body: ``log_prior``, ``log_none`` (with the evidence of the data without load) and what it
+    lets see of a load on each segment.
+    """
+
+    log_prior: float
+    log_none: float
+    log_det: float
+    views: tuple[LoadView, ...]
+    log_ratio: Array
+
+    @classmethod
+    def of(cls, data: Information, units: tuple[tuple[Array, Array], ...], before: Sip, log_prior: float) -> "_Rival":
+        rows, surprise, evidence = surprised(data, before)
+        views = tuple(LoadView.of(rows[:, 10 * i : 10 * i + 10], surprise, unit) for i, unit in enumerate(units))
+        ratio = np.array([view.log_ratio(MASSES) for view in views])
+        log_det = evidence + 0.5 * float(surprise @ surprise)
+        return cls(log_prior, log_prior + evidence, log_det, views, ratio)
+
+
+def _suspect(segment: str, i: int, bodies: tuple[_Rival, ...], load: Array, none: float) -> LoadCandidate:
+    """Return the hypothesis of a load on segment ``i`` from the log probabilities of it (rivals, n) and of ``none``."""
+    chance = float(logsumexp(load))
+    here = np.exp(load - np.logaddexp(chance, none))
+    posterior = LoadPosterior(float(np.exp(none - np.logaddexp(chance, none))), here.sum(axis=0))
+    place, place_sd = np.full(3, np.nan), np.full(3, np.nan)
+    if posterior.interval[0] > 0:
+        likely = int(np.argmax(here.sum(axis=1)))
+        place, place_sd = bodies[likely].views[i].place(here[likely])
+    bayes = chance - none + float(np.log(len(bodies[0].views)))
+    return LoadCandidate(segment, posterior, place, place_sd, bayes, float(np.exp(chance)), _smallest(bodies, i))
+
+
+def _smallest(bodies: tuple[_Rival, ...], i: int) -> float:
+    """Return the load (kg) on segment ``i`` from which on "no load" is improbable enough; infinite if none is."""
+    prior = log_mass_prior(_COARSE) - np.log(len(bodies[0].views))
+
+    def announced(true: float) -> bool:
+        none = np.array([one.log_prior + one.log_det - 0.5 * true**2 * one.views[i].squares for one in bodies])
+        load = np.array([n + one.views[i].log_ratio_if(true, _COARSE) for n, one in zip(none, bodies, strict=True)])
+        left = logsumexp(none)
+        return bool(left - np.logaddexp(left, logsumexp(load + prior)) < np.log(_THRESHOLD))
+
+    at = bisect_left(range(len(_TRUE)), True, key=lambda step: announced(float(_TRUE[step])))
+    return float(_TRUE[at]) if at < len(_TRUE) else float("inf")

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.body.parts import GRAVITY
 from biodance.identification.information import Information, fold
 from biodance.motion.kinematics import segment_motion
-from biodance.motion.regressor import GRAVITY, regressor_of
+from biodance.motion.regressor import regressor_of
 from biodance.records import Array, Motion, frozen_array
 
 PARAMETERS = ("M", "MX", "MY", "MZ", "XX", "XY", "YY", "XZ", "YZ", "ZZ")

@@ -6,6 +6,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.records import Array, Sip
+from biodance.spatial import point_mass
 
 _SCALE = 2.0
 """kg: typical size of a load; the answer changes little between half and twice of it."""
@@ -17,25 +18,38 @@ UNDECLARED = 0.25
 """Share of a load's second moment that noise is learned with: 1 kg on every segment, undeclared."""
 
 
-def point_mass(place: Array, radius: float = _RADIUS) -> Array:
-    """Return the ten parameters per kg of a compact load with CoM at ``place`` (3,) m and radius of gyration
-    ``radius`` m.
-    """
-    x, y, z = place
-    r = radius**2
-    return np.array([1.0, x, y, z, y * y + z * z + r, -x * y, x * x + z * z + r, -x * z, -y * z, x * x + y * y + r])
+def compact_load(place: Array) -> Array:
+    """Return the ten parameters per kg of a compact load with CoM at ``place`` (3,) m."""
+    return point_mass(1.0, place, radius=_RADIUS)
 
 
 def load_moments(body: Body, segment: int) -> Array:
     """Return U (10, k): U U' is the second moment of the parameters of a load of typical mass in or near the
     segment's box.
     """
+    loads = _unit_loads(body, segment) * _SCALE
+    return _factor(loads.T @ loads / len(loads))
+
+
+def unit_load(body: Body, segment: int) -> tuple[Array, Array]:
+    """Return mean (10,) and factor G (10, k) of the covariance G G' of the parameters of a load of 1 kg in or near the
+    segment's box.
+    """
+    loads = _unit_loads(body, segment)
+    mean = loads.mean(axis=0)
+    return mean, _factor((loads - mean).T @ (loads - mean) / len(loads))
+
+
+def _unit_loads(body: Body, segment: int) -> Array:
+    """Return the parameters (2000, 10) of loads of 1 kg, placed alike in and near the segment's box."""
     low, high = body.boxes[segment]
     margin = _NEAR * (high - low)
-    rng = np.random.default_rng(segment)
-    place = rng.uniform(low - margin, high + margin, (2000, 3))
-    loads = np.array([point_mass(p) for p in place]) * _SCALE
-    moment = loads.T @ loads / len(loads)
+    place = np.random.default_rng(segment).uniform(low - margin, high + margin, (2000, 3))
+    return np.array([compact_load(one) for one in place])
+
+
+def _factor(moment: Array) -> Array:
+    """Return U (10, k) with U U' = ``moment`` (10, 10), without directions of no size."""
     value, vector = np.linalg.eigh(moment)
     keep = value > 1e-12 * value.max()
     return np.asarray(vector[:, keep] * np.sqrt(value[keep]))

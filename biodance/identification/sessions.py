@@ -14,6 +14,7 @@ from biodance.identification.knowledge import QUANTITIES, SIGMAS, UNITS, segment
 from biodance.identification.loads import may_carry
 from biodance.identification.physical import physical_fit
 from biodance.identification.posterior import Posterior, posterior
+from biodance.identification.rival_bodies import weighing
 from biodance.records import Array
 
 
@@ -41,11 +42,11 @@ class Difference:
 def differences(earlier: Identification, later: Identification) -> tuple[Difference, ...]:
     """Return all differences, later minus earlier, each session with room for what it carries beyond the other.
 
-    The declared masses pin both totals, so a load that was not declared would be spread over the body. Every segment
-    therefore gets room D for a load, in proportion to the probability that one sits there (`added_mass`, in both
-    directions: a load, a loss); values may differ from those of the two tables of results. The two posteriors share the
-    table P: what both still owe to it is common and cancels. With the covariances C under the prior P + D and A = C (P
-    + D)^-1, Var = C1 + C2 - A1 P A2' - A2 P A1'.
+    Both tables count at the earlier session's declared mass: the later one may hold a load, declared or not, which
+    would be spread over the body. Every segment therefore gets room D for a load, in proportion to the probability that
+    one sits there (`added_mass`, in both directions: a load, a loss); values may differ from those of the two tables of
+    results. The two posteriors share the table P: what both still owe to it is common and cancels. With the covariances
+    C under the prior P + D and A = C (P + D)^-1, Var = C1 + C2 - A1 P A2' - A2 P A1'.
 
     Raises
     ------
@@ -58,7 +59,8 @@ def differences(earlier: Identification, later: Identification) -> tuple[Differe
         raise BiodanceError(
             "The two sessions have different segments and cannot be compared. Use the same kind of body in both."
         )
-    first, second = _with_room(earlier, later), _with_room(later, earlier)
+    mass = float(earlier.belief.prior.mass.sum())
+    first, second = _with_room(earlier, later, mass), _with_room(later, earlier, mass)
     mutual = _owed(first) @ earlier.belief.prior.covariance @ _owed(second).T
     spread = first.covariance + second.covariance - mutual - mutual.T
     values = [_possible(belief, one) for belief, one in ((first, earlier), (second, later))]
@@ -95,16 +97,10 @@ def _possible(belief: Posterior, one: Identification) -> Array:
     return fit.sip.phi
 
 
-def _with_room(one: Identification, other: Identification) -> Posterior:
-    """Return the belief of session ``one`` with room for the loads that it carries beyond ``other``.
-
-    A load is positive: its probability counts as far as its mass is above zero, by degrees, so that rounding opens and
-    closes no room.
+def _with_room(one: Identification, other: Identification, mass: float) -> Posterior:
+    """Return the belief of session ``one`` with room for the loads that it carries beyond ``other``, its table at
+    ``mass`` kg.
     """
-    chance = {
-        found.segment: found.probability * norm.cdf(found.mass / found.sd)
-        for found in added_mass(one, reference=other).suspects
-    }
-    return posterior(
-        one.data, may_carry(one.body, one.belief.prior, share=np.array([chance[s] for s in one.body.segments]))
-    )
+    chance = {found.segment: found.probability for found in added_mass(one, reference=other).suspects}
+    share = np.array([chance[segment] for segment in one.body.segments])
+    return posterior(one.data, may_carry(one.body, weighing(one.belief.prior, mass), share=share))

@@ -15,6 +15,7 @@ from biodance.motion.kinematics import segment_motion
 from biodance.motion.regressor import predict_wrench, regressor_of
 from biodance.records import Array, Motion, Wrench
 from biodance.settings import Settings
+from biodance.spatial import wrench_about_point
 from biodance.uncertainty.bands import BANDS, Bands
 from biodance.uncertainty.learning import Moments
 from biodance.uncertainty.noise import Noise
@@ -150,9 +151,8 @@ def believable(body: Body, fit: Fit, about: Array) -> tuple[Fit, str]:
     or "".
     """
     limit = -fit.outlier * body.gravity[2] * body.sip.mass.sum()
-    difference = fit.wrench.value - predict_wrench(body, fit.motion).value
-    moment = difference[:, 3:] - np.cross(about, difference[:, :3])
-    size = np.maximum(np.linalg.norm(difference[:, :3], axis=1), np.linalg.norm(moment, axis=1) / _LEVER)
+    difference = wrench_about_point(fit.wrench.value - predict_wrench(body, fit.motion).value, about)
+    size = np.maximum(np.linalg.norm(difference[:, :3], axis=1), np.linalg.norm(difference[:, 3:], axis=1) / _LEVER)
     wrong = fit.use & (size > limit)
     if not wrong.any():
         return fit, ""

@@ -15,6 +15,7 @@ from biodance.identification.statistics import Fit
 from biodance.motion.comparison import Agreement, compare
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Wrench
+from biodance.spatial import wrench_about_point
 
 BLOCK_SECONDS = 1.0
 """s: errors of a person's trial are correlated over about a movement; blocks this long are drawn as units."""
@@ -64,8 +65,10 @@ def validate(body: Body, identified: Body, fit: Fit, *, about: Array) -> TrialVa
     TrialRefused
         No frame of the trial may be compared.
     """
-    measured = about_point(fit.wrench, about)
-    table, found = (about_point(predict_wrench(one, fit.motion), about) for one in (body, identified))
+    measured, table, found = (
+        Wrench(wrench.time, wrench_about_point(wrench.value, about))
+        for wrench in (fit.wrench, predict_wrench(body, fit.motion), predict_wrench(identified, fit.motion))
+    )
     return TrialValidation(
         fit.name,
         about,
@@ -76,11 +79,6 @@ def validate(body: Body, identified: Body, fit: Fit, *, about: Array) -> TrialVa
         compare(measured, table, fit.use),
         compare(measured, found, fit.use),
     )
-
-
-def about_point(wrench: Wrench, about: Array) -> Wrench:
-    """Return the wrench with its moments about ``about`` (3,) m instead of the lab origin."""
-    return Wrench(wrench.time, np.concatenate([wrench.force, wrench.moment - np.cross(about, wrench.force)], axis=1))
 
 
 def residual_ratio(trials: tuple[TrialValidation, ...], *, draws: int = 1000, seed: int = 0) -> ResidualRatio:

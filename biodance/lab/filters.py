@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from biodance.errors import BiodanceError
-from biodance.records import Array
+from biodance.records import Array, runs
 from biodance.settings import FilterKind, FilterSettings, Settings
 
 _NAMES: dict[FilterKind, str] = {"butterworth": "Butterworth", "critically_damped": "critically damped"}
@@ -124,9 +124,3 @@ def left_raw(values: Array, rate: float, settings: LowPass) -> NDArray[np.bool_]
         for start, stop in runs(~np.isnan(columns[:, column])):
             out[start:stop, column] = stop - start < settings.shortest(rate)
     return out.reshape(np.shape(values))
-
-
-def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return the runs of True in ``mask`` (T,) as (start, stop), stop excluded."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
-    return [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]

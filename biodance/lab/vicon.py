@@ -19,7 +19,7 @@ MILLIMETRE = 1e-3
 MASSES = ("bodymass",)
 ANGLES = re.compile(r"torsion|rotation|plantflex|rotoff|abadd|headoffset|^theta$|^beta$|angle", flags=re.IGNORECASE)
 NOT_MEASURES = re.compile(r"usefloorff|hindfootflat|^(?:subject)?(?:name|id)$", flags=re.IGNORECASE)
-SIDES = re.compile(r"^(Left|Right)(?=[A-Z])")
+_SIDE = re.compile(r"^(Left|Right)(?=[A-Z])")
 
 
 def read_mp(path: str | Path) -> dict[str, float]:
@@ -137,7 +137,7 @@ def _in_si(values: dict[str, float]) -> dict[str, float]:
     """
     measures: dict[str, float] = {}
     for name, value in values.items():
-        short = SIDES.sub(lambda side: side[1][0], name)
+        short = _SIDE.sub(lambda side: side[1][0], name)
         if value == 0 or ANGLES.search(short) or NOT_MEASURES.search(short):
             continue
         measures[short] = value if short.lower() in MASSES else value * MILLIMETRE

@@ -21,6 +21,7 @@ from biodance.body.pinocchio_model import load_pinocchio
 from biodance.errors import BiodanceError
 from biodance.records import Array, Motion, Wrench, frozen_array
 from biodance.settings import COP_FORCE
+from biodance.spatial import wrench_about_origin, wrench_about_point, zero_moment_point
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,29 +115,20 @@ def distribute(
         raise BiodanceError(f"distribute: touching has shape {np.shape(touching)}, expected {(frames, 2)}.")
     share = _right_share(total, right, left, np.asarray(touching, dtype=bool), threshold)
     centre = share[:, None] * right + (1 - share[:, None]) * left
-    point, twist = _act_at(total, centre[:, 2])
-    loaded = (np.abs(total.force[:, 2]) >= threshold)[:, None]
+    point = zero_moment_point(total.value, height=centre[:, 2], threshold=threshold)
+    twist = wrench_about_point(total.value, point)[:, 3:] * np.array([0.0, 0.0, 1.0])
+    loaded = np.isfinite(point)
     feet = []
     for part, place in ((share, right), (1 - share, left)):
-        moment = np.where(loaded, np.cross(place + point - centre, total.force) + twist, total.moment)
+        own = wrench_about_origin(np.concatenate([total.force, twist], axis=1), place + point - centre)
+        moment = np.where(loaded, own[:, 3:], total.moment)
         feet.append(Wrench(total.time, part[:, None] * np.concatenate([total.force, moment], axis=1)))
     return feet[0], feet[1]
 
 
 def _right_share(total: Wrench, right: Array, left: Array, touching: NDArray[np.bool_], threshold: float) -> Array:
     """Return the right foot's share (T,) of the total, between 0 and 1."""
-    point, _ = _act_at(total, (right[:, 2] + left[:, 2]) / 2)
+    point = zero_moment_point(total.value, height=(right[:, 2] + left[:, 2]) / 2, threshold=threshold)
     d_right, d_left = (np.linalg.norm((point - centre)[:, :2], axis=1) for centre in (right, left))
     shared = np.divide(d_left, d_right + d_left, out=np.full(total.time.size, 0.5), where=d_right + d_left > 0)
-    shared[np.abs(total.force[:, 2]) < threshold] = 0.5
     return np.where(touching[:, 0] == touching[:, 1], shared, touching[:, 0].astype(float))
-
-
-def _act_at(wrench: Wrench, height: Array) -> tuple[Array, Array]:
-    """Return the zero-moment point (T, 3) m at the heights (T,) m of each frame and the free vertical moment (T, 3)
-    N·m there.
-    """
-    (fx, fy, fz), (mx, my, _) = wrench.force.T, wrench.moment.T
-    safe = np.where(fz == 0, 1.0, fz)
-    point = np.stack([(fx * height - my) / safe, (fy * height + mx) / safe, height], axis=1)
-    return point, (wrench.moment - np.cross(point, wrench.force)) * np.array([0.0, 0.0, 1.0])

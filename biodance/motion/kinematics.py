@@ -6,6 +6,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.records import Array, Motion
+from biodance.spatial import axis_rotation, cross, quaternion_matrix, skew
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,34 +27,6 @@ class Poses:
         """Return the lab positions (T, K, 3) m of points ``local`` (K, 3) fixed in the given segments (K)."""
         index = list(segment)
         return np.einsum("tkij,kj->tki", self.rotation[:, index], local) + self.position[:, index]
-
-
-def quaternion_matrix(xyzw: Array) -> Array:
-    """Return rotation matrices (T, 3, 3) of unit quaternions (T, 4) x y z w (normalised here)."""
-    x, y, z, w = (xyzw / np.linalg.norm(xyzw, axis=-1, keepdims=True)).T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
-
-
-def axis_rotation(axis: Array, angle: Array) -> Array:
-    """Return rotation matrices (T, 3, 3) about one unit ``axis`` (3,) by ``angle`` (T,) rad (Rodrigues)."""
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    sine, versine = np.sin(angle)[:, None, None], (1 - np.cos(angle))[:, None, None]
-    return np.eye(3) + sine * cross + versine * (cross @ cross)
-
-
-def cross(a: Array, b: Array) -> Array:
-    """Return the vector products (..., 3); a fifth of the time of numpy's, which serves other lengths too."""
-    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
-    out[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
-    out[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
-    out[..., 2] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-    return out
 
 
 def poses(body: Body, q: Array) -> Poses:
@@ -155,15 +128,6 @@ def chains(body: Body) -> tuple[tuple[int, ...], ...]:
     return tuple(found)
 
 
-def skew(vector: Array) -> Array:
-    """Return the cross-product matrices (..., 3, 3) of vectors (..., 3)."""
-    out = np.zeros((*vector.shape, 3))
-    x, y, z = np.moveaxis(vector, -1, 0)
-    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -z, y, -x
-    out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = z, -y, x
-    return out
-
-
 def jacobian(body: Body, pose: Poses, segment: list[int], points: Array) -> tuple[Array, Array]:
     """Return (T, 3S, nv) of points (T, S, 3) on segments and of their turn, per unit of the lab-frame tangent [root
     place, root turn, angles].
@@ -178,6 +142,6 @@ def jacobian(body: Body, pose: Poses, segment: list[int], points: Array) -> tupl
     for j, joint in enumerate(body.joints):
         on = np.flatnonzero(hangs[j])
         axis = (pose.joint_rotation[:, j] @ joint.axis)[:, None]
-        place[..., body.n_root + j][:, on] = np.cross(axis, points[:, on] - pose.joint_position[:, j, None])
+        place[..., body.n_root + j][:, on] = cross(axis, points[:, on] - pose.joint_position[:, j, None])
         turn[..., body.n_root + j][:, on] = axis
     return place.reshape(frames, 3 * count, body.nv), turn.reshape(frames, 3 * count, body.nv)

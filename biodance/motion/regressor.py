@@ -16,19 +16,7 @@ from biodance.body.body import Body
 from biodance.body.inertia import TENSOR
 from biodance.motion.kinematics import SegmentMotion, segment_motion
 from biodance.records import Array, Motion, Wrench
-from biodance.settings import STANDARD_GRAVITY
-
-GRAVITY = np.array([0.0, 0.0, -STANDARD_GRAVITY])
-"""(3,) m/s², lab frame, z up: where no body says otherwise (`Body.gravity`)."""
-
-
-def _skew(vector: Array) -> Array:
-    """Return the cross-product matrices (..., 3, 3) of vectors (..., 3)."""
-    out = np.zeros((*vector.shape, 3))
-    x, y, z = np.moveaxis(vector, -1, 0)
-    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -z, y, -x
-    out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = z, -y, x
-    return out
+from biodance.spatial import skew
 
 
 def _inertia_columns(local: Array) -> Array:
@@ -51,15 +39,15 @@ def regressor_of(segments: SegmentMotion, *, gravity: Array) -> Array:
     w = np.einsum("...ij,...j->...i", turned, segments.angular_velocity)
     dw = np.einsum("...ij,...j->...i", turned, segments.angular_acceleration)
     drive = segments.acceleration - gravity
-    skew_w = _skew(w)
-    first = rotation @ (_skew(dw) + skew_w @ skew_w)
+    skew_w = skew(w)
+    first = rotation @ (skew(dw) + skew_w @ skew_w)
     second = rotation @ (_inertia_columns(dw) + skew_w @ _inertia_columns(w))
-    arm = _skew(position)
+    arm = skew(position)
     columns = np.zeros((frames, count, 6, 10))
     columns[..., :3, 0] = drive
     columns[..., :3, 1:4] = first
     columns[..., 3:, 0] = np.einsum("...ij,...j->...i", arm, drive)
-    columns[..., 3:, 1:4] = arm @ first - _skew(drive) @ rotation
+    columns[..., 3:, 1:4] = arm @ first - skew(drive) @ rotation
     columns[..., 3:, 4:] = second
     return np.moveaxis(columns, 1, 2).reshape(frames, 6, 10 * count)
 

@@ -13,9 +13,9 @@ from scipy.interpolate import make_interp_spline
 from biodance.body.body import Body
 from biodance.errors import TrialRefused
 from biodance.lab.filters import LowPass, low_pass
-from biodance.motion.ik.chart import Balls, Smooth, chart_of
-from biodance.motion.quaternion import conjugate, continuous, matrix, normalised, product
+from biodance.motion.ik.chart import Balls, Smooth, chart_of, continued
 from biodance.records import Array, Motion
+from biodance.spatial import cross, quaternion_conjugate, quaternion_matrix, quaternion_product
 
 _DEGREE = 5
 """Degree of the spline: continuous acceleration and jerk."""
@@ -47,9 +47,7 @@ def smooth(body: Body, time: Array, q: Array, *, settings: LowPass | None = None
     chart = chart_of(body)
     rough = np.asarray(q).T
     filtered = chart.split(low_pass(chart.smooth(rough).stacked().T, _rate(time), settings).T)
-    even = Smooth(
-        filtered.place, continuous(normalised(filtered.root)), continuous(normalised(filtered.ball)), filtered.angle
-    )
+    even = Smooth(filtered.place, continued(filtered.root), continued(filtered.ball), filtered.angle)
     first, second = (chart.split(d) for d in _derivatives(time, even.stacked()))
     posture = chart.posture(even, rough[len(rough) - chart.joint_count :])
     v, a = np.empty((2, body.nv, len(time)))
@@ -103,13 +101,13 @@ def _check(time: Array, q: Array, settings: LowPass) -> None:
 
 def _root_rates(at: Smooth, first: Smooth, second: Smooth) -> tuple[Array, Array]:
     """Return v and a (6, T) of the root: linear, angular, in its own frame."""
-    turn = matrix(at.root)
-    half = product(conjugate(at.root), first.root)
-    omega = 2 * half[:3]
-    alpha = 2 * product(conjugate(at.root), second.root)[:3] - 4 * half[3] * half[:3]
-    linear = np.einsum("jit,jt->it", turn, first.place)
-    acceleration = np.einsum("jit,jt->it", turn, second.place) - np.cross(omega, linear, axis=0)
-    return np.concatenate([linear, omega]), np.concatenate([acceleration, alpha])
+    turn, back = quaternion_matrix(at.root.T), quaternion_conjugate(at.root.T)
+    half = quaternion_product(back, first.root.T)
+    omega = 2 * half[:, :3]
+    alpha = 2 * quaternion_product(back, second.root.T)[:, :3] - 4 * half[:, 3:] * half[:, :3]
+    linear = np.einsum("tji,jt->ti", turn, first.place)
+    acceleration = np.einsum("tji,jt->ti", turn, second.place) - cross(omega, linear)
+    return np.concatenate([linear, omega], axis=1).T, np.concatenate([acceleration, alpha], axis=1).T
 
 
 def _ball_rates(joints: Balls, angles: Array, at: Array, first: Array, second: Array) -> tuple[Array, Array]:
@@ -120,9 +118,11 @@ def _ball_rates(joints: Balls, angles: Array, at: Array, first: Array, second: A
     = cos(b) t3'.
     """
     sign = joints.sign
-    half = product(first, conjugate(at))
+    at, first, second = (np.moveaxis(one, 0, -1) for one in (at, first, second))
+    back = quaternion_conjugate(at)
+    half, change = (np.moveaxis(quaternion_product(one, back), -1, 0) for one in (first, second))
     omega = 2 * half[:3]
-    alpha = 2 * product(second, conjugate(at))[:3] - 4 * half[3] * half[:3]
+    alpha = 2 * change[:3] - 4 * half[3] * half[:3]
     sine, cosine = np.sin(sign * angles[1]), np.cos(sign * angles[1])
     cosine = np.where(np.abs(cosine) < LEAST_COSINE, np.copysign(LEAST_COSINE, cosine), cosine)
     w, dw = _before_first(sign * angles[0], omega), _before_first(sign * angles[0], alpha)

@@ -10,8 +10,8 @@ from biodance.body.human.limits import with_tracking_limits
 from biodance.body.human.scaling import Scaling, measure_static
 from biodance.errors import TrialRefused
 from biodance.motion.ik.functional_joints import functional_joints
-from biodance.pipeline.results import Step
 from biodance.pipeline.trial import Prepared, attempt
+from biodance.pipeline.trial_result import Step
 from biodance.records import Subject
 from biodance.settings import Settings
 

@@ -3,11 +3,30 @@
 The limits, and where they come from, are `biodance.settings.CheckLimits`.
 """
 
+from collections.abc import Iterable
+
 import numpy as np
 
-from biodance.pipeline.results import Check, QuietStanding, TrialResult
+from biodance.pipeline.trial_result import Check, QuietStanding, TrialResult
 from biodance.records import Subject
 from biodance.settings import CheckLimits
+
+_MASS = "mass on the plates against declared"
+_MARKERS = ("marker distance, RMS", "marker distance, largest")
+
+
+def load_doubts(checks: Iterable[Check], *, weighed: bool) -> tuple[str, ...]:
+    """Return why no load may be stated from a session: which of its ``checks`` failed.
+
+    Markers far from the body make every mass doubtful. A weight other than declared is a load, a wrong declaration or
+    a wrong plate, which only a session of the same person ``weighed`` without load can tell apart.
+    """
+    asked = _MARKERS if weighed else (*_MARKERS, _MASS)
+    return tuple(
+        f"{one.what}, {one.where}: {one.value} ({one.limit}). {one.advice}"
+        for one in checks
+        if not one.inside and one.what in asked
+    )
 
 
 def _upper(what: str, where: str, value: float, limit: float, unit: str, advice: str) -> Check:
@@ -21,7 +40,7 @@ def mass_check(subject: Subject, standing: QuietStanding | None, limits: CheckLi
     difference = abs(100 * (standing.mass / subject.mass - 1))
     return [
         _upper(
-            "mass on the plates against declared",
+            _MASS,
             standing.trial,
             difference,
             limits.mass,
@@ -56,12 +75,10 @@ def trial_checks(result: TrialResult, mass: float) -> list[Check]:
     name, limits, found = result.trial.name, result.trial.settings.checks, []
     if result.fit:
         advice = "See the worst marker in the trial's figure: placed, labelled and filled rightly?"
-        found.append(
-            _upper("marker distance, RMS", name, 1000 * result.fit.total_rms, 1000 * limits.marker_rms, "mm", advice)
-        )
+        found.append(_upper(_MARKERS[0], name, 1000 * result.fit.total_rms, 1000 * limits.marker_rms, "mm", advice))
         found.append(
             _upper(
-                "marker distance, largest",
+                _MARKERS[1],
                 name,
                 1000 * result.fit.total_max,
                 1000 * limits.marker_largest,

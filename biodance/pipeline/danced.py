@@ -10,12 +10,20 @@ from biodance.dance.metrics import zmp_path
 from biodance.errors import BiodanceError
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion, Subject
-from biodance.virtual_lab.choreography import septic
-from biodance.virtual_lab.dancing import USUAL_PERFORMER, Performer, Shown, copy_dance
-from biodance.virtual_lab.laboratory import FIRST_VISIT, LabVisit, perform_in, record, scale_reading, set_up, write
-from biodance.virtual_lab.performance import Performance
-from biodance.virtual_lab.person import make_person
-from biodance.virtual_lab.protocol import Protocol, read_protocol
+from biodance.virtual_lab.movement.choreography import septic
+from biodance.virtual_lab.movement.dancing import USUAL_PERFORMER, Performer, Shown, copy_dance
+from biodance.virtual_lab.movement.performance import Performance
+from biodance.virtual_lab.movement.protocol import Protocol, read_protocol
+from biodance.virtual_lab.person.person import make_person
+from biodance.virtual_lab.recording.laboratory import (
+    FIRST_VISIT,
+    LabVisit,
+    perform_in,
+    record,
+    scale_reading,
+    set_up,
+    write,
+)
 from biodance.virtual_lab.simulate import TRUTH, session_toml
 from biodance.virtual_lab.truth import truth
 

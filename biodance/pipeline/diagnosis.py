@@ -13,14 +13,15 @@ from biodance import display
 from biodance.body.body import Body
 from biodance.diagnosis.accept import Residuals, accept, case_fit, gain_by_naming, residuals_of
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
-from biodance.diagnosis.engine import Examined, diagnose_trials
+from biodance.diagnosis.engine import Examined, diagnose_trials, without_names
 from biodance.diagnosis.foresight import Foresight, foresee, session_of
 from biodance.diagnosis.problem import Look
 from biodance.discovery import Chosen
 from biodance.effects import Case, DiscreteEffect, Effect, Gate, causes, gates
-from biodance.errors import BiodanceError, NotSolved, SessionRefused, TrialRefused
-from biodance.identification.added_mass import expect_unloaded
+from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identification.identification import Identification, identify_body, standing_point
+from biodance.identification.rival_bodies import expect_unloaded
+from biodance.pipeline.attention import judged_trials, told
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES, SessionIdentification
 from biodance.pipeline.looked_at import Own, left_out, looked_at, looks, own_tolerances
 from biodance.pipeline.results import SessionResult
@@ -30,6 +31,8 @@ from biodance.uncertainty.tolerances import Tolerances
 if TYPE_CHECKING:
     import pandas as pd
 
+FAR = "its markers move more on the body than where tolerances were learned"
+"""Why no cause is told from a movement whose soft tissue or joints err more than in null sessions."""
 TRIAL_SECONDS = 20.0
 """s: a designed dance is looked at as trials of about this length."""
 
@@ -110,24 +113,32 @@ def diagnose_session(
     the body; ``tolerances`` as learned by the laboratory; ``effects`` names limit the causes to these, objects
     (``[MyEffect()]``) join the family.
 
-    Raises
-    ------
-    SessionRefused
-        No body, or no trial to look at, and no check found a cause either.
+    Where nothing can be judged, the verdict is "unexplained", and the first sentence says "Cannot tell".
     """
+    found = _diagnosed(result, reference=reference, tolerances=tolerances, effects=effects, tell=tell)
+    used = looked_at(result.trials) if found.examined else ()
+    return replace(found, diagnosis=told(found.diagnosis, result, judged_trials(result, used)))
+
+
+def _diagnosed(
+    result: SessionResult,
+    *,
+    reference: SessionIdentification | None,
+    tolerances: Tolerances | None,
+    effects: Chosen[Effect | DiscreteEffect],
+    tell: Callable[[str], None],
+) -> SessionDiagnosis:
+    """Return what was found; `told` says it."""
     fitted = looked_at(result.trials)
     tell("checking units, signs, labels and clocks")
     asked = causes(effects)
     checks = gates(result.session, _cases(result.body, (*fitted, *looks(result.trials, KEPT_ROLES))), chosen=asked)
     failed = tuple(gate for gate in checks if not gate.ok)
     if result.body is None or not fitted:
-        if failed:
-            return SessionDiagnosis(_by_checks(checks))
-        raise SessionRefused(
-            f"{result.session.folder}: there is nothing to diagnose. {result.body_source} {_reasons(result)}".strip()
-        )
+        why = f"There is nothing to diagnose. {result.body_source} {_reasons(result)}".strip()
+        return SessionDiagnosis(_by_checks(checks) if failed else _cannot_tell(checks, why, *result.doubts))
     tell("looking for causes")
-    own = Own(tolerances) if tolerances else own_tolerances(result.body, fitted)
+    own = Own(tolerances) if tolerances else own_tolerances(result.body, fitted, result.session.trials)
     try:
         examined = diagnose_trials(
             result.body,
@@ -138,17 +149,16 @@ def diagnose_session(
             effects=asked,
             search=not failed,
         )
-    except TrialRefused:
-        if failed:
-            return SessionDiagnosis(_by_checks(checks))
-        raise
+    except TrialRefused as why:
+        return SessionDiagnosis(_by_checks(checks) if failed else _cannot_tell(checks, str(why), *result.doubts))
     examined = _noted(
         examined, *_untold(reference), *result.doubts, *standing_notes(result), *left_out(result.trials), *own.notes
     )
     if failed:
         return SessionDiagnosis(_by_checks(checks, examined), examined)
-    if examined.named and not own.believed:
-        return SessionDiagnosis(_disbelieved(examined.diagnosis), examined)
+    if not own.believed:
+        examined = replace(examined, diagnosis=replace(examined.diagnosis, doubt=FAR))
+        return SessionDiagnosis(_disbelieved(without_names(examined).diagnosis), examined)
     tell("measuring what the findings change")
     return _with_gains(result, examined)
 
@@ -189,17 +199,19 @@ def foresee_dance(path: Path) -> Foresight:
     return foresee(dance.body, session_of(dance.motion(50.0), TRIAL_SECONDS))
 
 
+def _cannot_tell(checks: tuple[Gate, ...], *notes: str) -> Diagnosis:
+    """Return the diagnosis of a session of which nothing could be judged: its checks, and why."""
+    return Diagnosis(verdict="unexplained", findings=(), gates=checks, notes=notes)
+
+
 def _disbelieved(one: Diagnosis) -> Diagnosis:
-    """Return the diagnosis without its names, which become a note: the tolerances under which they were found do not
-    hold here.
+    """Return the diagnosis without its names, which are only resembled: the tolerances under which they were found do
+    not hold here.
     """
-    alike = ", ".join(f"{finding.effect} {finding.target}".strip() for finding in one.findings)
-    return replace(
-        one,
-        verdict="unexplained",
-        findings=(),
-        notes=(*one.notes, f"What is left resembles {alike}, which is not believed."),
-    )
+    alike = ", ".join(f"{finding.effect} {finding.target}".strip() for finding in one.resembles)
+    if not alike:
+        return one
+    return replace(one, notes=(*one.notes, f"What is left resembles {alike}, which is not believed."))
 
 
 def _noted(examined: Examined, *notes: str) -> Examined:
@@ -276,16 +288,34 @@ def _with_gains(result: SessionResult, examined: Examined) -> SessionDiagnosis:
     from.
     """
     before = result.identification.identification if result.identification else None
-    if not examined.named or before is None:
+    if not examined.diagnosis.findings or before is None:
         return SessionDiagnosis(examined.diagnosis, examined, before)
     try:
-        return _accepted(result, examined, before)
+        return _gained(_accepted(result, examined, before), examined, before)
     except TrialRefused as why:  # named in standing, and no movement to identify from
         return SessionDiagnosis(
             _noted(examined, f"What accepting the findings changes is not known. {why}").diagnosis, examined, before
         )
     except NotSolved as why:
         return SessionDiagnosis(examined.diagnosis, examined, before, failures={"what accepting changes": str(why)})
+
+
+def _gained(found: SessionDiagnosis, examined: Examined, before: Identification) -> SessionDiagnosis:
+    """Return the diagnosis, without its names where accepting them makes trials worse that were not used: the whole
+    interval of the gain lies below zero.
+    """
+    gain = next((one.gain for one in found.findings if one.gain), None)
+    if gain is None or gain.ci95[1] >= 0:
+        return found
+    bare = without_names(replace(examined, diagnosis=found.diagnosis))
+    low, high = (-100 * x for x in reversed(gain.ci95))
+    return SessionDiagnosis(
+        _noted(
+            bare, f"What was named made trials that were not used {low:.0f} to {high:.0f} % worse and was taken back."
+        ).diagnosis,
+        bare,
+        before,
+    )
 
 
 def _accepted(result: SessionResult, examined: Examined, before: Identification) -> SessionDiagnosis:

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from biodance.body.body import UPRIGHT, Body
+from biodance.body.body import Body
 from biodance.body.body_file import read_body
 from biodance.body.export import formats, write_model
 from biodance.body.export.osim import ROOT_ROTATIONS, ROOT_TRANSLATIONS
+from biodance.body.parts import UPRIGHT
 from biodance.body.solids import segment_solids
 from biodance.errors import SessionRefused, TrialRefused, UnknownName
 from biodance.lab.opensim.mot import TimeTable, write_mot

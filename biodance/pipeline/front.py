@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -242,5 +241,6 @@ def _against(result: SessionResult, before: SessionIdentification) -> SessionRes
     """Return an examined visit with its load looked for against an earlier one."""
     if result.body is None:
         return result
-    again = partial(identify_trials, result.body, result.trials, name=result.session.folder.name)
-    return replace(result, identification=again(reference=before))
+    name = result.session.folder.name
+    again = identify_trials(result.body, result.trials, name=name, reference=before, checks=result.checks)
+    return replace(result, identification=again)

@@ -165,8 +165,8 @@ def simulate(subject: Subject, protocol: str, out: str | Path, *, seed: int = 0,
     >>> sorted(path.name for path in folder.iterdir())
     ['session.toml', 'standing_1.c3d', 'standing_2.c3d', 'static.c3d', 'truth']
     """
-    from biodance.virtual_lab.causes import hide, parse_cause
-    from biodance.virtual_lab.protocol import read_protocol
+    from biodance.virtual_lab.faults.causes import hide, parse_cause
+    from biodance.virtual_lab.movement.protocol import read_protocol
     from biodance.virtual_lab.simulate import simulate_session as write_session
 
     plan = read_protocol(protocol)

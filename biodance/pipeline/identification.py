@@ -10,19 +10,23 @@ import numpy as np
 
 from biodance import display
 from biodance.body.body import Body
+from biodance.body.tables.error_sizes import error_size
 from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identification.added_mass import LoadSearch, added_mass
 from biodance.identification.identification import Identification, identify_body, standing_point
+from biodance.identification.knowledge import SIGMAS
 from biodance.identification.sessions import Difference, differences
 from biodance.identification.statistics import Fit
 from biodance.identification.torques import TorqueBands, torque_bands
 from biodance.identification.validation import ResidualRatio, TrialValidation, residual_ratio, validate
 from biodance.motion.comparison import Agreement, compare
 from biodance.motion.contact.contact import foot_wrenches, ground_contact
-from biodance.motion.contact.soles import FEET, soles_from_body
+from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.regressor import predict_wrench
-from biodance.pipeline.results import TrialResult
-from biodance.records import ROLES, Role, Wrench
+from biodance.pipeline.checks import load_doubts
+from biodance.pipeline.trial_result import Check, TrialResult
+from biodance.records import ROLES, SIDES, Role, Wrench
+from biodance.uncertainty.plates import around_zero
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -135,12 +139,18 @@ def can_identify(results: tuple[TrialResult, ...]) -> bool:
 
 
 def identify_trials(
-    body: Body, results: tuple[TrialResult, ...], *, name: str, reference: SessionIdentification | None = None
+    body: Body,
+    results: tuple[TrialResult, ...],
+    *,
+    name: str,
+    reference: SessionIdentification | None = None,
+    checks: tuple[Check, ...] = (),
 ) -> SessionIdentification:
     """Identify ``body`` from the trials with role fit, validate on those kept, and look for a load.
 
     ``name`` of the session; ``reference`` an earlier, unloaded session of the same person: what changed since is told,
-    and a load is looked for against it; without it, against the table.
+    and a load is looked for against it; without it, against the table. ``checks`` of the session: where they or those
+    of the trials failed, no load is stated (`load_doubts`).
 
     Raises
     ------
@@ -163,7 +173,8 @@ def identify_trials(
             f"{reference.failures['segments']}"
         )
         reference = None
-    search = added_mass(found, reference=reference.identification if reference else None)
+    doubts = _doubts(results, checks, reference)
+    search = added_mass(found, reference=reference.identification if reference else None, doubts=doubts)
     one = SessionIdentification(
         name,
         found,
@@ -176,7 +187,44 @@ def identify_trials(
         notes=found.notes,
         failures=failures,
     )
+    if reference is not None and found.status == "solved":
+        return _weighed(_predicted(one, results, fits, others), reference)
     return one if found.status == "failed" else _predicted(one, results, fits, others)
+
+
+def _doubts(
+    results: tuple[TrialResult, ...], checks: tuple[Check, ...], reference: SessionIdentification | None
+) -> tuple[str, ...]:
+    """Return why no load may be stated: checks of the session and of its fitted trials, and of the reference's."""
+    own = (*checks, *(check for one in results if one.trial.role in FITTED_ROLES for check in one.checks))
+    doubts = load_doubts(own, weighed=reference is not None)
+    if reference is None:
+        return doubts
+    return (*doubts, *(f"Session {reference.name}: {doubt}" for doubt in reference.search.doubts))
+
+
+def _weighed(one: SessionIdentification, reference: SessionIdentification) -> SessionIdentification:
+    """Return the same with a note of what plates and scale say about the weight of both sessions, where they differ."""
+    then, now = (_weights(some) for some in (reference, one))
+    declared, carried = now[0] - then[0], now[1] - then[1]
+    gain, scale = around_zero("plate_gain Fz") * then[1], error_size("scale", "mass")
+    limits = [SIGMAS * np.sqrt(2.0) * sd for sd in (scale, gain)]
+    if abs(declared) <= limits[0] and abs(carried) <= limits[1]:
+        return one
+    note = (
+        f"Declared are {then[0]:.1f} kg in session {reference.name} and {now[0]:.1f} kg here ({declared:+.2f} ± "
+        f"{limits[0]:.2f} kg); the plates carry {then[1]:.1f} and {now[1]:.1f} kg ({carried:+.2f} kg, "
+        f"± {limits[1]:.2f} kg unless their gain is the same). A load is looked for beyond the mass of session "
+        f"{reference.name}, whatever is declared here."
+    )
+    return replace(one, notes=(*one.notes, note))
+
+
+def _weights(one: SessionIdentification) -> tuple[float, float]:
+    """Return the declared mass and what the plates carried over the fitted trials, kg."""
+    gravity = -float(one.identification.body.gravity[2])
+    body = float(one.identification.sip.mass.sum())
+    return float(one.identification.belief.prior.mass.sum()), body + _unexplained(one.fitted, gravity)
 
 
 def _changes(
@@ -228,19 +276,22 @@ def _torques(found: Identification, results: tuple[TrialResult, ...]) -> TorqueB
                 continue
             soles = soles_from_body(found.body, one.motion)
             feet = foot_wrenches(one.trial, ground_contact(one.trial, soles, mass=found.sip.mass.sum()), soles)
-            ground = {f"{side}_foot": wrench for side, wrench in zip(FEET, feet, strict=True)}
+            ground = {f"{side}_foot": wrench for side, wrench in zip(SIDES, feet, strict=True)}
             return torque_bands(found, one.motion, ground, trial=one.trial.name, use=one.comparison.used)
     return None
+
+
+def _unexplained(fitted: tuple[TrialValidation, ...], gravity: float) -> float:
+    """Return how many kg more the plates carry than the identified body, in the mean over the fitted trials."""
+    beyond = np.concatenate([(trial.measured.force - trial.identified.force)[trial.use, 2] for trial in fitted])
+    return float(beyond.mean()) / gravity
 
 
 def _weight(fitted: tuple[TrialValidation, ...], gravity: float) -> list[str]:
     """Say it where the plates carry another weight than the identified body has: the table's total is pinned to the
     declared mass.
     """
-    missing = (
-        np.concatenate([(trial.measured.force - trial.identified.force)[trial.use, 2] for trial in fitted]).mean()
-        / gravity
-    )
+    missing = _unexplained(fitted, gravity)
     if abs(missing) <= UNEXPLAINED:
         return []
     return [

@@ -12,11 +12,11 @@ from biodance.diagnosis.spectrum import SHORTEST_RUN, spectrum, thinned
 from biodance.effects import Case
 from biodance.identification.identification import standing_point
 from biodance.identification.statistics import Fit
-from biodance.lab.filters import runs
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES
-from biodance.pipeline.results import TrialResult
-from biodance.records import Array, Role
+from biodance.pipeline.trial_result import TrialResult
+from biodance.records import Array, Role, Trial, runs
 from biodance.uncertainty.bands import BANDS
+from biodance.uncertainty.session_noise import added_noise, with_own_noise
 from biodance.uncertainty.tolerances import REFERENCE_PERSON, Tolerances, shipped
 
 
@@ -31,6 +31,8 @@ class Own:
     believed: bool = True
 
 
+_POSTURES = 4
+"""Postures in which the way from marker noise to wrench is computed."""
 _ENOUGH = 10.0
 """s of fully measured movement beside which quiet standing tells nothing more."""
 MORE = 1.6
@@ -76,28 +78,34 @@ def looked_at(results: tuple[TrialResult, ...]) -> tuple[Look, ...]:
     """
     roles = FITTED_ROLES if looks(results, FITTED_ROLES) else KEPT_ROLES
     moving = looks(results, roles)
-    return moving if sum(map(_seconds, moving)) >= _ENOUGH else looks(results, ("static", *roles))
+    return moving if sum(map(seconds_of, moving)) >= _ENOUGH else looks(results, ("static", *roles))
 
 
 def left_out(results: tuple[TrialResult, ...]) -> tuple[str, ...]:
     """Say of every trial that is not looked at, though it should be, why."""
-    roles, notes = ("static", *FITTED_ROLES), []
-    seen = {look.trial.name: _seconds(look) for look in looks(results, roles)}
+    return tuple(
+        f"{name} was left out{'. ' if why[:1].isupper() else ': '}{why}" if why else f"{name} was left out."
+        for name, why in reasons_left_out(results).items()
+    )
+
+
+def reasons_left_out(results: tuple[TrialResult, ...]) -> dict[str, str]:
+    """Return by name why a trial is not looked at, though it should be."""
+    roles, why = ("static", *FITTED_ROLES), {}
+    seen = {look.trial.name: seconds_of(look) for look in looks(results, roles)}
     for one in results:
-        name = one.trial.name
-        if one.trial.role == "static" or one.trial.role not in roles:
+        if one.trial.role not in FITTED_ROLES:
             continue
-        if name not in seen:
-            notes.append(f"{name} was left out. {' '.join(one.reasons)}".strip())
-        elif seen[name] == 0:
-            notes.append(
-                f"{name} was left out: no {SHORTEST_RUN:g} s in which the plates measure all ground contact without a "
-                f"break."
+        if one.trial.name not in seen:
+            why[one.trial.name] = " ".join(one.reasons)
+        elif seen[one.trial.name] == 0:
+            why[one.trial.name] = (
+                f"no {SHORTEST_RUN:g} s in which the plates measure all ground contact without a break."
             )
-    return tuple(notes)
+    return why
 
 
-def _seconds(look: Look) -> float:
+def seconds_of(look: Look) -> float:
     """Return for how many seconds a trial can be compared, in runs that are long enough."""
     rate = look.motion.rate
     if not np.isfinite(rate):
@@ -105,11 +113,17 @@ def _seconds(look: Look) -> float:
     return float(sum(stop - start for start, stop in runs(look.use) if stop - start >= SHORTEST_RUN * rate) / rate)
 
 
-def own_tolerances(body: Body, chosen: tuple[Look, ...]) -> Own:
+def own_tolerances(body: Body, chosen: tuple[Look, ...], recorded: tuple[Trial, ...] = ()) -> Own:
     """Return the shipped tolerances as they hold for these recordings: with markers that move more on the body than
-    those of virtual sessions, and with the unrest of a person who stands still where standing is looked at.
+    those of virtual sessions, with the noise of their own cameras and plates as ``recorded`` shows it, and with the
+    unrest of a person who stands still where standing is looked at.
     """
     found, notes = shipped(), []
+    usable_looks = [look for look in chosen if look.motion.q.size]
+    if recorded and usable_looks:
+        middle = np.array([look.motion.q[len(look.motion.q) // 2] for look in usable_looks[:_POSTURES]])
+        added = added_noise(body, recorded, middle, standing_point(tuple(map(_fit, chosen))))
+        found = with_own_noise(found, added, float(body.sip.mass.sum()))
     factor = soft_tissue(chosen) / error_size("marker_distance", "first quartile", state="after")
     if factor > MORE:
         sizes = {key: size * (factor if key.startswith(_SOFT) else 1.0) for key, size in found.sizes.items()}
@@ -121,7 +135,7 @@ def own_tolerances(body: Body, chosen: tuple[Look, ...]) -> Own:
             "sessions of your own "
             "laboratory without fault (biodance.diagnosis.learning) hold for it."
         )
-    standing = tuple(look for look in chosen if look.trial.role == "static" and _seconds(look) > 0)
+    standing = tuple(look for look in chosen if look.trial.role == "static" and seconds_of(look) > 0)
     if standing:
         shaken = unrest(body, standing, standing_point(tuple(map(_fit, chosen))))
         found = replace(found, noise=found.noise + shaken * (REFERENCE_PERSON / body.sip.mass.sum()) ** 2)
@@ -139,7 +153,7 @@ def soft_tissue(chosen: tuple[Look, ...]) -> float:
     """Return the first quartile over markers and moving trials of the RMS distance to the body, m: markers that are
     wrong do not count.
     """
-    moving = [look.motion.residual for look in chosen if look.trial.role != "static" and _seconds(look) > 0]
+    moving = [look.motion.residual for look in chosen if look.trial.role != "static" and seconds_of(look) > 0]
     with np.errstate(invalid="ignore"):
         each = [np.sqrt(np.nanmean(residual**2, axis=0)) for residual in moving if residual.size]
     return float(np.nanquantile(np.concatenate(each), 0.25)) if each else 0.0

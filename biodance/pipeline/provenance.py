@@ -10,10 +10,10 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from biodance import __version__
 from biodance.library import PACKAGE
 from biodance.pipeline.results import SessionResult
 from biodance.settings import Value
+from biodance.version import __version__
 
 LIBRARIES = (
     "numpy",

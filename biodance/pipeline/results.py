@@ -7,127 +7,19 @@ about the lab origin.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from biodance import display
 from biodance.body.body import Body
-from biodance.lab.markers.gaps import MarkerGaps
-from biodance.records import CHANNEL_TITLES, Array, Motion, Session, Subject, Trial, by_name
+from biodance.pipeline.identification import SessionIdentification
+from biodance.pipeline.trial_result import Check, QuietStanding, Step, TrialResult
+from biodance.records import Array, Session, Subject, by_name
 from biodance.settings import Settings
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from biodance.pipeline.identification import SessionIdentification
-
-Status = Literal["ok", "warning", "refused"]
-
-
-@dataclass(frozen=True)
-class Step:
-    """One step on one trial or on the session.
-
-    ``status`` "done"; "refused": the data cannot carry it, ``text`` says why and what to do; "failed": a fault of
-    biodance itself.
-    """
-
-    name: str
-    status: Literal["done", "refused", "failed"]
-    text: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class MarkerFit:
-    """Distance of the markers to the model: per marker ``names`` (K), ``rms`` and ``max`` (K,) m, NaN = never seen;
-    all together in m.
-    """
-
-    names: tuple[str, ...]
-    rms: Array
-    max: Array
-    total_rms: float
-    total_max: float
-
-
-@dataclass(frozen=True, eq=False)
-class WrenchComparison:
-    """Measured beside simulated wrench.
-
-    ``time`` (T,) s; ``measured``, ``simulated`` (T, 6) N, N·m about the lab origin; ``used`` (T,) True where the plates
-    measure all that the ground does; ``rms`` (6,) N, N·m and ``correlation`` (6,) over the used frames, NaN = not
-    defined; ``notes`` why frames were left out.
-    """
-
-    time: Array
-    measured: Array
-    simulated: Array
-    used: NDArray[np.bool_]
-    rms: Array
-    correlation: Array
-    notes: tuple[str, ...] = ()
-
-    def table(self) -> "pd.DataFrame":
-        """Return measured and simulated wrench over time, and whether a frame is used.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Index time (s); ``Fx measured (N)`` ..., ``Fx simulated (N)`` ... about the lab origin, ``used``.
-
-        Examples
-        --------
-        >>> result["squat_1"].comparison.table().shape[1]
-        13
-        """
-        import pandas as pd
-
-        titles = [title.replace(" (", f" {which} (") for which in ("measured", "simulated") for title in CHANNEL_TITLES]
-        out = pd.DataFrame(np.hstack([self.measured, self.simulated]), pd.Index(self.time, name="time (s)"), titles)
-        return out.assign(used=self.used)
-
-    def plot_wrench(self) -> NDArray[Any]:
-        """Draw the measured beside the simulated wrench; frames that are not used are grey.
-
-        Returns
-        -------
-        numpy.ndarray
-            (6,) matplotlib axes: Fx, Fy, Fz, Mx, My, Mz over time.
-
-        Examples
-        --------
-        >>> result["squat_1"].comparison.plot_wrench()[2].get_ylabel()
-        'Fz (N)'
-        """
-        return display.side_by_side(self.time, self.measured, self.simulated, self.used, CHANNEL_TITLES)
-
-
-@dataclass(frozen=True, eq=False)
-class QuietStanding:
-    """A quiet standing on the plates from ``start`` to ``end`` s; ``mass`` kg on the plates (mean vertical force / g),
-    ``mass_sd`` kg.
-
-    ``cop`` and ``com`` (T, 2) m, horizontal lab coordinates of the centre of pressure and of the table's centre of mass
-    (``com`` empty without a tracked motion); ``forward`` (2,) unit vector the subject faces; ``com_ahead``,
-    ``com_left`` m: mean of CoM minus CoP along it and to its left; ``feet`` (F, 2) m foot landmarks and their
-    ``foot_names`` (``left_heel`` ...); ``plates`` (P, 4, 2) m corners.
-    """
-
-    trial: str
-    start: float
-    end: float
-    mass: float
-    mass_sd: float
-    cop: Array
-    com: Array
-    forward: Array
-    com_ahead: float
-    com_left: float
-    feet: Array
-    foot_names: tuple[str, ...]
-    plates: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,75 +51,6 @@ class Still:
     residual: Array = field(default_factory=lambda: np.full(3, np.nan))
     load: Array = field(default_factory=lambda: np.full(3, np.nan))
     about: str = ""
-
-
-@dataclass(frozen=True)
-class Check:
-    """One row of the quality table: ``value`` as text with unit, the ``limit`` it is held against, and whether it is
-    inside.
-    """
-
-    what: str
-    where: str
-    value: str
-    limit: str
-    inside: bool
-    advice: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class TrialResult:
-    """One trial after all steps: ``trial`` prepared (as read where preparing was refused); ``gaps`` as recorded, before
-    any was filled.
-
-    None where the data could not carry a result.
-    """
-
-    trial: Trial
-    steps: tuple[Step, ...]
-    gaps: tuple[MarkerGaps, ...] = ()
-    fit: MarkerFit | None = None
-    motion: Motion | None = None
-    comparison: WrenchComparison | None = None
-    standing: QuietStanding | None = None
-    checks: tuple[Check, ...] = ()
-
-    def __repr__(self) -> str:
-        close = f", markers {1000 * self.fit.total_rms:.1f} mm from the body" if self.fit else ""
-        return f"TrialResult({self.name!r}, {self.trial.role}, {self.status}{close})"
-
-    def _repr_html_(self) -> str:
-        return display.card(repr(self), None, self.reasons)
-
-    @property
-    def name(self) -> str:
-        """Name of the trial."""
-        return self.trial.name
-
-    @property
-    def gaps_percent(self) -> float:
-        """Share of all marker samples that were not seen, %; NaN without markers."""
-        return float(np.mean([gap.percent for gap in self.gaps])) if self.gaps else float("nan")
-
-    @property
-    def status(self) -> Status:
-        """State of the trial: "refused" where no step after preparing was done, "warning" where a person must look,
-        "ok" otherwise.
-        """
-        if all(step.status != "done" or step.name == "prepare" for step in self.steps):
-            return "refused"
-        return "warning" if self.reasons else "ok"
-
-    @property
-    def reasons(self) -> tuple[str, ...]:
-        """All refusals and warnings of this trial, each once, in order."""
-        refusals = [step.text for step in self.steps if step.status != "done"]
-        return tuple(dict.fromkeys([*refusals, *self.trial.warnings]))
-
-    @property
-    def reason(self) -> str:
-        """The `reasons` as one text; "" if there are none."""
-        return " ".join(self.reasons)
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,7 +99,7 @@ class SessionResult:
     checks: tuple[Check, ...]
     standing: QuietStanding | None
     still: Still | None
-    identification: "SessionIdentification | None" = None
+    identification: SessionIdentification | None = None
     more_stills: tuple[Still, ...] = ()
 
     def __repr__(self) -> str:

@@ -6,19 +6,19 @@ from pathlib import Path
 
 import numpy as np
 
-from biodance import __version__
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab.c3d.results import Event, Output, write_results_c3d
 from biodance.lab.c3d.write import FileValue
 from biodance.motion.contact.contact import Contact, foot_wrenches, ground_contact
 from biodance.motion.contact.events import foot_events
-from biodance.motion.contact.soles import FEET, soles_from_body
+from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.dynamics import joint_torques
 from biodance.motion.regressor import predict_wrench
-from biodance.pipeline.results import TrialResult
 from biodance.pipeline.standing import centre_of_mass
-from biodance.records import Array, Wrench
+from biodance.pipeline.trial_result import TrialResult
+from biodance.records import SIDES, Array, Wrench
+from biodance.version import __version__
 
 _NAMES = {True: "Foot Strike", False: "Foot Off"}
 
@@ -114,7 +114,7 @@ def _moments(body: Body, one: TrialResult, contact: Contact) -> Iterator[Output]
     assert one.motion is not None
     assert one.comparison is not None
     feet = foot_wrenches(one.trial, contact, soles_from_body(body, one.motion))
-    ground = {f"{side}_foot": wrench for side, wrench in zip(FEET, feet, strict=True)}
+    ground = {f"{side}_foot": wrench for side, wrench in zip(SIDES, feet, strict=True)}
     torque = np.where(one.comparison.used[:, None], joint_torques(body, one.motion, ground).torque, np.nan)
     for name, columns, axes in _groups(body):
         yield Output(f"{name}Moments", "MOMENTS", _three(torque, columns), f"{axes}: what the muscles do", turns=False)

@@ -10,9 +10,10 @@ from biodance.errors import SessionRefused, TrialRefused
 from biodance.pipeline.body import body_of
 from biodance.pipeline.checks import mass_check, standing_check, trial_checks
 from biodance.pipeline.identification import SessionIdentification, can_identify, identify_trials
-from biodance.pipeline.results import QuietStanding, SessionResult, Step, Still, TrialResult
+from biodance.pipeline.results import SessionResult, Still
 from biodance.pipeline.still import load_still, still_of, worst_still
 from biodance.pipeline.trial import attempt, examine_trial, prepare_trial
+from biodance.pipeline.trial_result import QuietStanding, Step, TrialResult
 from biodance.records import Session
 from biodance.settings import StandingRules
 
@@ -78,10 +79,13 @@ def examine(
     done = tuple(replace(result, checks=tuple(trial_checks(result, session.subject.mass))) for result in results)
     standing = attempt(steps, "standing", lambda: best_standing(done))
     identification, limits = None, session.settings.checks
+    checks = (*mass_check(session.subject, standing, limits), *standing_check(standing, limits))
     if body is not None and can_identify(done):
         tell("identifying the segments")
         identification = attempt(
-            steps, "identify", partial(identify_trials, body, done, name=session.folder.name, reference=reference)
+            steps,
+            "identify",
+            partial(identify_trials, body, done, name=session.folder.name, reference=reference, checks=checks),
         )
     return SessionResult(
         session=session,
@@ -90,7 +94,7 @@ def examine(
         body_source=source,
         steps=tuple(steps),
         trials=done,
-        checks=(*mass_check(session.subject, standing, limits), *standing_check(standing, limits)),
+        checks=checks,
         standing=standing,
         still=attempt(steps, "still", lambda: still_of(body, done)) if body else None,
         identification=identification,

@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.lab.filters import runs
 from biodance.lab.markers.sets import landmark, read_marker_set
 from biodance.lab.weight import movement
 from biodance.motion.kinematics import poses
-from biodance.pipeline.results import QuietStanding
-from biodance.records import Array, Markers, Motion, Trial
+from biodance.pipeline.trial_result import QuietStanding
+from biodance.records import Array, Markers, Motion, Trial, runs
 from biodance.settings import StandingRules
 
 FOOT_LANDMARKS = tuple(

@@ -12,8 +12,9 @@ from biodance.errors import TrialRefused
 from biodance.identification.added_mass import LoadSearch
 from biodance.motion.kinematics import Poses, poses
 from biodance.motion.regressor import predict_wrench
-from biodance.pipeline.results import Still, TrialResult
+from biodance.pipeline.results import Still
 from biodance.pipeline.standing import centre_of_mass, facing
+from biodance.pipeline.trial_result import TrialResult
 from biodance.records import Array, Motion
 
 

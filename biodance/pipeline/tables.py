@@ -12,7 +12,8 @@ import numpy as np
 from biodance.diagnosis.diagnosis import Diagnosis
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.identification import SessionIdentification
-from biodance.pipeline.results import SessionResult, TrialResult
+from biodance.pipeline.results import SessionResult
+from biodance.pipeline.trial_result import TrialResult
 from biodance.records import CHANNELS, Array
 
 if TYPE_CHECKING:

@@ -17,8 +17,8 @@ from biodance.motion.contact.contact import Contact, ground_contact
 from biodance.motion.contact.soles import Soles, soles_from_body, soles_from_markers
 from biodance.motion.regressor import predict_wrench
 from biodance.motion.track import track
-from biodance.pipeline.results import MarkerFit, Step, TrialResult, WrenchComparison
 from biodance.pipeline.standing import quiet_standing
+from biodance.pipeline.trial_result import MarkerFit, Step, TrialResult, WrenchComparison
 from biodance.records import Motion, Trial
 
 T = TypeVar("T")

@@ -5,18 +5,19 @@ ground's action ON the subject, about the lab origin, force first; time is the f
 are copied, checked for shape at birth and read-only afterwards; change a record with ``dataclasses.replace``.
 """
 
-from biodance.records.arrays import CHANNEL_TITLES, CHANNELS, Array, Index, by_name, frozen_array
+from biodance.records.arrays import CHANNEL_TITLES, CHANNELS, Array, Index, by_name, frozen_array, runs
 from biodance.records.markers import Markers
 from biodance.records.motion import Motion
 from biodance.records.session import ROLES, Role, Session, Source, Trial
 from biodance.records.sip import Sip
-from biodance.records.subject import Subject
+from biodance.records.subject import SIDES, Subject
 from biodance.records.wrench import Plate, Wrench
 
 __all__ = [
     "CHANNELS",
     "CHANNEL_TITLES",
     "ROLES",
+    "SIDES",
     "Array",
     "Index",
     "Markers",
@@ -31,4 +32,5 @@ __all__ = [
     "Wrench",
     "by_name",
     "frozen_array",
+    "runs",
 ]

@@ -8,6 +8,9 @@ import numpy as np
 
 from biodance.errors import SessionRefused
 
+SIDES = ("right", "left")
+"""Of a person, in the order of every array over feet or hands."""
+
 
 @dataclass(frozen=True)
 class Subject:

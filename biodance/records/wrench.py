@@ -18,6 +18,7 @@ from biodance.records.arrays import (
     span,
 )
 from biodance.settings import COP_FORCE
+from biodance.spatial import zero_moment_point
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -97,11 +98,7 @@ class Wrench:
         >>> session["squat_1"].wrench.cop().shape[1]
         3
         """
-        (fx, fy, fz), (mx, my, _) = self.force.T, self.moment.T
-        loaded = np.abs(fz) >= threshold
-        safe = np.where(loaded, fz, 1.0)
-        x, y = (fx * height - my) / safe, (fy * height + mx) / safe
-        return np.where(loaded[:, None], np.stack([x, y, np.full_like(x, height)], axis=1), np.nan)
+        return zero_moment_point(self.value, height=height, threshold=threshold)
 
     def table(self) -> "pd.DataFrame":
         """Return the wrench as a table.

@@ -16,14 +16,13 @@ from biodance.lab.c3d.write import write_c3d
 from biodance.motion.kinematics import poses
 from biodance.pipeline.dance import DanceResult
 from biodance.pipeline.still import posture_still
-from biodance.records import Array, Markers
+from biodance.records import SIDES, Array, Markers
 from biodance.report.documents.session import plain_values, to_text
 from biodance.report.figures.dance import criterion_figure, expectation_figure, postures_figure, zmp_figure
 from biodance.report.figures.solid import solid_pngs
 
 _RATE = 100.0
 """Hz of the preview's markers."""
-SIDES = ("right", "left")
 DOTS = 160
 """Dots per inch of the figures."""
 

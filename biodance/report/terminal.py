@@ -7,9 +7,12 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from biodance.diagnosis.diagnosis import ABOUT
 from biodance.doctor import MachineFinding
+from biodance.pipeline.attention import without_path
 from biodance.pipeline.results import SessionResult
-from biodance.report.wording import attention, format_number, millimetres, without_path
+from biodance.records.attention import Attention
+from biodance.report.wording import format_number, millimetres, place
 
 
 def _inspected_lines(record: dict[str, Any]) -> list[str]:
@@ -53,8 +56,19 @@ def print_inspected(records: Sequence[dict[str, Any]], console: Console) -> None
             console.print(f"  {escape(line)}", soft_wrap=True)
 
 
-def print_session(result: SessionResult, console: Console) -> None:
-    """Print one line a trial, then all that needs a person."""
+def print_attention(found: Sequence[dict[str, Any]], console: Console) -> None:
+    """Print what a person must see: the verdict's sentence, then the others with their place, strongest first."""
+    for row in sorted(found, key=lambda row: str(row["about"]) != ABOUT):
+        one = Attention(row["level"], row["text"], row["trial"], row["about"])
+        if one.about == ABOUT:
+            console.print(f"[bold]{escape(one.text)}[/]", soft_wrap=True)
+        else:
+            console.print(f"look: [bold]{escape(place(one))}[/]: {escape(one.text)}", soft_wrap=True)
+
+
+def print_session(result: SessionResult, attention: Sequence[dict[str, Any]], console: Console) -> None:
+    """Print all that needs a person, then one line a trial."""
+    print_attention(attention, console)
     table = Table(box=None, pad_edge=False)
     for heading in ("trial", "role", "state", "markers RMS", "frames", "Fz RMS", "Fz cc"):
         table.add_column(heading, overflow="fold")
@@ -68,8 +82,12 @@ def print_session(result: SessionResult, console: Console) -> None:
         )
         table.add_row(escape(trial.trial.name), trial.trial.role, trial.status, rms, *wrench)
     console.print(table)
-    for where, sentence in attention(result):
-        console.print(f"look: [bold]{escape(where)}[/]: {escape(sentence)}", soft_wrap=True)
+
+
+def _judged_part(found: dict[str, Any]) -> str:
+    """Return what stands beside the verdict where it does not rest on all trials, or a check failed."""
+    said = [row["level"] for row in found["attention"] if row["about"] == ABOUT]
+    return " (in what could be judged)" if found["verdict"] == "nothing wrong" and said != ["note"] else ""
 
 
 def _print_failures(failures: dict[str, str], console: Console) -> None:
@@ -79,7 +97,7 @@ def _print_failures(failures: dict[str, str], console: Console) -> None:
 
 def print_identification(found: dict[str, Any], console: Console) -> None:
     """Print one line a segment, the validation, the added mass and the notes of `biodance identify`."""
-    _print_failures(found["failures"], console)
+    print_attention(found["attention"], console)
     table = Table(box=None, pad_edge=False)
     for heading in ("segment", "mass (kg)", "table (kg)", "from the data"):
         table.add_column(heading)
@@ -95,15 +113,7 @@ def print_identification(found: dict[str, Any], console: Console) -> None:
             f"{name} {' '.join(format_number(x) for x in row[name]['rms'])}" for name in ("table", "identified")
         )
         console.print(f"{escape(row['trial'])}, RMS Fx Fy Fz Mx My Mz: {told}", soft_wrap=True)
-    load = found["added_mass"]
-    if load:
-        low, high = (format_number(x, 2) for x in load["ci95_kg"])
-        console.print(
-            f"added mass: {format_number(load['kg'], 2)} kg ({low} to {high}) on {load['segment']}, beyond "
-            f"{escape(load['reference'])}"
-        )
-    else:
-        console.print(f"added mass: none found beyond {escape(found['added_mass_search']['reference'])}")
+    console.print(f"added mass: {escape(found['added_mass_search']['text'])}", soft_wrap=True)
     for note in found["notes"]:
         console.print(f"note: {escape(note)}", soft_wrap=True)
 
@@ -129,7 +139,8 @@ def print_foresight(found: dict[str, Any], console: Console) -> None:
 
 def print_diagnosis(found: dict[str, Any], console: Console) -> None:
     """Print the verdict, what was named with size and interval, and what could not be seen, of `biodance diagnose`."""
-    console.print(f"verdict: [bold]{found['verdict']}[/]")
+    console.print(f"verdict: [bold]{found['verdict']}[/]{_judged_part(found)}")
+    print_attention(found["attention"], console)
     _print_failures(found["failures"], console)
     for finding in found["findings"]:
         sizes = ", ".join(

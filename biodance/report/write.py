@@ -4,12 +4,13 @@ from pathlib import Path
 from typing import Any
 
 from biodance.body.body_file import body_text
+from biodance.pipeline.attention import identified_trials, session_attention
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.export import BODY, body_of_result
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.provenance import Provenance, now, provenance
 from biodance.pipeline.results import SessionResult
-from biodance.report.documents.diagnosis import diagnosis_document
+from biodance.report.documents.diagnosis import attention_document, diagnosis_document, judged_document
 from biodance.report.documents.identification import identification_document
 from biodance.report.documents.session import plain_values, results_document, to_text
 from biodance.report.figures.solid import still_addresses
@@ -24,7 +25,14 @@ def write_report(result: SessionResult, folder: Path, *, diagnosis: SessionDiagn
     latter.
     """
     made = provenance(result, created=now())
-    found = results_document(result, made) | {"diagnosis": diagnosis_document(diagnosis) if diagnosis else None}
+    first = diagnosis.diagnosis.attention if diagnosis else session_attention(result)
+    judged = diagnosis.diagnosis.judged if diagnosis else ()
+    found = {
+        **results_document(result, made),
+        "diagnosis": diagnosis_document(diagnosis) if diagnosis else None,
+        "attention": attention_document(first),
+        "judged": judged_document(judged),
+    }
     _write(folder, {_NUMBERS: to_text(found), PAGE: _page(result, made, diagnosis)})
     return dict(plain_values(found))
 
@@ -36,7 +44,13 @@ def write_identification(result: SessionResult, found: SessionIdentification, fo
     After a failed fit there is no ``body.json``.
     """
     made = provenance(result, created=now())
-    numbers = {"session": result.session.folder.name, **identification_document(found), "provenance": made.as_dict()}
+    numbers = {
+        "session": result.session.folder.name,
+        "attention": attention_document(session_attention(result)),
+        "judged": judged_document(identified_trials(result)),
+        **identification_document(found),
+        "provenance": made.as_dict(),
+    }
     files = {_NUMBERS: to_text(numbers), PAGE: _page(result, made)}
     if found.identification.status == "solved":
         files[BODY] = body_text(*body_of_result(result))
@@ -70,7 +84,8 @@ def write_diagnosis(result: SessionResult, found: SessionDiagnosis, folder: Path
 def _page(result: SessionResult, made: Provenance, diagnosis: SessionDiagnosis | None = None) -> str:
     told = diagnosis_section(diagnosis) if diagnosis else ""
     stills = still_addresses((result.still, *result.more_stills)) if result.still else []
-    return page(result, made, stills=stills, diagnosis=told)
+    attention = diagnosis.diagnosis.attention if diagnosis else session_attention(result)
+    return page(result, made, attention=attention, stills=stills, diagnosis=told)
 
 
 def _write(folder: Path, files: dict[str, str]) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.fft import dct, idct
 
 from biodance.errors import BiodanceError
-from biodance.records import Array
+from biodance.records import Array, runs
 
 BLOCK_SAMPLES = 1024
 """Samples transformed and folded in at once: constant memory, and cache-sized."""
@@ -73,8 +73,7 @@ class Bands:
         Hz, thinned to the rate of these bands, at most `BLOCK_SAMPLES` at a time. Recordings are low-passed far below
         half that rate: thinning loses nothing.
         """
-        edge = np.flatnonzero(np.diff(np.concatenate([[False], use, [False]]).astype(int)))
-        for start, stop in zip(edge[::2], edge[1::2], strict=True):
+        for start, stop in runs(use):
             frames = np.arange(start, stop, self.stride(rate))
             for piece in range(0, frames.size, BLOCK_SAMPLES):
                 yield frames[piece : piece + BLOCK_SAMPLES]

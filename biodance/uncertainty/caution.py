@@ -7,11 +7,11 @@ leaves out.
 
 import numpy as np
 
-from biodance.body.body import JointError
 from biodance.body.inertia import TENSOR
+from biodance.body.parts import JointError
 from biodance.body.tables.error_sizes import error_size, joint_size
-from biodance.motion.kinematics import skew
 from biodance.records import Array, Sip
+from biodance.spatial import skew
 
 JOINT = {
     "thigh": "hip",

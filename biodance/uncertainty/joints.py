@@ -6,8 +6,9 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.human.skeleton import kind_of
-from biodance.motion.kinematics import Poses, below, chains, poses, skew
+from biodance.motion.kinematics import Poses, below, chains, poses
 from biodance.records import Array, Index
+from biodance.spatial import skew
 from biodance.uncertainty.response import Pull, Response, centres_of_mass
 from biodance.uncertainty.source import Effects, ErrorSource, mean_local, mean_squares
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.records import Array, frozen_array
+from biodance.spatial import wrench_shift
 from biodance.uncertainty.bands import WHITE, Bands
 
 
@@ -41,10 +42,7 @@ class Noise:
     @property
     def shift(self) -> Array:
         """(6, 6) matrix that moves a wrench from the lab origin to ``about``."""
-        x, y, z = self.about
-        out = np.eye(6)
-        out[3:, :3] = -np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-        return out
+        return wrench_shift(self.about)
 
     def at(self, rate: float) -> "Noise":
         """Return the same noise for a recording at ``rate`` Hz, at the rate that its thinned samples really have."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.motion.kinematics import skew
 from biodance.records import CHANNELS, Array
+from biodance.spatial import skew
 from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.tolerances import shipped
 

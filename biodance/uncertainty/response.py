@@ -19,8 +19,9 @@ from scipy.interpolate import make_interp_spline
 
 from biodance.body.body import Body
 from biodance.body.inertia import TENSOR
-from biodance.motion.kinematics import Poses, jacobian, poses, segment_motion, skew
+from biodance.motion.kinematics import Poses, jacobian, poses, segment_motion
 from biodance.records import Array, Index, Motion
+from biodance.spatial import skew
 
 TRACKING_RIDGE = 1e-6
 """Share of the mean curvature of the tracking that is added to it, so that coordinates without markers stay where

@@ -7,8 +7,9 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.human.skeleton import kind_of
-from biodance.motion.kinematics import cross, segment_motion
+from biodance.motion.kinematics import segment_motion
 from biodance.records import Array, Index
+from biodance.spatial import cross
 from biodance.uncertainty.response import Pull, Response
 from biodance.uncertainty.source import Effects, ErrorSource, mean_local, mean_squares, neighbours
 

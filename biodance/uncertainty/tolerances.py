@@ -91,7 +91,30 @@ def shipped() -> Tolerances:
     which).
     """
     rest = read_tolerances(locate("anthropometry/uncertainty", "null_sessions").read_text(encoding="utf-8"))
-    return replace(rest, sizes=table_sizes())
+    return without_habits(replace(rest, sizes=table_sizes()))
+
+
+_PHYSICS = ("sag ",)
+"""Beginnings of the keys of means that hold in every laboratory: flesh sags downwards in everybody."""
+
+
+def without_habits(found: Tolerances) -> Tolerances:
+    """Return the tolerances with no expected mean but of what is physics: what else the sessions they were learned on
+    have in common is a habit of that laboratory and may be otherwise elsewhere, so that it counts as spread,
+    sd' = sqrt(sd² + mean²), with the mean square over sides and axes.
+    """
+    habits: dict[str, list[float]] = {}
+    for key, mean in found.means.items():
+        if not key.startswith(_PHYSICS):
+            effect, *target = key.split()[:-1]
+            habits.setdefault(key_of(effect, " ".join(target)), []).append(mean)
+    wider = {
+        key: float(np.sqrt(found.size(key) ** 2 + np.mean(np.square(means))))
+        for key, means in habits.items()
+        if found.size(key) > 0
+    }
+    physics = {key: mean for key, mean in found.means.items() if key.startswith(_PHYSICS)}
+    return replace(found, sizes={**found.sizes, **wider}, means=physics)
 
 
 def table_sizes() -> dict[str, float]:
@@ -126,12 +149,11 @@ def to_toml(found: Tolerances) -> str:
     """Return the tolerances as the text of a TOML file that `read_tolerances` reads."""
     lines = [f'origin = "{found.origin}"', f"threshold = {found.threshold:.4g}"]
     for name in ("energy", "energy_sd"):
-        rows = ", ".join("[" + ", ".join(f"{x:.4g}" for x in row) + "]" for row in getattr(found, name))
-        lines.append(f"{name} = [{rows}]")
+        rows = [f"  [{', '.join(f'{x:.4g}' for x in row)}]," for row in getattr(found, name)]
+        lines += [f"{name} = [", *rows, "]"]
     lines.append("noise = [")
-    lines += [
-        "  [" + ", ".join("[" + ", ".join(f"{x:.5g}" for x in row) + "]" for row in band) + "]," for band in found.noise
-    ]
+    for band in found.noise:
+        lines += ["  [", *(f"    [{', '.join(f'{x:.5g}' for x in row)}]," for row in band), "  ],"]
     lines += ["]", "", "[sizes]"]
     lines += [f'"{key}" = {value:.4g}' for key, value in sorted(found.sizes.items())]
     lines += ["", "[means]"] + [f'"{key}" = {value:.4g}' for key, value in sorted(found.means.items())]

@@ -12,9 +12,17 @@ import numpy as np
 
 from biodance.errors import BiodanceError
 from biodance.records import Subject
-from biodance.virtual_lab.laboratory import FIRST_VISIT, LabVisit, perform_in, record, scale_reading, set_up, write
-from biodance.virtual_lab.person import AddedLoad, Person, make_person
-from biodance.virtual_lab.protocol import Protocol, read_protocol
+from biodance.virtual_lab.movement.protocol import Protocol, read_protocol
+from biodance.virtual_lab.person.person import AddedLoad, Person, make_person
+from biodance.virtual_lab.recording.laboratory import (
+    FIRST_VISIT,
+    LabVisit,
+    perform_in,
+    record,
+    scale_reading,
+    set_up,
+    write,
+)
 from biodance.virtual_lab.truth import truth
 
 TRUTH = "truth"

@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from biodance import __version__
 from biodance.body.body import Body
 from biodance.records import Array, Sip
-from biodance.virtual_lab.flesh import of_parameters, parameters_of_inertia, place_inertia
-from biodance.virtual_lab.laboratory import Instruments
-from biodance.virtual_lab.merge import merged_sip, place_in_12, poses_12
-from biodance.virtual_lab.performance import Performance
-from biodance.virtual_lab.person import AddedLoad, Person
-from biodance.virtual_lab.skeleton import TRUE_SEGMENTS
+from biodance.version import __version__
+from biodance.virtual_lab.movement.performance import Performance
+from biodance.virtual_lab.person.flesh import of_parameters, parameters_of_inertia, place_inertia
+from biodance.virtual_lab.person.person import AddedLoad, Person
+from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS
+from biodance.virtual_lab.recording.laboratory import Instruments
+from biodance.virtual_lab.recording.merge import merged_sip, place_in_12, poses_12
 
 
 def _segments(sip: Sip) -> list[dict[str, Any]]:

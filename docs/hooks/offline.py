@@ -9,7 +9,8 @@ from mkdocs.exceptions import Abort
 LOADED = (
     re.compile(r"<(?:script|img|iframe|source|video)\b[^>]*\bsrc=[\"']?((?:https?:)?//[^\"'\s>]+)"),
     re.compile(
-        r"<link\b(?=[^>]*\brel=[\"']?(?:stylesheet|preconnect|preload|icon|manifest))[^>]*\bhref=[\"']?((?:https?:)?//[^\"'\s>]+)"
+        r"<link\b(?=[^>]*\brel=[\"']?(?:stylesheet|preconnect|preload|icon|manifest))"
+        r"[^>]*\bhref=[\"']?((?:https?:)?//[^\"'\s>]+)"
     ),
     re.compile(r"url\([\"']?((?:https?:)?//[^\"')]+)"),
     re.compile(r"@import\s+[\"']((?:https?:)?//[^\"']+)"),

@@ -11,7 +11,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from biodance.body.body import Body, Joint, JointLimits, SegmentMarkers
+from biodance.body.body import Body
+from biodance.body.parts import Joint, JointLimits, SegmentMarkers
 from biodance.errors import UnknownName
 from biodance.records import Array, Sip
 from biodance.settings import STANDARD_GRAVITY

@@ -7,7 +7,8 @@ from xml.etree.ElementTree import Comment, Element, SubElement, indent, tostring
 
 import numpy as np
 
-from biodance.body.body import NO_SEGMENT, Body
+from biodance.body.body import Body
+from biodance.body.parts import NO_SEGMENT
 from biodance.errors import BiodanceError
 from biodance.records import Array
 

@@ -4,15 +4,16 @@ skeleton.
 
 import numpy as np
 
-from biodance.body.body import Body, Foot, SegmentMarkers
+from biodance.body.body import Body
 from biodance.body.human.limits import joint_limits
-from biodance.body.human.skeleton import SEGMENTS, SIDES, Skeleton, generic_skeleton, joint_tree, kind_of, side_of
+from biodance.body.human.prior import com_sd, prior
+from biodance.body.human.skeleton import SEGMENTS, Skeleton, generic_skeleton, joint_tree, kind_of, side_of
+from biodance.body.parts import Foot, SegmentMarkers
 from biodance.body.tables.anthropometry import read_table, row_numbers
 from biodance.body.tables.choice import measured_whole, reference, studies, trunk_joint
-from biodance.body.tables.prior import com_sd, prior
 from biodance.body.tables.reference import proportion
 from biodance.lab.markers.sets import MarkerSet, read_marker_set
-from biodance.records import Array, Sip, Subject
+from biodance.records import SIDES, Array, Sip, Subject
 from biodance.settings import STANDARD_GRAVITY, Settings
 
 COM_SIGMAS = 3.0

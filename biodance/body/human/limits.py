@@ -6,7 +6,8 @@ from typing import Literal
 
 import numpy as np
 
-from biodance.body.body import Body, JointLimits
+from biodance.body.body import Body
+from biodance.body.parts import JointLimits
 from biodance.body.tables.anthropometry import AnthropometricTable, read_table, row_numbers
 from biodance.records import Array, Subject
 from biodance.settings import STANDARD_GRAVITY

@@ -10,16 +10,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from biodance.body.body import Body, Joint, SegmentMarkers
+from biodance.body.body import Body
 from biodance.body.human.human import assemble
 from biodance.body.human.limits import widen_limits
 from biodance.body.human.measures import Measures, measures
-from biodance.body.human.skeleton import JOINTS, SEGMENTS, SIDES, Skeleton, kind_of
+from biodance.body.human.skeleton import JOINTS, SEGMENTS, Skeleton, kind_of
 from biodance.body.human.standing import StaticPosture, standing
 from biodance.body.human.static_centres import Centres, SegmentFrames, segment_frames, static_centres, turn
+from biodance.body.parts import Joint, SegmentMarkers
 from biodance.body.tables.choice import reference
 from biodance.body.tables.reference import proportion
-from biodance.records import Array, Subject, Trial
+from biodance.records import SIDES, Array, Subject, Trial
 from biodance.settings import STANDARD_GRAVITY, Hip
 
 _ANKLE_HEIGHT = (0.04, 0.12)

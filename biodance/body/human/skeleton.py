@@ -5,12 +5,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from biodance.body.body import Joint
+from biodance.body.parts import Joint
 from biodance.body.tables.anthropometry import read_table, row_numbers
 from biodance.body.tables.reference import KINDS, Reference, proportion
-from biodance.records import Array, Subject
+from biodance.records import SIDES, Array, Subject
 
-SIDES = ("right", "left")
 SEGMENTS = (
     *("pelvis", "right_thigh", "right_shank", "right_foot", "left_thigh", "left_shank", "left_foot", "trunk_head"),
     *("right_upper_arm", "right_forearm_hand", "left_upper_arm", "left_forearm_hand"),

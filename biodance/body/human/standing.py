@@ -8,18 +8,14 @@ from numpy.typing import NDArray
 
 from biodance.errors import TrialRefused
 from biodance.lab.markers.sets import MarkerSet, canonical, landmark, read_marker_set
-from biodance.records import Array, Markers, Trial
+from biodance.records import SIDES, Array, Markers, Trial
 
 WINDOW = 0.5
 """s: length of the quietest part of the static trial that is averaged."""
 NEEDED = (
     *("right_asis", "left_asis", "mid_psis"),
-    *(
-        f"{side}_{place}"
-        for side in ("right", "left")
-        for place in ("knee_lateral", "ankle_lateral", "heel", "toe", "acromion")
-    ),
-    *(f"{side}_{place}" for side in ("right", "left") for place in ("elbow_lateral", "wrist_radial", "wrist_ulnar")),
+    *(f"{side}_{place}" for side in SIDES for place in ("knee_lateral", "ankle_lateral", "heel", "toe", "acromion")),
+    *(f"{side}_{place}" for side in SIDES for place in ("elbow_lateral", "wrist_radial", "wrist_ulnar")),
 )
 """Landmarks without which no 12-segment body can be placed."""
 

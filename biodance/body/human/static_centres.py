@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.body.body import JointError
 from biodance.body.human.joint_centres import (
     chord,
     davis_hip,
@@ -17,6 +16,7 @@ from biodance.body.human.joint_centres import (
     wrist,
 )
 from biodance.body.human.measures import Measures
+from biodance.body.parts import JointError
 from biodance.body.tables.error_sizes import error_size
 from biodance.records import Array
 from biodance.settings import Hip
@@ -39,7 +39,9 @@ class Centres:
     that axis may be turned about the bone; ``lateral`` -> (3,) m, the lateral marker. ``pelvis`` (3, 3) lab_R_pelvis;
     ``across`` side -> (3,) m, horizontal, to the right of the foot; ``cut``: at which fraction of the way from mid hip
     to mid shoulder the table cuts pelvis from trunk; ``notes`` what was assumed; ``errors`` of the joints that a
-    movement placed.
+    movement placed; ``contradicted`` the joints whose place here the movement contradicts. ``mid_hip``
+    (3,) m, where pelvis and trunk are taken to begin, None for the middle of the hip centres: one hip alone that lies
+    elsewhere does not move the matter of the pelvis.
     """
 
     place: Places
@@ -51,6 +53,8 @@ class Centres:
     cut: float
     notes: tuple[str, ...]
     errors: tuple[JointError, ...] = ()
+    contradicted: tuple[str, ...] = ()
+    mid_hip: Array | None = None
 
 
 def static_centres(mark: Places, sizes: Measures, *, hip: Hip, trunk_fraction: float) -> Centres:
@@ -193,13 +197,14 @@ class SegmentFrames:
 def segment_frames(centres: Centres) -> SegmentFrames:
     """Return the 12 segment frames.
 
-    Pelvis: ISB axes, origin in the middle of the hip centres. trunk_head: y along the line from mid hip to mid
-    shoulder. Thigh, upper arm: y to the proximal joint, z in the plane of the flexion axis. Shank, forearm: y to the
-    proximal joint, flexed about the parent's z and tilted by a constant varus. Foot: flat on the ground, x from heel to
-    toe.
+    Pelvis: ISB axes, origin in the middle of the hip centres (``centres.mid_hip`` where given). trunk_head: y along the
+    line from mid hip to mid shoulder. Thigh, upper arm: y to the proximal joint, z in the plane of the flexion axis.
+    Shank, forearm: y to the proximal joint, flexed about the parent's z and tilted by a constant varus. Foot: flat on
+    the ground, x from heel to toe.
     """
     at = centres.place
     hips, shoulders = ((at[f"right_{joint}"] + at[f"left_{joint}"]) / 2 for joint in ("hip", "shoulder"))
+    hips = hips if centres.mid_hip is None else centres.mid_hip
     axis = shoulders - hips
     rotation = {"pelvis": centres.pelvis, "trunk_head": frame_yz(axis, at["right_shoulder"] - at["left_shoulder"])}
     origin = {"pelvis": hips, "trunk_head": at["trunk"]}

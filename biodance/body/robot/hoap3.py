@@ -7,12 +7,13 @@ trunk (x forwards, y left, z up). At zero angles the legs are straight and the a
 
 import numpy as np
 
-from biodance.body.body import UPRIGHT, Body, Foot, Joint, JointLimits, SegmentMarkers
+from biodance.body.body import Body
 from biodance.body.human.static_centres import turn
 from biodance.body.inertia import RigidInertia, inertial_parameters
+from biodance.body.parts import UPRIGHT, Foot, Joint, JointLimits, SegmentMarkers
 from biodance.body.robot.prior import robot_covariance
 from biodance.body.tables.anthropometry import TableRow, read_table, row_numbers
-from biodance.records import Array, Sip
+from biodance.records import SIDES, Array, Sip
 
 _SEGMENTS = (
     "pelvis", "right_thigh", "right_shank", "right_foot", "left_thigh", "left_shank", "left_foot", "trunk_head",
@@ -67,7 +68,7 @@ def hoap3() -> Body:
         SegmentMarkers((), (), np.empty((0, 3)), np.empty(0)),
         boxes,
         boxes,
-        feet={side: _sole(side) for side in ("right", "left")},
+        feet={side: _sole(side) for side in SIDES},
         notes=("Fujitsu HOAP-3, configuration B, 7.942 kg; links merged to 12 segments at zero joint angles.",),
     )
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from biodance.body.body import Body, JointLimits
+from biodance.body.body import Body
+from biodance.body.parts import JointLimits
 from biodance.records import Array, Sip
 
 

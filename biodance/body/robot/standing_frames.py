@@ -9,10 +9,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from biodance.body.body import Body, Foot
+from biodance.body.body import Body
 from biodance.body.inertia import PSEUDO_INERTIA
+from biodance.body.parts import Foot
 from biodance.errors import BiodanceError
-from biodance.records import Array, Sip
+from biodance.records import SIDES, Array, Sip
 
 LEANS = np.cos(np.radians(30.0))
 """Cosine of the largest angle between a sole and the ground at zero joint angles."""
@@ -29,7 +30,7 @@ def standing_frames(body: Body) -> Body:
     BiodanceError
         A sole is not under its foot at zero joint angles.
     """
-    for side in ("right", "left"):
+    for side in SIDES:
         foot = body.feet[side]
         turn = _turn_at_zero(body, foot.segment)
         up = turn @ sole_normal(foot)

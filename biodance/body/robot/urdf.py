@@ -10,15 +10,16 @@ from pathlib import Path
 
 import numpy as np
 
-from biodance.body.body import NO_SEGMENT, Body, Foot, Joint, JointLimits, SegmentMarkers
+from biodance.body.body import Body
 from biodance.body.export import refuse_impossible
 from biodance.body.inertia import RigidInertia, combine_inertias, inertial_parameters
+from biodance.body.parts import NO_SEGMENT, Foot, Joint, JointLimits, SegmentMarkers
 from biodance.body.robot.prior import com_deviation, extended, is_point, robot_covariance
 from biodance.body.robot.sole import match_faces, sole_outline
 from biodance.body.robot.standing_frames import reframed
 from biodance.body.robot.urdf_file import Connection, UrdfFile, read_urdf_file
 from biodance.errors import BiodanceError, FileRefused, UnknownName
-from biodance.records import Array, Sip
+from biodance.records import SIDES, Array, Sip
 
 
 @dataclass
@@ -72,7 +73,7 @@ def read_urdf(path: str | Path, *, feet: tuple[str, str]) -> Body:
                 f"ground."
             )
     body = _body(file, joints, limits, heavy)
-    return _standing(file, body, {side: owner[foot] for side, foot in zip(("right", "left"), feet, strict=True)})
+    return _standing(file, body, {side: owner[foot] for side, foot in zip(SIDES, feet, strict=True)})
 
 
 def _body(file: UrdfFile, joints: list[Joint], limits: JointLimits, heavy: list[_Carrier]) -> Body:
@@ -200,7 +201,7 @@ def _standing(file: UrdfFile, body: Body, feet: dict[str, _Carrier]) -> Body:
         ahead = -ahead
     soles = _soles(file, feet, place, up, ahead)
     sideways = np.cross(ahead, up)
-    right, left = (float(place[side][1] @ sideways) for side in ("right", "left"))
+    right, left = (float(place[side][1] @ sideways) for side in SIDES)
     if not right > left:
         raise FileRefused(
             f"{file.path}: {feet['right'].link} stands left of {feet['left'].link}; name the right foot first, then "
@@ -216,7 +217,7 @@ def _backwards(feet: dict[str, _Carrier], place: dict[str, tuple[Array, Array]],
     say right and left.
     """
     crossed = float((place["right"][1] - place["left"][1]) @ sideways) < 0
-    right, left = (feet[side].link.lower() for side in ("right", "left"))
+    right, left = (feet[side].link.lower() for side in SIDES)
     pairs = (("right", "left"), ("r_", "l_"), ("_r", "_l"))
     return crossed and any(one in right and right.replace(one, other) == left for one, other in pairs)
 

@@ -12,9 +12,7 @@ from biodance.dance.problem.stance import Stance
 from biodance.motion.dynamics import distribute, joint_torques
 from biodance.motion.kinematics import Poses, poses
 from biodance.motion.regressor import predict_wrench
-from biodance.records import Array, Motion, Wrench
-
-SIDES = ("right", "left")
+from biodance.records import SIDES, Array, Motion, Wrench
 
 
 @dataclass(frozen=True, eq=False)

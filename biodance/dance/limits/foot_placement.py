@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.body.body import UPRIGHT, Body
+from biodance.body.body import Body
+from biodance.body.parts import UPRIGHT
 from biodance.dance.limits import CheckedMotion, Limit, Margins, Remaining, bounded, unconcerned
-from biodance.dance.limits._checked import SIDES
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State
 from biodance.motion.kinematics import poses
+from biodance.records import SIDES
 
 _STILL = 1e-6
 """m, rad: how far a planted foot may be from where it stands: rounding."""

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.dance.limits import NOTHING, CheckedMotion, Limit, Margins, Remaining, bounded, unconcerned
-from biodance.dance.limits._checked import SIDES
 from biodance.dance.problem.state import State
+from biodance.records import SIDES
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import NoReturn
 
 import numpy as np
 
-from biodance.body.body import UPRIGHT
+from biodance.body.parts import UPRIGHT
 from biodance.dance.limits import CheckedMotion, Limit
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.excitation import (

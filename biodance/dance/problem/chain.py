@@ -12,19 +12,18 @@ from typing import Any
 
 import numpy as np
 
-from biodance.body.body import UPRIGHT, Body
+from biodance.body.body import Body
+from biodance.body.parts import GRAVITY, UPRIGHT
 from biodance.body.pinocchio_model import load_pinocchio
 from biodance.errors import BiodanceError
 from biodance.motion.ik.general_legs import GeneralLeg
 from biodance.motion.ik.legs import Leg
-from biodance.motion.kinematics import axis_rotation
-from biodance.motion.regressor import GRAVITY
-from biodance.records import Array, Motion
+from biodance.records import SIDES, Array, Motion
+from biodance.spatial import axis_rotation
 
 ROOT = 6
 _TURNS = ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 """Axes of turn, drop and tilt in the root's frame (up, forward, right), in the order of rotation."""
-SIDES = ("right", "left")
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,6 +22,7 @@ from biodance.dance.problem.chain import ROOT
 from biodance.dance.problem.state import State
 from biodance.identification.base_parameters import structural_base
 from biodance.records import Array
+from biodance.spatial import cross, skew
 
 
 def condition(gram: Array) -> tuple[Array, Array]:
@@ -142,10 +143,7 @@ class Inertias:
     @cached_property
     def square(self) -> Array:
         """(3, 3, 3, 6): sum_bc w_b w_c square[b, c] = w x (I w)."""
-        skew = np.zeros((3, 3, 3))
-        for b, (i, j) in enumerate(((2, 1), (0, 2), (1, 0))):
-            skew[b, i, j], skew[b, j, i] = 1.0, -1.0
-        return np.einsum("bij,cjk->bcik", skew, self.linear)
+        return np.einsum("bij,cjk->bcik", skew(np.eye(3)), self.linear)
 
 
 INERTIAS = Inertias()
@@ -160,7 +158,8 @@ def turning(state: State, segments: list[int]) -> tuple[Array, Array]:
     """Return angular velocity and acceleration (T, S, 3) of segments in their own frames."""
     links = [state.chain.carriers[i] for i in segments]
     turn = state.rotation[:, segments]
-    return tuple(np.einsum("tsij,tsi->tsj", turn, s[:, links, 3:]) for s in (state.velocity, state.acceleration))  # type: ignore[return-value]
+    w, dw = (np.einsum("tsij,tsi->tsj", turn, s[:, links, 3:]) for s in (state.velocity, state.acceleration))
+    return w, dw
 
 
 def dynamic_grams(state: State, segments: list[int]) -> Array:
@@ -179,10 +178,10 @@ def dynamic_slopes(state: State, segments: list[int], slope: Array) -> Array:
     turn, moved = state.rotation[:, segments], state.chain.ancestors[links]
     by_dw, by_w = (np.einsum("tsij,tsj->tsi", turn, s) for s in (by_dw, by_w))
     axis, V, A = state.twists[..., 3:], state.velocity[..., 3:], state.acceleration[..., 3:]
-    swept = np.cross(V, axis)
+    swept = cross(V, axis)
     gap = V[:, links][:, :, None] - V[:, None]
-    back = np.cross(np.broadcast_to(swept[:, None], gap.shape), gap) - np.cross(axis, A)[:, None]
-    ahead = swept[:, None] + np.cross(np.broadcast_to(axis[:, None], gap.shape), gap)
+    back = cross(swept[:, None], gap) - cross(axis, A)[:, None]
+    ahead = swept[:, None] + cross(axis[:, None], gap)
     # in the segment's own frame: d(R'w) = R'(-w_i x w_i-link), d(R'dw) = R'(back)
     dx = np.einsum("tsc,tkc,sk->tk", by_w, swept, moved) + np.einsum("tsc,tskc,sk->tk", by_dw, back, moved)
     dv = np.einsum("tsc,tkc,sk->tk", by_w, axis, moved) + np.einsum("tsc,tskc,sk->tk", by_dw, ahead, moved)

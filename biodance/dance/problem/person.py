@@ -24,13 +24,14 @@ from pathlib import Path
 
 import numpy as np
 
-from biodance.body.body import Body, JointLimits
+from biodance.body.body import Body
+from biodance.body.parts import JointLimits
 from biodance.dance.problem.plan import Plan, finite_number, table
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import read_toml
+from biodance.records import SIDES
 
 _KEYS = ("reason", "max_speed_deg_s", "stand_alone_on", "seated", "hold_frame", "range_deg", "range_share", "strength")
-SIDES = ("right", "left")
 Shares = tuple[tuple[str, float], ...]
 
 

@@ -42,7 +42,7 @@ from biodance.body.human.limits import Range
 from biodance.dance.limits import Limit, family, join_limits, limits_with
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import locate, read_toml
-from biodance.records import Array
+from biodance.records import SIDES, Array
 
 _STANCES = ("parallel", "right_forward", "single_right", "single_left", "seated")
 """Foot configurations: both feet side by side, right foot in front, on the right leg, on the left leg (paper Table I),
@@ -74,7 +74,7 @@ class Plan:
     weights: tuple[tuple[str, float], ...] = ()
     other_weight: float = 1.0
     simplicity: float = 0.0
-    alone: tuple[str, ...] = ("right", "left")
+    alone: tuple[str, ...] = SIDES
     holds: tuple[str, ...] = ()
     ranges: Range = "comfortable"
     limits: tuple[Limit, ...] = field(default_factory=family)

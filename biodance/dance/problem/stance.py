@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.records import Array, frozen_array
+from biodance.records import SIDES, Array, frozen_array
 
 _WIDTH = 0.12
 """Distance between the ankles, fraction of stature (about 1.3 times the width of the hips)."""
@@ -136,7 +136,7 @@ def stance(
     ankle = np.array([[right, -half, height], [left, half, -float(body.feet["left"].outline[:, 1].min())]])
     soles = [
         ankle[k] + np.stack([o[:, 0], -o[:, 2], o[:, 1]], axis=1)
-        for k, o in enumerate(body.feet[side].outline for side in ("right", "left"))
+        for k, o in enumerate(body.feet[side].outline for side in SIDES)
     ]
     return Stance(name, ankle, planted, np.array(soles), share)
 
@@ -144,7 +144,7 @@ def stance(
 def holding(feet: Stance, body: Body, hands: tuple[str, ...]) -> Stance:
     """Return the stance in which the named ``hands`` ("right", "left") hold the grips of a frame around the person."""
     grips, stature = np.full((2, 3), np.nan), stature_of(body)
-    for side, name in enumerate(("right", "left")):
+    for side, name in enumerate(SIDES):
         if name in hands:
             grips[side] = [_GRIP[0], (-_GRIP[1], _GRIP[1])[side], _GRIP[2] * stature]
     return replace(feet, hands=grips)
@@ -153,10 +153,7 @@ def holding(feet: Stance, body: Body, hands: tuple[str, ...]) -> Stance:
 def seat(body: Body, *, share: float = 1.0) -> Stance:
     """Return the stance of a person on a stool, hips over the lab origin, feet hanging above the ground."""
     feet = stance(body, "seated", planted=(), share=share)
-    legs = [
-        np.linalg.norm(body.joints[body.joint_index(f"{side}_ankle_dorsiflexion")].translation)
-        for side in ("right", "left")
-    ]
+    legs = [np.linalg.norm(body.joints[body.joint_index(f"{side}_ankle_dorsiflexion")].translation) for side in SIDES]
     return replace(feet, props=STOOL, seat=float(max(legs) + feet.ankle[:, 2].max()) + HANGING)
 
 
@@ -216,5 +213,5 @@ _FEET = {
 
 def stance_words(stance: Stance) -> str:
     """Return where the feet are, in words, and on which of them the weight is where it must be over one."""
-    weight = "" if stance.over is None else f", the weight on the {('right', 'left')[stance.over]} one"
+    weight = "" if stance.over is None else f", the weight on the {SIDES[stance.over]} one"
     return _FEET[stance.name] + weight

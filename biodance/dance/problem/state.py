@@ -19,20 +19,9 @@ from biodance.body.pinocchio_model import load_pinocchio
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.stance import Stance
 from biodance.records import Array
+from biodance.spatial import spatial_cross, wrench_of_force
 
 _Index = list[int] | NDArray[np.intp]
-
-
-def spatial_cross(a: Array, b: Array) -> Array:
-    """Return the spatial (6) or ordinary (3) cross product along the last axis."""
-    if a.shape[-1] == 3:
-        return np.asarray(a[..., _NEXT] * b[..., _LAST] - a[..., _LAST] * b[..., _NEXT])
-    w1, w2 = a[..., 3:], b[..., 3:]
-    linear = spatial_cross(w1, b[..., :3]) + spatial_cross(a[..., :3], w2)
-    return np.concatenate([linear, spatial_cross(w1, w2)], axis=-1)
-
-
-_NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +85,7 @@ class State:
         """Return (T, K, n) derivative by x of the places (T, K, 3) m, fixed in the segments (K), along directions (T,
         K, 3).
         """
-        wrench = np.concatenate([direction, spatial_cross(place, direction)], axis=2)
+        wrench = wrench_of_force(direction, place)
         return (wrench @ np.swapaxes(self.twists, 1, 2)) * self.chain.ancestors[np.array(self.chain.carriers)[segment]]
 
     def points(self, segment: list[int], local: Array) -> tuple[Array, Array]:

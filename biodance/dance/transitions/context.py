@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import biodance
 from biodance.body.body import Body
 from biodance.body.body_file import body_text
 from biodance.dance.problem.chain import Chain
@@ -22,8 +21,8 @@ from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance
 from biodance.records import Array
 
-ROOMS = ("body", "dance", "identify", "motion")
-"""Rooms whose code decides what a dance becomes."""
+ROOMS = ("body", "dance", "identification", "motion", "uncertainty", "spatial.py")
+"""Whose code decides what a dance becomes."""
 
 
 class Checkpoint:
@@ -61,8 +60,8 @@ def code() -> str:
     """Return a hash of the source of all `ROOMS`: parts that older code found do not fit those that newer code
     finds.
     """
-    rooms = Path(biodance.__file__).parent
-    files = sorted(file for room in ROOMS for file in (rooms / room).rglob("*.py"))
+    package = Path(__file__).parents[2]
+    files = sorted(file for file in package.rglob("*.py") if file.relative_to(package).parts[0] in ROOMS)
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 

@@ -4,19 +4,17 @@ needs.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.effects._base.geometry import Geometry, geometry
 from biodance.errors import TrialRefused, UnknownName
+from biodance.lab.filters import motion_filter
 from biodance.motion.kinematics import Poses, SegmentMotion, poses, segment_motion
 from biodance.motion.regressor import regressor_of
 from biodance.records import Array, Motion, Plate, Trial, Wrench, frozen_array
-
-if TYPE_CHECKING:
-    from biodance.effects._base.geometry import Geometry
-
+from biodance.spatial import wrench_about_point
 
 OF_MOTION = ("regressor", "segments", "poses", "marker_columns", "measured_markers", "marker_residual", "memory")
 """What a case computes once from body, motion and markers, whatever the forces and the parameters."""
@@ -111,11 +109,18 @@ class Case:
         return {}
 
     @cached_property
-    def geometry(self) -> "Geometry":
+    def geometry(self) -> Geometry:
         """How posture, wrench and markers answer to changes of the body's geometry."""
-        from biodance.effects._base.geometry import geometry
-
-        return geometry(self)
+        return geometry(
+            self.body,
+            self.motion,
+            self.phi,
+            poses=self.poses,
+            segments=self.segments,
+            columns=self.marker_columns,
+            measured=self.measured_markers,
+            smoothed=motion_filter(self.trial.settings),
+        )
 
     def plate(self, name: str) -> Plate:
         """Return a plate by name; UnknownName lists the trial's plates."""
@@ -132,7 +137,7 @@ class Case:
         safe = np.where(np.abs(total) > 1.0, total, 1.0)
         share = np.where(np.abs(total) > 1.0, plate.wrench.value[:, 2] / safe, 1.0 / len(self.trial.plates))
         value = self.predicted * (np.ones_like(share) if len(self.trial.plates) == 1 else share)[:, None]
-        return at_point(value, plate.centre)
+        return wrench_about_point(value, plate.centre)
 
     def with_added(self, plate: Plate, change: Array) -> "Case":
         """Return the case with ``change`` (T, 6) about the lab origin added to what ``plate`` measured."""
@@ -154,13 +159,3 @@ class Case:
         """Return ``other``, a case of the same motion, with what was computed here already."""
         other.__dict__.update({name: self.__dict__[name] for name in names if name in self.__dict__})
         return other
-
-
-def at_point(wrench: Array, point: Array) -> Array:
-    """Return wrenches (T, 6) about the lab origin as wrenches about ``point`` (3,) m."""
-    return np.concatenate([wrench[:, :3], wrench[:, 3:] - np.cross(point, wrench[:, :3])], axis=1)
-
-
-def at_origin(wrench: Array, point: Array) -> Array:
-    """Return wrenches (T, 6) about ``point`` (3,) m as wrenches about the lab origin."""
-    return at_point(wrench, -np.asarray(point))

@@ -138,6 +138,10 @@ class Effect:
         """Return whether a cause of size ``theta`` (p,) can be: by default every size, either way."""
         return True
 
+    def possible_in(self, case: Case, theta: Array) -> bool:
+        """Return whether a cause of size ``theta`` (p,) can be in the person and laboratory of ``case``."""
+        return self.possible(theta)
+
     def reported(self, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
         """Return name, value, standard deviation and unit of what a report prints for ``theta`` (p,) with ``sd``
         (p,).

@@ -7,7 +7,6 @@ all causes.
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,12 +14,10 @@ from biodance.body.body import Body
 from biodance.body.changes import carried_by, neutral_turn
 from biodance.effects._base.moved_matter import MovedMatter, centres_of, moved_matter, wrench_of
 from biodance.effects._base.posture_answer import PostureAnswer
-from biodance.lab.filters import LowPass, motion_filter
-from biodance.motion.kinematics import Poses, SegmentMotion, below, chains, jacobian, skew
-from biodance.records import Array, Index
-
-if TYPE_CHECKING:
-    from biodance.effects._base.case import Case
+from biodance.lab.filters import LowPass
+from biodance.motion.kinematics import Poses, SegmentMotion, below, chains, jacobian
+from biodance.records import Array, Index, Motion
+from biodance.spatial import skew
 
 _RATE = 25.0
 """Hz, at least, of the frames in which the answer is computed."""
@@ -120,35 +117,46 @@ def _moves(answer: PostureAnswer, chain: tuple[int, ...]) -> tuple[Array, Array]
     return np.concatenate([parent, out], axis=2), np.concatenate([parent - kept, out], axis=2)
 
 
-def geometry(case: "Case") -> Geometry:
-    """Return the geometry of a tracked trial."""
-    every = _frames(case.motion.time.size, case.motion.rate)
-    pose, body = _poses(case.poses, every), case.body
-    columns = list(case.marker_columns)
+def geometry(
+    body: Body,
+    motion: Motion,
+    phi: Array,
+    *,
+    poses: Poses,
+    segments: SegmentMotion,
+    columns: tuple[int, ...],
+    measured: Array,
+    smoothed: LowPass,
+) -> Geometry:
+    """Return the geometry of a tracked trial.
+
+    ``poses`` and ``segments`` of the ``motion``; ``columns`` (K) which markers of the body were ``measured`` (T, K, 3)
+    m; ``smoothed`` the motion's low-pass.
+    """
+    every = _frames(motion.time.size, motion.rate)
+    pose = _poses(poses, every)
     segment = tuple(body.markers.segment[c] for c in columns)
-    markers = pose.points(list(segment), body.markers.position[columns])
-    measured = case.measured_markers[every]
+    markers = pose.points(list(segment), body.markers.position[list(columns)])
+    measured = measured[every]
     seen = np.asarray(np.isfinite(measured).all(axis=2), dtype=float)
-    weight = seen * body.markers.weight[columns]
+    weight = seen * body.markers.weight[list(columns)]
     apart = weight[..., None] * np.where(seen[..., None] > 0, markers - measured, 0.0)
-    answer = PostureAnswer(
-        body, pose, case.motion.q[every, body.nq - len(body.joints) :], segment, markers, apart, weight
-    )
-    com = pose.points(list(range(len(body.segments))), centres_of(case.phi))
+    answer = PostureAnswer(body, pose, motion.q[every, body.nq - len(body.joints) :], segment, markers, apart, weight)
+    com = pose.points(list(range(len(body.segments))), centres_of(phi))
     place, turn = jacobian(body, pose, list(range(len(body.segments))), com)
     shape = (len(com), len(body.segments), 3, body.nv)
-    speed = (place @ _tangent_speed(case, pose, every)[..., None]).reshape(shape[:3])
-    parts = moved_matter(_move(case.segments, every), case.phi, speed)
+    speed = (place @ _tangent_speed(body, motion, pose, every)[..., None]).reshape(shape[:3])
+    parts = moved_matter(_move(segments, every), phi, speed)
     return Geometry(
-        case.motion.time[every],
-        case.motion.time,
+        motion.time[every],
+        motion.time,
         answer,
         _by_posture(parts, place, turn),
         parts.by_place,
         turn.reshape(shape),
         seen,
-        case.phi,
-        motion_filter(case.trial.settings),
+        phi,
+        smoothed,
     )
 
 
@@ -165,10 +173,10 @@ def _by_posture(parts: MovedMatter, place: Array, turn: Array) -> Array:
     return np.asarray(parts.by_place.reshape(frames, 9, -1) @ place + parts.by_turn.reshape(frames, 9, -1) @ turn)
 
 
-def _tangent_speed(case: "Case", pose: Poses, every: Index) -> Array:
+def _tangent_speed(body: Body, motion: Motion, pose: Poses, every: Index) -> Array:
     """Return the velocity (F, nv) in the lab-frame tangent."""
-    v = np.array(case.motion.v[every])
-    for k in range(0, case.body.n_root, 3):
+    v = np.array(motion.v[every])
+    for k in range(0, body.n_root, 3):
         v[:, k : k + 3] = (pose.root_rotation @ v[:, k : k + 3, None])[..., 0]
     return v
 

@@ -17,8 +17,9 @@ from scipy.interpolate import make_interp_spline
 
 from biodance.body.inertia import TENSOR
 from biodance.lab.filters import LowPass, low_pass
-from biodance.motion.kinematics import SegmentMotion, skew
+from biodance.motion.kinematics import SegmentMotion
 from biodance.records import Array
+from biodance.spatial import skew
 
 _DEGREE = 5
 

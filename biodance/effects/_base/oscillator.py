@@ -8,8 +8,8 @@ import numpy as np
 from scipy.signal import cont2discrete, lfilter, lfilter_zi, ss2tf
 
 from biodance.effects._base.case import Case
-from biodance.motion.kinematics import cross
 from biodance.records import Array
+from biodance.spatial import cross
 
 
 def relative_motion(acceleration: Array, rate: float, *, frequency: float, damping: float) -> tuple[Array, Array]:

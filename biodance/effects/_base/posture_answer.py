@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.motion.kinematics import Poses, below, jacobian, skew
+from biodance.motion.kinematics import Poses, below, jacobian
 from biodance.records import Array
+from biodance.spatial import skew
 
 AT_LIMIT = 5e-3
 """rad: a joint so near to a limit that its markers push it against is held there."""

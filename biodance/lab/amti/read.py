@@ -12,10 +12,11 @@ from biodance.lab.plain_text import read_bytes, sha256
 from biodance.lab.plates.corners import LONGEST_SIDE, SHORTEST_SIDE
 from biodance.lab.plates.parameters import INCH, POUND
 from biodance.lab.plates.signs import DEEPEST, gravity_sign, sensor_below
-from biodance.lab.plates.wrench import about_reference
+from biodance.lab.plates.wrench import wrench_in_lab
 from biodance.lab.plates.zero import find_baseline
 from biodance.records import Array, Plate, Role, Source, Trial, Wrench
 from biodance.settings import STANDARD_GRAVITY
+from biodance.spatial import wrench_about_point
 
 PLATE_UPRIGHT = np.diag([1.0, -1.0, -1.0])
 """lab_R_plate (3, 3): AMTI's plate axes have z down; x stays, y and z are turned, so that the lab's z points up."""
@@ -40,10 +41,8 @@ def amti_plate(
     """
     channels, zeroed = _zeroed(channels, rate)
     below, placed = sensor_below(vector, PLATE_UPRIGHT)
-    wrench = about_reference(channels, below)
+    wrench = wrench_about_point(channels, below)
     sign = 1 if gravity_sign(wrench, PLATE_UPRIGHT, rate) > 0 else -1
-    force = sign * wrench[:, :3] @ PLATE_UPRIGHT.T
-    moment = sign * wrench[:, 3:] @ PLATE_UPRIGHT.T + np.cross(centre, force)
     half = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * np.array(size) / 2
     corners = np.column_stack([half, np.zeros(4)]) @ PLATE_UPRIGHT.T + centre
     directions = (
@@ -53,8 +52,8 @@ def amti_plate(
         if sign < 0
         else "Sign: the weight shows that the file holds the reaction, not the load on the plate; it was kept.",
     )
-    wrench_in_lab = Wrench(np.arange(len(channels)) / rate, np.hstack([force, moment]))
-    plate = Plate(f"plate{number}", 0, corners, wrench_in_lab, (*said, zeroed, placed, *directions))
+    recorded = Wrench(np.arange(len(channels)) / rate, wrench_in_lab(wrench, PLATE_UPRIGHT, sign, centre))
+    plate = Plate(f"plate{number}", 0, corners, recorded, (*said, zeroed, placed, *directions))
     return plate, (f"Plate {number}: {directions[1]}",) if sign > 0 else ()
 
 

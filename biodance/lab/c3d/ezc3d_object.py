@@ -18,6 +18,7 @@ from biodance.lab.c3d.read import read_c3d
 from biodance.lab.c3d.write import PlateRecording, write_c3d
 from biodance.lab.plates.corners import plate_axes
 from biodance.records import Plate, Role, Trial
+from biodance.spatial import wrench_about_point
 
 if TYPE_CHECKING:
     import ezc3d
@@ -71,9 +72,8 @@ def from_ezc3d(file: "ezc3d.c3d", *, name: str = "trial", role: Role = "fit", su
 
 def _recording(plate: Plate) -> PlateRecording:
     """Return what a plate of TYPE 2 records: the wrench in its own axes, about the centre of its surface."""
-    axes, force = plate_axes(plate.corners), plate.wrench.force
-    moment = plate.wrench.moment - np.cross(plate.centre, force)
-    return PlateRecording(2, plate.corners, np.zeros(3), np.hstack([force @ axes, moment @ axes]))
+    axes, wrench = plate_axes(plate.corners), wrench_about_point(plate.wrench.value, plate.centre)
+    return PlateRecording(2, plate.corners, np.zeros(3), np.hstack([wrench[:, :3] @ axes, wrench[:, 3:] @ axes]))
 
 
 def _measurements(trial: Trial) -> dict[str, float]:

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.lab.filters import runs
-from biodance.records import Array, Markers
+from biodance.records import Array, Markers, runs
 
 FLANK = 6
 """Seen frames that each side of a short gap must have."""

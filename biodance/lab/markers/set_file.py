@@ -6,8 +6,8 @@ from typing import Any
 
 from biodance.errors import BiodanceError
 from biodance.library import read_toml
+from biodance.records import SIDES
 
-SIDES = ("right", "left")
 _SEGMENTS = (
     "pelvis",
     *(f"{side}_{part}" for side in SIDES for part in ("thigh", "shank", "foot")),

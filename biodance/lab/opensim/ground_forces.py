@@ -14,6 +14,7 @@ from biodance.lab.opensim.mot import TimeTable
 from biodance.lab.vertical import Y_UP_TO_Z_UP
 from biodance.records import Array, Plate, Wrench
 from biodance.settings import COP_FORCE
+from biodance.spatial import wrench_about_origin, wrench_about_point
 
 FOOT_MARGIN = 0.15  # m, how far a foot reaches beyond its centres of pressure
 _FARTHEST = 50.0  # m
@@ -83,7 +84,7 @@ def table_of(plates: tuple[Plate, ...], *, name: str = "ground_reactions") -> Ti
     values: list[Array] = []
     for i, plate in enumerate(plates, start=1):
         point = np.broadcast_to(plate.centre, (plate.wrench.time.size, 3))
-        torque = plate.wrench.moment - np.cross(point, plate.wrench.force)
+        torque = wrench_about_point(plate.wrench.value, point)[:, 3:]
         columns += [
             f"ground_{kind}_{i}_{part}{axis}"
             for kind, part in (("force", "v"), ("force", "p"), ("torque", ""))
@@ -138,7 +139,7 @@ def _wrench(table: TimeTable, columns: dict[str, str], where: str) -> Array:
             f"{where}: the point of application lies {far:.0f} m from the origin; it must be in metres. Export it in "
             f"metres."
         )
-    return np.hstack([force, np.cross(point, force) + torque])
+    return wrench_about_origin(np.hstack([force, torque]), point)
 
 
 def _equal_steps(time: Array, raw: dict[str, Array]) -> tuple[Array, dict[str, Array]]:

@@ -8,7 +8,7 @@ from biodance.errors import TrialRefused
 from biodance.lab.plates.corners import half_sides, plate_axes
 from biodance.lab.plates.signals import PlateReading
 from biodance.lab.plates.signs import gravity_sign, sway_sign
-from biodance.lab.plates.wrench import centre_of_pressure
+from biodance.lab.plates.wrench import centre_of_pressure, wrench_in_lab
 from biodance.records import Array, Markers, Plate, Wrench
 
 LOW = 0.15  # m above the surface: markers of a standing foot, ankle included
@@ -82,20 +82,11 @@ def oriented(
     if markers is not None and sign:
         axes, checked, warned = _under_feet(reading, wrench, time, axes, markers)
         said, warnings = (*said, *checked), (*warnings, *warned)
-    value = _in_lab(wrench, axes, sign or otherwise, reading.corners.mean(axis=0))
+    value = wrench_in_lab(wrench, axes, sign or otherwise, reading.corners.mean(axis=0))
     decisions = (*reading.decisions, *said, _sign_said(sign, otherwise))
     zero = (sign or otherwise) * axes @ reading.empty
     plate = Plate(reading.plate.name, reading.plate.type, reading.corners, Wrench(time, value), decisions, zero)
     return plate, (*reading.warnings, *warnings)
-
-
-def _in_lab(wrench: Array, axes: Array, sign: int, centre: Array) -> Array:
-    """Return the wrench about the lab origin; a mirrored ``axes`` (determinant -1) turns moments the other way round
-    than forces.
-    """
-    force = sign * wrench[:, :3] @ axes.T
-    moment = sign * np.linalg.det(axes) * wrench[:, 3:] @ axes.T
-    return np.hstack([force, moment + np.cross(centre, force)])
 
 
 def _unmirrored(reading: PlateReading, time: Array, axes: Array, markers: Markers | None) -> tuple[Array, str]:

@@ -13,7 +13,6 @@ from biodance.lab.plates.parameters import CONTENT, PlateParameters, unit_factor
 from biodance.lab.plates.signs import DEEPEST, loaded_samples, sensor_below
 from biodance.lab.plates.wrench import (
     FOUR_SENSORS,
-    about_reference,
     calibrated,
     centre_of_pressure,
     polynomial_corrected,
@@ -22,6 +21,7 @@ from biodance.lab.plates.wrench import (
 )
 from biodance.lab.plates.zero import find_baseline
 from biodance.records import Array
+from biodance.spatial import wrench_about_point
 
 _EDGE = 0.02  # m by which a centre of pressure may lie beyond the edge
 INSIDE = 0.8  # share of the loaded samples that must lie on the plate
@@ -90,7 +90,7 @@ def read_plate_signals(raw: RawC3d, plate: PlateParameters, *, metres: float, tu
 
 def _at_surface(plate: PlateParameters, sensor: Array, vector: Array, axes: Array) -> tuple[Array, tuple[str, ...]]:
     below, said = sensor_below(vector, axes)
-    wrench = about_reference(sensor, below)
+    wrench = wrench_about_point(sensor, below)
     if plate.polynomial is None:
         return wrench, (said,)
     return polynomial_corrected(wrench, plate.polynomial), (

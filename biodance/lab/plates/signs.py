@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.lab.plates.wrench import centre_of_pressure
-from biodance.lab.plates.zero import block_means, runs
-from biodance.records import Array
+from biodance.lab.plates.zero import block_means
+from biodance.records import Array, runs
 from biodance.settings import TOUCH_FORCE
 
 DEEPEST = 0.3  # m, no sensor lies farther below the surface

@@ -10,6 +10,7 @@ import numpy as np
 from biodance.lab.plates.parameters import PlateParameters
 from biodance.records import Array
 from biodance.settings import COP_FORCE
+from biodance.spatial import wrench_about_origin, wrench_about_point, zero_moment_point
 
 EIGHT_CHANNELS, TWELVE_CHANNELS = (3, 7), (6,)
 FOUR_SENSORS = EIGHT_CHANNELS + TWELVE_CHANNELS
@@ -43,9 +44,8 @@ def sensor_wrench(plate: PlateParameters, signals: Array, origin: Array) -> Arra
         force = signals[:, :3]
         far = np.abs(signals[:, 3:5]).max(axis=1, keepdims=True) > _FARTHEST
         point = np.where(far, 0.0, signals[:, 3:5])
-        turning = np.cross(np.column_stack([point, np.zeros(len(point))]), force)
-        turning[:, 2] += signals[:, 5]
-        return np.hstack([force, turning])
+        free = np.column_stack([np.zeros((len(point), 2)), signals[:, 5]])
+        return wrench_about_origin(np.hstack([force, free]), _in_surface(point))
     return signals
 
 
@@ -59,16 +59,9 @@ def surface_vector(plate: PlateParameters, origin: Array) -> Array:
     return np.array([0.0, 0.0, z]) if plate.type in FOUR_SENSORS else np.array([x, y, z])
 
 
-def about_reference(wrench: Array, vector: Array) -> Array:
-    """Return the wrench (S, 6) about the point that lies at ``vector`` (3,) m from the old one: M + F x vector."""
-    return np.hstack([wrench[:, :3], wrench[:, 3:] + np.cross(wrench[:, :3], vector)])
-
-
 def centre_of_pressure(wrench: Array) -> Array:
     """Return the centre of pressure (S, 2) m on the surface from a wrench about its centre; NaN below 20 N."""
-    loaded = np.abs(wrench[:, 2]) >= COP_FORCE
-    vertical = np.where(loaded, wrench[:, 2], np.nan)
-    return np.stack([-wrench[:, 4] / vertical, wrench[:, 3] / vertical], axis=1)
+    return zero_moment_point(wrench, threshold=COP_FORCE)[:, :2]
 
 
 def polynomial_corrected(wrench: Array, polynomial: Array) -> Array:
@@ -84,10 +77,22 @@ def polynomial_corrected(wrench: Array, polynomial: Array) -> Array:
     for i, p in enumerate(polynomial):
         own, other = point[:, i], point[:, 1 - i] ** 2
         wrong[:, i] = (p[0] * other**2 + p[1] * other + p[2]) * own**3 + (p[3] * other**2 + p[4] * other + p[5]) * own
-    shift = np.nan_to_num(-wrong / 1000)
-    return np.hstack(
-        [wrench[:, :3], wrench[:, 3:] + np.cross(np.column_stack([shift, np.zeros(len(shift))]), wrench[:, :3])]
-    )
+    return wrench_about_point(wrench, _in_surface(np.nan_to_num(wrong / 1000)))
+
+
+def wrench_in_lab(wrench: Array, axes: Array, sign: int, centre: Array) -> Array:
+    """Return a plate's wrench (S, 6) about its ``centre`` (3,) m as the wrench about the lab origin.
+
+    ``axes`` (3, 3) lab_R_plate; mirrored ones (determinant -1) turn moments the other way round than forces.
+    """
+    force = sign * wrench[:, :3] @ axes.T
+    moment = sign * np.linalg.det(axes) * wrench[:, 3:] @ axes.T
+    return wrench_about_origin(np.hstack([force, moment]), centre)
+
+
+def _in_surface(point: Array) -> Array:
+    """Return points (S, 2) m of the surface as points (S, 3) m in plate axes."""
+    return np.column_stack([point, np.zeros(len(point))])
 
 
 def _sums(c: Array) -> tuple[tuple[Array, ...], tuple[Array, ...], tuple[Array, ...]]:

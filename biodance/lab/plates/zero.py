@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from biodance.records import Array
+from biodance.records import Array, runs
 
 _BLOCK = 0.04  # s: the force is judged in means over two periods of the mains
 _NEAR = 20.0  # N, readings this close to the unloaded end of the trial belong to it
@@ -83,12 +82,6 @@ def block_means(values: Array, rate: float, *, length: float = _BLOCK) -> tuple[
     size = min(max(1, round(length * rate)), values.size)
     count = values.size // size
     return values[: count * size].reshape(count, size).mean(axis=1), size
-
-
-def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return start and stop (exclusive) of every run of True."""
-    steps = np.diff(np.concatenate([[0], mask.astype(int), [0]]))
-    return list(zip(np.flatnonzero(steps == 1).tolist(), np.flatnonzero(steps == -1).tolist(), strict=True))
 
 
 def _written(vertical: Array, zero: tuple[int, int] | None) -> tuple[Baseline | None, str]:

@@ -23,9 +23,9 @@ from biodance.motion.contact.footing import (
     resting,
     speeds,
 )
-from biodance.motion.contact.soles import FEET, Soles
+from biodance.motion.contact.soles import Soles
 from biodance.motion.dynamics import distribute
-from biodance.records import Array, Trial, Wrench
+from biodance.records import SIDES, Array, Trial, Wrench
 from biodance.settings import ContactRules
 
 _Mask = NDArray[np.bool_]
@@ -109,7 +109,7 @@ def _faults(trial: Trial, place: Footing, touching: _Mask, rests: _Mask, load: _
         ("no plate is loaded", np.logical_not(load.any(axis=1))),
         ("a plate's force is unknown", np.logical_not(np.isfinite(trial.wrench.value).all(axis=1))),
     ]
-    for foot, side in enumerate(FEET):
+    for foot, side in enumerate(SIDES):
         apart = touching[:, foot] & ~place.covered[:, foot]
         hidden = place.unseen[:, foot]
         faults.append((f"the {side} foot was not seen", hidden))
@@ -125,7 +125,7 @@ def _faults(trial: Trial, place: Footing, touching: _Mask, rests: _Mask, load: _
     for index, plate in enumerate(trial.plates):
         on = place.on_plate[:, :, index]
         faults.append((f"{plate.name} is loaded but no foot is over it", load[:, index] & ~on.any(axis=1)))
-        for foot, side in enumerate(FEET):
+        for foot, side in enumerate(SIDES):
             alone = on[:, foot] & (place.on_plate[:, foot].sum(axis=1) == 1)
             faults.append(
                 (

@@ -4,10 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.lab.filters import runs
 from biodance.motion.contact.contact import Contact
-from biodance.motion.contact.soles import FEET
-from biodance.records import Wrench
+from biodance.records import SIDES, Wrench, runs
 
 _THRESHOLD = 20.0
 """N of vertical force from which a foot counts as down (Zeni et al. 2008, doi:10.1016/j.gaitpost.2007.07.007, use
@@ -46,7 +44,7 @@ def foot_events(feet: tuple[Wrench, Wrench], contact: Contact) -> tuple[FootEven
                 continue
             share = (_THRESHOLD - force[i]) / (force[i + 1] - force[i])
             time = wrench.time[i] + np.clip(share, 0, 1) * (wrench.time[i + 1] - wrench.time[i])
-            found.append(FootEvent(float(time), FEET[foot], bool(loaded[i + 1])))
+            found.append(FootEvent(float(time), SIDES[foot], bool(loaded[i + 1])))
     return tuple(sorted(found, key=lambda event: event.time))
 
 

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.lab.filters import runs
-from biodance.motion.contact.soles import FEET, Soles
-from biodance.records import Array, Plate, Trial
+from biodance.motion.contact.soles import Soles
+from biodance.records import SIDES, Array, Plate, Trial, runs
 
 if TYPE_CHECKING:
     pass
@@ -183,7 +182,7 @@ def find_surfaces(trial: Trial, soles: Soles, rests: _Mask2, load: _Mask2, *, we
     total = trial.wrench.force[:, 2]
     bare: list[float] = []
     notes: list[str] = []
-    for foot, side in enumerate(FEET):
+    for foot, side in enumerate(SIDES):
         lifted = 0
         for start, stop in runs(rests[:, foot]):
             span = slice(start, stop)

@@ -8,9 +8,8 @@ from biodance.body.body import Body
 from biodance.errors import TrialRefused
 from biodance.lab.markers.sets import MarkerSet, landmark
 from biodance.motion.kinematics import poses
-from biodance.records import Array, Markers, Motion, frozen_array
+from biodance.records import SIDES, Array, Markers, Motion, frozen_array
 
-FEET = ("right", "left")
 OUTLINE = np.array([[0.0, 0.17], [0.0, -0.17], [0.6, -0.21], [1.0, -0.23], [1.25, 0.0], [1.0, 0.23], [0.6, 0.21]])
 """(P, 2) outline of a sole, in units of the horizontal distance from the heel to the toe marker: forwards from the heel
 marker, and to the left. From foot length 0.152, breadth 0.055 and heel breadth 0.040 of stature (Winter 2009; ANSUR II
@@ -53,7 +52,7 @@ def soles_from_markers(markers: Markers, marker_set: MarkerSet) -> Soles:
         The recording lacks a heel or a toe marker.
     """
     feet = []
-    for side in FEET:
+    for side in SIDES:
         heel, toe = (landmark(markers, marker_set, f"{side}_{name}") for name in ("heel", "toe"))
         if heel is None or toe is None:
             raise TrialRefused(
@@ -74,14 +73,14 @@ def soles_from_body(body: Body, motion: Motion) -> Soles:
     TrialRefused
         The body has no right or no left foot, or the two outlines have different numbers of points.
     """
-    absent = [side for side in FEET if side not in body.feet]
-    if absent or len({body.feet[side].outline.shape for side in FEET}) > 1:
+    absent = [side for side in SIDES if side not in body.feet]
+    if absent or len({body.feet[side].outline.shape for side in SIDES}) > 1:
         raise TrialRefused(
             f"The body {body.name} lacks two feet with outlines of equally many points, so its ground contact is "
             f"unknown."
         )
     pose = poses(body, motion.q)
     feet = [
-        pose.points([body.feet[side].segment] * len(body.feet[side].outline), body.feet[side].outline) for side in FEET
+        pose.points([body.feet[side].segment] * len(body.feet[side].outline), body.feet[side].outline) for side in SIDES
     ]
     return Soles(motion.time, np.stack(feet, axis=1))

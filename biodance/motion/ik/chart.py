@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.body.body import NO_SEGMENT, Body
-from biodance.motion.quaternion import continuous, normalised
+from biodance.body.body import Body
+from biodance.body.parts import NO_SEGMENT
 from biodance.records import Array, Index
+from biodance.spatial import continuous_quaternion, unit_quaternion
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +48,18 @@ def ball_quaternion(angles: Array, sign: Array) -> Array:
     (s1, s2, s3), (c1, c2, c3) = np.sin(half), np.cos(half)
     c23, s23, sc, cs = c2 * c3, s2 * s3, s2 * c3, c2 * s3
     return np.stack([s1 * c23 + c1 * s23, c1 * sc - s1 * cs, c1 * cs + s1 * sc, c1 * c23 - s1 * s23])
+
+
+def continued(quaternion: Array) -> Array:
+    """Return unit quaternions (4, ..., B), components first, of ``quaternion`` (4, ..., B) without jumps of sign along
+    the last axis.
+    """
+    last = np.moveaxis(quaternion, 0, -1)
+    return np.moveaxis(continuous_quaternion(unit_quaternion(last)), -1, 0)
+
+
+def _unit(quaternion: Array) -> Array:
+    return np.moveaxis(unit_quaternion(np.moveaxis(quaternion, 0, -1)), -1, 0)
 
 
 def ball_angles(quaternion: Array, sign: Array, near: Array, lower: Array, upper: Array) -> Array:
@@ -122,8 +135,8 @@ class Chart:
         along them).
         """
         angles = q[7:] if self.n_root else q
-        root = continuous(q[3:7]) if self.n_root else q[:0]
-        ball = continuous(ball_quaternion(self.joints.angles_of(angles), self.joints.sign))
+        root = continued(q[3:7]) if self.n_root else q[:0]
+        ball = continued(ball_quaternion(self.joints.angles_of(angles), self.joints.sign))
         return Smooth(q[:3] if self.n_root else q[:0], root, ball, np.unwrap(angles[self.single], axis=-1))
 
     def split(self, stacked: Array) -> Smooth:
@@ -138,12 +151,10 @@ class Chart:
         """
         angles = np.empty_like(near)
         angles[self.single] = smooth.angle
-        ball = ball_angles(
-            normalised(smooth.ball), self.joints.sign, self.joints.angles_of(near), self.lower, self.upper
-        )
+        ball = ball_angles(_unit(smooth.ball), self.joints.sign, self.joints.angles_of(near), self.lower, self.upper)
         for k in range(3):
             angles[self.joints.first + k] = ball[k]
-        return np.concatenate([smooth.place, normalised(smooth.root), angles]) if self.n_root else angles
+        return np.concatenate([smooth.place, _unit(smooth.root), angles]) if self.n_root else angles
 
 
 def chart_of(body: Body) -> Chart:

@@ -13,13 +13,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.body.body import Body, JointError
+from biodance.body.body import Body
 from biodance.body.human.scaling import Scaling
 from biodance.body.human.skeleton import JOINTS
+from biodance.body.parts import JointError
 from biodance.body.tables.error_sizes import error_size
 from biodance.errors import TrialRefused
 from biodance.motion.ik.inverse_kinematics import FrameStatus, solve_ik
 from biodance.motion.ik.joint_unknowns import HINGES, SIZE, JointUnknowns, own_centre, own_turn
+from biodance.motion.ik.shown_joints import contradicted, doubted, excited, own_unknowns
 from biodance.motion.kinematics import chains, jacobian, poses
 from biodance.records import Array, Markers
 
@@ -29,10 +31,6 @@ _ALIKE = 8.0
 """s of movement that count as one independent posture, because skin slides with the posture and neighbours err alike.
 On virtual dances the places are the same from 1 to 16 s, their standard deviations are true at 8 s; in real walks of 2
 s less than 1 s moves joints by decimetres.
-"""
-EXCITED = 0.3
-"""Share of a joint's prior standard deviation that the movement must remove; below it the static trial's answer is
-kept, because what little the markers say of such a joint is soft tissue.
 """
 NO_FIXED_POINT = ("shoulder", "trunk")
 """Joints of which no fixed point of the trunk gives the centre: what the table says of that is added to their standard
@@ -87,18 +85,17 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> Functional
     body = scaling.body()[0]
     postures = spread_postures(trials, body.markers.names)
     seconds = sum(one.time.size / one.rate for one in trials if one.time.size > 1)
-    placed, found = _placed(scaling, postures, seconds)
-    joint, far = _farthest(scaling, found)
+    placed, (joint, far) = _placed(scaling, postures, seconds)
     if far <= _FAR:
         return placed
     near, left_out, better = _FAR, "", placed
     for name in _beside(body, joint):
         try:
-            tried, found = _placed(scaling, _without(postures, name), seconds)
+            tried, (_, left) = _placed(scaling, _without(postures, name), seconds)
         except TrialRefused:  # this marker cannot be spared
             continue
-        if _farthest(scaling, found)[1] <= near:
-            near, left_out, better = _farthest(scaling, found)[1], name, tried
+        if left <= near:
+            near, left_out, better = left, name, tried
     if not left_out:
         return placed
     note = (
@@ -118,16 +115,26 @@ def _without(postures: Markers, name: str) -> Markers:
     return replace(postures, xyz=xyz)
 
 
-def _placed(scaling: Scaling, postures: Markers, seconds: float) -> tuple[FunctionalJoints, CalibrationState]:
-    """Return the joints that ``postures`` from so many ``seconds`` of movement show, and the unknowns found."""
+def _placed(scaling: Scaling, postures: Markers, seconds: float) -> tuple[FunctionalJoints, tuple[str, float]]:
+    """Return the joints that ``postures`` from so many ``seconds`` of movement show or contradict, and the joint that
+    then lies farthest from its place.
+    """
     skin = error_size("soft_tissue", "marker")
     fresh = evaluate_joints(scaling, postures, np.zeros(SIZE), None, noise=skin)
     alike = max(1.0, postures.time.size * _ALIKE / seconds)
     noise = max(skin, fresh.rms / np.sqrt(3)) * np.sqrt(alike)
     start = evaluate_joints(scaling, postures, np.zeros(SIZE), fresh.q, noise=noise)
-    shown = excited(scaling, start)
+    shown = excited(scaling.centres, start.theta, start.information)
     found = fit_joints(scaling, postures, start, shown, noise=noise)
-    return _told(scaling, start, found, shown), found
+    wrong = contradicted(found.information, found.gradient, shown)
+    if wrong:
+        scaling = replace(scaling, centres=doubted(scaling.centres, wrong))
+        for joint in wrong:
+            shown[own_unknowns(joint)] = True
+        found = fit_joints(
+            scaling, postures, evaluate_joints(scaling, postures, found.theta, found.q, noise=noise), shown, noise=noise
+        )
+    return _told(scaling, start, found, shown), _farthest(scaling, found)
 
 
 def _farthest(scaling: Scaling, found: CalibrationState) -> tuple[str, float]:
@@ -211,24 +218,6 @@ def _left_open(coordinates: Array, slope: Array) -> Array:
     )
 
 
-def excited(scaling: Scaling, at: CalibrationState) -> NDArray[np.bool_]:
-    """Return (37,) True for the unknowns of the joints of whose standard deviation the movement removes the share
-    ``EXCITED``.
-
-    A hinge is judged by its axis.
-    """
-    slope = JointUnknowns(scaling.centres).prior(at.theta)[1]
-    before, after = (np.sqrt(np.diag(np.linalg.inv(information))) for information in (slope.T @ slope, at.information))
-    out = np.zeros(SIZE, dtype=bool)
-    for joint in JOINTS:
-        judged = [own_turn(joint)] if joint in HINGES else list(range(SIZE))[own_centre(joint)]
-        shown = np.linalg.norm(after[judged]) < (1 - EXCITED) * np.linalg.norm(before[judged])
-        out[own_centre(joint)] = shown
-        if joint in HINGES:
-            out[own_turn(joint)] = shown
-    return out
-
-
 def fit_joints(
     scaling: Scaling, postures: Markers, start: CalibrationState, shown: NDArray[np.bool_], *, noise: float
 ) -> CalibrationState:
@@ -258,7 +247,10 @@ def _told(
     kept = tuple(joint for joint in JOINTS if not shown[own_centre(joint)].any())
     moved = {joint: float(np.linalg.norm(found.theta[own_centre(joint)])) for joint in JOINTS if joint not in kept}
     axis = {hinge: float(deviation[own_turn(hinge)]) for hinge in HINGES}
-    errors = tuple(JointError(joint, _centre_sd(joint, deviation), axis.get(joint, 0.0)) for joint in moved)
+    wrong = scaling.centres.contradicted
+    errors = tuple(
+        JointError(joint, _centre_sd(joint, deviation), axis.get(joint, 0.0), joint in wrong) for joint in moved
+    )
     turned = {hinge: float(found.theta[own_turn(hinge)]) for hinge in HINGES if hinge not in kept}
     notes = []
     if moved:
@@ -271,9 +263,18 @@ def _told(
     if kept:
         names = ", ".join(joint.replace("_", " ") for joint in kept)
         notes.append(f"Joints that the movement does not show, kept where the static trial puts them: {names}.")
+    notes += [_contradiction(joint, moved[joint]) for joint in wrong]
     centres = replace(JointUnknowns(scaling.centres).moved(found.theta), errors=errors)
     placed = replace(scaling, centres=centres, notes=(*scaling.notes, *notes))
     return FunctionalJoints(placed, moved, turned, errors, kept, (start.rms, found.rms), tuple(notes))
+
+
+def _contradiction(joint: str, far: float) -> str:
+    """Return what is said of a joint that the movement puts ``far`` m away from the static trial's place."""
+    return (
+        f"Warning: the movement contradicts the static trial about the {joint.replace('_', ' ')}: it turns about a "
+        f"point {1e3 * far:.0f} mm away, and is placed there. Check the markers from which the static trial placed it."
+    )
 
 
 def _centre_sd(joint: str, deviation: Array) -> float:

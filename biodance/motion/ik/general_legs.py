@@ -14,8 +14,8 @@ from biodance.body.body import Body
 from biodance.errors import BiodanceError
 from biodance.motion.ik.compiled.leg_closure import LegJoints, close_leg, lead, scratch
 from biodance.motion.ik.legs import soft_limit
-from biodance.motion.kinematics import axis_rotation
 from biodance.records import Array
+from biodance.spatial import axis_rotation
 
 KNEE = 3
 """Place of the knee among the six joints."""

@@ -10,8 +10,9 @@ from biodance.body.body import Body
 from biodance.body.human.skeleton import JOINTS
 from biodance.body.human.static_centres import Centres
 from biodance.body.tables.error_sizes import error_size, joint_size
-from biodance.motion.kinematics import Poses, axis_rotation, below, chains, poses, skew
+from biodance.motion.kinematics import Poses, below, chains, poses
 from biodance.records import Array
+from biodance.spatial import axis_rotation, skew
 
 HINGES = ("right_knee", "left_knee", "right_elbow", "left_elbow")
 ABOVE = {"knee": "hip", "elbow": "shoulder"}
@@ -22,11 +23,19 @@ the bone above it.
 """
 
 
-def centre_sd(joint: str) -> float:
+_CONTRADICTED = 3.0
+"""Times its standard deviation by which a centre that the movement contradicts may be off: such an error is a fault,
+and faults are as rare and as large as the diagnosis takes them (`biodance.diagnosis.candidates.SCALE`).
+"""
+
+
+def centre_sd(joint: str, *, contradicted: bool = False) -> float:
     """Return the standard deviation (m per axis) of a ``joint``'s centre as the static trial places it, before any
-    movement; of a hinge about the place that its lateral marker and its axis give it.
+    movement; of a hinge about the place that its lateral marker and its axis give it; wider where the movement has
+    ``contradicted`` that place.
     """
-    return hinge_sd() if joint in HINGES else joint_size("joint_centre", joint)
+    usual = hinge_sd() if joint in HINGES else joint_size("joint_centre", joint)
+    return _CONTRADICTED * usual if contradicted else usual
 
 
 def hinge_sd() -> float:
@@ -64,15 +73,16 @@ class JointUnknowns:
         """
         residual, slope = np.empty(SIZE), np.zeros((SIZE, SIZE))
         for joint in JOINTS:
-            rows, sd = own_centre(joint), centre_sd(joint)
+            rows, sd = own_centre(joint), centre_sd(joint, contradicted=joint in self.centres.contradicted)
             residual[rows] = theta[rows] / sd
             slope[rows, rows] = np.eye(3) / sd
         for hinge in HINGES:
             rows, k, sd = own_centre(hinge), own_turn(hinge), self.centres.axis_sd[hinge]
             arm = self.centres.place[hinge] - self.centres.lateral[hinge]
             swung = self._turn(hinge, theta) @ arm
-            residual[rows] -= (swung - arm) / hinge_sd()
-            slope[rows, k] = -np.cross(self.bone(hinge), swung) / hinge_sd()
+            about = centre_sd(hinge, contradicted=hinge in self.centres.contradicted)
+            residual[rows] -= (swung - arm) / about
+            slope[rows, k] = -np.cross(self.bone(hinge), swung) / about
             residual[k], slope[k, k] = theta[k] / sd, 1 / sd
         return residual, slope
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.motion.kinematics import axis_rotation
 from biodance.records import Array
+from biodance.spatial import axis_rotation
 
 LEG = ("hip_flexion", "hip_adduction", "hip_rotation", "knee_flexion", "ankle_dorsiflexion", "ankle_inversion")
 

@@ -2,6 +2,7 @@
 Fz Mx My Mz.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from biodance.diagnosis.diagnosis import Alias, Finding, Gain, Unobservable
 from biodance.diagnosis.foresight import Foresight
 from biodance.identification.identification import Identification
 from biodance.pipeline.diagnosis import SessionDiagnosis
+from biodance.records.attention import Attention, Judged
 
 
 def _alias(one: Alias) -> dict[str, Any]:
@@ -27,6 +29,19 @@ def _gain(found: Gain | None) -> dict[str, Any] | None:
         "log_density_per_s": found.score,
         "log_density_se": found.score_se,
     }
+
+
+def attention_document(found: Sequence[Attention]) -> list[dict[str, Any]]:
+    """Return what a person must see, strongest first."""
+    return [{"level": one.level, "text": one.text, "trial": one.trial, "about": one.about} for one in found]
+
+
+def judged_document(found: Sequence[Judged]) -> list[dict[str, Any]]:
+    """Return what a verdict rests on, and of what it does not why; ``missed``: it should have."""
+    return [
+        {"trial": one.trial, "seconds": one.seconds, "why_not": one.why_not or None, "missed": one.missed}
+        for one in found
+    ]
 
 
 def _finding(one: Finding) -> dict[str, Any]:
@@ -85,14 +100,27 @@ def diagnosis_document(found: SessionDiagnosis) -> dict[str, Any]:
     """Return all that the diagnosis found; null where a number is not finite (a limit of null: never seen)."""
     one = found.diagnosis
     return {
+        "attention": attention_document(one.attention),
+        "judged": judged_document(one.judged),
         "verdict": one.verdict,
         "findings": [_finding(finding) for finding in one.findings],
+        "resembles": [_finding(finding) for finding in one.resembles],
+        "within_tolerance": [_finding(finding) for finding in one.tolerated],
         "gates": [
             {"check": g.check, "ok": g.ok, "text": g.text, "effect": g.effect, "target": g.target, "size": g.size}
             for g in one.gates
         ],
         "adequacy": [
-            {"channel": a.channel, "band_hz": a.band_hz, "z": a.z, "trial": a.trial, "around_s": a.second}
+            {
+                "channel": a.channel,
+                "band_hz": a.band_hz,
+                "z": a.z,
+                "size": a.size,
+                "unit": a.unit,
+                "matters": a.matters,
+                "trial": a.trial,
+                "around_s": a.second,
+            }
             for a in one.adequacy
         ],
         "unobservable": [_limit(row) for row in one.unobservable],

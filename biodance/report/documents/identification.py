@@ -8,6 +8,7 @@ import numpy as np
 from biodance.identification.added_mass import LoadSearch
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import Known
+from biodance.identification.load_words import say_load
 from biodance.identification.sessions import Difference
 from biodance.identification.torques import TorqueBands
 from biodance.identification.validation import ResidualRatio, TrialValidation
@@ -76,11 +77,13 @@ def _gain(found: ResidualRatio | None) -> dict[str, Any] | None:
 
 
 def added_mass_document(search: LoadSearch) -> dict[str, Any] | None:
-    """Return the load that is announced; None where none is."""
+    """Return the load that is announced, its place in the segment's joint frame; None where none is."""
     if not search.found:
         return None
     best = search.best
     return {
+        "status": search.status,
+        "text": say_load(search),
         "segment": best.segment,
         "kg": best.mass,
         "sd_kg": best.sd,
@@ -100,13 +103,22 @@ def _search(search: LoadSearch) -> dict[str, Any]:
             "segment": suspect.segment,
             "kg": suspect.mass,
             "sd_kg": suspect.sd,
+            "ci95_kg": suspect.interval,
             "probability": suspect.probability,
             "log_bayes_factor": suspect.log_bayes_factor,
             "smallest_detectable_kg": suspect.smallest,
         }
         for suspect in search.suspects
     ]
-    return {"reference": search.reference, "p_none": search.p_no_load, "announced": search.found, "segments": rows}
+    return {
+        "status": search.status,
+        "text": say_load(search),
+        "doubts": search.doubts,
+        "reference": search.reference,
+        "p_none": search.p_no_load,
+        "announced": search.found,
+        "segments": rows,
+    }
 
 
 def _difference(row: Difference) -> dict[str, Any]:
@@ -151,9 +163,10 @@ def identification_document(found: SessionIdentification) -> dict[str, Any]:
 
     CoM in the segment's axes from its proximal joint centre; inertia about the CoM, order xx xy yy xz yz zz; validation
     moments about ``about_m``, the mean centre of pressure. ``added_mass`` null: no load is announced;
-    ``added_mass_search`` says what was looked for; ``joint_torques`` of one trial with what the parameters leave
-    uncertain (not this trial's own skin and plates); ``differences`` to the reference session, empty without one.
-    ``failures`` what could not be computed, with cause and cure; after a failed fit (``status``) there are no segments.
+    ``added_mass_search`` says what was looked for and whether one is "found", there is "none" or one "cannot tell";
+    ``joint_torques`` of one trial with what the parameters leave uncertain (not this trial's own skin and plates);
+    ``differences`` to the reference session, empty without one. ``failures`` what could not be computed, with cause and
+    cure; after a failed fit (``status``) there are no segments.
     """
     one = found.identification
     return {

@@ -8,7 +8,8 @@ import numpy as np
 
 from biodance.motion.comparison import Agreement
 from biodance.pipeline.provenance import Provenance
-from biodance.pipeline.results import QuietStanding, SessionResult, TrialResult, WrenchComparison
+from biodance.pipeline.results import SessionResult
+from biodance.pipeline.trial_result import QuietStanding, TrialResult, WrenchComparison
 from biodance.records import CHANNELS, Plate
 from biodance.report.documents.identification import added_mass_document, agreement, identification_document
 

@@ -9,7 +9,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.display import BLACK, BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY
 from biodance.motion.kinematics import poses
-from biodance.records import Array
+from biodance.records import SIDES, Array
 from biodance.report.figures.style import FIGURE_WIDTH, SIDE_COLOURS, figure, look
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def stick_lines(body: Body, q: Array) -> tuple[Array, tuple[str, ...]]:
             ends.append(_tip(body, pose.rotation[:, i], pose.position[:, i], i))
         for end in ends:
             lines.append(np.stack([pose.position[:, i], end], axis=1))
-            sides.append(next((side for side in ("right", "left") if name.startswith(side)), "middle"))
+            sides.append(next((side for side in SIDES if name.startswith(side)), "middle"))
     return np.stack(lines, axis=1), tuple(sides)
 
 

@@ -9,8 +9,7 @@ from biodance.identification.identification import Identification
 from biodance.identification.knowledge import mass_interval
 from biodance.identification.torques import TorqueBands
 from biodance.identification.validation import TrialValidation
-from biodance.lab.filters import runs
-from biodance.records import CHANNELS
+from biodance.records import CHANNELS, runs
 from biodance.report.figures.session import LEAST, TITLES
 from biodance.report.figures.style import figure, look
 

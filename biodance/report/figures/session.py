@@ -5,9 +5,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from biodance.display import BLACK, GREEN, GREY, RED, SKY
-from biodance.lab.filters import runs
-from biodance.pipeline.results import MarkerFit, QuietStanding, WrenchComparison
-from biodance.records import CHANNELS, Array
+from biodance.pipeline.trial_result import MarkerFit, QuietStanding, WrenchComparison
+from biodance.records import CHANNELS, Array, runs
 from biodance.report.figures.style import SIDE_COLOURS, figure, look
 
 if TYPE_CHECKING:

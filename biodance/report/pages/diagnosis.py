@@ -6,7 +6,7 @@ import sys
 from dataclasses import dataclass
 from importlib.resources import files
 
-from biodance.diagnosis.diagnosis import Diagnosis, Estimate
+from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Estimate
 from biodance.effects import discrete_effects, effects
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.provenance import Provenance
@@ -14,7 +14,7 @@ from biodance.pipeline.results import SessionResult
 from biodance.records import CHANNELS
 from biodance.report.figures.diagnosis import adequacy_figure, left_figure, limits_figure
 from biodance.report.figures.style import svg_address
-from biodance.report.wording import format_number
+from biodance.report.wording import format_number, place
 
 _SHOWN = {"m": (1000.0, "mm", 0), "rad": (57.29578, "°", 1), "s": (1000.0, "ms", 1), "1": (100.0, "%", 1)}
 """Unit of a parameter: factor, unit and digits that are shown."""
@@ -74,27 +74,8 @@ _CERTAIN = 14.0
 
 
 def answer(one: Diagnosis) -> str:
-    """Return the verdict as one or two plain sentences."""
-    what = " and ".join(named(finding.effect, finding.target) for finding in one.findings)
-    worst = one.adequacy[0] if one.adequacy else None
-    where = ""
-    if worst:
-        low, high = worst.band_hz
-        where = (
-            f"{worst.channel}, movement of {low:g} to {high:g} Hz, most in trial {worst.trial} around "
-            f"{worst.second:.1f} s"
-        )
-    return {
-        "nothing wrong": "Nothing wrong was found: what the simulation misses is what it misses in any session "
-        "without a fault. "
-        "Faults below the sizes at the end of this page would not have been seen.",
-        "named, complete": f"Found: {what}. With it accepted, what is left is no more than in any session without a "
-        f"fault.",
-        "named, incomplete": f"Found: {what}. Something more is wrong that no known cause explains"
-        + (f" ({where})." if where else "."),
-        "unexplained": f"Something is wrong that no known cause explains. It shows most in {where}."
-        + (f" Part of it looks like {what}, which is not enough." if what else ""),
-    }[one.verdict]
+    """Return the verdict as one or two plain sentences, with what it rests on."""
+    return next((said.text for said in one.attention if said.about == ABOUT), f"{one.told[:1].upper()}{one.told[1:]}.")
 
 
 def odds(log_bayes_factor: float) -> str:
@@ -154,6 +135,7 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
         result=result,
         one=one,
         answer=answer(one),
+        others=[(place(said), said.text) for said in one.attention if said.about != ABOUT],
         failures={**result.failures, **found.failures},
         provenance=provenance,
         channels=list(zip(CHANNELS, ("N",) * 3 + ("N·m",) * 3, strict=True)),

@@ -3,6 +3,7 @@
 from importlib.resources import files
 
 from biodance.identification.knowledge import QUANTITIES
+from biodance.identification.load_words import say_load
 from biodance.pipeline.identification import SessionIdentification
 from biodance.records import CHANNELS
 from biodance.report.documents.identification import information_share, segment_rows, torques_document
@@ -52,5 +53,6 @@ def identification_section(found: SessionIdentification) -> str:
         torque_rows=(torques_document(found.torques) or {}).get("joints", []),
         torque_image=svg_address(torque_figure(found.torques)) if found.torques and drawn_joints(found.torques) else "",
         search=found.search,
+        load=say_load(found.search),
         changes=[row for row in found.changes if row.quantity == "mass"],
     )

@@ -4,14 +4,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 
+from biodance.diagnosis.diagnosis import ABOUT
 from biodance.lab.markers.gaps import MarkerGaps
 from biodance.pipeline.provenance import Provenance
-from biodance.pipeline.results import Check, SessionResult, TrialResult
+from biodance.pipeline.results import SessionResult
+from biodance.pipeline.trial_result import Check, TrialResult
 from biodance.records import CHANNELS
+from biodance.records.attention import Attention
 from biodance.report.figures.session import marker_figure, standing_figure, wrench_figure
 from biodance.report.figures.style import svg_address
 from biodance.report.pages.identification import identification_section
-from biodance.report.wording import attention, format_number, millimetres
+from biodance.report.wording import format_number, millimetres, place
 
 STATUS_WORDS = {"ok": "done", "warning": "look here", "refused": "refused"}
 
@@ -71,8 +74,16 @@ def _trial_part(result: TrialResult) -> TrialPart:
     )
 
 
-def page(result: SessionResult, provenance: Provenance, *, stills: Sequence[str] = (), diagnosis: str = "") -> str:
-    """Return the page of ``result`` as HTML text; ``stills`` are the addresses of its 3-D images (`still`, then
+def page(
+    result: SessionResult,
+    provenance: Provenance,
+    *,
+    attention: Sequence[Attention] = (),
+    stills: Sequence[str] = (),
+    diagnosis: str = "",
+) -> str:
+    """Return the page of ``result`` as HTML text; ``attention`` what a person must see first, ``stills``
+    are the addresses of its 3-D images (`still`, then
     `more_stills`), ``diagnosis`` the section on what the simulation gets wrong, "" for none.
 
     The same arguments give the same characters.
@@ -85,7 +96,7 @@ def page(result: SessionResult, provenance: Provenance, *, stills: Sequence[str]
     folder = files("biodance.report") / "templates"
     return environment.from_string((folder / "page.html.j2").read_text(encoding="utf-8")).render(
         style=Markup((folder / "page.css").read_text(encoding="utf-8")),
-        attention=attention(result),
+        attention=[(place(one), one.text) for one in sorted(attention, key=lambda one: one.about != ABOUT)],
         check_table=check_table(result),
         result=result,
         provenance=provenance,

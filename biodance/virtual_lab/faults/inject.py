@@ -14,13 +14,13 @@ from biodance.lab.c3d.layout import Layout, read_layout
 from biodance.lab.c3d.parameters import DEC, MIPS, floats, integers, read_header, read_parameters
 from biodance.lab.c3d.raw import RawC3d, read_raw
 from biodance.lab.c3d.units import metres_per_unit
+from biodance.lab.c3d.vertical import turn_to_z_up
 from biodance.lab.c3d.write import PlateRecording
 from biodance.lab.plates.corners import plate_axes
 from biodance.lab.plates.parameters import PlateParameters, count_plates, plate_parameters, unit_factors
 from biodance.lab.plates.signs import gravity_sign, sensor_below
-from biodance.lab.vertical import turn_to_z_up
 from biodance.records import Array, Markers
-from biodance.virtual_lab.laboratory import Fault, Recording
+from biodance.virtual_lab.recording.laboratory import Fault, Recording
 
 
 @dataclass(frozen=True, eq=False)

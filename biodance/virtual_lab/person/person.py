@@ -6,13 +6,13 @@ from types import MappingProxyType
 
 import numpy as np
 
-from biodance.body.body import Body, Foot, JointLimits
+from biodance.body.body import Body
+from biodance.body.parts import Foot, JointLimits
 from biodance.errors import BiodanceError, UnknownName
-from biodance.records import Array, Sip, Subject, frozen_array
-from biodance.virtual_lab.flesh import draw_sip, of_parameters, parameters_of_inertia, true_pseudo_inertia
-from biodance.virtual_lab.placement import glue_markers
-from biodance.virtual_lab.randomness import stream
-from biodance.virtual_lab.skeleton import (
+from biodance.records import SIDES, Array, Sip, Subject, frozen_array
+from biodance.virtual_lab.person.flesh import draw_sip, of_parameters, parameters_of_inertia, true_pseudo_inertia
+from biodance.virtual_lab.person.placement import glue_markers
+from biodance.virtual_lab.person.skeleton import (
     LIMITS_DEGREES,
     TRUE_SEGMENTS,
     Proportions,
@@ -20,6 +20,7 @@ from biodance.virtual_lab.skeleton import (
     draw_proportions,
     on_side,
 )
+from biodance.virtual_lab.randomness import stream
 from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances
 
 
@@ -98,7 +99,7 @@ class Person:
 
 NO_SHIFTS: Mapping[str, Array] = MappingProxyType({})
 _BEYOND = {"hip": "thigh", "knee": "shank", "ankle": "foot", "shoulder": "upper_arm"}
-MOVABLE = (*(f"{side}_{joint}" for side in ("right", "left") for joint in _BEYOND), "lumbar", "neck")
+MOVABLE = (*(f"{side}_{joint}" for side in SIDES for joint in _BEYOND), "lumbar", "neck")
 """Joints whose true centre can be moved."""
 
 
@@ -145,7 +146,7 @@ def make_person(
         glue_markers(size, seed, session, error=t.marker_placement),
         boxes,
         boxes,
-        {side: _sole(size, side) for side in ("right", "left")},
+        {side: _sole(size, side) for side in SIDES},
     )
     return Person(subject, seed, size, body, _habits(size, seed), tuple(loads))
 
@@ -201,7 +202,7 @@ def _habits(size: Proportions, seed: int) -> Habits:
     for name, (mean, sd) in mean_sd.items():
         value = float(np.radians(mean + sd * rng.normal()))
         both = name.startswith(("wrist", "forearm"))
-        angles |= {f"{side}_{name}": value for side in ("right", "left")} if both else {name: value}
+        angles |= {f"{side}_{name}": value for side in SIDES} if both else {name: value}
     stance = 0.115 * size["stature"] * (1 + 0.08 * rng.normal())
     right, left = np.radians(7.0 + 2.5 * rng.normal(size=2))
     return Habits(angles, float(stance), (float(right), float(left)))

@@ -9,15 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.records import Array
-from biodance.virtual_lab.protocol import FIELDS, STAND, ProtocolPosture, ProtocolStep, TrialPlan
+from biodance.records import SIDES, Array
+from biodance.virtual_lab.movement.protocol import FIELDS, STAND, ProtocolPosture, ProtocolStep, TrialPlan
 from biodance.virtual_lab.randomness import smooth_noise
 
 COLUMNS = {
     name: slice(sum(map(len, list(FIELDS.values())[:i])), sum(map(len, list(FIELDS.values())[: i + 1])))
     for i, name in enumerate(FIELDS)
 }
-SIDES = ("right", "left")
 SHIFT, RAISED = COLUMNS["shift"].start, sum(map(len, FIELDS.values()))
 WIDTH = RAISED + len(SIDES)
 EXACT = ("lean", "shift")

@@ -4,16 +4,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from biodance.body.parts import GRAVITY
 from biodance.errors import UnknownName
 from biodance.motion.kinematics import Poses, poses
-from biodance.motion.regressor import GRAVITY
 from biodance.records import Array
-from biodance.virtual_lab.choreography import septic
-from biodance.virtual_lab.merge import CARRIERS, MERGED
-from biodance.virtual_lab.performance import AppliedForce, Performance
-from biodance.virtual_lab.person import AddedLoad, Person
+from biodance.virtual_lab.movement.choreography import septic
+from biodance.virtual_lab.movement.performance import AppliedForce, Performance
+from biodance.virtual_lab.person.person import AddedLoad, Person
+from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS
 from biodance.virtual_lab.randomness import stream
-from biodance.virtual_lab.skeleton import TRUE_SEGMENTS
+from biodance.virtual_lab.recording.merge import CARRIERS, MERGED
 
 GRIPS = {
     "right_forearm_hand": ("right_hand", (0.0, -0.08, 0.0)),

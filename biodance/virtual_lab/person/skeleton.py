@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.body.body import Joint
-from biodance.records import Array, Subject
+from biodance.body.parts import Joint
+from biodance.records import SIDES, Array, Subject
 from biodance.virtual_lab.randomness import stream
 
 _FEMALE = {"thigh": 0.2354, "shank": 0.2410, "pelvis": 0.0640, "lumbar": 0.0776, "thorax": 0.2000, "head": 0.1509}
@@ -68,7 +68,7 @@ TRUE_SEGMENTS = (
     "lumbar",
     "thorax",
     "head",
-    *(f"{side}_{part}" for side in ("right", "left") for part in ARM_AND_LEG),
+    *(f"{side}_{part}" for side in SIDES for part in ARM_AND_LEG),
 )
 _X, _Y, _Z = np.eye(3)
 
@@ -162,14 +162,14 @@ class _Builder:
 def build_joints(size: Proportions) -> tuple[Joint, ...]:
     """Return the 39 joints of a person of the given proportions."""
     build, stature = _Builder(size), size["stature"]
-    for side in ("right", "left"):
+    for side in SIDES:
         hip = build.add("hip", f"{side}_thigh", -1, on_side(np.array([0, 0, size["hips"] / 2]), side), side=side)
         knee = build.add("knee", f"{side}_shank", hip, -size["thigh"] * _Y, side=side)
         build.add("ankle", f"{side}_foot", knee, -size["shank"] * _Y, side=side)
     lumbar = build.add("lumbar", "lumbar", -1, np.array([-0.012 * stature, size["pelvis"], 0]))
     thorax = build.add("thorax", "thorax", lumbar, np.array([0.004 * stature, size["lumbar"], 0]))
     build.add("neck", "head", thorax, size["thorax"] * _Y)
-    for side in ("right", "left"):
+    for side in SIDES:
         sternum = np.array([0.025 * stature, size["thorax"] - 0.042 * stature, 0.012 * stature])
         shoulder = np.array([0.0, size["thorax"] - size["shoulder_drop"], size["shoulders"] / 2])
         clavicle = build.add("clavicle", "", thorax, on_side(sternum, side), side=side)

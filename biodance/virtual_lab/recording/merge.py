@@ -6,10 +6,10 @@ from biodance.body.body import Body
 from biodance.errors import UnknownName
 from biodance.motion.kinematics import poses
 from biodance.records import Array, Sip
-from biodance.virtual_lab.cameras import reference_angles
-from biodance.virtual_lab.flesh import of_parameters, parameters_of_inertia, place_inertia
-from biodance.virtual_lab.person import AddedLoad, Person
-from biodance.virtual_lab.skeleton import TRUE_SEGMENTS
+from biodance.virtual_lab.person.flesh import of_parameters, parameters_of_inertia, place_inertia
+from biodance.virtual_lab.person.person import AddedLoad, Person
+from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS
+from biodance.virtual_lab.recording.cameras import reference_angles
 
 MERGED: dict[str, tuple[str, tuple[str, ...]]] = {
     "pelvis": ("", ("pelvis",)),

@@ -14,7 +14,7 @@ import numpy as np
 from biodance.errors import UnknownName
 from biodance.lab.c3d.write import PlateRecording
 from biodance.records import CHANNELS, Array, Markers
-from biodance.virtual_lab.laboratory import Fault, Recording
+from biodance.virtual_lab.recording.laboratory import Fault, Recording
 
 PlateChange = Callable[[Array, Recording], Array]
 """Changes the wrench (S, 6) on the subject about the plate's centre, lab axes, of one recording."""

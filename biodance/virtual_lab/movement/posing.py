@@ -4,14 +4,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 from scipy.special import logsumexp
 
-from biodance.body.body import UPRIGHT
+from biodance.body.parts import UPRIGHT
 from biodance.motion.ik.legs import LEG, Leg, soft_limit
-from biodance.motion.kinematics import axis_rotation
-from biodance.records import Array
-from biodance.virtual_lab.choreography import SIDES, Curves
-from biodance.virtual_lab.person import Person
+from biodance.records import SIDES, Array
+from biodance.virtual_lab.movement.choreography import Curves
+from biodance.virtual_lab.person.person import Person
 from biodance.virtual_lab.randomness import smooth_noise
 from biodance.virtual_lab.tolerances import LabTolerances
 
@@ -53,7 +53,7 @@ def take_stance(person: Person, kind: str, centre: Array, heading: float, rng: n
         )
         yaw = heading + sign * out
         ankle[side] = np.array([*xy, person.size["ankle_height"]])
-        turn[side] = axis_rotation(Z, np.array([yaw]))[0] @ UPRIGHT
+        turn[side] = turn_about(Z, np.array([yaw]))[0] @ UPRIGHT
         pressure[side] = xy + 0.19 * person.size["sole"] * np.array([np.cos(yaw), np.sin(yaw)])
     return FootStance(heading, ankle, turn, pressure)
 
@@ -131,13 +131,18 @@ _UNASKED = (
 def _pelvis_turn(angle: Array, heading: float) -> Array:
     """Return lab_R_pelvis (T, 3, 3) of forward tilt, right drop and left turn (T, 3) rad."""
     tilt, drop, turn = angle.T
-    return axis_rotation(Z, heading + turn) @ UPRIGHT @ axis_rotation(_X, drop) @ axis_rotation(-Z, tilt)
+    return turn_about(Z, heading + turn) @ UPRIGHT @ turn_about(_X, drop) @ turn_about(-Z, tilt)
+
+
+def turn_about(axis: Array, angle: Array) -> Array:
+    """Return rotations (T, 3, 3) about one unit ``axis`` (3,) by ``angle`` (T,) rad: scipy's, not those of
+    `biodance.spatial`.
+    """
+    return Rotation.from_rotvec(np.multiply.outer(angle, axis)).as_matrix()
 
 
 def _quaternion(turn: Array) -> Array:
     """Return unit quaternions x y z w (T, 4) of rotations, without jumps of sign."""
-    from scipy.spatial.transform import Rotation
-
     xyzw = Rotation.from_matrix(turn).as_quat()
     flips = np.cumprod(np.where(np.sum(xyzw[1:] * xyzw[:-1], axis=1) < 0, -1.0, 1.0))
     xyzw[1:] *= flips[:, None]

@@ -9,14 +9,14 @@ import numpy as np
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.write import PlateRecording, write_c3d
 from biodance.records import Array, Markers, Role, frozen_array
-from biodance.virtual_lab.cameras import SoftTissue, draw_soft_tissue, film
-from biodance.virtual_lab.performance import AppliedForce, Performance, perform
-from biodance.virtual_lab.person import Person
-from biodance.virtual_lab.placement import MARKER_RADIUS
-from biodance.virtual_lab.plates import HALF_SIZE, TruePlate, digitise, lay_plate, sense_plate
-from biodance.virtual_lab.protocol import TrialPlan
+from biodance.virtual_lab.movement.performance import AppliedForce, Performance, perform
+from biodance.virtual_lab.movement.protocol import TrialPlan
+from biodance.virtual_lab.person.person import Person
+from biodance.virtual_lab.person.placement import MARKER_RADIUS
+from biodance.virtual_lab.person.skeleton import small_rotation
 from biodance.virtual_lab.randomness import stream
-from biodance.virtual_lab.skeleton import small_rotation
+from biodance.virtual_lab.recording.cameras import SoftTissue, draw_soft_tissue, film
+from biodance.virtual_lab.recording.plates import HALF_SIZE, TruePlate, digitise, lay_plate, sense_plate
 from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances
 
 

@@ -10,15 +10,23 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+from biodance.body.parts import GRAVITY
 from biodance.body.pinocchio_model import load_pinocchio
-from biodance.motion.kinematics import quaternion_matrix
-from biodance.motion.regressor import GRAVITY
 from biodance.records import Array, Motion, Wrench
-from biodance.virtual_lab.choreography import Curves, choreograph
-from biodance.virtual_lab.person import Person
-from biodance.virtual_lab.posing import FootStance, Height, Pose, pelvis_height, stand_on_feet, take_stance, upper_body
-from biodance.virtual_lab.protocol import TrialPlan
+from biodance.virtual_lab.movement.choreography import Curves, choreograph
+from biodance.virtual_lab.movement.posing import (
+    FootStance,
+    Height,
+    Pose,
+    pelvis_height,
+    stand_on_feet,
+    take_stance,
+    upper_body,
+)
+from biodance.virtual_lab.movement.protocol import TrialPlan
+from biodance.virtual_lab.person.person import Person
 from biodance.virtual_lab.randomness import smooth_noise, stream
 from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances
 
@@ -179,7 +187,7 @@ def _motion(splines: tuple[Any, Any, Any], time: Array) -> Motion:
     value, rate, rate2 = (spline(time) for spline in splines)
     norm = np.linalg.norm(value[:, 3:7], axis=1, keepdims=True)
     quaternion = value[:, 3:7] / norm
-    turn = np.swapaxes(quaternion_matrix(quaternion), 1, 2)
+    turn = np.swapaxes(Rotation.from_quat(quaternion).as_matrix(), 1, 2)
     angular = _twice_conjugate_times(quaternion, rate[:, 3:7] / norm)
     angular_rate = _twice_conjugate_times(quaternion, rate2[:, 3:7] / norm)
     linear = np.einsum("tij,tj->ti", turn, rate[:, :3])
@@ -207,6 +215,6 @@ def true_wrench(person: Person, motion: Motion) -> Wrench:
     model.gravity = pin.Motion(np.array(GRAVITY), np.zeros(3))
     data = model.createData()
     root = np.array([pin.rnea(model, data, q, v, a)[:6] for q, v, a in zip(motion.q, motion.v, motion.a, strict=True)])
-    turn = quaternion_matrix(motion.q[:, 3:7])
+    turn = Rotation.from_quat(motion.q[:, 3:7]).as_matrix()
     force, moment = np.einsum("tij,tj->ti", turn, root[:, :3]), np.einsum("tij,tj->ti", turn, root[:, 3:])
     return Wrench(motion.time, np.concatenate([force, moment + np.cross(motion.q[:, :3], force)], axis=1))

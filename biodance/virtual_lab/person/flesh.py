@@ -9,8 +9,8 @@ rounded midpoint of Dumas & Wojtusch 2018 and de Leva 1996, so that neither tabl
 import numpy as np
 
 from biodance.records import Array, Sip
+from biodance.virtual_lab.person.skeleton import ARM_AND_LEG, TRUE_SEGMENTS, Proportions
 from biodance.virtual_lab.randomness import stream
-from biodance.virtual_lab.skeleton import ARM_AND_LEG, TRUE_SEGMENTS, Proportions
 
 PopulationRow = tuple[float, float, float, float, float, float, float]
 _FEMALE: dict[str, PopulationRow] = {

@@ -9,16 +9,14 @@ from typing import Any, Literal
 import numpy as np
 
 from biodance.errors import BiodanceError, UnknownName
-from biodance.records import Subject
-from biodance.virtual_lab import faults, forces
-from biodance.virtual_lab import instrument_faults as amplifier_faults
-from biodance.virtual_lab import instrument_faults as camera_faults
-from biodance.virtual_lab.forces import sloshing_load, wobbling_mass
-from biodance.virtual_lab.laboratory import FIRST_VISIT, Fault, LabVisit
-from biodance.virtual_lab.merge import load_on
-from biodance.virtual_lab.performance import AppliedForce
-from biodance.virtual_lab.person import AddedLoad, Person, make_person
-from biodance.virtual_lab.protocol import Protocol
+from biodance.records import SIDES, Subject
+from biodance.virtual_lab.faults import faults, forces, instrument_faults
+from biodance.virtual_lab.faults.forces import sloshing_load, wobbling_mass
+from biodance.virtual_lab.movement.performance import AppliedForce
+from biodance.virtual_lab.movement.protocol import Protocol
+from biodance.virtual_lab.person.person import AddedLoad, Person, make_person
+from biodance.virtual_lab.recording.laboratory import FIRST_VISIT, Fault, LabVisit
+from biodance.virtual_lab.recording.merge import load_on
 
 
 @dataclass(frozen=True)
@@ -79,12 +77,12 @@ FAULTS: dict[str, Callable[..., Fault]] = {
         faults.clock_drift,
         faults.plate_position, faults.plate_rotation, faults.body_mass, faults.unit_error, faults.axis_error,
         faults.clipping,
-        faults.mains_hum, faults.labels_swapped, amplifier_faults.filter_mismatch, amplifier_faults.plate_hysteresis,
-        amplifier_faults.plate_creep, amplifier_faults.plate_bending, amplifier_faults.loose_connection,
-        amplifier_faults.trigger_jitter,
-        amplifier_faults.object_on_plate, amplifier_faults.saturating, camera_faults.frame_rate,
-        camera_faults.dropped_frames,
-        camera_faults.swaying_cameras,
+        faults.mains_hum, faults.labels_swapped, instrument_faults.filter_mismatch, instrument_faults.plate_hysteresis,
+        instrument_faults.plate_creep, instrument_faults.plate_bending, instrument_faults.loose_connection,
+        instrument_faults.trigger_jitter,
+        instrument_faults.object_on_plate, instrument_faults.saturating, instrument_faults.frame_rate,
+        instrument_faults.dropped_frames,
+        instrument_faults.swaying_cameras,
     )
 }  # fmt: skip
 FORCES: dict[str, Callable[..., AppliedForce]] = {
@@ -169,7 +167,7 @@ def _longer(cause: Hidden, scene: Scene) -> Scene:
     """
     ends = {
         f"{side}_{upper}": f"{side}_{joint}"
-        for side in ("right", "left")
+        for side in SIDES
         for upper, joint in (("thigh", "knee"), ("shank", "ankle"))
     }
     if cause.target not in ends:

@@ -11,8 +11,8 @@ import numpy as np
 
 from biodance.lab.c3d.write import PlateRecording
 from biodance.records import Array
-from biodance.virtual_lab.performance import Performance
-from biodance.virtual_lab.skeleton import small_rotation
+from biodance.virtual_lab.movement.performance import Performance
+from biodance.virtual_lab.person.skeleton import small_rotation
 from biodance.virtual_lab.tolerances import LabTolerances
 
 HALF_SIZE = np.array([0.2, 0.3])

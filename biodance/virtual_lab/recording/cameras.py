@@ -6,15 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.body.body import SegmentMarkers
+from biodance.body.parts import GRAVITY, SegmentMarkers
 from biodance.motion.kinematics import Poses, poses
-from biodance.motion.regressor import GRAVITY
-from biodance.records import Array, Markers
-from biodance.virtual_lab.performance import Performance
-from biodance.virtual_lab.person import Person
-from biodance.virtual_lab.protocol import STAND
+from biodance.records import SIDES, Array, Markers
+from biodance.virtual_lab.movement.performance import Performance
+from biodance.virtual_lab.movement.protocol import STAND
+from biodance.virtual_lab.person.person import Person
+from biodance.virtual_lab.person.skeleton import ARM_AND_LEG, TRUE_SEGMENTS
 from biodance.virtual_lab.randomness import smooth_noise, stream
-from biodance.virtual_lab.skeleton import ARM_AND_LEG, TRUE_SEGMENTS
 from biodance.virtual_lab.tolerances import LabTolerances
 
 PULL: dict[str, dict[str, float]] = {
@@ -36,7 +35,7 @@ SHOULDER_PULL = {"shoulder_flexion": 12.0, "shoulder_adduction": 12.0}
 """mm per rad for SHO and RBAK: the shoulder blade slides on the thorax."""
 SWING = {"THI": 9.0, "UPA": 10.0, "TIB": 12.0, "FRM": 14.0}
 """Hz, natural frequency of flesh and marker where muscle lies under the skin: 9 Hz sags by 3 mm under gravity.
-Judgement, set so that fast squats leave residuals of the size of those in Jovic et al. (Table II).
+Judgement, set so that fast squats leave residuals of the size of those in Bonnet et al. (2016, Table II).
 """
 BONY = 16.0
 """Hz, the same where bone lies under the skin: all other markers."""
@@ -92,7 +91,7 @@ def reference_angles(person: Person) -> Array:
     away.
     """
     angles = dict(person.habits.angles)
-    for side in ("right", "left"):
+    for side in SIDES:
         flexion, adduction, rotation, elbow = np.radians(STAND.values[f"{side}_arm"])
         angles |= {f"{side}_shoulder_flexion": flexion, f"{side}_shoulder_adduction": adduction}
         angles |= {f"{side}_shoulder_rotation": rotation, f"{side}_elbow_flexion": elbow}

@@ -10,18 +10,20 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import make_interp_spline
 from scipy.ndimage import gaussian_filter1d
+from scipy.spatial.transform import Rotation
 from scipy.special import logsumexp
 
-from biodance.body.body import UPRIGHT, Body
+from biodance.body.body import Body
+from biodance.body.parts import UPRIGHT
 from biodance.errors import BiodanceError
 from biodance.motion.ik.legs import Leg
-from biodance.motion.kinematics import axis_rotation, poses, quaternion_matrix
-from biodance.records import Array, Motion, frozen_array
-from biodance.virtual_lab.choreography import COLUMNS, RAISED, SHIFT, SIDES, WIDTH, Curves
-from biodance.virtual_lab.performance import MARGIN, NODE_RATE, Performance, keep_balance
-from biodance.virtual_lab.person import Person
-from biodance.virtual_lab.posing import STRAIGHT, FootStance, Pose, Z, upper_body
-from biodance.virtual_lab.protocol import TrialPlan
+from biodance.motion.kinematics import poses
+from biodance.records import SIDES, Array, Motion, frozen_array
+from biodance.virtual_lab.movement.choreography import COLUMNS, RAISED, SHIFT, WIDTH, Curves
+from biodance.virtual_lab.movement.performance import MARGIN, NODE_RATE, Performance, keep_balance
+from biodance.virtual_lab.movement.posing import STRAIGHT, FootStance, Pose, Z, turn_about, upper_body
+from biodance.virtual_lab.movement.protocol import TrialPlan
+from biodance.virtual_lab.person.person import Person
 from biodance.virtual_lab.randomness import smooth_noise, stream
 from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances
 
@@ -129,7 +131,7 @@ def _fields(shown: Shown) -> Array:
     angle, out = np.degrees(q[:, body.nq - len(body.joints) :]), np.zeros((len(q), WIDTH))
     for field, names in _JOINTS.items():
         out[:, COLUMNS[field]] = angle[:, [body.joint_index(name) for name in names]]
-    out[:, COLUMNS["pelvis"]] = pelvis_angles(quaternion_matrix(q[:, 3:7]))
+    out[:, COLUMNS["pelvis"]] = pelvis_angles(Rotation.from_quat(q[:, 3:7]).as_matrix())
     out[:, COLUMNS["depth"]] = _depth(shown)[:, None]
     out[:, RAISED:] = shown.raised
     return out
@@ -183,11 +185,11 @@ def _stand(
     person: Person, shown: Shown, centre: Array, heading: float, rng: np.random.Generator
 ) -> tuple[FootStance, Array, Array]:
     """Return where the person's feet are, the plan's middle (2,) m and the turn (3, 3) from the plan to the lab."""
-    turn = axis_rotation(Z, np.array([heading]))[0]
+    turn = turn_about(Z, np.array([heading]))[0]
     middle = shown.ankle[:, :2].mean(axis=0) + np.array([0.04, 0.0])
     ankle, foot = {}, {}
     for k, side in enumerate(SIDES):
         xy = centre + turn[:2, :2] @ (shown.ankle[k, :2] - middle) + 0.005 * rng.normal(size=2)
         ankle[side] = np.array([*xy, person.size["ankle_height"]])
-        foot[side] = axis_rotation(Z, np.array([heading + 0.02 * rng.normal()]))[0] @ UPRIGHT
+        foot[side] = turn_about(Z, np.array([heading + 0.02 * rng.normal()]))[0] @ UPRIGHT
     return FootStance(heading, ankle, foot, {side: ankle[side][:2] for side in SIDES}), middle, turn

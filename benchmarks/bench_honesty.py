@@ -1,0 +1,189 @@
+"""No false certainty: real recordings, a foreign virtual laboratory and the own one, diagnosed and held against what a
+verdict may say.
+
+    BIODANCE_DATA=folder BIODANCE_FOREIGN_LAB=folder python benchmarks/bench_honesty.py --run NAME [--only real foreign
+        own] [--foreign 8] [--out docs/benchmarks/diagnosis.md]
+
+Sessions are tracked once and kept (`hidden_sessions.CACHE`), answers are kept per ``--run``: a run that was stopped
+goes on. ``--out`` writes the columns real, foreign and own of the runs ``before`` and NAME into that page.
+"""
+
+import argparse
+import json
+import os
+import pickle
+import subprocess
+import sys
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from hidden_causes import SINGLE, nulls, singles, truth
+from hidden_sessions import CACHE, examined, store
+
+from biodance.errors import BiodanceError
+from biodance.lab.session.read import read_session
+from biodance.pipeline.diagnosis import diagnose_session
+from biodance.pipeline.results import SessionResult
+from biodance.pipeline.session import examine
+
+REAL = (
+    *(f"biomechzoo/HC{number}A" for number in ("030", "031", "032", "038", "044", "050", "055")), "adl_gait", "pycgm",
+)  # fmt: skip
+TRULY = {"biomechzoo/HC030A": {"labels_swapped"}}
+"""What is wrong in a real session: names that are not false."""
+PEOPLE = (
+    ("F", 1.68, 61), ("M", 1.81, 78), ("F", 1.59, 54), ("M", 1.74, 70), ("F", 1.75, 66), ("M", 1.90, 88),
+    ("F", 1.63, 72), ("M", 1.69, 60),
+)  # fmt: skip
+ROOM = ("--noise", "0.6", "--camera", "0.3")
+NAMED = (
+    "plate_offset:target=Fx", "plate_gain:target=Fz", "plate_crosstalk:target=Fz->My", "plate_drift:target=Mx",
+    "plate_position:target=plate1:x", "plate_rotation:target=plate1:z", "time_delay",
+    "added_mass:target=left_forearm_hand",
+)  # fmt: skip
+START, END = "<!-- honesty: begin -->", "<!-- honesty: end -->"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What one session was told: ``column`` real, foreign or own; ``names`` found, ``false`` of them not true; the
+    ``headline``; ``failed`` checks and ``missed`` trials; ``hidden`` the true cause.
+    """
+
+    key: str
+    column: str
+    verdict: str
+    names: tuple[str, ...]
+    false: tuple[str, ...]
+    headline: str
+    failed: int
+    missed: int
+    worst: str
+    z: float
+    hidden: str = ""
+    seconds: float = 0.0
+
+    @property
+    def alarm(self) -> bool:
+        """Whether a session without fault is called wrong."""
+        return not self.hidden and (bool(self.false) or (self.verdict != "nothing wrong" and not self.cannot_tell))
+
+    @property
+    def cannot_tell(self) -> bool:
+        """Whether the session says that it cannot tell."""
+        return self.headline.lower().startswith("cannot tell")
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether "nothing wrong" or "complete" stands beside a failed check or an unjudged trial without a word."""
+        if not (self.failed or self.missed):
+            return False
+        bare = self.verdict == "nothing wrong" and "what could be judged" not in self.headline
+        return self.verdict == "named, complete" or bare
+
+
+def real_session(name: str) -> SessionResult:
+    """Return a real session, tracked once."""
+    return _kept(f"real-{name.replace('/', '-')}", lambda: Path(os.environ["BIODANCE_DATA"]) / name)
+
+
+def foreign_session(index: int) -> SessionResult:
+    """Return a clean session of the foreign laboratory with the noise of real rooms, tracked once."""
+
+    def written() -> Path:
+        sex, height, mass = PEOPLE[index]
+        folder = CACHE / "foreign" / f"clean-{index}"
+        if not folder.is_dir():
+            folder.parent.mkdir(parents=True, exist_ok=True)
+            script = Path(os.environ["BIODANCE_FOREIGN_LAB"]) / "foreign_lab.py"
+            who = ["--seed", str(101 + index), "--sex", sex, "--height", str(height), "--mass", str(mass)]
+            subprocess.run([sys.executable, str(script), *who, *ROOM, "--out", str(folder)], check=True)
+        return folder
+
+    return _kept(f"foreign-{index}", written)
+
+
+def _kept(key: str, folder) -> SessionResult:  # type: ignore[no-untyped-def]
+    path = CACHE / "honesty" / f"{key}.pickle"
+    if path.is_file():
+        with open(path, "rb") as stream:
+            return pickle.load(stream)
+    result = examine(read_session(folder()))
+    store(path, result)
+    return result
+
+
+def answered(key: str, column: str, result: SessionResult, true: set[str], hidden: str = "") -> Answer:
+    """Diagnose a session and say what it was told; ``true`` names are not false."""
+    start = time.process_time()
+    failed = sum(not check.inside for check in result.all_checks)
+    fits = [trial for trial in result.trials if trial.trial.role == "fit"]
+    missed = len(result.session.refused) + sum(
+        one.motion is None or one.comparison is None or not one.comparison.used.any() for one in fits
+    )
+    try:
+        found = diagnose_session(result)
+    except BiodanceError as error:
+        return Answer(key, column, "refused", (), (), str(error), failed, missed, "", 0.0, hidden)
+    one = found.diagnosis
+    missed = sum(judged.missed for judged in one.judged) if hasattr(one, "judged") else missed
+    names = tuple(f"{finding.effect} {finding.target}".strip() for finding in one.findings)
+    false = tuple(name for name in names if name.split()[0] not in true and name not in true)
+    head = next((said.text for said in getattr(one, "attention", ()) if said.about == "diagnosis"), one.told)
+    worst = one.adequacy[0] if one.adequacy else None
+    where = f"{worst.channel} {worst.band_hz[0]:g}-{worst.band_hz[1]:g} Hz" if worst else ""
+    seconds = time.process_time() - start
+    z = worst.z if worst else 0.0
+    return Answer(key, column, one.verdict, names, false, head, failed, missed, where, z, hidden, seconds)
+
+
+def jobs(foreign: int, own: int) -> list[tuple[str, str, object, set[str], str]]:
+    """Return key, column, how to get the session, true names and hidden cause of every session."""
+    out: list[tuple[str, str, object, set[str], str]] = [
+        (f"real {name}", "real", lambda name=name: real_session(name), TRULY.get(name, set()), "") for name in REAL
+    ]
+    out += [(f"foreign {k}", "foreign", lambda k=k: foreign_session(k), set(), "") for k in range(foreign)]
+    for one in nulls(range(own), range(1)):
+        out.append((f"own {one.key}", "own", lambda one=one: examined(one), set(), ""))
+    causes = {one.words.partition(",")[0]: one for one in SINGLE}
+    texts = [next(c for words, c in causes.items() if words.startswith(name)).text(0) for name in NAMED]
+    chosen = {text.partition(",")[0] for text in texts} | {"time_delay"}
+    for one in singles("above", (0,)):
+        if any(one.hidden[0].startswith(name) for name in chosen):
+            true = {" ".join(name).strip() for same in truth(one) for name in same}
+            out.append((f"own {one.hidden[0]}", "own", lambda one=one: examined(one), true, one.hidden[0]))
+    return out
+
+
+def run(name: str, only: list[str], foreign: int, own: int) -> list[Answer]:
+    """Return the answers of a run; those that are there are not made again."""
+    path = CACHE / "honesty" / f"answers-{name}.json"
+    known = {row["key"]: row for row in json.loads(path.read_text())} if path.is_file() else {}
+    for key, column, get, true, hidden in jobs(foreign, own):
+        if key not in known and (not only or column in only):
+            known[key] = asdict(answered(key, column, get(), true, hidden))  # type: ignore[operator]
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(json.dumps(list(known.values()), indent=1))
+            one = known[key]
+            print(
+                f"{key}: {one['verdict']} {one['names']} {one['worst']} z {one['z']:.1f} | {one['headline']}",
+                flush=True,
+            )
+    return [Answer(**{k: tuple(v) if isinstance(v, list) else v for k, v in row.items()}) for row in known.values()]
+
+
+def main() -> None:
+    """Diagnose what is asked for and write the page's part."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--run", default="now")
+    parser.add_argument("--only", nargs="*", default=[])
+    parser.add_argument("--foreign", type=int, default=len(PEOPLE))
+    parser.add_argument("--own", type=int, default=8)
+    parser.add_argument("--out", type=Path)
+    chosen = parser.parse_args()
+    run(chosen.run, chosen.only, chosen.foreign, chosen.own)
+
+
+if __name__ == "__main__":
+    main()

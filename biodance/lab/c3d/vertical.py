@@ -1,0 +1,123 @@
+"""Which way is up in a C3D file? Plates, person and POINT:Y_SCREEN may say it."""
+
+import re
+
+import numpy as np
+
+from biodance.lab.c3d.layout import parameter_numbers, texts
+from biodance.lab.c3d.raw import RawC3d
+from biodance.lab.markers.sets import landmark, recognise
+from biodance.records import Array, Markers
+
+UPPER = ("head_front", "head_back", "c7", "jugular_notch", "mid_psis", "right_asis", "left_asis")
+LOWER = ("right_heel", "left_heel", "right_toe", "left_toe", "right_ankle_lateral", "left_ankle_lateral")
+_AXES = "XYZ"
+_CLEAR = 2.0
+"""A direction counts if its largest component is so many times the others."""
+
+
+def turn_to_z_up(raw: RawC3d, markers: Markers | None) -> tuple[Array, tuple[str, ...], tuple[str, ...]]:
+    """Return the rotation lab_R_file (3, 3) that makes z point up, history and warnings; the identity if it does
+    already.
+
+    ``markers`` are still in file axes. The floor of the plates decides the axis, the side on which the markers are its
+    sign; without plates the upright person overrules Y_SCREEN, unless Y_SCREEN says +Z (the person may lie down). x
+    stays where it is not the vertical itself.
+    """
+    declared = _declared(raw, markers)
+    floor, body = _floor(raw, markers), _body(markers)
+    witnesses = {"the plates": floor, "the markers from feet to head": body, "POINT:Y_SCREEN": declared}
+    if floor is not None:
+        chosen, by = floor, "the plates"
+    elif body is not None and (declared is None or declared[2] < 1):
+        chosen, by = body, "the markers from feet to head"
+    elif declared is not None:
+        chosen, by = declared, "POINT:Y_SCREEN"
+    else:
+        chosen, by = np.array([0.0, 0.0, 1.0]), ""
+    history = [
+        f"Up is {_name(chosen)} in the file, as {by} {'say' if by != 'POINT:Y_SCREEN' else 'says'}."
+        if by
+        else "Nothing says which way is up; z assumed."
+    ]
+    warnings = [] if by else list(history)
+    for who, direction in witnesses.items():
+        if direction is not None and not np.array_equal(direction, chosen):
+            line = (
+                f"Up is {_name(chosen)} by {by}, but {_name(direction)} by {who}; the former was taken. Look at "
+                f"the person in the report."
+            )
+            (history if who == "POINT:Y_SCREEN" else warnings).append(line)
+    turn = _turn(chosen)
+    if not np.array_equal(turn, np.eye(3)):
+        history.append(f"Everything was turned so that z points up: {_name(chosen)} of the file became +Z.")
+    return turn, tuple(history), tuple(warnings)
+
+
+def _name(axis: Array) -> str:
+    i = int(np.argmax(np.abs(axis)))
+    return ("+" if axis[i] > 0 else "-") + _AXES[i]
+
+
+def _turn(up: Array) -> Array:
+    """Return the rotation whose third row is ``up``; its first row is x where possible."""
+    first = np.array([1.0, 0.0, 0.0]) if up[0] == 0 else np.array([0.0, 1.0, 0.0])
+    return np.stack([first, np.cross(up, first), up]) + 0.0
+
+
+def _declared(raw: RawC3d, markers: Markers | None) -> Array | None:
+    """Return the axis that POINT:Y_SCREEN, the upward direction of the recording's screen, names.
+
+    Its sign is not believed (labs with z up write -Z): up is the side of the lab origin on which the markers are.
+    """
+    text = next(iter(texts(raw.parameters, "POINT", "Y_SCREEN")), "").upper().replace(" ", "")
+    if not re.fullmatch(r"[+-]?[XYZ]", text):
+        return None
+    i = _AXES.index(text[-1])
+    below = markers is not None and bool(markers.seen.any()) and float(np.nanmedian(markers.xyz[..., i])) < 0
+    return np.eye(3)[i] * (-1.0 if below else 1.0)
+
+
+def _floor(raw: RawC3d, markers: Markers | None) -> Array | None:
+    """Return the normal of the plates on the side of the markers; None without plates that lie in a coordinate
+    plane.
+    """
+    corners = parameter_numbers(raw.parameters, "FORCE_PLATFORM", "CORNERS")
+    count = int(corners.size // 12)
+    if not count or not np.isfinite(corners).all():
+        return None
+    plates = corners[: 12 * count].reshape(count, 4, 3)
+    normals = np.abs(np.cross(plates[:, 1] - plates[:, 0], plates[:, 3] - plates[:, 0])).sum(axis=0)
+    axis = _axis(normals)
+    if axis is None or markers is None or not markers.seen.any():
+        return axis
+    i = int(np.argmax(axis))
+    above = float(np.nanmedian(markers.xyz[..., i])) - float(plates[..., i].mean())
+    return axis * (1.0 if above >= 0 else -1.0)
+
+
+def _body(markers: Markers | None) -> Array | None:
+    """Return the axis from the feet to the head or pelvis in most frames; None if the labels or the posture do not
+    tell it.
+    """
+    found = recognise(markers.names) if markers is not None else None
+    if markers is None or found is None:
+        return None
+    ends = [[p for name in names if (p := landmark(markers, found, name)) is not None] for names in (UPPER, LOWER)]
+    if not all(ends):
+        return None
+    top, bottom = (np.concatenate(points) for points in ends)
+    if not (np.isfinite(top).any() and np.isfinite(bottom).any()):
+        return None
+    return _axis(np.nanmedian(top, axis=0) - np.nanmedian(bottom, axis=0))
+
+
+def _axis(direction: Array) -> Array | None:
+    """Return the signed coordinate axis that a direction (3,) clearly follows; None if none or the direction is not
+    finite.
+    """
+    size = np.sort(np.abs(direction))
+    if not np.isfinite(size).all() or size[2] <= _CLEAR * size[1]:
+        return None
+    i = int(np.argmax(np.abs(direction)))
+    return np.eye(3)[i] * np.sign(direction[i])

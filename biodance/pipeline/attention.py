@@ -1,0 +1,239 @@
+"""What a person must see first: one sentence for the verdict and what it rests on, then everything refused, not solved
+or outside its limit, strongest first. Page, terminal and JSON show the same records.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from biodance.diagnosis.adequacy import LIMIT, alarming
+from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Finding
+from biodance.diagnosis.problem import Look
+from biodance.identification.added_mass import LoadSearch
+from biodance.pipeline.looked_at import reasons_left_out, seconds_of
+from biodance.pipeline.results import SessionResult
+from biodance.pipeline.trial_result import Check
+from biodance.records.attention import Attention, Judged, Level, strongest_first
+
+_STATIC = "quiet standing tells nothing beside so much movement"
+_KEPT = "kept to measure what a finding gains"
+_NEVER = "it holds no measured ground contact"
+EXPLAINS: dict[str, tuple[str, ...]] = {
+    "mass on the plates": (
+        "plate_gain", "plate_offset", "body_mass", "added_mass", "body_weight_support", "external_contact",
+        "sloshing_load", "unit_error", "clipping",
+    ),
+    "centre of mass off the centre of pressure": (
+        "plate_position", "plate_rotation", "plate_crosstalk", "plate_offset", "lab_tilt", "marker_misplaced",
+        "labels_swapped", "joint_centre",
+    ),
+    "marker distance": (
+        "labels_swapped", "marker_misplaced", "segment_length", "joint_centre", "trunk_joint", "head_joint",
+        "shoulder_girdle", "frame_rate", "unit_error",
+    ),
+    "force difference": (
+        "plate_gain", "plate_offset", "plate_drift", "plate_rotation", "plate_crosstalk", "time_delay", "clock_drift",
+        "filter_mismatch", "axis_error", "unit_error", "clipping", "added_mass", "body_mass", "external_contact",
+    ),
+}  # fmt: skip
+"""Causes that a check outside its limit may come from, by the beginning of the check's name."""
+
+
+def judged_trials(result: SessionResult, used: tuple[Look, ...]) -> tuple[Judged, ...]:
+    """Return for every trial and refused file of a session how many seconds of it are judged in ``used``, or why it
+    is not.
+    """
+    seconds = {look.trial.name: seconds_of(look) for look in used}
+    why = reasons_left_out(result.trials)
+    kept = {look.trial.role for look in used if seconds[look.trial.name] > 0}
+    rows = []
+    for one in result.trials:
+        name, role = one.trial.name, one.trial.role
+        if seconds.get(name, 0.0) > 0:
+            rows.append(Judged(name, seconds[name]))
+        elif "fit" in kept and role not in ("fit", "static"):
+            rows.append(Judged(name, 0.0, _KEPT))
+        elif role == "static" and kept:
+            rows.append(Judged(name, 0.0, _STATIC))
+        else:
+            rows.append(Judged(name, 0.0, why.get(name) or " ".join(one.reasons) or _NEVER, missed=True))
+    return (*rows, *(Judged(file, 0.0, reason, missed=True) for file, reason in result.session.refused.items()))
+
+
+def identified_trials(result: SessionResult) -> tuple[Judged, ...]:
+    """Return for every trial to identify from how many measured seconds it holds, or why none."""
+    used = set(result.identification.identification.trials) if result.identification else set()
+    rows = []
+    for one in result.trials:
+        if one.trial.role != "fit":
+            continue
+        here = one.comparison if one.name in used else None
+        seconds = float(here.used.sum() * np.median(np.diff(here.time))) if here and here.time.size > 1 else 0.0
+        rows.append(Judged(one.name, seconds, "" if seconds else " ".join(one.reasons) or _NEVER, missed=not seconds))
+    return tuple(rows)
+
+
+def told(one: Diagnosis, result: SessionResult, judged: tuple[Judged, ...]) -> Diagnosis:
+    """Return the diagnosis with what it rests on and its sentences, and never "complete" beside a check outside its
+    limit or an unjudged trial.
+    """
+    outside = tuple(check for check in result.all_checks if not check.inside)
+    if one.verdict == "named, complete" and (outside or any(row.missed for row in judged)):
+        one = replace(one, verdict="named, incomplete")
+    first = headline(one, amount(result, judged), judged, outside)
+    return replace(one, judged=judged, attention=strongest_first([first, *session_attention(result, one.findings)]))
+
+
+def is_well(one: Diagnosis) -> bool:
+    """Return whether nothing is wrong, every trial was judged, and no check is outside its limit."""
+    return one.verdict == "nothing wrong" and all(said.level == "note" for said in one.attention if said.about == ABOUT)
+
+
+def amount(result: SessionResult, judged: tuple[Judged, ...]) -> str:
+    """Return what was judged in words: ``3 s of standing and 12 s of movement``; "" for nothing."""
+    static = {one.trial.name for one in result.trials if one.trial.role == "static"}
+    sums = [
+        (sum(row.seconds for row in judged if (row.trial in static) is quiet), what)
+        for quiet, what in ((True, "standing"), (False, "movement"))
+    ]
+    return " and ".join(f"{total:.{0 if total >= 9.5 else 1}f} s of {what}" for total, what in sums if total > 0)
+
+
+def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside: tuple[Check, ...]) -> Attention:
+    """Return the one sentence that says the verdict, what it rests on, and what it does not know."""
+    beside = _beside(judged, outside)
+    names = " and ".join(in_words(finding) for finding in one.findings)
+    like = " and ".join(in_words(finding) for finding in one.resembles)
+    level: Level = "fail"
+    if one.findings:
+        rest = f"In {rests_on}, " if rests_on else ""
+        more = {
+            "named, complete": f"{rest or 'With it accepted, '}nothing more is wrong.",
+            "named, incomplete": _incomplete(one, rests_on),
+        }.get(one.verdict, "")
+        text = f"Found: {names}. {more}{_sentence(beside)}"
+    elif one.verdict == "nothing wrong":
+        level = "warn" if beside else "note"
+        text = f"Nothing wrong in what could be judged ({rests_on}){beside}." if beside or one.doubt else (
+            f"Nothing wrong was found in {rests_on}. Faults below the sizes that it could have seen stay unseen."
+        )  # fmt: skip
+    elif not rests_on:
+        level, text = "warn", f"Cannot tell whether anything is wrong: nothing could be judged{beside}."
+    elif one.doubt:
+        level = "warn"
+        text = f"Cannot tell whether anything is wrong in {rests_on}: {_where(one)}, but {one.doubt}{beside}."
+    else:
+        text = f"Something is wrong in {rests_on} that no known cause explains: {_where(one)}.{_sentence(beside)}"
+        text += f" It resembles {like}, which is not enough." if like else ""
+    return Attention(level, text.strip(), about=ABOUT)
+
+
+def in_words(finding: Finding) -> str:
+    """Return a cause with its place and size: ``plate gain Fz (gain 0.06 ± 0.002)``; a size less than two standard
+    deviations from none is not known.
+    """
+    name = f"{finding.effect} {finding.target}".replace("_", " ").replace("->", " into ").strip()
+    sizes = [f"{p.name.replace('_', ' ')} {p.value:.2g} ± {p.sd:.1g} {p.unit}".strip(" 1") for p in finding.parameters]
+    known = [abs(p.value) >= 2 * p.sd for p in finding.parameters if p.sd == p.sd]
+    if not known:
+        return name
+    return f"{name} ({', '.join(sizes)}{'' if any(known) else '; its size is hardly known'})"
+
+
+def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -> tuple[Attention, ...]:
+    """Return every file refused, step refused, fit that failed, load found, warning, and check outside its limit; a
+    check that a finding may explain points to it.
+    """
+    found = [Attention("fail", without_path(why, file), file, "file") for file, why in result.session.refused.items()]
+    found += [
+        Attention(_level(step.status), step.text, "", step.name) for step in result.steps if step.status != "done"
+    ]
+    found += [
+        Attention("fail", f"Not solved. {why}", "", f"identification, {what}") for what, why in result.failures.items()
+    ]
+    found += [Attention("warn", text.removeprefix("Warning: "), "", "body") for text in result.doubts]
+    for trial in result.trials:
+        level: Level = "fail" if trial.status == "refused" else "warn"
+        found += [Attention(level, text.removeprefix(f"Trial {trial.name}: "), trial.name) for text in trial.reasons]
+    found += [_checked(check, findings) for check in result.all_checks if not check.inside]
+    load = result.identification.search if result.identification else None
+    return strongest_first([*found, *_load(load)])
+
+
+def without_path(reason: str, file: str) -> str:
+    """Return a refusal without the path of the ``file`` in front, where the file is named beside it anyway."""
+    path, colon, rest = reason.partition(": ")
+    return rest if colon and path.endswith(file) else reason
+
+
+def _checked(check: Check, findings: Sequence[Finding]) -> Attention:
+    """Return a check outside its limit as a sentence, with the finding that may explain it instead of advice."""
+    mine = next((causes for what, causes in EXPLAINS.items() if check.what.startswith(what)), ())
+    cause = next((in_words(finding) for finding in findings if finding.effect in mine), "")
+    then = f"{cause}, which was found, may explain it." if cause else check.advice
+    text = f"{check.value}, should be {check.limit}. {then[:1].upper()}{then[1:]}".strip()
+    return Attention("note" if cause else "warn", text, check.where, check.what)
+
+
+def _load(search: LoadSearch | None) -> list[Attention]:
+    if search is None or not search.found:
+        return []
+    best = search.best
+    return [
+        Attention(
+            "warn",
+            f"A load of {best.mass:.2f} ± {best.sd:.2f} kg was found on the {best.segment.replace('_', ' ')}, beyond "
+            f"{search.reference}.",
+            about="added_mass",
+        )
+    ]
+
+
+def _level(status: str) -> Level:
+    return "fail" if status == "refused" else "warn"
+
+
+def _beside(judged: tuple[Judged, ...], outside: tuple[Check, ...]) -> str:
+    """Return what was not judged and which checks failed, to go on a sentence with."""
+    missed: dict[str, list[str]] = {}
+    for row in judged:
+        if row.missed:
+            missed.setdefault(_short(row.why_not), []).append(row.trial)
+    parts = [f"; not judged: {_listed(names)}, because: {why}" for why, names in missed.items()]
+    checks = [f"{one.what}, {one.where} ({one.value}, should be {one.limit})" for one in outside]
+    return "".join(parts) + (f"; outside the limit: {_listed(checks)}" if checks else "")
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Return names as a list in words, the fourth and later ones counted only."""
+    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+
+
+def _short(reason: str) -> str:
+    return reason.split(". ")[0].rstrip(".")
+
+
+def _sentence(beside: str) -> str:
+    """Return what goes on a sentence as one of its own."""
+    text = beside.removeprefix("; ")
+    return f" Beside it: {text}." if text else ""
+
+
+def _where(one: Diagnosis) -> str:
+    """Return where what is left is largest, with its size."""
+    rows = [row for row in one.adequacy if row.matters] or list(one.adequacy)
+    if not rows:
+        return "what is left is unlike sessions without fault"
+    row = rows[0]
+    return (
+        f"{row.channel} at {row.band_hz[0]:g} to {row.band_hz[1]:g} Hz is {row.size:.2g} {row.unit} off "
+        f"({row.z:.1f} standard deviations of sessions without fault), most in {row.trial} around {row.second:.1f} s"
+    )
+
+
+def _incomplete(one: Diagnosis, rests_on: str) -> str:
+    """Return what is more to say of a diagnosis that is not complete."""
+    if one.adequacy and alarming(one.adequacy) > LIMIT:
+        return f"Something more is wrong in {rests_on} that no known cause explains: {_where(one)}."
+    return f"Whether more is wrong cannot be told{f' from {rests_on}' if rests_on else ''}."

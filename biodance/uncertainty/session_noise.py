@@ -1,0 +1,136 @@
+"""What a session tells about its own instruments: camera noise from the markers' fastest changes, plate noise from the
+forces'; and what camera noise does to the wrench that a motion needs.
+
+White noise of standard deviation s moves the fourth difference of its samples by sqrt(70) s, a movement of a few hertz
+hardly at all. Least squares carries marker noise into the tangent of the posture with the covariance s² (J'J)^-1 (J the
+marker Jacobian), differentiating twice multiplies it by (2 pi f)^2, and the wrench is linear in accelerations.
+"""
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.motion.kinematics import jacobian, poses
+from biodance.motion.regressor import predict_wrench
+from biodance.records import Array, Markers, Motion, Plate, Trial
+from biodance.spatial import quaternion_matrix
+from biodance.uncertainty.bands import BANDS, Bands
+from biodance.uncertainty.noise import Noise
+from biodance.uncertainty.tolerances import REFERENCE_PERSON, Tolerances
+
+_ORDER = 4
+_GAIN = np.sqrt(70.0)
+"""Standard deviation of the fourth difference of unit white noise: 1, -4, 6, -4, 1."""
+_NORMAL = 1.4826
+"""Standard deviation of normal numbers over the median of their absolute values."""
+_ENOUGH = 50
+"""Samples below which no noise is estimated."""
+_LEVER = 0.03
+"""m: a joint whose markers move less than this per rad is not carried by them alone; its neighbours in time hold it."""
+LEARNED_CAMERAS = 1.0e-4
+"""m per axis: what `camera_noise` says of the sessions from which ``null_sessions.toml`` was learned."""
+LEARNED_PLATES = np.array([0.0077, 0.0077, 0.0304, 0.0068, 0.0099, 0.0032])
+"""N, N·m per root Hz: what `plate_noise` says of the same sessions."""
+
+
+def white_noise(samples: Array) -> Array:
+    """Return the standard deviation (...) of white noise in ``samples`` (T, ...), NaN = not seen; NaN where there are
+    too few.
+    """
+    change = np.abs(np.diff(samples, n=_ORDER, axis=0))
+    seen = np.isfinite(change).sum(axis=0)
+    with np.errstate(all="ignore"):
+        value = _NORMAL / _GAIN * np.nanmedian(np.where(seen >= _ENOUGH, change, np.nan), axis=0)
+    return np.asarray(value)
+
+
+def camera_noise(trials: Iterable[Markers]) -> float:
+    """Return the noise of one marker coordinate from frame to frame, m: the median over markers, axes and trials; 0
+    where no marker is seen for long.
+    """
+    found = [white_noise(one.xyz[:, on]).ravel() for one in trials for on in [_seen(one)] if on.any()]
+    values = np.concatenate(found) if found else np.empty(0)
+    values = values[np.isfinite(values)]
+    return float(np.median(values)) if values.size else 0.0
+
+
+def _seen(one: Markers) -> np.ndarray:
+    """Return which markers (K,) are seen long enough."""
+    return np.asarray(np.isfinite(one.xyz).all(axis=2).sum(axis=0) >= _ENOUGH + _ORDER)
+
+
+def plate_noise(plates: Iterable[Plate]) -> Array:
+    """Return (6,) N, N·m per square root of Hz: noise density of the quietest plate and recording of ``plates`` as
+    recorded (not filtered), moments about its centre; 0 without any that is long enough.
+    """
+    found = []
+    for one in plates:
+        time, value, centre = one.wrench.time, one.wrench.value, one.centre
+        if time.size < _ENOUGH + _ORDER:
+            continue
+        local = np.concatenate([value[:, :3], value[:, 3:] - np.cross(centre, value[:, :3])], axis=1)
+        found.append(white_noise(local) * np.sqrt(2 * float(np.median(np.diff(time)))))
+    return np.min(np.nan_to_num(found), axis=0) if found else np.zeros(6)
+
+
+def carried(body: Body, q: Array, about: Array) -> Array:
+    """Return (6, 6): covariance of the wrench about ``about`` (3,) m per m² of marker noise and (rad/s)^4, in the
+    posture ``q`` (nq,): what white marker noise becomes in a second derivative.
+    """
+    pose = poses(body, q[None])
+    segment = list(body.markers.segment)
+    points = pose.points(segment, body.markers.position)
+    place, _ = jacobian(body, pose, segment, points)
+    spread = np.linalg.inv(place[0].T @ place[0] + _LEVER**2 * np.eye(body.nv))
+    turn = np.eye(body.nv)
+    if body.n_root:
+        to_root = quaternion_matrix(q[None, 3:7])[0].T
+        turn[:3, :3], turn[3:6, 3:6] = to_root, to_root
+    rows = np.vstack([np.zeros(body.nv), np.eye(body.nv)]) @ turn.T
+    still = Motion(np.arange(len(rows)) / 100.0, np.tile(q, (len(rows), 1)), np.zeros_like(rows), rows)
+    value = predict_wrench(body, still).value
+    per = Noise.unit(about, BANDS).shift @ (value[1:] - value[0]).T
+    return np.asarray(per @ spread @ per.T)
+
+
+def of_cameras(body: Body, postures: Array, about: Array, *, noise: float, rate: float, bands: Bands = BANDS) -> Array:
+    """Return (B, 6, 6): covariance of one coefficient per band that marker noise of ``noise`` m at ``rate`` Hz adds to
+    the wrench residual, mean over the ``postures`` (n, nq).
+    """
+    lever = np.mean([carried(body, q, about) for q in postures], axis=0)
+    edges = np.array(bands.edges)
+    power = (2 * np.pi) ** 4 * np.diff(edges**5) / (5 * np.diff(edges))
+    return np.asarray(noise**2 * min(1.0, bands.rate / rate) * power[:, None, None] * lever)
+
+
+def of_plates(density: Array, count: int, bands: Bands = BANDS) -> Array:
+    """Return (6, 6): covariance of one coefficient from the noise of ``count`` plates of ``density`` (6,) N, N·m per
+    root Hz each.
+    """
+    return np.diag(count * density**2 * bands.rate / 2)
+
+
+def added_noise(body: Body, recorded: Iterable[Trial], postures: Array, about: Array) -> Array:
+    """Return (B, 6, 6): how much larger the covariance of one coefficient is with the cameras and plates of the trials
+    as ``recorded`` than where tolerances were learned; never smaller: what is quieter may be filtered.
+    """
+    trials = tuple(recorded)
+    markers = [one.markers for one in trials if one.markers is not None and one.markers.time.size > 1]
+    cameras, plates = camera_noise(markers), plate_noise(plate for one in trials for plate in one.plates)
+    beyond = np.sqrt(max(0.0, cameras**2 - LEARNED_CAMERAS**2))
+    density = np.sqrt(np.maximum(0.0, plates**2 - LEARNED_PLATES**2))
+    count = max((len(one.plates) for one in trials), default=1)
+    out = np.tile(of_plates(density, count), (len(BANDS), 1, 1))
+    if beyond > 0:
+        rate = float(np.median([one.rate for one in markers]))
+        out += of_cameras(body, postures, about, noise=float(beyond), rate=rate)
+    return np.asarray(out)
+
+
+def with_own_noise(known: Tolerances, added: Array, mass: float) -> Tolerances:
+    """Return tolerances whose noise grows by ``added`` (B, 6, 6), for a person of ``mass`` kg: limits and adequacy
+    follow.
+    """
+    return replace(known, noise=known.noise + added * (REFERENCE_PERSON / mass) ** 2)

@@ -1,0 +1,1 @@
+"""What is hidden in a recording, made without the formulas that find it."""

@@ -1,0 +1,1 @@
+"""What the person does: protocol, postures, balance, the true motion and wrench."""

@@ -1,0 +1,1 @@
+"""The virtual person: true skeleton, flesh and markers."""

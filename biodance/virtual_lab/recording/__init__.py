@@ -1,0 +1,1 @@
+"""What the instruments of the virtual laboratory record of it."""

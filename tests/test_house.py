@@ -1,0 +1,209 @@
+"""The plan of the house, checked on the source alone: one meaning per public name, no import circle, few floors, short
+files, short functions, short lines (docs/architecture.md, CONTRIBUTING.md).
+"""
+
+import ast
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "biodance"
+FLOORS = 8
+LINE = 120
+CONTRACTS = {
+    "biodance.effects": {"EFFECT"},
+    "biodance.dance.limits": {"LIMIT"},
+    "biodance.lab.readers": {"NAME", "EXTENSIONS", "PREFERENCE", "sniff", "read"},
+    "biodance.body.export": {"FORMAT", "SUFFIX", "text", "data", "beside"},
+}
+"""Family -> the names that every member gives because its contract asks for them."""
+FAMILIES = {*CONTRACTS, "biodance.body.tables.segment_data", "biodance.lab.markers.sets"}
+"""Where a family is found: each has its `FAMILY` (`biodance/discovery.py`)."""
+
+Graph = Mapping[str, set[str]]
+
+
+def module_name(path: Path) -> str:
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+@cache
+def modules() -> dict[str, ast.Module]:
+    """Every module of the package by its full name."""
+    return {module_name(path): ast.parse(path.read_text()) for path in sorted(PACKAGE.rglob("*.py"))}
+
+
+def public_names(tree: ast.Module) -> set[str]:
+    """Functions, classes and constants without underscore that a module defines itself."""
+    found = set()
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            found.add(node.name)
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            found |= {name.id for target in targets for name in ast.walk(target) if isinstance(name, ast.Name)}
+    return {name for name in found if not name.startswith("_")}
+
+
+def homonyms(trees: Mapping[str, ast.Module], contracts: Mapping[str, set[str]]) -> dict[str, list[str]]:
+    """Public names with more than one home; those of a family's contract are left out in its members."""
+    homes = defaultdict(list)
+    for module, tree in trees.items():
+        for name in public_names(tree) - contracts.get(module.rpartition(".")[0], set()):
+            homes[name].append(module)
+    return {name: found for name, found in sorted(homes.items()) if len(found) > 1}
+
+
+def imports(trees: Mapping[str, ast.Module]) -> dict[str, set[str]]:
+    """Module -> modules of the package that it imports anywhere: in functions and for types, too."""
+    graph: dict[str, set[str]] = {}
+    for module, tree in trees.items():
+        wanted: set[str] = set()
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Import):
+                wanted |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                inner = {f"{node.module}.{alias.name}": node.module for alias in node.names}
+                wanted |= {full if full in trees else outer for full, outer in inner.items()}
+        graph[module] = {other for other in wanted if other in trees and other != module}
+    return graph
+
+
+def circles(graph: Graph) -> list[list[str]]:
+    """Groups of modules that import each other (Tarjan's strongly connected components)."""
+    index: dict[str, int] = {}
+    low: dict[str, int] = {}
+    stack: list[str] = []
+    found = []
+
+    def visit(one: str) -> None:
+        index[one] = low[one] = len(index)
+        stack.append(one)
+        for other in sorted(graph[one]):
+            if other not in index:
+                visit(other)
+            if other in stack:
+                low[one] = min(low[one], low[other])
+        if low[one] == index[one]:
+            group = stack[stack.index(one) :]
+            del stack[stack.index(one) :]
+            if len(group) > 1:
+                found.append(sorted(group))
+
+    for module in graph:
+        if module not in index:
+            visit(module)
+    return found
+
+
+def floors(graph: Graph, folder: str) -> int:
+    """The longest chain of imports between the files of a folder, a sub-folder counted as one; what imports in a circle
+    counts as often as it has members.
+    """
+    room = folder + "."
+
+    def node(module: str) -> str:
+        return module if module == folder else room + module.removeprefix(room).split(".")[0]
+
+    inside: dict[str, set[str]] = defaultdict(set)
+    for module, others in graph.items():
+        if module == folder or module.startswith(room):
+            here = node(module)
+            inside[here] |= {node(o) for o in others if o == folder or o.startswith(room)} - {here}
+    group = {one: {one} for one in inside}
+    for circle in circles(inside):
+        group |= {one: set(circle) for one in circle}
+
+    @cache
+    def height(members: frozenset[str]) -> int:
+        below = {frozenset(group[other]) for one in members for other in inside[one]} - {members}
+        return len(members) + max(map(height, below), default=0)
+
+    return max((height(frozenset(group[one])) for one in inside), default=0)
+
+
+def folders(trees: Iterable[str]) -> list[str]:
+    """Every folder inside the package that holds modules."""
+    return sorted({module.rpartition(".")[0] for module in trees} - {"", "biodance"})
+
+
+def bodies(tree: ast.Module) -> list[tuple[str, int]]:
+    """Name and length in lines of every function's body, its docstring not counted."""
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef):
+            lines = node.body[1:] if ast.get_docstring(node) is not None else node.body
+            found.append((node.name, lines[-1].end_lineno - lines[0].lineno + 1 if lines else 0))
+    return found
+
+
+def test_a_public_name_has_one_meaning() -> None:
+    found = homonyms(modules(), CONTRACTS)
+    assert set(found.pop("FAMILY")) == FAMILIES
+    assert found == {}, "One meaning per public name: rename one, share it, or make it private."
+
+
+def test_nothing_is_imported_in_a_circle() -> None:
+    """The front door names what lives inside for type checkers only; nothing inside imports it."""
+    assert circles(imports(modules())) == []
+
+
+def test_a_folder_has_few_floors() -> None:
+    graph = imports(modules())
+    high = {folder: count for folder in folders(graph) if (count := floors(graph, folder)) > FLOORS}
+    assert high == {}, f"More than {FLOORS} floors: cut the folder into folders, or the chain of imports shorter."
+
+
+def test_files_and_functions_are_short() -> None:
+    lengths = {path: len(path.read_text().splitlines()) for path in PACKAGE.rglob("*.py")}
+    long = sorted(str(path.relative_to(ROOT)) for path, count in lengths.items() if count > 300)
+    assert len(long) <= 0.05 * len(lengths), f"files with more than 300 lines: {long}"
+    functions = [(count, f"{module}.{name}") for module, tree in modules().items() for name, count in bodies(tree)]
+    assert [one for one in functions if one[0] > 70] == []
+    over = sorted(one for one in functions if one[0] > 40)
+    assert len(over) <= 0.05 * len(functions), f"functions with more than 40 lines: {over}"
+
+
+def test_no_line_is_long() -> None:
+    code = [
+        path
+        for place in ("biodance", "tests", "benchmarks", "examples", "anthropometry", "protocols", "docs")
+        for kind in ("py", "toml", "j2")
+        for path in (ROOT / place).rglob(f"*.{kind}")
+    ]
+    long = [
+        f"{path.relative_to(ROOT)}:{number}"
+        for path in (*code, *ROOT.glob("*.toml"))
+        for number, line in enumerate(path.read_text().splitlines(), start=1)
+        if len(line) > LINE
+    ]
+    assert long == []
+
+
+TINY = {
+    "house.a": "from house.b import two\n\none = 1\n",
+    "house.b": "two = 2\n\n\ndef f():\n    from house.room.c import one\n",
+    "house.room.c": "import house.a\n\none = 3\nNAME: str = 'c'\n",
+    "house.room.d": "from house.room import c\n\nNAME = 'd'\n_hidden = 1\n",
+}
+
+
+@pytest.fixture
+def tiny() -> dict[str, ast.Module]:
+    return {name: ast.parse(text) for name, text in TINY.items()}
+
+
+def test_the_checks_see_what_is_wrong(tiny: dict[str, ast.Module]) -> None:
+    assert homonyms(tiny, {"house.room": {"NAME"}}) == {"one": ["house.a", "house.room.c"]}
+    assert set(homonyms(tiny, {})) == {"NAME", "one"}
+    graph = imports(tiny)
+    assert circles(graph) == [["house.a", "house.b", "house.room.c"]]
+    assert floors(graph, "house.room") == 2
+    assert floors(graph, "house") == 3  # a, b and the folder room, in a circle
+    assert floors({"h.a": {"h.b.x"}, "h.b.x": {"h.b.y"}, "h.b.y": set(), "h.c": {"h.a"}}, "h") == 3
+    assert bodies(ast.parse('def f():\n    """Doc."""\n    a = 1\n    return a\n')) == [("f", 2)]
