@@ -93,6 +93,19 @@ def test_joint_torque_a_forearm_held_out_weighs_m_g_l_on_the_elbow(low: float, h
     assert FAMILY["joint_torque"].check(checked(state)).value.min() == pytest.approx(left, abs=1e-4)
 
 
+def test_the_foot_under_the_weight_carries_it_while_a_dance_is_planned() -> None:
+    """A person who leans 3 cm to the left of two feet that stand symmetrically loads them by 1/2 -+ 3 cm / distance
+    (a little less: the legs stay behind).
+    """
+    x = upright()
+    x[0, :3] += [feet()[0].centre[0], 0.03, -0.1]
+    state = close_legs(CHAIN, feet()[0], x, *np.zeros((2, *x.shape)))
+    right, left = state.feet[0][0, :, 2]
+    apart = float(np.diff(feet()[0].sole_centres[:, 1])[0])
+    assert right + left == pytest.approx(65.0 * 9.80665)
+    assert left / right == pytest.approx((apart / 2 + 0.03) / (apart / 2 - 0.03), rel=0.15)
+
+
 def test_joint_range_and_speed_are_what_is_left_to_the_stops() -> None:
     knee = BODY.joint_index("right_knee_flexion")
     stop, fast = BODY.limits.upper[knee], BODY.limits.velocity[knee]

@@ -3,6 +3,7 @@
 Nothing of biodance is broken here; `python benchmarks/mutants.py` does that.
 """
 
+import hashlib
 import importlib.util
 import sys
 from pathlib import Path
@@ -69,6 +70,17 @@ def test_the_runner_tells_killed_from_survived_and_mends_what_it_broke(
         assert outcome.fate == fate
         assert outcome.by.startswith("test_half.py::test_half") == (fate == "killed")
     assert (tmp_path / "half.py").read_text() == "def half(x):\n    return x / 2  # exact\n"
+
+
+def test_the_digest_of_a_table_follows_its_mutant(tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text("a,1\n")
+    digest = hashlib.sha256(b"a,1\n").hexdigest()
+    (tmp_path / "t.toml").write_text(f'sha256 = "{digest}"\n')
+    with SCRIPT.broken(tmp_path, SCRIPT.Mutant("m", "t.csv", "a,1", "a,2", ("test_a.py",), "it matters")):
+        assert hashlib.sha256(b"a,2\n").hexdigest() in (tmp_path / "t.toml").read_text()
+        assert (tmp_path / "t.csv").read_text() == "a,2\n"
+    assert digest in (tmp_path / "t.toml").read_text()
+    assert (tmp_path / "t.csv").read_text() == "a,1\n"
 
 
 def test_a_result_holds_as_long_as_entry_file_and_tests_are_the_same(
