@@ -58,12 +58,13 @@ def contradicted(information: Array, gradient: Array, shown: NDArray[np.bool_]) 
     """
     free, found = np.flatnonzero(shown), []
     for joint in JOINTS:
-        own = own_unknowns(joint)
+        own = np.array(own_unknowns(joint))
         if shown[own].any():
             continue
-        shared = np.linalg.solve(information[np.ix_(free, free)], information[np.ix_(free, own)])
-        left = information[np.ix_(own, own)] - information[np.ix_(own, free)] @ shared
-        pull = gradient[own] - shared.T @ gradient[free]
-        if 0.5 * pull @ np.linalg.solve(left, pull) >= _GAIN:
+        across = information[np.ix_(free, own)]
+        shared: Array = np.asarray(np.linalg.solve(information[np.ix_(free, free)], across), dtype=float)
+        left: Array = information[np.ix_(own, own)] - across.T @ shared
+        pull: Array = gradient[own] - shared.T @ gradient[free]
+        if 0.5 * float(pull @ np.linalg.solve(left, pull)) >= _GAIN:
             found.append(joint)
     return tuple(found)
