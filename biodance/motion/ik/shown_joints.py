@@ -14,7 +14,7 @@ EXCITED = 0.3
 """Share of a joint's prior standard deviation that the movement must remove; below it the static trial's answer is
 kept, because what little the markers say of such a joint is soft tissue.
 """
-_GAIN = 10.0
+_MORE_PROBABLE = 10.0
 """Natural logarithm by which freeing a kept joint must make the markers more probable: the movement then contradicts
 the static trial's place, though it would hardly have shown a joint near it (26 sessions of 14 persons with hips and
 ankles near their places: 1.8 at most; a hip 81 mm off, two persons: 53 and 61).
@@ -51,7 +51,7 @@ def own_unknowns(joint: str) -> list[int]:
 def contradicted(information: Array, gradient: Array, shown: NDArray[np.bool_]) -> tuple[str, ...]:
     """Return the joints kept in a fit of the ``shown`` (37,) unknowns that the markers contradict, from the
     ``information`` (37, 37) and ``gradient`` (37,) of the cost there: to first order, freeing one makes them more
-    probable by `_GAIN` (natural logarithm) or more.
+    probable by `_MORE_PROBABLE` (natural logarithm) or more.
 
     A joint that lies far off makes the movement look poor in information about it, so that it would be kept and the
     joints beside it moved in its place.
@@ -61,9 +61,10 @@ def contradicted(information: Array, gradient: Array, shown: NDArray[np.bool_]) 
         own: Index = np.array(own_unknowns(joint))
         if shown[own].any():
             continue
-        shared = np.linalg.solve(information[np.ix_(free, free)], information[np.ix_(free, own)])
-        left = information[np.ix_(own, own)] - information[np.ix_(own, free)] @ shared
-        pull = gradient[own] - shared.T @ gradient[free]
-        if 0.5 * pull @ np.linalg.solve(left, pull) >= _GAIN:
+        across = information[np.ix_(free, own)]
+        shared: Array = np.asarray(np.linalg.solve(information[np.ix_(free, free)], across), dtype=float)
+        left: Array = information[np.ix_(own, own)] - across.T @ shared
+        pull: Array = gradient[own] - shared.T @ gradient[free]
+        if 0.5 * float(pull @ np.linalg.solve(left, pull)) >= _MORE_PROBABLE:
             found.append(joint)
     return tuple(found)
