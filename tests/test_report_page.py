@@ -14,6 +14,7 @@ import pytest
 from example_results import full_session, refused_session
 
 from biodance.doctor import BROWSERS
+from biodance.pipeline.attention import without_path
 from biodance.pipeline.provenance import provenance
 from biodance.pipeline.results import SessionResult
 from biodance.report.figures.session import marker_figure, wrench_figure
@@ -21,7 +22,7 @@ from biodance.report.figures.solid import still_addresses
 from biodance.report.figures.still import still_figure
 from biodance.report.figures.style import svg_address
 from biodance.report.pages.session import check_table, page
-from biodance.report.wording import format_number, millimetres, without_path
+from biodance.report.wording import format_number, millimetres
 
 TIME = "2026-01-01T00:00:00Z"
 VOID = {"meta", "img", "link", "br", "hr"}
