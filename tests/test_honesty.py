@@ -104,7 +104,7 @@ def test_a_name_that_another_one_takes_back_is_taken_back() -> None:
 
 
 def test_a_size_below_two_standard_deviations_or_above_what_can_be_does_not_stand() -> None:
-    found, causes = built(problem(body(), looks(1), chosen=("wobbling_mass", "plate_offset")), known(), FAST)
+    found, _ = built(problem(body(), looks(1), chosen=("wobbling_mass", "plate_offset")), known(), FAST)
     offset_fx = effects()["plate_offset"].at("Fx", found.problem.cases[0])
     assert not stands(found, NamedCause(offset_fx, np.array([5.9]), np.array([[9.0]])))
     assert stands(found, NamedCause(offset_fx, np.array([-6.1]), np.array([[9.0]])))
@@ -118,7 +118,7 @@ def test_a_size_below_two_standard_deviations_or_above_what_can_be_does_not_stan
 def test_what_hides_needs_overwhelming_evidence() -> None:
     found, _ = built(problem(body(), looks(1), chosen=("plate_offset",)), known(), ("plate_offset",))
     assert needed(found, 0.2) == found.tolerances.threshold
-    assert needed(found, 0.19) == 10 * found.tolerances.threshold
+    assert needed(found, 0.19) == 3 * found.tolerances.threshold
 
 
 # 2 ---- no expected mean that is no physics
@@ -188,7 +188,7 @@ def test_a_check_points_to_the_cause_that_was_found() -> None:
     assert plain.level == "warn"
     assert "Weigh again." in plain.text
     assert named.level == "note"
-    assert "plate gain Fz" in named.text
+    assert "Plate gain Fz" in named.text
     assert "Weigh again." not in named.text
     family = {name for causes in EXPLAINS.values() for name in causes}
     from biodance.effects import discrete_effects
@@ -334,14 +334,10 @@ def test_own_noise_is_added_beyond_what_was_learned_and_limits_follow() -> None:
     np.testing.assert_allclose(more, expected, rtol=0.1)
     wider = with_own_noise(known(), more, 70.0)
     np.testing.assert_allclose(wider.noise - known().noise, more, atol=1e-12)
-    limits = [
-        next(
-            row.limit
-            for row in diagnose_trials(body(), looks(1), tolerances=one, effects=("added_mass",)).diagnosis.limits
-        )
-        for one in (known(), wider)
+    seen = [
+        diagnose_trials(body(), looks(1), tolerances=one, effects=("added_mass",)).diagnosis for one in (known(), wider)
     ]
-    assert limits[1] > limits[0]
+    assert min(row.limit for row in seen[1].limits) > min(row.limit for row in seen[0].limits)
 
 
 # ---- real recordings

@@ -39,10 +39,11 @@ def white_noise(samples: Array) -> Array:
     too few.
     """
     change = np.abs(np.diff(samples, n=_ORDER, axis=0))
-    seen = np.isfinite(change).sum(axis=0)
-    with np.errstate(all="ignore"):
-        value = _NORMAL / _GAIN * np.nanmedian(np.where(seen >= _ENOUGH, change, np.nan), axis=0)
-    return np.asarray(value)
+    enough = np.isfinite(change).sum(axis=0) >= _ENOUGH
+    value = np.full(samples.shape[1:], np.nan)
+    if enough.any():
+        value[enough] = _NORMAL / _GAIN * np.nanmedian(change[:, enough], axis=0)
+    return value
 
 
 def camera_noise(trials: Iterable[Markers]) -> float:
