@@ -173,6 +173,56 @@ def run(name: str, only: list[str], foreign: int, own: int) -> list[Answer]:
     return [Answer(**{k: tuple(v) if isinstance(v, list) else v for k, v in row.items()}) for row in known.values()]
 
 
+def table(before: list[Answer], now: list[Answer]) -> list[str]:
+    """Return the page's part: counts before and now in the columns real, foreign and own, then every session."""
+
+    def cell(test, column: str) -> str:  # type: ignore[no-untyped-def]
+        counts = []
+        for some in (before, now):
+            here = [one for one in some if one.column == column and test(one) is not None]
+            counts.append(f"{sum(map(test, here))} of {len(here)}" if here else "-")
+        return " -> ".join(counts)
+
+    tests = {
+        "clean session: a false name": lambda one: None if one.hidden else bool(one.false),
+        "clean session: a false name or alarm": lambda one: None if one.hidden else one.alarm,
+        "clean session: says that it cannot tell, or was refused": (
+            lambda one: None if one.hidden else one.cannot_tell or one.verdict == "refused"
+        ),
+        '"nothing wrong" or "complete" beside a failed check or an unjudged trial, without a word': (
+            lambda one: one.contradicts
+        ),
+        "hidden fault: named, and nothing else": (
+            lambda one: bool(one.names) and not one.false if one.hidden else None
+        ),
+    }  # fmt: skip
+    lines = [
+        "## No more than the evidence carries",
+        "",
+        "Real recordings without a known fault, clean sessions of an independent virtual laboratory "
+        f"({' '.join(ROOM)}), and this project's own one; before -> now. Made by `benchmarks/bench_honesty.py`.",
+        "",
+        "| | real | foreign | own |",
+        "|---|---|---|---|",
+        *(
+            f"| {name} | {' | '.join(cell(test, c) for c in ('real', 'foreign', 'own'))} |"
+            for name, test in tests.items()
+        ),
+        "",
+        "| session | before | now |",
+        "|---|---|---|",
+    ]
+    old = {one.key: one for one in before}
+    return lines + [f"| {one.key} | {_said(old.get(one.key))} | {_said(one)} |" for one in now]
+
+
+def _said(one: Answer | None) -> str:
+    if one is None:
+        return "-"
+    names = f": {', '.join(one.names)}" if one.names else ""
+    return f"{'cannot tell' if one.cannot_tell else one.verdict}{names}"
+
+
 def main() -> None:
     """Diagnose what is asked for and write the page's part."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -182,7 +232,16 @@ def main() -> None:
     parser.add_argument("--own", type=int, default=8)
     parser.add_argument("--out", type=Path)
     chosen = parser.parse_args()
-    run(chosen.run, chosen.only, chosen.foreign, chosen.own)
+    answers = run(chosen.run, chosen.only, chosen.foreign, chosen.own)
+    if chosen.out:
+        path = CACHE / "honesty" / "answers-before.json"
+        rows = json.loads(path.read_text()) if path.is_file() else []
+        before = [Answer(**{k: tuple(v) if isinstance(v, list) else v for k, v in row.items()}) for row in rows]
+        text = chosen.out.read_text()
+        head, _, rest = text.partition(START)
+        part = "\n".join([START, *table(before, answers), END])
+        tail = rest.partition(END)[2] if rest else "\n"
+        chosen.out.write_text(f"{head.rstrip()}\n\n{part}{tail}")
 
 
 if __name__ == "__main__":

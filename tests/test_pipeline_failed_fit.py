@@ -97,7 +97,8 @@ def test_the_session_says_it_on_the_page_and_in_the_numbers(failing):
     assert "<figure>" not in page
     result = replace(session_result(), identification=found)
     assert result.needs_a_person
-    assert Attention("fail", f"Not solved. {FORCED.cause}", "", "identification, segments") in session_attention(result)
+    said = Attention("fail", f"Not solved. {FORCED.cause}", "", "identification, segments")
+    assert said in session_attention(result)
 
 
 def test_a_reference_that_failed_is_said_and_not_compared_with(monkeypatch):
@@ -131,7 +132,7 @@ def test_the_command_says_it_and_writes_and_exports_no_body(failing, monkeypatch
     for room in ("biodance.pipeline.session", "biodance.pipeline.export"):
         monkeypatch.setattr(f"{room}.examine", lambda session, **_: found)
     assert run(["identify", str(tmp_path / "S01"), "--out", str(tmp_path / "out")]) == NEEDS_A_PERSON
-    assert "not solved, segments" in capsys.readouterr().out
+    assert "Identification, segments: Not solved." in capsys.readouterr().out
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["report.html", "results.json"]
     assert json.loads((tmp_path / "out" / "results.json").read_text())["status"] == "failed"
     assert run(["export", str(tmp_path / "S01"), "--format", "csv", "--out", str(tmp_path / "s.csv")]) == NOT_DONE

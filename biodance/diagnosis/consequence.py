@@ -38,7 +38,7 @@ doi:10.1007/BF02513272)."""
 def least(effect: Effect) -> dict[str, float]:
     """Return the least size of each parameter that matters, by the parameter's name; only of those that have one."""
     sizes = LEAST.get(effect.name, {})
-    found = {one.name: sizes.get(_unit(effect, one.unit), 0.0) for one in effect.parameters}
+    found = {one.name: sizes.get(unit_at(effect, one.unit), 0.0) for one in effect.parameters}
     return {name: size for name, size in found.items() if size > 0}
 
 
@@ -53,7 +53,7 @@ def matters(effect: Effect, theta: Array) -> bool:
     return float(np.linalg.norm([values[name] / floor for name, floor in floors.items()])) >= 1.0
 
 
-def _unit(effect: Effect, unit: str) -> str:
+def unit_at(effect: Effect, unit: str) -> str:
     """Return the unit at the effect's target, where its parameter has another one at each (``N or N·m``)."""
     if " or " not in unit:
         return unit

@@ -8,7 +8,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.diagnosis.adequacy import STRAINED, adequacy, alarming, strain, verdict
-from biodance.diagnosis.consequence import matters
+from biodance.diagnosis.consequence import matters, unit_at
 from biodance.diagnosis.diagnosis import Diagnosis, Estimate, Finding, Unobservable
 from biodance.diagnosis.model import NamedCause
 from biodance.diagnosis.naming import Naming, Round, name_causes, suspicious
@@ -139,7 +139,8 @@ def _finding(one: NamedCause, found: Round, known: Tolerances) -> Finding:
     units = np.array([parameter.unit for parameter in one.effect.parameters])
     length = np.array([np.linalg.norm(one.theta[units == unit]) for unit in units])
     sd = np.hypot(np.maximum(np.sqrt(np.diag(one.covariance)), alike), known.unlike(one.effect.name) * length)
-    parameters = tuple(Estimate(*row) for row in one.effect.reported(one.theta, sd))
+    reported = one.effect.reported(one.theta, sd)
+    parameters = tuple(Estimate(name, size, own, unit_at(one.effect, unit)) for name, size, own, unit in reported)
     return Finding(
         one.effect.name, one.effect.target, parameters, found.set, found.suspects[0].visible, advice=one.effect.advice
     )

@@ -33,7 +33,7 @@ this share.
 """
 SURE = 2.0
 """A name is taken back where its size is less than so many of its standard deviations."""
-SEEN, OVERWHELMING = 0.2, 10.0
+SEEN, OVERWHELMING = 0.2, 3.0
 """Where less than this share of a cause is visible beside all that is no fault, its evidence must be so many times the
 threshold: it rests on the sizes of tolerances. (A gain of Fz of 5 % is visible to 2 %: the rest looks like mass. The
 declared mass still makes it 25 standard deviations.)

@@ -9,6 +9,7 @@ import numpy as np
 
 from biodance.diagnosis.adequacy import LIMIT, alarming
 from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Finding
+from biodance.diagnosis.engine import STRANGE
 from biodance.diagnosis.problem import Look
 from biodance.identification.added_mass import LoadSearch
 from biodance.pipeline.looked_at import reasons_left_out, seconds_of
@@ -222,7 +223,9 @@ def _sentence(beside: str) -> str:
 
 def _where(one: Diagnosis) -> str:
     """Return where what is left is largest, with its size."""
-    rows = [row for row in one.adequacy if row.matters] or list(one.adequacy)
+    rows = [row for row in one.adequacy if row.matters and row.z > LIMIT] or list(one.adequacy)
+    if STRANGE in one.notes and alarming(one.adequacy) <= LIMIT:
+        return "what the plates measured fits only a body that is more unlike the table than people are"
     if not rows:
         return "what is left is unlike sessions without fault"
     row = rows[0]
@@ -234,6 +237,6 @@ def _where(one: Diagnosis) -> str:
 
 def _incomplete(one: Diagnosis, rests_on: str) -> str:
     """Return what is more to say of a diagnosis that is not complete."""
-    if one.adequacy and alarming(one.adequacy) > LIMIT:
+    if STRANGE in one.notes or alarming(one.adequacy) > LIMIT:
         return f"Something more is wrong in {rests_on} that no known cause explains: {_where(one)}."
-    return f"Whether more is wrong cannot be told{f' from {rests_on}' if rests_on else ''}."
+    return f"What else there is to see in {rests_on} is as without fault." if rests_on else "Nothing else was judged."

@@ -19,5 +19,8 @@ def millimetres(value: float | None, digits: int = 1) -> str:
 
 
 def place(one: Attention) -> str:
-    """Return where a sentence belongs, to stand before it: check and trial, or the session."""
-    return ", ".join(filter(None, (one.about.replace("_", " "), one.trial))).capitalize() or "Session"
+    """Return where a sentence belongs, to stand before it: file, check and trial, step, or trial."""
+    about = one.about.replace("_", " ")
+    if one.trial:
+        return one.trial if about == "file" else f"{about}, {one.trial}" if about else f"Trial {one.trial}"
+    return f"{about[:1].upper()}{about[1:]}" or "Session"

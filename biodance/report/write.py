@@ -84,7 +84,7 @@ def write_diagnosis(result: SessionResult, found: SessionDiagnosis, folder: Path
 def _page(result: SessionResult, made: Provenance, diagnosis: SessionDiagnosis | None = None) -> str:
     told = diagnosis_section(diagnosis) if diagnosis else ""
     stills = still_addresses((result.still, *result.more_stills)) if result.still else []
-    attention = diagnosis.diagnosis.attention if diagnosis else session_attention(result)
+    attention = diagnosis.diagnosis.attention if diagnosis else None
     return page(result, made, attention=attention, stills=stills, diagnosis=told)
 
 

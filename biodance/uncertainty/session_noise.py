@@ -1,9 +1,9 @@
 """What a session tells about its own instruments: camera noise from the markers' fastest changes, plate noise from the
 forces'; and what camera noise does to the wrench that a motion needs.
 
-White noise of standard deviation s moves the fourth difference of its samples by sqrt(70) s, a movement of a few hertz
-hardly at all. Least squares carries marker noise into the tangent of the posture with the covariance s² (J'J)^-1 (J the
-marker Jacobian), differentiating twice multiplies it by (2 pi f)^2, and the wrench is linear in accelerations.
+White noise of standard deviation s changes the fourth difference of its samples by sqrt(70) s, a movement of a few
+hertz hardly at all. Least squares carries marker noise into the tangent of the posture with the covariance s² (J'J)^-1
+(J the marker Jacobian), differentiating twice multiplies it by (2 pi f)^2, and the wrench is linear in accelerations.
 """
 
 from collections.abc import Iterable
@@ -40,10 +40,11 @@ def white_noise(samples: Array) -> Array:
     too few.
     """
     change = np.abs(np.diff(samples, n=_ORDER, axis=0))
-    seen = np.isfinite(change).sum(axis=0)
-    with np.errstate(all="ignore"):
-        value = _NORMAL / _GAIN * np.nanmedian(np.where(seen >= _ENOUGH, change, np.nan), axis=0)
-    return np.asarray(value)
+    enough = np.isfinite(change).sum(axis=0) >= _ENOUGH
+    value = np.full(samples.shape[1:], np.nan)
+    if enough.any():
+        value[enough] = _NORMAL / _GAIN * np.nanmedian(change[:, enough], axis=0)
+    return value
 
 
 def camera_noise(trials: Iterable[Markers]) -> float:

@@ -6,6 +6,7 @@ from importlib.resources import files
 
 from biodance.diagnosis.diagnosis import ABOUT
 from biodance.lab.markers.gaps import MarkerGaps
+from biodance.pipeline.attention import session_attention
 from biodance.pipeline.provenance import Provenance
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import Check, TrialResult
@@ -78,25 +79,27 @@ def page(
     result: SessionResult,
     provenance: Provenance,
     *,
-    attention: Sequence[Attention] = (),
+    attention: Sequence[Attention] | None = None,
     stills: Sequence[str] = (),
     diagnosis: str = "",
 ) -> str:
-    """Return the page of ``result`` as HTML text; ``attention`` what a person must see first, ``stills``
-    are the addresses of its 3-D images (`still`, then
-    `more_stills`), ``diagnosis`` the section on what the simulation gets wrong, "" for none.
+    """Return the page of ``result`` as HTML text; ``attention`` what a person must see (by default
+    `session_attention`), ``stills`` the addresses of its 3-D images (`still`, then `more_stills`), ``diagnosis`` the
+    section on what the simulation gets wrong, "" for none.
 
     The same arguments give the same characters.
     """
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
+    said = session_attention(result) if attention is None else attention
+    first = sorted(said, key=lambda one: one.about != ABOUT)
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters.update(number=format_number, mm=millimetres)
     folder = files("biodance.report") / "templates"
     return environment.from_string((folder / "page.html.j2").read_text(encoding="utf-8")).render(
         style=Markup((folder / "page.css").read_text(encoding="utf-8")),
-        attention=[(place(one), one.text) for one in sorted(attention, key=lambda one: one.about != ABOUT)],
+        attention=[(place(one), one.text) for one in first],
         check_table=check_table(result),
         result=result,
         provenance=provenance,

@@ -1,0 +1,358 @@
+"""No verdict says more than its evidence carries: closed-form cases of every rule, a test over all verdicts and
+checks, and real recordings without fault (BIODANCE_DATA).
+"""
+
+import itertools
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from diagnosed_sessions import RATE, about_plate, body, known, looks, motion
+from example_results import full_session
+
+from biodance.diagnosis.adequacy import adequacy, alarming, verdict
+from biodance.diagnosis.consequence import least, matters
+from biodance.diagnosis.diagnosis import ABOUT, LEAST_FORCE, LEAST_MOMENT, Adequacy, Alias, Diagnosis, Estimate, Finding
+from biodance.diagnosis.engine import diagnose_trials
+from biodance.diagnosis.model import NamedCause
+from biodance.diagnosis.naming import built, held, needed, settle, stands
+from biodance.diagnosis.problem import problem
+from biodance.effects import Case, Gate, effects
+from biodance.lab.session.read import read_session
+from biodance.motion.regressor import predict_wrench
+from biodance.pipeline.attention import EXPLAINS, headline, is_well, session_attention, told
+from biodance.pipeline.diagnosis import diagnose_session
+from biodance.pipeline.results import Check
+from biodance.pipeline.session import examine
+from biodance.records import Markers, Motion, Plate, Wrench
+from biodance.records.attention import Attention, Judged, strongest_first
+from biodance.uncertainty.bands import BANDS
+from biodance.uncertainty.session_noise import (
+    LEARNED_CAMERAS,
+    added_noise,
+    camera_noise,
+    of_cameras,
+    of_plates,
+    plate_noise,
+    white_noise,
+    with_own_noise,
+)
+from biodance.uncertainty.tolerances import shipped, table_sizes, without_habits
+
+FAST = ("plate_gain", "plate_offset", "plate_drift", "time_delay", "body_mass", "added_mass")
+FOUND = Finding("plate_gain", "Fz", (Estimate("gain", 0.06, 0.002, "1"),), (Alias("plate_gain", "Fz", 80.0),), 0.9)
+GOOD = Check("marker distance, RMS", "walk", "8.0 mm", "at most 20 mm", True)
+BAD = replace(GOOD, value="31.0 mm", inside=False)
+HEAVY = Check("mass on the plates against declared", "static", "6.0 %", "at most 2 %", False, "Weigh again.")
+WALK = Judged("walk", 0.0, "no 1 s of contact. More.", missed=True)
+STATIC = Judged("static", 3.0)
+
+
+def offset(size: float):
+    def changed(local, session):
+        local[:, 0] += size
+        return local
+
+    return about_plate(changed)
+
+
+# 1 ---- what names need
+
+
+def standing_looks(shift: float):
+    """Return quiet standing with ``shift`` N too much of Fx."""
+    look = looks(1, trials=1)[0]
+    moving, frames = motion(3), int(4 * RATE)
+    zero = np.zeros((frames, moving.v.shape[1]))
+    still = Motion(np.arange(frames) / RATE, np.repeat(moving.q[:1], frames, axis=0), zero, zero)
+    value = predict_wrench(body(), still).value + shift * np.eye(6)[0]
+    plate = replace(look.trial.plates[0], wrench=Wrench(still.time, value))
+    quiet = replace(look.trial, role="fit", plates=(plate,))
+    return (replace(look, trial=quiet, motion=still, use=np.ones(frames, dtype=bool)),)
+
+
+def test_standing_alone_names_nothing_however_large() -> None:
+    moving = diagnose_trials(body(), looks(1, hidden=offset(40.0)), tolerances=known(), effects=FAST)
+    assert [one.effect for one in moving.diagnosis.findings] == ["plate_offset"]
+    quiet = diagnose_trials(body(), standing_looks(40.0), tolerances=known(), effects=FAST).diagnosis
+    assert (quiet.findings, quiet.resembles) == ((), ())
+    assert quiet.doubt
+
+
+def test_a_name_that_another_one_takes_back_is_taken_back() -> None:
+    """Offset and nothing else is hidden: a delay named beside it has no size of its own and falls, the offset stays."""
+    put = problem(body(), looks(2, hidden=offset(12.0)), chosen=FAST)
+    found, causes = built(put, known(), FAST)
+    one = {cause.names: cause for cause in causes}
+    start = tuple(
+        NamedCause(one[name].effect, one[name].effect.typical, np.eye(1))
+        for name in (("time_delay", ""), ("plate_offset", "Fx"))
+    )
+    both = settle(found, start)
+
+    def round_of(name):
+        from biodance.diagnosis.naming import Round, ScoredCandidate
+
+        return Round((ScoredCandidate(one[name], 50.0, 50.0, np.zeros(1), 0.9),))
+
+    kept, rounds = held(both, (round_of(("time_delay", "")), round_of(("plate_offset", "Fx"))))
+    assert [cause.effect.name for cause in kept.named] == ["plate_offset"]
+    assert len(rounds) == 1
+    assert kept.named[0].theta[0] == pytest.approx(12.0, abs=1.0)
+
+
+def test_a_size_below_two_standard_deviations_or_above_what_can_be_does_not_stand() -> None:
+    found, _ = built(problem(body(), looks(1), chosen=("wobbling_mass", "plate_offset")), known(), FAST)
+    offset_fx = effects()["plate_offset"].at("Fx", found.problem.cases[0])
+    assert not stands(found, NamedCause(offset_fx, np.array([5.9]), np.array([[9.0]])))
+    assert stands(found, NamedCause(offset_fx, np.array([-6.1]), np.array([[9.0]])))
+    wobbling = effects()["wobbling_mass"].at("right_shank", found.problem.cases[0])
+    own = float(body().sip.mass[body().segment_index("right_shank")])
+    assert stands(found, NamedCause(wobbling, np.array([0.9 * own]), np.array([[1e-4]])))
+    assert not stands(found, NamedCause(wobbling, np.array([1.1 * own]), np.array([[1e-4]])))
+    assert not stands(found, NamedCause(wobbling, np.array([-1.0]), np.array([[1e-4]])))
+
+
+def test_what_hides_needs_overwhelming_evidence() -> None:
+    found, _ = built(problem(body(), looks(1), chosen=("plate_offset",)), known(), ("plate_offset",))
+    assert needed(found, 0.2) == found.tolerances.threshold
+    assert needed(found, 0.19) == 3 * found.tolerances.threshold
+
+
+# 2 ---- no expected mean that is no physics
+
+
+def test_only_what_is_physics_keeps_a_mean_and_the_rest_is_spread() -> None:
+    one = replace(known(), sizes={"wobbling_mass thigh": 3.0, "time_delay": 0.3}, means={
+        "wobbling_mass left_thigh mass": -4.0, "wobbling_mass right_thigh mass": -4.0, "time_delay delay": 0.4,
+        "sag thigh": -3e-5, "clock_drift stretch": 0.1,
+    })  # fmt: skip
+    free = without_habits(one)
+    assert dict(free.means) == {"sag thigh": -3e-5}
+    assert dict(free.sizes) == pytest.approx({"wobbling_mass thigh": 5.0, "time_delay": 0.5})
+    assert all(key.startswith("sag ") for key in shipped().means)
+    assert all(shipped().sizes[key] >= size for key, size in table_sizes().items())
+
+
+# 3, 6 ---- verdicts and sentences
+
+
+def sessions():
+    """Yield every verdict beside every check and trial, as `told` says it."""
+    result = full_session()
+    left = (Adequacy("Fx", (0.3, 1.0), 12.0, "walk", 1.0, 5.0),)
+    whole = Diagnosis("nothing wrong", ())
+    some = (
+        whole,
+        replace(whole, verdict="named, complete", findings=(FOUND,)),
+        replace(whole, verdict="named, incomplete", findings=(FOUND,), adequacy=left),
+        replace(whole, verdict="unexplained", adequacy=left),
+        replace(whole, verdict="unexplained", adequacy=left, resembles=(FOUND,)),
+        replace(whole, verdict="unexplained", adequacy=left, doubt="standing alone tells no cause"),
+        replace(whole, verdict="unexplained"),
+    )
+    for one, check, row in itertools.product(some, (GOOD, BAD, HEAVY), ((STATIC,), (STATIC, WALK), (WALK,))):
+        trials = tuple(replace(trial, checks=()) for trial in result.trials)
+        yield one, check, row, told(one, replace(result, trials=trials, checks=(check,)), row)
+
+
+def test_no_verdict_contradicts_a_check_or_an_unjudged_trial() -> None:
+    count = 0
+    for before, check, rows, one in sessions():
+        said = next(line for line in one.attention if line.about == ABOUT)
+        whole = check.inside and not any(row.missed for row in rows)
+        count += 1
+        assert one.verdict != "named, complete" or whole
+        if one.verdict == "nothing wrong":
+            assert ("what could be judged" in said.text) == (not whole)
+            assert (said.level == "note") == whole == is_well(one)
+        if not check.inside:
+            assert check.what in said.text
+        if WALK in rows:
+            assert "not judged: walk" in said.text
+        if one.verdict == "unexplained":
+            assert not one.findings
+            assert said.text.startswith("Cannot tell") == (bool(before.doubt) or STATIC not in rows)
+        assert not is_well(one) or whole
+        assert list(one.attention) == list(strongest_first(one.attention))
+        assert one.judged == rows
+    assert count == 63
+
+
+def test_a_check_points_to_the_cause_that_was_found() -> None:
+    result = replace(full_session(), checks=(HEAVY,))
+    plain = next(one for one in session_attention(result) if one.about == HEAVY.what)
+    named = next(one for one in session_attention(result, [FOUND]) if one.about == HEAVY.what)
+    assert plain.level == "warn"
+    assert "Weigh again." in plain.text
+    assert named.level == "note"
+    assert "Plate gain Fz" in named.text
+    assert "Weigh again." not in named.text
+    family = {name for causes in EXPLAINS.values() for name in causes}
+    from biodance.effects import discrete_effects
+
+    assert family <= {*effects(), *discrete_effects()}
+
+
+def test_sentences_come_strongest_first_and_once() -> None:
+    note, fail = Attention("note", "a"), Attention("fail", "b")
+    assert strongest_first([note, fail, note]) == (fail, note)
+
+
+def test_a_size_that_is_hardly_known_says_so() -> None:
+    shaky = replace(FOUND, parameters=(Estimate("gain", 0.06, 0.05, "1"),))
+    line = headline(Diagnosis("named, complete", (shaky,)), "80 s of movement", (STATIC,), ())
+    assert "hardly known" in line.text
+    assert "hardly known" not in headline(Diagnosis("named, complete", (FOUND,)), "80 s", (STATIC,), ()).text
+
+
+def test_a_poor_model_resembles_and_is_no_finding() -> None:
+    def knocked(wrench, session, moving):
+        knock = 40.0 * np.sin(2 * np.pi * 4.0 * moving.time) * (np.abs(moving.time - 6.0) < 1.0)
+        return offset(12.0)(wrench + knock[:, None] * (np.arange(6) == 1), session, moving)
+
+    one = diagnose_trials(body(), looks(1, hidden=knocked), tolerances=known(), effects=FAST).diagnosis
+    assert one.verdict == "unexplained"
+    assert one.findings == ()
+    assert "plate_offset" in {finding.effect for finding in one.resembles}
+
+
+# 4 ---- what matters
+
+
+@pytest.mark.parametrize(
+    ("name", "target", "small", "large"),
+    [
+        ("time_delay", "", [0.0029], [-0.0031]),
+        ("plate_drift", "Fx", [1.9], [2.1]),
+        ("plate_drift", "Mx", [-0.49], [0.51]),
+        ("plate_crosstalk", "Fz->My", [0.0009], [0.0011]),
+        ("plate_crosstalk", "Fz->Fx", [0.0019], [0.0021]),
+        ("external_contact", "left_foot", [1.1, 1.1, 1.1], [1.2, 1.2, 1.2]),
+    ],
+)
+def test_a_cause_matters_from_its_least_size_on(name, target, small, large) -> None:
+    look = looks(1, trials=1)[0]
+    case = Case(body(), look.trial, look.motion, body().sip.phi, np.linspace(0, 1, look.motion.time.size))
+    one = effects()[name].at(target, case)
+    assert not matters(one, np.array(small))
+    assert matters(one, np.array(large))
+
+
+def test_a_cause_within_any_tolerance_is_told_but_no_finding() -> None:
+    one = diagnose_trials(body(), looks(1, hidden=offset(1.9)), tolerances=replace(known(), sizes={}), effects=FAST)
+    assert one.diagnosis.verdict == "nothing wrong"
+    assert one.diagnosis.findings == ()
+    assert [finding.effect for finding in one.diagnosis.tolerated] == ["plate_offset"]
+    limit = next(row for row in one.diagnosis.limits if (row.effect, row.target) == ("plate_offset", "Fx"))
+    assert limit.limit >= least(effects()["plate_offset"].at("Fx", one.naming.first.problem.cases[0]))["offset"]
+
+
+def test_an_alarm_must_matter_physically() -> None:
+    small, large = (Adequacy("Mx", (0.0, 0.04), 12.0, size=size) for size in (0.9 * LEAST_MOMENT, 1.1 * LEAST_MOMENT))
+    force = Adequacy("Fz", (0.0, 0.04), 5.0, size=1.1 * LEAST_FORCE)
+    assert alarming((small,)) == 0.0
+    assert alarming((small, force)) == 5.0
+    assert alarming((small, large)) == 12.0
+    assert verdict(0, alarming((small,)), ()) == "nothing wrong"
+    assert verdict(1, alarming((large,)), (Gate("x", True, ""),)) == "unexplained"
+
+
+def test_the_size_of_what_is_left_is_in_newton() -> None:
+    """A beat of 6 N amplitude, 4.2 N RMS, at 1.5 Hz that nothing describes is left in its band, in N."""
+
+    def beaten(wrench, session, moving):
+        return wrench + 6.0 * np.sin(2 * np.pi * 1.5 * moving.time)[:, None] * (np.arange(6) == 0)
+
+    found, _ = built(problem(body(), looks(1, hidden=beaten), chosen=("plate_offset",)), known(), ("plate_offset",))
+    row = next(one for one in adequacy(found) if (one.channel, one.band_hz) == ("Fx", (1.0, 2.5)))
+    assert row.size == pytest.approx(6.0 / np.sqrt(2), rel=0.15)
+    assert row.unit == "N"
+
+
+# 5 ---- noise from the session
+
+
+def test_white_noise_is_measured_under_movement() -> None:
+    rng = np.random.default_rng(3)
+    time = np.arange(0, 10, 0.01)
+    course = 0.3 * np.sin(2 * np.pi * 1.0 * time) + 0.02 * np.sin(2 * np.pi * 3.0 * time)
+    xyz = course[:, None, None] + rng.normal(0, 2e-4, (time.size, 5, 3))
+    xyz[100:300, 0] = np.nan
+    assert camera_noise([Markers(tuple("abcde"), time, xyz)]) == pytest.approx(2e-4, rel=0.05)
+    assert np.isnan(white_noise(np.zeros((20, 2)))).all()
+    assert camera_noise([Markers(("a",), time[:20], xyz[:20, 1:2])]) == 0.0
+
+
+def test_plate_noise_is_a_density_about_the_plates_centre() -> None:
+    rng = np.random.default_rng(4)
+    time = np.arange(0, 4, 0.001)
+    centre = np.array([3.0, 2.0, 0.0])
+    local = rng.normal(0, 1.0, (time.size, 6)) * [0.5, 0.5, 1.0, 0.1, 0.1, 0.05]
+    value = np.concatenate([local[:, :3], local[:, 3:] + np.cross(centre, local[:, :3])], axis=1)
+    corners = centre + np.array([[0.2, 0.3, 0], [-0.2, 0.3, 0], [-0.2, -0.3, 0], [0.2, -0.3, 0]])
+    found = plate_noise([Plate("plate1", 2, corners, Wrench(time, value))])
+    np.testing.assert_allclose(found * np.sqrt(500), [0.5, 0.5, 1.0, 0.1, 0.1, 0.05], rtol=0.1)
+    np.testing.assert_allclose(np.diag(of_plates(found, 2)), 2 * found**2 * 12.5)
+
+
+def test_camera_noise_reaches_the_forces_as_it_does_in_truth() -> None:
+    """Least squares on noisy markers of a person at rest, differentiated twice: the spread of a coefficient of Fz."""
+    from biodance.motion.kinematics import jacobian, poses
+
+    one, q, noise, rate = body(), motion(1).q[0], 3e-4, 100.0
+    cov = of_cameras(one, q[None], np.zeros(3), noise=noise, rate=rate)
+    rng, pose = np.random.default_rng(5), poses(one, q[None])
+    places = pose.points(list(one.markers.segment), one.markers.position)
+    J = jacobian(one, pose, list(one.markers.segment), places)[0][0]
+    com = jacobian(one, pose, list(range(len(one.segments))), pose.points(list(range(len(one.segments))), one.sip.com))
+    lift = (one.sip.mass @ com[0][0].reshape(-1, 3, one.nv)[:, 2]) @ np.linalg.pinv(J)
+    frames = 4096
+    course = rng.normal(0, noise, (frames, J.shape[0])) @ lift
+    spectrum = np.fft.rfft(course) * (2 * np.pi * np.fft.rfftfreq(frames, 1 / rate)) ** 2
+    frequency = np.fft.rfftfreq(frames, 1 / rate)
+    for band in (3, 4):
+        here = (frequency >= BANDS.edges[band]) & (frequency < BANDS.edges[band + 1])
+        per_coefficient = np.mean(np.abs(spectrum[here]) ** 2) / frames * BANDS.rate / rate
+        assert cov[band, 2, 2] == pytest.approx(per_coefficient, rel=0.25)
+
+
+def test_own_noise_is_added_beyond_what_was_learned_and_limits_follow() -> None:
+    rng, time = np.random.default_rng(6), np.arange(0, 5, 0.01)
+    trial = looks(1, trials=1)[0].trial
+
+    def recorded(noise):
+        xyz = rng.normal(0, noise, (time.size, 4, 3))
+        return (replace(trial, markers=Markers(tuple("abcd"), time, xyz), plates=()),)
+
+    q = motion(1).q[:1]
+    assert not added_noise(body(), recorded(0.9 * LEARNED_CAMERAS), q, np.zeros(3)).any()
+    more = added_noise(body(), recorded(3e-4), q, np.zeros(3))
+    expected = of_cameras(body(), q, np.zeros(3), noise=np.sqrt(9 - 1) * 1e-4, rate=100.0)
+    np.testing.assert_allclose(more, expected, rtol=0.1)
+    wider = with_own_noise(known(), more, 70.0)
+    np.testing.assert_allclose(wider.noise - known().noise, more, atol=1e-12)
+    seen = [
+        diagnose_trials(body(), looks(1), tolerances=one, effects=("added_mass",)).diagnosis for one in (known(), wider)
+    ]
+    assert min(row.limit for row in seen[1].limits) > min(row.limit for row in seen[0].limits)
+
+
+# ---- real recordings
+
+CHILDREN = ("HC031A", "HC032A", "HC038A", "HC044A", "HC050A", "HC055A")
+
+
+@pytest.mark.parametrize("name", [*(f"biomechzoo/{child}" for child in CHILDREN), "adl_gait", "pycgm"])
+def test_a_real_recording_without_fault_gets_no_name(name: str) -> None:
+    data = os.environ.get("BIODANCE_DATA")
+    if not data:
+        pytest.skip("BIODANCE_DATA is not set: no real recordings here")
+    found = diagnose_session(examine(read_session(Path(data) / name))).diagnosis
+    said = next(one for one in found.attention if one.about == ABOUT)
+    assert found.findings == ()
+    assert "what could be judged" in said.text or said.text.startswith("Cannot tell")
+    assert not is_well(found)
+    assert any(row.missed for row in found.judged) or found.doubt
