@@ -9,6 +9,7 @@ from identify_trials import noisy_fit, person, smooth_motion
 from biodance.identification.added_mass import LoadCandidate, LoadSearch, added_mass, surprised
 from biodance.identification.identification import Identification, identify_body, standing_point
 from biodance.identification.learning import learn_noise
+from biodance.identification.load_posterior import MASSES, LoadPosterior
 from biodance.identification.loads import compact_load, load_moments, may_carry
 from biodance.identification.statistics import layout_for, statistics
 from biodance.records import Sip
@@ -107,11 +108,19 @@ def test_without_any_data_a_load_is_as_likely_as_none() -> None:
 
 
 @pytest.mark.parametrize(
-    ("p_no_load", "mass", "announced"), [(0.051, 2.0, False), (0.049, 2.0, True), (0.0, -1.0, False)]
+    ("p_no_load", "smallest", "doubts", "status"),
+    [
+        (0.009, 0.5, (), "found"),
+        (0.011, 0.5, (), "cannot tell"),
+        (0.0, 3.0, (), "cannot tell"),
+        (0.0, 0.5, ("No scale.",), "cannot tell"),
+        (0.51, 0.5, (), "none"),
+    ],
 )
-def test_a_load_is_announced_below_five_per_cent_and_never_a_negative_one(
-    p_no_load: float, mass: float, announced: bool
+def test_a_load_is_announced_below_one_per_cent_where_the_session_can_see_it(
+    p_no_load: float, smallest: float, doubts: tuple[str, ...], status: str
 ) -> None:
-    nan = np.full(3, np.nan)
-    suspect = LoadCandidate("s1", mass, 0.1, nan, nan, 5.0, 1 - p_no_load, 0.5)
-    assert LoadSearch((suspect,), p_no_load, "the table").found == announced
+    nowhere, weight = np.full(3, np.nan), np.where(np.arange(MASSES.size) == np.argmin(np.abs(MASSES - 2.0)), 1.0, 0.0)
+    belief = LoadPosterior(p_no_load, (1 - p_no_load) * weight)
+    suspect = LoadCandidate("s1", belief, nowhere, nowhere, 5.0, 1 - p_no_load, smallest)
+    assert LoadSearch((suspect,), p_no_load, "the table", doubts).status == status
