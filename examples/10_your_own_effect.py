@@ -1,7 +1,6 @@
 """Add a cause that nobody thought of: an effect of your own, in one class.
 
-The floor of this laboratory shakes at 5 Hz. No effect of biodance describes that. `ShakingFloor` does in a few
-lines, and `diagnose` takes the object. The shaking is written into the recording by hand, not by the effect.
+The floor of this laboratory shakes at 5 Hz, which no effect of biodance describes: `ShakingFloor` does.
 
 python examples/10_your_own_effect.py [FIGURE.png]
 """
@@ -25,9 +24,7 @@ class ShakingFloor(Effect):
     """An ``acceleration`` (m/s²) amplitude of the floor, vertical, in phase with the start of the trial."""
 
     name = "shaking_floor"
-    parameters = (
-        Parameter("acceleration", "m/s²", 0.05, "treadmill: up to 5.6 N on a person of 70 kg (arXiv 2303.14482)"),
-    )
+    parameters = (Parameter("acceleration", "m/s²", 0.05, "treadmill: 5.6 N on 70 kg (arXiv 2303.14482)"),)
     separated_by = "A recording of the empty plate."
     advice = "Switch the motor off, or move the plate to another floor."
 

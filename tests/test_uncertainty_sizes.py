@@ -36,6 +36,7 @@ ELSEWHERE = {
     "body/robot/prior.py:RELATIVE_INERTIA_SD": "robots",
     "body/robot/prior.py:_COM_SD": "robots",
     "body/robot/hoap3.py:_COM_SD": "robots",
+    "uncertainty/session_noise.py:_GAIN": "of a difference filter",
     "identification/physical.py:RELATIVE_FLOOR": "share of an eigenvalue",
 }
 """Constants whose names sound like sizes and are none of this table's."""

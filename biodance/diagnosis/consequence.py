@@ -7,7 +7,7 @@ import numpy as np
 from biodance.effects import Effect, unit_of
 from biodance.records import Array
 
-LEAST: dict[str, dict[str, float]] = {
+LEAST_THAT_MATTERS: dict[str, dict[str, float]] = {
     "time_delay": {"s": 0.003},
     "clock_drift": {"s": 0.003},
     "plate_offset": {"N": 2.0, "N·m": 0.5},
@@ -37,14 +37,14 @@ doi:10.1007/BF02513272)."""
 
 def least(effect: Effect) -> dict[str, float]:
     """Return the least size of each parameter that matters, by the parameter's name; only of those that have one."""
-    sizes = LEAST.get(effect.name, {})
+    sizes = LEAST_THAT_MATTERS.get(effect.name, {})
     found = {one.name: sizes.get(unit_at(effect, one.unit), 0.0) for one in effect.parameters}
     return {name: size for name, size in found.items() if size > 0}
 
 
 def matters(effect: Effect, theta: Array) -> bool:
     """Return whether a cause of size ``theta`` (p,) matters: its parameters of one unit, as a vector, reach their
-    least size (`LEAST`); what has none always matters.
+    least size (`LEAST_THAT_MATTERS`); what has none always matters.
     """
     floors = least(effect)
     if not floors:

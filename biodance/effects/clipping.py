@@ -16,7 +16,7 @@ _CLEARLY = 3.0
 """How many times longer than anywhere else the flat top must be: coarse converters repeat values everywhere."""
 _SAME = 2e-5
 """Share of the channel's range within which two samples are the same number."""
-LEVELS = 64
+_LEVELS = 64
 """Different values that a channel must have taken: a movement of a few steps of the converter has flat tops anyway."""
 AT_ZERO = 0.05
 """Share of the largest value under which a flat part is an unloaded plate."""
@@ -80,7 +80,7 @@ def flat_level(values: Array, rate: float) -> float | None:
     """Return the level (unit of ``values`` (S,)) at which a channel is flat; None where it is not."""
     values = values[np.isfinite(values)]
     span = float(np.ptp(values)) if values.size > 2 else 0.0
-    if not span > 0 or np.unique(np.round(values / (_SAME * span))).size < LEVELS:
+    if not span > 0 or np.unique(np.round(values / (_SAME * span))).size < _LEVELS:
         return None
     same = np.abs(np.diff(values)) <= _SAME * span
     starts = np.flatnonzero(same & ~np.append(False, same[:-1]))

@@ -16,7 +16,7 @@ from biodance.errors import FileRefused
 from biodance.lab.plain_text import decode, parse_number, read_bytes, read_text
 
 MILLIMETRE = 1e-3
-MASSES = ("bodymass",)
+_MASSES = ("bodymass",)
 ANGLES = re.compile(r"torsion|rotation|plantflex|rotoff|abadd|headoffset|^theta$|^beta$|angle", flags=re.IGNORECASE)
 NOT_MEASURES = re.compile(r"usefloorff|hindfootflat|^(?:subject)?(?:name|id)$", flags=re.IGNORECASE)
 _SIDE = re.compile(r"^(Left|Right)(?=[A-Z])")
@@ -140,5 +140,5 @@ def _in_si(values: dict[str, float]) -> dict[str, float]:
         short = _SIDE.sub(lambda side: side[1][0], name)
         if value == 0 or ANGLES.search(short) or NOT_MEASURES.search(short):
             continue
-        measures[short] = value if short.lower() in MASSES else value * MILLIMETRE
+        measures[short] = value if short.lower() in _MASSES else value * MILLIMETRE
     return measures

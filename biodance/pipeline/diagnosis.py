@@ -31,7 +31,7 @@ from biodance.uncertainty.tolerances import Tolerances
 if TYPE_CHECKING:
     import pandas as pd
 
-FAR = "its markers move more on the body than where tolerances were learned"
+_FAR = "its markers move more on the body than where tolerances were learned"
 """Why no cause is told from a movement whose soft tissue or joints err more than in null sessions."""
 TRIAL_SECONDS = 20.0
 """s: a designed dance is looked at as trials of about this length."""
@@ -157,7 +157,7 @@ def _diagnosed(
     if failed:
         return SessionDiagnosis(_by_checks(checks, examined), examined)
     if not own.believed:
-        examined = replace(examined, diagnosis=replace(examined.diagnosis, doubt=FAR))
+        examined = replace(examined, diagnosis=replace(examined.diagnosis, doubt=_FAR))
         return SessionDiagnosis(_disbelieved(without_names(examined).diagnosis), examined)
     tell("measuring what the findings change")
     return _with_gains(result, examined)

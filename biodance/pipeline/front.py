@@ -123,8 +123,8 @@ def identify(session: Visit, *, reference: Earlier | None = None, tell: _Tell = 
     Examples
     --------
     >>> identified = biodance.identify(result)
-    >>> identified
-    SessionIdentification('visit': solved, 12 segments, 61.7 kg)
+    >>> identified  # doctest: +ELLIPSIS
+    SessionIdentification('visit': solved, 12 segments, 61... kg)
     """
     result = _examined(session, tell)
     if reference is None:

@@ -12,7 +12,7 @@ from biodance.doctor import MachineFinding
 from biodance.pipeline.attention import without_path
 from biodance.pipeline.results import SessionResult
 from biodance.records.attention import Attention
-from biodance.report.wording import format_number, millimetres, place
+from biodance.report.wording import format_number, millimetres, trial_and_subject
 
 
 def _inspected_lines(record: dict[str, Any]) -> list[str]:
@@ -63,7 +63,7 @@ def print_attention(found: Sequence[dict[str, Any]], console: Console) -> None:
         if one.about == ABOUT:
             console.print(f"[bold]{escape(one.text)}[/]", soft_wrap=True)
         else:
-            console.print(f"look: [bold]{escape(place(one))}[/]: {escape(one.text)}", soft_wrap=True)
+            console.print(f"look: [bold]{escape(trial_and_subject(one))}[/]: {escape(one.text)}", soft_wrap=True)
 
 
 def print_session(result: SessionResult, attention: Sequence[dict[str, Any]], console: Console) -> None:

@@ -18,7 +18,7 @@ def millimetres(value: float | None, digits: int = 1) -> str:
     return format_number(None if value is None else 1000 * value, digits)
 
 
-def place(one: Attention) -> str:
+def trial_and_subject(one: Attention) -> str:
     """Return where a sentence belongs, to stand before it: file, check and trial, step, or trial."""
     about = one.about.replace("_", " ")
     if one.trial:

@@ -14,7 +14,7 @@ from biodance.pipeline.results import SessionResult
 from biodance.records import CHANNELS
 from biodance.report.figures.diagnosis import adequacy_figure, left_figure, limits_figure
 from biodance.report.figures.style import svg_address
-from biodance.report.wording import format_number, place
+from biodance.report.wording import format_number, trial_and_subject
 
 _SHOWN = {"m": (1000.0, "mm", 0), "rad": (57.29578, "°", 1), "s": (1000.0, "ms", 1), "1": (100.0, "%", 1)}
 """Unit of a parameter: factor, unit and digits that are shown."""
@@ -135,7 +135,7 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
         result=result,
         one=one,
         answer=answer(one),
-        others=[(place(said), said.text) for said in one.attention if said.about != ABOUT],
+        others=[(trial_and_subject(said), said.text) for said in one.attention if said.about != ABOUT],
         failures={**result.failures, **found.failures},
         provenance=provenance,
         channels=list(zip(CHANNELS, ("N",) * 3 + ("N·m",) * 3, strict=True)),

@@ -15,7 +15,7 @@ from biodance.records.attention import Attention
 from biodance.report.figures.session import marker_figure, standing_figure, wrench_figure
 from biodance.report.figures.style import svg_address
 from biodance.report.pages.identification import identification_section
-from biodance.report.wording import format_number, millimetres, place
+from biodance.report.wording import format_number, millimetres, trial_and_subject
 
 STATUS_WORDS = {"ok": "done", "warning": "look here", "refused": "refused"}
 
@@ -99,7 +99,7 @@ def page(
     folder = files("biodance.report") / "templates"
     return environment.from_string((folder / "page.html.j2").read_text(encoding="utf-8")).render(
         style=Markup((folder / "page.css").read_text(encoding="utf-8")),
-        attention=[(place(one), one.text) for one in first],
+        attention=[(trial_and_subject(one), one.text) for one in first],
         check_table=check_table(result),
         result=result,
         provenance=provenance,
