@@ -104,7 +104,8 @@ def examine(
 
 def _stills(body: Body, done: tuple[TrialResult, ...], found: SessionIdentification | None) -> tuple[Still, ...]:
     """Return the worst frame of the body that is believed, and the load that was found."""
-    worst = worst_still(found.identification.identified if found else body, done)
+    solved = found is not None and found.identification.status == "solved"
+    worst = worst_still(found.identification.identified if found and solved else body, done)
     load = load_still(body, done, found.search) if found and worst else None
     return tuple(still for still in (worst, load) if still is not None)
 
