@@ -26,7 +26,7 @@ def lab(monkeypatch, tmp_path):
         monkeypatch.setattr(
             f"{room}.read_session", lambda folder, **_: replace(results[folder.name].session, folder=folder)
         )
-    for room in ("biodance.pipeline.session", "biodance.pipeline.export"):
+    for room in ("biodance.pipeline.session", "biodance.pipeline.export", "biodance.pipeline.front"):
         monkeypatch.setattr(f"{room}.examine", lambda session, **_: results[session.folder.name])
     return tmp_path
 
