@@ -30,7 +30,7 @@ def alone(channel: str, value: np.ndarray | float) -> np.ndarray:
     return out
 
 
-def close(found: np.ndarray, expected: np.ndarray) -> None:
+def assert_close(found: np.ndarray, expected: np.ndarray) -> None:
     """Compare to rounding, and see that there is something to compare."""
     assert np.abs(expected).max() > 1e-3
     np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(HERE).max())
@@ -44,29 +44,29 @@ def test_a_plate_turned_by_a_right_angle_records_what_points_forwards_as_sideway
     recorded = HERE.copy()
     for start in (0, 3):
         recorded[:, start + then], recorded[:, start + first] = HERE[:, start + first], -HERE[:, start + then]
-    close(added("plate_rotation", f"plate1:{axis}", np.pi / 2), recorded - HERE)
+    assert_close(added("plate_rotation", f"plate1:{axis}", np.pi / 2), recorded - HERE)
 
 
 def test_a_gain_reads_too_much() -> None:
-    close(added("plate_gain", "Fz", 0.04), alone("Fz", 0.04 * HERE[:, 2]))
+    assert_close(added("plate_gain", "Fz", 0.04), alone("Fz", 0.04 * HERE[:, 2]))
 
 
 def test_an_offset_is_added_at_the_centre() -> None:
-    close(added("plate_offset", "My", 5.0), alone("My", 5.0))
+    assert_close(added("plate_offset", "My", 5.0), alone("My", 5.0))
 
 
 def test_crosstalk_goes_from_the_first_channel_into_the_second() -> None:
-    close(added("plate_crosstalk", "Fz->Mx", 0.01), alone("Mx", 0.01 * HERE[:, 2]))
+    assert_close(added("plate_crosstalk", "Fz->Mx", 0.01), alone("Mx", 0.01 * HERE[:, 2]))
 
 
 def test_drift_is_negative_at_the_start_and_positive_at_the_end() -> None:
-    close(added("plate_drift", "Fz", 3.0), alone("Fz", 3.0 * (TIME - 0.5)))
+    assert_close(added("plate_drift", "Fz", 3.0), alone("Fz", 3.0 * (TIME - 0.5)))
 
 
 def test_a_body_mass_declared_too_small_is_positive() -> None:
     """All is in proportion: of a person who weighs as much again the plates measure as much again."""
     mass = float(CASE.phi[::10].sum())
-    close(wrench_about_origin(added("body_mass", "", mass), CENTRE), CASE.predicted)
+    assert_close(wrench_about_origin(added("body_mass", "", mass), CENTRE), CASE.predicted)
 
 
 def test_forces_of_a_clock_that_lags_are_late_at_the_end_and_early_at_the_start() -> None:
@@ -81,10 +81,10 @@ def test_a_tilted_laboratory_sees_a_share_of_the_weight_sideways(axis: str, chan
     """Gravity (0, 0, -g) turned by a small angle about x points to +y, about y to -x; the ground pushes against it."""
     weight = 9.80665 * float(CASE.phi[::10].sum())
     found = added("lab_tilt", axis, 0.01)
-    close(found[:, :3], alone(channel, sign * 0.01 * weight)[:, :3])
+    assert_close(found[:, :3], alone(channel, sign * 0.01 * weight)[:, :3])
 
 
 def test_what_a_rope_carries_the_plates_miss() -> None:
     """On the mean over time: away from its mean place a person hangs at a slant, but always with the whole force."""
     cause = effect("body_weight_support").targets(CASE)[0]
-    close(added("body_weight_support", cause, 100.0, 0.0)[:, 2:3], np.full((len(HERE), 1), -100.0))
+    assert_close(added("body_weight_support", cause, 100.0, 0.0)[:, 2:3], np.full((len(HERE), 1), -100.0))
