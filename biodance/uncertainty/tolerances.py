@@ -155,7 +155,7 @@ def to_toml(found: Tolerances) -> str:
     for band in found.noise:
         lines += ["  [", *(f"    [{', '.join(f'{x:.5g}' for x in row)}]," for row in band), "  ],"]
     lines += ["]", "", "[sizes]"]
-    lines += [f'"{key}" = {value:.4g}' for key, value in sorted(found.sizes.items())]
+    lines += [f'"{key}" = {value:.9g}' for key, value in sorted(found.sizes.items())]
     lines += ["", "[means]"] + [f'"{key}" = {value:.4g}' for key, value in sorted(found.means.items())]
     lines += ["", "[accuracy]"] + [f'"{key}" = {value:.4g}' for key, value in sorted(found.accuracy.items())]
     return "\n".join(lines) + "\n"
