@@ -23,6 +23,7 @@ from biodance.dance.postures import search
 from biodance.dance.problem.plan import Plan, read_plan
 from biodance.dance.verify import broken, verify
 from biodance.errors import BiodanceError, UnknownName
+from biodance.pipeline.front_dance import verify_dance
 from biodance.records import Subject
 
 BODY = human(Subject(65.0, 1.75, "F", 33.0))
@@ -139,7 +140,7 @@ class Quiet(Limit):
         return limits.Remaining(self.most - rate, motion.joints) if rate.any() else NOTHING
 
 
-def test_an_object_is_kept_like_a_member_of_the_family() -> None:
+def test_an_object_is_kept_like_a_member_of_the_family(tmp_path: Path) -> None:
     plan = Plan("small", "", (("parallel", 2),), move=4.0, hold=1.0)
     with ThreadPoolExecutor(1) as workers:
         free, _ = design(BODY, plan, seed=1, workers=workers)
@@ -152,6 +153,9 @@ def test_an_object_is_kept_like_a_member_of_the_family() -> None:
     assert {margin.limit for margin in broken(verify(BODY, free, plan.with_limits([Quiet(most=0.1)]).limits))} == {
         "quiet"
     }
+    (tmp_path / "small.toml").write_text("[postures]\nparallel = 2\n")
+    told = verify_dance(free, tmp_path / "small.toml", own_limits=[Quiet(most=0.1)])
+    assert {margin.limit for margin in broken(told)} == {"quiet"}
 
 
 def test_a_protocol_gives_the_limits_their_numbers(tmp_path: Path) -> None:

@@ -29,12 +29,14 @@ from biodance.dance.transitions.planner import Way
 from biodance.dance.transitions.schedule import replan
 from biodance.dance.verify import Margin, broken, verify_with
 from biodance.errors import BiodanceError
+from biodance.threads import one_thread
 
 WORKERS = 2
 _SHORT = 1.0
 """s that postures in between are held."""
 
 
+@one_thread()
 def design(
     body: Body,
     plan: Plan,

@@ -22,6 +22,7 @@ from biodance.identification.statistics import Fit, statistics
 from biodance.library import locate, read_toml
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion
+from biodance.threads import one_thread
 from biodance.uncertainty.bands import BANDS, Bands
 from biodance.uncertainty.caution import widened
 from biodance.uncertainty.noise import Noise
@@ -50,6 +51,7 @@ class Expectation:
     share: Array
 
 
+@one_thread()
 def expect(dance: Dance, *, steps: int = 10) -> Expectation:
     """Return what is expected after ``steps`` durations of ``dance``, evenly spread over its postures."""
     brief = replace(dance, hold=np.minimum(dance.hold, _STILL))

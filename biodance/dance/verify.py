@@ -14,6 +14,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
 from biodance.dance.limits import NOTHING, CheckedMotion, Limit
+from biodance.threads import one_thread
 
 EDGES = np.array([0.0025, 0.005])
 """s after the start and before the end of every move that are judged, too: there a foot has just left the ground or is
@@ -36,6 +37,7 @@ class Margin:
     what: str = ""
 
 
+@one_thread()
 def verify(
     body: Body, dance: Dance, limits: tuple[Limit, ...], *, rate: float = 100.0, part: slice = slice(None)
 ) -> tuple[Margin, ...]:

@@ -19,6 +19,7 @@ from biodance.discovery import Chosen
 from biodance.effects import Case, DiscreteEffect, Effect, Gate
 from biodance.effects import effects as family
 from biodance.records import Sip
+from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances, key_of, shipped
 
 STRANGE = (
@@ -52,6 +53,7 @@ class Examined:
         return suspicious(self.naming.screening, self.naming.first.tolerances)
 
 
+@one_thread()
 def diagnose_trials(
     body: Body,
     looks: tuple[Look, ...],

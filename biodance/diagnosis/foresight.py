@@ -19,6 +19,7 @@ from biodance.effects import Effect
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Markers, Motion, Plate, Source, Trial
+from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances, shipped
 
 _HALF = 0.3
@@ -56,6 +57,7 @@ class Foresight:
         return self.confusions[0].difference if self.confusions else 0.0
 
 
+@one_thread()
 def foresee(
     body: Body, motions: tuple[Motion, ...], *, tolerances: Tolerances | None = None, effects: Chosen[Effect] = None
 ) -> Foresight:

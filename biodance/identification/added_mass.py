@@ -21,6 +21,7 @@ from biodance.identification.load_posterior import MASSES, LoadPosterior, LoadVi
 from biodance.identification.loads import unit_load
 from biodance.identification.rival_bodies import expect_unloaded, rivals, surprised
 from biodance.records import Array, Sip
+from biodance.threads import one_thread
 
 _THRESHOLD = 0.01
 """Probability of "no load" below which a load is announced."""
@@ -107,6 +108,7 @@ class LoadSearch:
         return tuple(s.segment for s in self.suspects[: int(np.searchsorted(share, 0.95)) + 1])
 
 
+@one_thread()
 def added_mass(
     session: Identification, *, reference: Identification | None = None, doubts: tuple[str, ...] = ()
 ) -> LoadSearch:

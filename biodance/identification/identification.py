@@ -24,6 +24,7 @@ from biodance.identification.physical import FailedFit, PhysicalFit, physical_fi
 from biodance.identification.posterior import Posterior, posterior
 from biodance.identification.statistics import Fit, Statistics, believable, empty, layout_for, statistics
 from biodance.records import Array, Sip
+from biodance.threads import one_thread
 from biodance.uncertainty.caution import about_true_centres, widened
 from biodance.uncertainty.noise import Noise
 
@@ -190,6 +191,7 @@ class Identification:
         return tuple(k for k in self.known if k.verdict == "cannot be known")
 
 
+@one_thread()
 def identify_body(body: Body, fits: tuple[Fit, ...], *, prior: Sip | None = None) -> Identification:
     """Return the identified parameters of ``body`` from the trials ``fits``; ``prior`` is what is known before (by
     default the table in ``body.sip``, its standard deviations widened for frames that marker placement turns).
@@ -238,6 +240,7 @@ def usable(body: Body, fits: tuple[Fit, ...]) -> tuple[tuple[Fit, ...], Array, t
     return used, about, tuple(notes)
 
 
+@one_thread()
 def conclude(
     body: Body,
     total: Statistics,

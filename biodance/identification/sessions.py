@@ -16,6 +16,7 @@ from biodance.identification.physical import physical_fit
 from biodance.identification.posterior import Posterior, posterior
 from biodance.identification.rival_bodies import weighing
 from biodance.records import Array
+from biodance.threads import one_thread
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,7 @@ class Difference:
         return self.value - SIGMAS * self.sd, self.value + SIGMAS * self.sd
 
 
+@one_thread()
 def differences(earlier: Identification, later: Identification) -> tuple[Difference, ...]:
     """Return all differences, later minus earlier, each session with room for what it carries beyond the other.
 

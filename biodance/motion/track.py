@@ -10,8 +10,10 @@ from biodance.lab.filters import motion_filter
 from biodance.motion.ik.inverse_kinematics import FrameStatus, InverseKinematics, solve_ik
 from biodance.motion.smoothing import smooth
 from biodance.records import Motion, Trial
+from biodance.threads import one_thread
 
 
+@one_thread()
 def track(body: Body, trial: Trial) -> Motion:
     """Return the motion of a body under the markers of a trial, matched by name, low-passed as ``trial.settings`` say.
 

@@ -28,6 +28,7 @@ from biodance.dance.robot import design_robot, expect_robot, robot_plan
 from biodance.dance.verify import Margin, broken
 from biodance.errors import BiodanceError
 from biodance.records import Subject
+from biodance.threads import one_thread
 
 _Tell = Callable[[str, int, int], None]
 """Told what is being done, how many parts are finished and of how many (0: not counted)."""
@@ -130,6 +131,7 @@ def dancer(subject: Subject, plan: Plan) -> Body:
     return replace(human(subject), limits=joint_limits(subject, within=plan.ranges))
 
 
+@one_thread()
 def make_dance(
     body: Body,
     plan: Plan,

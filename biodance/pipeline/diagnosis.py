@@ -26,6 +26,7 @@ from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES, SessionId
 from biodance.pipeline.looked_at import Own, left_out, looked_at, looks, own_tolerances
 from biodance.pipeline.results import SessionResult
 from biodance.records import Role, Sip
+from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances
 
 if TYPE_CHECKING:
@@ -99,6 +100,7 @@ class SessionDiagnosis:
         return self.diagnosis.table()
 
 
+@one_thread()
 def diagnose_session(
     result: SessionResult,
     *,

@@ -85,6 +85,7 @@ def verify_dance(
     protocol: str | Path | None = None,
     *,
     limits: str | Path | None = None,
+    own_limits: "Iterable[Limit | type[Limit]]" = (),
     body: Body | None = None,
 ) -> "tuple[Margin, ...]":
     """Return what is left of every limit over a whole dance, judged by code that its design did not use.
@@ -97,6 +98,9 @@ def verify_dance(
         Whose limits hold, by name or TOML file; by default the dance's own, by name.
     limits : str or pathlib.Path, optional
         TOML file with what this person can and may do.
+    own_limits : iterable of Limit, optional
+        Limits of your own, judged beside those of the protocol or in place of one of the same name; those with which
+        a dance was designed (`design_dance`) are given again.
     body : Body, optional
         Who dances it; by default the person for whom it was designed.
 
@@ -124,9 +128,8 @@ def verify_dance(
     from biodance.dance.verify import verify
 
     one = dance if isinstance(dance, Dance) else Dance.load(dance)
-    own, plan, _ = fit_to_person(
-        body or one.body, read_plan(protocol or one.protocol), read_person(Path(limits)) if limits else HEALTHY
-    )
+    plan = read_plan(protocol or one.protocol).with_limits(own_limits)
+    own, plan, _ = fit_to_person(body or one.body, plan, read_person(Path(limits)) if limits else HEALTHY)
     return verify(own, one, plan.limits)
 
 

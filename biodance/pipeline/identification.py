@@ -26,6 +26,7 @@ from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.checks import load_doubts
 from biodance.pipeline.trial_result import Check, TrialResult
 from biodance.records import ROLES, SIDES, Role, Wrench
+from biodance.threads import one_thread
 from biodance.uncertainty.plates import around_zero
 
 if TYPE_CHECKING:
@@ -138,6 +139,7 @@ def can_identify(results: tuple[TrialResult, ...]) -> bool:
     return any(result.trial.role in FITTED_ROLES and trial_fit(result) is not None for result in results)
 
 
+@one_thread()
 def identify_trials(
     body: Body,
     results: tuple[TrialResult, ...],

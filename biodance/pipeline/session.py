@@ -16,10 +16,12 @@ from biodance.pipeline.trial import attempt, examine_trial, prepare_trial
 from biodance.pipeline.trial_result import QuietStanding, Step, TrialResult
 from biodance.records import Session
 from biodance.settings import StandingRules
+from biodance.threads import one_thread
 
 _STOPPED = Step("stop", "refused", "Not done: the run was stopped by Ctrl-C before this trial.")
 
 
+@one_thread()
 def examine(
     session: Session,
     *,

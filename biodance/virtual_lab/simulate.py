@@ -12,6 +12,7 @@ import numpy as np
 
 from biodance.errors import BiodanceError
 from biodance.records import Subject
+from biodance.threads import one_thread
 from biodance.virtual_lab.movement.protocol import Protocol, read_protocol
 from biodance.virtual_lab.person.person import AddedLoad, Person, make_person
 from biodance.virtual_lab.recording.laboratory import (
@@ -30,6 +31,7 @@ TRUTH = "truth"
 _LEGAL = {"mass": (30.0, 200.0, "kg"), "stature": (1.2, 2.2, "m")}
 
 
+@one_thread()
 def simulate_session(
     subject: Subject,
     protocol: Protocol | str | Path,

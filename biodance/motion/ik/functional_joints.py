@@ -24,6 +24,7 @@ from biodance.motion.ik.joint_unknowns import HINGES, SIZE, JointUnknowns, own_c
 from biodance.motion.ik.shown_joints import contradicted, doubted, excited, own_unknowns
 from biodance.motion.kinematics import chains, jacobian, poses
 from biodance.records import Array, Markers
+from biodance.threads import one_thread
 
 _POSTURES = 150
 """Postures taken evenly from all moving trials together."""
@@ -74,6 +75,7 @@ class CalibrationState:
     rms: float
 
 
+@one_thread()
 def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> FunctionalJoints:
     """Return ``scaling`` with joint centres and hinge axes from the moving ``trials`` (labels as in the marker set).
 
