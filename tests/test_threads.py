@@ -25,8 +25,14 @@ def test_a_stage_has_one_thread_and_what_was_set_comes_back() -> None:
 
 
 def test_it_comes_back_after_a_failure() -> None:
-    before = counts()
-    with pytest.raises(ZeroDivisionError), one_thread():
-        assert counts() == {1}
+    before, inside = counts(), []
+
+    @one_thread()
+    def fail() -> None:
+        inside.append(counts())
         raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    assert inside == [{1}]
     assert counts() == before
