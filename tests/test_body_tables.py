@@ -15,7 +15,7 @@ from biodance.body.inertia import TENSOR, RigidInertia, inertial_parameters, rig
 from biodance.body.tables.anthropometry import read_table
 from biodance.body.tables.choice import measured_whole, reference, table_names
 from biodance.body.tables.de_leva import PARTS
-from biodance.body.tables.older import regression
+from biodance.body.tables.published import regression
 from biodance.body.tables.reference import COUNT, KINDS
 from biodance.body.tables.segment_data import read_segment_table
 from biodance.errors import BiodanceError, UnknownName

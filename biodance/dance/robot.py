@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.robot.similar import Likeness, likeness
+from biodance.body.robot.likeness import Likeness, likeness
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.expectation import Expectation

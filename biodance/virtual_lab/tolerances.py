@@ -9,7 +9,7 @@ zero.
 
 from dataclasses import dataclass, fields, replace
 
-from biodance.body.tables.error_sizes import error_rows
+from biodance.body.tables.anthropometry import error_rows
 
 
 @dataclass(frozen=True)
