@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from biodance.errors import FileRefused, TrialRefused
 from biodance.lab.markers.sets import recognise
 from biodance.lab.opensim import Y_UP_TO_Z_UP
-from biodance.lab.plain_text import cells, decode, parse_number, read_bytes, sha256
+from biodance.lab.plain_text import cells, decode, parse_number, read_bytes, sha256, write_new
 from biodance.records import Array, Markers, Role, Source, Trial
 
 _METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
@@ -109,12 +109,7 @@ def write_trc(path: str | Path, markers: Markers) -> Path:
         "\t".join([str(i), f"{t:.9g}", *("" if np.isnan(v) else f"{v:.6f}" for v in frame.ravel())])
         for i, (t, frame) in enumerate(zip(markers.time, xyz, strict=True), start=1)
     )
-    try:
-        with open(path, "x", encoding="utf-8", newline="\n") as stream:
-            stream.write("\n".join([*header, *lines]) + "\n")
-    except FileExistsError:
-        raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.") from None
-    return path
+    return write_new(path, ("\n".join([*header, *lines]) + "\n").encode())
 
 
 def _header(rows: list[str], path: Path) -> dict[str, str]:
