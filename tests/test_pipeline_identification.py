@@ -15,7 +15,8 @@ from biodance.pipeline.session import identification_of
 from biodance.records import Plate, Wrench
 from biodance.report.documents.identification import identification_document
 from biodance.report.documents.session import plain_values, results_document, to_text
-from biodance.report.pages.session import identification_section, page
+from biodance.report.pages.identification import identification_section
+from biodance.report.pages.session import page
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +68,7 @@ def test_inertia_in_the_document_is_about_the_centre_of_mass(numbers, found):
 
 
 def test_a_load_is_found_against_the_unloaded_session(monkeypatch):
-    monkeypatch.setattr("biodance.report.pages.session.svg_address", lambda _: "data:,")
+    monkeypatch.setattr("biodance.report.pages.identification.svg_address", lambda _: "data:,")
     loaded, bare = session_result(load=1.5, seed=5), session_result()
     compared = identify_trials(body(), loaded.trials, name="S02", reference=bare.identification)
     search = compared.search
@@ -86,7 +87,7 @@ def test_a_load_is_found_against_the_unloaded_session(monkeypatch):
 
 
 def test_without_a_kept_trial_the_gain_is_not_claimed(monkeypatch):
-    monkeypatch.setattr("biodance.report.pages.session.svg_address", lambda _: "data:,")
+    monkeypatch.setattr("biodance.report.pages.identification.svg_address", lambda _: "data:,")
     alone = session_result(roles=("fit",)).identification
     assert alone.gain is None
     assert any("not proven" in note for note in alone.notes)
@@ -123,14 +124,14 @@ def test_the_report_holds_identification_where_there_is_one(roles, monkeypatch):
 
 
 def test_a_load_on_the_page_has_segment_size_and_interval(monkeypatch):
-    monkeypatch.setattr("biodance.report.pages.session.svg_address", lambda _: "data:,")
+    monkeypatch.setattr("biodance.report.pages.identification.svg_address", lambda _: "data:,")
     text = identification_section(session_result(load=2.4, seed=5).identification)
     assert "Beyond the table the subject carries 2." in text
     assert "kg on the left forearm hand (95 % interval" in text
 
 
 def test_joint_torques_of_the_kept_trial_are_told_with_their_band(monkeypatch):
-    monkeypatch.setattr("biodance.report.pages.session.svg_address", lambda _: "data:,")
+    monkeypatch.setattr("biodance.report.pages.identification.svg_address", lambda _: "data:,")
     fitted, kept = session_result().trials
     corners = np.array([[0.5, 0.5, 0], [-0.5, 0.5, 0], [-0.5, -0.5, 0], [0.5, -0.5, 0]])
     plate = Plate("plate1", 2, corners, Wrench(kept.comparison.time, kept.comparison.measured))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from biodance.body.body_file import body_text
 from biodance.errors import SessionRefused
+from biodance.lab.session.results_folder import made_folder
 from biodance.pipeline.attention import identified_trials, session_attention
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.export import BODY, body_of_result
@@ -127,13 +128,7 @@ def tables_folder(folder: Path, session: Path, *, force: bool) -> Path:
         raise SessionRefused(
             f"{folder}: holds files already ({(other or files)[0]}) and nothing is overwritten. {wanted}."
         )
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise SessionRefused(
-            f"{folder}: cannot be made ({error.strerror or error}). Choose a place where you may write."
-        ) from error
-    return folder
+    return made_folder(folder)
 
 
 def write_tables(tables: Mapping[str, "DataFrame"], folder: Path) -> tuple[Path, ...]:

@@ -1,74 +1,23 @@
-"""The analyst's page: one HTML file that holds all it shows and asks nothing of the network; with its sections on what
-the body weighs: figures, tables and sentences. Computes nothing.
-"""
+"""The analyst's page: one HTML file that holds all it shows and asks nothing of the network."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 
 from biodance.diagnosis.diagnosis import ABOUT
-from biodance.identification.knowledge import QUANTITIES
-from biodance.identification.load_words import say_load
 from biodance.lab.markers.gaps import MarkerGaps
 from biodance.pipeline.attention import session_attention
-from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.provenance import Provenance
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import Check, TrialResult
 from biodance.records import CHANNELS
 from biodance.records.attention import Attention
-from biodance.report.documents.identification import information_share, segment_rows, torques_document
-from biodance.report.figures.identification import drawn_joints, forest_figure, torque_figure, validation_figure
 from biodance.report.figures.session import marker_figure, standing_figure, wrench_figure
 from biodance.report.figures.style import svg_address
+from biodance.report.pages.identification import identification_section
 from biodance.report.wording import format_number, millimetres, trial_and_subject
 
-MARKS = {"known": "●", "partly known": "◐", "cannot be known": "○"}
-LISTED = "Cannot be known"
-"""Start of the note whose content the page shows as a table."""
 STATUS_WORDS = {"ok": "done", "warning": "look here", "refused": "refused"}
-_UNITS = ("N",) * 3 + ("N·m",) * 3
-
-
-def spaced(name: str) -> str:
-    """Return a segment's name as words."""
-    return name.replace("_", " ")
-
-
-def small(value: float) -> str:
-    """Return a probability as text, however small."""
-    return format_number(value, 3) if value >= 0.001 else "below 0.001"
-
-
-def identification_section(found: SessionIdentification) -> str:
-    """Return the sections as HTML text; the same argument gives the same characters."""
-    from jinja2 import Environment, StrictUndefined
-
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters.update(number=format_number, mm=millimetres, spaced=spaced, small=small)
-    template = (files("biodance.report") / "templates" / "identification.html.j2").read_text(encoding="utf-8")
-    one = found.identification
-    rows = [(name, segment_rows(one, name)) for name in one.sip.segments] if one.status == "solved" else []
-    shown = found.validations or found.fitted[:1]
-    return environment.from_string(template).render(
-        one=one,
-        notes=[note for note in found.notes if not note.startswith(LISTED)],
-        failures=found.failures,
-        forest=svg_address(forest_figure(one)) if rows else "",
-        segments=[(name, known, information_share(known)) for name, known in rows],
-        quantities=QUANTITIES,
-        marks=MARKS,
-        gain=found.gain,
-        trials=[(trial, "kept") for trial in found.validations] + [(trial, "fitted") for trial in found.fitted],
-        channels=list(zip(CHANNELS, _UNITS, strict=True)),
-        figures=[(trial, svg_address(validation_figure(trial))) for trial in shown],
-        torques=found.torques,
-        torque_rows=(torques_document(found.torques) or {}).get("joints", []),
-        torque_image=svg_address(torque_figure(found.torques)) if found.torques and drawn_joints(found.torques) else "",
-        search=found.search,
-        load=say_load(found.search),
-        changes=[row for row in found.changes if row.quantity == "mass"],
-    )
 
 
 def check_table(result: SessionResult) -> tuple[list[tuple[str, str]], list[tuple[str, list[Check | None]]]]:
@@ -114,7 +63,8 @@ class TrialPart:
         comparison = self.result.comparison
         if comparison is None:
             return []
-        return list(zip(CHANNELS, _UNITS, comparison.rms.tolist(), comparison.correlation.tolist(), strict=True))
+        units = ("N",) * 3 + ("N·m",) * 3
+        return list(zip(CHANNELS, units, comparison.rms.tolist(), comparison.correlation.tolist(), strict=True))
 
 
 def _trial_part(result: TrialResult) -> TrialPart:

@@ -1,0 +1,58 @@
+"""The pages of the report on what the body weighs: figures, tables and sentences; computes nothing."""
+
+from importlib.resources import files
+
+from biodance.identification.knowledge import QUANTITIES
+from biodance.identification.load_words import say_load
+from biodance.pipeline.identification import SessionIdentification
+from biodance.records import CHANNELS
+from biodance.report.documents.identification import information_share, segment_rows, torques_document
+from biodance.report.figures.identification import drawn_joints, forest_figure, torque_figure, validation_figure
+from biodance.report.figures.style import svg_address
+from biodance.report.wording import format_number, millimetres
+
+MARKS = {"known": "●", "partly known": "◐", "cannot be known": "○"}
+LISTED = "Cannot be known"
+"""Start of the note whose content the page shows as a table."""
+_UNITS = ("N",) * 3 + ("N·m",) * 3
+
+
+def spaced(name: str) -> str:
+    """Return a segment's name as words."""
+    return name.replace("_", " ")
+
+
+def small(value: float) -> str:
+    """Return a probability as text, however small."""
+    return format_number(value, 3) if value >= 0.001 else "below 0.001"
+
+
+def identification_section(found: SessionIdentification) -> str:
+    """Return the sections as HTML text; the same argument gives the same characters."""
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters.update(number=format_number, mm=millimetres, spaced=spaced, small=small)
+    template = (files("biodance.report") / "templates" / "identification.html.j2").read_text(encoding="utf-8")
+    one = found.identification
+    rows = [(name, segment_rows(one, name)) for name in one.sip.segments] if one.status == "solved" else []
+    shown = found.validations or found.fitted[:1]
+    return environment.from_string(template).render(
+        one=one,
+        notes=[note for note in found.notes if not note.startswith(LISTED)],
+        failures=found.failures,
+        forest=svg_address(forest_figure(one)) if rows else "",
+        segments=[(name, known, information_share(known)) for name, known in rows],
+        quantities=QUANTITIES,
+        marks=MARKS,
+        gain=found.gain,
+        trials=[(trial, "kept") for trial in found.validations] + [(trial, "fitted") for trial in found.fitted],
+        channels=list(zip(CHANNELS, _UNITS, strict=True)),
+        figures=[(trial, svg_address(validation_figure(trial))) for trial in shown],
+        torques=found.torques,
+        torque_rows=(torques_document(found.torques) or {}).get("joints", []),
+        torque_image=svg_address(torque_figure(found.torques)) if found.torques and drawn_joints(found.torques) else "",
+        search=found.search,
+        load=say_load(found.search),
+        changes=[row for row in found.changes if row.quantity == "mass"],
+    )
