@@ -22,8 +22,8 @@ from biodance.body.human.joint_centres import (
     wrist,
 )
 from biodance.body.human.limits import standing_tilt
+from biodance.body.human.measures import Measures
 from biodance.body.human.scaling import chain_angles, measure_static
-from biodance.body.human.standing import Measures
 from biodance.body.human.static_centres import arm_centres, turn
 from biodance.body.inertia import smallest_eigenvalues
 from biodance.errors import SessionRefused, TrialRefused

@@ -13,8 +13,9 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.human.human import assemble
 from biodance.body.human.limits import widen_limits
+from biodance.body.human.measures import Measures, measures
 from biodance.body.human.skeleton import JOINTS, SEGMENTS, Skeleton, kind_of
-from biodance.body.human.standing import Measures, StaticPosture, measures, standing
+from biodance.body.human.standing import StaticPosture, standing
 from biodance.body.human.static_centres import Centres, SegmentFrames, segment_frames, static_centres, turn
 from biodance.body.parts import Joint, SegmentMarkers
 from biodance.body.tables.choice import reference

@@ -15,7 +15,7 @@ from biodance.body.human.joint_centres import (
     unit,
     wrist,
 )
-from biodance.body.human.standing import Measures
+from biodance.body.human.measures import Measures
 from biodance.body.parts import JointError
 from biodance.body.tables.anthropometry import error_size
 from biodance.records import Array

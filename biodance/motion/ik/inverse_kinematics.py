@@ -14,97 +14,11 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, TrialRefused
+from biodance.motion.ik.determination import determination
 from biodance.motion.ik.marker_problem import MarkerProblem, Minimum, marker_distances, marker_problem, minimise_markers
 from biodance.motion.ik.search import from_guess, interpolate_postures, search
 from biodance.motion.kinematics import poses
 from biodance.records import Array, Index, Markers
-
-_LEVER = 0.1
-"""m, what one radian is compared with: one metre of root translation counts as 10 rad."""
-
-LEAST_MOTION = 0.02
-"""Least share of its lever by which any unit change of posture must move the markers that it carries, for the
-posture to be determined.
-"""
-
-
-@dataclass(frozen=True, eq=False)
-class Determination:
-    """Per frame: ``determined`` (T,); ``open_coordinates`` names what the best-seen frame leaves open (empty if it
-    is determined).
-    """
-
-    determined: NDArray[np.bool_]
-    open_coordinates: tuple[str, ...]
-
-
-def determination(body: Body, columns: list[int], seen: NDArray[np.bool_]) -> Determination:
-    """Tell for every frame whether the markers seen fix every coordinate of ``body``.
-
-    ``columns`` (K) indices of the markers in ``body.markers``; ``seen`` (T, K). Judged by the marker Jacobian at one
-    general posture, so that the answer depends on the markers and not on the pose: with the weighted Jacobian's columns
-    in units of moved weight and ``LEVER``, its smallest singular value must reach ``LEAST_MOTION``.
-    """
-    jacobian = _jacobian(body, columns)
-    useful = seen & (body.markers.weight[columns] > 0)
-    first = np.concatenate([[True], (useful[1:] != useful[:-1]).any(axis=1)])[: len(useful)]
-    patterns, which = np.unique(useful[first], axis=0, return_inverse=True)
-    which = which.ravel()[np.cumsum(first) - 1]
-    weight = body.markers.weight[columns] * patterns
-    value = np.concatenate(
-        [np.linalg.eigvalsh(_normal(jacobian, weight[i : i + 256]))[:, 0] for i in range(0, len(weight), 256)]
-    )
-    best = patterns.sum(axis=1).argmax()
-    names = ("root x", "root y", "root z", "root rotation x", "root rotation y", "root rotation z")[: body.n_root]
-    names += tuple(joint.name for joint in body.joints)
-    vague = _open(_normal(jacobian, weight[best : best + 1])[0])
-    return Determination(
-        value[which] >= LEAST_MOTION**2, tuple(name for name, is_open in zip(names, vague, strict=True) if is_open)
-    )
-
-
-def _normal(jacobian: Array, weight: Array) -> Array:
-    """Return (P, nv, nv) scaled normal matrices of P patterns of marker weights (P, K)."""
-    moves = np.abs(jacobian).max(axis=1) > 0
-    moved = weight @ moves
-    scale = 1 / np.sqrt(np.where(moved > 0, moved, 1.0))
-    pairs = np.einsum("kim,kin->kmn", jacobian, jacobian)
-    return np.einsum("pk,kmn->pmn", weight, pairs, optimize=True) * scale[:, :, None] * scale[:, None]
-
-
-def _open(normal: Array) -> NDArray[np.bool_]:
-    """Return (nv,) the coordinates that take part in a change of posture that the markers hardly see."""
-    value, vector = np.linalg.eigh(normal)
-    return (np.abs(vector[:, value < LEAST_MOTION**2]) > 0.2).any(axis=1)
-
-
-def _jacobian(body: Body, columns: list[int]) -> Array:
-    """Return (K, 3, nv) at a general posture: marker motion per m, and per rad divided by LEVER."""
-    angles = np.clip(0.4 + 0.2 * np.cos(1.7 * np.arange(len(body.joints))), body.limits.lower, body.limits.upper)
-    pose = poses(body, np.concatenate([body.neutral[: body.nq - len(angles)], angles]))
-    segment = [body.markers.segment[c] for c in columns]
-    points = pose.points(segment, body.markers.position[columns])[0]
-    out = np.zeros((len(columns), 3, body.nv))
-    if body.n_root:
-        out[:, :, :3] = np.eye(3)
-        out[:, :, 3:6] = np.cross(np.eye(3), points[:, None]).transpose(0, 2, 1) / _LEVER
-    carried = _carried(body)
-    for i, joint in enumerate(body.joints):
-        axis = pose.joint_rotation[0, i] @ joint.axis
-        moved = carried[i, segment][:, None]
-        out[:, :, body.n_root + i] = moved * np.cross(axis, points - pose.joint_position[0, i]) / _LEVER
-    return out
-
-
-def _carried(body: Body) -> NDArray[np.bool_]:
-    """Return (n, N) True where a segment moves with a joint."""
-    out = np.zeros((len(body.joints), len(body.segments)), dtype=bool)
-    for segment, joint in enumerate(body.segment_joint):
-        while joint >= 0:
-            out[joint, segment] = True
-            joint = body.joints[joint].parent
-    return out
-
 
 LEAN = 1e-3
 """Weight, per unit marker weight, of the interpolated posture in a frame whose own markers do not determine it."""
