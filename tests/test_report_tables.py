@@ -11,7 +11,7 @@ from identified_sessions import session_result
 from biodance.diagnosis.diagnosis import Adequacy, Alias, Diagnosis, Estimate, Finding, Gain, Unobservable
 from biodance.errors import SessionRefused
 from biodance.pipeline.tables import session_tables
-from biodance.report.write import tables_folder, write_tables
+from biodance.report.tables import tables_folder, write_tables
 
 GAIN = Gain(np.ones(6), np.full(6, 0.8), (0.1, 0.3), ("squat_1",))
 DIAGNOSIS = Diagnosis(

@@ -71,7 +71,7 @@ def report_session(
 def tabled(result: "SessionResult", folder: Path | None, diagnosis: "Diagnosis | None" = None) -> None:
     """Write the tables of a result into a folder that is ready for them; nothing without one."""
     from biodance.pipeline.tables import session_tables
-    from biodance.report.write import write_tables
+    from biodance.report.tables import write_tables
 
     if folder is not None:
         write_tables(session_tables(result, diagnosis), folder)
@@ -79,7 +79,7 @@ def tabled(result: "SessionResult", folder: Path | None, diagnosis: "Diagnosis |
 
 def ready(tables: Path | None, session: Path, *, force: bool) -> Path | None:
     """Return the folder for tables, made; None where none are wanted."""
-    from biodance.report.write import tables_folder
+    from biodance.report.tables import tables_folder
 
     return None if tables is None else tables_folder(tables, session, force=force)
 

@@ -1,14 +1,9 @@
-"""Write what was found into a folder: the page for the analyst and the numbers for programs; and tables, each as CSV,
-for eyes and spreadsheets, and as Parquet, which keeps types and is read ten times faster.
-"""
+"""Write what was found into a folder: the page for the analyst and the numbers for programs."""
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from biodance.body.body_file import body_text
-from biodance.errors import SessionRefused
-from biodance.lab.session.results_folder import made_folder
 from biodance.pipeline.attention import identified_trials, session_attention
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.export import BODY, body_of_result
@@ -21,9 +16,6 @@ from biodance.report.documents.session import plain_values, results_document, to
 from biodance.report.figures.solid import still_addresses
 from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
 from biodance.report.pages.session import page
-
-if TYPE_CHECKING:
-    from pandas import DataFrame
 
 PAGE, _NUMBERS = "report.html", "results.json"
 
@@ -102,45 +94,3 @@ def _write(folder: Path, files: dict[str, str]) -> None:
         part = folder / f".{name}.part"
         part.write_text(text, encoding="utf-8", newline="\n")
         part.replace(folder / name)
-
-
-ENDINGS = (".csv", ".parquet")
-
-
-def tables_folder(folder: Path, session: Path, *, force: bool) -> Path:
-    """Return the folder for tables, made if missing, before any long work starts.
-
-    Raises
-    ------
-    SessionRefused
-        It is the session folder or one above it, a file, holds anything else than tables, or holds tables and not
-        ``force``.
-    """
-    folder, session = folder.resolve(), session.resolve()
-    if folder == session or folder in session.parents:
-        raise SessionRefused(f"{folder}: tables must not lie among the recordings. Give another folder for --tables.")
-    if folder.exists() and not folder.is_dir():
-        raise SessionRefused(f"{folder}: is a file; the tables need a folder. Choose another name for --tables.")
-    files = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
-    other = [name for name in files if Path(name).suffix not in ENDINGS]
-    if files and (other or not force):
-        wanted = "Give another folder for --tables" if other else "Give another folder, or --force"
-        raise SessionRefused(
-            f"{folder}: holds files already ({(other or files)[0]}) and nothing is overwritten. {wanted}."
-        )
-    return made_folder(folder)
-
-
-def write_tables(tables: Mapping[str, "DataFrame"], folder: Path) -> tuple[Path, ...]:
-    """Write every table as ``NAME.csv`` and ``NAME.parquet`` into a folder that exists, and return the paths."""
-    written = []
-    for name, table in tables.items():
-        for ending in ENDINGS:
-            part, path = folder / f".{name}{ending}.part", folder / f"{name}{ending}"
-            if ending == ".csv":
-                table.to_csv(part, index=False, lineterminator="\n", encoding="utf-8")
-            else:
-                table.to_parquet(part, index=False, engine="pyarrow")
-            part.replace(path)
-            written.append(path)
-    return tuple(written)
