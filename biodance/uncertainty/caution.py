@@ -9,7 +9,7 @@ import numpy as np
 
 from biodance.body.inertia import TENSOR
 from biodance.body.parts import JointError
-from biodance.body.tables.anthropometry import error_size, joint_size
+from biodance.body.tables.error_sizes import error_size, joint_size
 from biodance.records import Array, Sip
 from biodance.spatial import skew
 

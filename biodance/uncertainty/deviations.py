@@ -5,7 +5,7 @@ joints.
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.tables.anthropometry import error_size, joint_size
+from biodance.body.tables.error_sizes import error_size, joint_size
 from biodance.errors import UnknownName
 from biodance.records import Array
 from biodance.uncertainty.source import ErrorSource

@@ -10,11 +10,11 @@ import numpy as np
 
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of, side_of
 from biodance.body.inertia import TENSOR, RigidInertia, inertial_parameters, mirror_inertia, turn_inertia
-from biodance.body.tables.anthropometry import error_size
 from biodance.body.tables.choice import measured_whole, reference, studies
 from biodance.body.tables.choice import reference as reference_of
 from biodance.body.tables.de_leva import PARTS
 from biodance.body.tables.de_leva import lengths as reference_lengths
+from biodance.body.tables.error_sizes import error_size
 from biodance.body.tables.published import regression, study_masses
 from biodance.body.tables.reference import Reference
 from biodance.records import Array, Sip, Subject
