@@ -17,7 +17,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.inertia import rigid_inertia, smallest_eigenvalues
-from biodance.body.robot.similar import Likeness, likeness
+from biodance.body.robot.likeness import Likeness, likeness
 from biodance.dance.dance import Dance
 from biodance.dance.rehearsal import rehearse
 from biodance.dance.robot import _RATE, ERROR, person_sized, robot_rows, shrunk

@@ -13,8 +13,7 @@ from robots import biped
 from biodance.body.body import Body
 from biodance.body.parts import UPRIGHT
 from biodance.body.robot.hoap3 import hoap3
-from biodance.body.robot.similar import Likeness, likeness
-from biodance.body.robot.standing_frames import reframed, sole_normal, standing_frames
+from biodance.body.robot.likeness import Likeness, likeness, reframed, sole_normal, standing_frames
 from biodance.body.robot.urdf import read_urdf
 from biodance.errors import BiodanceError
 from biodance.motion.dynamics import joint_torques

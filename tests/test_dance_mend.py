@@ -123,7 +123,7 @@ def test_a_way_leaves_half_of_what_a_lifting_sole_may_press(course, monkeypatch,
 
     def found(task, history, *, rng):
         tried.append(task.duration)
-        return Move(task.straight(), task.duration, np.zeros((12, 6, 6)), 0.0, 0.0, 0.0, "")
+        return Move(task.straight(), task.duration, np.zeros((12, 6, 6)), 0.0, "")
 
     monkeypatch.setattr(planner, "find_move", found)
     monkeypatch.setattr(planner, "verify", lambda *_: (Margin("ground_clearance", left, 0.01, "m"),))

@@ -1,17 +1,9 @@
 """What a movement will be able to see, before any force is measured."""
 
-from types import SimpleNamespace
-
 import numpy as np
-import pytest
 from diagnosed_sessions import body, known, motion
-from random_bodies import random_body, random_motion
 
 from biodance.diagnosis.foresight import foresee, planned, session_of
-from biodance.diagnosis.separation import evaluate
-from biodance.identification.information import fold
-from biodance.identification.posterior import prior_factor
-from biodance.motion.regressor import regressor
 
 CHOSEN = ("plate_gain", "plate_offset", "body_mass", "time_delay", "added_mass")
 
@@ -46,18 +38,3 @@ def test_a_long_movement_is_cut_into_trials() -> None:
     pieces = session_of(motion(1), 4.0)
     assert len(pieces) == 3
     assert sum(one.time.size for one in pieces) == motion(1).time.size
-
-
-def test_the_gradient_of_the_separation_agrees_with_differences() -> None:
-    one = random_body(np.random.default_rng(0), n_segments=3)
-    aim = SimpleNamespace(prior_factor=prior_factor(one.sip))
-    R = fold(regressor(one, random_motion(one, np.random.default_rng(1), frames=40)).reshape(-1, 30))
-    value, gradient = evaluate(R, aim)
-    rng = np.random.default_rng(2)
-    for _ in range(4):
-        step = rng.normal(size=R.shape)
-        h = 1e-6 * np.linalg.norm(R) / np.linalg.norm(step)
-        slope = (evaluate(R + h * step, aim)[0] - evaluate(R - h * step, aim)[0]) / (2 * h)
-        assert 2 * np.sum((R @ gradient) * step) == pytest.approx(slope, rel=2e-3)
-    twice = evaluate(np.concatenate([R, R]), aim)[0]
-    assert twice < value

@@ -21,8 +21,17 @@ from biodance.lab.prepare import prepare
 from biodance.lab.session.read import read_session
 from biodance.motion.ik.functional_joints import evaluate_joints, functional_joints, spread_postures
 from biodance.motion.ik.inverse_kinematics import solve_ik
-from biodance.motion.ik.joint_unknowns import HINGES, SIZE, JointUnknowns, centre_sd, own_centre, own_turn
-from biodance.motion.ik.shown_joints import contradicted, doubted, own_unknowns
+from biodance.motion.ik.joint_unknowns import (
+    HINGES,
+    SIZE,
+    JointUnknowns,
+    centre_sd,
+    contradicted,
+    doubted,
+    own_centre,
+    own_turn,
+    own_unknowns,
+)
 from biodance.motion.kinematics import poses
 from biodance.records import Array, Markers, Source, Subject, Trial
 from biodance.virtual_lab.simulate import simulate_session

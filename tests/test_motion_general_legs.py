@@ -14,8 +14,7 @@ from biodance.body.body import Body
 from biodance.body.human.human import human
 from biodance.body.parts import UPRIGHT
 from biodance.body.robot.hoap3 import hoap3
-from biodance.body.robot.similar import Likeness, likeness
-from biodance.body.robot.standing_frames import standing_frames
+from biodance.body.robot.likeness import Likeness, likeness, standing_frames
 from biodance.body.robot.urdf import read_urdf
 from biodance.errors import BiodanceError
 from biodance.motion.ik.general_legs import GeneralLeg

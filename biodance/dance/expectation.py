@@ -78,7 +78,7 @@ def expected_spread(body: Body, motion: Motion, ends: Array) -> Expectation:
         kinematics, plates = kinematics + found.kinematics, plates + found.plates
         beliefs.append(_belief(body, H, Mismatch(kinematics, plates)))
         start = end
-    sd = np.array([[_deviations(belief, 10 * i) for i in range(len(body.segments))] for belief in beliefs])
+    sd = np.array([parameter_deviations(belief) for belief in beliefs])
     before = np.diag(beliefs[0].prior.covariance).reshape(-1, 10)
     share = np.array(
         [
@@ -126,9 +126,14 @@ def _belief(body: Body, H: Array, found: Mismatch) -> Posterior:
     return posterior(temper(data, found, typical_sizes()) if H.any() else data, prior)
 
 
-def _deviations(belief: Posterior, first: int) -> Array:
-    """Return the standard deviations (3,) of mass kg, CoM m (per axis) and moments of inertia kg·m² of one segment."""
-    cut = slice(first, first + 10)
-    _, slope = segment_quantities(belief.prior.phi[cut])
-    variance = np.diag(slope @ belief.covariance[cut, cut] @ slope.T)
-    return np.sqrt([variance[0], np.mean(variance[1:4]), np.mean(variance[[4, 6, 9]])])
+def parameter_deviations(belief: Posterior) -> Array:
+    """Return the standard deviations (N, 3) of mass kg, CoM m (per axis) and moments of inertia kg·m² of every
+    segment.
+    """
+    out = []
+    for first in range(0, belief.prior.phi.size, 10):
+        cut = slice(first, first + 10)
+        _, slope = segment_quantities(belief.prior.phi[cut])
+        variance = np.diag(slope @ belief.covariance[cut, cut] @ slope.T)
+        out.append(np.sqrt([variance[0], np.mean(variance[1:4]), np.mean(variance[[4, 6, 9]])]))
+    return np.array(out)

@@ -252,22 +252,15 @@ class Rehearsal:
         fate = "stays up to the end" if p.stays_up else f"falls at {p.fell:.1f} s of {end:.1f} s"
         angle, gap = np.degrees(p.angle_error), 1e3 * p.zmp_error[np.isfinite(p.zmp_error)]
         inside = 1e3 * self.inside[np.isfinite(self.inside)]
+        angle_rms, gap_rms = (np.sqrt(np.mean(error**2)) for error in (angle, gap))
+        most, least = np.quantile(gap, 0.99), np.quantile(inside, 0.01)
         rows = (
             ("fate", fate),
-            (
-                "joint angles, RMS and worst gap to the plan",
-                f"{np.sqrt(np.mean(angle**2)):.2f} and {np.abs(angle).max():.1f} deg",
-            ),
+            ("joint angles, RMS and worst gap to the plan", f"{angle_rms:.2f} and {np.abs(angle).max():.1f} deg"),
             ("tilt of the pelvis, worst gap", f"{np.degrees(p.tilt_error.max()):.1f} deg"),
             ("place of the pelvis, worst gap", f"{1e3 * p.root_error.max():.0f} mm"),
-            (
-                "centre of pressure, RMS and 99 % gap",
-                f"{np.sqrt(np.mean(gap**2)):.1f} and {np.quantile(gap, 0.99):.0f} mm",
-            ),
-            (
-                "centre of pressure inside the soles, 1 % and least",
-                f"{np.quantile(inside, 0.01):.0f} and {inside.min():.0f} mm",
-            ),
+            ("centre of pressure, RMS and 99 % gap", f"{gap_rms:.1f} and {most:.0f} mm"),
+            ("centre of pressure inside the soles, 1 % and least", f"{least:.0f} and {inside.min():.0f} mm"),
         )
         return "\n".join(["| what | found |", "|---|---|", *(f"| {what} | {found} |" for what, found in rows)])
 

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.robot.similar import Likeness, likeness
+from biodance.body.robot.likeness import Likeness, likeness
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
-from biodance.dance.expectation import Expectation
+from biodance.dance.expectation import Expectation, parameter_deviations
 from biodance.dance.limits import Limit
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.plan import Plan
@@ -24,8 +24,7 @@ from biodance.dance.problem.stance import Stance
 from biodance.dance.verify import Margin, verify
 from biodance.errors import BiodanceError
 from biodance.identification.information import Information, fold
-from biodance.identification.knowledge import segment_quantities
-from biodance.identification.posterior import Posterior, posterior
+from biodance.identification.posterior import posterior
 from biodance.motion.regressor import regressor
 from biodance.records import Array, Motion
 
@@ -160,15 +159,7 @@ def expect_robot(dance: Dance, *, steps: int = 10) -> Expectation:
         stop = int(np.searchsorted(motion.time, end)) * 6
         triangle, start = fold(rows[start:stop], triangle), stop
         beliefs.append(posterior(Information(triangle, stop), body.sip))
-    sd = np.array([[_deviations(belief, 10 * i) for i in range(len(body.segments))] for belief in beliefs])
+    sd = np.array([parameter_deviations(belief) for belief in beliefs])
     share = np.array([belief.information.reshape(-1, 10).mean(axis=1) for belief in beliefs])
     mass, com, inertia = np.moveaxis(sd, 2, 0)
     return Expectation(body.segments, np.array([0.0, *chosen]), mass, com, inertia, share)
-
-
-def _deviations(belief: Posterior, first: int) -> Array:
-    """Return the standard deviations (3,) of mass kg, CoM m (per axis) and moments of inertia kg·m² of one segment."""
-    cut = slice(first, first + 10)
-    _, slope = segment_quantities(belief.prior.phi[cut])
-    variance = np.diag(slope @ belief.covariance[cut, cut] @ slope.T)
-    return np.sqrt([variance[0], np.mean(variance[1:4]), np.mean(variance[[4, 6, 9]])])

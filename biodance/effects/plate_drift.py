@@ -5,15 +5,12 @@ posture that changes with fatigue; a drifting clock. Separated by repeating the 
 recordings before and after.
 """
 
-import numpy as np
-
 from biodance.effects._base.case import Case
-from biodance.effects._base.effect import Effect, Parameter, channel_index, plate_channels
+from biodance.effects._base.effect import ChannelEffect, Parameter
 from biodance.records import Array
-from biodance.spatial import wrench_about_origin
 
 
-class PlateDrift(Effect):
+class PlateDrift(ChannelEffect):
     """A ``drift`` (N or N·m over the whole session) about the plate's centre in channel ``target``, zero in the
     middle of the session.
     """
@@ -30,15 +27,9 @@ class PlateDrift(Effect):
     separated_by = "The first trial repeated at the end, and the empty plate before and after."
     advice = "Let the plate warm up, zero it before each trial."
 
-    @classmethod
-    def targets(cls, case: Case) -> tuple[str, ...]:
-        """Return every channel of every plate."""
-        return plate_channels(case)
-
-    def columns(self, case: Case) -> Array:
-        """Return session time minus one half in the channel, moved to the lab origin."""
-        change = (case.session_time - 0.5)[:, None] * np.eye(6)[channel_index(self.target)]
-        return wrench_about_origin(change, self.plate_of(case).centre)[:, :, None]
+    def in_channel(self, case: Case) -> Array:
+        """Return session time minus one half."""
+        return case.session_time - 0.5
 
 
 EFFECT = PlateDrift

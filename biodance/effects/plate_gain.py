@@ -5,15 +5,12 @@ mass, exactly; the gain of Fz alone re-fits into the segment masses and leaves t
 the scale's weight and by differences between channels.
 """
 
-import numpy as np
-
 from biodance.effects._base.case import Case
-from biodance.effects._base.effect import Effect, Parameter, channel_index, plate_channels
+from biodance.effects._base.effect import ChannelEffect, Parameter
 from biodance.records import Array
-from biodance.spatial import wrench_about_origin
 
 
-class PlateGain(Effect):
+class PlateGain(ChannelEffect):
     """A relative ``gain`` (0.04: reads 4 % too much) of channel ``target`` about the plate's centre."""
 
     name = "plate_gain"
@@ -23,16 +20,9 @@ class PlateGain(Effect):
     separated_by = "Squats against standing: the channel's own size must change."
     advice = "Check the channel with dead weights; correct sensitivity or calibration matrix."
 
-    @classmethod
-    def targets(cls, case: Case) -> tuple[str, ...]:
-        """Return every channel of every plate."""
-        return plate_channels(case)
-
-    def columns(self, case: Case) -> Array:
-        """Return the predicted channel itself, moved to the lab origin."""
-        plate = self.plate_of(case)
-        only = case.predicted_on(plate) * np.eye(6)[channel_index(self.target)]
-        return wrench_about_origin(only, plate.centre)[:, :, None]
+    def in_channel(self, case: Case) -> Array:
+        """Return the predicted channel itself."""
+        return case.predicted_on(self.plate_of(case))[:, self.channel]
 
 
 EFFECT = PlateGain

@@ -9,15 +9,14 @@ unloading in steps with the person standing still between them.
 import numpy as np
 
 from biodance.effects._base.case import Case
-from biodance.effects._base.effect import Effect, Parameter, channel_index, plate_channels
+from biodance.effects._base.effect import ChannelEffect, Parameter
 from biodance.records import Array
-from biodance.spatial import wrench_about_origin
 
 REVERSAL = np.array([5.0, 5.0, 20.0, 5.0, 5.0, 2.0])
 """N, N·m by which a channel must turn back until the loop is crossed (to 63 %)."""
 
 
-class PlateHysteresis(Effect):
+class PlateHysteresis(ChannelEffect):
     """A loop of half ``width`` (N or N·m) in channel ``target`` about the plate's centre: read low on the way up,
     high on the way down.
     """
@@ -29,16 +28,9 @@ class PlateHysteresis(Effect):
     separated_by = "Weights put on and taken off one after the other, or slow squats with holds on the way down and up."
     advice = "Load and unload the plate with dead weights; look for a loose top plate, cable or screw."
 
-    @classmethod
-    def targets(cls, case: Case) -> tuple[str, ...]:
-        """Return every channel of every plate."""
-        return plate_channels(case)
-
-    def columns(self, case: Case) -> Array:
-        """Return minus the memory of the predicted channel, moved to the lab origin."""
-        plate, channel = self.plate_of(case), channel_index(self.target)
-        state = memory(case.predicted_on(plate)[:, channel], REVERSAL[channel])
-        return wrench_about_origin(-state[:, None] * np.eye(6)[channel], plate.centre)[:, :, None]
+    def in_channel(self, case: Case) -> Array:
+        """Return minus the memory of the predicted channel."""
+        return -memory(case.predicted_on(self.plate_of(case))[:, self.channel], REVERSAL[self.channel])
 
 
 def memory(load: Array, reversal: float) -> Array:

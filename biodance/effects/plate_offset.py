@@ -8,12 +8,11 @@ Fx a tilted plate. Separated by movements that change Fz (squats) and by an unlo
 import numpy as np
 
 from biodance.effects._base.case import Case
-from biodance.effects._base.effect import Effect, Parameter, channel_index, plate_channels
+from biodance.effects._base.effect import ChannelEffect, Parameter
 from biodance.records import Array
-from biodance.spatial import wrench_about_origin
 
 
-class PlateOffset(Effect):
+class PlateOffset(ChannelEffect):
     """A constant ``offset`` (N or N·m) about the plate's centre in channel ``target``."""
 
     name = "plate_offset"
@@ -21,15 +20,9 @@ class PlateOffset(Effect):
     separated_by = "Postures of different weight on the plate: squats, one leg, sitting down beside it."
     advice = "Record the empty plate before and after, and re-zero it."
 
-    @classmethod
-    def targets(cls, case: Case) -> tuple[str, ...]:
-        """Return every channel of every plate."""
-        return plate_channels(case)
-
-    def columns(self, case: Case) -> Array:
-        """Return one in the channel, moved to the lab origin."""
-        unit = np.tile(np.eye(6)[channel_index(self.target)], (case.motion.time.size, 1))
-        return wrench_about_origin(unit, self.plate_of(case).centre)[:, :, None]
+    def in_channel(self, case: Case) -> Array:
+        """Return one."""
+        return np.ones(case.motion.time.size)
 
 
 EFFECT = PlateOffset

@@ -54,12 +54,6 @@ class BaseParameters:
         """Positions (in the base set) of inertias."""
         return tuple(i for i, c in enumerate(self.columns) if c % 10 >= 4)
 
-    def of_segment(self, index: int) -> tuple[int, ...]:
-        """Return the positions (in the base set) of the parameters of one segment (the sub-regressor W_bi of paper
-        III.B).
-        """
-        return tuple(i for i, c in enumerate(self.columns) if c // 10 == index)
-
     def relations(self, *, digits: int = 4) -> tuple[str, ...]:
         """Return the regrouping relations as text, one per base parameter (paper eq. 13)."""
         lines = []

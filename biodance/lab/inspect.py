@@ -122,8 +122,8 @@ def _subjects(path: Path) -> list[str]:
     """Return the names of the people in a C3D file; none for the other formats, which hold none."""
     if format_of(path) != ".c3d":
         return []
-    from biodance.lab.c3d.points import subjects_of
     from biodance.lab.c3d.raw import read_raw
+    from biodance.lab.c3d.subject import subjects_of
 
     return list(subjects_of(read_raw(path)))
 

@@ -1,5 +1,5 @@
 """Read text as laboratories write it: UTF-8 with or without a mark, UTF-16, or the Windows code page, with any line
-ends.
+ends; and write files where none are yet.
 """
 
 import codecs
@@ -30,6 +30,26 @@ def read_bytes(path: Path) -> bytes:
     if not content:
         raise FileRefused(f"{path}: is empty (0 bytes). Export the recording again.")
     return content
+
+
+def write_new(path: Path, content: bytes) -> Path:
+    """Write a file that does not exist yet, and return its path.
+
+    Raises
+    ------
+    FileRefused
+        The file exists (nothing is overwritten), or cannot be written.
+    """
+    try:
+        with open(path, "xb") as stream:
+            stream.write(content)
+    except FileExistsError:
+        raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.") from None
+    except OSError as error:
+        raise FileRefused(
+            f"{path}: cannot be written ({error.strerror or error}). Choose a place where you may write."
+        ) from error
+    return path
 
 
 def refuse_special(path: Path) -> None:

@@ -14,7 +14,7 @@ from biodance import display
 from biodance.body.body import Body
 from biodance.body.human.human import human
 from biodance.body.human.limits import joint_limits
-from biodance.body.robot.standing_frames import standing_frames
+from biodance.body.robot.likeness import standing_frames
 from biodance.body.robot.urdf import read_urdf
 from biodance.dance.dance import Dance
 from biodance.dance.design import design

@@ -8,8 +8,8 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, TrialRefused
+from biodance.lab.c3d.parameters import FileValue
 from biodance.lab.c3d.results import Event, Output, write_results_c3d
-from biodance.lab.c3d.write import FileValue
 from biodance.motion.contact.contact import Contact, foot_wrenches, ground_contact
 from biodance.motion.contact.events import foot_events
 from biodance.motion.contact.soles import soles_from_body

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from biodance.errors import SessionRefused
+from biodance.lab.session.results_folder import made_folder
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -35,13 +36,7 @@ def tables_folder(folder: Path, session: Path, *, force: bool) -> Path:
         raise SessionRefused(
             f"{folder}: holds files already ({(other or files)[0]}) and nothing is overwritten. {wanted}."
         )
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise SessionRefused(
-            f"{folder}: cannot be made ({error.strerror or error}). Choose a place where you may write."
-        ) from error
-    return folder
+    return made_folder(folder)
 
 
 def write_tables(tables: Mapping[str, "DataFrame"], folder: Path) -> tuple[Path, ...]:

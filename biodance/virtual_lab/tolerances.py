@@ -1,5 +1,5 @@
 """How far reality is from the ideal in the virtual laboratory, everywhere between the bone and the file: the truth that
-is drawn from.
+is drawn from, and the reproducible random streams and smooth random motions that draw it.
 
 Numbers, units and sources are the rows "virtual" of ``anthropometry/uncertainty/sizes.csv``. "Prototype" there is the
 set of sizes with which synthetic sessions behaved like real ones; sensor numbers are from makers' sheets and from
@@ -8,8 +8,12 @@ zero.
 """
 
 from dataclasses import dataclass, fields, replace
+from zlib import crc32
+
+import numpy as np
 
 from biodance.body.tables.error_sizes import error_rows
+from biodance.records import Array
 
 
 @dataclass(frozen=True)
@@ -68,3 +72,23 @@ def instruments_perfect(tolerances: LabTolerances = REALISTIC) -> LabTolerances:
         list(LabTolerances.__dataclass_fields__).index("marker_placement") :
     ]
     return replace(tolerances, **dict.fromkeys(from_skin_on, 0.0))
+
+
+def stream(seed: int, *purpose: str) -> np.random.Generator:
+    """Return the random stream of one ``purpose``: drawing more numbers for one purpose never changes another."""
+    return np.random.default_rng([seed, *(crc32(word.encode()) for word in purpose)])
+
+
+def smooth_noise(rng: np.random.Generator, time: Array, *, columns: int, cutoff: float) -> Array:
+    """Return smooth random curves (T, columns) of zero mean and unit expected standard deviation.
+
+    ``time`` (T,) s, equidistant; ``cutoff`` Hz: the amplitude spectrum falls as exp(-(f / cutoff)²), so all derivatives
+    exist. The number of draws depends on the duration and the cutoff, not on the sampling rate.
+    """
+    duration = 2.0 * (time[-1] - time[0]) + 1.0
+    frequency = np.arange(1, int(np.ceil(3.0 * cutoff * duration)) + 1) / duration
+    weight = np.exp(-((frequency / cutoff) ** 2))
+    weight /= np.sqrt(np.sum(weight**2))
+    cosine, sine = rng.normal(size=(2, frequency.size, columns)) * weight[None, :, None]
+    phase = 2 * np.pi * np.outer(time, frequency)
+    return np.cos(phase) @ cosine + np.sin(phase) @ sine

@@ -16,7 +16,8 @@ from biodance.body.body import Body
 from biodance.body.inertia import pseudo_inertia
 from biodance.body.solids import SegmentSolids
 from biodance.discovery import Chosen, Family, missing_of
-from biodance.errors import BiodanceError, FileRefused
+from biodance.errors import BiodanceError
+from biodance.lab.plain_text import write_new
 
 _ROUNDING = 1e-9
 """Share of a pseudo-inertia's largest eigenvalue by which its smallest may be negative from rounding alone."""
@@ -96,12 +97,12 @@ def write_model(
     path = Path(path)
     (kind,) = (FAMILY.choose([format]) if isinstance(format, str) else FAMILY.judged([format])).values()
     refuse_impossible(body)
-    _write_new(path, _content(kind, body, source, solids))
+    write_new(path, _content(kind, body, source, solids))
     for name, content in _beside(kind, body, solids).items():
         file = path.parent / name
         if not (file.is_file() and file.read_bytes() == content):
             file.parent.mkdir(exist_ok=True)
-            _write_new(file, content)
+            write_new(file, content)
     return path
 
 
@@ -116,16 +117,3 @@ def _content(member: ModelFormat, body: Body, source: str, solids: SegmentSolids
 
 def _beside(member: ModelFormat, body: Body, solids: SegmentSolids | None) -> dict[str, bytes]:
     return dict(member.beside(body, solids)) if solids is not None and hasattr(member, "beside") else {}
-
-
-def _write_new(path: Path, content: bytes) -> None:
-    """Write a file that does not exist yet."""
-    try:
-        with open(path, "xb") as stream:
-            stream.write(content)
-    except FileExistsError:
-        raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.") from None
-    except OSError as error:
-        raise FileRefused(
-            f"{path}: cannot be written ({error.strerror or error}). Choose a place where you may write."
-        ) from error

@@ -15,7 +15,7 @@ from biodance.body.tables.choice import reference as reference_of
 from biodance.body.tables.de_leva import PARTS
 from biodance.body.tables.de_leva import lengths as reference_lengths
 from biodance.body.tables.error_sizes import error_size
-from biodance.body.tables.older import regression, study_masses
+from biodance.body.tables.published import regression, study_masses
 from biodance.body.tables.reference import Reference
 from biodance.records import Array, Sip, Subject
 

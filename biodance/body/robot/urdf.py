@@ -14,9 +14,9 @@ from biodance.body.body import Body
 from biodance.body.export import refuse_impossible
 from biodance.body.inertia import RigidInertia, combine_inertias, inertial_parameters
 from biodance.body.parts import NO_SEGMENT, Foot, Joint, JointLimits, SegmentMarkers
+from biodance.body.robot.likeness import reframed
 from biodance.body.robot.prior import com_deviation, extended, is_point, robot_covariance
 from biodance.body.robot.sole import match_faces, sole_outline
-from biodance.body.robot.standing_frames import reframed
 from biodance.body.robot.urdf_file import Connection, UrdfFile, read_urdf_file
 from biodance.errors import BiodanceError, FileRefused, UnknownName
 from biodance.records import SIDES, Array, Sip

@@ -1,17 +1,107 @@
 """Choose a table of segment inertial parameters: a shipped one or a study by its name, a user's own by the path of
 its .csv file.
+
+A user's own (DXA, scan) is in the segments and frames of the model itself, complete or not. Segments are pelvis,
+thigh, shank, foot, trunk_head, upper_arm and forearm_hand (right side; one of two); CoM and radii of gyration are in
+the segment frame (x anterior, y up, z right, origin at the proximal joint, for the pelvis the middle of the hip
+centres), radii about the CoM. Lengths are those of `Reference`. What it leaves out comes from another table at the
+person's stature.
 """
 
 from collections.abc import Callable, Mapping
 
+import numpy as np
+
+from biodance.body.inertia import RigidInertia, inertial_parameters, smallest_eigenvalues
 from biodance.body.tables.de_leva import de_leva
-from biodance.body.tables.dumas import dumas
-from biodance.body.tables.older import study, winter, zatsiorsky
-from biodance.body.tables.own import completed
-from biodance.body.tables.reference import Reference
+from biodance.body.tables.published import dumas, study, winter, zatsiorsky
+from biodance.body.tables.reference import COUNT, KINDS, Reference, normalised_person
 from biodance.body.tables.segment_data import FAMILY, SegmentTable, read_segment_table
-from biodance.errors import BiodanceError, UnknownName
-from biodance.records import Subject
+from biodance.errors import BiodanceError, FileRefused, UnknownName
+from biodance.records import Array, Subject
+
+_AXES = "xyz"
+FULL = 0.02
+"""How far the masses of a complete table may sum from the whole body, as a share."""
+
+
+def completed(table: SegmentTable, subject: Subject, base: Reference) -> Reference:
+    """Return the person of a table in the model's segments, with what it lacks from ``base``.
+
+    Raises
+    ------
+    FileRefused
+        A segment that the model does not have, no row for the person's sex, masses that are no whole body, or a segment
+        that cannot exist.
+    """
+    known = {key[1] for key in table.numbers if key[2] == subject.sex}
+    strange = sorted({key[1] for key in table.numbers} - set(KINDS))
+    if strange:
+        raise FileRefused(f"{table.name}: {strange[0]!r} is not a segment of the model. Legal: {', '.join(KINDS)}.")
+    if not known:
+        raise FileRefused(
+            f"{table.name}: holds no row for sex {subject.sex}. Add rows, or write FM where they hold for both."
+        )
+    lengths = {kind: _length(table, kind, subject, base) for kind in KINDS}
+    masses = _masses(table, subject, base)
+    lumps = {kind: _lump(table, kind, subject, base, lengths[kind], masses[kind]) for kind in KINDS}
+    for kind, lump in lumps.items():
+        if smallest_eigenvalues(inertial_parameters(lump))[0] <= 0:
+            raise FileRefused(
+                f"{table.name}: no body has the radii of gyration given for {kind} (each moment at most the sum of "
+                f"the others)."
+            )
+    return normalised_person(table.name, subject.stature, lengths, lumps)
+
+
+def _length(table: SegmentTable, kind: str, subject: Subject, base: Reference) -> float:
+    found = table.find(kind, "length", sex=subject.sex)
+    if found is None:
+        return base.lengths[kind] * subject.stature / base.stature
+    return found.of(subject) * (subject.stature if found.unit == "stature" else 1.0)
+
+
+def _masses(table: SegmentTable, subject: Subject, base: Reference) -> dict[str, float]:
+    """Return the share of the body mass of one segment of each kind; segments that are not given share what the
+    others leave.
+    """
+    given = {kind: found for kind in KINDS if (found := table.find(kind, "mass", sex=subject.sex))}
+    share = {kind: one.of(subject) / (subject.mass if one.unit == "kg" else 1.0) for kind, one in given.items()}
+    total = sum(COUNT[kind] * value for kind, value in share.items())
+    rest = {kind: base.segments[kind].mass for kind in KINDS if kind not in share}
+    if (not rest and abs(total - 1) > FULL) or (rest and not 0 <= total < 1) or min(share.values(), default=1.0) <= 0:
+        raise FileRefused(
+            f"{table.name}: the masses given are {100 * total:.1f} % of the body (two of each limb), expected "
+            f"{'less than 100' if rest else f'100 within {100 * FULL:.0f}'} %. Give the mass of one limb, in kg or as "
+            f"share of the body."
+        )
+    left = (1 - total) / sum(COUNT[kind] * value for kind, value in rest.items()) if rest else 0.0
+    return share | {kind: left * value for kind, value in rest.items()}
+
+
+def _lump(
+    table: SegmentTable, kind: str, subject: Subject, base: Reference, length: float, mass: float
+) -> RigidInertia:
+    """Return one segment: the base table's, stretched to ``length`` m, with the CoM and radii that the table gives."""
+    stretch = length / base.lengths[kind]
+    com, inertia = np.array(base.segments[kind].com) * stretch, np.array(base.segments[kind].inertia) * stretch**2
+    wider = np.ones(3)
+    for i, axis in enumerate(_AXES):
+        place, radius = (_metres(table, kind, quantity, axis, subject, length) for quantity in ("com", "gyration"))
+        com[i] = com[i] if place is None else place
+        wider[i] = 1.0 if radius is None else abs(radius) / np.sqrt(inertia[i, i])
+    return RigidInertia(mass, com, mass * _widened(inertia, wider))
+
+
+def _widened(inertia: Array, factor: Array) -> Array:
+    """Return the tensor with its radii of gyration multiplied by ``factor`` (3,), correlations kept."""
+    return inertia * np.outer(factor, factor)
+
+
+def _metres(table: SegmentTable, kind: str, quantity: str, axis: str, subject: Subject, length: float) -> float | None:
+    found = table.find(kind, quantity, axis, sex=subject.sex)
+    return None if found is None else found.of(subject) * (length if found.unit == "length" else 1.0)
+
 
 BASE = "de_leva_1996"
 """The table that completes a user's own, unless its .toml says otherwise (``completed_by``)."""
@@ -68,7 +158,7 @@ def reference(table: str, subject: Subject) -> Reference:
     UnknownName
         No such table for this sex; the message lists the legal ones.
     FileRefused
-        A user's own table breaks a rule (`read_segment_table`, `own_table.completed`).
+        A user's own table breaks a rule (`read_segment_table`, `completed`).
     """
     table = str(table)
     if table in studies(subject.sex):

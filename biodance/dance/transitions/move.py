@@ -105,24 +105,16 @@ class Task:
         """How much more time an instant of a long move stands for."""
         return max(1.0, self.duration / SLOW)
 
-    def state(self, via: Array) -> State:
-        """Return the move through ``via`` on the coarse grid."""
-        return self.problem(via, [], self.grid(GRID), reserve=0.0, objective=_nothing).state(np.empty(0))
-
 
 @dataclass(frozen=True, eq=False)
 class Move:
     """``via`` (2, n) of a move of ``duration`` s; ``gram`` (N, 6, 6) its own information on the inertias, integrated
-    over time; ``zmp_before``, ``zmp_after`` m, root mean square distance of the zero-moment point to the middle of
-    the support when only the excited coordinates leave the straight move, and in the move found; ``violation`` of
-    the limits in their scales (feasible: 0) and of which.
+    over time; ``violation`` of the limits in their scales (feasible: 0) and of which.
     """
 
     via: Array
     duration: float
     gram: Array
-    zmp_before: float
-    zmp_after: float
     violation: float
     limit: str
 
@@ -225,8 +217,5 @@ def evaluate_move(task: Task, via: Array) -> tuple[Move, Array]:
     worst, limit = found.worst
     left = np.pad(found.least, 1, constant_values=np.inf)
     dips = (left[1:-1] < 0) & (left[1:-1] <= left[:-2]) & (left[1:-1] <= left[2:])
-    plain = task.straight()
-    plain[:, task.excited] = via[:, task.excited]
     gram = dynamic_grams(found.state, list(range(len(task.chain.body.segments)))) * task.stretch / CHECK
-    before, after = (float(np.sqrt(off_centre(task.state(v))[0]) / 10) for v in (plain, via))
-    return Move(via, task.duration, gram, before, after, max(0.0, worst), limit if worst > 0 else ""), time[dips]
+    return Move(via, task.duration, gram, max(0.0, worst), limit if worst > 0 else ""), time[dips]

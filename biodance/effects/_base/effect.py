@@ -20,6 +20,7 @@ import numpy as np
 from biodance.effects._base.case import Case
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import CHANNELS, Array
+from biodance.spatial import wrench_about_origin
 
 
 @dataclass(frozen=True)
@@ -154,16 +155,29 @@ class Effect:
         return case.plate(name) if name.startswith("plate") else case.trial.plates[0]
 
 
-def plate_channels(case: Case, channels: tuple[str, ...] = CHANNELS) -> tuple[str, ...]:
-    """Return the targets ``Fx`` ... for one plate, ``plate2:Fx`` ... for several."""
-    if len(case.trial.plates) == 1:
-        return channels
-    return tuple(f"{plate.name}:{channel}" for plate in case.trial.plates for channel in channels)
+class ChannelEffect(Effect):
+    """A cause in one channel of a plate: ``Fx`` ... for one plate, ``plate2:Fx`` ... for several."""
 
+    @classmethod
+    def targets(cls, case: Case) -> tuple[str, ...]:
+        """Return every channel of every plate."""
+        if len(case.trial.plates) == 1:
+            return CHANNELS
+        return tuple(f"{plate.name}:{channel}" for plate in case.trial.plates for channel in CHANNELS)
 
-def channel_index(target: str) -> int:
-    """Return the index 0..5 of the channel that a target names last (``Fz``, ``plate2:Fz``)."""
-    return CHANNELS.index(target.rpartition(":")[2])
+    @property
+    def channel(self) -> int:
+        """Index 0..5 of the channel."""
+        return CHANNELS.index(self.target.rpartition(":")[2])
+
+    def in_channel(self, case: Case) -> Array:
+        """Return (T,): what one unit adds to the channel, about the plate's centre."""
+        raise NotImplementedError
+
+    def columns(self, case: Case) -> Array:
+        """Return what one unit adds to the channel, moved to the lab origin."""
+        only = self.in_channel(case)[:, None] * np.eye(6)[self.channel]
+        return wrench_about_origin(only, self.plate_of(case).centre)[:, :, None]
 
 
 def plate_axis_targets(case: Case) -> tuple[str, ...]:

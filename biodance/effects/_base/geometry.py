@@ -12,8 +12,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.changes import carried_by, neutral_turn
-from biodance.effects._base.moved_matter import MovedMatter, centres_of, moved_matter, wrench_of
-from biodance.effects._base.posture_answer import PostureAnswer
+from biodance.effects._base.moved_geometry import MovedMatter, PostureAnswer, centres_of, moved_matter, wrench_of
 from biodance.lab.filters import LowPass
 from biodance.motion.kinematics import Poses, SegmentMotion, below, chains, jacobian
 from biodance.records import Array, Index, Motion

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from biodance.errors import FileRefused
-from biodance.lab.c3d.measurements import PLAIN
 from biodance.lab.c3d.read import read_c3d
+from biodance.lab.c3d.subject import PLAIN
 from biodance.lab.c3d.write import PlateRecording, write_c3d
 from biodance.lab.plates.corners import plate_axes
 from biodance.records import Plate, Role, Trial

@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from biodance.errors import FileRefused
-from biodance.lab.c3d.measurements import measurements_of
-from biodance.lab.c3d.points import MarkerLabels, marker_labels
 from biodance.lab.c3d.raw import RawC3d, read_raw
+from biodance.lab.c3d.subject import MarkerLabels, marker_labels, measurements_of
 from biodance.lab.c3d.units import metres_per_unit
 from biodance.lab.c3d.vertical import turn_to_z_up
 from biodance.lab.markers.sets import recognise

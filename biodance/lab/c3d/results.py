@@ -19,9 +19,10 @@ import numpy as np
 
 from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.c3d.layout import texts
+from biodance.lab.c3d.parameters import FileValue
 from biodance.lab.c3d.raw import RawC3d, read_raw
 from biodance.lab.c3d.read import file_frame
-from biodance.lab.c3d.write import FileValue
+from biodance.lab.plain_text import write_new
 from biodance.records import Array, frozen_array
 
 _PATIENCE = 300.0
@@ -117,7 +118,7 @@ def write_results_c3d(
         np.save(Path(folder) / "values.npy", np.stack(scaled, axis=1) if scaled else np.empty((len(raw.points), 0, 3)))
         _run(original, made, question)
         _refuse_changed(raw, made)
-        return _placed(made.read_bytes(), path)
+        return write_new(path, made.read_bytes())
 
 
 def _refuse_unfitting(raw: RawC3d, outputs: Sequence[Output]) -> None:
@@ -187,19 +188,6 @@ def _refuse_changed(raw: RawC3d, made: Path) -> None:
             f"{raw.path}: the copy that ezc3d wrote holds other numbers, so it was thrown away. Export csv or mot "
             f"instead."
         )
-
-
-def _placed(content: bytes, path: Path) -> Path:
-    try:
-        with open(path, "xb") as stream:
-            stream.write(content)
-    except FileExistsError:
-        raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.") from None
-    except OSError as error:
-        raise FileRefused(
-            f"{path}: cannot be written ({error.strerror or error}). Choose a place where you may write."
-        ) from error
-    return path
 
 
 def _copy(original: str, made: str, question: dict[str, Any]) -> None:

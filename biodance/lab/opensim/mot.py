@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from biodance.errors import BiodanceError, FileRefused, TrialRefused, UnknownName
-from biodance.lab.plain_text import cells, parse_number, read_text
+from biodance.lab.plain_text import cells, parse_number, read_text, write_new
 from biodance.records import Array, frozen_array
 
 LONGEST_HEADER = 200
@@ -125,12 +125,7 @@ def write_mot(path: str | Path, table: TimeTable) -> Path:
         "\t".join(["time", *table.columns]),
     ]
     rows = ("\t".join(f"{v:.10g}" for v in (t, *values)) for t, values in zip(table.time, table.values, strict=True))
-    try:
-        with open(path, "x", encoding="utf-8", newline="\n") as stream:
-            stream.write("\n".join([*header, *rows]) + "\n")
-    except FileExistsError:
-        raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.") from None
-    return path
+    return write_new(path, ("\n".join([*header, *rows]) + "\n").encode())
 
 
 def _parts(path: Path) -> tuple[dict[str, str], list[str], list[tuple[int, str]]]:

@@ -2,7 +2,7 @@
 
 Five header rows (PathFileType; two rows of names and values; marker labels, one every three columns; X1 Y1 Z1 ...),
 then one row per frame with number, time and coordinates, separated by tabs; an empty cell means that the marker was not
-seen. OpenSim holds the files with y up; the recording itself is asked (see ``vertical.py``) because Motion Analysis
+seen. OpenSim holds the files with y up; the recording itself is asked (`body_is_tall_along_z`), for Motion Analysis
 writes the same file with z up.
 """
 
@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from biodance.errors import FileRefused, TrialRefused
 from biodance.lab.markers.sets import recognise
-from biodance.lab.plain_text import cells, decode, parse_number, read_bytes, sha256
-from biodance.lab.vertical import Y_UP_TO_Z_UP, body_is_tall_along_z
+from biodance.lab.opensim import Y_UP_TO_Z_UP
+from biodance.lab.plain_text import cells, decode, parse_number, read_bytes, sha256, write_new
 from biodance.records import Array, Markers, Role, Source, Trial
 
 _METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+_CLEARLY_TALLER = 1.3
 HEADER_ROWS = 4
 WIDEST = 50.0  # m, between the markers of one frame
 TIME_COLUMN_ROUNDING = 1e-3  # s, some programs write three decimals
@@ -108,12 +109,7 @@ def write_trc(path: str | Path, markers: Markers) -> Path:
         "\t".join([str(i), f"{t:.9g}", *("" if np.isnan(v) else f"{v:.6f}" for v in frame.ravel())])
         for i, (t, frame) in enumerate(zip(markers.time, xyz, strict=True), start=1)
     )
-    try:
-        with open(path, "x", encoding="utf-8", newline="\n") as stream:
-            stream.write("\n".join([*header, *lines]) + "\n")
-    except FileExistsError:
-        raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.") from None
-    return path
+    return write_new(path, ("\n".join([*header, *lines]) + "\n").encode())
 
 
 def _header(rows: list[str], path: Path) -> dict[str, str]:
@@ -242,3 +238,20 @@ def _equal_steps(
     if len(full) > raw.size:
         warnings.append(f"{len(full) - raw.size} frames are left out in the file; they count as not seen.")
     return raw[0] + np.arange(len(full)) / rate, full, warnings
+
+
+def body_is_tall_along_z(xyz: Array) -> bool:
+    """Return True if the marker cloud (T, K, 3) is clearly taller along the third axis than along the second.
+
+    The extent is taken frame by frame and its median over time is compared, so that walking does not count as height;
+    arms that are spread sideways stay below 1.3 times the stature. A single marker has no extent: the answer is then
+    False.
+    """
+    seen = xyz[:, np.logical_not(np.isnan(xyz).all(axis=(0, 2)))]
+    if seen.shape[1] < 2:
+        return False
+    frames = seen[np.logical_not(np.isnan(seen).any(axis=2)).sum(axis=1) >= 2]
+    if not len(frames):
+        return False
+    extent = np.median(np.nanmax(frames, axis=1) - np.nanmin(frames, axis=1), axis=0)
+    return bool(extent[2] > _CLEARLY_TALLER * extent[1])

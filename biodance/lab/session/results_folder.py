@@ -47,6 +47,11 @@ def results_folder(out: str | Path | None, session: str | Path, *, force: bool =
         raise SessionRefused(
             f"{folder}: holds files that biodance did not write ({files[0].name}). Give another folder."
         )
+    return made_folder(folder)
+
+
+def made_folder(folder: Path) -> Path:
+    """Return a folder, made if missing; SessionRefused if it cannot be made."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -20,8 +20,17 @@ from biodance.body.parts import JointError
 from biodance.body.tables.error_sizes import error_size
 from biodance.errors import TrialRefused
 from biodance.motion.ik.inverse_kinematics import FrameStatus, solve_ik
-from biodance.motion.ik.joint_unknowns import HINGES, SIZE, JointUnknowns, own_centre, own_turn
-from biodance.motion.ik.shown_joints import contradicted, doubted, excited, own_unknowns
+from biodance.motion.ik.joint_unknowns import (
+    HINGES,
+    SIZE,
+    JointUnknowns,
+    contradicted,
+    doubted,
+    excited,
+    own_centre,
+    own_turn,
+    own_unknowns,
+)
 from biodance.motion.kinematics import chains, jacobian, poses
 from biodance.records import Array, Markers
 from biodance.threads import one_thread

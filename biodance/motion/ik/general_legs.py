@@ -49,7 +49,7 @@ class GeneralLeg:
 
     @classmethod
     def of(cls, body: Body, side: str) -> "GeneralLeg":
-        """Return the leg that carries the ``side`` foot of a body in standing frames (`body.standing_frames`).
+        """Return the leg that carries the ``side`` foot of a body in standing frames (`standing_frames`).
 
         Raises
         ------

@@ -9,11 +9,12 @@ from biodance.identification.identification import Identification
 from biodance.identification.knowledge import mass_interval
 from biodance.identification.torques import TorqueBands
 from biodance.identification.validation import TrialValidation
-from biodance.records import CHANNELS, runs
-from biodance.report.figures.session import LEAST, TITLES
+from biodance.records import runs
+from biodance.report.figures.session import limit_channel, limit_difference, over_differences
 from biodance.report.figures.style import figure, look
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -121,10 +122,7 @@ def _curves(axes: "Axes", trial: TrialValidation, channel: int) -> None:
     for wrench, colour, style in ((trial.table, BLUE, TABLE), (trial.identified, RED, IDENTIFIED)):
         axes.plot(time, np.where(used, wrench.value[:, channel], np.nan), color=colour, linestyle=style)
     shown = np.concatenate([w.value[used, channel] for w in (trial.measured, trial.table, trial.identified)])
-    middle, half = (shown.max() + shown.min()) / 2, max(0.56 * np.ptp(shown), LEAST[channel] / 2)
-    axes.set_ylim(middle - half, middle + half)
-    axes.set_ylabel(TITLES[channel])
-    axes.tick_params(labelbottom=False)
+    limit_channel(axes, channel, shown)
 
 
 def _differences(axes: "Axes", trial: TrialValidation, channel: int) -> None:
@@ -134,9 +132,7 @@ def _differences(axes: "Axes", trial: TrialValidation, channel: int) -> None:
         difference = np.where(used, trial.measured.value[:, channel] - wrench.value[:, channel], np.nan)
         axes.plot(time, difference, color=colour, linestyle=style, linewidth=0.9)
         largest = max(largest, float(np.nanmax(np.abs(difference))))
-    half = max(1.15 * largest, LEAST[channel] / 4)
-    axes.set_ylim(-half, half)
-    axes.set_ylabel("diff.", fontsize=7.5)
+    limit_difference(axes, channel, largest)
 
 
 def validation_figure(trial: TrialValidation) -> "Figure":
@@ -146,20 +142,16 @@ def validation_figure(trial: TrialValidation) -> "Figure":
     from matplotlib.lines import Line2D
 
     with look():
-        drawn = figure(6.2)
-        grid = drawn.subplots(6, 2, sharex=True, height_ratios=[3, 1.2] * 3)
-        for channel in range(len(CHANNELS)):
-            row, column = 2 * (channel % 3), channel // 3
-            _curves(grid[row, column], trial, channel)
-            _differences(grid[row + 1, column], trial, channel)
-        for axes in grid[-1]:
-            axes.set_xlabel("time (s)")
-            axes.set_xlim(trial.measured.time[0], trial.measured.time[-1])
-        lines = [
+        lines: list[Artist] = [
             Line2D([], [], color=BLACK, label="measured by the plates"),
             Line2D([], [], color=BLUE, linestyle=TABLE, label="with the table"),
             Line2D([], [], color=RED, linestyle=IDENTIFIED, label="with the identified parameters"),
         ]
-        drawn.legend(handles=lines, loc="outside upper center", ncols=3)
-        drawn.align_ylabels()
-    return drawn
+        return over_differences(
+            6.2,
+            trial.measured.time,
+            lambda axes, channel: _curves(axes, trial, channel),
+            lambda axes, channel: _differences(axes, trial, channel),
+            share=1.2,
+            lines=lines,
+        )

@@ -1,5 +1,6 @@
 """Figures of a session: markers to the model, quiet standing from above, measured beside simulated wrench."""
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    _DrawChannel = Callable[[Axes, int], None]
 
 
 def marker_figure(fit: MarkerFit) -> "Figure":
@@ -135,11 +138,51 @@ def _curves(axes: "Axes", comparison: WrenchComparison, channel: int) -> None:
     shown = np.concatenate(
         [comparison.measured[:, channel], comparison.simulated[used, channel] if used.any() else np.empty(0)]
     )
+    limit_channel(axes, channel, shown)
+
+
+def limit_channel(axes: "Axes", channel: int, shown: Array) -> None:
+    """Let the axes of a channel hold all values ``shown``, no closer than `LEAST`."""
     low, high = np.nanmin(shown), np.nanmax(shown)
     half = max(0.56 * (high - low), LEAST[channel] / 2)
     axes.set_ylim((low + high) / 2 - half, (low + high) / 2 + half)
     axes.set_ylabel(TITLES[channel])
     axes.tick_params(labelbottom=False)
+
+
+def limit_difference(axes: "Axes", channel: int, largest: float) -> None:
+    """Let the axes of a channel's difference hold its ``largest`` size, zero in the middle."""
+    half = max(1.15 * largest, LEAST[channel] / 4)
+    axes.set_ylim(-half, half)
+    axes.set_ylabel("diff.", fontsize=7.5)
+
+
+def over_differences(
+    size: float,
+    time: Array,
+    curves: "_DrawChannel",
+    differences: "_DrawChannel",
+    *,
+    share: float,
+    lines: "list[Artist]",
+) -> "Figure":
+    """Draw six channels in two columns (forces left, moments right) over ``time`` (T,) s, each over its difference.
+
+    ``curves`` and ``differences`` draw one channel into the axes given; ``size`` inches is the height of the figure,
+    ``share`` that of a difference, ``lines`` the legend.
+    """
+    drawn = figure(size)
+    grid = drawn.subplots(6, 2, sharex=True, height_ratios=[3, share] * 3)
+    for channel in range(len(CHANNELS)):
+        row, column = 2 * (channel % 3), channel // 3
+        curves(grid[row, column], channel)
+        differences(grid[row + 1, column], channel)
+    for axes in grid[-1]:
+        axes.set_xlabel("time (s)")
+        axes.set_xlim(time[0], time[-1])
+    drawn.legend(handles=lines, loc="outside upper center", ncols=3)
+    drawn.align_ylabels()
+    return drawn
 
 
 def _residual(axes: "Axes", comparison: WrenchComparison, channel: int) -> None:
@@ -148,9 +191,7 @@ def _residual(axes: "Axes", comparison: WrenchComparison, channel: int) -> None:
     axes.axhline(0.0, color=GREY, linewidth=0.6)
     axes.plot(comparison.time, difference, color=BLACK, linestyle="-", linewidth=0.9)
     largest = np.nanmax(np.abs(difference)) if comparison.used.any() else 0.0
-    half = max(1.15 * largest, LEAST[channel] / 4)
-    axes.set_ylim(-half, half)
-    axes.set_ylabel("diff.", fontsize=7.5)
+    limit_difference(axes, channel, largest)
 
 
 def wrench_figure(comparison: WrenchComparison) -> "Figure":
@@ -161,15 +202,6 @@ def wrench_figure(comparison: WrenchComparison) -> "Figure":
     from matplotlib.patches import Patch
 
     with look():
-        drawn = figure(5.7)
-        grid = drawn.subplots(6, 2, sharex=True, height_ratios=[3, 1] * 3)
-        for channel in range(len(CHANNELS)):
-            row, column = 2 * (channel % 3), channel // 3
-            _curves(grid[row, column], comparison, channel)
-            _residual(grid[row + 1, column], comparison, channel)
-        for axes in grid[-1]:
-            axes.set_xlabel("time (s)")
-            axes.set_xlim(comparison.time[0], comparison.time[-1])
         lines: list[Artist] = [
             Line2D([], [], color=BLACK, linestyle="-", label="measured by the plates"),
             Line2D([], [], color=RED, linestyle=(0, (4, 2)), label="simulated with the table"),
@@ -184,6 +216,11 @@ def wrench_figure(comparison: WrenchComparison) -> "Figure":
                     label="left out: not fully measured",
                 )
             )
-        drawn.legend(handles=lines, loc="outside upper center", ncols=3)
-        drawn.align_ylabels()
-    return drawn
+        return over_differences(
+            5.7,
+            comparison.time,
+            lambda axes, channel: _curves(axes, comparison, channel),
+            lambda axes, channel: _residual(axes, comparison, channel),
+            share=1,
+            lines=lines,
+        )

@@ -32,7 +32,6 @@ TILE, _COLUMNS = (300, 420), 6
 PNG = b"\x89PNG"
 SKIN = 0.3
 """Opacity of the segments, through which bones and markers are seen."""
-TEXTS = ("trial", "about")
 
 
 def solid_pngs(stills: Sequence[Still], *, sheet: bool = False) -> list[bytes] | None:

@@ -9,9 +9,9 @@ import numpy as np
 from biodance.errors import BiodanceError
 from biodance.records import CHANNELS, Array, Markers
 from biodance.virtual_lab.faults.faults import all_late, fault_channel, on_plate
-from biodance.virtual_lab.randomness import stream
 from biodance.virtual_lab.recording.laboratory import Fault, Recording
 from biodance.virtual_lab.recording.plates import HALF_SIZE
+from biodance.virtual_lab.tolerances import stream
 
 
 def frame_rate(target: str, ratio: float) -> Fault:

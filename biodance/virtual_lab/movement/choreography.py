@@ -11,7 +11,7 @@ import numpy as np
 
 from biodance.records import SIDES, Array
 from biodance.virtual_lab.movement.protocol import FIELDS, STAND, ProtocolPosture, ProtocolStep, TrialPlan
-from biodance.virtual_lab.randomness import smooth_noise
+from biodance.virtual_lab.tolerances import smooth_noise
 
 COLUMNS = {
     name: slice(sum(map(len, list(FIELDS.values())[:i])), sum(map(len, list(FIELDS.values())[: i + 1])))

@@ -24,8 +24,7 @@ from biodance.virtual_lab.movement.performance import MARGIN, NODE_RATE, Perform
 from biodance.virtual_lab.movement.posing import STRAIGHT, FootStance, Pose, Z, turn_about, upper_body
 from biodance.virtual_lab.movement.protocol import TrialPlan
 from biodance.virtual_lab.person.person import Person
-from biodance.virtual_lab.randomness import smooth_noise, stream
-from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances
+from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances, smooth_noise, stream
 
 ARM = ("shoulder_flexion", "shoulder_adduction", "shoulder_rotation", "elbow_flexion")
 FREE_LEG = ("hip_flexion", "hip_adduction", "hip_rotation", "knee_flexion", "ankle_dorsiflexion")

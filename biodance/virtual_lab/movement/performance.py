@@ -27,8 +27,7 @@ from biodance.virtual_lab.movement.posing import (
 )
 from biodance.virtual_lab.movement.protocol import TrialPlan
 from biodance.virtual_lab.person.person import Person
-from biodance.virtual_lab.randomness import smooth_noise, stream
-from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances
+from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances, smooth_noise, stream
 
 NODE_RATE = 100.0
 """Hz of the nodes of the motion's spline; the instruments sample the spline at their own rates."""

@@ -12,8 +12,7 @@ from biodance.motion.ik.legs import LEG, Leg, soft_limit
 from biodance.records import SIDES, Array
 from biodance.virtual_lab.movement.choreography import Curves
 from biodance.virtual_lab.person.person import Person
-from biodance.virtual_lab.randomness import smooth_noise
-from biodance.virtual_lab.tolerances import LabTolerances
+from biodance.virtual_lab.tolerances import LabTolerances, smooth_noise
 
 _X, _Y, Z = np.eye(3)
 _SHARPNESS = 250.0

@@ -10,7 +10,7 @@ import numpy as np
 
 from biodance.records import Array, Sip
 from biodance.virtual_lab.person.skeleton import ARM_AND_LEG, TRUE_SEGMENTS, Proportions
-from biodance.virtual_lab.randomness import stream
+from biodance.virtual_lab.tolerances import stream
 
 PopulationRow = tuple[float, float, float, float, float, float, float]
 _FEMALE: dict[str, PopulationRow] = {

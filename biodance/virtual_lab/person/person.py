@@ -20,8 +20,7 @@ from biodance.virtual_lab.person.skeleton import (
     draw_proportions,
     on_side,
 )
-from biodance.virtual_lab.randomness import stream
-from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances
+from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances, stream
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ import numpy as np
 from biodance.body.parts import SegmentMarkers
 from biodance.records import Array
 from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS, Proportions, on_side
-from biodance.virtual_lab.randomness import stream
+from biodance.virtual_lab.tolerances import stream
 
 MARKER_RADIUS = 0.007
 """m; 14 mm markers, the plug-in-gait default."""

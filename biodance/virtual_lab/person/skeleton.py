@@ -8,7 +8,7 @@ import numpy as np
 
 from biodance.body.parts import Joint
 from biodance.records import SIDES, Array, Subject
-from biodance.virtual_lab.randomness import stream
+from biodance.virtual_lab.tolerances import stream
 
 _FEMALE = {"thigh": 0.2354, "shank": 0.2410, "pelvis": 0.0640, "lumbar": 0.0776, "thorax": 0.2000, "head": 0.1509}
 _MALE = {"thigh": 0.2441, "shank": 0.2446, "pelvis": 0.0525, "lumbar": 0.0853, "thorax": 0.1887, "head": 0.1571}

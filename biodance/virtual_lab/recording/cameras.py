@@ -13,8 +13,7 @@ from biodance.virtual_lab.movement.performance import Performance
 from biodance.virtual_lab.movement.protocol import STAND
 from biodance.virtual_lab.person.person import Person
 from biodance.virtual_lab.person.skeleton import ARM_AND_LEG, TRUE_SEGMENTS
-from biodance.virtual_lab.randomness import smooth_noise, stream
-from biodance.virtual_lab.tolerances import LabTolerances
+from biodance.virtual_lab.tolerances import LabTolerances, smooth_noise, stream
 
 PULL: dict[str, dict[str, float]] = {
     "pelvis": {"right_hip_flexion": 4, "left_hip_flexion": 4, "lumbar_flexion": 4},

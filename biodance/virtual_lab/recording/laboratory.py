@@ -14,10 +14,9 @@ from biodance.virtual_lab.movement.protocol import TrialPlan
 from biodance.virtual_lab.person.person import Person
 from biodance.virtual_lab.person.placement import MARKER_RADIUS
 from biodance.virtual_lab.person.skeleton import small_rotation
-from biodance.virtual_lab.randomness import stream
 from biodance.virtual_lab.recording.cameras import SoftTissue, draw_soft_tissue, film
 from biodance.virtual_lab.recording.plates import HALF_SIZE, TruePlate, digitise, lay_plate, sense_plate
-from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances
+from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances, stream
 
 
 @dataclass(frozen=True, eq=False)

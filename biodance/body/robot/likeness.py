@@ -1,17 +1,23 @@
-"""The same body in other segment frames: a robot's root and feet in the axes of a person who stands.
+"""A robot's body told otherwise: in the axes of a person who stands, and at another size at which the same angles are
+the same movement (Froude 1861).
 
 Whoever designs a dance wants root and feet with x forwards, y up, z right while the feet are flat (ISB, as in the human
 body). Frames of robots lie as their makers like; they are turned here, and what is written in them (parameters with
 covariance, boxes, soles, markers, joints that hang on them) is turned along, so that it is the same robot.
+
+Under gravity two bodies of the same shape and mass distribution move alike where times go with the square root of
+lengths: lengths times L, masses times M; angles, friction and balance are then the same, forces go with M, moments with
+M L, speeds of joints with 1 / sqrt(L). So a dance may be designed for a body of convenient size and danced, exactly, by
+its small or large likeness.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.inertia import PSEUDO_INERTIA
-from biodance.body.parts import Foot
+from biodance.body.parts import Foot, JointLimits
 from biodance.errors import BiodanceError
 from biodance.records import SIDES, Array, Sip
 
@@ -129,3 +135,40 @@ def _ankle(body: Body, segment: int) -> Array:
     if across @ across < 1e-6:
         return np.zeros(3)
     return np.asarray((np.cross(origin, before) @ across / (across @ across)) * last.axis)
+
+
+@dataclass(frozen=True)
+class Likeness:
+    """``length`` and ``mass``: factors from a body to its likeness."""
+
+    length: float
+    mass: float
+
+    @property
+    def time(self) -> float:
+        """Factor of times."""
+        return float(np.sqrt(self.length))
+
+
+def likeness(body: Body, to: Likeness) -> Body:
+    """Return the body of the same shape and angles, with all lengths, masses, strengths and speeds changed by the
+    factors of ``to``.
+    """
+    length, mass, limits = to.length, to.mass, body.limits
+    units: Array = mass * np.tile([1.0, *[length] * 3, *[length**2] * 6], len(body.segments))
+    return replace(
+        body,
+        joints=tuple(replace(joint, translation=length * joint.translation) for joint in body.joints),
+        sip=Sip(body.segments, units * body.sip.phi, np.outer(units, units) * body.sip.covariance),
+        limits=JointLimits(
+            limits.lower,
+            limits.upper,
+            limits.velocity / to.time,
+            mass * length * limits.torque_lower,
+            mass * length * limits.torque_upper,
+        ),
+        markers=replace(body.markers, position=length * body.markers.position),
+        boxes=length * body.boxes,
+        com_boxes=length * body.com_boxes,
+        feet={side: replace(foot, outline=length * foot.outline) for side, foot in body.feet.items()},
+    )

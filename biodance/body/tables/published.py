@@ -1,17 +1,73 @@
-"""Tables that give less than a full inertia: Winter 2009, the Zatsiorsky regressions, and the studies of segment
-masses.
+"""The published tables beside de Leva's: Dumas and Wojtusch 2018 (3-D CoM, full tensors, trunk joint at L5/S1), and
+those that give less than a full inertia: Winter 2009, the Zatsiorsky regressions, the studies of segment masses.
 
 What a table lacks is taken from another one, and said here. All are evaluated at the subject's own mass and stature.
 """
 
+from functools import cache
+
 import numpy as np
 
 from biodance.body.inertia import RigidInertia, combine_inertias
-from biodance.body.tables import de_leva, dumas
-from biodance.body.tables.reference import Reference, normalised_person, proportion
-from biodance.body.tables.segment_data import read_segment_table
+from biodance.body.tables import de_leva
+from biodance.body.tables.reference import Reference, Sex, normalised_person, proportion
+from biodance.body.tables.segment_data import SegmentTable, read_segment_table
 from biodance.errors import UnknownName
 from biodance.records import Subject
+
+
+def dumas(subject: Subject) -> Reference:
+    """Return the reference woman (1.61 m) or man (1.77 m); mid hip to mid shoulder, which the table lacks, in de
+    Leva's proportion.
+    """
+    sex = subject.sex
+    height, forearm = dumas_stature(sex), _dumas_length("forearm", sex)
+    lengths = {kind: _dumas_length(kind, sex) for kind in ("pelvis", "thigh", "shank", "upper_arm")}
+    lengths |= {"forearm_hand": forearm, "foot": proportion("foot_length", sex) * height}
+    lengths["trunk_head"] = de_leva.length("trunk_3", sex) / de_leva.de_leva_stature(sex) * height
+    lumps = {kind: _dumas_lump(kind, sex) for kind in ("thigh", "shank", "foot", "upper_arm")}
+    lumps["forearm_hand"] = combine_inertias(_dumas_lump("forearm", sex), _dumas_lump("hand", sex, -forearm))
+    lumps["trunk_head"] = combine_inertias(*trunk_parts(sex)[1:])
+    return normalised_person("dumas_2018", height, lengths, {"pelvis": trunk_parts(sex)[0], **lumps})
+
+
+def dumas_stature(sex: Sex) -> float:
+    """Return the stature of the reference person, m."""
+    return float(_dumas_table().provenance["reference_stature_m"][sex])
+
+
+@cache
+def _dumas_table() -> SegmentTable:
+    return read_segment_table("dumas_2018")
+
+
+def _dumas_length(segment: str, sex: Sex) -> float:
+    return _dumas_table().value(segment, "length", sex=sex)
+
+
+def trunk_parts(sex: Sex) -> tuple[RigidInertia, RigidInertia, RigidInertia, RigidInertia]:
+    """Return pelvis (over the mid hip), abdomen, thorax and head with neck (over L5/S1) at the reference stature."""
+    pelvis, abdomen, thorax = (_dumas_length(name, sex) for name in ("pelvis", "abdomen", "thorax"))
+    neck = abdomen + thorax
+    return (
+        _dumas_lump("pelvis", sex, pelvis),
+        _dumas_lump("abdomen", sex, abdomen),
+        _dumas_lump("thorax", sex, neck),
+        _dumas_lump("head_neck", sex, neck),
+    )
+
+
+def _dumas_lump(segment: str, sex: Sex, origin: float = 0.0) -> RigidInertia:
+    """Return the lump of a segment; ``origin`` m is the height of the table's own origin in the model's segment
+    frame.
+    """
+    table, length = _dumas_table(), _dumas_length(segment, sex)
+    mass = table.value(segment, "mass", sex=sex)
+    com = np.array(table.values(segment, "com", "x y z", sex=sex)) * length + [0.0, origin, 0.0]
+    xx, yy, zz, xy, xz, yz = (
+        r * abs(r) * length**2 for r in table.values(segment, "gyration", "xx yy zz xy xz yz", sex=sex)
+    )
+    return RigidInertia(mass, com, mass * np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
 
 
 def winter(subject: Subject) -> Reference:
@@ -19,7 +75,7 @@ def winter(subject: Subject) -> Reference:
     (L5/S1) from Dumas 2018.
     """
     sex, height, table = subject.sex, subject.stature, read_segment_table("winter_2009")
-    shape = dumas.dumas(subject)
+    shape = dumas(subject)
     scale = height / shape.stature
     lengths = {kind: scale * value for kind, value in shape.lengths.items()}
     lumps = {kind: _winter_limb(kind, subject) for kind in ("thigh", "shank", "upper_arm", "forearm", "hand")}
@@ -32,7 +88,7 @@ def winter(subject: Subject) -> Reference:
     names = ("pelvis", "abdomen", "thorax", "head_neck")
     pelvis, *upper = (
         _with_mass(part, table.value(name, "mass", sex=sex), scale)
-        for part, name in zip(dumas.trunk_parts(sex), names, strict=True)
+        for part, name in zip(trunk_parts(sex), names, strict=True)
     )
     return normalised_person(
         "winter_2009",

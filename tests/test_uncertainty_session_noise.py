@@ -1,0 +1,88 @@
+"""The noise of a session's own instruments: measured where it can be, added beyond what was learned."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosed_sessions import body, known, looks, motion
+
+from biodance.diagnosis.engine import diagnose_trials
+from biodance.records import Markers, Plate, Wrench
+from biodance.uncertainty.bands import BANDS
+from biodance.uncertainty.session_noise import (
+    LEARNED_CAMERAS,
+    added_noise,
+    camera_noise,
+    of_cameras,
+    of_plates,
+    plate_noise,
+    white_noise,
+    with_own_noise,
+)
+
+# 5 ---- noise from the session
+
+
+def test_white_noise_is_measured_under_movement() -> None:
+    rng = np.random.default_rng(3)
+    time = np.arange(0, 10, 0.01)
+    course = 0.3 * np.sin(2 * np.pi * 1.0 * time) + 0.02 * np.sin(2 * np.pi * 3.0 * time)
+    xyz = course[:, None, None] + rng.normal(0, 2e-4, (time.size, 5, 3))
+    xyz[100:300, 0] = np.nan
+    assert camera_noise([Markers(tuple("abcde"), time, xyz)]) == pytest.approx(2e-4, rel=0.05)
+    assert np.isnan(white_noise(np.zeros((20, 2)))).all()
+    assert camera_noise([Markers(("a",), time[:20], xyz[:20, 1:2])]) == 0.0
+
+
+def test_plate_noise_is_a_density_about_the_plates_centre() -> None:
+    rng = np.random.default_rng(4)
+    time = np.arange(0, 4, 0.001)
+    centre = np.array([3.0, 2.0, 0.0])
+    local = rng.normal(0, 1.0, (time.size, 6)) * [0.5, 0.5, 1.0, 0.1, 0.1, 0.05]
+    value = np.concatenate([local[:, :3], local[:, 3:] + np.cross(centre, local[:, :3])], axis=1)
+    corners = centre + np.array([[0.2, 0.3, 0], [-0.2, 0.3, 0], [-0.2, -0.3, 0], [0.2, -0.3, 0]])
+    found = plate_noise([Plate("plate1", 2, corners, Wrench(time, value))])
+    np.testing.assert_allclose(found * np.sqrt(500), [0.5, 0.5, 1.0, 0.1, 0.1, 0.05], rtol=0.1)
+    np.testing.assert_allclose(np.diag(of_plates(found, 2)), 2 * found**2 * 12.5)
+
+
+def test_camera_noise_reaches_the_forces_as_it_does_in_truth() -> None:
+    """Least squares on noisy markers of a person at rest, differentiated twice: the spread of a coefficient of Fz."""
+    from biodance.motion.kinematics import jacobian, poses
+
+    one, q, noise, rate = body(), motion(1).q[0], 3e-4, 100.0
+    cov = of_cameras(one, q[None], np.zeros(3), noise=noise, rate=rate)
+    rng, pose = np.random.default_rng(5), poses(one, q[None])
+    places = pose.points(list(one.markers.segment), one.markers.position)
+    J = jacobian(one, pose, list(one.markers.segment), places)[0][0]
+    com = jacobian(one, pose, list(range(len(one.segments))), pose.points(list(range(len(one.segments))), one.sip.com))
+    lift = (one.sip.mass @ com[0][0].reshape(-1, 3, one.nv)[:, 2]) @ np.linalg.pinv(J)
+    frames = 4096
+    course = rng.normal(0, noise, (frames, J.shape[0])) @ lift
+    spectrum = np.fft.rfft(course) * (2 * np.pi * np.fft.rfftfreq(frames, 1 / rate)) ** 2
+    frequency = np.fft.rfftfreq(frames, 1 / rate)
+    for band in (3, 4):
+        here = (frequency >= BANDS.edges[band]) & (frequency < BANDS.edges[band + 1])
+        per_coefficient = np.mean(np.abs(spectrum[here]) ** 2) / frames * BANDS.rate / rate
+        assert cov[band, 2, 2] == pytest.approx(per_coefficient, rel=0.25)
+
+
+def test_own_noise_is_added_beyond_what_was_learned_and_limits_follow() -> None:
+    rng, time = np.random.default_rng(6), np.arange(0, 5, 0.01)
+    trial = looks(1, trials=1)[0].trial
+
+    def recorded(noise):
+        xyz = rng.normal(0, noise, (time.size, 4, 3))
+        return (replace(trial, markers=Markers(tuple("abcd"), time, xyz), plates=()),)
+
+    q = motion(1).q[:1]
+    assert not added_noise(body(), recorded(0.9 * LEARNED_CAMERAS), q, np.zeros(3)).any()
+    more = added_noise(body(), recorded(3e-4), q, np.zeros(3))
+    expected = of_cameras(body(), q, np.zeros(3), noise=np.sqrt(9 - 1) * 1e-4, rate=100.0)
+    np.testing.assert_allclose(more, expected, rtol=0.1)
+    wider = with_own_noise(known(), more, 70.0)
+    np.testing.assert_allclose(wider.noise - known().noise, more, atol=1e-12)
+    seen = [
+        diagnose_trials(body(), looks(1), tolerances=one, effects=("added_mass",)).diagnosis for one in (known(), wider)
+    ]
+    assert min(row.limit for row in seen[1].limits) > min(row.limit for row in seen[0].limits)
