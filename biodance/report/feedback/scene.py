@@ -45,9 +45,7 @@ def scene_of(dance: Dance) -> dict[str, Any]:
         raise BiodanceError(
             f"The dance goes {np.abs(place).max() / _FACTOR:.1f} m from the lab origin; the page shows 3.2 m about it."
         )
-    turn = 32767 * Rotation.from_matrix(pose.rotation[:, chosen].reshape(-1, 3, 3)).as_quat().reshape(
-        *place.shape[:2], 4
-    )
+    turn = Rotation.from_matrix(pose.rotation[:, chosen].reshape(-1, 3, 3)).as_quat().reshape(*place.shape[:2], 4)
     packed = np.round(np.concatenate([place, 32767 * turn], axis=2)).astype("<i2")
     return {
         "name": dance.protocol,

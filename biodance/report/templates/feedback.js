@@ -243,7 +243,7 @@ addEventListener("keydown", (event) => {
   does();
 });
 
-// ---- the mirror: a camera behind the figure, aligned with the corners of the plate -----------------------------------
+// ---- the mirror: a camera behind the figure, aligned with the corners of the plate ----
 let stream = null;
 by("film").onclick = async () => {
   if (stream) {
