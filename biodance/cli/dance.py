@@ -15,6 +15,8 @@ from biodance.errors import BiodanceError
 if TYPE_CHECKING:
     from biodance.records import Subject
 
+FileOut = Annotated[Path, Parameter(name="--out", help="The file to write, such as dance.html.")]
+
 
 @app.command(name="dance")
 def dance_command(
@@ -64,6 +66,26 @@ def dance_command(
     if not result.feasible:
         say(f"There is no such dance. {result.reason}")
     return DONE if result.feasible and result.complete else NEEDS_A_PERSON
+
+
+@app.command(name="feedback")
+def feedback_command(dance: Path, *, out: FileOut, force: ForceOption = False) -> int:
+    """Write the page that leads a person through a dance: one file that opens in a browser without network.
+
+    It shows the person's own body, the next posture as a light figure, what to move, the seconds left and when to move,
+    by sight and sound; over the mirrored picture of a camera where that is wanted.
+
+    Parameters
+    ----------
+    dance
+        The dance.npz that `biodance dance` wrote, or its folder.
+    """
+    from biodance.dance.dance import Dance
+    from biodance.report.feedback.write import write_feedback
+
+    write_feedback(Dance.load(dance / "dance.npz" if dance.is_dir() else dance), out, force=force)
+    sys.stdout.write(f"{out}\n")
+    return DONE
 
 
 def _who(

@@ -1,0 +1,338 @@
+"use strict";
+// The page that leads: what is shown is a function of one number, the second of the dance (negative: before it).
+const data = JSON.parse(document.getElementById("data").textContent);
+const by = (id) => document.getElementById(id);
+const LEAD = 5, SHARE = 0.5; // s to get ready; speed of the preview
+const COLOURS = { left: 0x0072b2, right: 0xd55e00, "": 0x8a8f94 };
+const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+
+function bytes(text) {
+  return Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
+}
+
+// ---- the body ----------------------------------------------------------------------------------------------------
+const POSES = new Int16Array(bytes(data.poses)), COUNT = data.segments.length;
+const scene = new THREE.Scene();
+scene.add(new THREE.HemisphereLight(0xffffff, 0x777777, 0.9));
+const lamp = new THREE.DirectionalLight(0xffffff, 0.5);
+lamp.position.set(3, -2, 4);
+scene.add(lamp);
+
+function figure(opacity) {
+  const group = new THREE.Group();
+  for (const one of data.segments) {
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(bytes(one.vertices)), 3));
+    geometry.setIndex(new THREE.BufferAttribute(new Uint16Array(bytes(one.faces)), 1));
+    const flat = geometry.toNonIndexed();
+    flat.computeVertexNormals();
+    const seen = { color: COLOURS[one.side], side: THREE.DoubleSide, transparent: opacity < 1, opacity,
+      depthWrite: opacity === 1 };
+    group.add(new THREE.Mesh(flat, new THREE.MeshLambertMaterial(seen)));
+  }
+  scene.add(group);
+  return group;
+}
+
+const A = new THREE.Quaternion(), B = new THREE.Quaternion();
+function place(group, second) {
+  const at = Math.min(Math.max(second, 0) * data.rate_hz, data.frames - 1);
+  const k = Math.min(Math.floor(at), data.frames - 2), part = at - k;
+  group.children.forEach((mesh, i) => {
+    const a = 7 * (k * COUNT + i), b = a + 7 * COUNT, mix = (j) => POSES[a + j] + part * (POSES[b + j] - POSES[a + j]);
+    mesh.position.set(mix(0) / 1e4, mix(1) / 1e4, mix(2) / 1e4);
+    A.set(POSES[a + 3], POSES[a + 4], POSES[a + 5], POSES[a + 6]).normalize();
+    B.set(POSES[b + 3], POSES[b + 4], POSES[b + 5], POSES[b + 6]).normalize();
+    mesh.quaternion.copy(A.slerp(B, part));
+  });
+}
+
+const body = figure(1), ghost = figure(0.3);
+const lines = new THREE.Group();
+scene.add(lines);
+const PLATE = [[0.25, -0.3], [0.25, 0.3], [-0.35, 0.3], [-0.35, -0.3]]; // m, what is aligned with the plate's corners
+function outline(points, colour) {
+  const loop = points.map(([x, y]) => new THREE.Vector3(x, y, 0.002));
+  const geometry = new THREE.BufferGeometry().setFromPoints(loop);
+  return new THREE.LineLoop(geometry, new THREE.LineBasicMaterial({ color: colour }));
+}
+
+// ---- cameras ------------------------------------------------------------------------------------------------------
+const canvas = by("scene");
+let renderer = null;
+try {
+  renderer = new THREE.WebGLRenderer({ canvas, alpha: true, antialias: true, preserveDrawingBuffer: true });
+} catch (error) {
+  by("said").textContent = "This browser cannot draw in 3-D; the words and the count lead all the same.";
+}
+const front = new THREE.PerspectiveCamera(32, 1, 0.1, 50), side = new THREE.PerspectiveCamera(32, 1, 0.1, 50);
+for (const [camera, x, y] of [[front, 4.3, 0], [side, 0, -4.3]]) {
+  camera.up.set(0, 0, 1);
+  camera.position.set(x, y, 1.15);
+  camera.lookAt(0, 0, 0.95);
+}
+let aligned = null; // projection and view by the plate's corners in the picture
+
+function look(camera, x, width, height, mirror) {
+  camera.aspect = width / height;
+  camera.fov = width < 0.6 * height ? 50 : 32;
+  camera.updateProjectionMatrix();
+  if (mirror && aligned) {
+    camera.projectionMatrix.copy(aligned.projection);
+    camera.matrixAutoUpdate = false;
+    camera.matrix.copy(aligned.place);
+    camera.matrixWorld.copy(aligned.place);
+    camera.matrixWorldInverse.copy(aligned.place).invert();
+  }
+  if (mirror) camera.projectionMatrix.premultiply(new THREE.Matrix4().makeScale(-1, 1, 1));
+  camera.projectionMatrixInverse.copy(camera.projectionMatrix).invert();
+  renderer.setViewport(x, 0, width, height);
+  renderer.setScissor(x, 0, width, height);
+  renderer.render(scene, camera);
+}
+
+const HANDS = ["left", "right"].map((s) => data.segments.findIndex((one) => one.name === s + "_forearm_hand"));
+function label(camera, x, width, height) {
+  ["left", "right"].forEach((name, n) => {
+    const mark = by("label-" + name);
+    mark.hidden = HANDS[n] < 0;
+    if (mark.hidden) return;
+    const mesh = body.children[HANDS[n]];
+    const at = new THREE.Vector3(0, -0.3, 0).applyQuaternion(mesh.quaternion).add(mesh.position).project(camera);
+    mark.style.transform = `translate(${x + (0.5 + 0.5 * at.x) * width}px, ${(0.5 - 0.5 * at.y) * height}px)`;
+  });
+}
+
+function draw() {
+  if (!renderer) return;
+  const width = canvas.clientWidth, height = canvas.clientHeight, view = by("view").value;
+  renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+  renderer.setSize(width, height, false);
+  renderer.setScissorTest(true);
+  if (view === "both") {
+    look(front, 0, width / 2, height, true);
+    look(side, width / 2, width / 2, height, false);
+    label(front, 0, width / 2, height);
+  } else {
+    look(view === "front" ? front : side, 0, width, height, view === "front");
+    label(view === "front" ? front : side, 0, width, height);
+  }
+}
+
+// ---- what is told -------------------------------------------------------------------------------------------------
+const cues = data.cues;
+function moment(second) {
+  if (second >= data.duration_s) return { phase: "end", cue: cues.length - 1, left: 0 };
+  let k = cues.findLastIndex((cue) => cue.move_s <= second);
+  if (second < 0 || k < 0) return { phase: "ready", cue: 0, left: -second };
+  const cue = cues[k];
+  if (second < cue.hold_s) return { phase: "move", cue: k, left: cue.hold_s - second };
+  const next = k + 1 < cues.length ? cues[k + 1].move_s : data.duration_s;
+  return { phase: "hold", cue: k, left: next - second };
+}
+
+function words(text) {
+  const item = document.createElement("li");
+  for (const part of text.split(/(\bleft\b|\bright\b(?! angle))/)) {
+    const span = document.createElement("span");
+    if (part === "left" || part === "right") span.className = part;
+    span.textContent = part;
+    item.append(span);
+  }
+  return item;
+}
+
+let told = "";
+function tell(now) {
+  const coming = now.phase === "hold" ? Math.min(now.cue + 1, cues.length - 1) : now.cue;
+  const last = now.phase === "hold" && now.cue === cues.length - 1;
+  by("count").textContent = now.phase === "end" ? "" : Math.max(1, Math.ceil(now.left - 1e-6));
+  const key = now.phase + now.cue;
+  if (key === told) return;
+  told = key;
+  const shown = cues[now.phase === "move" ? now.cue : coming];
+  by("number").textContent = now.phase === "end" ? "The end" : `${cues[now.cue].number} of ${cues.length}`;
+  by("stance").textContent = shown.stance;
+  by("told").className = now.phase;
+  by("now").textContent = { ready: "Get ready", move: "Move now", end: "Thank you", hold: last ? "Stand still" :
+    "Stand still. Next:" }[now.phase];
+  by("calls").replaceChildren(...(now.phase === "end" || last ? [] : shown.calls.map(words)));
+  lines.clear();
+  lines.add(outline(PLATE, 0xb0b6bb), ...shown.feet.map((points) => outline(points, 0x222222)));
+}
+
+function preview(second, now) {
+  ghost.visible = now.phase === "hold" ? now.cue + 1 < cues.length : now.phase !== "end";
+  const cue = cues[now.phase === "hold" ? Math.min(now.cue + 1, cues.length - 1) : now.cue];
+  if (now.phase !== "hold" || still) return place(ghost, cue.hold_s);
+  const loop = (cue.hold_s - cue.move_s) / SHARE + 1, since = (second - cues[now.cue].hold_s) % loop;
+  place(ghost, Math.min(cue.move_s + SHARE * since, cue.hold_s));
+}
+
+// ---- sound --------------------------------------------------------------------------------------------------------
+let audio = null;
+function beep(tone, length) {
+  if (!by("sound").checked || !audio) return;
+  const source = audio.createOscillator(), gain = audio.createGain();
+  source.frequency.value = tone;
+  gain.gain.setValueAtTime(0.2, audio.currentTime);
+  gain.gain.exponentialRampToValueAtTime(0.001, audio.currentTime + length);
+  source.connect(gain).connect(audio.destination);
+  source.start();
+  source.stop(audio.currentTime + length);
+}
+function sound(before, now) {
+  if (before.phase !== "move" && now.phase === "move") beep(880, 0.5);
+  else if (before.phase === "move" && now.phase === "hold") beep(440, 0.3);
+  else if (now.phase !== "move" && now.left <= 3 && Math.ceil(before.left) !== Math.ceil(now.left)) beep(587, 0.12);
+}
+
+// ---- time ---------------------------------------------------------------------------------------------------------
+const asked = Number(new URLSearchParams(location.hash.slice(1)).get("t") ?? NaN);
+let second = Number.isFinite(asked) ? asked : -LEAD, playing = false, stamp = 0, frames = 0;
+function show() {
+  const now = moment(second);
+  place(body, second);
+  preview(second, now);
+  tell(now);
+  draw();
+  document.body.dataset.second = second.toFixed(3);
+  document.body.dataset.phase = now.phase;
+  document.body.dataset.frames = ++frames;
+}
+function tick(time) {
+  if (!playing) return;
+  const before = moment(second);
+  second += (Math.min(time - stamp, 250) / 1000) * Number(by("speed").value);
+  stamp = time;
+  sound(before, moment(second));
+  show();
+  if (second >= data.duration_s) run(false);
+  else requestAnimationFrame(tick);
+}
+function run(on) {
+  playing = on;
+  by("play").textContent = on ? "Pause" : second > -LEAD && second < data.duration_s ? "Go on" : "Start";
+  if (!on) return show();
+  if (second >= data.duration_s) second = -LEAD;
+  audio = audio || new AudioContext();
+  stamp = performance.now();
+  requestAnimationFrame(tick);
+}
+function leap(step) {
+  const at = moment(second).cue + step;
+  second = at < 0 ? -LEAD : cues[Math.min(at, cues.length - 1)].move_s;
+  show();
+}
+function stop() {
+  second = -LEAD;
+  run(false);
+}
+by("play").onclick = () => run(!playing);
+by("stop").onclick = stop;
+by("back").onclick = () => leap(-1);
+by("next").onclick = () => leap(1);
+by("view").onchange = show;
+addEventListener("resize", show);
+addEventListener("keydown", (event) => {
+  if (event.target.matches("select, input, button") && event.key === " ") return;
+  const does = { " ": () => run(!playing), Escape: stop, ArrowLeft: () => leap(-1), ArrowRight: () => leap(1),
+    v: () => { by("view").selectedIndex = (by("view").selectedIndex + 1) % 3; show(); } }[event.key];
+  if (!does || (event.target.matches("select") && event.key.startsWith("Arrow"))) return;
+  event.preventDefault();
+  does();
+});
+
+// ---- the mirror: a camera behind the figure, aligned with the corners of the plate ----
+let stream = null;
+by("film").onclick = async () => {
+  if (stream) {
+    stream.getTracks().forEach((track) => track.stop());
+    stream = null;
+  } else {
+    try {
+      stream = await navigator.mediaDevices.getUserMedia({ video: { facingMode: "user" }, audio: false });
+      by("camera").srcObject = stream;
+      await by("camera").play();
+      by("said").textContent = "";
+    } catch (error) {
+      stream = null;
+      by("said").textContent = error.name === "NotAllowedError"
+        ? "The camera was not allowed; the dance works without it."
+        : "There is no camera to be used (" + error.name + "); the dance works without it.";
+    }
+  }
+  by("camera").hidden = by("align").hidden = !stream;
+  by("film").setAttribute("aria-pressed", String(Boolean(stream)));
+  if (!stream) { aligned = null; corners(false); }
+  show();
+};
+
+let held = [[0.35, 0.85], [0.65, 0.85], [0.6, 0.72], [0.4, 0.72]]; // of width and height, in the mirrored picture
+function corners(on) {
+  by("align").setAttribute("aria-pressed", String(on));
+  held.forEach(([x, y], k) => {
+    const mark = by("corner-" + k);
+    mark.hidden = !on;
+    mark.style.left = 100 * x + "%";
+    mark.style.top = 100 * y + "%";
+  });
+}
+by("align").onclick = () => {
+  const on = by("align").getAttribute("aria-pressed") !== "true";
+  corners(on);
+  if (on) { align(); show(); }
+};
+held.forEach((_, k) => {
+  by("corner-" + k).onpointermove = (event) => {
+    if (!event.buttons) return;
+    event.target.setPointerCapture(event.pointerId);
+    const box = by("stage").getBoundingClientRect();
+    held[k] = [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
+    corners(true);
+    align();
+    show();
+  };
+});
+
+function solve(M, v) { // Gauss with pivoting; M is spoilt
+  const n = v.length;
+  for (let i = 0; i < n; i++) {
+    let p = i;
+    for (let r = i + 1; r < n; r++) if (Math.abs(M[r][i]) > Math.abs(M[p][i])) p = r;
+    [M[i], M[p]] = [M[p], M[i]];
+    [v[i], v[p]] = [v[p], v[i]];
+    for (let r = i + 1; r < n; r++) {
+      const f = M[r][i] / M[i][i];
+      for (let c = i; c < n; c++) M[r][c] -= f * M[i][c];
+      v[r] -= f * v[i];
+    }
+  }
+  for (let i = n - 1; i >= 0; i--) {
+    for (let c = i + 1; c < n; c++) v[i] -= M[i][c] * v[c];
+    v[i] /= M[i][i];
+  }
+  return v;
+}
+
+function align() { // the camera whose picture has the plate's corners where they were drawn (Zhang 2000, one plane)
+  const height = canvas.clientHeight, width = canvas.clientWidth, M = [], v = [];
+  PLATE.forEach(([X, Y], k) => { // unmirrored, centred, y up, in halves of the height
+    const x = -(2 * held[k][0] - 1) * (width / height), y = 1 - 2 * held[k][1];
+    M.push([X, Y, 1, 0, 0, 0, -x * X, -x * Y], [0, 0, 0, X, Y, 1, -y * X, -y * Y]);
+    v.push(x, y);
+  });
+  const h = solve(M, v), [a, b, t] = [[h[0], h[3], h[6]], [h[1], h[4], h[7]], [h[2], h[5], 1]];
+  const square = -(a[0] * b[0] + a[1] * b[1]) / (a[2] * b[2]);
+  const f = square > 0.5 && square < 25 ? Math.sqrt(square) : 1.9; // as usual webcams, where the picture does not tell
+  const ray = (c) => new THREE.Vector3(c[0] / f, c[1] / f, -c[2]);
+  const X = ray(a), Y = ray(b), scale = 2 / (X.length() + Y.length());
+  X.normalize();
+  const Z = new THREE.Vector3().crossVectors(X, Y.normalize()).normalize();
+  const view = new THREE.Matrix4().makeBasis(X, new THREE.Vector3().crossVectors(Z, X), Z);
+  view.setPosition(ray(t).multiplyScalar(scale));
+  const by2 = height / width, near = 0.1, far = 50;
+  aligned = { place: view.invert(), projection: new THREE.Matrix4().set(f * by2, 0, 0, 0, 0, f, 0, 0, 0, 0,
+    (far + near) / (near - far), (2 * far * near) / (near - far), 0, 0, -1, 0) };
+}
+show();
