@@ -116,6 +116,12 @@ class Effect:
         """
         return None
 
+    def measured(self, theta: Array, *cases: Case) -> Array:
+        """Return the size (p,) of a cause that was named with ``theta`` (p,): where the markers of all ``cases`` show
+        it by themselves, that, in place of what was inferred from all rows; by default ``theta``.
+        """
+        return theta
+
     def removed(self, case: Case, theta: Array) -> Array:
         """Return (T, 6): what this cause of size ``theta`` (p,) has added to what ``case`` measured, about the lab
         origin.
