@@ -36,8 +36,8 @@ STANDING = (
 
 @dataclass(frozen=True, eq=False)
 class Examined:
-    """A diagnosis with what it was made from: ``naming`` all rounds, with the problem; the ``named`` causes with their
-    sizes.
+    """A diagnosis with what it was made from: ``naming`` all rounds, with the problem; the ``named`` causes that matter,
+    with their sizes.
     """
 
     diagnosis: Diagnosis
@@ -100,7 +100,7 @@ def diagnose_trials(
         doubt="standing alone tells no cause" if quiet else "",
         candidates=tuple(one.alias for one in naming.screening.suspects),
     )
-    return Examined(found, naming, named)
+    return Examined(found, naming, tuple(one for one in named if matters(one.effect, one.theta)))
 
 
 def moves(case: Case) -> bool:
