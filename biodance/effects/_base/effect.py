@@ -154,6 +154,10 @@ class Effect:
         """
         return tuple((p.name, float(t), float(s), p.unit) for p, t, s in zip(self.parameters, theta, sd, strict=True))
 
+    def size_told(self, size: float) -> float:
+        """Return what a limit says for a ``size`` of the first parameter: by default the same."""
+        return size
+
     def plate_of(self, case: Case):  # type: ignore[no-untyped-def]
         """Return the plate that the target names, or the first one."""
         name = self.target.partition(":")[0]
