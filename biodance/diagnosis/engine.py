@@ -36,8 +36,8 @@ STANDING = (
 
 @dataclass(frozen=True, eq=False)
 class Examined:
-    """A diagnosis with what it was made from: ``naming`` all rounds, with the problem; the ``named`` causes that matter,
-    with their sizes.
+    """A diagnosis with what it was made from: ``naming`` all rounds, with the problem; ``named`` the causes that
+    matter, with their sizes.
     """
 
     diagnosis: Diagnosis
