@@ -197,6 +197,8 @@ def test_forces_that_fit_a_doubtful_body_do_not_end_as_nothing_wrong() -> None:
     assert one.attention[0].text.startswith("Cannot tell")
     assert "thigh is 38 mm shorter" in one.attention[0].text
     assert told(Diagnosis("named, complete", (FOUND,)), doubtful, (STATIC,)).verdict == "named, incomplete"
+    thigh = replace(FOUND, effect="segment_length", target="right_thigh")
+    assert told(Diagnosis("named, complete", (thigh,)), doubtful, (STATIC,)).verdict == "named, complete"
 
 
 def test_a_check_points_to_the_cause_that_was_found() -> None:

@@ -83,7 +83,9 @@ def told(one: Diagnosis, result: SessionResult, judged: tuple[Judged, ...]) -> D
     off as well.
     """
     outside = tuple(check for check in result.all_checks if not check.inside)
-    if one.verdict == "named, complete" and (outside or result.doubts or any(row.missed for row in judged)):
+    found = [finding.target.replace("_", " ") for finding in one.findings if finding.target]
+    doubts = [text for text in result.doubts if not any(target in text for target in found)]
+    if one.verdict == "named, complete" and (outside or doubts or any(row.missed for row in judged)):
         one = replace(one, verdict="named, incomplete")
     if one.verdict == "nothing wrong" and result.doubts:
         one = replace(one, verdict="unexplained", doubt=_FITS + _doubtful(result.doubts))
