@@ -61,8 +61,8 @@ class Score:
 
     @property
     def silent(self) -> bool:
-        """Whether nothing was said."""
-        return self.verdict == "nothing wrong"
+        """Whether nothing was found wrong, nor anything that keeps the session from telling."""
+        return self.verdict in ("nothing wrong", "cannot tell")
 
     @property
     def wrong(self) -> bool:
@@ -133,8 +133,8 @@ def score(scenario: Scenario, found: Diagnosis, seconds: float, *, group: str, h
     error, covered = _size(scenario, found.findings, wanted[0]) if len(wanted) == 1 else (float("nan"), None)
     worst = found.adequacy[0] if found.adequacy else None
     return Score(
-        scenario.key, group, scenario.level, scenario.subject, scenario.hidden, found.verdict, names, sets, exact,
-        within, ratio, told,
+        scenario.key, group, scenario.level, scenario.subject, scenario.hidden,
+        "cannot tell" if found.doubt else found.verdict, names, sets, exact, within, ratio, told,
         error, covered, (f"{worst.channel} {worst.band_hz[0]:g}-{worst.band_hz[1]:g} Hz", worst.z) if worst else ("",
         0.0), seconds,
         gain=harm | _gain(found.findings),

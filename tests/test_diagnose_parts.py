@@ -1,6 +1,6 @@
 """The parts of the diagnosis against brute force: evidence, limits, kinematic errors, rows, tolerances."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -13,9 +13,16 @@ from biodance.diagnosis.evidence import believe, evidence, smallest
 from biodance.diagnosis.learning import Null, learn_tolerances
 from biodance.diagnosis.model import model
 from biodance.diagnosis.naming import screen
-from biodance.diagnosis.observability import Visibility, after_calibration, detection_limits, placing_leaves, visibility
+from biodance.diagnosis.observability import (
+    Visibility,
+    after_calibration,
+    detection_limits,
+    placing_leaves,
+    unit_directions,
+    visibility,
+)
 from biodance.diagnosis.problem import problem
-from biodance.effects import effect
+from biodance.effects import Effect, Parameter, effect
 from biodance.uncertainty.tolerances import Tolerances, key_of, read_tolerances, shipped, to_toml
 
 
@@ -139,6 +146,31 @@ def test_what_placing_has_repaired_needs_a_larger_fault_to_be_seen() -> None:
     assert now["RSHO"] > 1.5 * plain["RSHO"]
     assert now["left_ankle"] == pytest.approx(plain["left_ankle"], rel=0.05)
     assert now["Fz"] == plain["Fz"]
+
+
+@dataclass(frozen=True)
+class Saturating(Effect):
+    """Adds a / (1 + a / most) newton to Fz."""
+
+    name = "saturating"
+    parameters = (Parameter("a", "N", 5.0, "a test"),)
+    most = 40.0
+
+    def transform(self, case, theta):
+        a = float(theta[0])
+        change = np.zeros((case.motion.time.size, 6))
+        change[:, 2] = a / (1 + a / self.most) * np.sin(4 * case.motion.time)
+        return case.with_added(case.trial.plates[0], change)
+
+
+def test_the_limit_of_what_saturates_lies_where_it_is_seen(put) -> None:
+    """A cause of size a acts like a / (1 + a / most) of one in proportion, and never like more than ``most``."""
+    for most in (1e6, 4.0, 0.01):
+        (cause,) = candidates(put, {"saturating": type("Saturating", (Saturating,), {"most": most})()})
+        seen = visibility(model(put, (cause,), known()), (cause,))
+        straight = smallest(seen.G, unit_directions(cause)[0], 10.0)
+        true = straight / (1 - straight / most) if straight < most else np.inf
+        assert seen.seen(0, 10.0) == pytest.approx(true, rel=0.3)
 
 
 def test_learning_finds_the_sizes_that_made_the_nulls() -> None:

@@ -11,7 +11,8 @@ from biodance.body.human.human import human
 from biodance.effects import effect
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
-from biodance.records import Array, Subject
+from biodance.motion.track import track
+from biodance.records import Array, Markers, Subject
 from biodance.spatial import point_mass
 
 CASE = human_case()
@@ -67,6 +68,23 @@ def test_true_marker_place_leaves_no_mean_residual() -> None:
     predicted = rows @ shift
     assert np.linalg.norm(change[row]) > 0.01
     np.testing.assert_allclose(change, predicted, atol=0.0015)
+
+
+def test_a_moved_marker_is_measured_from_postures_that_do_not_follow_it() -> None:
+    """A marker that sits 50 mm off in every frame: the tracked body follows it half the way."""
+    shift, body = np.array([0.05, 0.0, 0.01]), CASE.body
+    index = body.markers.names.index("RKNE")
+    pose = poses(body, CASE.motion.q)
+    xyz = np.array(pose.points(body.markers.segment, body.markers.position))
+    xyz[:, index] += pose.rotation[:, body.markers.segment[index]] @ shift
+    trial = replace(CASE.trial, markers=Markers(body.markers.names, CASE.motion.time, xyz))
+    case = replace(CASE, trial=trial, motion=track(body, trial))
+    found = effect("marker_misplaced").at("RKNE", case)
+    followed = case.marker_residual[case.marker_columns.index(index)]
+    assert np.linalg.norm(followed) < 0.7 * np.linalg.norm(shift)
+    np.testing.assert_allclose(found.measured(np.zeros(3), case), shift, atol=1e-3)
+    blind = replace(case, trial=replace(trial, markers=trial.markers.select(body.markers.names[:3])))
+    np.testing.assert_array_equal(found.measured(shift, blind), shift)
 
 
 def test_trial_without_the_marker_says_nothing_about_it() -> None:

@@ -118,6 +118,14 @@ def test_markers_show_the_joint_and_the_wrench_follows(name: str) -> None:
     assert np.linalg.norm(right.residual[INSIDE]) < 0.1 * before
 
 
+def test_the_size_reported_is_the_one_shown_and_the_wrenchs_sum_stays() -> None:
+    case, _ = person("head_joint", 0.2)
+    found = effect("head_joint").at("", case)
+    angle, beyond = found.measured(np.array([0.07, -0.03]), case)
+    assert angle == pytest.approx(0.2, rel=0.12)
+    assert angle + beyond == pytest.approx(0.04)
+
+
 @pytest.mark.parametrize("name", KINDS)
 def test_without_its_markers_there_is_no_target(name: str) -> None:
     case = human_case(120)

@@ -125,6 +125,12 @@ def test_only_what_is_physics_keeps_a_mean_and_the_rest_is_spread() -> None:
     assert all(shipped().sizes[key] >= size for key, size in table_sizes().items())
 
 
+def test_a_habit_that_the_markers_show_widens_the_other_rows_alone() -> None:
+    sizes = {"head_joint": 0.02, "shown head_joint": 0.01}
+    free = without_habits(replace(known(), sizes=sizes, means={"head_joint angle": 0.04, "head_joint beyond": -0.03}))
+    assert dict(free.sizes) == pytest.approx({**sizes, "habit head_joint": np.sqrt((0.04**2 + 0.03**2) / 2)})
+
+
 # 3, 6 ---- verdicts and sentences
 
 
@@ -168,6 +174,20 @@ def test_no_verdict_contradicts_a_check_or_an_unjudged_trial() -> None:
         assert list(one.attention) == list(strongest_first(one.attention))
         assert one.judged == rows
     assert count == 63
+
+
+def test_forces_that_fit_a_doubtful_body_do_not_end_as_nothing_wrong() -> None:
+    result = full_session()
+    trials = tuple(replace(trial, checks=()) for trial in result.trials)
+    odd = replace(body(), notes=("Warning: the right thigh is 38 mm shorter than the left thigh: check the markers.",))
+    doubtful = replace(result, trials=trials, checks=(), body=odd)
+    one = told(Diagnosis("nothing wrong", ()), doubtful, (STATIC,))
+    assert one.verdict == "unexplained"
+    assert one.attention[0].text.startswith("Cannot tell")
+    assert "thigh is 38 mm shorter" in one.attention[0].text
+    assert told(Diagnosis("named, complete", (FOUND,)), doubtful, (STATIC,)).verdict == "named, incomplete"
+    thigh = replace(FOUND, effect="segment_length", target="right_thigh")
+    assert told(Diagnosis("named, complete", (thigh,)), doubtful, (STATIC,)).verdict == "named, complete"
 
 
 def test_a_check_points_to_the_cause_that_was_found() -> None:

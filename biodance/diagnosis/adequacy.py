@@ -69,7 +69,9 @@ def alarming(left: tuple[Adequacy, ...]) -> float:
 
 
 def adequacy(found: Model) -> tuple[Adequacy, ...]:
-    """Return how far every band of every channel is from null sessions, worst first."""
+    """Return how far every band of every channel is from null sessions, worst first; the worst, and the worst that
+    matters, with its second.
+    """
     spectrum, names = found.problem.spectrum, [case.trial.name for case in found.problem.cases]
     z, size = unlikely(found), sizes(found)
     square = found.belief.left[: 6 * spectrum.band.size].reshape(-1, 6) ** 2
@@ -87,8 +89,9 @@ def adequacy(found: Model) -> tuple[Adequacy, ...]:
                     size=float(size[b, c]),
                 )
             )
-    worst, *others = sorted(rows, key=lambda row: -row.z)
-    return (replace(worst, second=_when(found, worst)), *others)
+    rows.sort(key=lambda row: -row.z)
+    told = {0, next((i for i, row in enumerate(rows) if row.matters), 0)}
+    return tuple(replace(row, second=_when(found, row)) if i in told else row for i, row in enumerate(rows))
 
 
 def _when(found: Model, row: Adequacy) -> float:

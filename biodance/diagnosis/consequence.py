@@ -26,13 +26,19 @@ LEAST_THAT_MATTERS: dict[str, dict[str, float]] = {
     "segment_length": {"m": 0.005},
     "marker_misplaced": {"m": 0.005},
     "wobbling_mass": {"kg": 0.5},
+    "sloshing_load": {"kg": 0.1},
+    "filter_mismatch": {"Hz": 0.5},
+    "head_joint": {"rad": 0.05},
+    "trunk_joint": {"rad": 0.05},
+    "shoulder_girdle": {"rad": 0.06},
 }
 """Least size that matters, by effect and unit; of an effect that is not here every size does. Time: a third of a frame
 at 100 Hz. Zero and drift: what a spot check before a session tolerates (2 N are 0.3 % of an adult's weight). Gain and
 cross-talk: makers' accuracy, 0.2 to 0.5 % and 0.05 to 0.2 % of full scale. Place and turn of a plate: 2 to 5 mm and
 0.2 degrees in laboratories that check (Collins 2009, doi:10.1016/j.gaitpost.2008.10.060). Mass: clinic scale and
 clothes, 0.2 kg. Joints, lengths and markers: who places markers twice places them 4 to 6 mm apart (Della Croce 1999,
-doi:10.1007/BF02513272)."""
+doi:10.1007/BF02513272). Missing joints: as much as everybody moves them anyway (`MissingJoint.natural`). Loads: as an
+added mass. A filter: half a hertz below the one that is assumed."""
 
 
 def least(effect: Effect) -> dict[str, float]:

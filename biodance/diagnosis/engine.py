@@ -14,7 +14,7 @@ from biodance.diagnosis.model import NamedCause
 from biodance.diagnosis.naming import Naming, Round, name_causes, suspicious
 from biodance.diagnosis.observability import detection_limits, hidden, visibility
 from biodance.diagnosis.passing import with_passing
-from biodance.diagnosis.problem import Look, problem
+from biodance.diagnosis.problem import Look, Problem, problem
 from biodance.discovery import Chosen
 from biodance.effects import Case, DiscreteEffect, Effect, Gate
 from biodance.effects import effects as family
@@ -37,15 +37,13 @@ STANDING = (
 
 @dataclass(frozen=True, eq=False)
 class Examined:
-    """A diagnosis with what it was made from: ``naming`` all rounds, with the problem and the named causes."""
+    """A diagnosis with what it was made from: ``naming`` all rounds, with the problem; ``named`` the causes that
+    matter, with their sizes.
+    """
 
     diagnosis: Diagnosis
     naming: Naming
-
-    @property
-    def named(self) -> tuple[NamedCause, ...]:
-        """The named causes with their sizes."""
-        return self.naming.found.named
+    named: tuple[NamedCause, ...] = ()
 
     @property
     def suspicious(self) -> bool:
@@ -87,7 +85,8 @@ def diagnose_trials(
         naming = name_causes(put, known, asked, rounds=0)
     rows = detection_limits(visibility(naming.first, naming.first_causes), body, known.threshold)
     left, strained = adequacy(naming.found), strain(naming.found) > STRAINED
-    every = [(one, _finding(one, r, known)) for one, r in zip(naming.found.named, naming.accepted, strict=True)]
+    named = tuple(_measured(one, put, known) for one in naming.found.named)
+    every = [(one, _finding(one, r, known)) for one, r in zip(named, naming.accepted, strict=True)]
     findings = tuple(finding for one, finding in every if matters(one.effect, one.theta))
     told = verdict(len(findings), alarming(left), gates, strained=strained)
     found = Diagnosis(
@@ -103,7 +102,7 @@ def diagnose_trials(
         doubt="standing alone tells no cause" if quiet else "",
         candidates=tuple(one.alias for one in naming.screening.suspects),
     )
-    return Examined(found, naming)
+    return Examined(found, naming, tuple(one for one in named if matters(one.effect, one.theta)))
 
 
 def moves(case: Case) -> bool:
@@ -131,6 +130,15 @@ def without_names(examined: Examined, gates: tuple[Gate, ...] = ()) -> Examined:
 
 def _relative(row: Unobservable) -> float:
     return row.limit / row.typical
+
+
+def _measured(one: NamedCause, put: Problem, known: Tolerances) -> NamedCause:
+    """Return a named cause with the size that the markers show by themselves, where they do (`Effect.measured`)."""
+    if one.course:
+        return one
+    covariance, shown = np.array(one.covariance), known.size(f"shown {one.effect.name}")
+    covariance[0, 0] = shown**2 or covariance[0, 0]
+    return replace(one, theta=one.effect.measured(one.theta, *put.cases), covariance=covariance)
 
 
 def _finding(one: NamedCause, found: Round, known: Tolerances) -> Finding:

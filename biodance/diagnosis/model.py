@@ -15,7 +15,7 @@ from biodance.effects import Effect
 from biodance.motion.kinematics import chains
 from biodance.records import Array
 from biodance.uncertainty.joints import joint_of
-from biodance.uncertainty.tolerances import Tolerances, in_state, key_of, mean_key, whitened
+from biodance.uncertainty.tolerances import HABIT, Tolerances, in_state, key_of, mean_key, whitened
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +96,20 @@ def nuisances(problem: Problem, causes: tuple[Candidate, ...]) -> tuple[Array, t
         loud = [p.name for p, silent in zip(one.effect.parameters, one.silent, strict=True) if not silent]
         keys += [own] * width
         means += [mean_key(*one.names, name) if own == key else "" for name in loud] + [""] * (width - len(loud))
+        if one.names in problem.shown:
+            parts.append(_where_not_shown(problem, parts[-1]))
+            keys += [HABIT + key] * width
+            means += [""] * width
     return np.concatenate(parts, axis=1), tuple(keys), tuple(means)
+
+
+def _where_not_shown(problem: Problem, columns: Array) -> Array:
+    """Return ``columns`` (r, k) with zero in the rows of sizes shown: what everybody does by habit is taken off there
+    already (`Effect.shown`).
+    """
+    out = np.array(columns)
+    out[len(out) - len(problem.shown) :] = 0.0
+    return out
 
 
 def shown_left_out(expected: Array, marker_keys: tuple[str, ...]) -> Array:

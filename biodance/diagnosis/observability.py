@@ -5,7 +5,7 @@ from which a cause is seen, the size from which it is told from every other caus
 follow from G.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -13,10 +13,10 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.parts import JointError
-from biodance.diagnosis.candidates import SCALE, Candidate
+from biodance.diagnosis.candidates import SCALE, Candidate, changes
 from biodance.diagnosis.consequence import least
 from biodance.diagnosis.diagnosis import Unobservable
-from biodance.diagnosis.evidence import smallest
+from biodance.diagnosis.evidence import Belief, smallest
 from biodance.diagnosis.model import Model
 from biodance.diagnosis.naming import TOGETHER
 from biodance.motion.ik.functional_joints import fixed_point
@@ -26,21 +26,32 @@ from biodance.records import Array
 LARGE = 4.0
 """A cause that is not seen at this many typical sizes is listed as one that this session cannot see."""
 
+_SEARCHED, _STEPS = 300.0, 24
+"""How far, and in how many steps, the limit of a cause is looked for whose effect is not in proportion to its size (a
+filter takes no more than there is).
+"""
+
 
 @dataclass(frozen=True, eq=False)
 class Visibility:
-    """``causes`` (C); ``G`` (k, k) information of all bases together, ``cuts`` where each cause's basis lies in it."""
+    """``causes`` (C); ``G`` (k, k) information of all bases together, ``cuts`` where each cause's basis lies in it;
+    ``found`` the model without named causes that they are seen in.
+    """
 
     causes: tuple[Candidate, ...]
     G: Array
     cuts: tuple[slice, ...]
+    found: Model | None = None
 
     def seen(self, index: int, threshold: float) -> float:
         """Return the size, in units of the first parameter, from which cause ``index`` is expected to pass
         ``threshold``; each of several forces or masses at once in the same size: the worst of them.
         """
         one, cut = self.causes[index], self.cuts[index]
-        return max(smallest(self.G[cut, cut], way, threshold) for way in unit_directions(one))
+        size = max(smallest(self.G[cut, cut], way, threshold) for way in unit_directions(one))
+        if self.found is None or one.effect.linear or any(one.silent):
+            return size
+        return _really_seen(self.found, one, size, threshold)
 
     def separation(self, index: int) -> tuple[Array, Array]:
         """Return ``fixed``, ``growth`` (C,): log Bayes factor of cause ``index`` less that of every other one at size a
@@ -80,6 +91,21 @@ class Visibility:
         return float(size.max(initial=0.0))
 
 
+def _really_seen(found: Model, one: Candidate, size: float, threshold: float) -> float:
+    """Return the size from which a cause that is not in proportion to its size is expected to pass ``threshold``, from
+    the ``size`` from which it would if it were; infinite beyond `_SEARCHED` times that.
+    """
+    Z, first = found.white(one.basis), np.eye(len(one.silent))[0]
+    for grown in size * np.geomspace(1.0, _SEARCHED, _STEPS) if np.isfinite(size) else ():
+        rows = changes(found.problem, one.effect, grown * first)
+        s, G = Belief.known(found.belief.X, found.belief.factor, found.white(rows[:, None])[:, 0]).score(Z)
+        inner = np.linalg.inv(np.eye(len(G)) + G)
+        chance = 0.5 * float(np.trace(inner @ G) - np.linalg.slogdet(np.eye(len(G)) + G)[1])
+        if 0.5 * float(s @ inner @ s) + chance >= threshold:
+            return float(grown)
+    return float("inf")
+
+
 def unit_directions(one: Candidate) -> list[Array]:
     """Return the coefficients (k,) of one unit of each parameter that is not silent."""
     loud = np.flatnonzero(~np.array(one.silent))
@@ -93,7 +119,7 @@ def visibility(found: Model, causes: tuple[Candidate, ...]) -> Visibility:
     widths = np.cumsum([0, *(one.basis.shape[1] for one in causes)])
     Z = found.white(np.concatenate([one.basis for one in causes], axis=1))
     _, G = found.belief.score(Z)
-    return Visibility(causes, G, tuple(slice(a, b) for a, b in pairwise(widths.tolist())))
+    return Visibility(causes, G, tuple(slice(a, b) for a, b in pairwise(widths.tolist())), found)
 
 
 def after_calibration(seen: Visibility, body: Body) -> Visibility:
@@ -116,7 +142,7 @@ def after_calibration(seen: Visibility, body: Body) -> Visibility:
     size = np.sqrt((1 / share - 1) / np.maximum(own, 1e-12))
     taken = seen.G[:, picks] * size
     inner = np.eye(len(picks)) + size[:, None] * seen.G[np.ix_(picks, picks)] * size
-    return Visibility(seen.causes, seen.G - taken @ np.linalg.solve(inner, taken.T), seen.cuts)
+    return replace(seen, G=seen.G - taken @ np.linalg.solve(inner, taken.T))
 
 
 def placing_leaves(error: JointError) -> float:
@@ -139,7 +165,8 @@ def detection_limits(seen: Visibility, body: Body, threshold: float) -> tuple[Un
         limit = here.seen(i, threshold + float(np.log(targets[one.names[0]])))
         first = one.effect.parameters[one.silent.index(False)]
         limit = max(limit, least(one.effect).get(first.name, 0.0))
-        rows.append(Unobservable(*one.names, limit, first.unit, max(limit, here.told(i)), first.typical))
+        sizes = [one.effect.size_told(size) for size in (limit, max(limit, here.told(i)), first.typical)]
+        rows.append(Unobservable(*one.names, sizes[0], first.unit, *sizes[1:]))
     return tuple(rows)
 
 

@@ -13,8 +13,11 @@ import numpy as np
 from biodance.body.changes import move_marker
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
+from biodance.errors import TrialRefused
+from biodance.motion.ik.inverse_kinematics import solve_ik
+from biodance.motion.kinematics import poses
 from biodance.motion.track import track
-from biodance.records import Array
+from biodance.records import Array, Markers
 
 
 class MarkerMisplaced(Effect):
@@ -50,6 +53,33 @@ class MarkerMisplaced(Effect):
             if own is None
             else -case.geometry.marker_changes.residual[..., own]
         )
+
+    def measured(self, theta: Array, *cases: Case) -> Array:
+        """Return the mean place (3,) m of the marker beside the one in the model, over postures tracked without it:
+        a posture that follows the marker hides half of how far it has moved.
+        """
+        found = [one for one in map(self._beside, cases) if one is not None]
+        seen = np.concatenate([one[np.isfinite(one).all(axis=1)] for one in found] or [np.empty((0, 3))])
+        return seen.mean(axis=0) if len(seen) else theta
+
+    def _beside(self, case: Case) -> Array | None:
+        """Return (F, 3) m, axes of its segment: where the marker lies beside its place in the model, once a second, in
+        postures that do not follow it; None where it is not there or the others determine no posture.
+        """
+        markers, body = case.trial.markers, case.body
+        if markers is None or self.target not in markers:
+            return None
+        every = slice(None, None, max(1, round(case.motion.rate)))
+        names = [name for name in markers.names if name != self.target]
+        others = Markers(tuple(names), markers.time[every], markers.select(names).xyz[every])
+        try:
+            pose = poses(body, solve_ik(body, others, guess=case.motion.q[every]).q)
+        except TrialRefused:
+            return None
+        index = body.markers.names.index(self.target)
+        segment = body.markers.segment[index]
+        apart = markers[self.target][every] - pose.points([segment], body.markers.position[[index]])[:, 0]
+        return np.asarray(np.einsum("tij,ti->tj", pose.rotation[:, segment], apart))
 
     def corrected(self, case: Case, theta: Array) -> Case:
         """Return the trial tracked again with the marker at its true place."""

@@ -20,6 +20,8 @@ from biodance.records.attention import Attention, Judged, Level, strongest_first
 _STATIC = "quiet standing tells nothing beside so much movement"
 _KEPT = "kept to measure what a finding gains"
 _NEVER = "it holds no measured ground contact"
+_FITS = "the forces fit this body, but "
+"""Beginning of the doubt about a body whose residual is as without fault."""
 EXPLAINS: dict[str, tuple[str, ...]] = {
     "mass on the plates": (
         "plate_gain", "plate_offset", "body_mass", "added_mass", "body_weight_support", "external_contact",
@@ -77,11 +79,16 @@ def identified_trials(result: SessionResult) -> tuple[Judged, ...]:
 
 def told(one: Diagnosis, result: SessionResult, judged: tuple[Judged, ...]) -> Diagnosis:
     """Return the diagnosis with what it rests on and its sentences, and never "complete" beside a check outside its
-    limit or an unjudged trial.
+    limit, an unjudged trial or a doubtful body, nor "nothing wrong" beside the last: forces fit a body with a hip 50 mm
+    off as well.
     """
     outside = tuple(check for check in result.all_checks if not check.inside)
-    if one.verdict == "named, complete" and (outside or any(row.missed for row in judged)):
+    found = [finding.target.replace("_", " ") for finding in one.findings if finding.target]
+    doubts = [text for text in result.doubts if not any(target in text for target in found)]
+    if one.verdict == "named, complete" and (outside or doubts or any(row.missed for row in judged)):
         one = replace(one, verdict="named, incomplete")
+    if one.verdict == "nothing wrong" and result.doubts:
+        one = replace(one, verdict="unexplained", doubt=_FITS + _doubtful(result.doubts))
     first = headline(one, amount(result, judged), judged, outside)
     return replace(one, judged=judged, attention=strongest_first([first, *session_attention(result, one.findings)]))
 
@@ -121,6 +128,8 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
         )  # fmt: skip
     elif not rests_on:
         level, text = "warn", f"Cannot tell whether anything is wrong: nothing could be judged{beside}."
+    elif one.doubt.startswith(_FITS):
+        level, text = "warn", f"Cannot tell whether anything is wrong in {rests_on}: {one.doubt}{beside}."
     elif one.doubt:
         level = "warn"
         text = f"Cannot tell whether anything is wrong in {rests_on}: {_where(one)}, but {one.doubt}{beside}."
@@ -128,6 +137,11 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
         text = f"Something is wrong in {rests_on} that no known cause explains: {_where(one)}.{_sentence(beside)}"
         text += f" It resembles {like}, which is not enough." if like else ""
     return Attention(level, text.strip(), about=ABOUT)
+
+
+def _doubtful(doubts: Sequence[str]) -> str:
+    """Return what is doubtful of a body, without advice."""
+    return _listed([_short(text.removeprefix("Warning: ").partition(": check")[0]) for text in doubts])
 
 
 def in_words(finding: Finding) -> str:

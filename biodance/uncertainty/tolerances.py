@@ -26,6 +26,8 @@ REFERENCE_PERSON = 70.0
 """kg: the noise is stated for a person of this mass and grows in proportion to it."""
 BEFORE = " before"
 """End of the key of what belongs to a joint where no functional calibration was made."""
+HABIT = "habit "
+"""Beginning of the key of what persons do by habit and `Effect.shown` takes off: spread of all other rows only."""
 CALIBRATED = ("joint_centre", "tilt")
 """Quantities that a functional calibration changes."""
 
@@ -101,18 +103,20 @@ _PHYSICS = ("sag ",)
 def without_habits(found: Tolerances) -> Tolerances:
     """Return the tolerances with no expected mean but of what is physics: what else the sessions they were learned on
     have in common is a habit of that laboratory and may be otherwise elsewhere, so that it counts as spread,
-    sd' = sqrt(sd² + mean²), with the mean square over sides and axes.
+    sd' = sqrt(sd² + mean²), with the mean square over sides and axes. Of a size that the markers show by themselves
+    the habit is taken off there (`Effect.shown`), so that it widens the other rows alone (`HABIT`).
     """
     habits: dict[str, list[float]] = {}
     for key, mean in found.means.items():
         if not key.startswith(_PHYSICS):
             effect, *target = key.split()[:-1]
             habits.setdefault(key_of(effect, " ".join(target)), []).append(mean)
-    wider = {
-        key: float(np.sqrt(found.size(key) ** 2 + np.mean(np.square(means))))
-        for key, means in habits.items()
-        if found.size(key) > 0
-    }
+    wider = {}
+    for key, means in habits.items():
+        shown = found.size(f"shown {key}") > 0
+        if found.size(key) > 0:
+            own = 0.0 if shown else found.size(key)
+            wider[HABIT + key if shown else key] = float(np.sqrt(own**2 + np.mean(np.square(means))))
     physics = {key: mean for key, mean in found.means.items() if key.startswith(_PHYSICS)}
     return replace(found, sizes={**found.sizes, **wider}, means=physics)
 

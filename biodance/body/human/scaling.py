@@ -273,7 +273,10 @@ def _doubts(skeleton: Skeleton, subject: Subject) -> list[str]:
         other = segment.replace("right_", "left_")
         if other != segment and abs(skeleton.lengths[segment] - skeleton.lengths[other]) > 0.02:
             more = 1e3 * (skeleton.lengths[segment] - skeleton.lengths[other])
-            notes.append(f"Warning: {segment} is {more:+.0f} mm longer than {other}: check the markers.")
+            how = f"is {abs(more):.0f} mm {'longer' if more > 0 else 'shorter'} than"
+            notes.append(
+                f"Warning: the {segment.replace('_', ' ')} {how} the {other.replace('_', ' ')}: check the markers."
+            )
     for joint, rotation in skeleton.turns.items():
         tilt = np.degrees(np.arccos((np.trace(rotation) - 1) / 2))
         if tilt > TILT[joint.split("_")[1]]:

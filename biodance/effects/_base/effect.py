@@ -117,6 +117,12 @@ class Effect:
         """
         return None
 
+    def measured(self, theta: Array, *cases: Case) -> Array:
+        """Return the size (p,) of a cause that was named with ``theta`` (p,): where the markers of all ``cases`` show
+        it by themselves, that, in place of what was inferred from all rows; by default ``theta``.
+        """
+        return theta
+
     def removed(self, case: Case, theta: Array) -> Array:
         """Return (T, 6): what this cause of size ``theta`` (p,) has added to what ``case`` measured, about the lab
         origin.
@@ -148,6 +154,10 @@ class Effect:
         (p,).
         """
         return tuple((p.name, float(t), float(s), p.unit) for p, t, s in zip(self.parameters, theta, sd, strict=True))
+
+    def size_told(self, size: float) -> float:
+        """Return what a limit says for a ``size`` of the first parameter: by default the same."""
+        return size
 
     def plate_of(self, case: Case):  # type: ignore[no-untyped-def]
         """Return the plate that the target names, or the first one."""
