@@ -17,6 +17,7 @@ from biodance.body.human.measures import Measures, measures
 from biodance.body.human.skeleton import JOINTS, SEGMENTS, Skeleton, kind_of
 from biodance.body.human.standing import StaticPosture, standing
 from biodance.body.human.static_centres import Centres, SegmentFrames, segment_frames, static_centres, turn
+from biodance.body.human.unseen import with_unseen_parts
 from biodance.body.parts import Joint, SegmentMarkers
 from biodance.body.tables.choice import reference
 from biodance.body.tables.reference import proportion
@@ -64,7 +65,8 @@ class Scaling:
         body = assemble(self.subject, skeleton, table=self.table, markers=markers, notes=notes, gravity=self.gravity)
         q = static_posture(body, frames)
         limits, widened = widen_limits(body, q)
-        return replace(body, limits=limits, notes=(*body.notes, *widened), joint_errors=self.centres.errors), q
+        body = replace(body, limits=limits, notes=(*body.notes, *widened), joint_errors=self.centres.errors)
+        return body.holding(self.posture.unseen, q), q
 
 
 def measure_static(subject: Subject, static: Trial, *, hip: Hip | None = None, table: str | None = None) -> Scaling:
@@ -85,9 +87,11 @@ def measure_static(subject: Subject, static: Trial, *, hip: Hip | None = None, t
     """
     subject.require("mass", "stature")
     hip, table = hip or static.settings.hip, table or static.settings.table
-    posture = standing(static)
+    usual = reference(table, subject)
+    lengths = usual.lengths
+    tall = subject.stature / usual.stature
+    posture = with_unseen_parts(standing(static), {kind: tall * length for kind, length in lengths.items()})
     sizes = measures(posture, static, subject)
-    lengths = reference(table, subject).lengths
     centres = static_centres(
         posture.landmarks, sizes, hip=hip, trunk_fraction=lengths["pelvis"] / lengths["trunk_head"]
     )

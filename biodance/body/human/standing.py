@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.errors import TrialRefused
+from biodance.lab.markers.set_file import LANDMARKS
 from biodance.lab.markers.sets import MarkerSet, canonical, landmark, read_marker_set
 from biodance.records import SIDES, Array, Markers, Trial
 
@@ -14,10 +15,11 @@ WINDOW = 0.5
 """s: length of the quietest part of the static trial that is averaged."""
 NEEDED = (
     *("right_asis", "left_asis", "mid_psis"),
-    *(f"{side}_{place}" for side in SIDES for place in ("knee_lateral", "ankle_lateral", "heel", "toe", "acromion")),
-    *(f"{side}_{place}" for side in SIDES for place in ("elbow_lateral", "wrist_radial", "wrist_ulnar")),
+    *(f"{side}_{place}" for side in SIDES for place in ("knee_lateral", "ankle_lateral", "heel", "toe")),
 )
-"""Landmarks without which no 12-segment body can be placed."""
+"""Landmarks without which no body can be placed: pelvis and legs. What is not marked above stands by proportion
+(`unseen`).
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,13 +27,15 @@ class StaticPosture:
     """Markers of the set (canonical labels) in one standing posture: ``points`` label -> (3,) m, lab frame;
     ``landmarks`` name -> (3,) m.
 
-    ``notes`` say which frames were averaged and which markers come from elsewhere in the trial or are missing.
+    ``unseen`` the anatomical joints that no marker shows, whose landmarks were put by proportion; ``notes`` say which
+    frames were averaged and which markers come from elsewhere in the trial or are missing.
     """
 
     marker_set: MarkerSet
     points: Mapping[str, Array]
     landmarks: Mapping[str, Array]
     notes: tuple[str, ...]
+    unseen: tuple[str, ...] = ()
 
 
 def standing(static: Trial) -> StaticPosture:
@@ -68,6 +72,7 @@ def standing(static: Trial) -> StaticPosture:
         if len(track):
             points[label] = np.median(near if len(near) else track, axis=0)
         (missing if not len(track) else elsewhere if not len(near) else []).append(label)
+    points |= _corners(points, marker_set)
     landmarks = _landmarks(points, marker_set)
     _refuse_missing(landmarks, marker_set, where)
     first, last = (static.source.first_frame + int(i) for i in np.flatnonzero(chosen)[[0, -1]])
@@ -95,9 +100,27 @@ def quietest(markers: Markers) -> NDArray[np.bool_]:
     return np.isin(np.arange(frames), np.arange(start, start + length))
 
 
+def _corners(points: Mapping[str, Array], marker_set: MarkerSet) -> dict[str, Array]:
+    """Return the markers that a knee alignment device stood in for, label -> (3,) m: where its three arms meet, square
+    to each other and equally long, on the side of the body.
+    """
+    found = {}
+    for marker in marker_set.markers:
+        if marker.label in points or not set(marker.corner_of) or not set(marker.corner_of) <= points.keys():
+            continue
+        ends = np.array([points[label] for label in marker.corner_of])
+        middle = ends.mean(axis=0)
+        square = np.cross(ends[1] - ends[0], ends[2] - ends[0])
+        reach = float(np.mean(np.linalg.norm(ends - middle, axis=1))) / np.sqrt(2.0)
+        body = np.mean(list(points.values()), axis=0)
+        step = reach * square / np.linalg.norm(square)
+        found[marker.label] = middle + (step if step @ (body - middle) > 0 else -step)
+    return found
+
+
 def _landmarks(points: Mapping[str, Array], marker_set: MarkerSet) -> dict[str, Array]:
     one = Markers(tuple(points), np.zeros(1), np.array(list(points.values())).reshape(1, -1, 3))
-    found = {name: landmark(one, marker_set, name) for name in marker_set.landmarks}
+    found = {name: landmark(one, marker_set, name) for name in LANDMARKS}
     return {name: place[0] for name, place in found.items() if place is not None}
 
 

@@ -136,6 +136,8 @@ def knee_centre(place: Places, sizes: Measures, hip: Array, pelvis_right: Array,
     distance = sizes.widths[f"{side}_knee"] / 2 + sizes.marker_radius
     foot_right = unit(np.cross(place[f"{side}_toe"] - place[f"{side}_heel"], UP))
     across = unit(pelvis_right + foot_right)
+    if f"{side}_knee_axis" in place:
+        return chord(hip, lateral, distance, place[f"{side}_knee_axis"]), ""
     usual = chord(hip, lateral, distance, lateral + 0.1 * SIGN[side] * across)
     if f"{side}_thigh_wand" not in place:
         return usual, f"{side.capitalize()} knee: no medial or thigh marker, axis taken square to the line of march."

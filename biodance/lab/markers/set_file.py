@@ -27,6 +27,7 @@ SIDED_LANDMARKS = (
         "ankle_medial",
         "thigh_wand",
         "shank_wand",
+        "knee_axis",
     ),
     *("heel", "toe", "toe_lateral", "toe_medial"),
     *("acromion", "elbow_lateral", "elbow_medial", "wrist_radial", "wrist_ulnar", "hand"),
@@ -41,7 +42,7 @@ MIDLINE = ("mid_psis", "head_front", "head_back")
 
 SEGMENT_OF = {
     **dict.fromkeys(("asis", "psis", "hip_centre", "mid_psis"), "pelvis"),
-    **dict.fromkeys(("knee_lateral", "knee_medial", "thigh_wand"), "thigh"),
+    **dict.fromkeys(("knee_lateral", "knee_medial", "thigh_wand", "knee_axis"), "thigh"),
     **dict.fromkeys(("ankle_lateral", "ankle_medial", "shank_wand"), "shank"),
     **dict.fromkeys(("heel", "toe", "toe_lateral", "toe_medial"), "foot"),
     **dict.fromkeys(("acromion", "c7", "t10", "jugular_notch", "xiphoid", "head_front", "head_back"), "trunk_head"),
@@ -59,7 +60,7 @@ hip for the trunk.
 """
 
 ORIGINS = ("segment", "mid_shoulder")
-MARKER_KEYS = ("segment", "weight", "offset", "normaliser", "origin")
+MARKER_KEYS = ("segment", "weight", "offset", "normaliser", "origin", "corner_of")
 FILE_KEYS = ("name", "description", "source", "required", "aliases", "markers", "landmarks")
 
 
@@ -205,12 +206,16 @@ def _marker(path: Path, label: str, fields: Any) -> dict[str, Any]:
         raise BiodanceError(
             f"{where} has an offset without normaliser or a normaliser without offset. Give both or neither."
         )
+    corner_of = fields.get("corner_of", [])
+    if corner_of and not (isinstance(corner_of, list) and len(corner_of) == 3):
+        raise BiodanceError(f"{where} has corner_of {corner_of!r}, expected the three labels of an alignment device.")
     offset = fields.get("offset")
     if offset is not None and not (isinstance(offset, list) and len(offset) == 3 and all(_number(x) for x in offset)):
         raise BiodanceError(
             f"{where} has the offset {offset!r}, expected three numbers [x, y, z] (anterior, up, right)."
         )
-    return {**fields, "weight": float(weight), "offset": None if offset is None else tuple(float(x) for x in offset)}
+    places = {"corner_of": tuple(map(str, corner_of)), "weight": float(weight)}
+    return {**fields, **places, "offset": None if offset is None else tuple(float(x) for x in offset)}
 
 
 def _number(value: Any) -> bool:

@@ -18,7 +18,7 @@ import numpy as np
 from biodance.discovery import DataFamily
 from biodance.errors import FileRefused, TrialRefused, UnknownName
 from biodance.lab.markers.set_file import LANDMARKS, parse_map, parse_marker_set
-from biodance.records import Array, Markers, Trial
+from biodance.records import SIDES, Array, Markers, Trial
 
 FOLDER = "anthropometry/marker_sets"
 FAMILY = DataFamily("marker set", "biodance.marker_sets", FOLDER, ".toml")
@@ -33,7 +33,8 @@ class SetMarker:
     ``weight`` >= 0 multiplies its squared residual; ``offset`` (3,) times the body measure ``normaliser`` (m) is its
     place in the segment frame (x anterior, y up, z right) relative to ``origin``: "segment" (the segment's own origin)
     or "mid_shoulder" (the middle of the two shoulder joint centres). ``offset`` is None where no generic place is
-    known: such a marker exists only once a static trial places it.
+    known: such a marker exists only once a static trial places it. ``corner_of``: the three markers of a knee alignment
+    device that stands in for this one in the static trial.
     """
 
     label: str
@@ -42,6 +43,7 @@ class SetMarker:
     offset: tuple[float, float, float] | None = None
     normaliser: str = ""
     origin: str = "segment"
+    corner_of: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -163,14 +165,16 @@ def wearing(trial: Trial, marker_set: MarkerSet) -> Trial:
 def canonical(markers: Markers, marker_set: MarkerSet) -> Markers:
     """Return the markers of the set only, under the set's own labels and in its order.
 
+    A moving trial need not have all that the static one has: which joints its markers determine is not asked here.
+
     Raises
     ------
     TrialRefused
-        A required label of the set is not there.
+        No required label of the set is there.
     """
     match = marker_set.match(markers.names)
     absent = [label for label in marker_set.required if label not in match]
-    if absent:
+    if len(absent) == len(marker_set.required):
         raise TrialRefused(
             f"The markers are not of the set {marker_set.name}: {', '.join(absent)} "
             f"{'is' if len(absent) == 1 else 'are'} not among them. "
@@ -198,4 +202,29 @@ def landmark(markers: Markers, marker_set: MarkerSet, name: str) -> Array | None
     for alternative in marker_set.landmarks.get(name, ()):
         if all(label in match for label in alternative):
             return np.mean([markers[match[label]] for label in alternative], axis=0)
+    side, _, part = name.partition("_")
+    for others in _STAND_INS.get(part if side in SIDES else name, ()):
+        places = [landmark(markers, marker_set, f"{side}_{other}" if side in SIDES else other) for other in others]
+        if all(place is not None for place in places):
+            return np.mean(np.array(places), axis=0)
     return None
+
+
+_STAND_INS = {
+    "toe": (("toe_medial", "toe_lateral"), ("toe_lateral",), ("toe_medial",)),
+    "mid_psis": (("left_psis", "right_psis"),),
+}
+"""Landmarks whose mean stands in for one that has no marker of its own."""
+
+
+@cache
+def usual_places() -> Mapping[str, SetMarker]:
+    """Return the marker with a usual place on every landmark that has one: of plug-in gait, else of the ISB set."""
+    found: dict[str, SetMarker] = {}
+    for name in ("plug_in_gait", "isb_landmarks"):
+        known = read_marker_set(name)
+        for place, alternatives in known.landmarks.items():
+            marker = known.marker(alternatives[0][0])
+            if len(alternatives[0]) == 1 and marker.offset is not None:
+                found.setdefault(place, marker)
+    return MappingProxyType(found)
