@@ -4,15 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from biodance.errors import TrialRefused
 from biodance.lab.markers.set_file import LANDMARKS
 from biodance.lab.markers.sets import MarkerSet, canonical, landmark, read_marker_set
+from biodance.lab.markers.still import WINDOW, quietest
 from biodance.records import SIDES, Array, Markers, Trial
 
-WINDOW = 0.5
-"""s: length of the quietest part of the static trial that is averaged."""
 NEEDED = (
     *("right_asis", "left_asis", "mid_psis"),
     *(f"{side}_{place}" for side in SIDES for place in ("knee_lateral", "ankle_lateral", "heel", "toe")),
@@ -82,24 +80,6 @@ def standing(static: Trial) -> StaticPosture:
     return StaticPosture(marker_set, points, landmarks, tuple(notes))
 
 
-def quietest(markers: Markers) -> NDArray[np.bool_]:
-    """Return (T,) True for the ``WINDOW`` s in which the markers move least while most of them are seen; all frames
-    of a shorter trial.
-    """
-    frames = markers.time.size
-    length = frames if frames < 3 else round(WINDOW * markers.rate)
-    if frames <= max(length, 2):
-        return np.ones(frames, dtype=bool)
-    step = np.linalg.norm(np.diff(markers.xyz, axis=0), axis=2)
-    unseen = np.isnan(step)
-    cost = np.where(unseen, 0.0, step).sum(axis=1) + 0.1 * unseen.sum(
-        axis=1
-    )  # an unseen marker costs as much as one moving 0.1 m a frame
-    total = np.convolve(cost, np.ones(max(length - 1, 1)), mode="valid")
-    start = int(np.argmin(total))
-    return np.isin(np.arange(frames), np.arange(start, start + length))
-
-
 def _corners(points: Mapping[str, Array], marker_set: MarkerSet) -> dict[str, Array]:
     """Return the markers that a knee alignment device stood in for, label -> (3,) m: where its three arms meet, square
     to each other and equally long, on the side of the body.
@@ -133,6 +113,6 @@ def _refuse_missing(landmarks: Mapping[str, Array], marker_set: MarkerSet, where
         ]
         listed = ", ".join(f"{name.replace('_', ' ')} ({label})" for name, label in zip(absent, labels, strict=True))
         raise TrialRefused(
-            f"{where}: no frame shows these landmarks of the set {marker_set.name}: {listed}. "
+            f"{where}: no frame shows these landmarks of the set {marker_set.title}: {listed}. "
             "Choose or record a static trial that shows them, or fill the gaps."
         )

@@ -1,5 +1,6 @@
 """Read and check one marker-set file: every entry is legal or the file is refused with the entry's name."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -114,12 +115,8 @@ def parse_marker_set(path: Path) -> Contents:
     )
 
 
-def parse_map(path: Path) -> Contents:
-    """Read ``[markers] map`` of a session.toml: which label of the recordings is which landmark, or merely sits on
-    which segment.
-
-    Several labels on a landmark of the midline are its mean, and both posterior iliac spines together are ``mid_psis``.
-    Landmarks of the pelvis must be in a recording (the first label, without one); the others may be left out.
+def read_map(path: Path) -> Contents:
+    """Read ``[markers] map`` of a session.toml; see `parse_map`.
 
     Raises
     ------
@@ -132,6 +129,21 @@ def parse_map(path: Path) -> Contents:
         raise BiodanceError(
             f'{path}: [markers] has no map. Write map = {{LABEL = "left_asis", ...}}, one label per landmark.'
         )
+    return parse_map(given, str(path))
+
+
+def parse_map(given: Mapping[str, Any], path: str) -> Contents:
+    """Return the marker set of a map: which label of the recordings is which landmark, or merely sits on which
+    segment; ``path`` names where it stands.
+
+    Several labels on a landmark of the midline are its mean, and both posterior iliac spines together are ``mid_psis``.
+    Landmarks of the pelvis must be in a recording (the first label, without one); the others may be left out.
+
+    Raises
+    ------
+    BiodanceError
+        It names a landmark or segment that does not exist.
+    """
     markers: dict[str, dict[str, Any]] = {}
     landmarks: dict[str, tuple[tuple[str, ...], ...]] = {}
     for label, place in given.items():
@@ -152,7 +164,7 @@ def parse_map(path: Path) -> Contents:
         landmarks["mid_psis"] = ((*landmarks["left_psis"][0], *landmarks["right_psis"][0]),)
     pelvis = tuple(names[0][0] for place, names in landmarks.items() if segment_of(place) == "pelvis")
     required = pelvis or tuple(markers)[:1]
-    return Contents("labels of the session's own", str(path), required, {}, markers, landmarks)
+    return Contents("labels of the session's own", path, required, {}, markers, landmarks)
 
 
 def segment_of(landmark: str) -> str:

@@ -7,6 +7,7 @@ and, for bodies that nobody has measured, an ``offset`` in units of a body measu
 mark which anatomical landmark.
 """
 
+import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
@@ -17,13 +18,15 @@ import numpy as np
 
 from biodance.discovery import DataFamily
 from biodance.errors import FileRefused, TrialRefused, UnknownName
-from biodance.lab.markers.set_file import LANDMARKS, parse_map, parse_marker_set
+from biodance.lab.markers.set_file import LANDMARKS, Contents, parse_map, parse_marker_set, read_map
 from biodance.records import SIDES, Array, Markers, Trial
 
 FOLDER = "anthropometry/marker_sets"
 FAMILY = DataFamily("marker set", "biodance.marker_sets", FOLDER, ".toml")
 MAPS = ("session.toml", "subject.toml")
 """Files whose ``[markers] map`` is a marker set of its own."""
+GUESSED = "guessed "
+"""How the name of a guessed set begins; its map follows (`guess.guess_set`)."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,11 @@ class MarkerSet:
     aliases: Mapping[str, str]
     landmarks: Mapping[str, tuple[tuple[str, ...], ...]]
     required: tuple[str, ...]
+
+    @property
+    def title(self) -> str:
+        """The name for a reader: of a guessed set without its map."""
+        return self.name.partition(" {")[0]
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -104,6 +112,8 @@ def read_marker_set(name_or_path: str | Path) -> MarkerSet:
         The file is missing, is not TOML, or breaks a rule; the message names the file, the entry and what would be
         legal.
     """
+    if str(name_or_path).startswith(GUESSED):
+        return _guessed(str(name_or_path))
     path = FAMILY.locate(name_or_path)
     if not path.is_file():
         raise FileRefused(
@@ -116,12 +126,35 @@ def read_marker_set(name_or_path: str | Path) -> MarkerSet:
 @cache
 def _read(name: str, path: Path, _stamp: int) -> MarkerSet:
     """Return the marker set in a file; read anew when the file has changed."""
-    contents = parse_map(path) if path.name in MAPS else parse_marker_set(path)
+    if path.name in MAPS:
+        return _made(name, read_map(path), usual=True)
+    return _made(name, parse_marker_set(path), usual=False)
+
+
+@cache
+def _guessed(name: str) -> MarkerSet:
+    """Return the set of a guessed map, which its name holds."""
+    given = json.loads(name.removeprefix(GUESSED))
+    return _made(name, parse_map(given, "the guess from names and posture"), usual=True)
+
+
+def _made(name: str, contents: Contents, *, usual: bool) -> MarkerSet:
+    """Return the marker set of a file's contents; where it is a map, markers on landmarks get the usual places and
+    weights of these.
+    """
+    markers = {label: SetMarker(label, **fields) for label, fields in contents.markers.items()}
+    if usual:
+        on = {labels[0][0]: place for place, labels in contents.landmarks.items() if len(labels[0]) == 1}
+        known = usual_places()
+        markers = {
+            label: replace(known[on[label]], label=label, corner_of=()) if on.get(label) in known else marker
+            for label, marker in markers.items()
+        }
     return MarkerSet(
         name,
         contents.description,
         contents.source,
-        tuple(SetMarker(label, **fields) for label, fields in contents.markers.items()),
+        tuple(markers.values()),
         MappingProxyType(contents.aliases),
         MappingProxyType(contents.landmarks),
         contents.required,
@@ -151,12 +184,12 @@ def wearing(trial: Trial, marker_set: MarkerSet) -> Trial:
     absent = [label for label in marker_set.required if label not in match]
     if not absent:
         said = (
-            f"The markers were read as the set {marker_set.name}: {len(match)} of its {len(marker_set.labels)} "
+            f"The markers were read as the set {marker_set.title}: {len(match)} of its {len(marker_set.labels)} "
             f"labels are there."
         )
         return replace(trial, marker_set=marker_set.name, history=(*trial.history, said))
     warning = (
-        f"The markers are not of the chosen set {marker_set.name}: {', '.join(absent)} missing. Choose the set "
+        f"The markers are not of the chosen set {marker_set.title}: {', '.join(absent)} missing. Choose the set "
         f"that was worn."
     )
     return replace(trial, warnings=(*trial.warnings, warning))
@@ -176,7 +209,7 @@ def canonical(markers: Markers, marker_set: MarkerSet) -> Markers:
     absent = [label for label in marker_set.required if label not in match]
     if len(absent) == len(marker_set.required):
         raise TrialRefused(
-            f"The markers are not of the set {marker_set.name}: {', '.join(absent)} "
+            f"The markers are not of the set {marker_set.title}: {', '.join(absent)} "
             f"{'is' if len(absent) == 1 else 'are'} not among them. "
             "Label them, or choose the set that was worn."
         )
