@@ -34,6 +34,8 @@ class _Vocabulary:
     noise: frozenset[str]
     landmarks: Mapping[str, tuple[tuple[str, int], ...]]
     segments: Mapping[str, str]
+    words: Mapping[str, str]
+    composed: Mapping[frozenset[str], str]
 
 
 @cache
@@ -46,7 +48,9 @@ def _vocabulary() -> _Vocabulary:
     segments = {word: segment for segment, words in table["segments"].items() for word in words}
     sides = {word: side for side, words in table["sides"].items() for word in words}
     landmarks = {word: tuple(found) for word, found in spelled.items()}
-    return _Vocabulary(sides, frozenset(table["noise"]["words"]), landmarks, segments)
+    single = {word: kind for group in ("regions", "qualities") for kind, words in table[group].items() for word in words}
+    composed = {frozenset(way.split()): landmark for landmark, ways in table["composed"].items() for way in ways}
+    return _Vocabulary(sides, frozenset(table["noise"]["words"]), landmarks, segments, single, composed)
 
 
 def meanings(label: str) -> tuple[Meaning, ...]:
@@ -71,6 +75,10 @@ def _places(words: _Vocabulary, rest: tuple[str, ...], side: str) -> list[tuple[
                 found.append((f"{side}_{landmark}", rank))
     if found:
         return found
+    split = [part for token in rest for part in re.split(r"(?<=[a-z])(?=\d)|(?<=\d)(?=[a-z])", token)]
+    kinds = frozenset(words.words[part] for part in split if part in words.words)
+    if side and kinds in words.composed:
+        return [(f"{side}_{words.composed[kinds]}", 100)]
     for spelling in joined:
         segment = words.segments.get(re.sub(r"\d+$", "", spelling)) or words.segments.get(spelling)
         middle = segment in ("pelvis", "trunk_head")
