@@ -42,6 +42,8 @@ def sessions(data: Path) -> None:
 
     print("| session | marker set | unseen parts | trial: RMS mm |\n|---|---|---|---|")
     for name, patterns in SESSIONS.items():
+        if len(sys.argv) > 2 and not any(word in name for word in sys.argv[2:]):
+            continue
         with tempfile.TemporaryDirectory() as folder:
             for pattern in patterns:
                 for file in sorted(data.glob(pattern)):

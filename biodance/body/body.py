@@ -139,11 +139,12 @@ class Body:
         """(n) True for the joints that can move; a held one has a range of width zero."""
         return np.asarray(self.limits.lower < self.limits.upper)
 
-    def holding(self, groups: Collection[str], q: Array) -> "Body":
-        """Return the body with some anatomical joints (``trunk``, ``right_shoulder``) held at the angles of ``q``
-        (nq,): what hangs on them is carried as one piece.
+    def holding(self, names: Collection[str], q: Array) -> "Body":
+        """Return the body with some joints (``trunk_flexion``, or a whole anatomical one: ``right_shoulder``) held at
+        the angles of ``q`` (nq,): what hangs on them is carried as one piece.
         """
-        held = np.array([joint.name.rsplit("_", 1)[0] in groups for joint in self.joints], dtype=bool)
+        wanted = {*names}
+        held = np.array([bool({j.name, j.name.rsplit("_", 1)[0]} & wanted) for j in self.joints], dtype=bool)
         angle = np.asarray(q)[self.nq - len(self.joints) :]
         lower, upper = (np.where(held, angle, limit) for limit in (self.limits.lower, self.limits.upper))
         return replace(self, limits=replace(self.limits, lower=lower, upper=upper))

@@ -16,6 +16,12 @@ from biodance.records import Subject
 from biodance.settings import Settings
 
 
+_NO_STATIC = (
+    "No static trial can be used, so the body was scaled on one frame of {}, with both feet on the ground. Record a static "
+    "trial: joints and markers are then placed better."
+)
+
+
 def body_of(
     subject: Subject, read: tuple[Prepared, ...], settings: Settings, steps: list[Step]
 ) -> tuple[Body | None, str]:
@@ -39,6 +45,15 @@ def body_of(
                 f"Scaled on the static trial {static.name}, {how}; masses and inertias from the table {settings.table}."
             )
     if not statics:
+        moving = [one.trial for one in read if one.usable and one.trial.markers is not None and one.trial.marker_set]
+        for trial in moving:
+            scaling = attempt([], "scale", partial(measure_static, subject, trial))
+            if scaling is not None:
+                steps.append(Step("scale", "refused", _NO_STATIC.format(trial.name)))
+                return scaling.body()[0], (
+                    f"Scaled on one frame of {trial.name}, with both feet on the ground; masses and inertias from the "
+                    f"table {settings.table}."
+                )
         steps.append(
             Step(
                 "scale",

@@ -93,7 +93,11 @@ def measure_static(subject: Subject, static: Trial, *, hip: Hip | None = None, t
     posture = with_unseen_parts(standing(static), {kind: tall * length for kind, length in lengths.items()})
     sizes = measures(posture, static, subject)
     centres = static_centres(
-        posture.landmarks, sizes, hip=hip, trunk_fraction=lengths["pelvis"] / lengths["trunk_head"]
+        posture.landmarks,
+        sizes,
+        hip=hip,
+        trunk_fraction=lengths["pelvis"] / lengths["trunk_head"],
+        flat=posture.still,
     )
     notes = (f"Scaled on static trial {static.name}; hip centres: {hip}.", *posture.notes, *sizes.notes, *centres.notes)
     return Scaling(subject, table, posture, sizes, centres, notes, static.settings.gravity)
@@ -203,7 +207,7 @@ def _foot(
     place, ankle = posture.landmarks, frames.origin[f"{side}_foot"]
     heel, toe = (frames.rotation[f"{side}_foot"].T @ (place[f"{side}_{end}"] - ankle) for end in ("heel", "toe"))
     length = float(toe[0] - heel[0]) / proportion("heel_to_toe_marker", subject.sex)
-    standing_on_zero = _ANKLE_HEIGHT[0] < ankle[2] < _ANKLE_HEIGHT[1]
+    standing_on_zero = posture.still and _ANKLE_HEIGHT[0] < ankle[2] < _ANKLE_HEIGHT[1]
     height = float(ankle[2]) if standing_on_zero else proportion("ankle_height", subject.sex) * subject.stature
     return length, height, float(-heel[0]) - sizes.marker_radius
 

@@ -8,7 +8,7 @@ import numpy as np
 from biodance.errors import TrialRefused
 from biodance.lab.markers.set_file import LANDMARKS
 from biodance.lab.markers.sets import MarkerSet, canonical, landmark, read_marker_set
-from biodance.lab.markers.still import WINDOW, quietest
+from biodance.lab.markers.still import WINDOW, posture_frames
 from biodance.records import SIDES, Array, Markers, Trial
 
 NEEDED = (
@@ -26,7 +26,8 @@ class StaticPosture:
     ``landmarks`` name -> (3,) m.
 
     ``unseen`` the anatomical joints that no marker shows, whose landmarks were put by proportion; ``notes`` say which
-    frames were averaged and which markers come from elsewhere in the trial or are missing.
+    frames were averaged and which markers come from elsewhere in the trial or are missing. ``still`` is False where the
+    person moves and one frame was taken: then the feet need not be flat.
     """
 
     marker_set: MarkerSet
@@ -34,6 +35,7 @@ class StaticPosture:
     landmarks: Mapping[str, Array]
     notes: tuple[str, ...]
     unseen: tuple[str, ...] = ()
+    still: bool = True
 
 
 def standing(static: Trial) -> StaticPosture:
@@ -60,7 +62,7 @@ def standing(static: Trial) -> StaticPosture:
         )
     marker_set = read_marker_set(static.marker_set)
     markers = canonical(static.markers, marker_set)
-    chosen = quietest(markers)
+    chosen, still = posture_frames(markers)
     points = {}
     elsewhere: list[str] = []
     missing: list[str] = []
@@ -75,9 +77,11 @@ def standing(static: Trial) -> StaticPosture:
     _refuse_missing(landmarks, marker_set, where)
     first, last = (static.source.first_frame + int(i) for i in np.flatnonzero(chosen)[[0, -1]])
     notes = [f"{where}: posture from frames {first} to {last}, the quietest {WINDOW} s."]
+    if not still:
+        notes = [f"Warning: {where}: nobody stands still in it; its frame {first} was taken for the posture."]
     notes += [f"{where}: {', '.join(elsewhere)} not seen then, taken from the rest of the trial."] if elsewhere else []
     notes += [f"{where}: {', '.join(missing)} never seen, so not on the body."] if missing else []
-    return StaticPosture(marker_set, points, landmarks, tuple(notes))
+    return StaticPosture(marker_set, points, landmarks, tuple(notes), still=still)
 
 
 def _corners(points: Mapping[str, Array], marker_set: MarkerSet) -> dict[str, Array]:

@@ -14,7 +14,7 @@ import numpy as np
 from biodance.lab.markers.names import Meaning, meanings
 from biodance.lab.markers.set_file import LANDMARKS, MIDLINE, segment_of
 from biodance.lab.markers.sets import GUESSED
-from biodance.lab.markers.still import quietest
+from biodance.lab.markers.still import posture_frames
 from biodance.records import SIDES, Array, Markers
 
 _HEIGHT = {
@@ -36,8 +36,6 @@ _HEIGHT = {
 anywhere (winter 2009; plug-in-gait static trials)."""
 _BELIEVED = 0.85
 """Share of the named landmarks that the standing person must confirm, or the names mean something else here."""
-_STILL = 0.02
-"""m, standard deviation over half a second beyond which a marker does not stand still."""
 _APART = 0.005
 """m: by so much a lateral marker must lie farther out than the medial one, or the two are exchanged."""
 
@@ -115,17 +113,8 @@ def guessed_name(map_: Mapping[str, str]) -> str:
 
 
 def _posture(markers: Markers) -> dict[str, Array]:
-    """Return label -> (3,) m: the median of the quietest half second; where nobody stands still, of the frame in which
-    the lowest third of the markers is lowest: both feet are on the ground.
-    """
-    near = markers.xyz[quietest(markers)]
-    known = np.isfinite(near).all(axis=(1, 2)).any()
-    if markers.time.size > 2 and (not known or np.nanmax(np.nanstd(near, axis=0)) > _STILL):
-        height = np.sort(np.where(markers.seen, markers.xyz[:, :, 2], np.inf), axis=1)
-        lowest = height[:, : max(1, len(markers.names) // 3)].mean(axis=1)
-        unseen = (~markers.seen).sum(axis=1)
-        lowest[unseen > np.min(unseen)] = np.inf
-        near = markers.xyz[[int(np.argmin(lowest))]]
+    """Return label -> (3,) m in the posture that geometry is judged by."""
+    near = markers.xyz[posture_frames(markers)[0]]
     seen = np.isfinite(near).all(axis=2)
     return {name: np.median(near[seen[:, k], k], axis=0) for k, name in enumerate(markers.names) if seen[:, k].any()}
 

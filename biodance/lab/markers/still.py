@@ -25,3 +25,27 @@ def quietest(markers: Markers) -> NDArray[np.bool_]:
     total = np.convolve(cost, np.ones(max(length - 1, 1)), mode="valid")
     start = int(np.argmin(total))
     return np.isin(np.arange(frames), np.arange(start, start + length))
+
+
+_STILL = 0.02
+"""m, standard deviation over half a second beyond which a marker does not stand still."""
+
+
+def posture_frames(markers: Markers) -> tuple[NDArray[np.bool_], bool]:
+    """Return (T,) True for the frames that show one posture, and whether the person stands still in them.
+
+    They are the quietest half second; where nobody stands still, the one frame, among those that show most markers, in
+    which the lowest third of the markers is lowest: both feet are on the ground.
+    """
+    quiet = quietest(markers)
+    near = markers.xyz[quiet]
+    several = np.isfinite(near).all(axis=2).sum(axis=0) > 1
+    if markers.time.size <= 2:
+        return quiet, True
+    if several.any() and np.nanmedian(np.nanstd(near[:, several], axis=0).max(axis=1)) <= _STILL:
+        return quiet, True
+    height = np.sort(np.where(markers.seen, markers.xyz[:, :, 2], np.inf), axis=1)
+    lowest = height[:, : max(1, len(markers.names) // 3)].mean(axis=1)
+    unseen = (~markers.seen).sum(axis=1)
+    lowest[unseen > unseen.min()] = np.inf
+    return np.arange(markers.time.size) == int(np.argmin(lowest)), False
