@@ -144,8 +144,8 @@ def scale(subject: Subject, static: Trial, *, hip: Hip | None = None, table: str
 
 
 def calibrated_markers(frames: SegmentFrames, posture: StaticPosture) -> SegmentMarkers:
-    """Return every marker of the set that was seen, at its place in its segment."""
-    worn = [marker for marker in posture.marker_set.markers if marker.label in posture.points]
+    """Return every marker of the set that was seen and counts, at its place in its segment."""
+    worn = [one for one in posture.marker_set.markers if one.label in posture.points and one.weight > 0]
     local = [frames.rotation[m.segment].T @ (posture.points[m.label] - frames.origin[m.segment]) for m in worn]
     return SegmentMarkers(
         tuple(m.label for m in worn),

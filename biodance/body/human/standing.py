@@ -72,8 +72,11 @@ def standing(static: Trial) -> StaticPosture:
         if len(track):
             points[label] = np.median(near if len(near) else track, axis=0)
         (missing if not len(track) else elsewhere if not len(near) else []).append(label)
-    points |= _corners(points, marker_set)
-    landmarks = _landmarks(points, marker_set)
+    corners = _corners(points, marker_set)
+    landmarks = _landmarks(points | corners, marker_set)
+    if not corners:
+        landmarks = {name: place for name, place in landmarks.items() if not name.endswith("_knee_axis")}
+    points |= corners
     _refuse_missing(landmarks, marker_set, where)
     first, last = (static.source.first_frame + int(i) for i in np.flatnonzero(chosen)[[0, -1]])
     notes = [f"{where}: posture from frames {first} to {last}, the quietest {WINDOW} s."]

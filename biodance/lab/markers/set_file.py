@@ -62,7 +62,7 @@ hip for the trunk.
 
 ORIGINS = ("segment", "mid_shoulder")
 MARKER_KEYS = ("segment", "weight", "offset", "normaliser", "origin", "corner_of")
-FILE_KEYS = ("name", "description", "source", "required", "aliases", "markers", "landmarks")
+FILE_KEYS = ("name", "description", "source", "required", "aliases", "markers", "landmarks", "map")
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,8 @@ class Contents:
 
 
 def parse_marker_set(path: Path) -> Contents:
-    """Read and check a marker-set file.
+    """Read and check a marker-set file; a ``[map]`` of labels to landmarks or segments (`parse_map`) is the short form
+    of ``[markers]`` and ``[landmarks]``.
 
     Raises
     ------
@@ -88,10 +89,12 @@ def parse_marker_set(path: Path) -> Contents:
     """
     table = read_toml(path)
     _legal(path, "key", tuple(table), FILE_KEYS)
-    for name in ("aliases", "markers", "landmarks"):
+    for name in ("aliases", "markers", "landmarks", "map"):
         if not isinstance(table.get(name, {}), dict):
             raise BiodanceError(f"{path}: [{name}] must be a table. Write [{name}] and one line per entry below it.")
+    short = parse_map(table["map"], str(path)) if table.get("map") else None
     markers = {label: _marker(path, label, fields) for label, fields in table.get("markers", {}).items()}
+    markers |= short.markers if short else {}
     if not markers:
         raise BiodanceError(f"{path}: the set has no marker. Write one line per marker under [markers].")
     required = tuple(_labels(path, "required", table.get("required", []), markers))
@@ -110,6 +113,7 @@ def parse_marker_set(path: Path) -> Contents:
     landmarks = table.get("landmarks", {})
     _legal(path, "landmark", tuple(landmarks), LANDMARKS)
     chosen = {name: _alternatives(path, name, value, markers) for name, value in landmarks.items()}
+    chosen = {**(short.landmarks if short else {}), **chosen}
     return Contents(
         str(table.get("description", "")), str(table.get("source", "")), required, dict(aliases), markers, chosen
     )

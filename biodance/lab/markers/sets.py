@@ -123,12 +123,16 @@ def read_marker_set(name_or_path: str | Path) -> MarkerSet:
     return _read(str(name_or_path), path, path.stat().st_mtime_ns)
 
 
+_PLACED = ("plug_in_gait", "isb_landmarks")
+"""The sets whose own places are the usual ones of their landmarks."""
+
+
 @cache
 def _read(name: str, path: Path, _stamp: int) -> MarkerSet:
     """Return the marker set in a file; read anew when the file has changed."""
     if path.name in MAPS:
         return _made(name, read_map(path), usual=True)
-    return _made(name, parse_marker_set(path), usual=False)
+    return _made(name, parse_marker_set(path), usual=path.stem not in _PLACED)
 
 
 @cache
@@ -147,7 +151,9 @@ def _made(name: str, contents: Contents, *, usual: bool) -> MarkerSet:
         on = {labels[0][0]: place for place, labels in contents.landmarks.items() if len(labels[0]) == 1}
         known = usual_places()
         markers = {
-            label: replace(known[on[label]], label=label, corner_of=()) if on.get(label) in known else marker
+            label: replace(known[on[label]], label=label, corner_of=())
+            if on.get(label) in known and marker.offset is None
+            else marker
             for label, marker in markers.items()
         }
     return MarkerSet(
@@ -254,7 +260,7 @@ _STAND_INS = {
 def usual_places() -> Mapping[str, SetMarker]:
     """Return the marker with a usual place on every landmark that has one: of plug-in gait, else of the ISB set."""
     found: dict[str, SetMarker] = {}
-    for name in ("plug_in_gait", "isb_landmarks"):
+    for name in _PLACED:
         known = read_marker_set(name)
         for place, alternatives in known.landmarks.items():
             marker = known.marker(alternatives[0][0])

@@ -47,8 +47,9 @@ def init_session(folder: str | Path, *, subject_name: str | None = None) -> dict
     session = read_session(folder, subject_name=subject_name)
     found = _found(session, target)
     _refuse_existing(target)
+    lines = [" ".join(line.split()) for line in _lines(found)]
     with open(target, "x", encoding="utf-8") as stream:
-        stream.write("\n".join(_lines(found)) + "\n")
+        stream.write("\n".join(lines) + "\n")
     return found
 
 
@@ -71,7 +72,10 @@ def _found(session: Session, target: Path) -> dict[str, Any]:
     return {
         "file": str(target),
         "subject": _subject(session.subject),
-        "trials": [{"name": trial.name, "role": trial.role, "why": _why(session, trial)} for trial in session.trials],
+        "trials": [
+            {"name": trial.source.path.stem, "role": trial.role, "why": _why(session, trial)}
+            for trial in session.trials
+        ],
         "marker_set": worn.partition(" {")[0] or None,
         "marker_map": json.loads(worn.removeprefix(GUESSED)) if worn.startswith(GUESSED) else None,
         "plates": plates,
@@ -110,7 +114,7 @@ def _lines(found: dict[str, Any]) -> Iterator[str]:
         value = subject[key]
         remark = "  # guessed" if guessed.get(key) in subject["guessed"] else ""
         yield f"{key} = {json.dumps(value)}{remark}" if value is not None else f"# {key} =   not known"
-    for trial in found["trials"]:
+    for trial in {trial["name"]: trial for trial in found["trials"]}.values():
         yield from ("", f"[trials.{json.dumps(trial['name'])}]", f'role = "{trial["role"]}"  # {trial["why"]}')
     yield from ("", *_marker_lines(found))
     for plate in found["plates"]:
