@@ -10,6 +10,7 @@ from biodance.lab.filters import motion_filter
 from biodance.motion.ik.determination import determination
 from biodance.motion.ik.inverse_kinematics import FrameStatus, InverseKinematics, solve_ik
 from biodance.motion.smoothing import smooth
+from biodance.motion.upright import upright_trunk
 from biodance.records import Markers, Motion, Trial
 
 
@@ -51,7 +52,9 @@ def track(body: Body, trial: Trial) -> Motion:
     try:
         followed, held = _hold_open(body, trial.markers)
         found = solve_ik(followed, trial.markers)
-        motion = smooth(followed, trial.markers.time, found.q, settings=motion_filter(trial.settings))
+        rate = trial.markers.rate if trial.markers.time.size > 1 else 1.0
+        postures = upright_trunk(followed, found.q, rate)
+        motion = smooth(followed, trial.markers.time, postures, settings=motion_filter(trial.settings))
     except TrialRefused as error:
         raise TrialRefused(f"Trial {trial.name}: {error}") from error
     return replace(

@@ -100,9 +100,9 @@ def _trunk(mark: dict[str, Array], upright: _Upright) -> tuple[list[str], list[s
     if len(thorax) >= 3:
         return [], [f"The acromia have no markers: shoulders placed by proportion from {', '.join(thorax)}."]
     return ["trunk"], [
-        "Warning: the trunk carries too few markers to be followed: trunk, head and arms stand upright by proportion "
-        "and are carried by the pelvis as one piece, at the mass of the table. How they lean and turn against the "
-        "pelvis is not in the simulated wrench, so horizontal forces and moments of this body prove little."
+        "Warning: the trunk carries too few markers to be followed: trunk, head and arms are one piece of the table's "
+        "size and mass that stays upright over the pelvis and faces where it goes. How they really lean and turn is not "
+        "in the simulated wrench, so horizontal forces and moments prove little."
     ]
 
 
