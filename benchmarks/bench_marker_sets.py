@@ -9,7 +9,6 @@ import os
 import sys
 import tempfile
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +16,7 @@ import numpy as np
 from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.sets import MarkerSet, landmark, read_marker_set
 from biodance.lab.read import read_trial
+from biodance.library import read_toml
 from biodance.records import Markers, Trial
 
 SESSIONS = {
@@ -71,59 +71,7 @@ def _why(one: object) -> str:
     return next((step.text for step in one.steps if step.status != "done"), "?")[:160]
 
 
-LABORATORIES: dict[str, dict[str, str]] = {
-    "plug-in gait": dict(
-        asis="ASI", psis="PSI", mid_psis="SACR", knee_lateral="KNE", knee_medial="KNM", ankle_lateral="ANK",
-        ankle_medial="MED", heel="HEE", toe="TOE", toe_lateral="VMH", toe_medial="FMH", acromion="SHO",
-        elbow_lateral="ELB", elbow_medial="ELBM", wrist_radial="WRA", wrist_ulnar="WRB", c7="C7", t10="T10",
-        jugular_notch="CLAV", xiphoid="STRN",
-    ),
-    "ISB": dict(
-        asis="IAS", psis="IPS", mid_psis="SACR", knee_lateral="FLE", knee_medial="FME", ankle_lateral="FAL",
-        ankle_medial="TAM", heel="FCC", toe="FM2", toe_lateral="FM5", toe_medial="FM1", acromion="SAE",
-        elbow_lateral="HLE", elbow_medial="HME", wrist_radial="RSP", wrist_ulnar="UHE", c7="CV7", t10="TV10",
-        jugular_notch="SJN", xiphoid="SXS",
-    ),
-    "OpenCap": dict(
-        asis="ASIS", psis="PSIS", knee_lateral="knee", knee_medial="mknee", ankle_lateral="ankle",
-        ankle_medial="mankle", heel="calc", toe="toe", toe_lateral="5meta", acromion="shoulder",
-        elbow_lateral="lelbow", elbow_medial="melbow", wrist_radial="lwrist", wrist_ulnar="mwrist", c7="C7",
-    ),
-    "Rajagopal": dict(
-        asis="ASI", psis="PSI", knee_lateral="LFC", knee_medial="MFC", ankle_lateral="LMAL", ankle_medial="MMAL",
-        heel="CAL", toe="TOE", toe_lateral="MT5", acromion="ACR", elbow_lateral="LEL", elbow_medial="MEL",
-        wrist_radial="FAradius", wrist_ulnar="FAulna", c7="C7", jugular_notch="CLAV",
-    ),
-    "Qualisys sports": dict(
-        asis="WaistFront", psis="WaistBack", knee_lateral="KneeOut", knee_medial="KneeIn", ankle_lateral="AnkleOut",
-        ankle_medial="AnkleIn", heel="HeelBack", toe="Forefoot2", toe_lateral="Forefoot5", acromion="ShoulderTop",
-        elbow_lateral="ElbowOut", elbow_medial="ElbowIn", wrist_radial="WristOut", wrist_ulnar="WristIn",
-        jugular_notch="Chest", c7="SpineTop",
-    ),
-    "Vicon-41": dict(
-        asis="FWT", psis="BWT", knee_lateral="KNE", ankle_lateral="ANK", heel="HEE", toe="TOE", toe_lateral="MT5",
-        acromion="SHO", elbow_lateral="ELB", wrist_radial="WRA", wrist_ulnar="WRB", c7="C7", t10="T10",
-        jugular_notch="CLAV", xiphoid="STRN",
-    ),
-    "a French clinic": dict(
-        asis="EIAS", psis="EIPS", knee_lateral="GENEXT", knee_medial="GENINT", ankle_lateral="MALEXT",
-        ankle_medial="MALINT", heel="TALON", toe="META2", toe_lateral="META5", toe_medial="META1", acromion="ACRO",
-        c7="C7", t10="T10", jugular_notch="MANU", xiphoid="XIPH",
-    ),
-    "whole words": dict(
-        asis="Anterior_Iliac_Spine", psis="Posterior_Iliac_Spine", knee_lateral="Lateral_Femoral_Epicondyle",
-        knee_medial="Medial_Femoral_Epicondyle", ankle_lateral="Lateral_Malleolus", ankle_medial="Medial_Malleolus",
-        heel="Calcaneus", toe="Metatarsal_2", toe_lateral="Metatarsal_5", acromion="Acromion", c7="C7",
-        elbow_lateral="Lateral_Humeral_Epicondyle", elbow_medial="Medial_Humeral_Epicondyle",
-        wrist_radial="Radial_Styloid", wrist_ulnar="Ulnar_Styloid", jugular_notch="Jugular_Notch", xiphoid="Xiphoid",
-    ),
-    "epicondyles": dict(
-        asis="ASIS", psis="PSIS", knee_lateral="LatEpi", knee_medial="MedEpi", ankle_lateral="LatMal",
-        ankle_medial="MedMal", heel="Heel", toe="MT2", toe_lateral="MT5", toe_medial="MT1", acromion="Acromion",
-        elbow_lateral="LatElbow", elbow_medial="MedElbow", wrist_radial="Radius", wrist_ulnar="Ulna", c7="C7",
-        jugular_notch="JN", xiphoid="PX",
-    ),
-}
+LABORATORIES = read_toml(Path(__file__).with_name("marker_names.toml"))
 """What published sets and laboratories call a landmark, without side."""
 
 SPELLINGS: dict[str, Callable[[str, str], str]] = {
@@ -139,7 +87,9 @@ SPELLINGS: dict[str, Callable[[str, str], str]] = {
 }
 
 
-def respelled(trial: Trial, worn: MarkerSet, names: dict[str, str], spell: Callable[[str, str], str]) -> tuple[Markers, dict[str, str]]:
+def respelled(
+    trial: Trial, worn: MarkerSet, names: dict[str, str], spell: Callable[[str, str], str]
+) -> tuple[Markers, dict[str, str]]:
     """Return the landmarks of a static trial under another laboratory's labels, and label -> landmark."""
     truth, columns = {}, []
     assert trial.markers is not None
@@ -160,7 +110,12 @@ def _where(markers: Markers, worn: MarkerSet, place: str, side: str) -> np.ndarr
     """
     found = landmark(markers, worn, f"{side}_{place}" if side else place)
     spines = [landmark(markers, worn, f"{one}_asis") for one in ("right", "left")]
-    inside = {"psis": ("mid_psis", -0.045), "knee_medial": ("knee_lateral", 0.1), "ankle_medial": ("ankle_lateral", 0.07), "elbow_medial": ("elbow_lateral", 0.07)}
+    inside = {
+        "psis": ("mid_psis", -0.045),
+        "knee_medial": ("knee_lateral", 0.1),
+        "ankle_medial": ("ankle_lateral", 0.07),
+        "elbow_medial": ("elbow_lateral", 0.07),
+    }
     if found is not None or place not in inside or spines[0] is None or spines[1] is None:
         return found
     beside, width = inside[place]
@@ -171,7 +126,11 @@ def _where(markers: Markers, worn: MarkerSet, place: str, side: str) -> np.ndarr
 
 def names(data: Path) -> None:
     """Print the share of landmarks that the guess gets right, by laboratory, and every error."""
-    statics = [*sorted(data.glob("biomechzoo/*/*01.c3d")), data / "pycgm/Static_trial.c3d", data / "adl_gait/2014001_ST.c3d"]
+    statics = [
+        *sorted(data.glob("biomechzoo/*/*01.c3d")),
+        data / "pycgm/Static_trial.c3d",
+        data / "adl_gait/2014001_ST.c3d",
+    ]
     read = [read_trial(file) for file in statics]
     errors: dict[tuple[str, str, str], int] = {}
     total = np.zeros(4, dtype=int)
@@ -193,7 +152,9 @@ def names(data: Path) -> None:
                     errors[key] = errors.get(key, 0) + 1
                 count += (right, len(wrong), len(truth) - right - len(wrong), 0)
         total += count
-        print(f"| {laboratory} | {100 * count[0] / count[:3].sum():.1f} | {100 * count[1] / count[:3].sum():.2f} | {count[3]} |")
+        print(
+            f"| {laboratory} | {100 * count[0] / count[:3].sum():.1f} | {100 * count[1] / count[:3].sum():.2f} | {count[3]} |"
+        )
     print(f"| all | {100 * total[0] / total[:3].sum():.1f} | {100 * total[1] / total[:3].sum():.2f} | {total[3]} |")
     for key, times in sorted(errors.items(), key=lambda item: -item[1])[:25]:
         print("   ", times, *key)

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from biodance.errors import BiodanceError
-from biodance.lab.markers.gaps import report_gaps
 from biodance.lab.markers.dress import said_of
+from biodance.lab.markers.gaps import report_gaps
 from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.sets import GUESSED, MarkerSet, canonical, read_marker_set
 from biodance.lab.read import format_of, read_trial

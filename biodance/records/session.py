@@ -112,11 +112,7 @@ class Trial:
 
     def __repr__(self) -> str:
         row = self._row()
-        worn = (
-            f"{row['markers']} markers ({self.worn or 'no known set'})"
-            if self.markers is not None
-            else "no markers"
-        )
+        worn = f"{row['markers']} markers ({self.worn or 'no known set'})" if self.markers is not None else "no markers"
         plates = f"{len(self.plates)} plate{'s' if len(self.plates) != 1 else ''}"
         return f"Trial({self.name!r}, {self.role}, {worn}, {plates}, {row['duration (s)']:.2f} s)"
 

@@ -59,12 +59,16 @@ def print_inspected(records: Sequence[dict[str, Any]], console: Console) -> None
 def print_initialised(found: dict[str, Any], console: Console) -> None:
     """Print what `biodance init` wrote: the subject, the roles and the map of the markers, guesses marked as such."""
     subject = found["subject"]
-    said = ", ".join(f"{key} {subject[key]}" for key in ("mass_kg", "height_m", "sex", "age") if subject[key] is not None)
+    said = ", ".join(
+        f"{key} {subject[key]}" for key in ("mass_kg", "height_m", "sex", "age") if subject[key] is not None
+    )
     guessed = f" (guessed: {', '.join(subject['guessed'])})" if subject["guessed"] else ""
     console.print(escape(f"subject: {said or 'not known'}{guessed}"), soft_wrap=True)
     for trial in found["trials"]:
         console.print(escape(f"{trial['name']}: {trial['role']}, {trial['why']}"), soft_wrap=True)
-    console.print(escape(f"markers: {found['marker_set'] or 'no known set, and none could be guessed'}"), soft_wrap=True)
+    console.print(
+        escape(f"markers: {found['marker_set'] or 'no known set, and none could be guessed'}"), soft_wrap=True
+    )
     if found["marker_map"]:
         table = Table("label", "landmark or segment", box=None)
         for label, place in found["marker_map"].items():

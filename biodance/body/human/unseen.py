@@ -12,16 +12,13 @@ import numpy as np
 
 from biodance.body.human.joint_centres import harrington_hip, pelvis_frame, unit
 from biodance.body.human.standing import StaticPosture
+from biodance.body.human.static_centres import SIGN, UP
 from biodance.lab.markers.sets import usual_places
 from biodance.records import SIDES, Array
 
-UP = np.array([0.0, 0.0, 1.0])
-_SIGN = {"right": 1.0, "left": -1.0}
 _THORAX = ("c7", "jugular_notch", "t10", "xiphoid")
 ARM_JOINTS = {side: (f"{side}_shoulder", f"{side}_elbow") for side in SIDES}
 """The anatomical joints of an arm, held where it is not seen."""
-UPPER_BODY = ("trunk", *(joint for side in SIDES for joint in ARM_JOINTS[side]))
-"""The anatomical joints that a trial may leave out: legs and pelvis alone are still a motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,8 +98,8 @@ def _trunk(mark: dict[str, Array], upright: _Upright) -> tuple[list[str], list[s
         return [], [f"The acromia have no markers: shoulders placed by proportion from {', '.join(thorax)}."]
     return ["trunk"], [
         "Warning: the trunk carries too few markers to be followed: trunk, head and arms are one piece of the table's "
-        "size and mass that stays upright over the pelvis and faces where it goes. How they really lean and turn is not "
-        "in the simulated wrench, so horizontal forces and moments prove little."
+        "size and mass that stays upright over the pelvis and faces where it goes. How they really lean and turn is "
+        "not in the simulated wrench, so horizontal forces and moments prove little."
     ]
 
 
@@ -113,7 +110,7 @@ def _arm(mark: dict[str, Array], upright: _Upright, side: str) -> list[str]:
     if f"{side}_elbow_lateral" in mark and wrist:
         mark |= {radial: mark.get(radial, wrist[0]), ulnar: mark.get(ulnar, wrist[0])}
         return []
-    out = _SIGN[side] * upright.right
+    out = SIGN[side] * upright.right
     under = upright.usual(f"{side}_acromion") @ UP
     elbow = mark[f"{side}_acromion"] - under * UP - upright.sizes["upper_arm_length"] * UP
     half = 0.15 * upright.sizes["upper_arm_length"]

@@ -62,7 +62,15 @@ def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None
     measures, measure_history, measure_warnings = measurements_of(raw)
     plates, plate_warnings = _plates(raw, metres, turn, markers, measures.get("Bodymass"))
     marker_set = recognise(markers.names) if markers is not None else None
-    warnings = (*raw.warnings, *([poses] if poses else []), *labels.warnings, *unit_warnings, *turn_warnings, *measure_warnings, *plate_warnings)
+    warnings = (
+        *raw.warnings,
+        *([poses] if poses else []),
+        *labels.warnings,
+        *unit_warnings,
+        *turn_warnings,
+        *measure_warnings,
+        *plate_warnings,
+    )
     return Trial(
         name=raw.path.stem,
         role=role,

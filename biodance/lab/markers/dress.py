@@ -42,7 +42,7 @@ def said_of(guess: GuessedSet, name: str) -> str:
     if not guess.name:
         return (
             f"{name}: its labels are of no known marker set, and none could be guessed: {guess.doubts[0]} Name the set "
-            f"with --markers FILE, or write [markers] map = {{LABEL = \"left_asis\", ...}} into session.toml."
+            f'with --markers FILE, or write [markers] map = {{LABEL = "left_asis", ...}} into session.toml.'
         )
     listed = ", ".join(f"{label} = {place}" for label, place in guess.map.items())
     doubts = f" Doubtful: {' '.join(guess.doubts)}" if guess.doubts else ""

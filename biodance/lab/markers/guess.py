@@ -1,8 +1,8 @@
 """A marker set that nobody described, guessed from what its labels say and from where the markers are on a standing
 person: one landmark a marker, right on the right, knees under hips, lateral outside medial.
 
-A wrong map is worse than none: a landmark whose marker stands where no person has it is left out, and a guess that lacks
-a landmark the body needs, or of which too much is contradicted, is none.
+A wrong map is worse than none: a landmark whose marker stands where no person has it is left out, and a guess that
+lacks a landmark the body needs, or of which too much is contradicted, is none.
 """
 
 import json

@@ -48,7 +48,9 @@ def _vocabulary() -> _Vocabulary:
     segments = {word: segment for segment, words in table["segments"].items() for word in words}
     sides = {word: side for side, words in table["sides"].items() for word in words}
     landmarks = {word: tuple(found) for word, found in spelled.items()}
-    single = {word: kind for group in ("regions", "qualities") for kind, words in table[group].items() for word in words}
+    single = {
+        word: kind for group in ("regions", "qualities") for kind, words in table[group].items() for word in words
+    }
     composed = {frozenset(way.split()): landmark for landmark, ways in table["composed"].items() for way in ways}
     return _Vocabulary(sides, frozenset(table["noise"]["words"]), landmarks, segments, single, composed)
 
@@ -98,7 +100,9 @@ def _readings(label: str) -> list[tuple[str, tuple[str, ...], int]]:
         out.append(("", given, 0))
         for i, token in enumerate(given):
             if token in words.sides and len(given) > 1:
-                out.append((words.sides[token], given[:i] + given[i + 1 :], 0 if len(token) > 1 or token in "lr" else 3))
+                out.append(
+                    (words.sides[token], given[:i] + given[i + 1 :], 0 if len(token) > 1 or token in "lr" else 3)
+                )
         whole = "".join(given)
         for word, side in words.sides.items():
             cost = 0 if word in ("l", "r", "left", "right") else 3
@@ -109,4 +113,3 @@ def _readings(label: str) -> list[tuple[str, tuple[str, ...], int]]:
             if whole.endswith(word) and len(whole) > len(word):
                 out.append((side, (whole[: -len(word)],), cost + 1))
     return [(side, tuple(token for token in rest if token), cost) for side, rest, cost in out if any(rest)]
-

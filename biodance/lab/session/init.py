@@ -124,7 +124,7 @@ def _lines(found: dict[str, Any]) -> Iterator[str]:
 def _marker_lines(found: dict[str, Any]) -> Iterator[str]:
     if found["marker_map"] is None:
         worn = found["marker_set"]
-        yield "[markers]" if worn else "# [markers]  no marker set is known; file = \"set.toml\", or map = {...}"
+        yield "[markers]" if worn else '# [markers]  no marker set is known; file = "set.toml", or map = {...}'
         if worn:
             yield f"file = {json.dumps(worn)}  # recognised by its labels"
     else:

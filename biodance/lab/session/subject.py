@@ -152,7 +152,8 @@ def _check_mass(mass: float, on_plates: list[Declared], notes: list[str]) -> flo
 
 
 def _stature_of_markers(trials: Sequence[Trial], notes: list[str]) -> float:
-    """Return the stature (m) from the height of markers in the static trial; NaN if none stands over feet on the floor.
+    """Return the stature (m) from the height of markers in the static trial; NaN if none stands over feet on the
+    floor.
     """
     for trial in (t for t in trials if t.role == "static"):
         feet = _height(trial, "right_heel", "left_heel", "right_toe", "left_toe")
