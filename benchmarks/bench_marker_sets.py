@@ -55,7 +55,11 @@ def sessions(data: Path) -> None:
                 continue
         sets = sorted({trial.trial.worn or "none" for trial in result.trials})
         body = result.body
-        held = sorted({j.name.rsplit("_", 1)[0] for j, free in zip(body.joints, body.free) if not free}) if body else []
+        held = (
+            sorted({j.name.rsplit("_", 1)[0] for j, free in zip(body.joints, body.free, strict=True) if not free})
+            if body
+            else []
+        )
         unseen = "trunk, arms" if "trunk" in held else "arms" if held else "-"
         fits = [
             f"{one.trial.name}: {1e3 * one.fit.total_rms:.1f}"
@@ -152,9 +156,8 @@ def names(data: Path) -> None:
                     errors[key] = errors.get(key, 0) + 1
                 count += (right, len(wrong), len(truth) - right - len(wrong), 0)
         total += count
-        print(
-            f"| {laboratory} | {100 * count[0] / count[:3].sum():.1f} | {100 * count[1] / count[:3].sum():.2f} | {count[3]} |"
-        )
+        right, wrong = 100 * count[:2] / count[:3].sum()
+        print(f"| {laboratory} | {right:.1f} | {wrong:.2f} | {count[3]} |")
     print(f"| all | {100 * total[0] / total[:3].sum():.1f} | {100 * total[1] / total[:3].sum():.2f} | {total[3]} |")
     for key, times in sorted(errors.items(), key=lambda item: -item[1])[:25]:
         print("   ", times, *key)

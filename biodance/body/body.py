@@ -140,8 +140,24 @@ class Body:
         return np.asarray(self.limits.lower < self.limits.upper)
 
     def holding(self, names: Collection[str], q: Array) -> "Body":
-        """Return the body with some joints (``trunk_flexion``, or a whole anatomical one: ``right_shoulder``) held at
-        the angles of ``q`` (nq,): what hangs on them is carried as one piece.
+        """Return the body with some joints held: what hangs on them is carried as one piece.
+
+        Parameters
+        ----------
+        names : collection of str
+            Joints (``trunk_flexion``) or whole anatomical ones (``right_shoulder``).
+        q : array_like
+            (nq,) posture at whose angles they are held.
+
+        Returns
+        -------
+        Body
+            In which the range of these joints has width zero.
+
+        Examples
+        --------
+        >>> int(result.body.holding({"trunk"}, result.body.neutral).free.sum())
+        20
         """
         wanted = {*names}
         held = np.array([bool({j.name, j.name.rsplit("_", 1)[0]} & wanted) for j in self.joints], dtype=bool)

@@ -128,8 +128,8 @@ def _marker_lines(found: dict[str, Any]) -> Iterator[str]:
         if worn:
             yield f"file = {json.dumps(worn)}  # recognised by its labels"
     else:
-        yield "# Guessed from the names and from where the markers are on the standing person; a wrong map is worse than"
-        yield "# none: compare it with what you placed. Legal are landmarks (left_asis) and segments (left_thigh)."
+        yield "# Guessed from the names and from where the markers are on the standing person; a wrong map is worse"
+        yield "# than none: compare it with what you placed. Legal are landmarks (left_asis) and segments (left_thigh)."
         yield "[markers.map]"
         for label, place in sorted(found["marker_map"].items(), key=lambda item: (item[1].split("_")[-2:], item[0])):
             yield f"{json.dumps(label)} = {json.dumps(place)}"
