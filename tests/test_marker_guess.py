@@ -143,18 +143,18 @@ def test_an_unseen_trunk_stays_upright_over_a_swinging_pelvis() -> None:
 
 
 def test_init_writes_its_guesses_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    two_trials(tmp_path)
-    before = {trial.name: trial.role for trial in read_session(tmp_path).trials}
-    assert run(["init", str(tmp_path), "--json"]) == 0
+    folder = two_trials(tmp_path)
+    before = {trial.name: trial.role for trial in read_session(folder).trials}
+    assert run(["init", str(folder), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert {trial["name"]: trial["role"] for trial in found["trials"]} == before
-    after = read_session(tmp_path)
+    after = read_session(folder)
     assert {trial.name: trial.role for trial in after.trials} == before
     assert after.subject.mass == pytest.approx(found["subject"]["mass_kg"])
-    text = (tmp_path / "session.toml").read_text()
+    text = (folder / "session.toml").read_text()
     with pytest.raises(SessionRefused, match="nothing of yours is overwritten"):
-        init_session(tmp_path)
-    assert (tmp_path / "session.toml").read_text() == text
+        init_session(folder)
+    assert (folder / "session.toml").read_text() == text
 
 
 def test_inspect_honours_the_markers_of_the_session_file(tmp_path: Path) -> None:
