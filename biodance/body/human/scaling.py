@@ -17,7 +17,7 @@ from biodance.body.human.measures import Measures, measures
 from biodance.body.human.skeleton import JOINTS, SEGMENTS, Skeleton, kind_of
 from biodance.body.human.standing import StaticPosture, standing
 from biodance.body.human.static_centres import Centres, SegmentFrames, segment_frames, static_centres, turn
-from biodance.body.human.unseen import with_unseen_parts
+from biodance.body.human.unseen import widen_unseen, with_unseen_parts
 from biodance.body.parts import Joint, SegmentMarkers
 from biodance.body.tables.choice import reference
 from biodance.body.tables.reference import proportion
@@ -66,7 +66,7 @@ class Scaling:
         q = static_posture(body, frames)
         limits, widened = widen_limits(body, q)
         body = replace(body, limits=limits, notes=(*body.notes, *widened), joint_errors=self.centres.errors)
-        return body.holding(self.posture.unseen, q), q
+        return widen_unseen(body, self.posture.unseen).holding(self.posture.unseen, q), q
 
 
 def measure_static(subject: Subject, static: Trial, *, hip: Hip | None = None, table: str | None = None) -> Scaling:

@@ -37,11 +37,12 @@ class Centres:
     ``place`` joint -> (3,) m: hips, knees, ankles, trunk, shoulders, elbows, and the wrists, where the forearms end.
     ``right`` of knees and elbows -> (3,) m, along the flexion axis to the person's right; ``axis_sd`` -> rad, how far
     that axis may be turned about the bone; ``lateral`` -> (3,) m, the lateral marker. ``pelvis`` (3, 3) lab_R_pelvis;
-    ``across`` side -> (3,) m, horizontal, to the right of the foot; ``sole`` side -> (3,), upwards,
-    square to the sole, the vertical without it; ``cut``: at which fraction of the way from mid hip to mid shoulder the
-    table cuts pelvis from trunk; ``notes`` what was assumed; ``errors`` of the joints that a movement placed; ``contradicted`` the joints whose place here the movement contradicts. ``mid_hip``
-    (3,) m, where pelvis and trunk are taken to begin, None for the middle of the hip centres: one hip alone that lies
-    elsewhere does not move the matter of the pelvis.
+    ``across`` side -> (3,) m, horizontal, to the right of the foot; ``sole`` side -> (3,), upwards, square to the
+    sole, the vertical without it; ``cut``: at which fraction of the way from mid hip to mid shoulder the table cuts
+    pelvis from trunk; ``notes`` what was assumed; ``errors`` of the joints that a movement placed; ``contradicted``
+    the joints whose place here the movement contradicts. ``mid_hip`` (3,) m, where pelvis and trunk are taken to
+    begin, None for the middle of the hip centres: one hip alone that lies elsewhere does not move the matter of the
+    pelvis.
     """
 
     place: Places

@@ -10,9 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from biodance.body.body import Body
 from biodance.body.human.joint_centres import harrington_hip, pelvis_frame, unit
 from biodance.body.human.standing import StaticPosture
 from biodance.body.human.static_centres import SIGN, UP
+from biodance.body.tables.error_sizes import error_size
 from biodance.lab.markers.sets import usual_places
 from biodance.records import SIDES, Array
 
@@ -66,6 +68,24 @@ def with_unseen_parts(posture: StaticPosture, lengths: Mapping[str, float]) -> S
             f"wrench."
         )
     return replace(posture, points=points, landmarks=mark, unseen=tuple(unseen), notes=(*posture.notes, *notes))
+
+
+def widen_unseen(body: Body, unseen: tuple[str, ...]) -> Body:
+    """Return the body with wider standard deviations of where the mass of its unseen parts is: a posture that nobody
+    saw shifts the centre of mass.
+    """
+    sizes = {
+        f"{side}_{part}": "arm" for side in SIDES for part in ("upper_arm", "forearm_hand") if f"{side}_elbow" in unseen
+    }
+    sizes |= {"trunk_head": "trunk_head"} if "trunk" in unseen else {}
+    if not sizes:
+        return body
+    covariance = np.array(body.sip.covariance)
+    for segment, kind in sizes.items():
+        k = body.segments.index(segment)
+        moments = np.arange(10 * k + 1, 10 * k + 4)
+        covariance[moments, moments] += (body.sip.mass[k] * error_size("unseen_com", kind)) ** 2
+    return replace(body, sip=replace(body.sip, covariance=covariance))
 
 
 def _upright(mark: Mapping[str, Array], lengths: Mapping[str, float]) -> _Upright:

@@ -34,7 +34,8 @@ _HEIGHT = {
     "head": (0.94, 0.06),
 }
 """Share of the stature at which a standing person has a landmark, and how far from it it is still believed; arms may be
-anywhere (winter 2009; plug-in-gait static trials)."""
+anywhere (Winter 2009; static trials of nine persons).
+"""
 _BELIEVED = 0.85
 """Share of the named landmarks that the standing person must confirm, or the names mean something else here."""
 _APART = 0.005
