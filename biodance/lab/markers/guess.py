@@ -10,7 +10,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from biodance.lab.markers.names import Meaning, meanings
 from biodance.lab.markers.set_file import LANDMARKS, MIDLINE, segment_of
@@ -118,7 +117,7 @@ def _posture(markers: Markers) -> dict[str, Array]:
     """Return label -> (3,) m in the posture that geometry is judged by."""
     chosen, _ = posture_frames(markers)
     near = markers.xyz[chosen]
-    seen: NDArray[np.bool_] = np.isfinite(near).all(axis=2)
+    seen = np.asarray(np.isfinite(near).all(axis=2))
     return {name: np.median(near[seen[:, k], k], axis=0) for k, name in enumerate(markers.names) if seen[:, k].any()}
 
 
