@@ -114,7 +114,7 @@ def test_nothing_is_overwritten_without_force(session, tmp_path, capsys, no_stil
     assert (out / "results.json").stat().st_mtime_ns > before
 
 
-def test_a_session_without_static_is_reported_from_stature_alone(session, tmp_path, capsys, no_stills):
+def test_a_session_without_static_is_reported_from_one_frame(session, tmp_path, capsys, no_stills):
     folder = tmp_path / "session"
     folder.mkdir()
     shutil.copy(session / "walk.c3d", folder)
@@ -122,7 +122,7 @@ def test_a_session_without_static_is_reported_from_stature_alone(session, tmp_pa
     (folder / "session.toml").write_text(text)
     assert run(["report", str(folder), "--out", str(tmp_path / "out"), "--json"]) == NEEDS_A_PERSON
     found = json.loads(capsys.readouterr().out)
-    assert "stature alone" in found["body"]["source"]
+    assert "Scaled on one frame of walk" in found["body"]["source"]
     assert any("Record a static trial" in step["reason"] for step in found["steps"])
     assert found["trials"][0]["wrench"]["frames_used"] == 100
 

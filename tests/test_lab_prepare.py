@@ -14,11 +14,7 @@ from biodance.settings import Settings
 
 CORNERS = np.array([[0.4, 0.6, 0], [0, 0.6, 0], [0, 0, 0], [0.4, 0, 0]])
 LABELS = (
-    *(
-        label
-        for label in read_marker_set("plug_in_gait").labels
-        if label not in ("SACR", "LKNM", "RKNM", "LMED", "RMED")
-    ),
+    *(marker.label for marker in read_marker_set("plug_in_gait").markers if marker.offset is not None),
     "*115",
 )
 

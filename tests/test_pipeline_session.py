@@ -145,7 +145,10 @@ def test_plates_alone_are_weighed():
     assert all("no markers" in trial.reason for trial in result.trials)
 
 
-def test_labels_of_no_known_set_are_refused_and_the_weight_is_read():
+def test_labels_of_no_known_set_are_guessed_and_legs_and_trunk_followed():
     result = recording("c3d_parser")
-    assert all("no known marker set" in trial.reason for trial in result.trials)
-    assert result.standing.mass == pytest.approx(36.3, abs=0.1)
+    assert {trial.trial.worn for trial in result.trials} == {"guessed"}
+    assert all(trial.fit.total_rms < 0.02 for trial in result.trials)
+    assert "the map was guessed from names and posture: " in " ".join(result.session.notes)
+    assert "carry no markers that place elbow and wrist" in " ".join(result.body.notes)
+    assert result.session.subject.mass == pytest.approx(36.3, abs=0.1)

@@ -6,11 +6,13 @@ by +90 deg about x. A joint with several degrees of freedom is a chain of one-do
 no segment.
 """
 
-from dataclasses import dataclass, field
+from collections.abc import Collection
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance import display
 from biodance.body.parts import GRAVITY, NO_JOINT, NO_SEGMENT, Foot, Joint, JointError, JointLimits, SegmentMarkers
@@ -131,6 +133,37 @@ class Body:
     def nv(self) -> int:
         """Number of velocity coordinates."""
         return len(self.joints) + self.n_root
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """(n) True for the joints that can move; a held one has a range of width zero."""
+        return np.asarray(self.limits.lower < self.limits.upper)
+
+    def holding(self, names: Collection[str], q: Array) -> "Body":
+        """Return the body with some joints held: what hangs on them is carried as one piece.
+
+        Parameters
+        ----------
+        names : collection of str
+            Joints (``trunk_flexion``) or whole anatomical ones (``right_shoulder``).
+        q : array_like
+            (nq,) posture at whose angles they are held.
+
+        Returns
+        -------
+        Body
+            In which the range of these joints has width zero.
+
+        Examples
+        --------
+        >>> int(result.body.holding({"trunk"}, result.body.neutral).free.sum())
+        20
+        """
+        wanted = {*names}
+        held = np.array([bool({j.name, j.name.rsplit("_", 1)[0]} & wanted) for j in self.joints], dtype=bool)
+        angle = np.asarray(q)[self.nq - len(self.joints) :]
+        lower, upper = (np.where(held, angle, limit) for limit in (self.limits.lower, self.limits.upper))
+        return replace(self, limits=replace(self.limits, lower=lower, upper=upper))
 
     @cached_property
     def segment_joint(self) -> tuple[int, ...]:

@@ -37,8 +37,9 @@ class JointCentre(Effect):
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:
-        """Return every anatomical joint; none without markers."""
-        return tuple(joint_chains(case.body)) if case.marker_columns else ()
+        """Return every anatomical joint that is followed; none without markers."""
+        followed = [name for name, chain in joint_chains(case.body).items() if case.body.free[list(chain)].any()]
+        return tuple(followed) if case.marker_columns else ()
 
     def columns(self, case: Case) -> Array:
         """Return the change of the wrench with the posture that the markers give the true body, per metre."""

@@ -1,16 +1,21 @@
 """Say what is in a recording: all that a person wants to know before trusting it, as plain values ready for JSON."""
 
+import json
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from biodance.errors import BiodanceError
+from biodance.lab.markers.dress import said_of
 from biodance.lab.markers.gaps import report_gaps
-from biodance.lab.markers.sets import MarkerSet, canonical, read_marker_set
+from biodance.lab.markers.guess import guess_set
+from biodance.lab.markers.sets import GUESSED, MarkerSet, canonical, read_marker_set
 from biodance.lab.read import format_of, read_trial
+from biodance.lab.session.file import read_session_file
 from biodance.lab.session.recordings import recordings_below
 from biodance.lab.session.subject import declared_mass, declared_stature
 from biodance.lab.weight import standing_mass
@@ -26,7 +31,8 @@ def inspect_paths(
 ) -> list[dict[str, Any]]:
     """Return one record (see `inspect_file`) for each file, and for each recording in each folder and below it.
 
-    ``markers`` is the name or file of the marker set that was worn.
+    ``markers`` is the name or file of the marker set that was worn; without it, what the session.toml of a file's
+    folder says of it, else the known set that fits, else what can be guessed.
 
     Raises
     ------
@@ -36,6 +42,7 @@ def inspect_paths(
     if not paths:
         raise BiodanceError("There is nothing to inspect: name files, or folders with recordings.")
     worn = read_marker_set(markers) if markers is not None else None
+    said: dict[Path, tuple[MarkerSet | None, str]] = {}
     records = []
     for path in map(Path, paths):
         files = recordings_below(path) if path.is_dir() else [path]
@@ -44,15 +51,42 @@ def inspect_paths(
         for file in files:
             if tell:
                 tell(file.name)
-            records.append(inspect_file(file, markers=worn))
+            if worn is not None:
+                records.append(inspect_file(file, markers=worn))
+                continue
+            chosen, fault = said.setdefault(file.parent, _said_in(file.parent))
+            record = inspect_file(file, markers=chosen)
+            records.append(_warned(record, fault) if fault else record)
     return records
+
+
+def _said_in(folder: Path) -> tuple[MarkerSet | None, str]:
+    """Return the marker set that the session.toml of a folder names, None without one, and what is wrong with it."""
+    try:
+        name = read_session_file(folder).marker_set
+        return (read_marker_set(name) if name else None), ""
+    except BiodanceError as error:
+        return None, str(error)
+
+
+def _warned(record: dict[str, Any], warning: str) -> dict[str, Any]:
+    """Return the record with one more warning."""
+    if record["status"] == "refused":
+        return record
+    return {
+        **record,
+        "status": "warning",
+        "reason": record["reason"] or warning,
+        "warnings": [*record["warnings"], warning],
+    }
 
 
 def inspect_file(path: str | Path, *, markers: MarkerSet | None = None) -> dict[str, Any]:
     """Return what is in one recording; a file that cannot be read gives the status "refused" and the reason.
 
     Keys: ``file``; ``status`` "ok", "warning" or "refused"; ``reason`` (None if ok); ``format``; ``frames``,
-    ``rate_hz``, ``analog_rate_hz``; ``markers`` names; ``marker_set``; ``gaps_percent`` of the set's markers that were
+    ``rate_hz``, ``analog_rate_hz``; ``markers`` names; ``marker_set``, "guessed" where no known one fits;
+    ``marker_map`` label -> landmark or segment of a guessed one; ``gaps_percent`` of the set's markers that were
     seen at all (of all markers, without a set); ``subjects`` names in the file; ``plates`` with ``type``,
     ``corners_m``, ``mean_force_n`` (3), ``mean_vertical_n``, ``zero_n`` (3, what the empty plate read and was taken
     off), ``cop_m`` (2, mean while loaded, lab frame) and ``decisions``; ``mean_vertical_n`` of all plates together as
@@ -64,7 +98,8 @@ def inspect_file(path: str | Path, *, markers: MarkerSet | None = None) -> dict[
         trial = read_trial(path, markers=markers)
     except BiodanceError as error:
         return _refused(path, str(error))
-    warnings = [*trial.warnings, *_never_seen(trial)]
+    trial, guessed = _guessed(trial)
+    warnings = [*trial.warnings, *guessed, *_never_seen(trial)]
     plates = [_plate(plate) for plate in trial.plates]
     time = (
         trial.markers.time
@@ -85,7 +120,8 @@ def inspect_file(path: str | Path, *, markers: MarkerSet | None = None) -> dict[
         "rate_hz": _number(trial.source.rate),
         "analog_rate_hz": _number(trial.source.analog_rate),
         "markers": list(trial.markers.names) if trial.markers is not None else [],
-        "marker_set": trial.marker_set or None,
+        "marker_set": trial.worn or None,
+        "marker_map": _map_of(trial),
         "gaps_percent": _gaps(trial),
         "subjects": _subjects(path),
         "plates": plates,
@@ -96,6 +132,19 @@ def inspect_file(path: str | Path, *, markers: MarkerSet | None = None) -> dict[
         "history": list(trial.history),
         "warnings": warnings,
     }
+
+
+def _guessed(trial: Trial) -> tuple[Trial, list[str]]:
+    """Return a trial of no known set with what can be guessed of it, and that it was."""
+    if trial.markers is None or trial.marker_set:
+        return trial, []
+    guess = guess_set(trial.markers)
+    return replace(trial, marker_set=guess.name), [said_of(guess, trial.name)]
+
+
+def _map_of(trial: Trial) -> dict[str, str] | None:
+    """Return the map of a guessed set."""
+    return dict(json.loads(trial.marker_set.removeprefix(GUESSED))) if trial.marker_set.startswith(GUESSED) else None
 
 
 def _refused(path: Path, reason: str) -> dict[str, Any]:
@@ -109,6 +158,7 @@ def _refused(path: Path, reason: str) -> dict[str, Any]:
         **nothing,
         "markers": [],
         "marker_set": None,
+        "marker_map": None,
         "gaps_percent": None,
         "subjects": [],
         "plates": [],

@@ -92,7 +92,9 @@ def _fill(markers: Markers, set_name: str, rules: GapSettings) -> tuple[Markers,
         others = len(markers.names)
         markers = canonical(markers, marker_set)
         others -= len(markers.names)
-        history.append(f"{len(markers.names)} markers of the set {set_name} kept, {others} other points left out.")
+        history.append(
+            f"{len(markers.names)} markers of the set {marker_set.title} kept, {others} other points left out."
+        )
     warnings = [
         f"{gaps.label} was not seen in {gaps.percent:.0f} % of the frames (longest gap {gaps.longest:.2f} s)."
         for gaps in report_gaps(markers)

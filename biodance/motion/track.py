@@ -7,9 +7,11 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.errors import TrialRefused
 from biodance.lab.filters import motion_filter
+from biodance.motion.ik.determination import determination
 from biodance.motion.ik.inverse_kinematics import FrameStatus, InverseKinematics, solve_ik
 from biodance.motion.smoothing import smooth
-from biodance.records import Motion, Trial
+from biodance.motion.upright import upright_trunk
+from biodance.records import Markers, Motion, Trial
 from biodance.threads import one_thread
 
 
@@ -50,8 +52,11 @@ def track(body: Body, trial: Trial) -> Motion:
             f"Trial {trial.name}: no markers were recorded, so there is no motion. Export the trial with its markers."
         )
     try:
-        found = solve_ik(body, trial.markers)
-        motion = smooth(body, trial.markers.time, found.q, settings=motion_filter(trial.settings))
+        followed, held = _hold_open(body, trial.markers)
+        found = solve_ik(followed, trial.markers)
+        rate = trial.markers.rate if trial.markers.time.size > 1 else 1.0
+        postures = upright_trunk(followed, found.q, rate)
+        motion = smooth(followed, trial.markers.time, postures, settings=motion_filter(trial.settings))
     except TrialRefused as error:
         raise TrialRefused(f"Trial {trial.name}: {error}") from error
     return replace(
@@ -59,7 +64,31 @@ def track(body: Body, trial: Trial) -> Motion:
         residual=found.residual,
         marker_names=found.marker_names,
         determined=found.status == FrameStatus.SOLVED,
-        notes=_notes(body, found),
+        notes=(*_notes(body, found), *held),
+    )
+
+
+_LEGS = ("hip", "knee", "ankle")
+
+
+def _hold_open(body: Body, markers: Markers) -> tuple[Body, tuple[str, ...]]:
+    """Return the body for one trial, joints of trunk and arms that its markers leave open held in the neutral posture,
+    and a warning that names them; unchanged where pelvis or legs are open too.
+    """
+    columns = [k for k, name in enumerate(body.markers.names) if name in markers]
+    seen = markers.select(body.markers.names[k] for k in columns).seen
+    vague: set[str] = set()
+    for _ in range(len(body.joints)):
+        verdict = determination(body.holding(vague, body.neutral), columns, seen)
+        more = {name for name in verdict.open_coordinates if not name.startswith("root")}
+        if verdict.determined.any() or not more or len(more) < len(verdict.open_coordinates):
+            break
+        vague |= more
+    if not vague or not verdict.determined.any() or any(name.split("_")[1] in _LEGS for name in vague):
+        return body, ()
+    listed = ", ".join(name.replace("_", " ") for name in sorted(vague))
+    return body.holding(vague, body.neutral), (
+        f"Warning: the markers of this trial do not determine {listed}: held straight; what they do is not known.",
     )
 
 

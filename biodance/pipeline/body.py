@@ -2,7 +2,10 @@
 alone; how it came about is said.
 """
 
+import math
 from functools import partial
+
+import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.human.human import human
@@ -10,10 +13,16 @@ from biodance.body.human.limits import with_tracking_limits
 from biodance.body.human.scaling import Scaling, measure_static
 from biodance.errors import TrialRefused
 from biodance.motion.ik.functional_joints import functional_joints
+from biodance.motion.track import track
 from biodance.pipeline.trial import Prepared, attempt
 from biodance.pipeline.trial_result import Step
-from biodance.records import Subject
+from biodance.records import Subject, Trial
 from biodance.settings import Settings
+
+_NO_STATIC = (
+    "No static trial can be used, so the body comes from stature alone or from one frame of a moving trial, "
+    "whichever fits better. Record a static trial."
+)
 
 
 def body_of(
@@ -38,24 +47,37 @@ def body_of(
             return (placed or scaling).body()[0], (
                 f"Scaled on the static trial {static.name}, {how}; masses and inertias from the table {settings.table}."
             )
-    if not statics:
-        steps.append(
-            Step(
-                "scale",
-                "refused",
-                "No static trial can be used, so the body comes from stature alone. Record a static trial.",
-            )
-        )
-    sets = [one.trial.marker_set for one in read if one.trial.marker_set]
-    if not sets:
+    return _without_static(subject, read, settings, steps, had_static=bool(statics))
+
+
+def _without_static(
+    subject: Subject, read: tuple[Prepared, ...], settings: Settings, steps: list[Step], *, had_static: bool
+) -> tuple[Body | None, str]:
+    """Return the better of two bodies: from stature alone, or scaled on one frame of a moving trial with both feet on
+    the ground; better is the one whose markers lie nearer in that trial.
+    """
+    worn = [one.trial for one in read if one.usable and one.trial.markers is not None and one.trial.marker_set]
+    if not had_static:
+        steps.append(Step("scale", "refused", _NO_STATIC))
+    if not worn:
         return None, "No body: no trial has markers of a known set."
-    generic = partial(human, subject, table=settings.table, markers=sets[0], gravity=settings.gravity)
+    generic = partial(human, subject, table=settings.table, markers=worn[0].marker_set, gravity=settings.gravity)
+    tables = f"masses and inertias from the table {settings.table}."
     body = attempt(steps, "body from stature", lambda: with_tracking_limits(generic()))
-    return (
-        body,
-        f"From stature alone, with the usual places of the markers; masses and inertias from the table "
-        f"{settings.table}.",
-    )
+    choices = [(body, f"From stature alone, with the usual places of the markers; {tables}")] if body else []
+    for trial in worn:
+        scaling = attempt([], "scale", partial(measure_static, subject, trial))
+        if scaling is not None:
+            said = f"Scaled on one frame of {trial.name}, with both feet on the ground; {tables}"
+            choices.append((scaling.body()[0], said))
+            break
+    return min(choices, key=lambda choice: _distance(choice[0], worn[0]), default=(None, "No body."))
+
+
+def _distance(body: Body, trial: Trial) -> float:
+    """Return the RMS distance (m) of the trial's markers from a body that follows them; infinite if it cannot."""
+    motion = attempt([], "track", partial(track, body, trial))
+    return float(np.sqrt(np.nanmean(motion.residual**2))) if motion is not None else math.inf
 
 
 def placed_by_movement(scaling: Scaling, read: tuple[Prepared, ...]) -> Scaling:

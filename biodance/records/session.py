@@ -105,13 +105,14 @@ class Trial:
             warnings=tuple(self.warnings),
         )
 
+    @property
+    def worn(self) -> str:
+        """Name of the marker set for a reader: of a guessed one without its map."""
+        return self.marker_set.partition(" {")[0]
+
     def __repr__(self) -> str:
         row = self._row()
-        worn = (
-            f"{row['markers']} markers ({self.marker_set or 'no known set'})"
-            if self.markers is not None
-            else "no markers"
-        )
+        worn = f"{row['markers']} markers ({self.worn or 'no known set'})" if self.markers is not None else "no markers"
         plates = f"{len(self.plates)} plate{'s' if len(self.plates) != 1 else ''}"
         return f"Trial({self.name!r}, {self.role}, {worn}, {plates}, {row['duration (s)']:.2f} s)"
 
@@ -134,7 +135,7 @@ class Trial:
             "frames": time.size,
             "rate (Hz)": rate_of(time),
             "markers": len(self.markers.names) if self.markers is not None else 0,
-            "marker set": self.marker_set,
+            "marker set": self.worn,
             "plates": len(self.plates),
             "warnings": len(self.warnings),
         }

@@ -56,6 +56,30 @@ def print_inspected(records: Sequence[dict[str, Any]], console: Console) -> None
             console.print(f"  {escape(line)}", soft_wrap=True)
 
 
+def print_initialised(found: dict[str, Any], console: Console) -> None:
+    """Print what `biodance init` wrote: the subject, the roles and the map of the markers, guesses marked as such."""
+    subject = found["subject"]
+    said = ", ".join(
+        f"{key} {subject[key]}" for key in ("mass_kg", "height_m", "sex", "age") if subject[key] is not None
+    )
+    guessed = f" (guessed: {', '.join(subject['guessed'])})" if subject["guessed"] else ""
+    console.print(escape(f"subject: {said or 'not known'}{guessed}"), soft_wrap=True)
+    for trial in found["trials"]:
+        console.print(escape(f"{trial['name']}: {trial['role']}, {trial['why']}"), soft_wrap=True)
+    console.print(
+        escape(f"markers: {found['marker_set'] or 'no known set, and none could be guessed'}"), soft_wrap=True
+    )
+    if found["marker_map"]:
+        table = Table("label", "landmark or segment", box=None)
+        for label, place in found["marker_map"].items():
+            table.add_row(escape(label), place.replace("_", " "))
+        console.print(table)
+        console.print("Confirm or correct this map: a wrong one is worse than none.")
+    for file, reason in found["refused"].items():
+        console.print(escape(f"look: {file}: {reason}"), soft_wrap=True)
+    console.print(escape(found["file"]), soft_wrap=True)
+
+
 def print_attention(found: Sequence[dict[str, Any]], console: Console) -> None:
     """Print what a person must see: the verdict's sentence, then the others with their place, strongest first."""
     for row in sorted(found, key=lambda row: str(row["about"]) != ABOUT):

@@ -17,6 +17,7 @@ from biodance.body.human.measures import Measures, measures
 from biodance.body.human.skeleton import JOINTS, SEGMENTS, Skeleton, kind_of
 from biodance.body.human.standing import StaticPosture, standing
 from biodance.body.human.static_centres import Centres, SegmentFrames, segment_frames, static_centres, turn
+from biodance.body.human.unseen import widen_unseen, with_unseen_parts
 from biodance.body.parts import Joint, SegmentMarkers
 from biodance.body.tables.choice import reference
 from biodance.body.tables.reference import proportion
@@ -64,7 +65,8 @@ class Scaling:
         body = assemble(self.subject, skeleton, table=self.table, markers=markers, notes=notes, gravity=self.gravity)
         q = static_posture(body, frames)
         limits, widened = widen_limits(body, q)
-        return replace(body, limits=limits, notes=(*body.notes, *widened), joint_errors=self.centres.errors), q
+        body = replace(body, limits=limits, notes=(*body.notes, *widened), joint_errors=self.centres.errors)
+        return widen_unseen(body, self.posture.unseen).holding(self.posture.unseen, q), q
 
 
 def measure_static(subject: Subject, static: Trial, *, hip: Hip | None = None, table: str | None = None) -> Scaling:
@@ -85,11 +87,17 @@ def measure_static(subject: Subject, static: Trial, *, hip: Hip | None = None, t
     """
     subject.require("mass", "stature")
     hip, table = hip or static.settings.hip, table or static.settings.table
-    posture = standing(static)
+    usual = reference(table, subject)
+    lengths = usual.lengths
+    tall = subject.stature / usual.stature
+    posture = with_unseen_parts(standing(static), {kind: tall * length for kind, length in lengths.items()})
     sizes = measures(posture, static, subject)
-    lengths = reference(table, subject).lengths
     centres = static_centres(
-        posture.landmarks, sizes, hip=hip, trunk_fraction=lengths["pelvis"] / lengths["trunk_head"]
+        posture.landmarks,
+        sizes,
+        hip=hip,
+        trunk_fraction=lengths["pelvis"] / lengths["trunk_head"],
+        flat=posture.still,
     )
     notes = (f"Scaled on static trial {static.name}; hip centres: {hip}.", *posture.notes, *sizes.notes, *centres.notes)
     return Scaling(subject, table, posture, sizes, centres, notes, static.settings.gravity)
@@ -136,8 +144,8 @@ def scale(subject: Subject, static: Trial, *, hip: Hip | None = None, table: str
 
 
 def calibrated_markers(frames: SegmentFrames, posture: StaticPosture) -> SegmentMarkers:
-    """Return every marker of the set that was seen, at its place in its segment."""
-    worn = [marker for marker in posture.marker_set.markers if marker.label in posture.points]
+    """Return every marker of the set that was seen and counts, at its place in its segment."""
+    worn = [one for one in posture.marker_set.markers if one.label in posture.points and one.weight > 0]
     local = [frames.rotation[m.segment].T @ (posture.points[m.label] - frames.origin[m.segment]) for m in worn]
     return SegmentMarkers(
         tuple(m.label for m in worn),
@@ -199,7 +207,7 @@ def _foot(
     place, ankle = posture.landmarks, frames.origin[f"{side}_foot"]
     heel, toe = (frames.rotation[f"{side}_foot"].T @ (place[f"{side}_{end}"] - ankle) for end in ("heel", "toe"))
     length = float(toe[0] - heel[0]) / proportion("heel_to_toe_marker", subject.sex)
-    standing_on_zero = _ANKLE_HEIGHT[0] < ankle[2] < _ANKLE_HEIGHT[1]
+    standing_on_zero = posture.still and _ANKLE_HEIGHT[0] < ankle[2] < _ANKLE_HEIGHT[1]
     height = float(ankle[2]) if standing_on_zero else proportion("ankle_height", subject.sex) * subject.stature
     return length, height, float(-heel[0]) - sizes.marker_radius
 

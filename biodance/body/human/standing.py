@@ -4,20 +4,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from biodance.errors import TrialRefused
+from biodance.lab.markers.set_file import LANDMARKS
 from biodance.lab.markers.sets import MarkerSet, canonical, landmark, read_marker_set
+from biodance.lab.markers.still import WINDOW, posture_frames
 from biodance.records import SIDES, Array, Markers, Trial
 
-WINDOW = 0.5
-"""s: length of the quietest part of the static trial that is averaged."""
 NEEDED = (
     *("right_asis", "left_asis", "mid_psis"),
-    *(f"{side}_{place}" for side in SIDES for place in ("knee_lateral", "ankle_lateral", "heel", "toe", "acromion")),
-    *(f"{side}_{place}" for side in SIDES for place in ("elbow_lateral", "wrist_radial", "wrist_ulnar")),
+    *(f"{side}_{place}" for side in SIDES for place in ("knee_lateral", "ankle_lateral", "heel", "toe")),
 )
-"""Landmarks without which no 12-segment body can be placed."""
+"""Landmarks without which no body can be placed: pelvis and legs. What is not marked above stands by proportion
+(`unseen`).
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,13 +25,17 @@ class StaticPosture:
     """Markers of the set (canonical labels) in one standing posture: ``points`` label -> (3,) m, lab frame;
     ``landmarks`` name -> (3,) m.
 
-    ``notes`` say which frames were averaged and which markers come from elsewhere in the trial or are missing.
+    ``unseen`` the anatomical joints that no marker shows, whose landmarks were put by proportion; ``notes`` say which
+    frames were averaged and which markers come from elsewhere in the trial or are missing. ``still`` is False where the
+    person moves and one frame was taken: then the feet need not be flat.
     """
 
     marker_set: MarkerSet
     points: Mapping[str, Array]
     landmarks: Mapping[str, Array]
     notes: tuple[str, ...]
+    unseen: tuple[str, ...] = ()
+    still: bool = True
 
 
 def standing(static: Trial) -> StaticPosture:
@@ -58,7 +62,7 @@ def standing(static: Trial) -> StaticPosture:
         )
     marker_set = read_marker_set(static.marker_set)
     markers = canonical(static.markers, marker_set)
-    chosen = quietest(markers)
+    chosen, still = posture_frames(markers)
     points = {}
     elsewhere: list[str] = []
     missing: list[str] = []
@@ -68,36 +72,42 @@ def standing(static: Trial) -> StaticPosture:
         if len(track):
             points[label] = np.median(near if len(near) else track, axis=0)
         (missing if not len(track) else elsewhere if not len(near) else []).append(label)
-    landmarks = _landmarks(points, marker_set)
+    corners = _corners(points, marker_set)
+    landmarks = _landmarks(points | corners, marker_set)
+    if not corners:
+        landmarks = {name: place for name, place in landmarks.items() if not name.endswith("_knee_axis")}
+    points |= corners
     _refuse_missing(landmarks, marker_set, where)
     first, last = (static.source.first_frame + int(i) for i in np.flatnonzero(chosen)[[0, -1]])
     notes = [f"{where}: posture from frames {first} to {last}, the quietest {WINDOW} s."]
+    if not still:
+        notes = [f"Warning: {where}: nobody stands still in it; its frame {first} was taken for the posture."]
     notes += [f"{where}: {', '.join(elsewhere)} not seen then, taken from the rest of the trial."] if elsewhere else []
     notes += [f"{where}: {', '.join(missing)} never seen, so not on the body."] if missing else []
-    return StaticPosture(marker_set, points, landmarks, tuple(notes))
+    return StaticPosture(marker_set, points, landmarks, tuple(notes), still=still)
 
 
-def quietest(markers: Markers) -> NDArray[np.bool_]:
-    """Return (T,) True for the ``WINDOW`` s in which the markers move least while most of them are seen; all frames
-    of a shorter trial.
+def _corners(points: Mapping[str, Array], marker_set: MarkerSet) -> dict[str, Array]:
+    """Return the markers that a knee alignment device stood in for, label -> (3,) m: where its three arms meet, square
+    to each other and equally long, on the side of the body.
     """
-    frames = markers.time.size
-    length = frames if frames < 3 else round(WINDOW * markers.rate)
-    if frames <= max(length, 2):
-        return np.ones(frames, dtype=bool)
-    step = np.linalg.norm(np.diff(markers.xyz, axis=0), axis=2)
-    unseen = np.isnan(step)
-    cost = np.where(unseen, 0.0, step).sum(axis=1) + 0.1 * unseen.sum(
-        axis=1
-    )  # an unseen marker costs as much as one moving 0.1 m a frame
-    total = np.convolve(cost, np.ones(max(length - 1, 1)), mode="valid")
-    start = int(np.argmin(total))
-    return np.isin(np.arange(frames), np.arange(start, start + length))
+    found = {}
+    for marker in marker_set.markers:
+        if marker.label in points or not set(marker.corner_of) or not set(marker.corner_of) <= points.keys():
+            continue
+        ends = np.array([points[label] for label in marker.corner_of])
+        middle = ends.mean(axis=0)
+        square = np.cross(ends[1] - ends[0], ends[2] - ends[0])
+        reach = float(np.mean(np.linalg.norm(ends - middle, axis=1))) / np.sqrt(2.0)
+        body = np.mean(list(points.values()), axis=0)
+        step = reach * square / np.linalg.norm(square)
+        found[marker.label] = middle + (step if step @ (body - middle) > 0 else -step)
+    return found
 
 
 def _landmarks(points: Mapping[str, Array], marker_set: MarkerSet) -> dict[str, Array]:
     one = Markers(tuple(points), np.zeros(1), np.array(list(points.values())).reshape(1, -1, 3))
-    found = {name: landmark(one, marker_set, name) for name in marker_set.landmarks}
+    found = {name: landmark(one, marker_set, name) for name in LANDMARKS}
     return {name: place[0] for name, place in found.items() if place is not None}
 
 
@@ -110,6 +120,6 @@ def _refuse_missing(landmarks: Mapping[str, Array], marker_set: MarkerSet, where
         ]
         listed = ", ".join(f"{name.replace('_', ' ')} ({label})" for name, label in zip(absent, labels, strict=True))
         raise TrialRefused(
-            f"{where}: no frame shows these landmarks of the set {marker_set.name}: {listed}. "
+            f"{where}: no frame shows these landmarks of the set {marker_set.title}: {listed}. "
             "Choose or record a static trial that shows them, or fill the gaps."
         )

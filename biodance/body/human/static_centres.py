@@ -1,7 +1,7 @@
 """Joint centres and segment frames of a standing person: the answer of the static trial alone."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -37,11 +37,12 @@ class Centres:
     ``place`` joint -> (3,) m: hips, knees, ankles, trunk, shoulders, elbows, and the wrists, where the forearms end.
     ``right`` of knees and elbows -> (3,) m, along the flexion axis to the person's right; ``axis_sd`` -> rad, how far
     that axis may be turned about the bone; ``lateral`` -> (3,) m, the lateral marker. ``pelvis`` (3, 3) lab_R_pelvis;
-    ``across`` side -> (3,) m, horizontal, to the right of the foot; ``cut``: at which fraction of the way from mid hip
-    to mid shoulder the table cuts pelvis from trunk; ``notes`` what was assumed; ``errors`` of the joints that a
-    movement placed; ``contradicted`` the joints whose place here the movement contradicts. ``mid_hip``
-    (3,) m, where pelvis and trunk are taken to begin, None for the middle of the hip centres: one hip alone that lies
-    elsewhere does not move the matter of the pelvis.
+    ``across`` side -> (3,) m, horizontal, to the right of the foot; ``sole`` side -> (3,), upwards, square to the
+    sole, the vertical without it; ``cut``: at which fraction of the way from mid hip to mid shoulder the table cuts
+    pelvis from trunk; ``notes`` what was assumed; ``errors`` of the joints that a movement placed; ``contradicted``
+    the joints whose place here the movement contradicts. ``mid_hip`` (3,) m, where pelvis and trunk are taken to
+    begin, None for the middle of the hip centres: one hip alone that lies elsewhere does not move the matter of the
+    pelvis.
     """
 
     place: Places
@@ -55,19 +56,21 @@ class Centres:
     errors: tuple[JointError, ...] = ()
     contradicted: tuple[str, ...] = ()
     mid_hip: Array | None = None
+    sole: Places = field(default_factory=dict)
 
 
-def static_centres(mark: Places, sizes: Measures, *, hip: Hip, trunk_fraction: float) -> Centres:
+def static_centres(mark: Places, sizes: Measures, *, hip: Hip, trunk_fraction: float, flat: bool = True) -> Centres:
     """Return the joint centres from the landmarks ``mark`` name -> (3,) m.
 
     Hip: regressions. Knee, ankle, elbow: middle of lateral and medial marker, or the constructions of plug-in gait.
     Trunk: on the line from mid hip to mid shoulder, at ``trunk_fraction`` of it, where the table cuts the trunk.
+    ``flat``: the feet stand flat; otherwise each lies as its heel and toe markers do.
     """
     pelvis, hips = hip_centres(mark, sizes, hip=hip)
     middle = (hips["right"] + hips["left"]) / 2
     shoulders = shoulder_centres(mark, sizes, middle)
     place = {"trunk": middle + trunk_fraction * ((shoulders["right"] + shoulders["left"]) / 2 - middle)}
-    right, axis_sd, lateral, across = {}, {}, {}, {}
+    right, axis_sd, lateral, across, sole = {}, {}, {}, {}, {}
     notes: list[str] = []
     for side, sign in SIGN.items():
         knee, note = knee_centre(mark, sizes, hips[side], pelvis[:, 2], side)
@@ -85,8 +88,10 @@ def static_centres(mark: Places, sizes: Measures, *, hip: Hip, trunk_fraction: f
             right[name] = sign * (lateral[name] - place[name])
             way = "medial marker" if f"{name}_medial" in mark else otherwise
             axis_sd[name] = error_size("axis_turn", f"{joint} {way}", state="before")
-        across[side] = np.cross(mark[f"{side}_toe"] - mark[f"{side}_heel"], UP)
-    return Centres(place, right, axis_sd, lateral, pelvis, across, trunk_fraction, tuple(notes))
+        along = mark[f"{side}_toe"] - mark[f"{side}_heel"]
+        across[side] = np.cross(along, UP)
+        sole[side] = UP if flat else np.cross(across[side], along)
+    return Centres(place, right, axis_sd, lateral, pelvis, across, trunk_fraction, tuple(notes), sole=sole)
 
 
 def hip_centres(place: Places, sizes: Measures, *, hip: Hip) -> tuple[Array, dict[str, Array]]:
@@ -136,6 +141,8 @@ def knee_centre(place: Places, sizes: Measures, hip: Array, pelvis_right: Array,
     distance = sizes.widths[f"{side}_knee"] / 2 + sizes.marker_radius
     foot_right = unit(np.cross(place[f"{side}_toe"] - place[f"{side}_heel"], UP))
     across = unit(pelvis_right + foot_right)
+    if f"{side}_knee_axis" in place:
+        return chord(hip, lateral, distance, place[f"{side}_knee_axis"]), ""
     usual = chord(hip, lateral, distance, lateral + 0.1 * SIGN[side] * across)
     if f"{side}_thigh_wand" not in place:
         return usual, f"{side.capitalize()} knee: no medial or thigh marker, axis taken square to the line of march."
@@ -222,7 +229,7 @@ def segment_frames(centres: Centres) -> SegmentFrames:
                 centres.right[f"{side}_{joints[1]}"],
             )
         origin[f"{side}_foot"] = at[f"{side}_ankle"]
-        rotation[f"{side}_foot"] = frame_yz(UP, centres.across[side])
+        rotation[f"{side}_foot"] = frame_yz(centres.sole.get(side, UP), centres.across[side])
     ends = {f"{side}_wrist": at[f"{side}_wrist"] for side in SIGN}
     return SegmentFrames(rotation, origin, ends, hips + centres.cut * axis)
 

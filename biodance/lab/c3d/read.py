@@ -8,7 +8,7 @@ import numpy as np
 
 from biodance.errors import FileRefused
 from biodance.lab.c3d.raw import RawC3d, read_raw
-from biodance.lab.c3d.subject import MarkerLabels, marker_labels, measurements_of
+from biodance.lab.c3d.subject import MarkerLabels, marker_labels, measurements_of, poses_only
 from biodance.lab.c3d.units import metres_per_unit
 from biodance.lab.c3d.vertical import turn_to_z_up
 from biodance.lab.markers.sets import recognise
@@ -37,7 +37,7 @@ def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None
     ------
     FileRefused
         The file is missing, damaged or contradicts itself; holds several subjects and none was chosen; its unit of
-        length or its rate is not known.
+        length or its rate is not known; holds segment poses and neither points nor channels.
 
     References
     ----------
@@ -49,6 +49,9 @@ def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None
     Markers(39 markers, 301 frames at 100 Hz, 3.00 s)
     """
     raw = read_raw(path)
+    poses = poses_only(raw)
+    if poses and not raw.analog.size:
+        raise FileRefused(poses)
     labels = marker_labels(raw, subject=subject)
     points = raw.points[:, list(labels.columns)]
     metres, unit_history, unit_warnings = metres_per_unit(raw.parameters, points, where=str(raw.path))
@@ -58,7 +61,15 @@ def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None
     measures, measure_history, measure_warnings = measurements_of(raw)
     plates, plate_warnings = _plates(raw, metres, turn, markers, measures.get("Bodymass"))
     marker_set = recognise(markers.names) if markers is not None else None
-    warnings = (*raw.warnings, *labels.warnings, *unit_warnings, *turn_warnings, *measure_warnings, *plate_warnings)
+    warnings = (
+        *raw.warnings,
+        *([poses] if poses else []),
+        *labels.warnings,
+        *unit_warnings,
+        *turn_warnings,
+        *measure_warnings,
+        *plate_warnings,
+    )
     return Trial(
         name=raw.path.stem,
         role=role,

@@ -30,6 +30,20 @@ def subjects_of(raw: RawC3d) -> tuple[str, ...]:
     return tuple(prefixes) or tuple(name for name in texts(raw.parameters, "SUBJECTS", "NAMES") if name)
 
 
+def poses_only(raw: RawC3d) -> str:
+    """Return the sentence for a file with segment poses (group ROTATION) and no point that was ever seen; "" for
+    others.
+    """
+    poses = [label.removesuffix("_4X4") for label in texts(raw.parameters, "ROTATION", "LABELS") if label]
+    if not poses or np.isfinite(raw.points).any():
+        return ""
+    return (
+        f"{raw.path}: holds the poses of {len(poses)} segments ({', '.join(poses[:4])} ...), as markerless systems "
+        f"(Theia) write them, and no points. Markers are followed here, not poses: export the trial with its landmarks "
+        f"as points, or record markers."
+    )
+
+
 def marker_labels(raw: RawC3d, *, subject: str | None) -> MarkerLabels:
     """Return the points that are markers of ``subject`` (None = the only one).
 

@@ -1,5 +1,6 @@
 """Read and check one marker-set file: every entry is legal or the file is refused with the entry's name."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ SIDED_LANDMARKS = (
         "ankle_medial",
         "thigh_wand",
         "shank_wand",
+        "knee_axis",
     ),
     *("heel", "toe", "toe_lateral", "toe_medial"),
     *("acromion", "elbow_lateral", "elbow_medial", "wrist_radial", "wrist_ulnar", "hand"),
@@ -41,7 +43,7 @@ MIDLINE = ("mid_psis", "head_front", "head_back")
 
 SEGMENT_OF = {
     **dict.fromkeys(("asis", "psis", "hip_centre", "mid_psis"), "pelvis"),
-    **dict.fromkeys(("knee_lateral", "knee_medial", "thigh_wand"), "thigh"),
+    **dict.fromkeys(("knee_lateral", "knee_medial", "thigh_wand", "knee_axis"), "thigh"),
     **dict.fromkeys(("ankle_lateral", "ankle_medial", "shank_wand"), "shank"),
     **dict.fromkeys(("heel", "toe", "toe_lateral", "toe_medial"), "foot"),
     **dict.fromkeys(("acromion", "c7", "t10", "jugular_notch", "xiphoid", "head_front", "head_back"), "trunk_head"),
@@ -59,8 +61,8 @@ hip for the trunk.
 """
 
 ORIGINS = ("segment", "mid_shoulder")
-MARKER_KEYS = ("segment", "weight", "offset", "normaliser", "origin")
-FILE_KEYS = ("name", "description", "source", "required", "aliases", "markers", "landmarks")
+MARKER_KEYS = ("segment", "weight", "offset", "normaliser", "origin", "corner_of")
+FILE_KEYS = ("name", "description", "source", "required", "aliases", "markers", "landmarks", "map")
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,8 @@ class Contents:
 
 
 def parse_marker_set(path: Path) -> Contents:
-    """Read and check a marker-set file.
+    """Read and check a marker-set file; a ``[map]`` of labels to landmarks or segments (`parse_map`) is the short form
+    of ``[markers]`` and ``[landmarks]``.
 
     Raises
     ------
@@ -86,10 +89,12 @@ def parse_marker_set(path: Path) -> Contents:
     """
     table = read_toml(path)
     _legal(path, "key", tuple(table), FILE_KEYS)
-    for name in ("aliases", "markers", "landmarks"):
+    for name in ("aliases", "markers", "landmarks", "map"):
         if not isinstance(table.get(name, {}), dict):
             raise BiodanceError(f"{path}: [{name}] must be a table. Write [{name}] and one line per entry below it.")
+    short = parse_map(table["map"], str(path)) if table.get("map") else None
     markers = {label: _marker(path, label, fields) for label, fields in table.get("markers", {}).items()}
+    markers |= short.markers if short else {}
     if not markers:
         raise BiodanceError(f"{path}: the set has no marker. Write one line per marker under [markers].")
     required = tuple(_labels(path, "required", table.get("required", []), markers))
@@ -108,17 +113,14 @@ def parse_marker_set(path: Path) -> Contents:
     landmarks = table.get("landmarks", {})
     _legal(path, "landmark", tuple(landmarks), LANDMARKS)
     chosen = {name: _alternatives(path, name, value, markers) for name, value in landmarks.items()}
+    chosen = {**(short.landmarks if short else {}), **chosen}
     return Contents(
         str(table.get("description", "")), str(table.get("source", "")), required, dict(aliases), markers, chosen
     )
 
 
-def parse_map(path: Path) -> Contents:
-    """Read ``[markers] map`` of a session.toml: which label of the recordings is which landmark, or merely sits on
-    which segment.
-
-    Several labels on a landmark of the midline are its mean, and both posterior iliac spines together are ``mid_psis``.
-    Landmarks of the pelvis must be in a recording (the first label, without one); the others may be left out.
+def read_map(path: Path) -> Contents:
+    """Read ``[markers] map`` of a session.toml; see `parse_map`.
 
     Raises
     ------
@@ -131,6 +133,21 @@ def parse_map(path: Path) -> Contents:
         raise BiodanceError(
             f'{path}: [markers] has no map. Write map = {{LABEL = "left_asis", ...}}, one label per landmark.'
         )
+    return parse_map(given, str(path))
+
+
+def parse_map(given: Mapping[str, Any], path: str) -> Contents:
+    """Return the marker set of a map: which label of the recordings is which landmark, or merely sits on which
+    segment; ``path`` names where it stands.
+
+    Several labels on a landmark of the midline are its mean, and both posterior iliac spines together are ``mid_psis``.
+    Landmarks of the pelvis must be in a recording (the first label, without one); the others may be left out.
+
+    Raises
+    ------
+    BiodanceError
+        It names a landmark or segment that does not exist.
+    """
     markers: dict[str, dict[str, Any]] = {}
     landmarks: dict[str, tuple[tuple[str, ...], ...]] = {}
     for label, place in given.items():
@@ -151,7 +168,7 @@ def parse_map(path: Path) -> Contents:
         landmarks["mid_psis"] = ((*landmarks["left_psis"][0], *landmarks["right_psis"][0]),)
     pelvis = tuple(names[0][0] for place, names in landmarks.items() if segment_of(place) == "pelvis")
     required = pelvis or tuple(markers)[:1]
-    return Contents("labels of the session's own", str(path), required, {}, markers, landmarks)
+    return Contents("labels of the session's own", path, required, {}, markers, landmarks)
 
 
 def segment_of(landmark: str) -> str:
@@ -205,12 +222,16 @@ def _marker(path: Path, label: str, fields: Any) -> dict[str, Any]:
         raise BiodanceError(
             f"{where} has an offset without normaliser or a normaliser without offset. Give both or neither."
         )
+    corner_of = fields.get("corner_of", [])
+    if corner_of and not (isinstance(corner_of, list) and len(corner_of) == 3):
+        raise BiodanceError(f"{where} has corner_of {corner_of!r}, expected the three labels of an alignment device.")
     offset = fields.get("offset")
     if offset is not None and not (isinstance(offset, list) and len(offset) == 3 and all(_number(x) for x in offset)):
         raise BiodanceError(
             f"{where} has the offset {offset!r}, expected three numbers [x, y, z] (anterior, up, right)."
         )
-    return {**fields, "weight": float(weight), "offset": None if offset is None else tuple(float(x) for x in offset)}
+    places = {"corner_of": tuple(map(str, corner_of)), "weight": float(weight)}
+    return {**fields, **places, "offset": None if offset is None else tuple(float(x) for x in offset)}
 
 
 def _number(value: Any) -> bool:

@@ -7,6 +7,7 @@ and, for bodies that nobody has measured, an ``offset`` in units of a body measu
 mark which anatomical landmark.
 """
 
+import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
@@ -17,13 +18,15 @@ import numpy as np
 
 from biodance.discovery import DataFamily
 from biodance.errors import FileRefused, TrialRefused, UnknownName
-from biodance.lab.markers.set_file import LANDMARKS, parse_map, parse_marker_set
-from biodance.records import Array, Markers, Trial
+from biodance.lab.markers.set_file import LANDMARKS, Contents, parse_map, parse_marker_set, read_map
+from biodance.records import SIDES, Array, Markers, Trial
 
 FOLDER = "anthropometry/marker_sets"
 FAMILY = DataFamily("marker set", "biodance.marker_sets", FOLDER, ".toml")
 MAPS = ("session.toml", "subject.toml")
 """Files whose ``[markers] map`` is a marker set of its own."""
+GUESSED = "guessed "
+"""How the name of a guessed set begins; its map follows (`guess.guess_set`)."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +36,8 @@ class SetMarker:
     ``weight`` >= 0 multiplies its squared residual; ``offset`` (3,) times the body measure ``normaliser`` (m) is its
     place in the segment frame (x anterior, y up, z right) relative to ``origin``: "segment" (the segment's own origin)
     or "mid_shoulder" (the middle of the two shoulder joint centres). ``offset`` is None where no generic place is
-    known: such a marker exists only once a static trial places it.
+    known: such a marker exists only once a static trial places it. ``corner_of``: the three markers of a knee alignment
+    device that stands in for this one in the static trial.
     """
 
     label: str
@@ -42,6 +46,7 @@ class SetMarker:
     offset: tuple[float, float, float] | None = None
     normaliser: str = ""
     origin: str = "segment"
+    corner_of: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -58,6 +63,11 @@ class MarkerSet:
     aliases: Mapping[str, str]
     landmarks: Mapping[str, tuple[tuple[str, ...], ...]]
     required: tuple[str, ...]
+
+    @property
+    def title(self) -> str:
+        """The name for a reader: of a guessed set without its map."""
+        return self.name.partition(" {")[0]
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -102,6 +112,8 @@ def read_marker_set(name_or_path: str | Path) -> MarkerSet:
         The file is missing, is not TOML, or breaks a rule; the message names the file, the entry and what would be
         legal.
     """
+    if str(name_or_path).startswith(GUESSED):
+        return _guessed(str(name_or_path))
     path = FAMILY.locate(name_or_path)
     if not path.is_file():
         raise FileRefused(
@@ -111,15 +123,44 @@ def read_marker_set(name_or_path: str | Path) -> MarkerSet:
     return _read(str(name_or_path), path, path.stat().st_mtime_ns)
 
 
+_PLACED = ("plug_in_gait", "isb_landmarks")
+"""The sets whose own places are the usual ones of their landmarks."""
+
+
 @cache
 def _read(name: str, path: Path, _stamp: int) -> MarkerSet:
     """Return the marker set in a file; read anew when the file has changed."""
-    contents = parse_map(path) if path.name in MAPS else parse_marker_set(path)
+    if path.name in MAPS:
+        return _made(name, read_map(path), usual=True)
+    return _made(name, parse_marker_set(path), usual=path.stem not in _PLACED)
+
+
+@cache
+def _guessed(name: str) -> MarkerSet:
+    """Return the set of a guessed map, which its name holds."""
+    given = json.loads(name.removeprefix(GUESSED))
+    return _made(name, parse_map(given, "the guess from names and posture"), usual=True)
+
+
+def _made(name: str, contents: Contents, *, usual: bool) -> MarkerSet:
+    """Return the marker set of a file's contents; where it is a map, markers on landmarks get the usual places and
+    weights of these.
+    """
+    markers = {label: SetMarker(label, **fields) for label, fields in contents.markers.items()}
+    if usual:
+        on = {labels[0][0]: place for place, labels in contents.landmarks.items() if len(labels[0]) == 1}
+        known = usual_places()
+        markers = {
+            label: replace(known[on[label]], label=label, corner_of=())
+            if on.get(label) in known and marker.offset is None
+            else marker
+            for label, marker in markers.items()
+        }
     return MarkerSet(
         name,
         contents.description,
         contents.source,
-        tuple(SetMarker(label, **fields) for label, fields in contents.markers.items()),
+        tuple(markers.values()),
         MappingProxyType(contents.aliases),
         MappingProxyType(contents.landmarks),
         contents.required,
@@ -149,12 +190,12 @@ def wearing(trial: Trial, marker_set: MarkerSet) -> Trial:
     absent = [label for label in marker_set.required if label not in match]
     if not absent:
         said = (
-            f"The markers were read as the set {marker_set.name}: {len(match)} of its {len(marker_set.labels)} "
+            f"The markers were read as the set {marker_set.title}: {len(match)} of its {len(marker_set.labels)} "
             f"labels are there."
         )
         return replace(trial, marker_set=marker_set.name, history=(*trial.history, said))
     warning = (
-        f"The markers are not of the chosen set {marker_set.name}: {', '.join(absent)} missing. Choose the set "
+        f"The markers are not of the chosen set {marker_set.title}: {', '.join(absent)} missing. Choose the set "
         f"that was worn."
     )
     return replace(trial, warnings=(*trial.warnings, warning))
@@ -163,16 +204,18 @@ def wearing(trial: Trial, marker_set: MarkerSet) -> Trial:
 def canonical(markers: Markers, marker_set: MarkerSet) -> Markers:
     """Return the markers of the set only, under the set's own labels and in its order.
 
+    A moving trial need not have all that the static one has: which joints its markers determine is not asked here.
+
     Raises
     ------
     TrialRefused
-        A required label of the set is not there.
+        No required label of the set is there.
     """
     match = marker_set.match(markers.names)
     absent = [label for label in marker_set.required if label not in match]
-    if absent:
+    if len(absent) == len(marker_set.required):
         raise TrialRefused(
-            f"The markers are not of the set {marker_set.name}: {', '.join(absent)} "
+            f"The markers are not of the set {marker_set.title}: {', '.join(absent)} "
             f"{'is' if len(absent) == 1 else 'are'} not among them. "
             "Label them, or choose the set that was worn."
         )
@@ -198,4 +241,29 @@ def landmark(markers: Markers, marker_set: MarkerSet, name: str) -> Array | None
     for alternative in marker_set.landmarks.get(name, ()):
         if all(label in match for label in alternative):
             return np.mean([markers[match[label]] for label in alternative], axis=0)
+    side, _, part = name.partition("_")
+    for others in _STAND_INS.get(part if side in SIDES else name, ()):
+        places = [landmark(markers, marker_set, f"{side}_{other}" if side in SIDES else other) for other in others]
+        if all(place is not None for place in places):
+            return np.mean(np.array(places), axis=0)
     return None
+
+
+_STAND_INS = {
+    "toe": (("toe_medial", "toe_lateral"), ("toe_lateral",), ("toe_medial",)),
+    "mid_psis": (("left_psis", "right_psis"),),
+}
+"""Landmarks whose mean stands in for one that has no marker of its own."""
+
+
+@cache
+def usual_places() -> Mapping[str, SetMarker]:
+    """Return the marker with a usual place on every landmark that has one: of plug-in gait, else of the ISB set."""
+    found: dict[str, SetMarker] = {}
+    for name in _PLACED:
+        known = read_marker_set(name)
+        for place, alternatives in known.landmarks.items():
+            marker = known.marker(alternatives[0][0])
+            if len(alternatives[0]) == 1 and marker.offset is not None:
+                found.setdefault(place, marker)
+    return MappingProxyType(found)

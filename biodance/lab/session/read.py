@@ -8,6 +8,7 @@ from pathlib import Path
 
 from biodance.discovery import Chosen
 from biodance.errors import BiodanceError, SessionRefused
+from biodance.lab.markers.dress import dress
 from biodance.lab.markers.sets import read_marker_set
 from biodance.lab.read import read_trial
 from biodance.lab.readers import Reader, extensions
@@ -111,6 +112,9 @@ def read_session(
     if not trials:
         raise SessionRefused(_nothing_left(folder, refused, readers))
     trials = _settle_static(trials, file_says, reasons, notes)
+    if marker_set is None:
+        trials, guessed = dress(trials)
+        notes += guessed
     subject, guesses = identify_subject(
         file_says.subject, measurements, trials, name=subject_name or folder.resolve().name
     )

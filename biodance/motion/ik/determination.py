@@ -29,13 +29,14 @@ class Determination:
 
 
 def determination(body: Body, columns: list[int], seen: NDArray[np.bool_]) -> Determination:
-    """Tell for every frame whether the markers seen fix every coordinate of ``body``.
+    """Tell for every frame whether the markers seen fix every coordinate of ``body`` that is free to move.
 
     ``columns`` (K) indices of the markers in ``body.markers``; ``seen`` (T, K). Judged by the marker Jacobian at one
     general posture, so that the answer depends on the markers and not on the pose: with the weighted Jacobian's columns
     in units of moved weight and ``LEVER``, its smallest singular value must reach ``LEAST_MOTION``.
     """
-    jacobian = _jacobian(body, columns)
+    free = np.concatenate([np.ones(body.n_root, dtype=bool), body.free])
+    jacobian = _jacobian(body, columns)[:, :, free]
     useful = seen & (body.markers.weight[columns] > 0)
     first = np.concatenate([[True], (useful[1:] != useful[:-1]).any(axis=1)])[: len(useful)]
     patterns, which = np.unique(useful[first], axis=0, return_inverse=True)
@@ -46,7 +47,7 @@ def determination(body: Body, columns: list[int], seen: NDArray[np.bool_]) -> De
     )
     best = patterns.sum(axis=1).argmax()
     names = ("root x", "root y", "root z", "root rotation x", "root rotation y", "root rotation z")[: body.n_root]
-    names += tuple(joint.name for joint in body.joints)
+    names += tuple(joint.name for joint, moves in zip(body.joints, body.free, strict=True) if moves)
     vague = _open(_normal(jacobian, weight[best : best + 1])[0])
     return Determination(
         value[which] >= LEAST_MOTION**2, tuple(name for name, is_open in zip(names, vague, strict=True) if is_open)

@@ -71,7 +71,7 @@ def _trial(result: TrialResult, identified: Agreement | None) -> dict[str, Any]:
         "status": result.status,
         "reason": result.reason,
         "file": trial.source.path.name,
-        "marker_set": trial.marker_set,
+        "marker_set": trial.worn,
         "frames": 0 if trial.markers is None else trial.markers.time.size,
         "rate_hz": None if trial.markers is None else trial.markers.rate,
         "gaps_percent": result.gaps_percent,

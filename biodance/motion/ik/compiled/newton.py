@@ -52,7 +52,9 @@ def held_at(chain, q, at, g, held):
     for i in range(g.shape[0]):
         j = i - roots
         held[i] = j >= 0 and (
-            (q[first + j] <= chain.lower[j] and g[i] > 0) or (q[first + j] >= chain.upper[j] and g[i] < 0)
+            chain.lower[j] == chain.upper[j]
+            or (q[first + j] <= chain.lower[j] and g[i] > 0)
+            or (q[first + j] >= chain.upper[j] and g[i] < 0)
         )
 
 
