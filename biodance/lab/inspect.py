@@ -129,7 +129,7 @@ def _subjects(path: Path) -> list[str]:
 
 
 def _plate(plate: Plate) -> dict[str, Any]:
-    force = plate.wrench.force.mean(axis=0) if plate.wrench.time.size else np.full(3, math.nan)
+    force = np.nanmean(plate.wrench.force, axis=0) if plate.wrench.time.size else np.full(3, math.nan)
     cop = plate.wrench.cop(height=plate.height, threshold=COP_FORCE)[:, :2]
     loaded = cop[np.isfinite(cop).all(axis=1)]
     stepped_on = loaded.size > 0 and len(loaded) >= SHORTEST_STEP * plate.wrench.rate
