@@ -46,14 +46,7 @@ class LabelsSwapped(DiscreteEffect):
         """Return the pairs that the markers of each trial show, and where they show none those whose exchange makes
         the body fit.
         """
-        known, found = _exchanges(recorded.session)
-        for case in recorded.cases:
-            more = {pair for pair in known if _is_open(case.trial, pair) and not fits_better(case, pair)}
-            if more:
-                found[case.trial.name] = found.get(case.trial.name, frozenset()) | more
-        if not known:
-            rest = tuple(case for case in recorded.cases if case.trial.name not in found)
-            found |= {case.trial.name: frozenset(pairs) for case in _worst(rest) if (pairs := exchanged(case))}
+        found = exchanges(recorded)
         where: dict[Pair, list[str]] = {}
         for name, pairs in found.items():
             for pair in sorted(pairs):
@@ -66,6 +59,21 @@ class LabelsSwapped(DiscreteEffect):
             )
         looked = any(trial.markers is not None for trial in recorded.session.trials)
         return (Gate(check, True, "No two markers seem to carry each other's names."),) if looked else ()
+
+
+def exchanges(recorded: Recorded) -> dict[str, frozenset[Pair]]:
+    """Return by trial the pairs of labels that carry each other's names: as the markers alone show them, with and
+    without plates, else by the exchange that makes the body fit.
+    """
+    known, found = _exchanges(recorded.session)
+    for case in recorded.cases:
+        more = {pair for pair in known if _is_open(case.trial, pair) and not fits_better(case, pair)}
+        if more:
+            found[case.trial.name] = found.get(case.trial.name, frozenset()) | more
+    if not known:
+        rest = tuple(case for case in recorded.cases if case.trial.name not in found)
+        found |= {case.trial.name: frozenset(pairs) for case in _worst(rest) if (pairs := exchanged(case))}
+    return found
 
 
 def _exchanges(session: Session) -> tuple[frozenset[Pair], dict[str, frozenset[Pair]]]:

@@ -147,6 +147,34 @@ def read_parameters(content: bytes, header: Header, where: str) -> Parameters:
     return MappingProxyType({name: MappingProxyType(group) for name, group in groups.items()})
 
 
+def text_rows(content: bytes, header: Header, where: str, *, group: str, name: str) -> list[tuple[int, int]]:
+    """Return byte position and width of every string of the text parameter ``group``:``name`` and its continuations
+    NAME2, NAME3 ...
+
+    Raises
+    ------
+    FileRefused
+        As `read_parameters`.
+    """
+    numbers: dict[int, str] = {}
+    found: list[tuple[int, int, bytes]] = []
+    section, at = content[: header.data_start], header.parameter_start + 4
+    while at and at + 2 <= header.data_start and section[at] != 0 and section[at + 1] != 0:
+        here = at
+        at, number, word, value = _record(section, here, header.processor, where)
+        if value is None:
+            numbers[number] = word
+        elif isinstance(value, list) and word.rstrip("0123456789") == name:
+            first = here + 2 + abs(int(np.int8(np.uint8(section[here])))) + 2
+            found.append((number, first, section[first : first + 2 + section[first + 1]]))
+    rows = []
+    for number, first, head in found:
+        if numbers.get(number) == group and head[1] >= 1:
+            width, count = head[2], math.prod(head[3:])
+            rows += [(first + len(head) + i * width, width) for i in range(count)]
+    return rows
+
+
 def _record(section: bytes, at: int, processor: int, where: str) -> tuple[int, int, str, ParameterValue | None]:
     """Return position of the next record (0 = none), group number, name and value (None = a group) of the record at
     ``at``.
