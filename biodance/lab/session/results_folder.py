@@ -4,10 +4,9 @@ from pathlib import Path
 
 from biodance.errors import SessionRefused
 from biodance.lab.readers import extensions
-from biodance.lab.session.recordings import TEXT
+from biodance.lab.session.recordings import RESULTS, TEXT
 
 DEFAULT = "biodance"
-_OURS = ("results.json", "report.html", "results.partial.json")
 
 
 def results_folder(out: str | Path | None, session: str | Path, *, force: bool = False) -> Path:
@@ -34,7 +33,7 @@ def results_folder(out: str | Path | None, session: str | Path, *, force: bool =
         raise SessionRefused(f"{folder}: is a file; the results need a folder. Choose another name.")
     files = [path for path in folder.iterdir() if not path.name.startswith(".")] if folder.is_dir() else []
     raw = [path.name for path in files if path.suffix.lower() in extensions() and path.suffix.lower() not in TEXT]
-    ours = any(path.name in _OURS for path in files)
+    ours = any(path.name in RESULTS for path in files)
     if raw and not ours:
         raise SessionRefused(
             f"{folder}: holds recordings ({raw[0]}); results are never written beside them. Give another folder."
