@@ -71,7 +71,7 @@ def find_recordings(folder: Path, readers: Chosen[Reader] = None) -> tuple[list[
     more, notes = _in_parts(folder, files, readers)
     kept: dict[tuple[Path, str], Path] = {}
     trials = _without_companions([*files, *more], readers)
-    for file in sorted(trials, key=lambda f: (order.index(f.suffix.lower()), str(f))):
+    for file in sorted(trials, key=lambda f: (order.index(f.suffix.lower()), not _beside(f, readers), str(f))):
         trial = (file.parent, file.stem.lower())
         twin = next((one for one in kept.values() if one.name == file.name and _same_bytes(one, file)), None)
         if trial in kept:
@@ -92,9 +92,12 @@ def _in_parts(folder: Path, own: list[Path], readers: Chosen[Reader]) -> tuple[l
             notes.append(f"The folder {part.name} was left aside: it holds results of biodance.")
         elif found:
             parts[part] = found
+    several = len(parts) > 1
+    trials = set(_without_companions([*own, *(file for found in parts.values() for file in found)], readers))
+    parts = {part: own_trials for part, found in parts.items() if (own_trials := [f for f in found if f in trials])}
     whole = [part for part, found in parts.items() if _is_whole(part, found)]
     alone = len(whole) + any(role_by_name(file.stem) == "static" for file in own) < 2
-    if alone and (own or len(parts) > 1):
+    if alone and (own or several):
         whole = [part for part in whole if any((part / name).is_file() for name in _OWN_FILES)]
     for part in whole:
         count = len(parts.pop(part))
