@@ -22,11 +22,16 @@ SHORTEST_STEP = 0.05
 
 
 def inspect_paths(
-    paths: Sequence[str | Path], *, markers: str | Path | None = None, tell: Callable[[str], None] | None = None
+    paths: Sequence[str | Path],
+    *,
+    subject: str | None = None,
+    markers: str | Path | None = None,
+    tell: Callable[[str], None] | None = None,
 ) -> list[dict[str, Any]]:
     """Return one record (see `inspect_file`) for each file, and for each recording in each folder and below it.
 
-    ``markers`` is the name or file of the marker set that was worn.
+    ``subject`` chooses the person in C3D files that hold several; ``markers`` is the name or file of the marker set
+    that was worn.
 
     Raises
     ------
@@ -44,11 +49,13 @@ def inspect_paths(
         for file in files:
             if tell:
                 tell(file.name)
-            records.append(inspect_file(file, markers=worn))
+            records.append(inspect_file(file, subject=subject, markers=worn))
     return records
 
 
-def inspect_file(path: str | Path, *, markers: MarkerSet | None = None) -> dict[str, Any]:
+def inspect_file(
+    path: str | Path, *, subject: str | None = None, markers: MarkerSet | None = None
+) -> dict[str, Any]:
     """Return what is in one recording; a file that cannot be read gives the status "refused" and the reason.
 
     Keys: ``file``; ``status`` "ok", "warning" or "refused"; ``reason`` (None if ok); ``format``; ``frames``,
@@ -61,7 +68,7 @@ def inspect_file(path: str | Path, *, markers: MarkerSet | None = None) -> dict[
     """
     path = Path(path)
     try:
-        trial = read_trial(path, markers=markers)
+        trial = read_trial(path, subject=subject, markers=markers)
     except BiodanceError as error:
         return _refused(path, str(error))
     warnings = [*trial.warnings, *_never_seen(trial)]

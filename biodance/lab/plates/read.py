@@ -13,9 +13,8 @@ from biodance.lab.plates.signals import PlateReading, read_plate_signals
 from biodance.lab.plates.signs import gravity_sign
 from biodance.lab.weight import movement, steady_mass
 from biodance.records import Array, Markers, Plate, Wrench
-from biodance.settings import TOUCH_FORCE, StandingRules
+from biodance.settings import TOUCH_FORCE, CheckLimits, StandingRules
 
-OFF_WEIGHT = 0.05  # share of the declared mass from which on the weight on the plates is worth a warning
 AS_POUNDS = 0.03
 STUCK = 2e-3  # share of its mean by which the vertical of a loaded plate varies at least, whoever moves on it
 
@@ -146,7 +145,7 @@ def _weight_said(plates: tuple[Plate, ...], markers: Markers | None, body_mass: 
     """Return a warning if the weight in quiet standing contradicts the declared mass."""
     walks = markers is not None and movement(markers) > StandingRules.still
     mass = steady_mass(total_wrench(plates)) if plates and not walks else None
-    if mass is None or body_mass is None or not body_mass > 0 or abs(mass / body_mass - 1) <= OFF_WEIGHT:
+    if mass is None or body_mass is None or not body_mass > 0 or abs(mass / body_mass - 1) <= CheckLimits.mass / 100:
         return ()
     said = f"The plates carry {mass:.2f} kg in quiet standing, {body_mass:.2f} kg are declared"
     for factor, meaning in ((POUND, "newton declared as pounds"), (1 / POUND, "pounds declared as newton")):
