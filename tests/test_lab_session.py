@@ -3,6 +3,9 @@ never stops the rest.
 """
 
 import os
+import platform
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -259,3 +262,18 @@ def test_markers_and_forces_in_folders_of_their_own_and_copies(tmp_path):
     assert [len(trial.plates) for trial in session.trials if trial.name == "static1"] == [1]
     assert sorted(trial.name for trial in session.trials) == ["static1", "walk1"]
     assert any("is a copy of" in note for note in session.notes)
+
+
+def test_two_runs_never_write_into_one_folder(tmp_path, folder):
+    out = results_folder(tmp_path / "out", folder)
+    assert results_folder(out, folder) == out  # this process holds it
+    lock = next(out.glob(".*lock"))
+    other = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    try:
+        lock.write_text(f"{other.pid} {platform.node()}")
+        with pytest.raises(SessionRefused, match=f"process {other.pid} on .* is writing there"):
+            results_folder(out, folder)
+    finally:
+        other.communicate(b"\n")
+    assert results_folder(out, folder) == out  # that one has ended
+    assert lock.read_text().startswith(f"{os.getpid()} ")

@@ -72,7 +72,7 @@ def on_a_belt(speed: float) -> tuple:
     """Return a walk over one long plate, everything carried backwards by its belt at ``speed`` m/s."""
     long = [plate("plate1", (-3.0, 6.0), (-0.3, 0.3))]
     right = [Stand(k, k + 0.6, (1.2 * k, -0.1, 0)) for k in range(4)]
-    left = [Stand(0.0, 0.1, (-0.6, 0.1, 0)), *(Stand(k + 0.5, k + 1.1, (1.2 * k + 0.6, 0.1, 0)) for k in range(3))]
+    left = [Stand(0.0, 0.1, (-0.6, 0.1, 0)), *(Stand(k + 0.5, k + 1.1, (1.2 * k + 0.6, 0.1, 0)) for k in range(4))]
     trial, _, true, _ = walker(right, left, long, duration=3.5)
     time, back = trial.markers.time, speed * trial.markers.time[:, None] * np.array([-1.0, 0, 0])
     force = trial.plates[0].wrench.value[:, :3]

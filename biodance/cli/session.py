@@ -58,11 +58,14 @@ def report_session(
     of results.json.
     """
     from biodance.pipeline.diagnosis import diagnosed
-    from biodance.pipeline.session import examine
+    from biodance.pipeline.session import examine, stopped_before
     from biodance.report.write import write_report
 
     result = examine(recording, tell=tell)
-    found = diagnosed(result, tell=tell) if not result.stopped else None
+    try:
+        found = diagnosed(result, tell=tell) if not result.stopped else None
+    except KeyboardInterrupt:
+        found, result = None, stopped_before(result, "the diagnosis")
     tell("writing the page")
     tabled(result, tables, found.diagnosis if found else None)
     return result, write_report(result, folder, diagnosis=found)
