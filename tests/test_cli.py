@@ -12,8 +12,8 @@ import pytest
 from bad_sessions import UNREADABLE, bad_session
 
 from biodance.cli import run
-from biodance.errors import BiodanceError
 from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED
+from biodance.errors import BiodanceError
 
 
 def biodance(*words):

@@ -31,9 +31,7 @@ def visit(*, speed: float) -> tuple[Trial, Trial]:
         xyz = markers.xyz.copy()
         xyz[:, markers.names.index("RBHD")] += [-0.02, 0.012, 0.0]
         source = Source(Path(f"{role}.c3d"), "", "C3D", 100.0)
-        trials.append(
-            Trial(role, role, Markers(markers.names, markers.time, xyz), (), source, "plug_in_gait")
-        )
+        trials.append(Trial(role, role, Markers(markers.names, markers.time, xyz), (), source, "plug_in_gait"))
     return trials[0], trials[1]
 
 

@@ -250,7 +250,16 @@ def test_source_and_role(read):
     assert trial.markers.time[0] == trial.plates[0].wrench.time[0] == 0.0
 
 
-STANDING = {"Nasion": 1.6, "C7x": 1.45, "Acr_R": 1.4, "Acr_L": 1.4, "K1": 0.5, "K2": 0.5, "R_Calc": 0.05, "L_Calc": 0.05}
+STANDING = {
+    "Nasion": 1.6,
+    "C7x": 1.45,
+    "Acr_R": 1.4,
+    "Acr_L": 1.4,
+    "K1": 0.5,
+    "K2": 0.5,
+    "R_Calc": 0.05,
+    "L_Calc": 0.05,
+}
 
 
 def unknown_set(labels):

@@ -95,7 +95,7 @@ def test_a_treadmills_origin_from_the_surface_to_the_sensor_is_turned(seen):
     raw.parameters["FORCE_PLATFORM"]["ORIGIN"][0] *= -1
     time = np.arange(0, 4, 0.01)
     point = truths[0][1][:: len(truths[0][1]) // time.size]
-    feet = np.stack([point + [0.05, 0.02, 0.03], point - [0.05, 0.02, -0.03]], axis=1)
+    feet = np.stack([point + np.array([0.05, 0.02, 0.03]), point - [0.05, 0.02, -0.03]], axis=1)
     read, warnings = read_plates(raw, metres=0.001, markers=Markers(("A", "B"), time, feet) if seen else None)
     assert largest_error(read, sum(truth for truth, _ in truths)) < 1e-6
     assert sum("they were turned" in said for said in warnings) == 2

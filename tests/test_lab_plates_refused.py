@@ -133,7 +133,7 @@ def test_forces_that_no_plate_measures_are_refused():
 
 
 def test_a_plate_that_never_changes_while_somebody_walks_is_refused():
-    raw, truth = two_plates()
+    raw, _ = two_plates()
     raw.analog[:, 2:8] = [0.3, -0.2, 1448.0, 200.0, 100.0, 0.0]
     time = np.arange(0, 2, 0.01)
     walk = np.zeros((time.size, 4, 3)) + np.array([9.0, 9.0, 1.0])

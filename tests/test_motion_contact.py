@@ -103,7 +103,7 @@ def test_a_flight_is_measured_where_the_markers_fall_freely(falls: float, measur
     left = [Stand(0.0, 0.3, (0.0, 0.1, 0)), Stand(0.8, 1.2, (1.2, 0.1, 0))]
     trial, soles, true, _ = walker(right, left, floor, duration=1.2)
     time = trial.markers.time
-    body = np.zeros((time.size, 30, 3)) + [0.5, 0.0, 1.0]
+    body = np.zeros((time.size, 30, 3)) + np.array([0.5, 0.0, 1.0])
     body[..., 2] -= falls * (9.81 / 2 * np.clip(np.abs(time - 0.6), 0, 0.22) ** 2)[:, None]
     names = (*trial.markers.names, *(f"B{i}" for i in range(30)))
     markers = Markers(names, time, np.concatenate([trial.markers.xyz, body], axis=1))
@@ -131,7 +131,9 @@ def test_a_chair_that_carries_a_third_is_not_fully_measured(share: float, measur
 
 def test_plates_of_unknown_place_measure_the_feet_over_their_pressure() -> None:
     trial, soles, true, carried = walk()
-    somewhere = tuple(replace(one, corners=one.corners + [0.2, 0.0, 0.0], placed=False) for one in trial.plates)
+    somewhere = tuple(
+        replace(one, corners=one.corners + np.array([0.2, 0.0, 0.0]), placed=False) for one in trial.plates
+    )
     contact = ground_contact(replace(trial, plates=somewhere), soles, mass=MASS)
     unmeasured = (true & ~carried).any(axis=1) | ~true.any(axis=1)
     assert not (contact.measured & unmeasured).any()

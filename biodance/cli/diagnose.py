@@ -55,7 +55,12 @@ def diagnose_command(
     out: OutOption,
     reference: Path | None = None,
     accept: Annotated[
-        bool, Parameter(name="--accept", negative="", help="Also write the body with the findings accepted; labels are exchanged in a copy first.")
+        bool,
+        Parameter(
+            name="--accept",
+            negative="",
+            help="Also write the body with the findings accepted; labels are exchanged in a copy first.",
+        ),
     ] = False,
     subject: str | None = None,
     chosen: Set = (),

@@ -100,7 +100,8 @@ def fits_better(case: Case, pair: Pair) -> bool:
         return False
     frames = np.unique(np.linspace(0, case.motion.time.size - 1, _FRAMES).astype(int))
     as_is, other = (
-        _distances(case.body, markers, frames, pair) for markers in (case.trial.markers, _renamed(case.trial.markers, pair))
+        _distances(case.body, markers, frames, pair)
+        for markers in (case.trial.markers, _renamed(case.trial.markers, pair))
     )
     return other < BETTER * as_is
 

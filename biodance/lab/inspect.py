@@ -53,9 +53,7 @@ def inspect_paths(
     return records
 
 
-def inspect_file(
-    path: str | Path, *, subject: str | None = None, markers: MarkerSet | None = None
-) -> dict[str, Any]:
+def inspect_file(path: str | Path, *, subject: str | None = None, markers: MarkerSet | None = None) -> dict[str, Any]:
     """Return what is in one recording; a file that cannot be read gives the status "refused" and the reason.
 
     Keys: ``file``; ``status`` "ok", "warning" or "refused"; ``reason`` (None if ok); ``format``; ``frames``,

@@ -37,8 +37,8 @@ def smooth(body: Body, time: Array, q: Array, *, settings: LowPass | None = None
     spaced.
 
     ``settings`` None: the default low-pass. A single frame is a pose at rest: v and a are zero. Joint angles may leave
-    their limits by what the filter rounds off; in the first and last half period of the cut-off v and a are less certain.
-    Root v and a: linear, angular, in the root's own frame, a = dv/dt (Pinocchio's convention).
+    their limits by what the filter rounds off; in the first and last half period of the cut-off v and a are less
+    certain. Root v and a: linear, angular, in the root's own frame, a = dv/dt (Pinocchio's convention).
 
     Raises
     ------

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from biodance import display
-from biodance.body.body import Body
 from biodance.diagnosis.accept import Residuals, accept, case_fit, gain_by_naming, residuals_of
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
 from biodance.diagnosis.engine import Examined, diagnose_trials, without_names
@@ -24,7 +23,6 @@ from biodance.identification.rival_bodies import expect_unloaded
 from biodance.pipeline.attention import judged_trials, told
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES, SessionIdentification
 from biodance.pipeline.looked_at import Own, all_looks, cases_of, left_out, looked_at, looks, own_tolerances
-from biodance.pipeline.mended import with_right_labels
 from biodance.pipeline.results import SessionResult
 from biodance.records import Role, Sip
 from biodance.uncertainty.tolerances import Tolerances
@@ -109,30 +107,28 @@ def diagnose_session(
     reference: SessionIdentification | None = None,
     tolerances: Tolerances | None = None,
     effects: Chosen[Effect | DiscreteEffect] = None,
-    accept: bool = False,
+    mended: tuple[Gate, ...] = (),
     tell: Callable[[str], None] = lambda _: None,
 ) -> SessionDiagnosis:
     """Return the diagnosis of an examined session, with the gain of every finding on the trials that were kept.
 
     ``reference`` an earlier session of the same person without fault or load: its posterior is then what is known of
     the body; ``tolerances`` as learned by the laboratory; ``effects`` names limit the causes to these, objects
-    (``[MyEffect()]``) join the family; ``accept`` exchanges labels that carry each other's names in a copy (``mended``)
-    and goes on with that.
+    (``[MyEffect()]``) join the family; ``mended`` are the checks of the recordings where ``result`` is of a copy
+    with its labels put right (`with_right_labels`): they are named first.
 
     Where nothing can be judged, the verdict is "unexplained", and the first sentence says "Cannot tell".
     """
-    again = with_right_labels(result, tell=tell) if accept else result
-    found = _diagnosed(again, reference=reference, tolerances=tolerances, effects=effects, tell=tell)
-    if again is not result:
-        first = gates(result.session, cases_of(result.body, all_looks(result.trials)), chosen=("labels_swapped",))
-        found = replace(found, diagnosis=_with_mended_labels(found.diagnosis, first), mended=again)
-    used = looked_at(again.trials) if found.examined else ()
-    return replace(found, diagnosis=told(found.diagnosis, again, judged_trials(again, used)))
+    found = _diagnosed(result, reference=reference, tolerances=tolerances, effects=effects, tell=tell)
+    if mended:
+        found = replace(found, diagnosis=_with_mended_labels(found.diagnosis, mended), mended=result)
+    used = looked_at(result.trials) if found.examined else ()
+    return replace(found, diagnosis=told(found.diagnosis, result, judged_trials(result, used)))
 
 
 def _with_mended_labels(diagnosis: Diagnosis, checks: tuple[Gate, ...]) -> Diagnosis:
     """Return the diagnosis of a copy with the labels exchanged, these named first."""
-    failed = tuple(gate for gate in checks if not gate.ok)
+    failed = checks
     note = (
         "The labels named were exchanged in a copy, and everything else was found in that copy. "
         "The recordings themselves are as they were."

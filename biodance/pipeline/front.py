@@ -11,6 +11,7 @@ from biodance.effects import DiscreteEffect, Effect, causes
 from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import SessionDiagnosis, diagnose_session
 from biodance.pipeline.identification import SessionIdentification, identify_trials
+from biodance.pipeline.mended import with_right_labels
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine, identification_of
 from biodance.records import Session
@@ -191,9 +192,8 @@ def diagnose(
     asked = causes(effects)
     result = _examined(session, tell)
     before = None if reference is None else _earlier(reference, tell)
-    return diagnose_session(
-        result, reference=before, tolerances=tolerances, effects=asked, accept=accept, tell=tell
-    )
+    result, checks = with_right_labels(result, tell=tell) if accept else (result, ())
+    return diagnose_session(result, reference=before, tolerances=tolerances, effects=asked, mended=checks, tell=tell)
 
 
 def compare_sessions(earlier: Earlier, later: Earlier, *, tell: _Tell = _silent) -> SessionComparison:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from biodance.effects import Recorded
+from biodance.effects import Gate, Recorded, gates
 from biodance.effects.labels_swapped import exchanges, renamed
 from biodance.lab.c3d.relabel import write_relabelled
 from biodance.pipeline.looked_at import all_looks, cases_of
@@ -13,13 +13,14 @@ from biodance.pipeline.session import examine
 from biodance.records import Session
 
 _ROUNDS = 3
-"""How often exchanged labels are looked for again after some were mended: a static trial that was wrong hides others."""
+"""How often exchanged labels are looked for again: a static trial that was wrong hides others."""
 
 
-def with_right_labels(result: SessionResult, *, tell: Callable[[str], None]) -> SessionResult:
-    """Return the session examined again with its labels exchanged, until no two carry each other's names; the same
-    result where none do.
+def with_right_labels(result: SessionResult, *, tell: Callable[[str], None]) -> tuple[SessionResult, tuple[Gate, ...]]:
+    """Return the session examined again with its labels exchanged, until no two carry each other's names, and the
+    checks that named them; the same result and no check where none do.
     """
+    checks = gates(result.session, cases_of(result.body, all_looks(result.trials)), chosen=("labels_swapped",))
     for _ in range(_ROUNDS):
         found = exchanges(Recorded(result.session, cases_of(result.body, all_looks(result.trials))))
         if not found:
@@ -29,7 +30,7 @@ def with_right_labels(result: SessionResult, *, tell: Callable[[str], None]) -> 
             renamed(trial, found[trial.name]) if trial.name in found else trial for trial in result.session.trials
         )
         result = examine(replace(result.session, trials=trials))
-    return result
+    return result, tuple(gate for gate in checks if not gate.ok)
 
 
 def write_mended(session: Session, mended: Session, folder: Path) -> tuple[Path, ...]:

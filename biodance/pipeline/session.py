@@ -18,8 +18,6 @@ from biodance.records import Session
 from biodance.settings import StandingRules
 
 
-
-
 def stopped_before(result: SessionResult, what: str) -> SessionResult:
     """Return the result with a step that says that Ctrl-C ended the run before ``what`` was done."""
     return replace(result, steps=(*result.steps, _stop(what)))

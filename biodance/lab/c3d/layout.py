@@ -29,7 +29,8 @@ class Layout:
     none).
 
     ``scale`` turns integer points into file units; ``gain`` (C,) and ``offset`` (C,) turn analog numbers into units:
-    ``(number - offset) * gain``; ``notes`` say in sentences how contradictions were decided, ``remarks`` what is missing.
+    ``(number - offset) * gain``; ``notes`` say in sentences how contradictions were decided, ``remarks`` what is
+    missing.
     """
 
     processor: int
@@ -263,7 +264,9 @@ def _analog_transform(
         held = np.array(values[:channels], dtype=float)
         whole[: held.size] = np.where(np.isfinite(held), held, np.nan)
         filled.append(whole)
-        lacking = [str(c + 1) for c in np.flatnonzero(np.isnan(whole))] + [str(c + 1) for c in range(held.size, channels)]
+        lacking = [str(c + 1) for c in np.flatnonzero(np.isnan(whole))] + [
+            str(c + 1) for c in range(held.size, channels)
+        ]
         if lacking:
             how = "have no numbers" if name == "SCALE" else "have the offset 0"
             notes.append(f"ANALOG:{name} has {held.size} values for {channels} channels: {_listed(lacking)} {how}.")

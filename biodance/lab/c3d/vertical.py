@@ -13,7 +13,9 @@ from biodance.records import Array, Markers
 
 UPPER = ("head_front", "head_back", "c7", "jugular_notch", "mid_psis", "right_asis", "left_asis")
 LOWER = ("right_heel", "left_heel", "right_toe", "left_toe", "right_ankle_lateral", "left_ankle_lateral")
-_HIGH = re.compile(r"head|[fb]hd|^hd|nasion|sellion|c7|clav|acr|sho(u|$)|asis?$|psis?$|[_.]?i[ap]s$|sacr", re.IGNORECASE)
+_HIGH = re.compile(
+    r"head|[fb]hd|^hd|nasion|sellion|c7|clav|acr|sho(u|$)|asis?$|psis?$|[_.]?i[ap]s$|sacr", re.IGNORECASE
+)
 _DEEP = re.compile(r"hee|calc|cal[0-9]?$|toe|hallux|ank|mal|mt[p0-9]|foot|^[lr][lm]m$|f[cm][ac]|fm[125]", re.IGNORECASE)
 """What labels of the upper and of the lowest part of the body are called in sets that nobody described."""
 _CLOUD = 6

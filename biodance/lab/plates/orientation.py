@@ -107,8 +107,8 @@ def _origin_under_feet(
     if written is None or turned is None or written <= NOT_UNDER or turned > UNDER_THE_FOOT:
         return reading, ()
     said = (
-        f"ORIGIN x, y of ({x:.4g}, {y:.4g}) mm put the load {written:.2f} m from the feet that the markers show, turned "
-        f"round {turned:.2f} m: they were turned."
+        f"ORIGIN x, y of ({x:.4g}, {y:.4g}) mm put the load {written:.2f} m from the feet that the markers show, "
+        f"turned round {turned:.2f} m: they were turned."
     )
     return other, (said,)
 

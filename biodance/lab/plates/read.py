@@ -89,9 +89,10 @@ def _alive(readings: list[PlateReading], markers: Markers | None) -> tuple[list[
         if not (moves and abs(mean) > TOUCH_FORCE and spread < STUCK * abs(mean)):
             alive.append(reading)
             continue
+        wires = ", ".join(str(c + 1) for c in reading.plate.channels)
         stuck = TrialRefused(
-            f"it reads a constant {mean:.0f} N (± {spread:.2g} N) while the person moves: a stuck or unplugged channel, "
-            f"or a plate whose zero was never set. Check channels {', '.join(str(c + 1) for c in reading.plate.channels)}."
+            f"it reads a constant {mean:.0f} N (± {spread:.2g} N) while the person moves: a stuck or unplugged "
+            f"channel, or a plate whose zero was never set. Check channels {wires}."
         )
         said.append(_left_out(reading.plate.number, stuck))
     return alive, said

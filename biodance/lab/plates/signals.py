@@ -151,7 +151,9 @@ def _without_gaps(channels: Array, plate: PlateParameters) -> tuple[Array, NDArr
     sample, column = np.argwhere(np.logical_not(np.isfinite(channels)))[0]
     where = f"analog channel {plate.channels[column] + 1} is not a number at sample {sample + 1}"
     if not known.any():
-        raise TrialRefused(f"{where}, and no sample of the plate is whole. Check the channel in the recording software.")
+        raise TrialRefused(
+            f"{where}, and no sample of the plate is whole. Check the channel in the recording software."
+        )
     whole = np.flatnonzero(known)
     between = np.searchsorted((whole[1:] + whole[:-1]) / 2, np.arange(known.size))
     said = f"{int((~known).sum())} of {known.size} samples are unknown, the first: {where}; they are masked."

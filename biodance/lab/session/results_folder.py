@@ -22,8 +22,8 @@ def results_folder(out: str | Path | None, session: str | Path, *, force: bool =
     Raises
     ------
     SessionRefused
-        Another run is writing there; the folder is the session folder or one above it, is a file, holds recordings, holds anything at all without
-        ``force``, or holds only files that biodance did not write.
+        Another run is writing there; the folder is the session folder or one above it, is a file, holds recordings,
+        holds anything at all without ``force``, or holds only files that biodance did not write.
     """
     session = Path(session).resolve()
     folder = (Path(out) if out is not None else session / DEFAULT).resolve()
@@ -76,8 +76,8 @@ def _lock(folder: Path) -> None:
                 return
             if _is_alive(holder):
                 raise SessionRefused(
-                    f"{folder}: another run of biodance (process {holder.replace(' ', ' on ')}) is writing there. Wait for "
-                    f"it, or give another folder; if it is not running any more, delete {lock}."
+                    f"{folder}: another run of biodance (process {holder.replace(' ', ' on ')}) is writing there. "
+                    f"Wait for it, or give another folder; if it is not running any more, delete {lock}."
                 ) from None
             lock.unlink(missing_ok=True)
         except OSError as error:

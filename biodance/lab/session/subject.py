@@ -63,8 +63,10 @@ def identify_subject(
     stature = stature if math.isfinite(stature) else _stature_of_markers(ordered, notes)
     age = _choose("age", "years", [*_typed(typed.age), *_declared(sources, AGE_NAMES, (0.0, 120.0))], [])
     if math.isnan(age):
-        notes.append("The age is not given: adult tables and limits are used (below 1.50 m with twice their standard deviations, as "
-            "for a child). Set age in session.toml.")
+        notes.append(
+            "The age is not given: adult tables and limits are used (below 1.50 m with twice their standard "
+            "deviations, as for a child). Set age in session.toml."
+        )
     sex = sex or _likely_sex(stature, notes)
     measures: dict[str, float] = {}
     for values in sources.values():

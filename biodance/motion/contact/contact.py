@@ -90,10 +90,18 @@ def ground_contact(
     place = footing(trial.plates, soles, surfaces, touching)
     faults = _faults(trial, place, touching, rests, load)
     elsewhere = carried_elsewhere(trial, weight=trial.settings.gravity * mass)
-    faults.append(("the person is still and the plates carry too little: a chair or a hand carries the rest", elsewhere))
+    faults.append(
+        ("the person is still and the plates carry too little: a chair or a hand carries the rest", elsewhere)
+    )
     measured = ~np.any([mask for _, mask in faults], axis=0)
     outside = cop_outside(trial.plates, soles, place, pressed)
-    notes = _notes(measured, faults) + _unplaced(trial) + belted + surfaces.notes + _cop_notes(trial, outside, measured, rules)
+    notes = (
+        _notes(measured, faults)
+        + _unplaced(trial)
+        + belted
+        + surfaces.notes
+        + _cop_notes(trial, outside, measured, rules)
+    )
     return Contact(soles.time, touching, place.on_plate, measured, outside, notes)
 
 

@@ -66,7 +66,11 @@ def footing(plates: tuple[Plate, ...], soles: Soles, surfaces: "Surfaces", touch
     raised = np.ones(low.shape, dtype=bool)
     on_plate = np.zeros((*low.shape, len(plates)), dtype=bool)
     for index, plate in enumerate(plates):
-        over = inside(plate, samples) >= 0 if plate.placed else _pressed(plate, soles)[..., None] & ~np.isnan(samples[..., 0])
+        over = (
+            inside(plate, samples) >= 0
+            if plate.placed
+            else _pressed(plate, soles)[..., None] & ~np.isnan(samples[..., 0])
+        )
         over &= (np.abs(low - plate.height) < REACH)[..., None]
         on_plate[..., index] = over.any(axis=-1) & touching
         anywhere |= over

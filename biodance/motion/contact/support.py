@@ -11,7 +11,7 @@ _Mask = NDArray[np.bool_]
 _SHORTEST_FLIGHT = 0.05
 """s: in less the parabola of the markers cannot be seen."""
 _FALLS = (0.6, 1.4)
-"""Downward acceleration of the markers' mean, in g, that counts as free fall: limbs that move, markers unevenly spread."""
+"""Downward acceleration of the markers' mean, in g, that counts as free fall (limbs move, markers sit unevenly)."""
 _STILL = 0.05
 """m/s: the mean of the markers of somebody who sits or stands still is slower ..."""
 _LASTING = 0.4
