@@ -145,7 +145,7 @@ def _without_gaps(channels: Array, plate: PlateParameters) -> tuple[Array, NDArr
 
     Raises TrialRefused where nothing is known.
     """
-    known = np.isfinite(channels).all(axis=1)
+    known = np.asarray(np.isfinite(channels).all(axis=1))
     if known.all():
         return channels, known, ()
     sample, column = np.argwhere(np.logical_not(np.isfinite(channels)))[0]

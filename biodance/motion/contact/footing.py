@@ -91,7 +91,7 @@ def _pressed(plate: Plate, soles: Soles) -> _Mask:
     for feet in ([0], [1], [0, 1]):
         here = known & np.isfinite(soles.outline[:, feet]).all(axis=(1, 2, 3)) & ~alone.any(axis=1)
         points = np.concatenate([soles.outline[here, foot, :, :2] for foot in feet], axis=1)
-        alone[np.ix_(here, feet)] |= (distance_to_hull(cop[here], points) < _UNDER)[:, None]
+        alone[np.ix_(np.flatnonzero(here), np.array(feet))] |= (distance_to_hull(cop[here], points) < _UNDER)[:, None]
     return alone
 
 

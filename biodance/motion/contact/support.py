@@ -32,7 +32,7 @@ def flight(trial: Trial, touching: _Mask, load: _Mask) -> _Mask:
     ``touching`` (T, 2), ``load`` (T, P). The plates then measure all that the ground does: nothing.
     """
     found = np.zeros(len(touching), dtype=bool)
-    markers, free = trial.markers, ~touching.any(axis=1) & ~load.any(axis=1)
+    markers, free = trial.markers, np.logical_not(np.hstack([touching, load]).any(axis=1))
     if markers is None or markers.time.size < 2:
         return found
     for start, stop in runs(free):
