@@ -1,5 +1,7 @@
 """The 12-segment, 23-joint human: names, axes, ranges, posture and size."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -94,3 +96,20 @@ def test_an_impossible_subject_is_refused() -> None:
         human(Subject(65.0, float("nan"), "F", 33.0))
     with pytest.raises(BiodanceError):
         human(Subject(float("nan"), 1.7, "F", 33.0))
+
+
+@pytest.mark.parametrize(
+    ("subject", "child"),
+    [
+        (Subject(45.0, 1.48, "F"), True),
+        (Subject(60.0, 1.70, "M", 14.0), True),
+        (Subject(45.0, 1.48, "F", 40.0), False),
+        (Subject(62.0, 1.60, "F"), False),
+    ],
+)
+def test_the_tables_of_adults_are_believed_half_as_much_for_a_child(subject: Subject, child: bool) -> None:
+    wide, adult = (human(person).sip for person in (subject, replace(subject, age=30.0)))
+    np.testing.assert_allclose(wide.mass, adult.mass)
+    ratio = np.sqrt(wide.covariance[10, 10] / adult.covariance[10, 10])
+    assert 1.8 < ratio < 2.4 if child else ratio == pytest.approx(1.0)
+    assert any("A child" in note for note in human(subject).notes) == child

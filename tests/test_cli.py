@@ -6,12 +6,14 @@ import json
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from bad_sessions import UNREADABLE, bad_session
 
 from biodance.cli import run
 from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED
+from biodance.errors import BiodanceError
 
 
 def biodance(*words):
@@ -146,6 +148,30 @@ def test_ctrl_c_keeps_the_trials_that_are_done_and_says_so(session, tmp_path, ca
     }
     assert states["no_plates"] == "warning"
     assert states["unknown_set"] == states["walk"] == "refused"
+
+
+def test_ctrl_c_while_identifying_keeps_all_trials(session, tmp_path, capsys, monkeypatch, no_stills):
+    import biodance.pipeline.session as room
+
+    def stopping(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(room, "can_identify", lambda _: True)
+    monkeypatch.setattr(room, "identify_trials", stopping)
+    assert run(["report", str(session), "--out", str(tmp_path / "out")]) == STOPPED
+    assert "Stopped by Ctrl-C" in capsys.readouterr().err
+    assert len(json.loads((tmp_path / "out" / "results.json").read_text())["trials"]) > 2
+
+
+def test_a_full_disk_is_told_with_the_path(tmp_path, monkeypatch):
+    from biodance.report.write import _write
+
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", full)
+    with pytest.raises(BiodanceError, match=r"results.json: cannot be written \(No space left on device\)"):
+        _write(tmp_path, {"results.json": "{}"})
 
 
 def test_ctrl_c_before_anything_was_done_writes_nothing(tmp_path, capsys, monkeypatch):

@@ -50,6 +50,16 @@ def test_jacobian_is_the_derivative_of_the_places() -> None:
         np.testing.assert_allclose(place[:, :, 6 + j], change.reshape(5, -1) / step, atol=1e-5)
 
 
+@pytest.mark.parametrize("frames", [8, 9, 17])
+def test_a_short_run_tells_how_far_markers_should_be_off(frames: int) -> None:
+    body, _, rng = person(2)
+    fit = noisy_fit(body, smooth_motion(body, rng, frames=4 * frames), body.sip.phi, rng)
+    names = body.markers.names
+    motion = replace(fit.motion, residual=np.full((4 * frames, len(names)), 0.02), marker_names=names)
+    found = mismatch(body, (replace(fit, motion=motion),), Noise.unit(np.zeros(3), BANDS))
+    assert np.isfinite(found.kinematics).all()
+
+
 def test_neighbours_are_at_the_ends() -> None:
     body, _, _ = person(4)
     table = neighbours(body)

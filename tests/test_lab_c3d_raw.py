@@ -216,8 +216,6 @@ def damaged(numbers):
             header={"points": 0, "values": 0},
             parameters={"POINT": {"USED": whole(0)}, "ANALOG": {"USED": whole(0)}},
         ).bytes(),
-        "ANALOG:SCALE has 0 usable": File(points, analog, parameters={"ANALOG": {"SCALE": None}}).bytes(),
-        "ANALOG:SCALE has 1 usable": File(points, analog, parameters={"ANALOG": {"SCALE": real(1.0)}}).bytes(),
         "POINT:SCALE is 5": File(points, analog, parameters={"POINT": {"SCALE": real(5.0)}}).bytes(),
         "is there twice": good.replace(b"OFFSET", b"LABELS"),
         "the parameter section is damaged": good.replace(b"SCALE\x0e", b"SCALE\x0c"),
@@ -232,6 +230,51 @@ def test_a_damaged_file_is_refused_with_one_sentence(tmp_path, numbers, reason):
         read_raw(path)
     assert reason in str(refusal.value)
     assert str(path) in str(refusal.value)
+
+
+def test_what_a_step_does_not_need_never_refuses_the_file(tmp_path, numbers):
+    points, analog = numbers
+    lacking = {
+        "GEN_SCALE is missing": ({"GEN_SCALE": None}, np.ones(CHANNELS, dtype=bool)),
+        "SCALE has 1 values": ({"SCALE": real(1.0)}, np.arange(CHANNELS) < 1),
+        "SCALE has 0 values": ({"SCALE": None}, np.zeros(CHANNELS, dtype=bool)),
+        "OFFSET has 0 values": ({"OFFSET": None}, np.ones(CHANNELS, dtype=bool)),
+    }
+    for said, (missing, known) in lacking.items():
+        raw = read_raw(save(tmp_path, File(points, analog, parameters={"ANALOG": missing})))
+        assert said in raw.warnings[0]
+        np.testing.assert_allclose(raw.points, points[..., :3], rtol=1e-6)
+        np.testing.assert_allclose(raw.analog[:, known], analog[:, known], rtol=1e-6)
+        assert np.isnan(raw.analog[:, ~known]).all()
+
+
+def test_a_parameter_twice_with_the_same_value_is_one(tmp_path, numbers):
+    points, _ = numbers
+    for second, good in ((70.0, True), (71.0, False)):
+        group = {"BODYMASS": real(70.0), "BODYMASX": real(second)}
+        content = File(points, parameters={"SUBJECTS": group}).bytes().replace(b"BODYMASX", b"BODYMASS")
+        path = save(tmp_path, content)
+        if good:
+            assert read_raw(path).parameters["SUBJECTS"]["BODYMASS"] == 70.0
+            continue
+        with pytest.raises(FileRefused, match=r"SUBJECTS:BODYMASS is there twice, as 70.0 and as 71.0"):
+            read_raw(path)
+
+
+def test_a_parameter_of_an_undefined_group_is_kept_aside(tmp_path, numbers):
+    points, _ = numbers
+    content = File(points, parameters={"MINE": {"NOTE": text("x")}}).bytes()
+    at = content.index(b"NOTE")
+    raw = read_raw(save(tmp_path, content[: at - 1] + b"\x63" + content[at:]))
+    assert raw.parameters["GROUP 99"]["NOTE"] == ["x"]
+
+
+def test_the_last_pointer_of_a_mips_file_in_the_other_byte_order(tmp_path, numbers):
+    points, _ = numbers
+    content = bytearray(File(points, processor=MIPS, parameters={"MINE": {"NOTE": text("x")}}).bytes())
+    at = content.index(b"NOTE") + 4
+    content[at], content[at + 1] = content[at + 1], content[at]
+    assert read_raw(save(tmp_path, bytes(content))).parameters["MINE"]["NOTE"] == ["x"]
 
 
 def test_missing_file_and_folder(tmp_path):

@@ -248,3 +248,56 @@ def test_source_and_role(read):
     assert (trial.name, trial.role, trial.source.format, trial.source.rate) == ("trial", "static", "C3D", 100.0)
     assert (trial.source.analog_rate, trial.source.first_frame, len(trial.source.sha256)) == (1000.0, 286, 64)
     assert trial.markers.time[0] == trial.plates[0].wrench.time[0] == 0.0
+
+
+STANDING = {
+    "Nasion": 1.6,
+    "C7x": 1.45,
+    "Acr_R": 1.4,
+    "Acr_L": 1.4,
+    "K1": 0.5,
+    "K2": 0.5,
+    "R_Calc": 0.05,
+    "L_Calc": 0.05,
+}
+
+
+def unknown_set(labels):
+    """(T, K, 3) m of somebody who stands, in labels of a set that nobody described."""
+    generator = np.random.default_rng(3)
+    xyz = np.column_stack([generator.uniform(-0.2, 0.2, (len(labels), 2)), list(STANDING.values())])
+    return np.repeat(xyz[None], FRAMES, axis=0)
+
+
+@pytest.mark.parametrize("turn", [Z_UP, Y_UP, X_UP])
+def test_head_over_feet_tells_the_vertical_in_any_set(read, turn):
+    trial = read(file(unknown_set(STANDING), tuple(STANDING), turn=turn))
+    np.testing.assert_allclose(trial.markers.xyz[..., 2], unknown_set(STANDING)[..., 2], atol=1e-6)
+    assert not any("Up is" in line or "z assumed" in line for line in trial.warnings)
+
+
+def test_somebody_who_would_lie_and_of_whom_nothing_tells_the_vertical_is_refused(read):
+    numbers = tuple(f"M{i}" for i in range(len(STANDING)))
+    with pytest.raises(FileRefused, match=r"along Y the markers are .* Write the upward axis into POINT:Y_SCREEN"):
+        read(file(unknown_set(STANDING), numbers, turn=Y_UP))
+    assert "z assumed" in read(file(unknown_set(STANDING), numbers)).warnings[0]
+
+
+def test_corners_that_make_no_plate_have_no_vote_on_the_vertical(read):
+    recording = file(unknown_set(STANDING), tuple(STANDING), plates=True)
+    kind, shape, values = recording.parameters["FORCE_PLATFORM"]["CORNERS"]
+    bent = np.array(values).reshape(4, 3)
+    bent[1] = bent[0]
+    bent[:, 1] = [0, 0, 900, 1800]
+    recording.parameters["FORCE_PLATFORM"]["CORNERS"] = (kind, shape, tuple(bent[:, [0, 2, 1]].ravel()))
+    trial = read(recording)
+    np.testing.assert_allclose(trial.markers.xyz[..., 2], unknown_set(STANDING)[..., 2], atol=1e-6)
+    assert trial.plates == ()
+
+
+def test_a_file_of_muscles_alone_needs_no_unit_of_length(read):
+    points = np.zeros((FRAMES, 0, 4))
+    analog = np.random.default_rng(0).normal(size=(10 * FRAMES, 3))
+    trial = read(File(points, analog, parameters={"POINT": {"UNITS": None, "LABELS": None}}))
+    assert trial.markers is None
+    assert any("holds no lengths" in line for line in trial.history)

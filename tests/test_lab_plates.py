@@ -79,9 +79,26 @@ def test_several_plates_of_different_types_add_up():
     truths = [step(rng, plate)[0] for plate in plates]
     raw = raw_file(plates, [channels(p, t) for p, t in zip(plates, truths, strict=True)])
     read, warnings = read_plates(raw, metres=0.001)
-    assert warnings == ()
+    assert [said[:29] for said in warnings] == ["Two signs in one laboratory: "]
     assert [p.name for p in read] == ["plate1", "plate2", "plate3"]
     assert largest_error(read, sum(truths)) < 1e-6
+
+
+@pytest.mark.parametrize("seen", [False, True])
+def test_a_treadmills_origin_from_the_surface_to_the_sensor_is_turned(seen):
+    rng = np.random.default_rng(14)
+    belts = [made(2, rng), made(2, rng)]
+    for belt, x in zip(belts, (0.25, -0.25), strict=True):
+        belt.origin = np.array([x, 0.0, belt.origin[2]])
+    truths = [step(rng, belt) for belt in belts]
+    raw = raw_file(belts, [channels(belt, truth) for belt, (truth, _) in zip(belts, truths, strict=True)])
+    raw.parameters["FORCE_PLATFORM"]["ORIGIN"][0] *= -1
+    time = np.arange(0, 4, 0.01)
+    point = truths[0][1][:: len(truths[0][1]) // time.size]
+    feet = np.stack([point + np.array([0.05, 0.02, 0.03]), point - [0.05, 0.02, -0.03]], axis=1)
+    read, warnings = read_plates(raw, metres=0.001, markers=Markers(("A", "B"), time, feet) if seen else None)
+    assert largest_error(read, sum(truth for truth, _ in truths)) < 1e-6
+    assert sum("they were turned" in said for said in warnings) == 2
 
 
 def test_a_y_up_lab_is_turned():

@@ -11,6 +11,7 @@ from plate_emulator import Emulated, channels, raw_file, step
 
 from biodance.lab.plates.corners import corners_in_lab, plate_axes
 from biodance.lab.plates.read import read_plates
+from biodance.records import Markers
 
 GOOD = Emulated(centre=np.array([1.0, 1.0, 0.0]))
 
@@ -106,10 +107,40 @@ def test_the_sensors_of_an_eight_channel_plate_must_lie_inside():
     assert "half distances of the sensors" in warnings[0]
 
 
-def test_samples_that_are_no_numbers():
+def test_samples_that_are_no_numbers_are_masked_and_nothing_else():
     raw, truth = two_plates()
+    whole, _ = read_plates(raw, metres=0.001)
     raw.analog[7, 4] = np.nan
-    assert "analog channel 5 is not a number at sample 8" in warning_of_the_first(raw, truth)
+    raw.analog[-30:, 6] = np.inf
+    plates, warnings = read_plates(raw, metres=0.001)
+    lost = np.isin(np.arange(len(truth)), [7, *range(len(truth) - 30, len(truth))])
+    np.testing.assert_array_equal(np.isnan(plates[0].wrench.value).all(axis=1), lost)
+    np.testing.assert_allclose(plates[0].wrench.value[~lost], whole[0].wrench.value[~lost], atol=1e-9)
+    np.testing.assert_array_equal(plates[1].wrench.value, whole[1].wrench.value)
+    assert "31 of 2000 samples are unknown, the first: analog channel 5 is not a number at sample 8" in warnings[0]
+
+
+def test_a_channel_without_any_number_is_refused():
+    raw, truth = two_plates()
+    raw.analog[:, 4] = np.nan
+    assert "analog channel 5 is not a number at sample 1" in warning_of_the_first(raw, truth)
+
+
+def test_forces_that_no_plate_measures_are_refused():
+    raw, truth = two_plates()
+    raw.analog[50, 2] = 1e16
+    assert "Fx reads up to 9.98e+15 N; no plate measures more than 30000" in warning_of_the_first(raw, truth)
+
+
+def test_a_plate_that_never_changes_while_somebody_walks_is_refused():
+    raw, _ = two_plates()
+    raw.analog[:, 2:8] = [0.3, -0.2, 1448.0, 200.0, 100.0, 0.0]
+    time = np.arange(0, 2, 0.01)
+    walk = np.zeros((time.size, 4, 3)) + np.array([9.0, 9.0, 1.0])
+    walk[..., 0] += time[:, None]
+    plates, warnings = read_plates(raw, metres=0.001, markers=Markers(("A", "B", "C", "D"), time, walk))
+    assert [plate.name for plate in plates] == ["plate2"]
+    assert "it reads a constant 1448 N" in warnings[0]
 
 
 def test_load_beside_the_plate_is_warned_about_and_refused_without_units():

@@ -3,6 +3,9 @@ never stops the rest.
 """
 
 import os
+import platform
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +13,8 @@ import pytest
 from lab_sessions import GRAVITY, MASS, plate, roles, said, two_trials, write_trial
 
 from biodance.errors import SessionRefused
+from biodance.lab.opensim.ground_forces import table_of
+from biodance.lab.opensim.mot import write_mot
 from biodance.lab.read import read_trial
 from biodance.lab.session.read import read_session
 from biodance.lab.session.recordings import role_by_name
@@ -209,3 +214,66 @@ def test_results_never_lie_among_recordings_or_strangers(tmp_path, folder, force
             results_folder(place, folder, force=force)
     with pytest.raises(SessionRefused, match="is a file"):
         results_folder(folder / "static01.trc", folder, force=force)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("Static/s1", "Straight/w1", "Turn/t1"),
+        ("static01", "Slow/w1", "Fast/w1", "Fast/again/w2"),
+        ("Static/s1", "walk01"),
+        ("Day 1/cal1", "Day 1/w1", "Conditions/Slow/w1"),
+    ],
+)
+def test_nothing_in_a_natural_layout_is_left_out(tmp_path, names):
+    for number, name in enumerate(names):
+        write_trial(tmp_path / Path(name).parent, Path(name).name, seed=number)
+    session = read_session(tmp_path)
+    assert len(session.trials) == len(names)
+    assert sum(trial.role == "static" for trial in session.trials) == 1
+    assert len({trial.name for trial in session.trials}) == len(names)
+
+
+def test_sessions_of_their_own_are_named_and_left_aside(tmp_path):
+    for name in ("static01", "walk", "Day 2/static01", "Day 2/walk"):
+        write_trial(tmp_path / Path(name).parent, Path(name).name, seed=len(name))
+    session = read_session(tmp_path)
+    assert len(session.trials) == 2
+    assert any("Day 2 (2 recordings) was left aside: it is a session of its own" in note for note in session.notes)
+    days = tmp_path / "Day 2" / "x"
+    for day in ("A", "B"):
+        write_trial(days / day, "static01")
+        write_trial(days / day, "walk")
+    with pytest.raises(SessionRefused, match="these folders do: A, B"):
+        read_session(days)
+
+
+def test_markers_and_forces_in_folders_of_their_own_and_copies(tmp_path):
+    for name in ("static1", "walk1"):
+        write_trial(tmp_path / "MarkerData", name, mass=None, speed=0.0 if name == "static1" else 1.0)
+        write_mot(tmp_path / "MarkerData" / f"{name}_forces.mot", table_of((plate(),)))
+    (tmp_path / "ID").mkdir()
+    for path in (tmp_path / "MarkerData").glob("*_forces.mot"):
+        path.rename(tmp_path / "ID" / path.name)
+    (tmp_path / "Copies").mkdir()
+    (tmp_path / "Copies" / "walk1.trc").write_bytes((tmp_path / "MarkerData" / "walk1.trc").read_bytes())
+    session = read_session(tmp_path)
+    assert session.refused == {}
+    assert [len(trial.plates) for trial in session.trials if trial.name == "static1"] == [1]
+    assert sorted(trial.name for trial in session.trials) == ["static1", "walk1"]
+    assert any("is a copy of" in note for note in session.notes)
+
+
+def test_two_runs_never_write_into_one_folder(tmp_path, folder):
+    out = results_folder(tmp_path / "out", folder)
+    assert results_folder(out, folder) == out  # this process holds it
+    lock = next(out.glob(".*lock"))
+    other = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    try:
+        lock.write_text(f"{other.pid} {platform.node()}")
+        with pytest.raises(SessionRefused, match=f"process {other.pid} on .* is writing there"):
+            results_folder(out, folder)
+    finally:
+        other.communicate(b"\n")
+    assert results_folder(out, folder) == out  # that one has ended
+    assert lock.read_text().startswith(f"{os.getpid()} ")

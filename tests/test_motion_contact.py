@@ -68,6 +68,79 @@ def test_a_foot_half_on_the_edge_is_not_measured(heel: float, measured: bool) ->
     assert any("right foot may stand partly" in note for note in contact.notes) != measured
 
 
+def on_a_belt(speed: float) -> tuple:
+    """Return a walk over one long plate, everything carried backwards by its belt at ``speed`` m/s."""
+    long = [plate("plate1", (-3.0, 6.0), (-0.3, 0.3))]
+    right = [Stand(k, k + 0.6, (1.2 * k, -0.1, 0)) for k in range(4)]
+    left = [Stand(0.0, 0.1, (-0.6, 0.1, 0)), *(Stand(k + 0.5, k + 1.1, (1.2 * k + 0.6, 0.1, 0)) for k in range(4))]
+    trial, _, true, _ = walker(right, left, long, duration=3.5)
+    time, back = trial.markers.time, speed * trial.markers.time[:, None] * np.array([-1.0, 0, 0])
+    force = trial.plates[0].wrench.value[:, :3]
+    value = trial.plates[0].wrench.value + np.hstack([0 * force, np.cross(back, force)])
+    trial = replace(
+        trial,
+        markers=Markers(trial.markers.names, time, trial.markers.xyz + back[:, None]),
+        plates=(replace(trial.plates[0], wrench=Wrench(time, value)),),
+    )
+    return trial, soles_from_markers(trial.markers, read_marker_set("plug_in_gait")), true
+
+
+def test_soles_that_move_with_a_belt_stand_on_it() -> None:
+    trial, soles, true = on_a_belt(1.2)
+    contact = ground_contact(trial, soles, mass=MASS)
+    assert np.all(contact.touching[true])
+    assert contact.measured[true.any(axis=1)].mean() > 0.97
+    assert contact.touching.mean() < true.mean() + 0.25  # swings are still seen
+    said = next(note for note in contact.notes if "a belt" in note)
+    assert float(said.split(" at ")[1].split()[0]) == pytest.approx(1.2, abs=0.01)
+    assert not any("a belt" in note for note in ground_contact(*on_a_belt(0.0)[:2], mass=MASS).notes)
+
+
+@pytest.mark.parametrize(("falls", "measured"), [(1.0, True), (0.0, False)])
+def test_a_flight_is_measured_where_the_markers_fall_freely(falls: float, measured: bool) -> None:
+    floor = [plate("plate1", (-1.0, 3.0), (-0.3, 0.3))]
+    right = [Stand(0.0, 0.4, (0.0, -0.1, 0)), Stand(0.9, 1.2, (1.4, -0.1, 0))]
+    left = [Stand(0.0, 0.3, (0.0, 0.1, 0)), Stand(0.8, 1.2, (1.2, 0.1, 0))]
+    trial, soles, true, _ = walker(right, left, floor, duration=1.2)
+    time = trial.markers.time
+    body = np.zeros((time.size, 30, 3)) + np.array([0.5, 0.0, 1.0])
+    body[..., 2] -= falls * (9.81 / 2 * np.clip(np.abs(time - 0.6), 0, 0.22) ** 2)[:, None]
+    names = (*trial.markers.names, *(f"B{i}" for i in range(30)))
+    markers = Markers(names, time, np.concatenate([trial.markers.xyz, body], axis=1))
+    contact = ground_contact(replace(trial, markers=markers), soles, mass=MASS)
+    airborne = np.logical_not(contact.touching.any(axis=1))
+    assert airborne.sum() > 8
+    assert not airborne[true.any(axis=1)].any()
+    assert contact.measured[airborne].all() == measured
+    assert contact.measured[airborne].any() == measured
+
+
+@pytest.mark.parametrize(("share", "measured"), [(1.0, True), (0.64, False), (0.9, True), (0.4536, True)])
+def test_a_chair_that_carries_a_third_is_not_fully_measured(share: float, measured: bool) -> None:
+    trial, soles, *_ = walker([Stand(0, 2, (0.1, -0.1, 0))], [Stand(0, 2, (0.1, 0.1, 0))], TWO[:1], duration=2.0)
+    time = trial.markers.time
+    part = np.where(time < 1.0, share, 1.0)[:, None] if share != 0.4536 else np.full((time.size, 1), share)
+    seated = replace(
+        trial, plates=(replace(trial.plates[0], wrench=Wrench(time, part * trial.plates[0].wrench.value)),)
+    )
+    contact = ground_contact(seated, soles, mass=MASS)
+    assert contact.measured[time < 0.99].all() == measured
+    assert contact.measured[time > 1.01].all()
+    assert any("a chair or a hand" in note for note in contact.notes) != measured
+
+
+def test_plates_of_unknown_place_measure_the_feet_over_their_pressure() -> None:
+    trial, soles, true, carried = walk()
+    somewhere = tuple(
+        replace(one, corners=one.corners + np.array([0.2, 0.0, 0.0]), placed=False) for one in trial.plates
+    )
+    contact = ground_contact(replace(trial, plates=somewhere), soles, mass=MASS)
+    unmeasured = (true & ~carried).any(axis=1) | ~true.any(axis=1)
+    assert not (contact.measured & unmeasured).any()
+    assert contact.measured.sum() > 0.6 * (~unmeasured).sum()
+    assert any("cannot be seen" in note for note in contact.notes)
+
+
 def test_stairs_hang_over_the_edges_of_raised_plates() -> None:
     steps = [plate(f"plate{i + 1}", (0.3 * i, 0.3 * (i + 1)), (-0.3, 0.3), 0.19 * (i + 1)) for i in range(3)]
     right = [Stand(0.0, 1.0, (-0.6, -0.1, 0)), Stand(1.4, 2.6, (0.33, -0.1, 0.38)), Stand(3.0, 4.0, (1.0, -0.1, 0.76))]

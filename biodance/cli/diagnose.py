@@ -55,7 +55,12 @@ def diagnose_command(
     out: OutOption,
     reference: Path | None = None,
     accept: Annotated[
-        bool, Parameter(name="--accept", negative="", help="Also write the body with the findings accepted.")
+        bool,
+        Parameter(
+            name="--accept",
+            negative="",
+            help="Also write the body with the findings accepted; labels are exchanged in a copy first.",
+        ),
     ] = False,
     subject: str | None = None,
     chosen: Set = (),
@@ -80,6 +85,7 @@ def diagnose_command(
 
     from biodance.pipeline import front
     from biodance.pipeline.attention import is_well
+    from biodance.pipeline.mended import write_mended
     from biodance.report.terminal import print_diagnosis
     from biodance.report.write import write_diagnosis
 
@@ -87,7 +93,10 @@ def diagnose_command(
         place = ready(tables, session, force=force)
         options = Reading(subject, markers, chosen)
         result, before, folder = examine_with_reference(session, reference, out, options, force=force, tell=tell)
-        found = front.diagnose(result, reference=before, tell=tell)
+        found = front.diagnose(result, reference=before, accept=accept, tell=tell)
+        if found.mended is not None:
+            write_mended(result.session, found.mended.session, folder)
+            result = found.mended
         tell("writing the page")
         tabled(result, place, found.diagnosis)
         document = write_diagnosis(result, found, folder, accepted=accept)

@@ -58,11 +58,14 @@ def report_session(
     of results.json.
     """
     from biodance.pipeline.diagnosis import diagnosed
-    from biodance.pipeline.session import examine
+    from biodance.pipeline.session import examine, stopped_before
     from biodance.report.write import write_report
 
     result = examine(recording, tell=tell)
-    found = diagnosed(result, tell=tell) if not result.stopped else None
+    try:
+        found = diagnosed(result, tell=tell) if not result.stopped else None
+    except KeyboardInterrupt:
+        found, result = None, stopped_before(result, "the diagnosis")
     tell("writing the page")
     tabled(result, tables, found.diagnosis if found else None)
     return result, write_report(result, folder, diagnosis=found)
@@ -141,13 +144,17 @@ def _told_identified(result: "SessionResult", folder: Path, found: "dict[str, An
 
 
 @app.command(name="inspect")
-def inspect_command(*paths: Path, markers: MarkersFile = None, json: JsonOption = False) -> int:
+def inspect_command(
+    *paths: Path, subject: str | None = None, markers: MarkersFile = None, json: JsonOption = False
+) -> int:
     """Say what is in recordings: markers, gaps, plates, the weight on them, and every decision the readers take.
 
     Parameters
     ----------
     paths
         Files, or folders whose recordings are all read.
+    subject
+        The person to look at where C3D files hold several.
     """
     from rich.console import Console
 
@@ -155,7 +162,7 @@ def inspect_command(*paths: Path, markers: MarkersFile = None, json: JsonOption 
     from biodance.report.terminal import print_inspected
 
     with progress() as tell:
-        records = inspect_paths(paths, markers=markers, tell=tell)
+        records = inspect_paths(paths, subject=subject, markers=markers, tell=tell)
     if json:
         print_json(records)
     else:

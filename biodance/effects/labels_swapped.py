@@ -1,18 +1,24 @@
 """Two markers carry each other's names: left and right, front and back of the wrist, for a whole session or from one
 trial on.
 
-Signature: both markers are far from the model, each where the other one should be. Look-alikes: a marker that fell off
-(one of the two is right then). Separated by exchanging the two names: only then does the body fit.
+Signature: a left marker on the right side, a wrist that is no mirror image of the other, distances within the head that
+are those of the static trial under other names (two pairs at once, too); else both markers are far from the model, each
+where the other one should be. Look-alikes: a marker that fell off (one of the two is right then). Separated by
+exchanging the two names: only then does the body fit.
 """
+
+from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
 from biodance.body.body import Body
 from biodance.effects._base.case import Case
+from biodance.effects._base.exchanged_labels import Pair, exchanged_pairs, partner, travels
 from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded
 from biodance.errors import BiodanceError
 from biodance.motion.ik.inverse_kinematics import solve_ik
-from biodance.records import Array, Markers, Trial
+from biodance.records import Array, Markers, Session, Trial
 
 _FAR = 0.04
 """m: RMS distance from which on a marker is suspected."""
@@ -26,10 +32,6 @@ ROUGH = 1e-3
 """m, tolerance of the trial trackings."""
 BETTER = 0.3
 """Share of the squared distances that the exchange must leave at most."""
-OPPOSITE = 0.4
-"""Cosine: how opposite one wrist must be to the mirrored other one."""
-_LEAST = 0.03
-"""m by which a left marker must lie to the right of its right partner in the static trial."""
 
 
 class LabelsSwapped(DiscreteEffect):
@@ -41,89 +43,89 @@ class LabelsSwapped(DiscreteEffect):
 
     @classmethod
     def look(cls, recorded: Recorded) -> tuple[Gate, ...]:
-        """Return the pairs found in the static trials by their sides, and in the others by exchanging suspects."""
-        found: dict[tuple[str, str], list[str]] = {}
-        statics = [trial for trial in recorded.session.trials if trial.role == "static" and trial.markers is not None]
-        for trial in statics:
-            for pair in (*crossed(trial), *turned_wrists(trial)):
-                found.setdefault(pair, []).append(trial.name)
-        for case in () if found else _worst(recorded.cases):
-            for pair in exchanged(case):
-                found.setdefault(pair, []).append(case.trial.name)
-        if found:
+        """Return the pairs that the markers of each trial show, and where they show none those whose exchange makes
+        the body fit.
+        """
+        found = exchanges(recorded)
+        where: dict[Pair, list[str]] = {}
+        for name, pairs in found.items():
+            for pair in sorted(pairs):
+                where.setdefault(pair, []).append(name)
+        check = "labels of the markers"
+        if where:
             return tuple(
-                Gate(
-                    "labels of the markers",
-                    False,
-                    f"{a} and {b} carry each other's names in {', '.join(where)}.",
-                    cls.name,
-                    f"{a}/{b}",
-                )
-                for (a, b), where in found.items()
+                Gate(check, False, f"{a} and {b} carry each other's names in {', '.join(names)}.", cls.name, f"{a}/{b}")
+                for (a, b), names in where.items()
             )
-        looked = bool(statics or recorded.cases)
-        return (
-            (Gate("labels of the markers", True, "No two markers seem to carry each other's names."),) if looked else ()
-        )
+        looked = any(trial.markers is not None for trial in recorded.session.trials)
+        return (Gate(check, True, "No two markers seem to carry each other's names."),) if looked else ()
 
 
-def partner(name: str) -> str:
-    """Return the label of the same place on the other side; "" for a midline marker."""
-    other = {"L": "R", "R": "L", "l": "r", "r": "l"}.get(name[:1], "")
-    return other + name[1:] if other else ""
-
-
-def crossed(trial: Trial) -> tuple[tuple[str, str], ...]:
-    """Return the pairs of left and right markers that lie on each other's side of the body, against the majority of
-    pairs.
+def exchanges(recorded: Recorded) -> dict[str, frozenset[Pair]]:
+    """Return by trial the pairs of labels that carry each other's names: as the markers alone show them, with and
+    without plates, else by the exchange that makes the body fit.
     """
-    markers = trial.markers
-    assert markers is not None
-    pairs = [(name, partner(name)) for name in markers.names if name[:1] in "Ll" and partner(name) in markers]
-    if len(pairs) < 5:
-        return ()
-    with np.errstate(invalid="ignore"):
-        apart = np.array([_median(markers[left] - markers[right]) for left, right in pairs])
-    apart[:, 2] = 0.0
-    known = np.isfinite(apart).all(axis=1)
-    if known.sum() < 5:
-        return ()
-    strongest = np.linalg.svd(apart[known])[2][0]
-    along = apart @ strongest
-    leftwards = along * np.sign(np.nansum(np.sign(along)))
-    return tuple(pair for pair, side in zip(pairs, leftwards, strict=True) if side < -_LEAST)
+    known, found = _exchanges(recorded.session)
+    for case in recorded.cases:
+        more = {pair for pair in known if _is_open(case.trial, pair) and not fits_better(case, pair)}
+        if more:
+            found[case.trial.name] = found.get(case.trial.name, frozenset()) | more
+    if not known:
+        rest = tuple(case for case in recorded.cases if case.trial.name not in found)
+        found |= {case.trial.name: frozenset(pairs) for case in _worst(rest) if (pairs := exchanged(case))}
+    return found
 
 
-def turned_wrists(trial: Trial) -> tuple[tuple[str, str], ...]:
-    """Return the wrists whose thumb-side marker (WRA) lies behind and inside of the other one (WRB) while the person
-    stands, against the mirrored other wrist.
+def _exchanges(session: Session) -> tuple[frozenset[Pair], dict[str, frozenset[Pair]]]:
+    """Return the pairs of labels that carry each other's names in the static trial, and those by trial, as the markers
+    alone show them; with and without plates.
     """
+    static = next((trial for trial in session.trials if trial.role == "static" and trial.markers is not None), None)
+    known = exchanged_pairs(static, None, frozenset()) if static else frozenset()
+    found = {trial.name: exchanged_pairs(trial, static, known) for trial in session.trials}
+    return known, {name: pairs for name, pairs in found.items() if pairs}
+
+
+def _is_open(trial: Trial, pair: Pair) -> bool:
+    """Return whether a trial's markers alone do not tell if it has the exchange of the static trial: front and back of
+    a wrist, while the arms do anything.
+    """
+    sides = partner(pair[0]) == pair[1]
+    return trial.role != "static" and trial.markers is not None and not sides and not travels(trial.markers)
+
+
+def fits_better(case: Case, pair: Pair) -> bool:
+    """Return whether a trial's own markers of a ``pair`` lie nearer to the body under each other's names."""
+    if case.trial.markers is None or any(name not in case.motion.marker_names for name in pair):
+        return False
+    frames = np.unique(np.linspace(0, case.motion.time.size - 1, _FRAMES).astype(int))
+    as_is, other = (
+        _distances(case.body, markers, frames, pair)
+        for markers in (case.trial.markers, _renamed(case.trial.markers, pair))
+    )
+    return other < BETTER * as_is
+
+
+def _distances(body: Body, markers: Markers, frames: Array, pair: Pair) -> float:
+    """Return the mean square distance (m²) of the markers of a ``pair`` to the body in some frames; infinite where they
+    do not determine it.
+    """
+    try:
+        found = solve_ik(body, Markers(markers.names, markers.time[frames], markers.xyz[frames]), tolerance=ROUGH)
+    except BiodanceError:
+        return float("inf")
+    return float(np.nanmean(found.residual[:, [found.marker_names.index(name) for name in pair]] ** 2))
+
+
+def renamed(trial: Trial, pairs: Iterable[Pair]) -> Trial:
+    """Return the trial with the names of each of the ``pairs`` exchanged; its history says so."""
     markers = trial.markers
-    assert markers is not None
-    needed = [f"{side}{name}" for side in "LR" for name in ("WRA", "WRB", "TOE", "HEE")]
-    if any(name not in markers for name in needed):
-        return ()
-    middle = {name: _median(markers[name]) for name in needed}
-    forward = sum((middle[f"{side}TOE"] - middle[f"{side}HEE"] for side in "LR"), np.zeros(3)) * [1, 1, 0]
-    across = (middle["RHEE"] - middle["LHEE"]) * [1, 1, 0]
-    if not (np.isfinite(forward).all() and np.linalg.norm(forward) > 0.1 and np.linalg.norm(across) > _LEAST):
-        return ()
-    forward /= np.linalg.norm(forward)
-    right = np.array([forward[1], -forward[0], 0.0])
-    out = {}
-    for side, sign in (("L", -1.0), ("R", 1.0)):
-        bar = middle[f"{side}WRA"] - middle[f"{side}WRB"]
-        out[side] = np.array([bar @ forward, sign * (bar @ right)]) / max(float(np.linalg.norm(bar)), 1e-9)
-    if out["L"] @ out["R"] > -OPPOSITE:
-        return ()
-    wrong = min(out, key=lambda side: float(out[side].sum()))
-    return ((f"{wrong}WRA", f"{wrong}WRB"),)
-
-
-def _median(values: Array) -> Array:
-    """Return the median (3,) over the frames (T, 3) in which a distance is known; NaN without any."""
-    seen = values[np.isfinite(values).all(axis=1)]
-    return np.asarray(np.median(seen, axis=0)) if len(seen) else np.full(3, np.nan)
+    if markers is None:
+        return trial
+    for pair in pairs:
+        markers = _renamed(markers, pair)
+    said = tuple(f"The labels {a} and {b} were exchanged: they carried each other's names." for a, b in sorted(pairs))
+    return replace(trial, markers=markers, history=(*trial.history, *said))
 
 
 def _worst(cases: tuple[Case, ...]) -> list[Case]:

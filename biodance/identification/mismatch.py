@@ -88,9 +88,10 @@ def nothing(body: Body) -> Mismatch:
 
 def _marker_squares(body: Body, motion: Motion, sources: tuple[ErrorSource, ...]) -> Array:
     """Return (K,) mean square distance (m²) between markers and model that every error of unit size leaves, over one
-    of `EVERY` frames.
+    of `EVERY` frames (two at least).
     """
-    few = Response.of(body, Motion(motion.time[::EVERY], motion.q[::EVERY], motion.v[::EVERY], motion.a[::EVERY]))
+    some = slice(None, None, min(EVERY, max(1, motion.time.size // 2)))
+    few = Response.of(body, Motion(motion.time[some], motion.q[some], motion.v[some], motion.a[some]))
     return np.concatenate([source.squares(few) for source in sources])
 
 

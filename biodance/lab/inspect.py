@@ -27,12 +27,17 @@ SHORTEST_STEP = 0.05
 
 
 def inspect_paths(
-    paths: Sequence[str | Path], *, markers: str | Path | None = None, tell: Callable[[str], None] | None = None
+    paths: Sequence[str | Path],
+    *,
+    subject: str | None = None,
+    markers: str | Path | None = None,
+    tell: Callable[[str], None] | None = None,
 ) -> list[dict[str, Any]]:
     """Return one record (see `inspect_file`) for each file, and for each recording in each folder and below it.
 
-    ``markers`` is the name or file of the marker set that was worn; without it, what the session.toml of a file's
-    folder says of it, else the known set that fits, else what can be guessed.
+    ``subject`` chooses the person in C3D files that hold several; ``markers`` is the name or file of the marker set
+    that was worn; without it, what the session.toml of a file's folder says of it, else the known set that fits, else
+    what can be guessed.
 
     Raises
     ------
@@ -52,10 +57,10 @@ def inspect_paths(
             if tell:
                 tell(file.name)
             if worn is not None:
-                records.append(inspect_file(file, markers=worn))
+                records.append(inspect_file(file, subject=subject, markers=worn))
                 continue
             chosen, fault = said.setdefault(file.parent, _said_in(file.parent))
-            record = inspect_file(file, markers=chosen)
+            record = inspect_file(file, subject=subject, markers=chosen)
             records.append(_warned(record, fault) if fault else record)
     return records
 
@@ -81,7 +86,7 @@ def _warned(record: dict[str, Any], warning: str) -> dict[str, Any]:
     }
 
 
-def inspect_file(path: str | Path, *, markers: MarkerSet | None = None) -> dict[str, Any]:
+def inspect_file(path: str | Path, *, subject: str | None = None, markers: MarkerSet | None = None) -> dict[str, Any]:
     """Return what is in one recording; a file that cannot be read gives the status "refused" and the reason.
 
     Keys: ``file``; ``status`` "ok", "warning" or "refused"; ``reason`` (None if ok); ``format``; ``frames``,
@@ -95,7 +100,7 @@ def inspect_file(path: str | Path, *, markers: MarkerSet | None = None) -> dict[
     """
     path = Path(path)
     try:
-        trial = read_trial(path, markers=markers)
+        trial = read_trial(path, subject=subject, markers=markers)
     except BiodanceError as error:
         return _refused(path, str(error))
     trial, guessed = _guessed(trial)
@@ -179,7 +184,7 @@ def _subjects(path: Path) -> list[str]:
 
 
 def _plate(plate: Plate) -> dict[str, Any]:
-    force = plate.wrench.force.mean(axis=0) if plate.wrench.time.size else np.full(3, math.nan)
+    force = np.nanmean(plate.wrench.force, axis=0) if plate.wrench.time.size else np.full(3, math.nan)
     cop = plate.wrench.cop(height=plate.height, threshold=COP_FORCE)[:, :2]
     loaded = cop[np.isfinite(cop).all(axis=1)]
     stepped_on = loaded.size > 0 and len(loaded) >= SHORTEST_STEP * plate.wrench.rate

@@ -66,7 +66,7 @@ def _longest_steady(blocks: Array, rules: StandingRules) -> Array | None:
     """Return the longest run of blocks that stay within the sway of their median; None if it is too short or carries
     nobody.
     """
-    middle = float(np.median(blocks)) if blocks.size else 0.0
+    middle = float(np.nanmedian(blocks)) if np.isfinite(blocks).any() else 0.0
     if not middle >= rules.force:
         return None
     steady = np.concatenate([[0], np.abs(blocks - middle) <= rules.sway * middle, [0]]).astype(int)

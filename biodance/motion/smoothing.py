@@ -1,6 +1,9 @@
 """Positions, velocities and accelerations of a body from the noisy postures of its frames, consistent on the manifold
 of postures.
 
+The ends of a trial are continued with their acceleration mirrored (`_continued_at_the_ends`): point reflection, as of
+forces, makes the acceleration at the ends zero, which costs a walker half the body weight in the last frames.
+
 The smooth coordinates of ``chart`` (root position, quaternions of the root and of every ball joint, other angles) pass
 the same low-pass as the forces, the quaternions are made unit again, and a quintic spline through the samples gives the
 derivatives in closed form; nothing is differenced. With u a unit quaternion, P = u^-1 u' is half the angular velocity
@@ -20,6 +23,9 @@ from biodance.spatial import cross, quaternion_conjugate, quaternion_matrix, qua
 _DEGREE = 5
 """Degree of the spline: continuous acceleration and jerk."""
 
+_PERIODS = 3
+"""Periods of the cut-off by which the ends are continued."""
+
 LEAST_COSINE = 1e-3
 """Smallest |cos| of a ball joint's second angle that rates are divided by: nearer to the singularity the rates are
 bounded, not exact.
@@ -31,8 +37,8 @@ def smooth(body: Body, time: Array, q: Array, *, settings: LowPass | None = None
     spaced.
 
     ``settings`` None: the default low-pass. A single frame is a pose at rest: v and a are zero. Joint angles may leave
-    their limits by what the filter rounds off; in the first and last period of the cut-off v and a are less certain.
-    Root v and a: linear, angular, in the root's own frame, a = dv/dt (Pinocchio's convention).
+    their limits by what the filter rounds off; in the first and last half period of the cut-off v and a are less
+    certain. Root v and a: linear, angular, in the root's own frame, a = dv/dt (Pinocchio's convention).
 
     Raises
     ------
@@ -46,9 +52,12 @@ def smooth(body: Body, time: Array, q: Array, *, settings: LowPass | None = None
         return Motion(time, q, np.zeros((1, body.nv)), np.zeros((1, body.nv)), joint_names=names)
     chart = chart_of(body)
     rough = np.asarray(q).T
-    filtered = chart.split(low_pass(chart.smooth(rough).stacked().T, _rate(time), settings).T)
+    longer, span = _continued_at_the_ends(chart.smooth(rough).stacked(), _rate(time), settings)
+    filtered = chart.split(low_pass(longer.T, _rate(time), settings).T)
     even = Smooth(filtered.place, continued(filtered.root), continued(filtered.ball), filtered.angle)
-    first, second = (chart.split(d) for d in _derivatives(time, even.stacked()))
+    step = np.arange(longer.shape[1]) / _rate(time)
+    first, second = (chart.split(d[:, span]) for d in _derivatives(step, even.stacked()))
+    even = chart.split(even.stacked()[:, span])
     posture = chart.posture(even, rough[len(rough) - chart.joint_count :])
     v, a = np.empty((2, body.nv, len(time)))
     v[body.n_root + chart.single], a[body.n_root + chart.single] = first.angle, second.angle
@@ -59,6 +68,25 @@ def smooth(body: Body, time: Array, q: Array, *, settings: LowPass | None = None
     if body.n_root:
         v[:6], a[:6] = _root_rates(even, first, second)
     return Motion(time, posture.T, v.T, a.T, joint_names=names)
+
+
+def _continued_at_the_ends(values: Array, rate: float, settings: LowPass) -> tuple[Array, slice]:
+    """Return ``values`` (m, T) continued at both ends so that their second derivative is mirrored there, and where
+    (T) they lie in it.
+
+    Before the first sample x(-t) = x(t) - 2 v t, behind the last one alike; v, the slope at the end, is that of the
+    cubic through one period of the cut-off, in which the low-pass leaves little more.
+    """
+    period = settings.shortest(rate)
+    count = min(_PERIODS * period, values.shape[1] - 1)
+    before, behind = (_beyond(side, period, count) for side in (values, values[:, ::-1]))
+    return np.hstack([before[:, ::-1], values, behind]), slice(count, count + values.shape[1])
+
+
+def _beyond(values: Array, period: int, count: int) -> Array:
+    """Return ``count`` samples (m, count) that come before ``values`` (m, T), the nearest first."""
+    slope = np.polynomial.polynomial.polyfit(np.arange(min(period, values.shape[1])), values[:, :period].T, 3)[1]
+    return values[:, 1 : count + 1] - 2 * slope[:, None] * np.arange(1, count + 1)
 
 
 def _derivatives(time: Array, values: Array) -> tuple[Array, Array]:

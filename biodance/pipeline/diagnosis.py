@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from biodance import display
-from biodance.body.body import Body
 from biodance.diagnosis.accept import Residuals, accept, case_fit, gain_by_naming, residuals_of
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
 from biodance.diagnosis.engine import Examined, diagnose_trials, without_names
@@ -23,7 +22,7 @@ from biodance.identification.identification import Identification, identify_body
 from biodance.identification.rival_bodies import expect_unloaded
 from biodance.pipeline.attention import judged_trials, told
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES, SessionIdentification
-from biodance.pipeline.looked_at import Own, left_out, looked_at, looks, own_tolerances
+from biodance.pipeline.looked_at import Own, all_looks, cases_of, left_out, looked_at, looks, own_tolerances
 from biodance.pipeline.results import SessionResult
 from biodance.records import Role, Sip
 from biodance.threads import one_thread
@@ -54,6 +53,8 @@ class SessionDiagnosis:
         What the body in use leaves of the kept trials, and what is left once the findings are accepted.
     failures : mapping
         What could not be computed ("what accepting changes"), with cause and cure.
+    mended : SessionResult or None
+        The copy with its labels exchanged, in which all else was found; None where no labels were mended.
 
     Examples
     --------
@@ -67,6 +68,7 @@ class SessionDiagnosis:
     accepted: Identification | None = None
     left: tuple[Residuals, Residuals] | None = None
     failures: Mapping[str, str] = field(default_factory=dict)
+    mended: SessionResult | None = None
 
     def __repr__(self) -> str:
         return f"SessionDiagnosis({self.diagnosis.told})"
@@ -107,19 +109,39 @@ def diagnose_session(
     reference: SessionIdentification | None = None,
     tolerances: Tolerances | None = None,
     effects: Chosen[Effect | DiscreteEffect] = None,
+    mended: tuple[Gate, ...] = (),
     tell: Callable[[str], None] = lambda _: None,
 ) -> SessionDiagnosis:
     """Return the diagnosis of an examined session, with the gain of every finding on the trials that were kept.
 
     ``reference`` an earlier session of the same person without fault or load: its posterior is then what is known of
     the body; ``tolerances`` as learned by the laboratory; ``effects`` names limit the causes to these, objects
-    (``[MyEffect()]``) join the family.
+    (``[MyEffect()]``) join the family; ``mended`` are the checks of the recordings where ``result`` is of a copy
+    with its labels put right (`with_right_labels`): they are named first.
 
     Where nothing can be judged, the verdict is "unexplained", and the first sentence says "Cannot tell".
     """
     found = _diagnosed(result, reference=reference, tolerances=tolerances, effects=effects, tell=tell)
+    if mended:
+        found = replace(found, diagnosis=_with_mended_labels(found.diagnosis, mended), mended=result)
     used = looked_at(result.trials) if found.examined else ()
     return replace(found, diagnosis=told(found.diagnosis, result, judged_trials(result, used)))
+
+
+def _with_mended_labels(diagnosis: Diagnosis, checks: tuple[Gate, ...]) -> Diagnosis:
+    """Return the diagnosis of a copy with the labels exchanged, these named first."""
+    failed = checks
+    note = (
+        "The labels named were exchanged in a copy, and everything else was found in that copy. "
+        "The recordings themselves are as they were."
+    )
+    return replace(
+        diagnosis,
+        verdict="named, complete" if diagnosis.verdict == "nothing wrong" else diagnosis.verdict,
+        findings=(*(_finding(gate) for gate in failed), *diagnosis.findings),
+        gates=(*failed, *diagnosis.gates),
+        notes=(note, *diagnosis.notes),
+    )
 
 
 def _diagnosed(
@@ -134,7 +156,7 @@ def _diagnosed(
     fitted = looked_at(result.trials)
     tell("checking units, signs, labels and clocks")
     asked = causes(effects)
-    checks = gates(result.session, _cases(result.body, (*fitted, *looks(result.trials, KEPT_ROLES))), chosen=asked)
+    checks = gates(result.session, cases_of(result.body, all_looks(result.trials)), chosen=asked)
     failed = tuple(gate for gate in checks if not gate.ok)
     if result.body is None or not fitted:
         why = f"There is nothing to diagnose. {result.body_source} {_reasons(result)}".strip()
@@ -240,16 +262,6 @@ def _untold(reference: SessionIdentification | None) -> tuple[str, ...]:
     )
 
 
-def _cases(body: Body | None, found: tuple[Look, ...]) -> tuple[Case, ...]:
-    """Return the trials as effects see them, at the rate of the markers, with the table's parameters."""
-    if body is None:
-        return ()
-    return tuple(
-        Case(body, look.trial, look.motion, body.sip.phi, np.linspace(look.start, look.end, look.motion.time.size))
-        for look in found
-    )
-
-
 def _by_checks(checks: tuple[Gate, ...], examined: Examined | None = None) -> Diagnosis:
     """Return the diagnosis of a session in which a check failed: what it found, and nothing built on unmended
     recordings.
@@ -351,7 +363,7 @@ def _pairs(result: SessionResult, phi: np.ndarray, roles: tuple[Role, ...]) -> l
     """Return the cases with the parameters found, and where they came from."""
     assert result.body is not None
     found = looks(result.trials, roles)
-    return list(zip((replace(case, phi=phi) for case in _cases(result.body, found)), found, strict=True))
+    return list(zip((replace(case, phi=phi) for case in cases_of(result.body, found)), found, strict=True))
 
 
 def _changes(before: Identification, after: Identification) -> tuple[str, ...]:

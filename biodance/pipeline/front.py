@@ -11,6 +11,7 @@ from biodance.effects import DiscreteEffect, Effect, causes
 from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import SessionDiagnosis, diagnose_session
 from biodance.pipeline.identification import SessionIdentification, identify_trials
+from biodance.pipeline.mended import with_right_labels
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine, identification_of
 from biodance.records import Session
@@ -138,6 +139,7 @@ def diagnose(
     reference: Earlier | None = None,
     effects: Chosen[Effect | DiscreteEffect | type[Effect | DiscreteEffect]] = None,
     tolerances: Tolerances | None = None,
+    accept: bool = False,
     tell: _Tell = _silent,
 ) -> SessionDiagnosis:
     """Return what the simulation of a visit gets wrong: cause, size, how sure, what else it could be, and what naming
@@ -154,6 +156,8 @@ def diagnose(
         The causes to look for, by name or as objects of your own; by default all.
     tolerances : Tolerances, optional
         Of everything that is no fault, as learned by a laboratory.
+    accept : bool
+        Exchange labels that carry each other's names in a copy, and go on with that (`SessionDiagnosis.mended`).
     tell : callable, optional
         Called with what is being done, in words.
 
@@ -188,7 +192,8 @@ def diagnose(
     asked = causes(effects)
     result = _examined(session, tell)
     before = None if reference is None else _earlier(reference, tell)
-    return diagnose_session(result, reference=before, tolerances=tolerances, effects=asked, tell=tell)
+    result, checks = with_right_labels(result, tell=tell) if accept else (result, ())
+    return diagnose_session(result, reference=before, tolerances=tolerances, effects=asked, mended=checks, tell=tell)
 
 
 def compare_sessions(earlier: Earlier, later: Earlier, *, tell: _Tell = _silent) -> SessionComparison:

@@ -81,6 +81,21 @@ def looked_at(results: tuple[TrialResult, ...]) -> tuple[Look, ...]:
     return moving if sum(map(seconds_of, moving)) >= _ENOUGH else looks(results, ("static", *roles))
 
 
+def all_looks(results: tuple[TrialResult, ...]) -> tuple[Look, ...]:
+    """Return the trials that checks look at: those to look at, and those kept."""
+    return (*looked_at(results), *looks(results, KEPT_ROLES))
+
+
+def cases_of(body: Body | None, found: tuple[Look, ...]) -> tuple[Case, ...]:
+    """Return the trials as effects see them, at the rate of the markers, with the table's parameters."""
+    if body is None:
+        return ()
+    return tuple(
+        Case(body, look.trial, look.motion, body.sip.phi, np.linspace(look.start, look.end, look.motion.time.size))
+        for look in found
+    )
+
+
 def left_out(results: tuple[TrialResult, ...]) -> tuple[str, ...]:
     """Say of every trial that is not looked at, though it should be, why."""
     return tuple(

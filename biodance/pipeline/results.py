@@ -161,8 +161,8 @@ class SessionResult:
 
     @property
     def stopped(self) -> bool:
-        """Whether Ctrl-C ended the run before all trials were done."""
-        return any(step.name == "stop" for trial in self.trials for step in trial.steps)
+        """Whether Ctrl-C ended the run before all was done."""
+        return any(step.name == "stop" for steps in (self.steps, *(t.steps for t in self.trials)) for step in steps)
 
     @property
     def doubts(self) -> tuple[str, ...]:

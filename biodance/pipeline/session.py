@@ -18,7 +18,14 @@ from biodance.records import Session
 from biodance.settings import StandingRules
 from biodance.threads import one_thread
 
-_STOPPED = Step("stop", "refused", "Not done: the run was stopped by Ctrl-C before this trial.")
+
+def stopped_before(result: SessionResult, what: str) -> SessionResult:
+    """Return the result with a step that says that Ctrl-C ended the run before ``what`` was done."""
+    return replace(result, steps=(*result.steps, _stop(what)))
+
+
+def _stop(what: str) -> Step:
+    return Step("stop", "refused", f"Not done: the run was stopped by Ctrl-C before {what}.")
 
 
 @one_thread()
@@ -77,18 +84,18 @@ def examine(
             tell(f"tracking {one.trial.name}")
             results.append(examine_trial(one, body, mass=session.subject.mass))
     except KeyboardInterrupt:
-        results += [TrialResult(one.trial, (*one.steps, _STOPPED), one.gaps) for one in read[len(results) :]]
+        results += [TrialResult(one.trial, (*one.steps, _stop("this trial")), one.gaps) for one in read[len(results) :]]
     done = tuple(replace(result, checks=tuple(trial_checks(result, session.subject.mass))) for result in results)
     standing = attempt(steps, "standing", lambda: best_standing(done))
     identification, limits = None, session.settings.checks
     checks = (*mass_check(session.subject, standing, limits), *standing_check(standing, limits))
     if body is not None and can_identify(done):
         tell("identifying the segments")
-        identification = attempt(
-            steps,
-            "identify",
-            partial(identify_trials, body, done, name=session.folder.name, reference=reference, checks=checks),
-        )
+        work = partial(identify_trials, body, done, name=session.folder.name, reference=reference, checks=checks)
+        try:
+            identification = attempt(steps, "identify", work)
+        except KeyboardInterrupt:
+            steps.append(_stop("the segments were identified"))
     return SessionResult(
         session=session,
         subject=session.subject,

@@ -180,7 +180,7 @@ def examine_trial(read: Prepared, body: Body | None, *, mass: float) -> TrialRes
         )
         return TrialResult(trial, tuple(steps), read.gaps, fit, motion)
     if not trial.marker_set:
-        everything = np.ones(trial.wrench.time.size, dtype=bool)
+        everything = np.asarray(np.isfinite(trial.wrench.value).all(axis=1))
         standing = attempt(steps, "standing", lambda: quiet_standing(trial, everything, None, None))
         return TrialResult(trial, tuple(steps), read.gaps, standing=standing)
     contact = attempt(steps, "contact", lambda: ground_contact(trial, feet(trial, body, motion), mass=mass))

@@ -174,6 +174,8 @@ class Plate:
         Sign, zero, units, corner order: what was decided and why, in sentences.
     zero : array_like
         (3,) N that the EMPTY plate read and that was subtracted, lab frame, as if it acted on the subject.
+    placed : bool
+        Whether the file says where the plate lies; False: ``corners`` only enclose the centres of pressure.
 
     Examples
     --------
@@ -187,6 +189,7 @@ class Plate:
     wrench: Wrench
     decisions: tuple[str, ...] = ()
     zero: Array = field(default_factory=lambda: np.zeros(3))
+    placed: bool = True
 
     def __post_init__(self) -> None:
         corners, zero = (

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from biodance.body.body_file import body_text
+from biodance.errors import BiodanceError
 from biodance.pipeline.attention import identified_trials, session_attention
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.export import BODY, body_of_result
@@ -92,5 +93,12 @@ def _write(folder: Path, files: dict[str, str]) -> None:
     """Write every file under another name first and then rename it, so that a stopped run leaves no half file."""
     for name, text in files.items():
         part = folder / f".{name}.part"
-        part.write_text(text, encoding="utf-8", newline="\n")
-        part.replace(folder / name)
+        try:
+            part.write_text(text, encoding="utf-8", newline="\n")
+            part.replace(folder / name)
+        except OSError as error:
+            part.unlink(missing_ok=True)
+            raise BiodanceError(
+                f"{folder / name}: cannot be written ({error.strerror or error}). Make room or choose another --out, "
+                f"and run again."
+            ) from error

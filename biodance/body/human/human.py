@@ -6,7 +6,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.human.limits import joint_limits
-from biodance.body.human.prior import com_sd, prior
+from biodance.body.human.prior import child_widening, com_sd, is_child, prior
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, generic_skeleton, joint_tree, kind_of, side_of
 from biodance.body.parts import Foot, SegmentMarkers
 from biodance.body.tables.anthropometry import read_table, row_numbers
@@ -156,6 +156,12 @@ def _prior_notes(subject: Subject, table: str) -> tuple[str, ...]:
         notes.append(
             f"Table {table} is of young adults, the subject is {subject.age:.0f} years old; consider "
             f"{', '.join(sorted(groups))}."
+        )
+    if is_child(subject):
+        why = f"{subject.age:.0f} years" if not np.isnan(subject.age) else f"{subject.stature:.2f} m and no age given"
+        notes.append(
+            f"A child ({why}): no table of children has centres of mass and inertias, so those of adults are scaled "
+            f"and their standard deviations are multiplied by {child_widening(subject):.1f} (boys of 12, Jensen 1986)."
         )
     return tuple(notes)
 

@@ -121,8 +121,34 @@ def prior(reference: Reference, skeleton: Skeleton, subject: Subject) -> Sip:
         for name in measured_whole()
         if name != reference.table
     )
-    covariance = jacobian @ primitive_covariance(lumps, skeleton, others) @ jacobian.T
+    covariance = child_widening(subject) ** 2 * (jacobian @ primitive_covariance(lumps, skeleton, others) @ jacobian.T)
     return Sip(SEGMENTS, np.concatenate([inertial_parameters(lump) for lump in lumps]), (covariance + covariance.T) / 2)
+
+
+CHILD_AGE, CHILD_STATURE = 18.0, 1.50
+"""years, m: below, a person is a child; the stature counts where the age is not known (1.50 m: one adult woman in
+twenty is smaller, ANSUR II 2012)."""
+
+
+def is_child(subject: Subject) -> bool:
+    """Return whether age, or the stature of somebody whose age is not known, says child."""
+    return subject.stature < CHILD_STATURE if np.isnan(subject.age) else subject.age < CHILD_AGE
+
+
+def child_widening(subject: Subject) -> float:
+    """Return by how much the standard deviations of the adult tables are multiplied for a person: 1 for an adult.
+
+    For a child it is what makes the table's masses and those of boys of 12 years (Jensen 1986, J. Biomech. 19,
+    359-368) differ by one standard deviation in the root mean square over the segments: no
+    table here holds centres of mass and inertias of children.
+    """
+    if not is_child(subject):
+        return 1.0
+    adult, boy = reference("de_leva_1996", MAN), study_masses("jensen_1986_12y", MAN)
+    limbs = ("thigh", "shank", "foot", "upper_arm", "forearm_hand")
+    apart = np.array([boy[kind] / adult.segments[kind].mass - 1.0 for kind in limbs])
+    spread = np.array([table_spread(kind).mass for kind in limbs])
+    return float(max(1.0, np.sqrt(np.mean((apart**2 + spread**2) / spread**2))))
 
 
 def scaled_lumps(reference: Reference, skeleton: Skeleton, subject: Subject) -> tuple[RigidInertia, ...]:

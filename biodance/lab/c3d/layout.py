@@ -29,7 +29,8 @@ class Layout:
     none).
 
     ``scale`` turns integer points into file units; ``gain`` (C,) and ``offset`` (C,) turn analog numbers into units:
-    ``(number - offset) * gain``; ``notes`` say in sentences what was decided.
+    ``(number - offset) * gain``; ``notes`` say in sentences how contradictions were decided, ``remarks`` what is
+    missing.
     """
 
     processor: int
@@ -47,6 +48,7 @@ class Layout:
     gain: NDArray[Any]
     offset: NDArray[Any]
     notes: tuple[str, ...]
+    remarks: tuple[str, ...] = ()
 
 
 def parameter_numbers(parameters: Parameters, group: str, name: str) -> NDArray[Any]:
@@ -89,10 +91,13 @@ def read_layout(size: int, header: Header, parameters: Parameters, where: str) -
     start, points, channels, samples, frames = _counts(size, header, parameters, 4 if floating else 2, where, notes)
     rate, analog_rate = _rates(header, parameters, samples if channels else 0, notes)
     unsigned = "UNSIGNED" in (text.upper() for text in texts(parameters, "ANALOG", "FORMAT"))
-    gain, offset = _analog_transform(parameters, channels, unsigned, where)
+    remarks: list[str] = []
+    gain, offset = _analog_transform(parameters, channels, unsigned, where, remarks)
     first = _first_frame(header, parameters, frames, notes)
     kind = (floating, unsigned, abs(scale), rate, analog_rate, gain, offset)
-    return Layout(header.processor, start, points, channels, samples, frames, first, *kind, tuple(notes))
+    return Layout(
+        header.processor, start, points, channels, samples, frames, first, *kind, tuple(notes), tuple(remarks)
+    )
 
 
 def _agreed_scale(header: Header, parameters: Parameters, where: str) -> float:
@@ -242,20 +247,36 @@ def _rates(header: Header, parameters: Parameters, samples: int, notes: list[str
 
 
 def _analog_transform(
-    parameters: Parameters, channels: int, unsigned: bool, where: str
+    parameters: Parameters, channels: int, unsigned: bool, where: str, notes: list[str]
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return gain (C,) and offset (C,) of the analog channels."""
+    """Return gain (C,) and offset (C,) of the analog channels; a channel without a scale has gain NaN, and so no
+    numbers.
+    """
     general, gain, offset = (parameter_numbers(parameters, "ANALOG", name) for name in ("GEN_SCALE", "SCALE", "OFFSET"))
-    needed = {"GEN_SCALE": (general, min(1, channels)), "SCALE": (gain, channels), "OFFSET": (offset, channels)}
-    for name, (values, count) in needed.items():
-        if values.size < count or not np.all(np.isfinite(values[:count])):
-            raise FileRefused(
-                f"{where}: ANALOG:{name} has {values.size} usable values for {channels} channels: the numbers have no "
-                f"scale. {RESAVE}"
-            )
-    gain = gain[:channels] * (general[0] if channels else 1.0)
-    offset = np.array(offset[:channels], dtype=float)
+    if channels and not general.size:
+        general = np.ones(1)
+        notes.append("ANALOG:GEN_SCALE is missing; it was taken as 1, the channels' own SCALE stays.")
+    if channels and not np.isfinite(general[:1]).all():
+        raise FileRefused(f"{where}: ANALOG:GEN_SCALE is not a number: no channel has a scale. {RESAVE}")
+    filled = []
+    for name, values, usual in (("SCALE", gain, np.nan), ("OFFSET", offset, 0.0)):
+        whole = np.full(channels, usual)
+        held = np.array(values[:channels], dtype=float)
+        whole[: held.size] = np.where(np.isfinite(held), held, np.nan)
+        filled.append(whole)
+        lacking = [str(c + 1) for c in np.flatnonzero(np.isnan(whole))] + [
+            str(c + 1) for c in range(held.size, channels)
+        ]
+        if lacking:
+            how = "have no numbers" if name == "SCALE" else "have the offset 0"
+            notes.append(f"ANALOG:{name} has {held.size} values for {channels} channels: {_listed(lacking)} {how}.")
+    gain, offset = filled[0] * (general[0] if channels else 1.0), filled[1]
     return gain, np.where((offset < 0) & unsigned, offset + 65536, offset)
+
+
+def _listed(channels: list[str]) -> str:
+    """Return channel numbers for a sentence, each once."""
+    return f"channels {', '.join(dict.fromkeys(channels))}"
 
 
 def _first_frame(header: Header, parameters: Parameters, frames: int, notes: list[str]) -> int:

@@ -22,6 +22,7 @@ PROCESSORS = {INTEL: "Intel", DEC: "DEC", MIPS: "SGI/MIPS"}
 _SCALES, RATES = (1e-9, 1e6), (1e-3, 1e6)
 """Believable magnitudes of the header's scale and rate (Hz): numbers of the wrong processor type are outside by far."""
 
+RESAVE_IT = "export the trial again from the recording software."
 RESAVE = "Export the trial again from the recording software, or copy the file again from its source."
 
 ParameterValue = NDArray[Any] | list[str]
@@ -142,14 +143,52 @@ def read_parameters(content: bytes, header: Header, where: str) -> Parameters:
             break
     groups: dict[str, dict[str, ParameterValue]] = {name: {} for name in names.values()}
     for group, name, value in records:
-        if group not in names:
+        known = groups.setdefault(names.get(group, f"GROUP {group}"), {})
+        if name in known and not _same(known[name], value):
             raise FileRefused(
-                f"{where}: parameter {name} belongs to group number {group}, which the file does not define. {RESAVE}"
+                f"{where}: parameter {names.get(group, group)}:{name} is there twice, as {_short(known[name])} and as "
+                f"{_short(value)}. Delete the wrong one, for example in Mokka or with ezc3d, or {RESAVE_IT}"
             )
-        if name in groups[names[group]]:
-            raise FileRefused(f"{where}: parameter {names[group]}:{name} is there twice. {RESAVE}")
-        groups[names[group]][name] = value
+        known[name] = value
     return MappingProxyType({name: MappingProxyType(group) for name, group in groups.items()})
+
+
+def _same(one: ParameterValue, other: ParameterValue) -> bool:
+    if isinstance(one, list) or isinstance(other, list):
+        return isinstance(one, list) and isinstance(other, list) and one == other
+    return one.dtype.kind == other.dtype.kind and np.array_equal(one, other)
+
+
+def _short(value: ParameterValue) -> str:
+    return ", ".join(str(one) for one in (value if isinstance(value, list) else np.ravel(value, order="F"))[:4])
+
+
+def text_rows(content: bytes, header: Header, where: str, *, group: str, name: str) -> list[tuple[int, int]]:
+    """Return byte position and width of every string of the text parameter ``group``:``name`` and its continuations
+    NAME2, NAME3 ...
+
+    Raises
+    ------
+    FileRefused
+        As `read_parameters`.
+    """
+    numbers: dict[int, str] = {}
+    found: list[tuple[int, int, bytes]] = []
+    section, at = content[: header.data_start], header.parameter_start + 4
+    while at and at + 2 <= header.data_start and section[at] != 0 and section[at + 1] != 0:
+        here = at
+        at, number, word, value = _record(section, here, header.processor, where)
+        if value is None:
+            numbers[number] = word
+        elif isinstance(value, list) and word.rstrip("0123456789") == name:
+            first = here + 2 + abs(int(np.int8(np.uint8(section[here])))) + 2
+            found.append((number, first, section[first : first + 2 + section[first + 1]]))
+    rows = []
+    for number, first, head in found:
+        if numbers.get(number) == group and head[1] >= 1:
+            width, count = head[2], math.prod(head[3:])
+            rows += [(first + len(head) + i * width, width) for i in range(count)]
+    return rows
 
 
 def _record(section: bytes, at: int, processor: int, where: str) -> tuple[int, int, str, ParameterValue | None]:
@@ -171,9 +210,16 @@ def _record(section: bytes, at: int, processor: int, where: str) -> tuple[int, i
         raise damaged
     end += 1 + section[end]
     following = body + offset if offset else 0
+    if processor == MIPS and following > len(section) and body + _swapped(offset) == end:
+        following = 0 if not any(section[end:]) else end
     if end > len(section) or (following and not (end <= following <= len(section) and not any(section[end:following]))):
         raise damaged
     return following, abs(group), name, value
+
+
+def _swapped(word: int) -> int:
+    """Return a 16-bit word with its bytes exchanged: some software writes the last pointer of a MIPS file so."""
+    return (word >> 8) | ((word & 0xFF) << 8)
 
 
 def _value(section: bytes, at: int, processor: int, damaged: FileRefused) -> tuple[ParameterValue, int]:

@@ -130,7 +130,7 @@ def read_raw(path: str | Path) -> RawC3d:
         analog_units=_fit(texts(parameters, "ANALOG", "UNITS"), layout.channels),
         analog_rate=layout.analog_rate,
         parameters=parameters,
-        warnings=(*layout.notes, *smells),
+        warnings=(*layout.notes, *layout.remarks, *smells),
     )
 
 

@@ -26,6 +26,7 @@ raised.
 PLATE = 0.6
 """m, the longest side of a force plate: 0.4 m to 1.2 m in the makers' sheets."""
 
+_CORNERS = ("FORCE_PLATFORM", "CORNERS")
 BELIEVABLE = (0.05, 4.75)
 """Extents, m, that a declared unit may give: the markers on a hand, a person who lies or leaps; outside it is
 overruled.
@@ -50,6 +51,8 @@ def metres_per_unit(
     size, expected, what = _size(parameters, points)
     if unit and (math.isnan(size) or BELIEVABLE[0] <= size * _METRES[unit] <= BELIEVABLE[1]):
         return _METRES[unit], (f"Lengths are in {unit} (POINT:UNITS).",), ()
+    if math.isnan(size) and not np.isfinite(points).any() and not parameter_numbers(parameters, *_CORNERS).size:
+        return _METRES["mm"], ("The file holds no lengths, so its unit of length does not matter.",), ()
     if math.isnan(size):
         raise FileRefused(
             f"{where}: POINT:UNITS is {written!r} and neither markers nor plates tell the unit of length (mm, cm or "
@@ -69,7 +72,7 @@ def _size(parameters: Parameters, points: Array) -> tuple[float, float, str]:
         extent = float(np.median((np.nanmax(frames, axis=1) - np.nanmin(frames, axis=1)).max(axis=1)))
         if 0 < extent < math.inf:
             return extent, PERSON, "a cloud of markers"
-    corners = parameter_numbers(parameters, "FORCE_PLATFORM", "CORNERS")
+    corners = parameter_numbers(parameters, *_CORNERS)
     if corners.size >= 12 and np.isfinite(corners).all():
         longest = float(np.linalg.norm(np.diff(corners[:12].reshape(4, 3), axis=0), axis=1).max())
         if 0 < longest < math.inf:

@@ -4,13 +4,23 @@ import re
 
 import numpy as np
 
+from biodance.errors import FileRefused
 from biodance.lab.c3d.layout import parameter_numbers, texts
 from biodance.lab.c3d.raw import RawC3d
 from biodance.lab.markers.sets import landmark, recognise
+from biodance.lab.plates.corners import is_rectangle
 from biodance.records import Array, Markers
 
 UPPER = ("head_front", "head_back", "c7", "jugular_notch", "mid_psis", "right_asis", "left_asis")
 LOWER = ("right_heel", "left_heel", "right_toe", "left_toe", "right_ankle_lateral", "left_ankle_lateral")
+_HIGH = re.compile(
+    r"head|[fb]hd|^hd|nasion|sellion|c7|clav|acr|sho(u|$)|asis?$|psis?$|[_.]?i[ap]s$|sacr", re.IGNORECASE
+)
+_DEEP = re.compile(r"hee|calc|cal[0-9]?$|toe|hallux|ank|mal|mt[p0-9]|foot|^[lr][lm]m$|f[cm][ac]|fm[125]", re.IGNORECASE)
+"""What labels of the upper and of the lowest part of the body are called in sets that nobody described."""
+_CLOUD = 6
+"""Markers that show how a body lies."""
+_LONGER = 1.5
 _AXES = "XYZ"
 _CLEAR = 2.0
 """A direction counts if its largest component is so many times the others."""
@@ -35,6 +45,8 @@ def turn_to_z_up(raw: RawC3d, markers: Markers | None) -> tuple[Array, tuple[str
         chosen, by = declared, "POINT:Y_SCREEN"
     else:
         chosen, by = np.array([0.0, 0.0, 1.0]), ""
+    if not by:
+        _refuse_lying(markers, raw)
     history = [
         f"Up is {_name(chosen)} in the file, as {by} {'say' if by != 'POINT:Y_SCREEN' else 'says'}."
         if by
@@ -52,6 +64,24 @@ def turn_to_z_up(raw: RawC3d, markers: Markers | None) -> tuple[Array, tuple[str
     if not np.array_equal(turn, np.eye(3)):
         history.append(f"Everything was turned so that z points up: {_name(chosen)} of the file became +Z.")
     return turn, tuple(history), tuple(warnings)
+
+
+def _refuse_lying(markers: Markers | None, raw: RawC3d) -> None:
+    """Refuse a file in which nothing says which way is up and the markers are far longer along x or y than along z."""
+    if markers is None or len(markers.names) < _CLOUD:
+        return
+    frames = markers.xyz[markers.seen.sum(axis=1) >= _CLOUD]
+    if not len(frames):
+        return
+    extent = np.median(np.nanmax(frames, axis=1) - np.nanmin(frames, axis=1), axis=0)
+    longest = int(np.argmax(extent))
+    if longest != 2 and extent[longest] > _LONGER * extent[2]:
+        raise FileRefused(
+            f"{raw.path}: nothing says which way is up (no plates, no POINT:Y_SCREEN, no labels of head and feet), and "
+            f"along {_AXES[longest]} the markers are {extent[longest] / extent[2]:.1f} times as long as along Z. Write "
+            f"the upward axis into POINT:Y_SCREEN (for example +{_AXES[longest]}), or name the markers' set with "
+            f"--markers FILE."
+        )
 
 
 def _name(axis: Array) -> str:
@@ -80,13 +110,13 @@ def _declared(raw: RawC3d, markers: Markers | None) -> Array | None:
 
 def _floor(raw: RawC3d, markers: Markers | None) -> Array | None:
     """Return the normal of the plates on the side of the markers; None without plates that lie in a coordinate
-    plane.
+    plane. Corners that make no plate have no vote.
     """
     corners = parameter_numbers(raw.parameters, "FORCE_PLATFORM", "CORNERS")
-    count = int(corners.size // 12)
-    if not count or not np.isfinite(corners).all():
+    plates = corners[: corners.size // 12 * 12].reshape(-1, 4, 3)
+    plates = plates[[is_rectangle(one) for one in plates]]
+    if not len(plates):
         return None
-    plates = corners[: 12 * count].reshape(count, 4, 3)
     normals = np.abs(np.cross(plates[:, 1] - plates[:, 0], plates[:, 3] - plates[:, 0])).sum(axis=0)
     axis = _axis(normals)
     if axis is None or markers is None or not markers.seen.any():
@@ -100,10 +130,14 @@ def _body(markers: Markers | None) -> Array | None:
     """Return the axis from the feet to the head or pelvis in most frames; None if the labels or the posture do not
     tell it.
     """
-    found = recognise(markers.names) if markers is not None else None
-    if markers is None or found is None:
+    if markers is None:
         return None
-    ends = [[p for name in names if (p := landmark(markers, found, name)) is not None] for names in (UPPER, LOWER)]
+    found = recognise(markers.names)
+    ends = [
+        [p for name in names if found and (p := landmark(markers, found, name)) is not None] for names in (UPPER, LOWER)
+    ]
+    if not all(ends):
+        ends = [[markers[name] for name in markers.names if words.search(name)] for words in (_HIGH, _DEEP)]
     if not all(ends):
         return None
     top, bottom = (np.concatenate(points) for points in ends)

@@ -70,7 +70,8 @@ def plates_of(table: TimeTable, *, where: str) -> tuple[tuple[Plate, ...], tuple
             "The file does not say where the plate lies: its corners enclose the centres of pressure under "
             "load with 0.15 m to spare."
         )
-        plates.append(Plate(f"plate{number}", 0, _rectangle(cop), wrench, (f"Columns of {name}.", *decided, corners)))
+        said = (f"Columns of {name}.", *decided, corners)
+        plates.append(Plate(f"plate{number}", 0, _rectangle(cop), wrench, said, placed=False))
     return tuple(plates), tuple(history)
 
 

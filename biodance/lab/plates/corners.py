@@ -7,6 +7,7 @@ from biodance.records import Array
 
 SHORTEST_SIDE, LONGEST_SIDE = 0.2, 2.0  # m
 NOT_CLOSED, CROOKED = 0.02, 0.005  # m: refused from here on; worth a sentence from here on
+_UNEVEN = 0.1  # share of the shortest side by which a rectangle may miss its closure
 _STEEPEST = 0.7  # the plate's normal must have at least this vertical share (45 degrees)
 SWAPS = {(0, 1, 3, 2): "3 and 4 (or 1 and 2)", (0, 2, 1, 3): "2 and 3 (or 1 and 4)"}
 _UNITS = {"m": 1.0, "mm": 0.001}
@@ -57,6 +58,18 @@ def corners_in_lab(corners: Array, *, metres: float, turn: Array) -> tuple[Array
             f"corners and lab axes."
         )
     return lab, tuple(decisions)
+
+
+def is_rectangle(corners: Array) -> bool:
+    """Return whether corners (4, 3), in any unit and axes, make a closed rectangle with sides of similar length."""
+    if not np.isfinite(corners).all():
+        return False
+    sides = np.roll(corners, -1, axis=0) - corners
+    lengths = np.linalg.norm(sides, axis=1)
+    if not lengths.min() * LONGEST_SIDE > SHORTEST_SIDE * lengths.max() > 0 or sides[0] @ sides[2] >= 0:
+        return False
+    gap = float(np.linalg.norm(corners[0] - corners[1] + corners[2] - corners[3]))
+    return max(gap, _skew(corners)) < _UNEVEN * float(lengths.min())
 
 
 def plate_axes(corners: Array) -> Array:

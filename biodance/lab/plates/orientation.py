@@ -2,13 +2,15 @@
 witnesses.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from biodance.errors import TrialRefused
 from biodance.lab.plates.corners import half_sides, plate_axes
-from biodance.lab.plates.signals import PlateReading
+from biodance.lab.plates.signals import LEAST_BESIDE, PlateReading
 from biodance.lab.plates.signs import gravity_sign, sway_sign
-from biodance.lab.plates.wrench import centre_of_pressure, wrench_in_lab
+from biodance.lab.plates.wrench import FOUR_SENSORS, centre_of_pressure, wrench_in_lab
 from biodance.records import Array, Markers, Plate, Wrench
 
 LOW = 0.15  # m above the surface: markers of a standing foot, ankle included
@@ -65,6 +67,7 @@ def oriented(
         The corners contradict the recorded forces and the markers do not decide between the two possible corrections.
     """
     axes = plate_axes(reading.corners)
+    reading, moved = _origin_under_feet(reading, time, axes, markers)
     wrench, said = reading.at_surface(axes)
     sign = gravity_sign(wrench, axes, reading.rate)
     sway = sway_sign(wrench, reading.rate) if alone and sign else 0
@@ -83,10 +86,31 @@ def oriented(
         axes, checked, warned = _under_feet(reading, wrench, time, axes, markers)
         said, warnings = (*said, *checked), (*warnings, *warned)
     value = wrench_in_lab(wrench, axes, sign or otherwise, reading.corners.mean(axis=0))
-    decisions = (*reading.decisions, *said, _sign_said(sign, otherwise))
+    value[~reading.known] = np.nan
+    decisions = (*reading.decisions, *moved, *said, _sign_said(sign, otherwise))
     zero = (sign or otherwise) * axes @ reading.empty
     plate = Plate(reading.plate.name, reading.plate.type, reading.corners, Wrench(time, value), decisions, zero)
-    return plate, (*reading.warnings, *warnings)
+    return plate, (*reading.warnings, *(f"Plate {reading.plate.number}: {one}" for one in moved), *warnings)
+
+
+def _origin_under_feet(
+    reading: PlateReading, time: Array, axes: Array, markers: Markers | None
+) -> tuple[PlateReading, Said]:
+    """Return the reading with ORIGIN x, y turned round where only that puts the load under the feet, and what was
+    decided.
+    """
+    x, y = 1000 * reading.vector[:2]
+    if markers is None or reading.plate.type in FOUR_SENSORS or np.hypot(x, y) < 1000 * LEAST_BESIDE:
+        return reading, ()
+    other = replace(reading, vector=reading.vector * np.array([-1.0, -1.0, 1.0]))
+    written, turned = (_distance(one, time, axes, markers) for one in (reading, other))
+    if written is None or turned is None or written <= NOT_UNDER or turned > UNDER_THE_FOOT:
+        return reading, ()
+    said = (
+        f"ORIGIN x, y of ({x:.4g}, {y:.4g}) mm put the load {written:.2f} m from the feet that the markers show, "
+        f"turned round {turned:.2f} m: they were turned."
+    )
+    return other, (said,)
 
 
 def _unmirrored(reading: PlateReading, time: Array, axes: Array, markers: Markers | None) -> tuple[Array, str]:

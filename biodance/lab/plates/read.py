@@ -13,10 +13,10 @@ from biodance.lab.plates.signals import PlateReading, read_plate_signals
 from biodance.lab.plates.signs import gravity_sign
 from biodance.lab.weight import movement, steady_mass
 from biodance.records import Array, Markers, Plate, Wrench
-from biodance.settings import StandingRules
+from biodance.settings import TOUCH_FORCE, CheckLimits, StandingRules
 
-OFF_WEIGHT = 0.05  # share of the declared mass from which on the weight on the plates is worth a warning
 AS_POUNDS = 0.03
+STUCK = 2e-3  # share of its mean by which the vertical of a loaded plate varies at least, whoever moves on it
 
 ReadPlates = tuple[tuple[Plate, ...], tuple[str, ...]]
 
@@ -49,8 +49,9 @@ def read_plates(
             f"The file declares {count} force plates but {lacks}: no plate was read. Export it with the analog data.",
         )
     readings, refused = _readings(raw, count, metres, np.eye(3) if turn is None else turn)
+    readings, stuck = _alive(readings, markers)
     plates, said = _oriented(readings, _time(raw, markers), markers)
-    return plates, (*warnings, *refused, *said, *_weight_said(plates, markers, body_mass))
+    return plates, (*warnings, *refused, *stuck, *said, *_weight_said(plates, markers, body_mass))
 
 
 def total_wrench(plates: tuple[Plate, ...]) -> Wrench:
@@ -76,6 +77,39 @@ def _readings(raw: RawC3d, count: int, metres: float, turn: Array) -> tuple[list
     return readings, refused
 
 
+def _alive(readings: list[PlateReading], markers: Markers | None) -> tuple[list[PlateReading], list[str]]:
+    """Return the readings without plates that carry the same load for the whole trial, though the person moves; a
+    sentence for each of these.
+    """
+    alive, said = [], []
+    moves = markers is not None and movement(markers) > StandingRules.still
+    for reading in readings:
+        vertical = reading.sensor[reading.known, 2]
+        mean, spread = float(vertical.mean()), float(vertical.std())
+        if not (moves and abs(mean) > TOUCH_FORCE and spread < STUCK * abs(mean)):
+            alive.append(reading)
+            continue
+        wires = ", ".join(str(c + 1) for c in reading.plate.channels)
+        stuck = TrialRefused(
+            f"it reads a constant {mean:.0f} N (± {spread:.2g} N) while the person moves: a stuck or unplugged "
+            f"channel, or a plate whose zero was never set. Check channels {wires}."
+        )
+        said.append(_left_out(reading.plate.number, stuck))
+    return alive, said
+
+
+def _two_signs(readings: list[PlateReading], votes: list[float]) -> tuple[str, ...]:
+    """Say that some plates of the file hold the reaction and others the load."""
+    by = {sign: [str(r.plate.number) for r, v in zip(readings, votes, strict=True) if v == sign] for sign in (1, -1)}
+    if not (by[1] and by[-1]):
+        return ()
+    return (
+        f"Two signs in one laboratory: along the same direction plate {', '.join(by[1])} holds the force up and plate "
+        f"{', '.join(by[-1])} the force down; each was turned so that weight points up, its shear with it. If only Fz "
+        f"of one plate has the wrong sign, its shear is now wrong: check cabling and software.",
+    )
+
+
 def _oriented(readings: list[PlateReading], time: Array, markers: Markers | None) -> ReadPlates:
     """Return the plates in the lab frame; an unloaded plate takes the sign of the majority, +1 (reaction) if nobody
     stood on any.
@@ -84,7 +118,7 @@ def _oriented(readings: list[PlateReading], time: Array, markers: Markers | None
     signs = [gravity_sign(r.at_surface(a)[0], a, r.rate) for r, a in zip(readings, axes, strict=True)]
     # the sign belongs to the plate's z: a plate whose z points the other way has the other sign
     votes = [sign * np.sign(a[2, 2]) for sign, a in zip(signs, axes, strict=True)]
-    plates, warnings = [], []
+    plates, warnings = [], [*_two_signs(readings, votes)]
     for reading, sign, a in zip(readings, signs, axes, strict=True):
         otherwise = int(np.sign(sum(votes)) * np.sign(a[2, 2])) or 1
         alone = bool(sign) and sum(map(abs, signs)) == 1
@@ -112,7 +146,7 @@ def _weight_said(plates: tuple[Plate, ...], markers: Markers | None, body_mass: 
     """Return a warning if the weight in quiet standing contradicts the declared mass."""
     walks = markers is not None and movement(markers) > StandingRules.still
     mass = steady_mass(total_wrench(plates)) if plates and not walks else None
-    if mass is None or body_mass is None or not body_mass > 0 or abs(mass / body_mass - 1) <= OFF_WEIGHT:
+    if mass is None or body_mass is None or not body_mass > 0 or abs(mass / body_mass - 1) <= CheckLimits.mass / 100:
         return ()
     said = f"The plates carry {mass:.2f} kg in quiet standing, {body_mass:.2f} kg are declared"
     for factor, meaning in ((POUND, "newton declared as pounds"), (1 / POUND, "pounds declared as newton")):

@@ -5,6 +5,7 @@ the recorded sign.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.errors import TrialRefused
 from biodance.lab.c3d.raw import RawC3d
@@ -20,13 +21,15 @@ from biodance.lab.plates.wrench import (
     surface_vector,
 )
 from biodance.lab.plates.zero import find_baseline
-from biodance.records import Array
+from biodance.records import CHANNELS, Array
 from biodance.spatial import wrench_about_point
 
 _EDGE = 0.02  # m by which a centre of pressure may lie beyond the edge
 INSIDE = 0.8  # share of the loaded samples that must lie on the plate
 STILLEST = 0.0015  # m: nobody's centre of pressure stays this close to the plate's centre
 FARTHEST_ORIGIN, CLOSEST_SENSORS = 2.0, 0.05  # m
+LEAST_BESIDE = 0.02  # m: sensors so near to the middle of the surface cannot be told to lie on its other side
+STRONGEST = np.array([30e3, 30e3, 30e3, 30e3, 30e3, 30e3])  # N, N·m: beyond the range of every maker's plate
 MOMENT_UNITS = (1.0, 1000.0, 0.001)
 
 
@@ -37,7 +40,8 @@ class PlateReading:
 
     ``vector`` (3,) m from there to the centre of the surface as the file says; ``corners`` (4, 3) m lab; ``rate`` Hz of
     the samples; ``empty`` (3,) N is the force that the empty plate read and that was subtracted, plate axes, sign as
-    recorded.
+    recorded; ``known`` (S,) False where a channel holds no number (``sensor`` then keeps the nearest known sample, for
+    decisions only).
     """
 
     plate: PlateParameters
@@ -48,6 +52,7 @@ class PlateReading:
     decisions: tuple[str, ...]
     warnings: tuple[str, ...]
     empty: Array
+    known: NDArray[np.bool_]
 
     def at_surface(self, axes: Array) -> tuple[Array, tuple[str, ...]]:
         """Return the wrench (S, 6) about the centre of the surface in plate axes, and what was decided, for
@@ -68,7 +73,7 @@ def read_plate_signals(raw: RawC3d, plate: PlateParameters, *, metres: float, tu
     corners, placed = corners_in_lab(plate.corners, metres=metres, turn=turn)
     origin, origin_said = _origin(plate, half_sides(corners), metres)
     channels = np.asarray(raw.analog[:, plate.channels], dtype=float)
-    _refuse_gaps(channels, plate)
+    channels, known, gaps_said = _without_gaps(channels, plate)
     units = tuple(raw.analog_units[c] for c in plate.channels)
     factors, unit_said = unit_factors(plate, units, metres=metres)
     vertical = (calibrated(plate, channels) * factors)[
@@ -79,13 +84,15 @@ def read_plate_signals(raw: RawC3d, plate: PlateParameters, *, metres: float, tu
     signals = calibrated(plate, channels - offsets) * factors
     sensor, vector = sensor_wrench(plate, signals, origin), surface_vector(plate, origin)
     empty = sensor_wrench(plate, calibrated(plate, offsets[None]) * factors, origin)[0, :3]
+    vector, turned = _beside(plate, sensor, vector, corners, raw.analog_rate)
     sensor, sense, warnings = _moments_in_sense(
         plate, sensor, vector, corners, rate=raw.analog_rate, unsure=len(unit_said) > 1
     )
+    _refuse_impossible(plate, sensor)
     first = f"TYPE {plate.type}, analog channels {', '.join(str(c + 1) for c in plate.channels)}."
-    said = (first, *placed, *origin_said, *unit_said, *sense, zero.said)
-    odd = tuple(f"Plate {plate.number}: {sentence}" for sentence in (*placed, *origin_said))
-    return PlateReading(plate, corners, sensor, vector, raw.analog_rate, said, (*odd, *warnings), empty)
+    said = (first, *placed, *origin_said, *turned, *unit_said, *gaps_said, *sense, zero.said)
+    odd = tuple(f"Plate {plate.number}: {sentence}" for sentence in (*placed, *origin_said, *turned, *gaps_said))
+    return PlateReading(plate, corners, sensor, vector, raw.analog_rate, said, (*odd, *warnings), empty, known)
 
 
 def _at_surface(plate: PlateParameters, sensor: Array, vector: Array, axes: Array) -> tuple[Array, tuple[str, ...]]:
@@ -132,13 +139,70 @@ def _makes_sense(plate: PlateParameters, origin: Array, half: Array) -> bool:
     return plate.type not in FOUR_SENSORS or bool((beside >= CLOSEST_SENSORS).all() and (beside <= half + _EDGE).all())
 
 
-def _refuse_gaps(channels: Array, plate: PlateParameters) -> None:
-    if not np.isfinite(channels).all():
-        sample, column = np.argwhere(np.logical_not(np.isfinite(channels)))[0]
+def _without_gaps(channels: Array, plate: PlateParameters) -> tuple[Array, NDArray[np.bool_], tuple[str, ...]]:
+    """Return the channels with the nearest known sample where one is no number, where all are known, and what was
+    masked.
+
+    Raises TrialRefused where nothing is known.
+    """
+    known = np.asarray(np.isfinite(channels).all(axis=1))
+    if known.all():
+        return channels, known, ()
+    sample, column = np.argwhere(np.logical_not(np.isfinite(channels)))[0]
+    where = f"analog channel {plate.channels[column] + 1} is not a number at sample {sample + 1}"
+    if not known.any():
         raise TrialRefused(
-            f"analog channel {plate.channels[column] + 1} is not a number at sample {sample + 1}. Export the file "
-            f"again."
+            f"{where}, and no sample of the plate is whole. Check the channel in the recording software."
         )
+    whole = np.flatnonzero(known)
+    between = np.searchsorted((whole[1:] + whole[:-1]) / 2, np.arange(known.size))
+    said = f"{int((~known).sum())} of {known.size} samples are unknown, the first: {where}; they are masked."
+    return channels[whole[between]], known, (said,)
+
+
+def _refuse_impossible(plate: PlateParameters, sensor: Array) -> None:
+    """Refuse a plate that reads what no plate measures: TrialRefused names channel and value."""
+    largest = np.abs(sensor).max(axis=0, initial=0.0)
+    worst = int(np.argmax(largest / STRONGEST))
+    if largest[worst] > STRONGEST[worst]:
+        raise TrialRefused(
+            f"{CHANNELS[worst]} reads up to {largest[worst]:.3g} {'N' if worst < 3 else 'N·m'}; no plate measures more "
+            f"than {STRONGEST[worst]:g}. Check the channels {', '.join(str(c + 1) for c in plate.channels)}, their "
+            f"ANALOG:SCALE and units."
+        )
+
+
+def _beside(
+    plate: PlateParameters, sensor: Array, vector: Array, corners: Array, rate: float
+) -> tuple[Array, tuple[str, ...]]:
+    """Return the vector sensor -> surface centre with x and y turned where only that puts the load on the plate, and
+    what was decided.
+
+    Treadmills write ORIGIN from the surface centre to the sensor (x, y up to 1 m); z has a test of its own
+    (`sensor_below`).
+    """
+    other = vector * np.array([-1.0, -1.0, 1.0])
+    if plate.type in FOUR_SENSORS or np.hypot(vector[0], vector[1]) < LEAST_BESIDE:
+        return vector, ()
+    loaded = loaded_samples(sensor, rate)
+    if not loaded.any():
+        return vector, ()
+    axes, half = plate_axes(corners), half_sides(corners)
+    written, turned = (
+        _share_on(centre_of_pressure(_at_surface(plate, sensor[loaded], way, axes)[0]), half) for way in (vector, other)
+    )
+    if turned < INSIDE or written >= INSIDE:
+        return vector, ()
+    said = (
+        f"ORIGIN x, y of ({1000 * vector[0]:.4g}, {1000 * vector[1]:.4g}) mm put {100 * written:.0f} % of the load on "
+        f"the plate, turned round {100 * turned:.0f} %: they were turned."
+    )
+    return other, (said,)
+
+
+def _share_on(point: Array, half: Array) -> float:
+    """Return the share of points (S, 2) m that lie on the plate."""
+    return float((np.abs(point) <= half + _EDGE).all(axis=1).mean())
 
 
 def _vertical(plate: PlateParameters, forces: Array) -> Array:
@@ -173,7 +237,7 @@ def _moments_in_sense(
     for factor in factors:
         tried = sensor * np.array([1, 1, 1, factor, factor, factor])
         point = centre_of_pressure(_at_surface(plate, tried, vector, axes)[0][loaded])
-        on_it = float((np.abs(point) <= half + _EDGE).all(axis=1).mean())
+        on_it = _share_on(point, half)
         lives = float(np.percentile(np.abs(centre_of_pressure(tried[loaded])).max(axis=1), 90)) > STILLEST
         share[factor] = (on_it, on_it >= INSIDE and lives)
     good = [factor for factor in factors if share[factor][1]]

@@ -1,6 +1,8 @@
 """OpenSim's table of markers, with the forces in a table of the same stem beside it."""
 
+import re
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 from biodance.errors import FileRefused
@@ -17,6 +19,9 @@ EXTENSIONS = (".trc",)
 PREFERENCE = 10
 FORCES_BESIDE = ("", "_grf", "_GRF", "_forces", "_ground_forces")
 
+MARKER_FOLDER = re.compile(r"marker|mocap|trc", flags=re.IGNORECASE)
+FORCE_FOLDER = re.compile(r"force|grf|^id$|kinetic|^mot$|inverse.?dynamics", flags=re.IGNORECASE)
+
 
 def sniff(head: bytes) -> bool:
     """Return whether the head begins with "PathFileType"."""
@@ -31,19 +36,26 @@ def read(path: Path, *, role: Role, subject: str | None = None) -> Trial:
 
 
 def beside(path: Path) -> Path | None:
-    """Return the .mot or .sto file with plate columns that belongs to a .trc file (or should, but is damaged); None
-    if there is none.
+    """Return the .mot or .sto file with plate columns that belongs to a .trc file (or should, but is damaged), in its
+    folder or in the one for forces beside it (MarkerData/ and ForceData/ or ID/); None if there is none.
     """
-    for candidate in (
-        path.with_name(f"{path.stem}{ending}{suffix}") for ending in FORCES_BESIDE for suffix in (".mot", ".sto")
-    ):
-        if candidate.is_file():
-            try:
-                if has_plates(columns_of(candidate)):
+    for place in (path.parent, *_places_of_forces(path.parent)):
+        for ending, suffix in product(FORCES_BESIDE, (".mot", ".sto")):
+            candidate = place / f"{path.stem}{ending}{suffix}"
+            if candidate.is_file():
+                try:
+                    if has_plates(columns_of(candidate)):
+                        return candidate
+                except FileRefused:
                     return candidate
-            except FileRefused:
-                return candidate
     return None
+
+
+def _places_of_forces(markers: Path) -> list[Path]:
+    """Return the folders for forces beside a folder for markers; none where the folder is no such one."""
+    if not MARKER_FOLDER.search(markers.name):
+        return []
+    return [path for path in sorted(markers.parent.iterdir()) if path.is_dir() and FORCE_FOLDER.search(path.name)]
 
 
 def _with_forces(trial: Trial, path: Path) -> Trial:

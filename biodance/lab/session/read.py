@@ -16,7 +16,7 @@ from biodance.lab.session.file import SessionFile, read_session_file
 from biodance.lab.session.recordings import (
     find_recordings,
     guess_static,
-    recordings_in,
+    recordings_below,
     role_by_eclipse,
     role_by_name,
     vicon_notes,
@@ -189,7 +189,7 @@ def _nothing_left(folder: Path, refused: Mapping[str, str], readers: Chosen[Read
     if refused:
         name, reason = next(iter(refused.items()))
         return f"{folder}: none of its {len(refused)} files can be read. The first, {name}: {reason}"
-    inside = [part.name for part in sorted(folder.iterdir()) if part.is_dir() and recordings_in(part, readers)]
+    inside = [part.name for part in sorted(folder.iterdir()) if part.is_dir() and recordings_below(part, readers)]
     if inside:
         return (
             f"{folder}: holds no recording itself, but these folders do: {', '.join(inside[:8])}. Point at one of them."

@@ -1,5 +1,6 @@
 """Find the recordings in a folder, what belongs to them, and which role each trial plays."""
 
+import filecmp
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -53,31 +54,70 @@ def _static_quality(trial: Trial) -> tuple[int, float]:
 
 TEXT = (".txt", ".csv")
 """Extensions that notes and tables for people have, too: there the content decides."""
-PART_FOLDERS = re.compile(
-    r"static|cal|dynamic|trials?|fit|validat|squat|walk|movement|recordings?", flags=re.IGNORECASE
-)
+RESULTS = ("results.json", "report.html", "results.partial.json")
+"""Files by which a folder with results of biodance is known."""
+_OWN_FILES = ("session.toml", "subject.toml")
 
 
 def find_recordings(folder: Path, readers: Chosen[Reader] = None) -> tuple[list[Path], list[str]]:
     """Return the recordings of a session, sorted by name, and notes on what was left aside.
 
-    They lie in the folder itself, else in its parts (folders such as ``static`` and ``dynamic``). A table of forces
-    that belongs to a .trc file is no recording of its own; of one trial in several formats the C3D file is taken; text
-    that holds no table of numbers is none.
+    They lie in the folder itself and in its parts (folders such as ``Static``, ``Straight``, ``MarkerData``). Folders
+    that are sessions of their own (a static trial and others, or a session.toml, in more than one place) are left aside
+    and named. A table of forces that belongs to a .trc file is no recording of its own; of one trial in several formats
+    the C3D file is taken; text that holds no table of numbers is none.
     """
     files, order = recordings_in(folder, readers), list(extensions(readers))
-    if not files:
-        parts = [part for part in sorted(folder.iterdir()) if part.is_dir() and PART_FOLDERS.match(part.name)]
-        files = [file for part in parts for file in recordings_in(part, readers)]
-    notes: list[str] = []
+    more, notes = _in_parts(folder, files, readers)
     kept: dict[tuple[Path, str], Path] = {}
-    for file in sorted(_without_companions(files, readers), key=lambda f: (order.index(f.suffix.lower()), str(f))):
+    trials = _without_companions([*files, *more], readers)
+    for file in sorted(trials, key=lambda f: (order.index(f.suffix.lower()), not _beside(f, readers), str(f))):
         trial = (file.parent, file.stem.lower())
+        twin = next((one for one in kept.values() if one.name == file.name and _same_bytes(one, file)), None)
         if trial in kept:
             notes.append(f"{file.name} was left aside: it is the same trial as {kept[trial].name}.")
+        elif twin is not None:
+            notes.append(f"{file.relative_to(folder)} was left aside: it is a copy of {twin.relative_to(folder)}.")
         else:
             kept[trial] = file
     return sorted(kept.values()), notes
+
+
+def _in_parts(folder: Path, own: list[Path], readers: Chosen[Reader]) -> tuple[list[Path], list[str]]:
+    """Return the recordings in the parts of a session folder, and a sentence for every folder that is none."""
+    parts, notes = {}, []
+    for part in sorted(path for path in folder.iterdir() if path.is_dir() and not path.name.startswith(".")):
+        found = recordings_below(part, readers)
+        if found and any((part / name).is_file() for name in RESULTS):
+            notes.append(f"The folder {part.name} was left aside: it holds results of biodance.")
+        elif found:
+            parts[part] = found
+    several = len(parts) > 1
+    trials = set(_without_companions([*own, *(file for found in parts.values() for file in found)], readers))
+    parts = {part: own_trials for part, found in parts.items() if (own_trials := [f for f in found if f in trials])}
+    whole = [part for part, found in parts.items() if _is_whole(part, found)]
+    alone = len(whole) + any(role_by_name(file.stem) == "static" for file in own) < 2
+    if alone and (own or several):
+        whole = [part for part in whole if any((part / name).is_file() for name in _OWN_FILES)]
+    for part in whole:
+        count = len(parts.pop(part))
+        notes.append(
+            f"The folder {part.name} ({count} recordings) was left aside: it is a session of its own. Point at it to "
+            f"read it."
+        )
+    return [file for found in parts.values() for file in found], notes
+
+
+def _is_whole(part: Path, files: list[Path]) -> bool:
+    """Return whether a folder is a session of its own: it says so, or holds a static trial and others."""
+    if any((part / name).is_file() for name in _OWN_FILES):
+        return True
+    roles = [role_by_name(file.stem) or role_by_name(file.parent.name) for file in files]
+    return "static" in roles and any(role != "static" for role in roles)
+
+
+def _same_bytes(one: Path, other: Path) -> bool:
+    return one.stat().st_size == other.stat().st_size and filecmp.cmp(one, other, shallow=False)
 
 
 def recordings_in(folder: Path, readers: Chosen[Reader] = None) -> list[Path]:

@@ -1,13 +1,15 @@
 """Where results go: a folder of their own, never over or among the raw recordings."""
 
+import atexit
+import os
+import platform
 from pathlib import Path
 
 from biodance.errors import SessionRefused
 from biodance.lab.readers import extensions
-from biodance.lab.session.recordings import TEXT
+from biodance.lab.session.recordings import RESULTS, TEXT
 
 DEFAULT = "biodance"
-_OURS = ("results.json", "report.html", "results.partial.json")
 
 
 def results_folder(out: str | Path | None, session: str | Path, *, force: bool = False) -> Path:
@@ -20,8 +22,8 @@ def results_folder(out: str | Path | None, session: str | Path, *, force: bool =
     Raises
     ------
     SessionRefused
-        The folder is the session folder or one above it, is a file, holds recordings, holds anything at all without
-        ``force``, or holds only files that biodance did not write.
+        Another run is writing there; the folder is the session folder or one above it, is a file, holds recordings,
+        holds anything at all without ``force``, or holds only files that biodance did not write.
     """
     session = Path(session).resolve()
     folder = (Path(out) if out is not None else session / DEFAULT).resolve()
@@ -34,7 +36,7 @@ def results_folder(out: str | Path | None, session: str | Path, *, force: bool =
         raise SessionRefused(f"{folder}: is a file; the results need a folder. Choose another name.")
     files = [path for path in folder.iterdir() if not path.name.startswith(".")] if folder.is_dir() else []
     raw = [path.name for path in files if path.suffix.lower() in extensions() and path.suffix.lower() not in TEXT]
-    ours = any(path.name in _OURS for path in files)
+    ours = any(path.name in RESULTS for path in files)
     if raw and not ours:
         raise SessionRefused(
             f"{folder}: holds recordings ({raw[0]}); results are never written beside them. Give another folder."
@@ -58,4 +60,58 @@ def made_folder(folder: Path) -> Path:
         raise SessionRefused(
             f"{folder}: cannot be made ({error.strerror or error}). Choose a place where you may write."
         ) from error
+    _lock(folder)
     return folder
+
+
+_LOCK = ".biodance.lock"
+
+
+def _lock(folder: Path) -> None:
+    """Take a folder for this process until it ends; SessionRefused where another one, still alive, has taken it."""
+    lock = folder / _LOCK
+    mine = f"{os.getpid()} {platform.node()}"
+    for _ in range(2):
+        try:
+            with open(lock, "x", encoding="ascii", errors="replace") as stream:
+                stream.write(mine)
+        except FileExistsError:
+            holder = _text(lock)
+            if holder == mine:
+                return
+            if _is_alive(holder):
+                raise SessionRefused(
+                    f"{folder}: another run of biodance (process {holder.replace(' ', ' on ')}) is writing there. "
+                    f"Wait for it, or give another folder; if it is not running any more, delete {lock}."
+                ) from None
+            lock.unlink(missing_ok=True)
+        except OSError as error:
+            raise SessionRefused(
+                f"{folder}: cannot be written to ({error.strerror or error}). Choose a place where you may write."
+            ) from error
+        else:
+            atexit.register(lock.unlink, missing_ok=True)
+            return
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="ascii", errors="replace")
+    except OSError:
+        return ""
+
+
+def _is_alive(holder: str) -> bool:
+    """Return whether the process that a lock names may still run: one of another machine counts as alive."""
+    number, _, machine = holder.partition(" ")
+    if not number.isdecimal():
+        return False
+    if machine != platform.node() or os.name == "nt":  # there, signal 0 is no question but Ctrl-C
+        return True
+    try:
+        os.kill(int(number), 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    return True

@@ -13,13 +13,13 @@ from biodance.lab.markers.sets import landmark, read_marker_set
 from biodance.lab.session.file import SubjectEntry
 from biodance.lab.weight import standing_mass
 from biodance.records import Subject, Trial
+from biodance.settings import CheckLimits
 
 MASS_NAMES = ("bodymass", "mass_kg", "mass", "weight")
 STATURE_NAMES = ("height", "stature", "height_m", "bodyheight")
 AGE_NAMES = ("age",)
 SEX_NAMES = ("gender", "sex")
 SAME_MASS = 0.01  # share by which two declared masses, or statures, may differ
-MASS_ON_PLATES = 0.02  # share by which the plates may differ from the declared mass
 LEGAL_MASS, LEGAL_STATURE = (5.0, 400.0), (0.4, 2.6)
 STATURE_OF = (
     ("C7", ("c7",), 0.840),
@@ -69,7 +69,10 @@ def identify_subject(
     stature = stature if math.isfinite(stature) else _stature_of_markers(ordered, notes)
     age = _choose("age", "years", [*_typed(typed.age), *_declared(sources, AGE_NAMES, (0.0, 120.0))], [])
     if math.isnan(age):
-        notes.append("The age is not given: adult tables and limits are used. Set age in session.toml.")
+        notes.append(
+            "The age is not given: adult tables and limits are used (below 1.50 m with twice their standard "
+            "deviations, as for a child). Set age in session.toml."
+        )
     sex = sex or _likely_sex(stature, notes)
     measures: dict[str, float] = {}
     for values in sources.values():
@@ -141,7 +144,7 @@ def _check_mass(mass: float, on_plates: list[Declared], notes: list[str]) -> flo
             f"The body mass was not declared: {mass:.2f} kg were read from quiet standing on the plates in "
             f"{first.source}."
         )
-    other = next((found for found in on_plates if abs(found.value - mass) > MASS_ON_PLATES * mass), None)
+    other = next((found for found in on_plates if abs(found.value - mass) > CheckLimits.mass / 100 * mass), None)
     if other:
         notes.append(
             f"The plates carry {other.value:.2f} kg in quiet standing in {other.source}, but the body mass is "

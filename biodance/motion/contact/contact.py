@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.errors import BiodanceError, TrialRefused
+from biodance.motion.contact.belts import belts
 from biodance.motion.contact.footing import (
     Footing,
     Surfaces,
@@ -24,6 +25,7 @@ from biodance.motion.contact.footing import (
     speeds,
 )
 from biodance.motion.contact.soles import Soles
+from biodance.motion.contact.support import carried_elsewhere, flight
 from biodance.motion.dynamics import distribute
 from biodance.records import SIDES, Array, Trial, Wrench
 from biodance.settings import ContactRules
@@ -80,15 +82,26 @@ def ground_contact(
     force = np.stack([plate.wrench.force[:, 2] for plate in trial.plates], axis=1)
     largest = float(np.nanmax(force.sum(axis=1), initial=0.0))
     load, pressed = (force > max(rules.force, share * largest) for share in (rules.loaded, rules.pressed))
-    speed = speeds(soles)
+    moving, belted = belts(trial, soles, load)
+    speed = speeds(soles, trial.plates, moving)
     rests = resting(speed, soles.time, still=rules.still, lasting=rules.lasting)
     surfaces = find_surfaces(trial, soles, rests, load, weight=trial.settings.gravity * mass)
     touching = _touching(soles, speed, surfaces, rules)
     place = footing(trial.plates, soles, surfaces, touching)
     faults = _faults(trial, place, touching, rests, load)
+    elsewhere = carried_elsewhere(trial, weight=trial.settings.gravity * mass)
+    faults.append(
+        ("the person is still and the plates carry too little: a chair or a hand carries the rest", elsewhere)
+    )
     measured = ~np.any([mask for _, mask in faults], axis=0)
     outside = cop_outside(trial.plates, soles, place, pressed)
-    notes = _notes(measured, faults) + surfaces.notes + _cop_notes(trial, outside, measured, rules)
+    notes = (
+        _notes(measured, faults)
+        + _unplaced(trial)
+        + belted
+        + surfaces.notes
+        + _cop_notes(trial, outside, measured, rules)
+    )
     return Contact(soles.time, touching, place.on_plate, measured, outside, notes)
 
 
@@ -106,7 +119,7 @@ def _touching(soles: Soles, speed: Array, surfaces: Surfaces, rules: ContactRule
 def _faults(trial: Trial, place: Footing, touching: _Mask, rests: _Mask, load: _Mask) -> list[tuple[str, _Mask]]:
     """Return every reason why frames are not fully measured, with its frames (T,)."""
     faults: list[tuple[str, _Mask]] = [
-        ("no plate is loaded", np.logical_not(load.any(axis=1))),
+        ("no plate is loaded", ~load.any(axis=1) & ~flight(trial, touching, load)),
         ("a plate's force is unknown", np.logical_not(np.isfinite(trial.wrench.value).all(axis=1))),
     ]
     for foot, side in enumerate(SIDES):
@@ -140,6 +153,17 @@ def _notes(measured: _Mask, faults: list[tuple[str, _Mask]]) -> tuple[str, ...]:
     counts = Counter({text: int(mask.sum()) for text, mask in faults if mask.any()})
     first = f"{int(measured.sum())} of {measured.size} frames are fully measured by the plates."
     return (first, *(f"Left out, {count} of {measured.size}: {text}." for text, count in counts.most_common()))
+
+
+def _unplaced(trial: Trial) -> tuple[str, ...]:
+    """Say what cannot be known of plates whose place the file does not tell."""
+    names = [plate.name for plate in trial.plates if not plate.placed]
+    if not names:
+        return ()
+    return (
+        f"Where {', '.join(names)} lie is not in the file: a foot is taken to stand on the plate whose centre of "
+        f"pressure is under it, and a foot partly beside its plate cannot be seen.",
+    )
 
 
 def _cop_notes(trial: Trial, outside: Array, measured: _Mask, rules: ContactRules) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from biodance.motion.contact.soles import Soles
 from biodance.records import SIDES, Array, Plate, Trial, runs
+from biodance.settings import COP_FORCE
 
 if TYPE_CHECKING:
     pass
@@ -23,6 +24,8 @@ REACH = 0.09
 """m: a foot within this height of a plate is over that plate and not over one of another step."""
 _HALF = 0.3
 """Share of the sole that must be over a raised plate."""
+_UNDER = 0.03
+"""m: a centre of pressure so near to a sole is under it."""
 _RAISED = 0.05
 """m that a plate stands out of everything around it to count as raised."""
 
@@ -63,7 +66,12 @@ def footing(plates: tuple[Plate, ...], soles: Soles, surfaces: "Surfaces", touch
     raised = np.ones(low.shape, dtype=bool)
     on_plate = np.zeros((*low.shape, len(plates)), dtype=bool)
     for index, plate in enumerate(plates):
-        over = (inside(plate, samples) >= 0) & (np.abs(low - plate.height) < REACH)[..., None]
+        over = (
+            inside(plate, samples) >= 0
+            if plate.placed
+            else _pressed(plate, soles)[..., None] & ~np.isnan(samples[..., 0])
+        )
+        over &= (np.abs(low - plate.height) < REACH)[..., None]
         on_plate[..., index] = over.any(axis=-1) & touching
         anywhere |= over
         if any(abs(height - plate.height) < _RAISED for height in surfaces.bare):
@@ -71,6 +79,20 @@ def footing(plates: tuple[Plate, ...], soles: Soles, surfaces: "Surfaces", touch
     share = anywhere.mean(axis=-1)
     covered = (share == 1) | (raised & (share >= _HALF))
     return Footing(on_plate, share, covered & ~unseen, unseen)
+
+
+def _pressed(plate: Plate, soles: Soles) -> _Mask:
+    """Return (T, 2) which soles carry what a plate of unknown place measures: its centre of pressure lies under this
+    foot, else under both.
+    """
+    cop = plate.wrench.cop(height=plate.height, threshold=COP_FORCE)[:, :2]
+    known = np.isfinite(cop).all(axis=1)
+    alone = np.zeros((len(cop), 2), dtype=bool)
+    for feet in ([0], [1], [0, 1]):
+        here = known & np.isfinite(soles.outline[:, feet]).all(axis=(1, 2, 3)) & ~alone.any(axis=1)
+        points = np.concatenate([soles.outline[here, foot, :, :2] for foot in feet], axis=1)
+        alone[np.ix_(np.flatnonzero(here), np.array(feet))] |= (distance_to_hull(cop[here], points) < _UNDER)[:, None]
+    return alone
 
 
 def _samples(soles: Soles) -> Array:
@@ -143,11 +165,17 @@ class Surfaces:
     notes: tuple[str, ...]
 
 
-def speeds(soles: Soles) -> Array:
-    """Return the speed (T, 2, P) m/s of every point of the soles; 0 for a single frame, NaN beside unseen ones."""
+def speeds(soles: Soles, plates: tuple[Plate, ...] = (), moving: Array | None = None) -> Array:
+    """Return the speed (T, 2, P) m/s of every point of the soles, over a plate relative to its ``moving`` (plates, 3)
+    m/s; 0 for a single frame, NaN beside unseen ones.
+    """
     if soles.time.size < 2:
         return 0.0 * soles.outline[..., 0]
-    return np.linalg.norm(np.gradient(soles.outline, soles.time, axis=0), axis=-1)
+    velocity = np.gradient(soles.outline, soles.time, axis=0)
+    for plate, belt in zip(plates, moving if moving is not None else (), strict=False):
+        if belt.any():
+            velocity = velocity - belt * (inside(plate, soles.outline) >= 0)[..., None]
+    return np.linalg.norm(velocity, axis=-1)
 
 
 def resting(speed: Array, time: Array, *, still: float, lasting: float) -> _Mask2:

@@ -1,0 +1,179 @@
+"""Which markers of a trial carry each other's names, told by the markers alone: sides of the body, distances within
+a rigid group, wrists.
+"""
+
+from collections.abc import Iterator
+from itertools import combinations
+
+import numpy as np
+
+from biodance.lab.markers.sets import MarkerSet, read_marker_set
+from biodance.records import Array, Markers, Trial
+
+Pair = tuple[str, str]
+"""Two labels in alphabetical order."""
+_FEWEST = 5
+"""Pairs of left and right markers that tell which side is which."""
+_ASIDE = 0.02
+"""m by which a left marker must lie to the right of its right partner, in the median over the trial."""
+_OPPOSITE = -0.4
+"""Cosine between one wrist and the mirrored other one from which on they contradict each other (19 real trials: -0.65
+and less where exchanged, 0.25 and more elsewhere)."""
+_BACKWARDS = -0.5
+"""Share of a wrist that points backwards, thumb behind, while the person moves: nobody walks so."""
+_FAR_AWAY = 1.0
+"""m between first and last frame that a person walks at least."""
+_MISFIT = 0.003
+"""m: distances within a rigid group that differ so much (RMS) between static and trial are not those of one group."""
+_BETTER = 0.4
+"""Share of the misfit that the right names leave at most, and share of what the next best names leave."""
+
+
+def partner(name: str) -> str:
+    """Return the label of the same place on the other side; "" for a midline marker."""
+    other = {"L": "R", "R": "L", "l": "r", "r": "l"}.get(name[:1], "")
+    return other + name[1:] if other else ""
+
+
+def exchanged_pairs(trial: Trial, static: Trial | None, known: frozenset[Pair]) -> frozenset[Pair]:
+    """Return the pairs of markers that carry each other's names in a trial.
+
+    ``static`` of the same person (None, or the trial itself: what the trial says alone), ``known`` the pairs that are
+    exchanged in it: distances only tell whether a trial has other names than the static.
+    """
+    markers = trial.markers
+    if markers is None:
+        return frozenset()
+    alone = {*crossed_sides(markers)}
+    if trial.role == "static" or travels(markers):
+        alone |= {*turned_wrists(markers, moves=trial.role != "static")}
+    if static is None or static.markers is None or static is trial or not trial.marker_set:
+        return frozenset(alone)
+    marker_set = read_marker_set(trial.marker_set)
+    for group in rigid_groups(markers, marker_set):
+        swaps = other_names(markers, static.markers, group)
+        if swaps is None:
+            continue
+        here = {pair for pair in known | alone if set(pair) <= set(group)}
+        relative = frozenset(swaps)
+        alone = (alone - here) | (relative ^ {pair for pair in known if set(pair) <= set(group)})
+    return frozenset(alone)
+
+
+def travels(markers: Markers) -> bool:
+    """Return whether the person goes from one place to another: only then, and in a static trial, do both arms hang
+    alike.
+    """
+    place = np.nanmean(markers.xyz[..., :2], axis=1) if markers.seen.any(axis=1).all() else np.zeros((1, 2))
+    return bool(np.linalg.norm(place[-1] - place[0]) > _FAR_AWAY)
+
+
+def crossed_sides(markers: Markers) -> tuple[Pair, ...]:
+    """Return the pairs of left and right markers that lie on each other's side of the body in the median over the
+    trial, against the majority of pairs.
+    """
+    pairs = [(name, partner(name)) for name in markers.names if name[:1] in "Ll" and partner(name) in markers]
+    if len(pairs) < _FEWEST:
+        return ()
+    apart = np.stack([markers[right] - markers[left] for left, right in pairs]) * [1.0, 1.0, 0.0]
+    to_right = _rightwards(apart)
+    with np.errstate(invalid="ignore"):
+        side = np.einsum("ptk,tk->pt", apart, to_right)
+    return tuple(_sorted(pair) for pair, one in zip(pairs, side, strict=True) if _middle(one) < -_ASIDE)
+
+
+def turned_wrists(markers: Markers, *, moves: bool) -> tuple[Pair, ...]:
+    """Return the wrists whose thumb-side marker (WRA) and other one (WRB) lie the other way round than at the mirrored
+    other wrist; while the person ``moves``, also every wrist whose thumb side points backwards.
+    """
+    if any(f"{side}{name}" not in markers for side in "LR" for name in ("WRA", "WRB")):
+        return ()
+    pairs = [(name, partner(name)) for name in markers.names if name[:1] in "Ll" and partner(name) in markers]
+    to_right = _rightwards(np.stack([markers[right] - markers[left] for left, right in pairs]) * [1.0, 1.0, 0.0])
+    ahead = np.cross([0.0, 0.0, 1.0], to_right)
+    out = {}
+    for side, sign in (("L", -1.0), ("R", 1.0)):
+        bar = markers[f"{side}WRA"] - markers[f"{side}WRB"]
+        with np.errstate(invalid="ignore"):
+            bar = bar / np.linalg.norm(bar, axis=1, keepdims=True)
+        parts = (np.sum(bar * ahead, axis=1), sign * np.sum(bar * to_right, axis=1), bar[:, 2])
+        out[side] = np.array([_middle(part) for part in parts])
+    if not np.isfinite([*out.values()]).all():
+        return ()
+    wrong = {side for side, bar in out.items() if moves and bar[0] < _BACKWARDS}
+    if out["L"] @ out["R"] < _OPPOSITE and not wrong:
+        wrong = {min(out, key=lambda side: float(out[side][:2].sum()))}
+    return tuple((f"{side}WRA", f"{side}WRB") for side in sorted(wrong))
+
+
+def rigid_groups(markers: Markers, marker_set: MarkerSet) -> Iterator[tuple[str, ...]]:
+    """Yield the labels in the file of at least four markers that sit on the same bone: those of the head, of the
+    pelvis.
+    """
+    match = marker_set.match(markers.names)
+    heads = {
+        label for name in ("head_front", "head_back") for way in marker_set.landmarks.get(name, ()) for label in way
+    }
+    pelvis = {marker.label for marker in marker_set.markers if marker.segment == "pelvis"}
+    for group in (heads, pelvis):
+        names = tuple(match[label] for label in marker_set.labels if label in group and label in match)
+        if len(names) >= 4:
+            yield names
+
+
+def other_names(markers: Markers, static: Markers, group: tuple[str, ...]) -> tuple[Pair, ...] | None:
+    """Return the exchanges (one or two pairs) under which the distances within a ``group`` are those of the static
+    trial; () where they are already, None where it cannot be told.
+    """
+    if any(name not in static for name in group):
+        return None
+    here, there = (_distances(one, group) for one in (markers, static))
+    left = {}
+    for swaps in _exchanges(group):
+        order = [group.index(_renamed(name, swaps)) for name in group]
+        left[swaps] = float(np.sqrt(np.mean((here[np.ix_(order, order)] - there) ** 2)))
+    best, *others = sorted(left, key=lambda swaps: left[swaps])
+    if not np.isfinite(left[()]):
+        return None
+    if left[()] < _MISFIT:
+        return () if left[()] <= left[best] + 1e-4 or best == () else None
+    sure = left[best] < _BETTER * left[()] and left[best] < _BETTER * left[others[0]]
+    return best if sure else None
+
+
+def _exchanges(group: tuple[str, ...]) -> Iterator[tuple[Pair, ...]]:
+    pairs = [_sorted(pair) for pair in combinations(group, 2)]
+    yield ()
+    yield from ((pair,) for pair in pairs)
+    yield from ((one, two) for one, two in combinations(pairs, 2) if not set(one) & set(two))
+
+
+def _renamed(name: str, swaps: tuple[Pair, ...]) -> str:
+    for one, two in swaps:
+        if name in (one, two):
+            return two if name == one else one
+    return name
+
+
+def _distances(markers: Markers, group: tuple[str, ...]) -> Array:
+    """Return the median distances (n, n) m between the markers of a group."""
+    points = np.stack([markers[name] for name in group])
+    apart = np.linalg.norm(points[:, None] - points[None], axis=-1)
+    return np.array([[_middle(one) for one in row] for row in apart])
+
+
+def _rightwards(apart: Array) -> Array:
+    """Return the unit vector (T, 3) to the right of the body, from left-to-right vectors (P, T, 3)."""
+    total = np.nansum(apart, axis=0)
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(np.where(length > 0, total / length, np.nan))
+
+
+def _middle(values: Array) -> float:
+    seen = values[np.isfinite(values)]
+    return float(np.median(seen)) if seen.size else float("nan")
+
+
+def _sorted(pair: Pair) -> Pair:
+    return (min(pair), max(pair))

@@ -1,0 +1,78 @@
+"""Frames in which nothing carries the person, and frames in which something else does: what markers and weight tell of
+them.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.records import Array, Trial, runs
+
+_Mask = NDArray[np.bool_]
+_SHORTEST_FLIGHT = 0.05
+"""s: in less the parabola of the markers cannot be seen."""
+_FALLS = (0.6, 1.4)
+"""Downward acceleration of the markers' mean, in g, that counts as free fall (limbs move, markers sit unevenly)."""
+_STILL = 0.05
+"""m/s: the mean of the markers of somebody who sits or stands still is slower ..."""
+_LASTING = 0.4
+"""s: ... for this long."""
+_CARRIED = (0.25, 0.75)
+"""Share of the weight on the plates between which somebody who is still is carried by something else, too."""
+_WHOLE = 0.9
+"""Share of the weight from which on nothing else carries."""
+_UNITS = (0.45359237,)
+"""Shares that a wrong unit explains (pounds for kilograms) ..."""
+_NEAR = 0.03
+"""... within this."""
+
+
+def flight(trial: Trial, touching: _Mask, load: _Mask) -> _Mask:
+    """Return (T,) where the person flies: no foot may touch, no plate is loaded, and the markers fall freely.
+
+    ``touching`` (T, 2), ``load`` (T, P). The plates then measure all that the ground does: nothing.
+    """
+    found = np.zeros(len(touching), dtype=bool)
+    markers, free = trial.markers, np.logical_not(np.hstack([touching, load]).any(axis=1))
+    if markers is None or markers.time.size < 2:
+        return found
+    for start, stop in runs(free):
+        span = slice(max(0, start - 1), min(len(free), stop + 1))
+        time, height = markers.time[span], markers.xyz[span, :, 2]
+        whole = np.isfinite(height).all(axis=0)
+        if time[-1] - time[0] < _SHORTEST_FLIGHT or time.size < 4 or not whole.any():
+            continue
+        curve = np.polyfit(time - time.mean(), height[:, whole].mean(axis=1), 2)
+        found[start:stop] = _FALLS[0] <= -2 * curve[0] / trial.settings.gravity <= _FALLS[1]
+    return found
+
+
+def carried_elsewhere(trial: Trial, *, weight: float) -> _Mask:
+    """Return (T,) where something beside the plates carries a good part of the ``weight`` (N; NaN = unknown, then
+    nowhere): a chair, a rail.
+
+    The person is still and the plates carry clearly less than the weight, and nobody's unit explains it; the frames
+    around until they carry it all count, too.
+    """
+    markers, total = trial.markers, trial.wrench.force[:, 2]
+    found = np.zeros(total.size, dtype=bool)
+    if markers is None or markers.time.size < 2 or not weight > 0:
+        return found
+    speed = _mean_speed(markers.time, markers.xyz)
+    share = np.nan_to_num(total / weight, nan=1.0)
+    least = _LASTING / float(np.median(np.diff(markers.time)))
+    for start, stop in runs((speed < _STILL) & (_CARRIED[0] < share) & (share < _CARRIED[1])):
+        level = float(share[start:stop].mean())
+        if stop - start < least or any(abs(level - unit) < _NEAR for unit in _UNITS):
+            continue
+        for first, last in runs(share < _WHOLE):
+            if first < stop and start < last:
+                found[first:last] = True
+    return found
+
+
+def _mean_speed(time: Array, xyz: Array) -> Array:
+    """Return the speed (T,) m/s of the mean of the markers that are seen throughout; infinite without one."""
+    whole = np.isfinite(xyz).all(axis=(0, 2))
+    if not whole.any():
+        return np.full(time.size, np.inf)
+    return np.asarray(np.linalg.norm(np.gradient(xyz[:, whole].mean(axis=1), time, axis=0), axis=1))

@@ -1,0 +1,83 @@
+"""Exchanged labels: the right set from copies with the exchange in one file, in both, in none; two pairs at once;
+mended copies.
+"""
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from c3d_files import File, text
+from lab_sessions import person
+
+from biodance.effects import Recorded
+from biodance.effects.labels_swapped import exchanges, renamed
+from biodance.errors import FileRefused
+from biodance.lab.c3d.raw import read_raw
+from biodance.lab.c3d.relabel import write_relabelled
+from biodance.lab.session.read import read_session
+from biodance.records import Markers, Session, Source, Subject, Trial
+
+HEAD = (("LFHD", "RFHD"), ("LBHD", "RBHD"))
+REAL = os.environ.get("BIODANCE_DATA")
+
+
+def visit(*, speed: float) -> tuple[Trial, Trial]:
+    """Return a static and a walk at ``speed`` m/s; the head band sits a centimetre askew, as all do."""
+    trials = []
+    for role, moving in (("static", 0.0), ("fit", speed)):
+        markers = person(frames=120, speed=moving)
+        xyz = markers.xyz.copy()
+        xyz[:, markers.names.index("RBHD")] += [-0.02, 0.012, 0.0]
+        source = Source(Path(f"{role}.c3d"), "", "C3D", 100.0)
+        trials.append(Trial(role, role, Markers(markers.names, markers.time, xyz), (), source, "plug_in_gait"))
+    return trials[0], trials[1]
+
+
+@pytest.mark.parametrize("pairs", [(("LKNE", "RKNE"),), (("LWRA", "LWRB"),), (("RWRA", "RWRB"),), HEAD])
+@pytest.mark.parametrize("wrong", [(), ("static",), ("fit",), ("static", "fit")])
+def test_every_copy_gives_the_right_set(pairs: tuple, wrong: tuple) -> None:
+    trials = tuple(renamed(one, pairs) if one.name in wrong else one for one in visit(speed=1.5))
+    found = exchanges(Recorded(Session(Subject(62.0, 1.7, "F"), trials, Path())))
+    right = frozenset(tuple(sorted(pair)) for pair in pairs)
+    assert found == dict.fromkeys(wrong, right)
+
+
+def test_a_trial_that_is_mended_has_nothing_exchanged() -> None:
+    static, walk = visit(speed=1.5)
+    wrong = renamed(walk, HEAD)
+    session = Session(Subject(62.0, 1.7, "F"), (static, wrong), Path())
+    mended = renamed(wrong, exchanges(Recorded(session))["fit"])
+    np.testing.assert_array_equal(mended.markers["LFHD"], walk.markers["LFHD"])
+    assert exchanges(Recorded(replace(session, trials=(static, mended)))) == {}
+    assert "were exchanged" in mended.history[-1]
+
+
+def test_a_copy_with_other_labels_is_the_same_to_the_byte_elsewhere(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    points = np.concatenate([rng.normal(0, 500, (20, 3, 3)), np.zeros((20, 3, 1))], axis=2)
+    source = tmp_path / "walk.c3d"
+    source.write_bytes(File(points, parameters={"POINT": {"LABELS": text("S:LASI", "S:RASI", "S:C7")}}).bytes())
+    copy = write_relabelled(source, tmp_path / "mended" / "walk.c3d", {"LASI": "RASI", "RASI": "LASI", "C7": "C7"})
+    before, after = read_raw(source), read_raw(copy)
+    assert after.labels == ("S:RASI", "S:LASI", "S:C7")
+    np.testing.assert_array_equal(before.points, after.points)
+    assert sum(a != b for a, b in zip(source.read_bytes(), copy.read_bytes(), strict=True)) == 2
+    with pytest.raises(FileRefused, match="nothing is overwritten"):
+        write_relabelled(source, copy, {})
+
+
+@pytest.mark.skipif(not REAL, reason="BIODANCE_DATA is not set: real recordings are not here")
+@pytest.mark.parametrize(
+    ("child", "truth"),
+    [
+        ("HC030A", {name: {("LWRA", "LWRB")} for name in ("HC030A01", "HC030A05", "HC030A22")}),
+        ("HC055A", {"HC055A34": {("LFHD", "RFHD"), ("LBHD", "RBHD")}}),
+        ("HC032A", {}),
+        ("HC044A", {}),
+    ],
+)
+def test_real_exchanges_are_found_and_no_others(child: str, truth: dict) -> None:
+    found = exchanges(Recorded(read_session(Path(str(REAL)) / "biomechzoo" / child)))
+    assert found == truth
