@@ -112,3 +112,21 @@ def test_accepting_writes_lab_file_and_corrected_trials(tmp_path: Path) -> None:
         "session.toml",
         "t.c3d",
     ]
+
+
+def test_a_dance_is_played_and_filmed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("mujoco", reason="MuJoCo is not installed (extra peers)")
+    from PIL import Image
+
+    small_dance().save(tmp_path / "dance.npz")
+    words = ["play", str(tmp_path / "dance.npz"), "--out"]
+    assert run([*words, str(tmp_path / "film.gif"), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["stays_up"]
+    assert told["played_s"] == pytest.approx(3.0)
+    with Image.open(tmp_path / "film.gif") as film:
+        assert film.n_frames == pytest.approx(3.0 * 12.5, abs=2)
+    assert run([*words, str(tmp_path / "film.gif")]) == 2
+    assert "--force" in capsys.readouterr().err
+    assert run([*words, str(tmp_path / "film.avi")]) == 2
+    assert ".gif or .mp4" in capsys.readouterr().err
