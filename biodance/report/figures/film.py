@@ -19,16 +19,16 @@ from biodance.records import Array
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-RATE = 12.5
+_RATE = 12.5
 """Pictures per second."""
 _SIZE, _FLOOR = (420, 480), 440
 """Of one view, px; row of the floor."""
 _SCALE = 190.0
 """px per metre."""
-_VIEWS = ((0, 1.0, "from the right"), (1, -1.0, "from the front"))
+_VIEWS = ((0, 1.0, "from the right"), (1, 1.0, "from the front"))
 """Lab axis to the right of the picture, its sign, and the title of each view."""
 _INK = {"planned": (190, 190, 190), "right": (0, 114, 178), "left": (213, 94, 0), "middle": (60, 60, 60)}
-FORMATS = (".gif", ".mp4")
+_FORMATS = (".gif", ".mp4")
 
 
 def film_path(out: Path, *, force: bool = False) -> Path:
@@ -41,8 +41,8 @@ def film_path(out: Path, *, force: bool = False) -> Path:
     MissingLibrary
         An .mp4 is asked for and ffmpeg is not installed.
     """
-    if out.suffix.lower() not in FORMATS:
-        raise BiodanceError(f"{out}: a film ends in {' or '.join(FORMATS)}. Choose another --out.")
+    if out.suffix.lower() not in _FORMATS:
+        raise BiodanceError(f"{out}: a film ends in {' or '.join(_FORMATS)}. Choose another --out.")
     if out.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
         raise MissingLibrary(f"{out}: an .mp4 needs the program ffmpeg, which is not installed. Choose a .gif.")
     if out.exists() and not force:
@@ -53,7 +53,7 @@ def film_path(out: Path, *, force: bool = False) -> Path:
 def write_film(found: Rehearsal, out: Path) -> Path:
     """Write the film of a rehearsal and return its path (see `film_path`)."""
     played, body = found.playback, found.dance.body
-    rows = np.arange(0, len(played.q), max(1, round(played.wrench.rate / RATE)))
+    rows = np.arange(0, len(played.q), max(1, round(played.wrench.rate / _RATE)))
     plan = found.dance.motion(played.wrench.rate).q[rows]
     cop = played.wrench.cop()[rows]
     frames = [
@@ -62,10 +62,10 @@ def write_film(found: Rehearsal, out: Path) -> Path:
     ]
     if out.suffix.lower() == ".gif":
         small = [frame.quantize(16) for frame in frames]
-        small[0].save(out, save_all=True, append_images=small[1:], duration=round(1000 / RATE), loop=0)
+        small[0].save(out, save_all=True, append_images=small[1:], duration=round(1000 / _RATE), loop=0)
         return out
     words = ["ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"]
-    words += ["-s", f"{2 * _SIZE[0]}x{_SIZE[1]}", "-r", str(RATE), "-i", "-", "-pix_fmt", "yuv420p", str(out)]
+    words += ["-s", f"{2 * _SIZE[0]}x{_SIZE[1]}", "-r", str(_RATE), "-i", "-", "-pix_fmt", "yuv420p", str(out)]
     done = subprocess.run(words, input=b"".join(frame.tobytes() for frame in frames), capture_output=True, check=False)
     if done.returncode:
         raise BiodanceError(f"{out}: ffmpeg could not write it ({done.stderr.decode(errors='replace').strip()[:200]}).")
