@@ -97,10 +97,6 @@ class DanceResult:
     def _repr_html_(self) -> str:
         return display.card(repr(self), self.dance.table() if self.dance is not None else None, self.notes)
 
-    def of_subject(self, subject: Subject) -> "DanceResult":
-        """Return the same, its dance knowing for whom it was designed."""
-        return self if self.dance is None else replace(self, dance=replace(self.dance, subject=subject))
-
     @property
     def feasible(self) -> bool:
         """True where there is a dance and every margin of it is kept."""
@@ -111,6 +107,11 @@ class DanceResult:
         """True where nothing of the protocol was left out: neither for the person nor because a move was impossible."""
         counted = self.dance.counted.sum() if self.dance else 0
         return not self.notes and (np.isfinite(self.plan.budget) or counted == self.plan.count)
+
+
+def designed_for(made: DanceResult, subject: Subject) -> DanceResult:
+    """Return ``made`` with its dance knowing for whom it was designed."""
+    return made if made.dance is None else replace(made, dance=replace(made.dance, subject=subject))
 
 
 _LEGAL = {"mass": (30.0, 200.0, "kg"), "stature": (1.2, 2.2, "m")}

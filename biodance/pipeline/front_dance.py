@@ -77,12 +77,12 @@ def design_dance(
     """
     from biodance.dance.problem.person import HEALTHY, read_person
     from biodance.dance.problem.plan import read_plan
-    from biodance.pipeline.dance import dancer, make_dance
+    from biodance.pipeline.dance import dancer, designed_for, make_dance
 
     plan = read_plan(protocol)
     person = read_person(Path(limits)) if limits else HEALTHY
     made = make_dance(dancer(subject, plan), plan, person, limits=own_limits, seed=seed, tell=tell)
-    return made.of_subject(subject)
+    return designed_for(made, subject)
 
 
 def verify_dance(
