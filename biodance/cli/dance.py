@@ -40,7 +40,15 @@ def dance_command(
     """
     from biodance.dance.problem.person import HEALTHY, read_person
     from biodance.dance.problem.plan import read_plan
-    from biodance.pipeline.dance import UNFINISHED, dance_folder, dancer, make_dance, make_robot_dance, robot_dancer
+    from biodance.pipeline.dance import (
+        UNFINISHED,
+        dance_folder,
+        dancer,
+        designed_for,
+        make_dance,
+        make_robot_dance,
+        robot_dancer,
+    )
     from biodance.report.dance_write import print_dance, write_dance
 
     plan, person = read_plan(protocol), read_person(limits) if limits else HEALTHY

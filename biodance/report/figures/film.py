@@ -57,8 +57,8 @@ def write_film(found: Rehearsal, out: Path) -> Path:
     plan = found.dance.motion(played.wrench.rate).q[rows]
     cop = played.wrench.cop()[rows]
     frames = [
-        _picture(body, *both, point, float(t))
-        for *both, point, t in zip(plan, played.q[rows], cop, played.time[rows], strict=True)
+        _picture(body, planned, real, point, float(t))
+        for planned, real, point, t in zip(plan, played.q[rows], cop, played.time[rows], strict=True)
     ]
     if out.suffix.lower() == ".gif":
         small = [frame.quantize(16) for frame in frames]
