@@ -42,7 +42,15 @@ def dance_command(
     """
     from biodance.dance.problem.person import HEALTHY, read_person
     from biodance.dance.problem.plan import read_plan
-    from biodance.pipeline.dance import UNFINISHED, dance_folder, dancer, make_dance, make_robot_dance, robot_dancer
+    from biodance.pipeline.dance import (
+        UNFINISHED,
+        dance_folder,
+        dancer,
+        designed_for,
+        make_dance,
+        make_robot_dance,
+        robot_dancer,
+    )
     from biodance.report.dance_write import print_dance, write_dance
 
     plan, person = read_plan(protocol), read_person(limits) if limits else HEALTHY
@@ -56,6 +64,7 @@ def dance_command(
             say(f"Stopped; {folder} keeps what is finished. The same command goes on from there.")
             return STOPPED
         tell("writing", 0, 0)
+        result = result if isinstance(who, tuple) else designed_for(result, who)
         found = write_dance(result, folder)
     shutil.rmtree(folder / UNFINISHED, ignore_errors=True)
     if json:
@@ -86,6 +95,41 @@ def feedback_command(dance: Path, *, out: FileOut, force: ForceOption = False) -
     write_feedback(Dance.load(dance / "dance.npz" if dance.is_dir() else dance), out, force=force)
     sys.stdout.write(f"{out}\n")
     return DONE
+
+
+@app.command(name="play")
+def play_command(
+    dance: Path,
+    *,
+    out: Annotated[Path, Parameter(name="--out", help="The film to write: .gif, or .mp4 where ffmpeg is installed.")],
+    hold: Annotated[float, Parameter(help="Longest hold of a posture, s.")] = 0.5,
+    friction: Annotated[float, Parameter(help="Of the soles on the floor.")] = 0.5,
+    json: JsonOption = False,
+    force: ForceOption = False,
+) -> int:
+    """Play a designed dance in MuJoCo, the body on its own feet, and film it beside the plan.
+
+    Parameters
+    ----------
+    dance
+        The file dance.npz that `biodance dance` wrote.
+    """
+    from biodance.dance.dance import Dance
+    from biodance.dance.rehearsal import rehearse
+    from biodance.report.dance_write import playback_document
+    from biodance.report.figures.film import film_path, write_film
+
+    place, one = film_path(out, force=force), Dance.load(dance)
+    with counted_progress() as tell:
+        tell("playing in MuJoCo", 0, 0)
+        found = rehearse(one, hold=hold, friction=friction)
+        tell("drawing the film", 0, 0)
+        write_film(found, place)
+    if json:
+        print_json(playback_document(found, place))
+    else:
+        sys.stdout.write(f"{found.table()}\n{place}\n")
+    return DONE if found.playback.stays_up else NEEDS_A_PERSON
 
 
 def _who(

@@ -9,10 +9,13 @@ from cyclopts import Parameter
 from biodance.cli.app import (
     DONE,
     NEEDS_A_PERSON,
+    BodyOption,
     ForceOption,
     JsonOption,
+    LabOption,
     MarkersFile,
     OutOption,
+    ReferenceOption,
     Set,
     Tables,
     app,
@@ -53,13 +56,16 @@ def diagnose_command(
     session: Path,
     *,
     out: OutOption,
-    reference: Path | None = None,
+    reference: ReferenceOption = None,
+    body: BodyOption = None,
+    lab: LabOption = None,
     accept: Annotated[
         bool,
         Parameter(
             name="--accept",
             negative="",
-            help="Also write the body with the findings accepted; labels are exchanged in a copy first.",
+            help="Also write what follows from the findings: body.json, lab.toml, trials; labels are exchanged in a "
+            "copy first.",
         ),
     ] = False,
     subject: str | None = None,
@@ -76,8 +82,6 @@ def diagnose_command(
     ----------
     session
         Folder with the static trial and the other trials.
-    reference
-        An earlier session of the same person without load: the body is then known ten times better than from the table.
     subject
         The person to diagnose where C3D files hold several.
     """
@@ -85,21 +89,22 @@ def diagnose_command(
 
     from biodance.pipeline import front
     from biodance.pipeline.attention import is_well
+    from biodance.pipeline.carry import read_lab
     from biodance.pipeline.mended import write_mended
     from biodance.report.terminal import print_diagnosis
     from biodance.report.write import write_diagnosis
 
     with progress() as tell:
         place = ready(tables, session, force=force)
-        options = Reading(subject, markers, chosen)
-        result, before, folder = examine_with_reference(session, reference, out, options, force=force, tell=tell)
-        found = front.diagnose(result, reference=before, accept=accept, tell=tell)
+        options, carried = Reading(subject, markers, chosen, reference, body, lab), read_lab(lab)
+        result, before, folder = examine_with_reference(session, out, options, force=force, tell=tell)
+        found = front.diagnose(result, reference=before, tolerances=carried.tolerances, accept=accept, tell=tell)
         if found.mended is not None:
             write_mended(result.session, found.mended.session, folder)
             result = found.mended
         tell("writing the page")
         tabled(result, place, found.diagnosis)
-        document = write_diagnosis(result, found, folder, accepted=accept)
+        document = write_diagnosis(result, found, folder, accepted=accept, earlier=carried.corrections)
     if json:
         print_json(document)
     else:

@@ -110,6 +110,11 @@ class DanceResult:
         return not self.notes and (np.isfinite(self.plan.budget) or counted == self.plan.count)
 
 
+def designed_for(made: DanceResult, subject: Subject) -> DanceResult:
+    """Return ``made`` with its dance knowing for whom it was designed."""
+    return made if made.dance is None else replace(made, dance=replace(made.dance, subject=subject))
+
+
 _LEGAL = {"mass": (30.0, 200.0, "kg"), "stature": (1.2, 2.2, "m")}
 
 
