@@ -74,18 +74,23 @@ class History:
     changes: tuple[Change, ...]
     strangers: tuple[Stranger, ...]
 
+    def level_over_time(self, plate: str) -> Array:
+        """Return (V,) the level of a plate at every visit."""
+        first, level = len(self.series.plates), np.full(len(self.series.visits), self.fitted.beta[self._own(plate)])
+        for i, one in enumerate(self.changes):
+            if one.plate in (plate, ALL):
+                level[self.series.visits.index(one.visit) :] += self.fitted.beta[first + i]
+        return level
+
+    def _own(self, plate: str) -> int:
+        return self.series.plates.index(plate)
+
     def level(self, plate: str) -> tuple[float, float]:
         """Return the level of a plate after its last change, and its standard deviation."""
-        kept, weight = self.series, np.zeros(self.fitted.beta.size)
-        weight[kept.plates.index(plate)] = 1.0
-        first = len(kept.plates)
-        steps = [i for i, one in enumerate(self._found) if isinstance(one, Change) and one.plate in (plate, ALL)]
-        weight[[first + i for i in steps]] = 1.0
+        weight, first = np.zeros(self.fitted.beta.size), len(self.series.plates)
+        weight[self._own(plate)] = 1.0
+        weight[[first + i for i, one in enumerate(self.changes) if one.plate in (plate, ALL)]] = 1.0
         return float(weight @ self.fitted.beta), float(np.sqrt(weight @ self.fitted.covariance @ weight))
-
-    @property
-    def _found(self) -> tuple[Change | Stranger, ...]:
-        return (*self.changes, *self.strangers)
 
 
 @dataclass(frozen=True, eq=False)

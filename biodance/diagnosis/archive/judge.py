@@ -11,6 +11,8 @@ from biodance.diagnosis.archive.conditions import ConditionEffect, condition_eff
 from biodance.diagnosis.archive.observation import QUANTITIES, Observation, Visit, in_order
 from biodance.diagnosis.archive.series import series_of
 
+_HORIZONTAL = ("offset_x", "offset_y")
+"""What may wander; vertically a difference from visit to visit may be the declared mass."""
 _SURE = 3.0
 """Standard deviations from which on a level is not what the file says."""
 
@@ -196,7 +198,7 @@ def _wrong(level: Level) -> list[PlateFinding]:
         return []
     interval = (level.value - half, level.value + half)
     text = (
-        f"{_WORDS[level.quantity]} is off by {said(level.quantity, level.value)} in all visits (95 % interval "
+        f"{_WORDS[level.quantity]} is off by {said(level.quantity, level.value)} over {level.visits} visits (95 % interval "
         f"{said(level.quantity, interval[0])} to {said(level.quantity, interval[1])})."
     )
     return [PlateFinding(known.effect, known.target, text, level.quantity, level.value, interval)]
@@ -206,7 +208,7 @@ def _wandering(plate: str, level: Level, one: History) -> list[PlateFinding]:
     """Return an offset that differs from day to day more than within a day, and is not taken off."""
     known, series = QUANTITIES[level.quantity], one.series
     rows = series.design[:, series.plates.index(plate)] != 0
-    if known.effect != "plate_offset" or level.taken_off > 0.5 or level.visits < 3 or level.between < known.matters / 2:
+    if level.quantity not in _HORIZONTAL or level.taken_off > 0.5 or level.visits < 3 or level.between < known.matters / 2:
         return []
     left = (series.value - one.columns @ one.fitted.beta)[rows]
     free = left.size - np.linalg.matrix_rank(one.columns[rows])
