@@ -1,25 +1,25 @@
 """What the plates weigh while somebody walks: the mean vertical force over whole steps, and over one foot alone.
 
 From the middle of one stance to the middle of the next the body comes back to the same height and speed: the mean force
-is its weight but for the change of velocity, which the pelvis shows. While the other foot swings, one plate alone says
+is its weight but for the change of velocity, which the pelvis shows. In the middle of a stance the other foot swings: one plate alone says
 the same a little coarser: plates are told from each other.
 """
 
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-from biodance.records import Array, runs
+from biodance.records import Array
 from biodance.witnesses import Observation, Recording, Step, Witness
 from biodance.witnesses._recording import ONSET
 
 DECLARED = 0.01
 """Share of the declared mass by which careful declarations are wrong: clothes, shoes, another day."""
-_STEP = {"kg": (-0.004, 0.008), "N": (0.0, 0.012)}
-_ALONE = (0.008, 0.014)
-"""Expected error and sd of one observation as shares of the weight: of a whole step (mass, horizontal force), of one
-foot alone (mass)."""
+_STEP, _ALONE, _HORIZONTAL = (-0.001, 0.008), (0.009, 0.014), 0.012
+"""Expected error and sd of the mass as shares of it: of a whole step, of one foot alone; sd of the mean horizontal
+force over a step as a share of the weight."""
+_ONE = (0.2, 0.8)
+"""Start and stop, as shares of stance, of the time in which the other foot swings."""
 _SHORTEST = 0.15
 """s that one foot alone must be seen."""
 
@@ -44,11 +44,9 @@ class StrideForce(Witness):
         part = seen.stance(step)
         if part is None:
             return []
-        wrench, other = seen.plate(step.plate).wrench, "left" if step.side == "right" else "right"
-        swinging = seen.swings(other, wrench.time[part])
-        start, stop = max(runs(swinging), key=lambda run: run[1] - run[0], default=(0, 0))
-        span = slice(part.start + start, part.start + stop)
-        if stop - start < _SHORTEST * wrench.rate:
+        wrench, count = seen.plate(step.plate).wrench, part.stop - part.start
+        span = slice(part.start + round(_ONE[0] * count), part.start + round(_ONE[1] * count))
+        if span.stop - span.start < _SHORTEST * wrench.rate:
             return []
         value = _mass(seen, wrench.time[span], wrench.force[span, 2])
         bias, sd = _ALONE
@@ -61,11 +59,11 @@ class StrideForce(Witness):
         total, g, name = seen.trial.wrench, seen.trial.settings.gravity, f"{first.side} to {last.side} step"
         time, force = total.time[span], total.force[span]
         what = f"{name} from {time[0]:.2f} s"
-        found = [_weighed(self.name, what, seen, _mass(seen, time, force[:, 2]), *_STEP["kg"])]
+        found = [_weighed(self.name, what, seen, _mass(seen, time, force[:, 2]), *_STEP)]
         change = seen.mass * _change(seen, time) / (time[-1] - time[0])
         for axis, channel in enumerate(("Fx", "Fy")):
             value = float(force[:, axis].mean() - change[axis])
-            sd = _STEP["N"][1] * seen.mass * g
+            sd = _HORIZONTAL * seen.mass * g
             found.append(Observation(self.name, f"{what}, mean {channel}", seen.trial.name, value, sd, 0.0, "N"))
         return found
 
@@ -93,14 +91,14 @@ def _mass(seen: Recording, time: Array, vertical: Array) -> float:
 def _pairs(seen: Recording) -> Iterator[tuple[Step, Step]]:
     """Return steps that follow one another with different feet, the second before the first has ended."""
     for first, last in zip(seen.steps, seen.steps[1:], strict=False):
-        if first.side != last.side and first.plate != last.plate and _apart(seen):
+        if first.side != last.side and first.plate != last.plate and _one_clock(seen):
             yield first, last
 
 
-def _apart(seen: Recording) -> NDArray[np.bool_]:
+def _one_clock(seen: Recording) -> bool:
     """Return whether all plates share one time base, so that their forces add."""
     time = seen.trial.plates[0].wrench.time
-    return np.bool_(all(np.array_equal(plate.wrench.time, time) for plate in seen.trial.plates))
+    return all(np.array_equal(plate.wrench.time, time) for plate in seen.trial.plates)
 
 
 def _middle_to_middle(seen: Recording, first: Step, last: Step) -> slice | None:
