@@ -17,9 +17,23 @@ from typing import ClassVar
 import numpy as np
 
 from biodance.discovery import Chosen, Family
+from biodance.witnesses._causes import Cause, Key, possible_causes, turned_signs
 from biodance.witnesses._recording import Foot, Recording, Step, recording
 
-__all__ = ["Foot", "Observation", "Recording", "Step", "Witness", "observe", "recording", "witnesses"]
+__all__ = [
+    "Cause",
+    "Foot",
+    "Observation",
+    "Recording",
+    "Step",
+    "Witness",
+    "observe",
+    "possible_causes",
+    "recording",
+    "traces",
+    "turned_signs",
+    "witnesses",
+]
 
 
 @dataclass(frozen=True)
@@ -48,7 +62,7 @@ class Observation:
         object.__setattr__(self, "norms", MappingProxyType(dict(self.norms)))
 
     @property
-    def key(self) -> tuple[str, str, str]:
+    def key(self) -> Key:
         """Witness, trial and what: the same in an altered recording."""
         return self.witness, self.trial, self.what
 
@@ -101,3 +115,20 @@ def observe(seen: Recording, chosen: Chosen[Witness | type[Witness]] = None) -> 
     """Return all that the witnesses saw in one trial, finite values only."""
     found = (one for witness in witnesses(chosen).values() for one in witness.look(seen))
     return tuple(one for one in found if np.isfinite([one.value, one.expected, one.sd]).all())
+
+
+def traces(
+    seen: Recording, found: tuple[Observation, ...], cause: Cause, chosen: Chosen[Witness | type[Witness]] = None
+) -> np.ndarray:
+    """Return (n,) what one unit of a cause adds to value less expectation of the observations ``found`` of a
+    recording: the slope between the recordings altered by a step either way; 0 where the witness is blind.
+    """
+    out = np.zeros(len(found))
+    sides = [
+        {one.key: one.value - one.expected for one in observe(cause.alter(seen, size), chosen)}
+        for size in (-cause.step, cause.step)
+    ]
+    for i, one in enumerate(found):
+        if all(one.key in side for side in sides):
+            out[i] = (sides[1][one.key] - sides[0][one.key]) / (2 * cause.step)
+    return out

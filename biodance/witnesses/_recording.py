@@ -20,6 +20,8 @@ ONSET = 20.0
 """N of vertical force from which a foot counts as down (Zeni et al. 2008, doi:10.1016/j.gaitpost.2007.07.007)."""
 _SHORTEST, _LONGEST = 0.2, 2.5
 """s that one foot stands on a plate in a step."""
+_RAISED = 0.05
+"""m that a plate stands out above the lowest one: what sticks out over a stair hangs in the air."""
 _BESIDE = 0.04
 """m: a sole that reaches farther over the edge is half beside the plate: its centre of pressure says nothing."""
 _STILL = 0.5
@@ -144,7 +146,10 @@ def recording(trial: Trial, *, mass: float = float("nan")) -> Recording:
     ``mass`` kg as declared, NaN = unknown. Without foot markers or plates there are no steps; nothing is raised.
     """
     feet = _feet(trial.markers)
-    steps = tuple(step for plate in trial.plates for step in _steps(plate, feet)) if feet else ()
+    lowest = min((plate.height for plate in trial.plates), default=0.0)
+    steps = tuple(
+        step for plate in trial.plates for step in _steps(plate, feet, raised=plate.height > lowest + _RAISED) if feet
+    )
     return Recording(trial, mass, feet, tuple(sorted(steps, key=lambda step: step.middle)), _pelvis(trial.markers))
 
 
@@ -203,7 +208,7 @@ def _velocity(markers: Markers, path: Array) -> Array:
     return velocity
 
 
-def _steps(plate: Plate, feet: tuple[Foot, ...]) -> list[Step]:
+def _steps(plate: Plate, feet: tuple[Foot, ...], *, raised: bool) -> list[Step]:
     """Return the steps on one plate: one foot stands wholly over it while it is loaded, the other one is not on it."""
     found = []
     wrench = plate.wrench
@@ -212,7 +217,7 @@ def _steps(plate: Plate, feet: tuple[Foot, ...]) -> list[Step]:
         if not _SHORTEST <= last - first <= _LONGEST:
             continue
         time = np.linspace(first + 0.25 * (last - first), first + 0.7 * (last - first), 10)
-        over = {foot.side: _over(plate, foot, time) for foot in feet}
+        over = {foot.side: _over(plate, foot, time, raised=raised) for foot in feet}
         on = [foot for foot in feet if over[foot.side] > -_BESIDE and _stands(foot, time)]
         other = [foot for foot in feet if foot not in on and _treads(plate, foot, first, last)]
         if len(on) == 1 and not other:
@@ -221,9 +226,12 @@ def _steps(plate: Plate, feet: tuple[Foot, ...]) -> list[Step]:
     return found
 
 
-def _over(plate: Plate, foot: Foot, time: Array) -> float:
-    """Return how far the sole is inside the plate, m: its outermost point, the median over times; negative outside."""
-    distance = inside(plate, foot.outline(time)).min(axis=1)
+def _over(plate: Plate, foot: Foot, time: Array, *, raised: bool) -> float:
+    """Return how far the sole is inside the plate, m: its outermost point (its middle on a ``raised`` plate), the
+    median over times; negative outside.
+    """
+    distance = inside(plate, foot.outline(time))
+    distance = distance.mean(axis=1) if raised else distance.min(axis=1)
     return float(np.nanmedian(distance)) if np.isfinite(distance).any() else -np.inf
 
 
@@ -237,7 +245,7 @@ def _treads(plate: Plate, foot: Foot, first: float, last: float) -> bool:
     """Return whether any part of a foot is over the plate, slow and low, at some time of a contact."""
     time = np.linspace(first, last, 30)
     with np.errstate(invalid="ignore"):
-        near = (inside(plate, foot.outline(time)) > 0.01).any(axis=1)
+        near = (inside(plate, foot.outline(time)) > 0.01).mean(axis=1) > 0.3
         slow = _between(foot.time, foot.speed[:, None], time)[:, 0] < _STILL
         low = np.minimum(*(path[:, 2] for path in foot.at(time)))
         lowest = min(np.nanmin(foot.heel[:, 2]), np.nanmin(foot.toe[:, 2]))

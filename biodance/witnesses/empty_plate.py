@@ -8,6 +8,7 @@ import numpy as np
 
 from biodance.records import CHANNELS, Plate
 from biodance.witnesses import Observation, Recording, Witness
+from biodance.witnesses._causes import was_zeroed
 from biodance.witnesses._recording import ONSET
 
 _SETTLES = 0.15
@@ -55,11 +56,6 @@ class EmptyPlate(Witness):
             )
             for name, size in zip(CHANNELS[:3], value, strict=True)
         ]  # fmt: skip
-
-
-def was_zeroed(plate: Plate) -> bool:
-    """Return whether the reader found the plate empty in this trial and took its reading off."""
-    return any("subtracted" in said and "nothing was subtracted" not in said for said in plate.decisions)
 
 
 WITNESS = EmptyPlate

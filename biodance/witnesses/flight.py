@@ -7,6 +7,8 @@ from biodance.witnesses import Foot, Observation, Recording, Witness
 
 _HIGH = 0.06
 """m above their lowest place in the trial that both markers of a foot in flight are."""
+_LEVEL = 0.05
+"""m between plates: on stairs a high foot may stand."""
 _SHORTEST = 0.06
 """s of flight."""
 _OWN = {"Fx": 1.5, "Fy": 1.5, "Fz": 4.0}
@@ -22,7 +24,8 @@ class Flight(Witness):
 
     def look(self, seen: Recording) -> tuple[Observation, ...]:
         """Return three observations of each plate that was loaded in the trial, over all its flight."""
-        if not seen.feet:
+        heights = [plate.height for plate in seen.trial.plates]
+        if not seen.feet or not heights or max(heights) - min(heights) > _LEVEL:
             return ()
         air = np.min([_height(foot) for foot in seen.feet], axis=0) > _HIGH
         time = seen.feet[0].time

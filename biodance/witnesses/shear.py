@@ -10,13 +10,15 @@ from biodance.witnesses import Observation, Recording, Step, Witness
 from biodance.witnesses._stance import Stance, stance
 
 _PARTS = {
-    "braking": (0.08, 0.35, 0, -0.10, 0.035),
-    "pushing": (0.65, 0.92, 0, 0.11, 0.035),
+    "braking": (0.08, 0.35, 0, -0.145, 0.030),
+    "pushing": (0.65, 0.92, 0, 0.150, 0.035),
     "inwards": (0.20, 0.80, 1, -0.045, 0.020),
 }
 """Start and stop as shares of stance, direction (0 ahead, 1 outwards), expected share of the mean vertical force, sd of
 one person."""
 _STEP = 0.015
+_STRAIGHT = 0.35
+"""rad between the ways of the first and the second half of a stance: in a turn the shear points to its middle."""
 _SLANT = 0.075
 """rad: sd of the direction in which shear goes from braking to pushing, of one step."""
 
@@ -67,7 +69,7 @@ def _slope(left: Array, ahead: Array, vertical: Array) -> float:
 
 def way(seen: Recording, step: Step, part: Stance) -> Array | None:
     """Return the unit vector (2,) along which the pelvis goes over the foot in the middle of a stance; None where it
-    hardly goes.
+    hardly goes, or turns.
     """
     time = part.time[(part.phase > 0.2) & (part.phase < 0.8)]
     assert seen.trial.markers is not None
@@ -77,8 +79,10 @@ def way(seen: Recording, step: Step, part: Stance) -> Array | None:
     path = path[np.isfinite(path).all(axis=1)]
     if len(path) < 5:
         return None
-    moved = path[-1] - path[0]
-    return moved / np.linalg.norm(moved) if np.linalg.norm(moved) > 0.1 else None
+    moved, halves = path[-1] - path[0], np.array([path[len(path) // 2] - path[0], path[-1] - path[len(path) // 2]])
+    length = float(np.linalg.norm(moved))
+    bent = abs(np.arctan2(halves[0, 0] * halves[1, 1] - halves[0, 1] * halves[1, 0], np.sum(halves[0] * halves[1])))
+    return moved / length if length > 0.1 and bent < _STRAIGHT else None
 
 
 WITNESS = Shear
