@@ -1,0 +1,263 @@
+"""One trial as witnesses look at it: where each foot was, which steps fell on which plate, which way the person went.
+
+The steps are sorted from the markers, not from the forces: a plate that lies elsewhere than the file says, or whose
+force comes late, must not hide the very steps that show it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.errors import BiodanceError
+from biodance.lab.markers.sets import FAMILY, landmark, read_marker_set
+from biodance.motion.contact.footing import inside
+from biodance.motion.contact.soles import OUTLINE
+from biodance.records import SIDES, Array, Markers, Plate, Trial, runs
+from biodance.records.arrays import rate_of
+
+ONSET = 20.0
+"""N of vertical force from which a foot counts as down (Zeni et al. 2008, doi:10.1016/j.gaitpost.2007.07.007)."""
+_SHORTEST, _LONGEST = 0.2, 2.5
+"""s that one foot stands on a plate in a step."""
+_RAISED = 0.05
+"""m that a plate stands out above the lowest one: what sticks out over a stair hangs in the air."""
+_BESIDE = 0.04
+"""m: a sole that reaches farther over the edge is half beside the plate: its centre of pressure says nothing."""
+_STILL = 0.5
+"""m/s of a foot that stands; the other one swings faster."""
+_LIFTED = 0.06
+"""m of a foot above its lowest place in the trial from which it cannot stand."""
+_UNSEEN = 0.05
+"""s over which a marker that was not seen is believed to go on straight."""
+
+
+@dataclass(frozen=True, eq=False)
+class Foot:
+    """One foot: ``time`` (T,) s; ``heel``, ``toe`` (T, 3) m of its markers, lab frame, NaN = not seen."""
+
+    side: str
+    time: Array
+    heel: Array
+    toe: Array
+
+    def at(self, time: Array) -> tuple[Array, Array]:
+        """Return heel and toe (n, 3) m at other times (n,) s; NaN beside frames in which they were not seen."""
+        return _between(self.time, self.heel, time), _between(self.time, self.toe, time)
+
+    def outline(self, time: Array) -> Array:
+        """Return the sole (n, P, 2) m seen from above, from heel and toe marker."""
+        heel, toe = (path[:, :2] for path in self.at(time))
+        ahead = toe - heel
+        left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
+        return heel[:, None] + OUTLINE[:, :1] * ahead[:, None] + OUTLINE[:, 1:] * left[:, None]
+
+    def axes(self, time: float) -> Array:
+        """Return the horizontal unit vectors (2, 2) from heel to toe marker and outwards of it, at ``time`` s."""
+        heel, toe = (path[0, :2] for path in self.at(np.array([time])))
+        ahead = (toe - heel) / np.linalg.norm(toe - heel)
+        return np.stack([ahead, np.array([ahead[1], -ahead[0]]) * (1.0 if self.side == "right" else -1.0)])
+
+    def in_foot(self, time: Array, point: Array) -> tuple[Array, Array, Array]:
+        """Return how far ``point`` (n, 2) m lies ahead of the heel marker and outwards of the line to the toe marker,
+        m (n,), and the horizontal distance of the two markers (n,) m.
+        """
+        heel, toe = (path[:, :2] for path in self.at(time))
+        length = np.linalg.norm(toe - heel, axis=1)
+        ahead = (toe - heel) / length[:, None]
+        out = np.stack([ahead[:, 1], -ahead[:, 0]], axis=1) * (1.0 if self.side == "right" else -1.0)
+        return np.sum((point - heel) * ahead, axis=1), np.sum((point - heel) * out, axis=1), length
+
+    @property
+    def rate(self) -> float:
+        """Hz of the markers."""
+        return rate_of(self.time)
+
+    @property
+    def speed(self) -> Array:
+        """(T,) m/s of the middle between the two markers."""
+        if self.time.size < 2:
+            return np.zeros(self.time.size)
+        return np.linalg.norm(np.gradient((self.heel + self.toe) / 2, self.time, axis=0), axis=1)
+
+
+@dataclass(frozen=True)
+class Step:
+    """One foot alone on one plate: ``plate`` its name; ``side``; ``middle`` s, a time at which it stands; ``overhang``
+    m that the sole may reach over the edge; ``heel_first`` whether the heel came down first.
+    """
+
+    plate: str
+    side: str
+    middle: float
+    overhang: float
+    heel_first: bool
+
+    @property
+    def name(self) -> str:
+        """The step in words."""
+        return f"{self.side} foot on {self.plate} at {self.middle:.2f} s"
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One ``trial`` with the declared ``mass`` kg of the person (NaN = unknown), both ``feet`` (none where their
+    markers are missing), the ``steps`` on its plates and the ``pelvis`` (T, 3) m at marker times (None = not seen).
+    """
+
+    trial: Trial
+    mass: float
+    feet: tuple[Foot, ...]
+    steps: tuple[Step, ...]
+    pelvis: Array | None
+
+    def plate(self, name: str) -> Plate:
+        """Return the plate of that name."""
+        return next(plate for plate in self.trial.plates if plate.name == name)
+
+    def foot(self, side: str) -> Foot:
+        """Return the foot of that side."""
+        return next(foot for foot in self.feet if foot.side == side)
+
+    def stance(self, step: Step) -> slice | None:
+        """Return the samples of a step's plate while the foot stands on it; None where the force does not show it."""
+        wrench = self.plate(step.plate).wrench
+        here = [run for run in runs(wrench.force[:, 2] > ONSET) if wrench.time[run[0]] <= step.middle]
+        if not here or wrench.time[here[-1][1] - 1] < step.middle:
+            return None
+        return slice(*here[-1])
+
+    def pelvis_velocity(self, time: Array) -> Array:
+        """Return (n, 3) m/s of the pelvis at times (n,) s, without its trembling above 8 Hz."""
+        assert self.pelvis is not None
+        assert self.trial.markers is not None
+        return _between(self.trial.markers.time, _velocity(self.trial.markers, self.pelvis), time)
+
+    def swings(self, side: str, time: Array) -> NDArray[np.bool_]:
+        """Return (n,) whether the foot of a side swings at times (n,) s."""
+        foot = self.foot(side)
+        speed = _between(foot.time, foot.speed[:, None], time)[:, 0]
+        return np.nan_to_num(speed) > _STILL
+
+
+def recording(trial: Trial, *, mass: float = float("nan")) -> Recording:
+    """Return a trial as witnesses look at it; as read (forces at their own rate) it says most.
+
+    ``mass`` kg as declared, NaN = unknown. Without foot markers or plates there are no steps; nothing is raised.
+    """
+    feet = _feet(trial.markers)
+    lowest = min((plate.height for plate in trial.plates), default=0.0)
+    steps = tuple(
+        step for plate in trial.plates for step in _steps(plate, feet, raised=plate.height > lowest + _RAISED) if feet
+    )
+    return Recording(trial, mass, feet, tuple(sorted(steps, key=lambda step: step.middle)), _pelvis(trial.markers))
+
+
+def _between(known: Array, path: Array, time: Array) -> Array:
+    """Return a path (T, n) at other times, straight between frames; NaN where no frame near is known."""
+    seen = np.isfinite(path).all(axis=1)
+    if not seen.any():
+        return np.full((len(time), path.shape[1]), np.nan)
+    at, values = known[seen], path[seen]
+    out = np.stack([np.interp(time, at, column) for column in values.T], axis=1)
+    after = np.clip(np.searchsorted(at, time), 0, at.size - 1)
+    near = np.minimum(np.abs(time - at[after]), np.abs(time - at[np.maximum(after - 1, 0)]))
+    out[near > _UNSEEN] = np.nan
+    return out
+
+
+def _feet(markers: Markers | None) -> tuple[Foot, ...]:
+    """Return both feet by the landmarks heel and toe of the first marker set that has all four; () without."""
+    for name in FAMILY.files() if markers is not None and markers.time.size else ():
+        places = {(s, p): _landmark(markers, name, f"{s}_{p}") for s in SIDES for p in ("heel", "toe")}
+        if all(path is not None and np.isfinite(path).any() for path in places.values()):
+            return tuple(Foot(s, markers.time, places[s, "heel"], places[s, "toe"]) for s in SIDES)
+    return ()
+
+
+def _landmark(markers: Markers, set_name: str, name: str) -> Array | None:
+    try:
+        return landmark(markers, read_marker_set(set_name), name)
+    except BiodanceError:
+        return None
+
+
+def _pelvis(markers: Markers | None) -> Array | None:
+    """Return the middle (T, 3) m of the front and back of the pelvis; None where no set has them."""
+    for name in FAMILY.files() if markers is not None else ():
+        front = [_landmark(markers, name, f"{side}_asis") for side in SIDES]
+        back = _landmark(markers, name, "mid_psis")
+        if back is not None and all(path is not None for path in front):
+            middle = (np.mean(front, axis=0) + back) / 2
+            return middle if np.isfinite(middle).any() else None
+    return None
+
+
+def _velocity(markers: Markers, path: Array) -> Array:
+    """Return the velocity (T, 3) m/s of a path (T, 3) m below 8 Hz; NaN where it was not seen."""
+    from scipy.signal import butter, sosfiltfilt
+
+    seen = np.isfinite(path).all(axis=1)
+    rate = markers.rate
+    if seen.sum() < 12 or not rate > 20:
+        return np.full(path.shape, np.nan)
+    filled = np.stack([np.interp(markers.time, markers.time[seen], column) for column in path[seen].T], axis=1)
+    smooth = sosfiltfilt(butter(2, 8.0, fs=rate, output="sos"), filled, axis=0, padlen=min(20, len(filled) - 1))
+    velocity = np.gradient(smooth, markers.time, axis=0)
+    velocity[~seen] = np.nan
+    return velocity
+
+
+def _steps(plate: Plate, feet: tuple[Foot, ...], *, raised: bool) -> list[Step]:
+    """Return the steps on one plate: one foot stands wholly over it while it is loaded, the other one is not on it."""
+    found = []
+    wrench = plate.wrench
+    for start, stop in runs(wrench.force[:, 2] > ONSET):
+        first, last = wrench.time[start], wrench.time[stop - 1]
+        if not _SHORTEST <= last - first <= _LONGEST:
+            continue
+        time = np.linspace(first + 0.25 * (last - first), first + 0.7 * (last - first), 10)
+        over = {foot.side: _over(plate, foot, time, raised=raised) for foot in feet}
+        on = [foot for foot in feet if over[foot.side] > -_BESIDE and _stands(foot, time)]
+        other = [foot for foot in feet if foot not in on and _treads(plate, foot, first, last)]
+        if len(on) == 1 and not other:
+            overhang = max(0.0, -over[on[0].side])
+            found.append(Step(plate.name, on[0].side, float(time[5]), overhang, _heel_first(on[0], first)))
+    return found
+
+
+def _over(plate: Plate, foot: Foot, time: Array, *, raised: bool) -> float:
+    """Return how far the sole is inside the plate, m: its outermost point (its middle on a ``raised`` plate), the
+    median over times; negative outside.
+    """
+    distance = inside(plate, foot.outline(time))
+    distance = distance.mean(axis=1) if raised else distance.min(axis=1)
+    return float(np.nanmedian(distance)) if np.isfinite(distance).any() else -np.inf
+
+
+def _stands(foot: Foot, time: Array) -> bool:
+    """Return whether a foot stands at most of some times."""
+    speed = _between(foot.time, foot.speed[:, None], time)[:, 0]
+    return bool(np.nanmedian(speed) < _STILL) if np.isfinite(speed).any() else False
+
+
+def _treads(plate: Plate, foot: Foot, first: float, last: float) -> bool:
+    """Return whether any part of a foot is over the plate, slow and low, at some time of a contact."""
+    time = np.linspace(first, last, 30)
+    with np.errstate(invalid="ignore"):
+        near = (inside(plate, foot.outline(time)) > 0.01).mean(axis=1) > 0.3
+        slow = _between(foot.time, foot.speed[:, None], time)[:, 0] < _STILL
+        low = np.minimum(*(path[:, 2] for path in foot.at(time)))
+        lowest = min(np.nanmin(foot.heel[:, 2]), np.nanmin(foot.toe[:, 2]))
+    return bool((near & slow & (low < lowest + _LIFTED)).sum() >= 3)
+
+
+def _heel_first(foot: Foot, first: float) -> bool:
+    """Return whether the toe is farther above its standing height than the heel when a contact begins."""
+    at = np.array([first])
+    heel, toe = (path[0, 2] for path in foot.at(at))
+    flat = foot.speed < 0.1
+    if not flat.any():
+        return False
+    rest = [np.nanmedian(path[flat, 2]) for path in (foot.heel, foot.toe)]
+    return bool(toe - rest[1] > heel - rest[0] + 0.01)
