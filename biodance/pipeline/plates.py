@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from biodance import display
-from biodance.diagnosis.archive.evidence import observe, plainly_named
+from biodance.diagnosis.archive.evidence import plainly_named, plate_evidence
 from biodance.diagnosis.archive.judge import ArchiveJudgement, judge
-from biodance.diagnosis.archive.observation import Observation, Visit
+from biodance.diagnosis.archive.quantities import PlateEvidence, LabVisit
 from biodance.errors import BiodanceError, SessionRefused
 from biodance.lab.session.archive import archive_folders, iso_date, visit_date
 from biodance.lab.session.index import IndexedTrial, read_index, read_plate_text
@@ -31,7 +31,7 @@ class PlatesJudged:
         Its folder.
     judgement : ArchiveJudgement
         Cards of the plates, changes, kinds of trial, people who stand out.
-    observations : tuple of Observation
+    observations : tuple of PlateEvidence
         What every trial says of every plate.
     refused : mapping
         Session or recording -> why it was left out.
@@ -41,7 +41,7 @@ class PlatesJudged:
 
     archive: Path
     judgement: ArchiveJudgement
-    observations: tuple[Observation, ...]
+    observations: tuple[PlateEvidence, ...]
     refused: Mapping[str, str]
     notes: tuple[str, ...] = ()
 
@@ -104,7 +104,7 @@ def judge_plates(archive: str | Path, *, tell: _Tell = lambda _: None) -> Plates
     folder = Path(archive)
     sessions, indices = archive_folders(folder)
     refused: dict[str, str] = {}
-    observations: list[Observation] = []
+    observations: list[PlateEvidence] = []
     for path in sessions:
         tell(f"reading {path.name}")
         observations += _of_session(path, folder, refused)
@@ -129,14 +129,14 @@ def judge_plates(archive: str | Path, *, tell: _Tell = lambda _: None) -> Plates
     return PlatesJudged(folder, judged, named, refused, notes)
 
 
-def _of_session(path: Path, archive: Path, refused: dict[str, str]) -> list[Observation]:
+def _of_session(path: Path, archive: Path, refused: dict[str, str]) -> list[PlateEvidence]:
     """Return what one session folder says; it is refused with a reason instead of stopping the rest."""
     name = path.relative_to(archive).as_posix() if path != archive else path.resolve().name
     try:
         session = read_session(path)
-        visit = Visit(name, session.subject.name, visit_date(path))
+        visit = LabVisit(name, session.subject.name, visit_date(path))
         mass = float("nan") if "mass" in session.subject.guessed else session.subject.mass
-        found = list(observe(session.trials, visit, mass=mass))
+        found = list(plate_evidence(session.trials, visit, mass=mass))
     except BiodanceError as why:
         refused[name] = str(why)
         return []
@@ -146,19 +146,19 @@ def _of_session(path: Path, archive: Path, refused: dict[str, str]) -> list[Obse
     return found
 
 
-def _of_index(path: Path, refused: dict[str, str]) -> list[Observation]:
+def _of_index(path: Path, refused: dict[str, str]) -> list[PlateEvidence]:
     """Return what the recordings that a table names say."""
     try:
         rows = read_index(path)
     except BiodanceError as why:
         refused[path.name] = str(why)
         return []
-    found: list[Observation] = []
+    found: list[PlateEvidence] = []
     for name in dict.fromkeys(row.visit for row in rows):
         own = [row for row in rows if row.visit == name]
         trials, conditions = _plate_trials(own, refused)
-        visit = Visit(name, own[0].person, iso_date(own[0].date))
-        found += observe(trials, visit, mass=own[0].mass, conditions=conditions)
+        visit = LabVisit(name, own[0].person, iso_date(own[0].date))
+        found += plate_evidence(trials, visit, mass=own[0].mass, conditions=conditions)
     return found
 
 

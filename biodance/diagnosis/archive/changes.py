@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from biodance.diagnosis.archive.observation import QUANTITIES, Visit
+from biodance.diagnosis.archive.quantities import QUANTITIES, LabVisit
 from biodance.diagnosis.archive.series import Fitted, Series, fit
 from biodance.records import Array
 
@@ -35,9 +35,9 @@ class Change:
 
     plate: str
     quantity: str
-    visit: Visit
-    earliest: Visit
-    latest: Visit
+    visit: LabVisit
+    earliest: LabVisit
+    latest: LabVisit
     before: float
     after: float
     interval: tuple[float, float]
@@ -139,7 +139,8 @@ def candidates(series: Series) -> list[_Candidate]:
     seen, out = np.unique(series.visit), []
     for plate, share in among:
         out += [
-            _Candidate("step", plate, int(v), share * (series.visit >= v)) for v in seen[_LEAST : seen.size - _LEAST + 1]
+            _Candidate("step", plate, int(v), share * (series.visit >= v))
+            for v in seen[_LEAST : seen.size - _LEAST + 1]
         ]
         out += [_Candidate("visit", plate, int(v), share * (series.visit == v)) for v in seen]
         several = [p for p in np.unique(series.person) if np.unique(series.visit[series.person == p]).size > 1]
@@ -207,7 +208,9 @@ def _change(series: Series, columns: Array, fitted: Fitted, chosen: list[_Candid
     size, error = float(fitted.beta[k]), float(np.sqrt(fitted.covariance[k, k]))
     plate = one.plate if one.plate != ALL else series.plates[0]
     earlier = [
-        j for j, other in enumerate(chosen) if other.kind == "step" and other.plate in (plate, ALL) and other.at < one.at
+        j
+        for j, other in enumerate(chosen)
+        if other.kind == "step" and other.plate in (plate, ALL) and other.at < one.at
     ]
     before = float(fitted.beta[series.plates.index(plate)] + sum(fitted.beta[len(series.plates) + j] for j in earlier))
     others = np.delete(columns, k, axis=1)
@@ -218,5 +221,12 @@ def _change(series: Series, columns: Array, fitted: Fitted, chosen: list[_Candid
     first, last = (series.visits[v] for v in (min(possible), max(possible)))
     half = 1.96 * error
     return Change(
-        one.plate, series.quantity, series.visits[one.at], first, last, before, before + size, (size - half, size + half)
+        one.plate,
+        series.quantity,
+        series.visits[one.at],
+        first,
+        last,
+        before,
+        before + size,
+        (size - half, size + half),
     )

@@ -13,7 +13,7 @@ from types import MappingProxyType
 import numpy as np
 
 from biodance.diagnosis.archive.changes import ALARM
-from biodance.diagnosis.archive.observation import QUANTITIES, Observation, Visit
+from biodance.diagnosis.archive.quantities import QUANTITIES, PlateEvidence, LabVisit
 from biodance.diagnosis.archive.pooling import Pooled, pool
 from biodance.records import Array
 
@@ -32,7 +32,7 @@ class ConditionEffect:
     factor: str
     level: str
     base: str
-    visits: tuple[Visit, ...]
+    visits: tuple[LabVisit, ...]
     shared: Pooled
 
     @property
@@ -48,7 +48,7 @@ class ConditionEffect:
         )
 
 
-def condition_effects(observations: Sequence[Observation]) -> tuple[ConditionEffect, ...]:
+def condition_effects(observations: Sequence[PlateEvidence]) -> tuple[ConditionEffect, ...]:
     """Return the effects of conditions that matter and that chance does not explain, each quantity, plate and level
     tested with its share of the alarm rate; one visit alone tells none, for its zero may have jumped in between.
     """
@@ -61,8 +61,8 @@ def condition_effects(observations: Sequence[Observation]) -> tuple[ConditionEff
 
 
 def without_conditions(
-    observations: Sequence[Observation], effects: Sequence[ConditionEffect]
-) -> tuple[Observation, ...]:
+    observations: Sequence[PlateEvidence], effects: Sequence[ConditionEffect]
+) -> tuple[PlateEvidence, ...]:
     """Return the observations of the base conditions: the others read what is not the plate's."""
     odd = {(one.quantity, one.factor, one.level) for one in effects}
     return tuple(
@@ -72,21 +72,21 @@ def without_conditions(
     )
 
 
-def _kinds(observations: Sequence[Observation]) -> list[list[Observation]]:
+def _kinds(observations: Sequence[PlateEvidence]) -> list[list[PlateEvidence]]:
     """Return the observations apart by quantity and plates, where trials say in what they differ."""
-    kinds: dict[tuple[str, tuple[str, ...]], list[Observation]] = {}
+    kinds: dict[tuple[str, tuple[str, ...]], list[PlateEvidence]] = {}
     for one in observations:
         if one.conditions:
             kinds.setdefault((one.quantity, tuple(sorted(one.plates))), []).append(one)
     return list(kinds.values())
 
 
-def _effects(some: list[Observation]) -> list[ConditionEffect]:
+def _effects(some: list[PlateEvidence]) -> list[ConditionEffect]:
     """Return what every level of every factor changes, pooled over the visits that have it beside the base."""
     bases = {factor: _base(some, factor) for factor in sorted({name for one in some for name in one.conditions})}
     visits = {visit: [one for one in some if one.visit == visit] for visit in sorted({o.visit for o in some}, key=str)}
     spread = _pooled_scatter(list(visits.values()), bases)
-    found: dict[tuple[str, str], list[tuple[Visit, float, float]]] = {}
+    found: dict[tuple[str, str], list[tuple[LabVisit, float, float]]] = {}
     for visit, own in visits.items():
         for key, value, sd in _differences(own, bases, spread):
             found.setdefault(key, []).append((visit, value, sd))
@@ -105,7 +105,7 @@ def _effects(some: list[Observation]) -> list[ConditionEffect]:
     ]
 
 
-def _base(some: list[Observation], factor: str) -> str:
+def _base(some: list[PlateEvidence], factor: str) -> str:
     """Return the level that most trials have; of equally frequent ones that which reads nearest to nothing wrong."""
     count = Counter(one.conditions[factor] for one in some if factor in one.conditions)
     most = [level for level, n in count.items() if n >= 0.9 * max(count.values())]
@@ -116,7 +116,7 @@ def _base(some: list[Observation], factor: str) -> str:
     return min(most, key=lambda level: (middle[level], level))
 
 
-def _dummies(own: list[Observation], bases: Mapping[str, str]) -> tuple[Array, list[tuple[str, str]]]:
+def _dummies(own: list[PlateEvidence], bases: Mapping[str, str]) -> tuple[Array, list[tuple[str, str]]]:
     """Return the columns (n, 1 + m) of a visit's mean and levels, and which level each of the m is."""
     levels = sorted(
         {(f, one.conditions[f]) for one in own for f in bases if f in one.conditions and one.conditions[f] != bases[f]}
@@ -131,14 +131,14 @@ def _dummies(own: list[Observation], bases: Mapping[str, str]) -> tuple[Array, l
     return np.column_stack(columns), kept
 
 
-def _left(own: list[Observation], columns: Array) -> tuple[Array, float, int]:
+def _left(own: list[PlateEvidence], columns: Array) -> tuple[Array, float, int]:
     """Return least squares of a visit: coefficients, residual sum of squares, degrees of freedom."""
     value = np.array([one.value for one in own])
     beta = np.linalg.lstsq(columns, value, rcond=None)[0]
     return beta, float(np.sum((value - columns @ beta) ** 2)), len(own) - columns.shape[1]
 
 
-def _pooled_scatter(visits: list[list[Observation]], bases: Mapping[str, str]) -> float:
+def _pooled_scatter(visits: list[list[PlateEvidence]], bases: Mapping[str, str]) -> float:
     """Return the variance of one trial about its visit and conditions, over all visits."""
     rows = [_left(own, _dummies(own, bases)[0])[1:] for own in visits]
     free = sum(row[1] for row in rows)
@@ -147,7 +147,7 @@ def _pooled_scatter(visits: list[list[Observation]], bases: Mapping[str, str]) -
 
 
 def _differences(
-    own: list[Observation], bases: Mapping[str, str], spread: float
+    own: list[PlateEvidence], bases: Mapping[str, str], spread: float
 ) -> list[tuple[tuple[str, str], float, float]]:
     """Return (factor, level), value and standard error of every difference that one visit knows."""
     columns, levels = _dummies(own, bases)

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from biodance.diagnosis.archive.observation import QUANTITIES, Observation, in_order
+from biodance.diagnosis.archive.quantities import QUANTITIES, PlateEvidence, in_order
 
 
-def daily_rows(observations: Sequence[Observation]) -> list[dict[str, Any]]:
+def daily_rows(observations: Sequence[PlateEvidence]) -> list[dict[str, Any]]:
     """Return one row for each visit and plate that it stood on alone; a quantity that nothing saw is None.
 
     Keys: ``date``, ``visit``, ``person``, ``plate``; ``place_x_m``, ``place_x_sd_m``, ``place_x_trials`` and so for
@@ -19,7 +19,9 @@ def daily_rows(observations: Sequence[Observation]) -> list[dict[str, Any]]:
     for visit in in_order(observations):
         own = [one for one in observations if one.visit == visit]
         for plate in plates:
-            some = [one for one in own if plate in one.plates and max(one.plates.values()) / sum(one.plates.values()) > 0.9]
+            some = [
+                one for one in own if plate in one.plates and max(one.plates.values()) / sum(one.plates.values()) > 0.9
+            ]
             if some:
                 row: dict[str, Any] = {
                     "date": visit.date, "visit": visit.name, "person": visit.person, "plate": plate
@@ -31,7 +33,7 @@ def daily_rows(observations: Sequence[Observation]) -> list[dict[str, Any]]:
     return rows
 
 
-def _cells(name: str, some: Sequence[Observation]) -> dict[str, Any]:
+def _cells(name: str, some: Sequence[PlateEvidence]) -> dict[str, Any]:
     """Return mean, standard error and number of trials of one quantity."""
     suffix = {"1": "", "m": "_m", "s": "_s", "N": "_n"}[QUANTITIES[name].unit]
     if not some:

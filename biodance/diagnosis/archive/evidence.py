@@ -1,5 +1,5 @@
-"""What the recordings of one visit say of its plates without any model of a body: the empty plate, quiet standing, and
-the declared mass.
+"""What the recordings of one visit say of its plates without any model of a body: the empty plate, quiet standing, the
+declared mass, and ordinary steps.
 
 The empty plate is what a plate reads at its unloaded end, before the reader takes it off. A person who stands still is
 not accelerated: the mean horizontal force is the plates' own. What the plates weigh less what was declared is their gain
@@ -11,7 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from biodance.diagnosis.archive.observation import Observation, Visit
+from biodance.diagnosis.archive.quantities import PlateEvidence, LabVisit
+from biodance.diagnosis.archive.walking import of_steps
 from biodance.lab.plates.zero import block_means, find_baseline
 from biodance.lab.weight import is_still, standing_mass
 from biodance.records import Array, Plate, Trial
@@ -33,27 +34,27 @@ _ROUND = 0.02
 """m to which the sides of a plate are rounded, to know it again."""
 
 
-def observe(
+def plate_evidence(
     trials: Sequence[Trial],
-    visit: Visit,
+    visit: LabVisit,
     *,
     mass: float = float("nan"),
     conditions: Mapping[str, Mapping[str, str]] | None = None,
-) -> tuple[Observation, ...]:
+) -> tuple[PlateEvidence, ...]:
     """Return what the trials of a visit say of their plates.
 
     Parameters
     ----------
     trials : sequence of Trial
         As read.
-    visit : Visit
+    visit : LabVisit
         Whose they are.
     mass : float
         Declared, kg; NaN where nobody declared it.
     conditions : mapping
         Trial -> what it was, where trials of the visit differ in it.
     """
-    found: list[Observation] = []
+    found: list[PlateEvidence] = []
     empty = {plate_label(plate) for trial in trials for plate in trial.plates if _empty(plate) is not None}
     for trial in trials:
         kind = (conditions or {}).get(trial.name, {})
@@ -61,6 +62,9 @@ def observe(
             found += _of_empty(plate, trial, visit, kind)
         if trial.plates and (trial.markers is None or is_still(trial)):
             found += _of_standing(trial, visit, kind, mass, empty)
+        elif trial.plates:
+            labels = {plate.name: plate_label(plate) for plate in trial.plates}
+            found += of_steps(trial, visit, kind, mass, labels)
     return tuple(found)
 
 
@@ -73,11 +77,13 @@ def plate_label(plate: Plate) -> str:
     return f"{plate.name} ({first:.0f} x {second:.0f} mm)"
 
 
-def plainly_named(observations: Sequence[Observation]) -> tuple[Observation, ...]:
+def plainly_named(observations: Sequence[PlateEvidence]) -> tuple[PlateEvidence, ...]:
     """Return the observations with plates by their names alone where an archive has one plate of that name."""
     labels = {label for one in observations for label in one.plates}
     names = [label.partition(" (")[0] for label in labels]
-    short = {label: name if names.count(name) == 1 else label for label in labels for name in [label.partition(" (")[0]]}
+    short = {
+        label: name if names.count(name) == 1 else label for label in labels for name in [label.partition(" (")[0]]
+    }
     return tuple(
         replace(one, plates={short[label]: part for label, part in one.plates.items()}) for one in observations
     )
@@ -96,22 +102,30 @@ def _empty(plate: Plate) -> Array | None:
     return np.asarray(plate.zero + force[found.start : found.stop].mean(axis=0))
 
 
-def _of_empty(plate: Plate, trial: Trial, visit: Visit, kind: Mapping[str, str]) -> list[Observation]:
+def _of_empty(plate: Plate, trial: Trial, visit: LabVisit, kind: Mapping[str, str]) -> list[PlateEvidence]:
     reads = _empty(plate)
     if reads is None:
         return []
     taken = bool(plate.zero.any()) or float(np.abs(reads).max()) < _WEIGHS
     return [
-        Observation(
-            f"offset_{axis}", {plate_label(plate): 1.0}, float(value), _WEIGHS, visit, trial.name, kind, "empty plate", taken
+        PlateEvidence(
+            f"offset_{axis}",
+            {plate_label(plate): 1.0},
+            float(value),
+            _WEIGHS,
+            visit,
+            trial.name,
+            kind,
+            "empty plate",
+            taken,
         )
         for axis, value in zip(AXES, reads, strict=True)
     ]
 
 
 def _of_standing(
-    trial: Trial, visit: Visit, kind: Mapping[str, str], mass: float, empty: set[str]
-) -> list[Observation]:
+    trial: Trial, visit: LabVisit, kind: Mapping[str, str], mass: float, empty: set[str]
+) -> list[PlateEvidence]:
     """Return what quiet standing says: horizontal offsets of plates that were never seen empty, and the weight."""
     on = [plate for plate in trial.plates if plate.wrench.force[:, 2].mean() > _LOADED]
     weighed = standing_mass(trial)
@@ -124,7 +138,7 @@ def _of_standing(
         mean = np.sum([plate.wrench.force.mean(axis=0) for plate in on], axis=0)
         sd = float(np.hypot(_WEIGHS, np.sqrt(2) * weighed * _SWAY_SPEED / min(seconds, _LONGEST)))
         found += [
-            Observation(
+            PlateEvidence(
                 f"offset_{axis}", dict.fromkeys(unknown, 1.0), float(value), sd, visit, trial.name, kind, "standing"
             )
             for axis, value in zip(AXES[:2], mean[:2], strict=True)
@@ -136,17 +150,17 @@ def _of_standing(
 
 def _weighed(
     trial: Trial,
-    visit: Visit,
+    visit: LabVisit,
     kind: Mapping[str, str],
     mass: float,
     weighed: float,
     on: list[Plate],
     unknown: list[str],
-) -> Observation:
+) -> PlateEvidence:
     """Return what the plates weigh against what was declared."""
     if unknown:
         value, share = (weighed - mass) * trial.settings.gravity, dict.fromkeys(unknown, 1.0)
-        return Observation("offset_z", share, value, _WEIGHS, visit, trial.name, kind, "weight")
+        return PlateEvidence("offset_z", share, value, _WEIGHS, visit, trial.name, kind, "weight")
     vertical = np.array([plate.wrench.force[:, 2].mean() for plate in on])
     share = {plate_label(plate): float(part) for plate, part in zip(on, vertical / vertical.sum(), strict=True)}
-    return Observation("gain", share, weighed / mass - 1, _GAIN, visit, trial.name, kind, "weight")
+    return PlateEvidence("gain", share, weighed / mass - 1, _GAIN, visit, trial.name, kind, "weight")

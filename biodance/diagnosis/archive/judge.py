@@ -8,7 +8,7 @@ from scipy.stats import f as fisher
 
 from biodance.diagnosis.archive.changes import ALARM, ALL, Change, History, Stranger, history
 from biodance.diagnosis.archive.conditions import ConditionEffect, condition_effects, without_conditions
-from biodance.diagnosis.archive.observation import QUANTITIES, Observation, Visit, in_order
+from biodance.diagnosis.archive.quantities import QUANTITIES, PlateEvidence, LabVisit, in_order
 from biodance.diagnosis.archive.series import series_of
 
 _HORIZONTAL = ("offset_x", "offset_y")
@@ -61,7 +61,7 @@ class ArchiveJudgement:
 
     Parameters
     ----------
-    visits : tuple of Visit
+    visits : tuple of LabVisit
         In order of their date, else of their name.
     plates : tuple of PlateCard
         By name.
@@ -73,7 +73,7 @@ class ArchiveJudgement:
         Of every quantity that was seen.
     """
 
-    visits: tuple[Visit, ...]
+    visits: tuple[LabVisit, ...]
     plates: tuple[PlateCard, ...]
     conditions: tuple[ConditionEffect, ...]
     strangers: tuple[Stranger, ...]
@@ -85,7 +85,7 @@ class ArchiveJudgement:
         return tuple(finding for card in self.plates for finding in card.findings)
 
 
-def judge(observations: Sequence[Observation]) -> ArchiveJudgement:
+def judge(observations: Sequence[PlateEvidence]) -> ArchiveJudgement:
     """Return what the observations of an archive say about its plates, kinds of trial and people; none gives an empty
     judgement.
     """
@@ -102,7 +102,7 @@ def judge(observations: Sequence[Observation]) -> ArchiveJudgement:
 
 def _card(
     plate: str,
-    observations: Sequence[Observation],
+    observations: Sequence[PlateEvidence],
     histories: tuple[History, ...],
     conditions: tuple[ConditionEffect, ...],
 ) -> PlateCard:
@@ -110,7 +110,9 @@ def _card(
     own = [one for one in histories if plate in one.series.plates]
     levels = tuple(_level(plate, one, observations) for one in own)
     changes = tuple(change for one in own for change in one.changes if change.plate in (plate, ALL))
-    findings = [_changed(change, _taken_off(plate, change.quantity, observations)) for change in changes if change.matters]
+    findings = [
+        _changed(change, _taken_off(plate, change.quantity, observations)) for change in changes if change.matters
+    ]
     findings += [_condition(one) for one in conditions if plate in one.plate.split("+")]
     for level, one in zip(levels, own, strict=True):
         findings += _wrong(level)
@@ -119,14 +121,15 @@ def _card(
     return PlateCard(plate, len(seen), levels, changes, tuple(findings))
 
 
-def _taken_off(plate: str, quantity: str, observations: Sequence[Observation]) -> float:
+def _taken_off(plate: str, quantity: str, observations: Sequence[PlateEvidence]) -> float:
     some = [one.taken_off for one in observations if one.quantity == quantity and plate in one.plates]
     return float(np.mean(some)) if some else 0.0
 
 
-def _level(plate: str, one: History, observations: Sequence[Observation]) -> Level:
+def _level(plate: str, one: History, observations: Sequence[PlateEvidence]) -> Level:
     rows = one.series.design[:, one.series.plates.index(plate)] != 0
-    value, sd = one.level(plate)
+    value, error = one.level(plate)
+    sd = float(np.hypot(error, QUANTITIES[one.series.quantity].norm))
     between = float(np.hypot(one.fitted.between, one.fitted.alone))
     visits = int(np.unique(one.series.visit[rows]).size)
     return Level(one.series.quantity, value, sd, between, visits, _taken_off(plate, one.series.quantity, observations))
@@ -156,7 +159,9 @@ def _changed(change: Change, taken_off: float) -> PlateFinding:
         f"{said(change.quantity, change.after)} on {when}{between}; step {said(change.quantity, change.after - change.before)}, "
         f"95 % interval {said(change.quantity, low)} to {said(change.quantity, high)}.{mended}"
     )
-    return PlateFinding(known.effect, known.target, text, change.quantity, change.after - change.before, change.interval)
+    return PlateFinding(
+        known.effect, known.target, text, change.quantity, change.after - change.before, change.interval
+    )
 
 
 _WORDS = {
@@ -208,7 +213,12 @@ def _wandering(plate: str, level: Level, one: History) -> list[PlateFinding]:
     """Return an offset that differs from day to day more than within a day, and is not taken off."""
     known, series = QUANTITIES[level.quantity], one.series
     rows = series.design[:, series.plates.index(plate)] != 0
-    if level.quantity not in _HORIZONTAL or level.taken_off > 0.5 or level.visits < 3 or level.between < known.matters / 2:
+    if (
+        level.quantity not in _HORIZONTAL
+        or level.taken_off > 0.5
+        or level.visits < 3
+        or level.between < known.matters / 2
+    ):
         return []
     left = (series.value - one.columns @ one.fitted.beta)[rows]
     free = left.size - np.linalg.matrix_rank(one.columns[rows])

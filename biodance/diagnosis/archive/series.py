@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.optimize import minimize
 
-from biodance.diagnosis.archive.observation import QUANTITIES, Observation, Visit
+from biodance.diagnosis.archive.quantities import QUANTITIES, PlateEvidence, LabVisit
 from biodance.records import Array
 
 _DOUBT = 0.8
@@ -34,7 +34,7 @@ class Series:
 
     quantity: str
     plates: tuple[str, ...]
-    visits: tuple[Visit, ...]
+    visits: tuple[LabVisit, ...]
     value: Array
     sd: Array
     design: Array
@@ -61,13 +61,13 @@ class Fitted:
     alone: float
 
 
-def series_of(quantity: str, observations: Sequence[Observation], visits: tuple[Visit, ...]) -> Series:
+def series_of(quantity: str, observations: Sequence[PlateEvidence], visits: tuple[LabVisit, ...]) -> Series:
     """Return the ``quantity`` over the visits: trials of one visit about the same plates become one row, their weighted
     mean; its error follows from how much trials of one visit differ in this archive.
     """
     seen = [one for one in observations if one.quantity == quantity]
     plates = tuple(sorted({plate for one in seen for plate in one.plates}))
-    groups: dict[tuple[int, tuple[tuple[str, float], ...]], list[Observation]] = {}
+    groups: dict[tuple[int, tuple[tuple[str, float], ...]], list[PlateEvidence]] = {}
     for one in seen:
         share = tuple(sorted((plate, round(part, 1)) for plate, part in one.plates.items()))
         groups.setdefault((visits.index(one.visit), share), []).append(one)
@@ -90,7 +90,7 @@ def series_of(quantity: str, observations: Sequence[Observation], visits: tuple[
     )
 
 
-def _scatter(groups: list[list[Observation]]) -> float:
+def _scatter(groups: list[list[PlateEvidence]]) -> float:
     """Return by how many of its own standard deviations a trial differs from its visit's others, at least 1."""
     square, count = 0.0, 0
     for some in groups:
@@ -100,7 +100,7 @@ def _scatter(groups: list[list[Observation]]) -> float:
     return max(1.0, float(np.sqrt(square / count))) if count else 1.0
 
 
-def _mean(some: list[Observation], scatter: float, quantity: str) -> tuple[float, float]:
+def _mean(some: list[PlateEvidence], scatter: float, quantity: str) -> tuple[float, float]:
     """Return the weighted mean of the trials of one visit, and its standard error."""
     weight = np.array([one.sd**-2.0 for one in some])
     mean = float(weight @ np.array([one.value for one in some]) / weight.sum())
@@ -155,6 +155,4 @@ def _restricted(lower: Array, value: Array, columns: Array) -> float:
     white = solve_triangular(lower, np.column_stack([columns, value]), lower=True)
     orthogonal, triangle = np.linalg.qr(white[:, :-1])
     left = white[:, -1] - orthogonal @ (orthogonal.T @ white[:, -1])
-    return float(
-        np.log(np.diag(lower)).sum() + np.log(np.abs(np.diag(triangle)) + 1e-300).sum() + left @ left / 2
-    )
+    return float(np.log(np.diag(lower)).sum() + np.log(np.abs(np.diag(triangle)) + 1e-300).sum() + left @ left / 2)

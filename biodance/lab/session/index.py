@@ -79,7 +79,9 @@ def read_index(path: Path) -> tuple[IndexedTrial, ...]:
         mass = row.get(found["mass"], "")
         trials.append((IndexedTrial(recording, person, visit, said, _number(mass)), row))
     if not trials:
-        raise FileRefused(f"{path}: names no recording that lies beside it. Check the column {found['trial'] or 'trial'}.")
+        raise FileRefused(
+            f"{path}: names no recording that lies beside it. Check the column {found['trial'] or 'trial'}."
+        )
     differing = _conditions(trials, [name for name in names if name not in found.values()])
     return tuple(
         IndexedTrial(one.path, one.person, one.visit, one.date, one.mass, {name: row[name] for name in differing})
@@ -146,7 +148,9 @@ def read_plate_text(path: Path) -> Trial:
     raw = np.array([_values(line, path, number) for number, line in enumerate(lines[1:], start=2)])
     time, *value = (raw[:, i] * factor for i, factor in (columns[name] for name in ("time", *CHANNELS)))
     plate = _plate(np.asarray(time), np.column_stack(value))
-    return Trial(path.stem, "fit", None, (plate,), Source(path, sha256(read_bytes(path)), "text"), history=plate.decisions)
+    return Trial(
+        path.stem, "fit", None, (plate,), Source(path, sha256(read_bytes(path)), "text"), history=plate.decisions
+    )
 
 
 def _plate(time: Array, value: Array) -> Plate:
@@ -172,5 +176,3 @@ def _factor(channel: str, unit: str, path: Path) -> float:
         return float(legal[unit or usual] if channel == "time" else legal[plain_unit(unit or usual)])
     except KeyError:
         raise FileRefused(f"{path}: the unit {unit!r} of {channel} is not known. Legal: {', '.join(legal)}.") from None
-
-

@@ -5,7 +5,7 @@ from typing import Any
 from biodance.diagnosis.archive.changes import Change, Stranger
 from biodance.diagnosis.archive.conditions import ConditionEffect
 from biodance.diagnosis.archive.judge import Level, PlateCard, PlateFinding, said
-from biodance.diagnosis.archive.observation import QUANTITIES
+from biodance.diagnosis.archive.quantities import QUANTITIES
 from biodance.pipeline.plates import PlatesJudged
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from biodance.diagnosis.archive.changes import ALL, History
 from biodance.diagnosis.archive.conditions import ConditionEffect
-from biodance.diagnosis.archive.observation import QUANTITIES
+from biodance.diagnosis.archive.quantities import QUANTITIES
 from biodance.display import BLACK, BLUE, GREY, RED
 from biodance.report.figures.style import figure, look
 

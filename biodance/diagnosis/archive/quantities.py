@@ -22,6 +22,9 @@ class Quantity:
         starts from.
     matters : float
         Smaller changes are listed, but are no finding.
+    norm : float
+        Standard deviation of what is expected of a plate without fault, the same in all visits of a laboratory (where
+        it puts its toe marker): it blurs the level, not a change.
     """
 
     name: str
@@ -30,6 +33,7 @@ class Quantity:
     target: str
     typical: float
     matters: float
+    norm: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0 < self.typical:
@@ -40,13 +44,13 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
     {
         one.name: one
         for one in (
-            Quantity("place_x", "m", "plate_position", "x", 0.002, 0.003),
-            Quantity("place_y", "m", "plate_position", "y", 0.002, 0.003),
+            Quantity("place_x", "m", "plate_position", "x", 0.003, 0.003, 0.004),
+            Quantity("place_y", "m", "plate_position", "y", 0.003, 0.003, 0.004),
             Quantity("gain", "1", "plate_gain", "Fz", 0.003, 0.01),
             Quantity("offset_x", "N", "plate_offset", "Fx", 0.5, 2.0),
             Quantity("offset_y", "N", "plate_offset", "Fy", 0.5, 2.0),
             Quantity("offset_z", "N", "plate_offset", "Fz", 0.5, 2.0),
-            Quantity("delay", "s", "time_delay", "", 0.0015, 0.004),
+            Quantity("delay", "s", "time_delay", "", 0.002, 0.004, 0.003),
         )
     }
 )
@@ -56,7 +60,7 @@ laboratory guides (+-5 N).
 
 
 @dataclass(frozen=True)
-class Visit:
+class LabVisit:
     """One visit of one person: its ``name``, the ``person``, and the ``date`` (ISO 8601, "" = not known)."""
 
     name: str
@@ -65,7 +69,7 @@ class Visit:
 
 
 @dataclass(frozen=True)
-class Observation:
+class PlateEvidence:
     """What one trial says of one quantity.
 
     Parameters
@@ -77,7 +81,7 @@ class Observation:
         each gain. Usually ``{"plate1": 1.0}``.
     value, sd : float
         In the quantity's unit; ``sd`` is what another trial of the same visit may differ by.
-    visit : Visit
+    visit : LabVisit
         Whose.
     trial : str
         Its name.
@@ -93,7 +97,7 @@ class Observation:
     plates: Mapping[str, float]
     value: float
     sd: float
-    visit: Visit
+    visit: LabVisit
     trial: str
     conditions: Mapping[str, str] = field(default_factory=dict)
     witness: str = ""
@@ -103,10 +107,10 @@ class Observation:
         if self.quantity not in QUANTITIES:
             raise UnknownName.of("quantity of a plate", self.quantity, QUANTITIES)
         if not self.sd > 0:
-            raise ValueError(f"Observation {self.quantity} of {self.trial}: sd = {self.sd} must be positive.")
+            raise ValueError(f"PlateEvidence {self.quantity} of {self.trial}: sd = {self.sd} must be positive.")
 
 
-def in_order(observations: Iterable[Observation]) -> tuple[Visit, ...]:
+def in_order(observations: Iterable[PlateEvidence]) -> tuple[LabVisit, ...]:
     """Return the visits, each once, by date where all have one, else by name."""
     visits = set(one.visit for one in observations)
     dated = all(visit.date for visit in visits)
