@@ -2,7 +2,7 @@
 
 Every date between two visits at which one plate, or all together, may have stepped, and every visit or person who may
 stand out, is a column; the one whose studentised effect is largest is believed if chance reaches it less often than
-agreed, over all columns at once (the distribution of the largest is simulated for just these rows and columns:
+agreed, over all columns of its kind at once (the distribution of the largest is simulated for just these rows and columns:
 Andrews 1993, doi:10.2307/2951764, without its asymptotics). Then it joins the model, and the search goes on.
 """
 
@@ -21,6 +21,8 @@ _MOST = 8
 """Steps and strangers looked for in one series."""
 _LEAST = 2
 """Visits on each side of a step."""
+_FEWEST = 3
+"""Rows beyond the columns without which nothing is looked for."""
 _DRAWS = 6000
 _DATE = 3.84
 """Fall of twice the log likelihood within which a date is not excluded (chi-square, 95 %)."""
@@ -105,28 +107,40 @@ class _Candidate:
     column: Array
 
 
-def history(series: Series, *, alarm: float = ALARM / len(QUANTITIES)) -> History:
-    """Return what changed and who stands out in a series, each with a probability below ``alarm`` of being chance."""
+def history(series: Series) -> History:
+    """Return what changed and who stands out in a series, each kind with a probability below the quantity's share of
+    `ALARM` of being chance.
+    """
+    alarm = ALARM * QUANTITIES[series.quantity].share
     chosen: list[_Candidate] = []
-    while len(chosen) < _MOST:
-        columns = _columns(series, chosen)
-        possible = [
-            one
-            for one in candidates(series)
-            if np.linalg.matrix_rank(np.column_stack([columns, one.column])) > columns.shape[1]
-        ]
-        if not possible or series.value.size - columns.shape[1] < 3:
-            break
-        best = possible[int(np.argmax(np.abs(_studentised(series, columns, possible, fit(series, columns)))))]
-        sure = fit(series, np.column_stack([columns, best.column]))  # variances that a step does not blow up
-        size = np.abs(_studentised(series, columns, possible, sure))
-        best = possible[int(np.argmax(size))]
-        if _chance(series, columns, possible, sure, float(size.max())) > alarm:
-            break
+    while len(chosen) < _MOST and (best := _next(series, _columns(series, chosen), alarm)) is not None:
         chosen.append(best)
     chosen.sort(key=lambda one: (one.kind != "step", one.at))
     columns = _columns(series, chosen)
     return _told(series, columns, fit(series, columns), chosen)
+
+
+def _next(series: Series, columns: Array, alarm: float) -> _Candidate | None:
+    """Return what explains most of what ``columns`` (n, K) leave, of the kinds that chance does not explain; None where
+    there is nothing.
+    """
+    possible = [
+        one
+        for one in candidates(series)
+        if np.linalg.matrix_rank(np.column_stack([columns, one.column])) > columns.shape[1]
+    ]
+    if series.value.size - columns.shape[1] < _FEWEST:
+        return None
+    sure: list[tuple[float, _Candidate]] = []
+    for kind in (True, False):
+        rivals = [one for one in possible if (one.kind == "step") == kind]
+        if rivals:
+            first = rivals[int(np.argmax(_studentised(series, columns, rivals, fit(series, columns))))]
+            known = fit(series, np.column_stack([columns, first.column]))  # variances that a step does not blow up
+            size = _studentised(series, columns, rivals, known)
+            if _chance(series, columns, rivals, known, float(size.max())) <= alarm:
+                sure.append((float(size.max()), rivals[int(np.argmax(size))]))
+    return max(sure, key=lambda pair: pair[0])[1] if sure else None
 
 
 def candidates(series: Series) -> list[_Candidate]:
@@ -176,7 +190,7 @@ def _largest(directions: Array, data: Array) -> Array:
 
 def _studentised(series: Series, columns: Array, possible: list[_Candidate], known: Fitted) -> Array:
     _, directions, data = _white(series, columns, possible, known)
-    return _largest(directions, data[:, None])[:, 0]
+    return np.abs(_largest(directions, data[:, None])[:, 0])
 
 
 def _chance(series: Series, columns: Array, possible: list[_Candidate], known: Fitted, size: float) -> float:

@@ -223,7 +223,7 @@ def _wandering(plate: str, level: Level, one: History) -> list[PlateFinding]:
     left = (series.value - one.columns @ one.fitted.beta)[rows]
     free = left.size - np.linalg.matrix_rank(one.columns[rows])
     ratio = float(np.sum((left / series.sd[rows]) ** 2)) / max(1, free)
-    if free < 1 or fisher.sf(ratio, free, 60) > ALARM / len(QUANTITIES):
+    if free < 1 or fisher.sf(ratio, free, 60) > ALARM * known.share:
         return []
     low, high = series.value[rows].min(), series.value[rows].max()
     text = (

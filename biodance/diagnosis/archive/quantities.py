@@ -22,6 +22,8 @@ class Quantity:
         starts from.
     matters : float
         Smaller changes are listed, but are no finding.
+    share : float
+        Of the alarms that chance may raise: more where evidence is thin.
     norm : float
         Standard deviation of what is expected of a plate without fault, the same in all visits of a laboratory (where
         it puts its toe marker): it blurs the level, not a change.
@@ -33,6 +35,7 @@ class Quantity:
     target: str
     typical: float
     matters: float
+    share: float
     norm: float = 0.0
 
     def __post_init__(self) -> None:
@@ -44,13 +47,13 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
     {
         one.name: one
         for one in (
-            Quantity("place_x", "m", "plate_position", "x", 0.003, 0.003, 0.004),
-            Quantity("place_y", "m", "plate_position", "y", 0.003, 0.003, 0.004),
-            Quantity("gain", "1", "plate_gain", "Fz", 0.003, 0.01),
-            Quantity("offset_x", "N", "plate_offset", "Fx", 0.5, 2.0),
-            Quantity("offset_y", "N", "plate_offset", "Fy", 0.5, 2.0),
-            Quantity("offset_z", "N", "plate_offset", "Fz", 0.5, 2.0),
-            Quantity("delay", "s", "time_delay", "", 0.002, 0.004, 0.003),
+            Quantity("place_x", "m", "plate_position", "x", 0.003, 0.003, 0.3, 0.004),
+            Quantity("place_y", "m", "plate_position", "y", 0.003, 0.003, 0.3, 0.004),
+            Quantity("gain", "1", "plate_gain", "Fz", 0.003, 0.01, 0.1),
+            Quantity("offset_x", "N", "plate_offset", "Fx", 0.5, 2.0, 0.05),
+            Quantity("offset_y", "N", "plate_offset", "Fy", 0.5, 2.0, 0.05),
+            Quantity("offset_z", "N", "plate_offset", "Fz", 0.5, 2.0, 0.05),
+            Quantity("delay", "s", "time_delay", "", 0.002, 0.004, 0.15, 0.003),
         )
     }
 )

@@ -22,6 +22,9 @@ _DOUBT = 0.8
 """Standard deviation of the logarithm of a typical size."""
 _ONE_PLATE = 0.5
 """Share of the typical size that one plate has for itself."""
+_NORMAL = 1.4826
+"""Standard deviation of normal numbers over the median of their absolute values."""
+_FAR, _ROUNDS = 2.0, 8
 _QUIETEST = 0.02
 """Share of the typical size below which no error is believed: files may hold forces that software set to zero."""
 
@@ -91,20 +94,28 @@ def series_of(quantity: str, observations: Sequence[PlateEvidence], visits: tupl
 
 
 def _scatter(groups: list[list[PlateEvidence]]) -> float:
-    """Return by how many of its own standard deviations a trial differs from its visit's others, at least 1."""
-    square, count = 0.0, 0
+    """Return by how many of its own standard deviations a trial differs from its visit's others, at least 1; a few
+    trials that are plainly wrong do not count.
+    """
+    found = [np.empty(0)]
     for some in groups:
-        value, weight = np.array([one.value for one in some]), np.array([one.sd**-2.0 for one in some])
-        square += float(weight @ (value - weight @ value / weight.sum()) ** 2)
-        count += len(some) - 1
-    return max(1.0, float(np.sqrt(square / count))) if count else 1.0
+        if len(some) > 1:
+            value, sd = np.array([one.value for one in some]), np.array([one.sd for one in some])
+            found.append((value - np.average(value, weights=sd**-2)) / sd * np.sqrt(len(some) / (len(some) - 1)))
+    each = np.abs(np.concatenate(found))
+    return max(1.0, _NORMAL * float(np.median(each))) if each.size else 1.0
 
 
 def _mean(some: list[PlateEvidence], scatter: float, quantity: str) -> tuple[float, float]:
-    """Return the weighted mean of the trials of one visit, and its standard error."""
-    weight = np.array([one.sd**-2.0 for one in some])
-    mean = float(weight @ np.array([one.value for one in some]) / weight.sum())
-    return mean, max(scatter / float(np.sqrt(weight.sum())), _QUIETEST * QUANTITIES[quantity].typical)
+    """Return the mean of the trials of one visit and its standard error; trials beyond two standard deviations count
+    less (Huber 1964, doi:10.1214/aoms/1177703732).
+    """
+    value, sd = np.array([one.value for one in some]), scatter * np.array([one.sd for one in some])
+    mean, weight = float(np.median(value)), sd**-2
+    for _ in range(_ROUNDS):
+        weight = sd**-2 * np.minimum(1.0, _FAR / np.maximum(np.abs(value - mean) / sd, 1e-12))
+        mean = float(weight @ value / weight.sum())
+    return mean, max(float(weight.sum() ** -0.5), _QUIETEST * QUANTITIES[quantity].typical)
 
 
 def fit(series: Series, columns: Array) -> Fitted:

@@ -1,0 +1,87 @@
+"""Archives of visits drawn by chance, for bench_plates.py and its tests: what every trial says of every plate, with a
+truth that is known. Nothing here is imported from the room that judges but the records it takes.
+
+Sizes are those measured on real walks (docs/benchmarks/plates.md): errors of steps have heavy tails (Student, 5 degrees
+of freedom) and one step in twenty is plainly wrong; a person's feet have habits of their own, mirrored from left to
+right; the declared mass of a visit is wrong; plates are zeroed a little otherwise every day.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import date, timedelta
+
+import numpy as np
+
+from biodance.diagnosis.archive.quantities import LabVisit, PlateEvidence
+
+PLATES = ("plate1", "plate2")
+ACROSS, ALONG, ONSET, WEIGHED, EMPTY = 0.0045, 0.006, 0.005, 0.001, 0.1
+"""m, m, s, 1, N: one step or trial."""
+FOOT, STRIDE, DECLARED, ZEROED = 0.0035, 0.004, 0.003, 0.5
+"""m, m, 1, N: a foot across, a person along, a declared mass, a day's zero."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """From visit ``at`` (0 ...) on, ``quantity`` of ``plate`` is ``size`` larger; ``plate`` "" none."""
+
+    plate: str = ""
+    quantity: str = ""
+    size: float = 0.0
+    at: int = 0
+
+    def of(self, plate: str, quantity: str, visit: int) -> float:
+        """Return what it adds."""
+        return self.size if (plate, quantity) == (self.plate, self.quantity) and visit >= self.at else 0.0
+
+
+def draw(seed: int, *, visits: int = 16, step: Step | None = None) -> tuple[PlateEvidence, ...]:
+    """Return an archive of ``visits`` of people who walk (y is across) along x over two plates."""
+    chance = np.random.default_rng(seed)
+    day, people = date(2025, 1, 7), 0
+    habits: dict[int, np.ndarray] = {}
+    found: list[PlateEvidence] = []
+    for v in range(visits):
+        day += timedelta(days=int(chance.integers(1, 9)))
+        known = bool(people) and chance.random() < 0.25
+        person = int(chance.integers(people)) if known else people
+        people += not known
+        if person not in habits:
+            habits[person] = np.array([*chance.normal(0, FOOT, 2), chance.normal(0, STRIDE)])
+        visit = LabVisit(f"V{v:02d}", f"P{person}", day.isoformat())
+        found += _visit(chance, visit, v, habits[person], step or Step())
+    return tuple(found)
+
+
+def _visit(
+    chance: np.random.Generator, visit: LabVisit, v: int, habit: np.ndarray, step: Step
+) -> Iterator[PlateEvidence]:
+    declared = chance.normal(0, DECLARED)
+    zero = chance.normal(0, ZEROED, (len(PLATES), 3))
+    for t in range(int(chance.integers(6, 13))):
+        first = int(chance.integers(2))
+        for p, plate in enumerate(PLATES):
+            for axis in range(3):
+                name = f"offset_{'xyz'[axis]}"
+                value = zero[p, axis] + chance.normal(0, EMPTY) + step.of(plate, name, v)
+                yield PlateEvidence(
+                    name, {plate: 1.0}, value, 0.3, visit, f"walk{t}", {}, "empty plate", taken_off=True
+                )
+            if chance.random() < 0.85:
+                yield from _foot(chance, visit, v, t, plate, (first + p) % 2, habit, step)
+    mass = chance.normal(declared, WEIGHED) + step.of("plate1", "gain", v)
+    yield PlateEvidence("gain", {"plate1": 1.0}, mass, WEIGHED, visit, "static")
+
+
+def _foot(
+    chance: np.random.Generator, visit: LabVisit, v: int, t: int, plate: str, foot: int, habit: np.ndarray, step: Step
+) -> Iterator[PlateEvidence]:
+    """Yield what one step on one plate says."""
+    wild = 4.0 if chance.random() < 0.05 else 1.0
+    way = 1 if t % 2 else -1
+    tail = wild * chance.standard_t(5, 3) / np.sqrt(5 / 3)
+    y = way * (1 if foot else -1) * habit[foot] + ACROSS * tail[0]
+    x = way * habit[2] + ALONG * tail[1]
+    sizes = {"place_x": (x, ALONG), "place_y": (y, ACROSS), "delay": (ONSET * tail[2], ONSET)}
+    for name, (value, sd) in sizes.items():
+        yield PlateEvidence(name, {plate: 1.0}, value + step.of(plate, name, v), sd, visit, f"walk{t}")
