@@ -36,6 +36,23 @@ Tables = Annotated[
 ]
 OutOption = Annotated[Path, Parameter(name="--out", help="Folder for the results; it is made if it is missing.")]
 
+ReferenceOption = Annotated[
+    Path | None,
+    Parameter(
+        name="--reference",
+        help="An earlier session of the same person without load: changes and loads are then told against it.",
+    ),
+]
+BodyOption = Annotated[
+    Path | None,
+    Parameter(
+        name="--body",
+        help="body.json of an earlier session of the same person: what is known before, instead of the table.",
+    ),
+]
+LabOption = Annotated[
+    Path | None, Parameter(name="--lab", help="lab.toml: the laboratory's accepted corrections, made first.")
+]
 Set = Annotated[
     tuple[str, ...],
     Parameter(

@@ -54,6 +54,7 @@ def dance_command(
             say(f"Stopped; {folder} keeps what is finished. The same command goes on from there.")
             return STOPPED
         tell("writing", 0, 0)
+        result = result if isinstance(who, tuple) else result.of_subject(who)
         found = write_dance(result, folder)
     shutil.rmtree(folder / UNFINISHED, ignore_errors=True)
     if json:

@@ -9,10 +9,13 @@ from cyclopts import Parameter
 from biodance.cli.app import (
     DONE,
     NEEDS_A_PERSON,
+    BodyOption,
     ForceOption,
     JsonOption,
+    LabOption,
     MarkersFile,
     OutOption,
+    ReferenceOption,
     Set,
     Tables,
     app,
@@ -53,9 +56,14 @@ def diagnose_command(
     session: Path,
     *,
     out: OutOption,
-    reference: Path | None = None,
+    reference: ReferenceOption = None,
+    body: BodyOption = None,
+    lab: LabOption = None,
     accept: Annotated[
-        bool, Parameter(name="--accept", negative="", help="Also write the body with the findings accepted.")
+        bool,
+        Parameter(
+            name="--accept", negative="", help="Also write what follows from the findings: body.json, lab.toml, trials."
+        ),
     ] = False,
     subject: str | None = None,
     chosen: Set = (),
@@ -71,8 +79,6 @@ def diagnose_command(
     ----------
     session
         Folder with the static trial and the other trials.
-    reference
-        An earlier session of the same person without load: the body is then known ten times better than from the table.
     subject
         The person to diagnose where C3D files hold several.
     """
@@ -80,17 +86,18 @@ def diagnose_command(
 
     from biodance.pipeline import front
     from biodance.pipeline.attention import is_well
+    from biodance.pipeline.carry import read_lab
     from biodance.report.terminal import print_diagnosis
     from biodance.report.write import write_diagnosis
 
     with progress() as tell:
         place = ready(tables, session, force=force)
-        options = Reading(subject, markers, chosen)
-        result, before, folder = examine_with_reference(session, reference, out, options, force=force, tell=tell)
-        found = front.diagnose(result, reference=before, tell=tell)
+        options, carried = Reading(subject, markers, chosen, reference, body, lab), read_lab(lab)
+        result, before, folder = examine_with_reference(session, out, options, force=force, tell=tell)
+        found = front.diagnose(result, reference=before, tolerances=carried.tolerances, tell=tell)
         tell("writing the page")
         tabled(result, place, found.diagnosis)
-        document = write_diagnosis(result, found, folder, accepted=accept)
+        document = write_diagnosis(result, found, folder, accepted=accept, earlier=carried.corrections)
     if json:
         print_json(document)
     else:

@@ -1,7 +1,7 @@
 """Commands on a recorded session: inspect, report, identify, settings, export."""
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,10 +12,13 @@ from biodance.cli.app import (
     NEEDS_A_PERSON,
     NOT_DONE,
     STOPPED,
+    BodyOption,
     ForceOption,
     JsonOption,
+    LabOption,
     MarkersFile,
     OutOption,
+    ReferenceOption,
     Set,
     Tables,
     app,
@@ -31,15 +34,21 @@ if TYPE_CHECKING:
     from biodance.pipeline.identification import SessionIdentification
     from biodance.pipeline.results import SessionResult
     from biodance.records import Session
+    from biodance.uncertainty.tolerances import Tolerances
 
 
 @dataclass(frozen=True)
 class Reading:
-    """How a folder is read: the person where files hold several, the marker set that was worn, the settings chosen."""
+    """How a folder is read: the person where files hold several, the marker set that was worn, the settings chosen;
+    and what is known from earlier sessions: a reference, a body, the laboratory's file.
+    """
 
     subject: str | None
     markers: str | None
     chosen: tuple[str, ...]
+    reference: Path | None = None
+    body: Path | None = None
+    lab: Path | None = None
 
     def read(self, folder: Path, tell: "Callable[[str], None]") -> "Session":
         """Return the session in ``folder``."""
@@ -52,17 +61,22 @@ class Reading:
 
 
 def report_session(
-    recording: "Session", folder: Path, tell: "Callable[[str], None]", *, tables: Path | None = None
+    result: "SessionResult",
+    folder: Path,
+    tell: "Callable[[str], None]",
+    *,
+    tables: Path | None = None,
+    reference: "SessionIdentification | None" = None,
+    tolerances: "Tolerances | None" = None,
 ) -> "tuple[SessionResult, dict[str, Any]]":
-    """Examine a session and report it into ``folder``, as tables into ``tables``; return the result and the content
-    of results.json.
+    """Report an examined session into ``folder``, as tables into ``tables``; return the result and the content of
+    results.json.
     """
     from biodance.pipeline.diagnosis import diagnosed
-    from biodance.pipeline.session import examine
     from biodance.report.write import write_report
 
-    result = examine(recording, tell=tell)
-    found = diagnosed(result, tell=tell) if not result.stopped else None
+    stopped = result.stopped
+    found = None if stopped else diagnosed(result, reference=reference, tolerances=tolerances, tell=tell)
     tell("writing the page")
     tabled(result, tables, found.diagnosis if found else None)
     return result, write_report(result, folder, diagnosis=found)
@@ -103,7 +117,6 @@ def print_reported(result: "SessionResult", folder: Path, found: "dict[str, Any]
 
 def examine_with_reference(
     session: Path,
-    reference: Path | None,
     out: Path,
     options: Reading,
     *,
@@ -116,14 +129,16 @@ def examine_with_reference(
     What cannot be read or written is said before the long work starts.
     """
     from biodance.lab.session.results_folder import results_folder
+    from biodance.pipeline.carry import known_body, read_lab
     from biodance.pipeline.front import identify
     from biodance.pipeline.session import examine
 
-    earlier = options.read(reference, tell) if reference else None
-    recording = options.read(session, tell)
+    lab, known = read_lab(options.lab), known_body(options.body)
+    earlier = lab.corrected(options.read(options.reference, tell)) if options.reference else None
+    recording = lab.corrected(options.read(session, tell))
     folder = results_folder(out, session, force=force)
     before = identify(earlier, tell=tell) if earlier else None
-    return examine(recording, reference=before, tell=tell), before, folder
+    return examine(recording, reference=before, known=known, tell=tell), before, folder
 
 
 def _told_identified(result: "SessionResult", folder: Path, found: "dict[str, Any]", json: bool) -> int:
@@ -169,6 +184,9 @@ def report_command(
     session: Path,
     *,
     out: OutOption,
+    reference: ReferenceOption = None,
+    body: BodyOption = None,
+    lab: LabOption = None,
     subject: str | None = None,
     markers: MarkersFile = None,
     chosen: Set = (),
@@ -186,12 +204,13 @@ def report_command(
         The person to report where C3D files hold several; without it a file with several persons is refused and names
         them.
     """
-    from biodance.lab.session.results_folder import results_folder
+    from biodance.pipeline.carry import read_lab
 
     with progress() as tell:
-        recording = Reading(subject, markers, chosen).read(session, tell)
-        folder, place = results_folder(out, session, force=force), ready(tables, session, force=force)
-        result, found = report_session(recording, folder, tell, tables=place)
+        options, place = Reading(subject, markers, chosen, reference, body, lab), ready(tables, session, force=force)
+        result, before, folder = examine_with_reference(session, out, options, force=force, tell=tell)
+        known = read_lab(lab).tolerances
+        result, found = report_session(result, folder, tell, tables=place, reference=before, tolerances=known)
     return print_reported(result, folder, found, json)
 
 
@@ -200,7 +219,12 @@ def identify_command(
     session: Path,
     *,
     out: OutOption,
-    reference: Path | None = None,
+    reference: ReferenceOption = None,
+    dance: Annotated[
+        Path | None, Parameter(name="--dance", help="dance.npz that was shown: says how well it was danced.")
+    ] = None,
+    body: BodyOption = None,
+    lab: LabOption = None,
     subject: str | None = None,
     chosen: Set = (),
     tables: Tables = None,
@@ -214,19 +238,20 @@ def identify_command(
     ----------
     session
         Folder with the static trial and the other trials.
-    reference
-        An earlier session of the same person without load: a load is then looked for against it instead of the table.
     subject
         The person to identify where C3D files hold several.
     """
+    from biodance.dance.dance import Dance
     from biodance.pipeline import front
     from biodance.report.write import write_identification
 
     with progress() as tell:
         place = ready(tables, session, force=force)
-        options = Reading(subject, markers, chosen)
-        result, _, folder = examine_with_reference(session, reference, out, options, force=force, tell=tell)
-        found = front.identify(result)
+        shown = None if dance is None else Dance.load(dance)
+        options = Reading(subject, markers, chosen, reference, body, lab)
+        result, _, folder = examine_with_reference(session, out, options, force=force, tell=tell)
+        found = front.identify(result, dance=shown)
+        result = replace(result, identification=found)
         tell("writing the page")
         tabled(result, place)
         document = write_identification(result, found, folder)

@@ -13,10 +13,19 @@ from biodance.cli.session import print_reported, report_session
 @app.command(name="simulate")
 def simulate_command(
     *,
-    protocol: str,
-    sex: Literal["F", "M"],
-    height: Annotated[float, Parameter(help="Stature, m.")],
-    mass: Annotated[float, Parameter(help="Body mass, kg.")],
+    protocol: str | None = None,
+    dance: Annotated[
+        Path | None, Parameter(name="--dance", help="dance.npz of `biodance dance`, performed instead of a protocol.")
+    ] = None,
+    performer: Annotated[
+        Literal["steady", "normal", "restless"],
+        Parameter(help="How well the dance is copied: 2, 5 or 7 degrees off; 5, 10 or 20 % off in tempo; swaying."),
+    ] = "normal",
+    sex: Annotated[
+        Literal["F", "M"] | None, Parameter(help="Of the person; by default as the dance was designed for.")
+    ] = None,
+    height: Annotated[float | None, Parameter(help="Stature, m; by default the dance's.")] = None,
+    mass: Annotated[float | None, Parameter(help="Body mass, kg; by default the dance's.")] = None,
     age: Annotated[float, Parameter(help="Age, years.")] = float("nan"),
     seed: Annotated[int, Parameter(help="The same seed gives the same person and the same files.")],
     effect: Annotated[
@@ -30,16 +39,18 @@ def simulate_command(
     Parameters
     ----------
     protocol
-        Name of a protocol: dance, short, squat, standing ...; a wrong name lists all.
+        Name of a protocol: dance, short, squat, standing ...; a wrong name lists all. Give this or --dance.
     """
+    from biodance.dance.dance import Dance
     from biodance.pipeline import front_dance
-    from biodance.records import Subject
 
+    shown = None if dance is None else Dance.load(dance)
+    who = front_dance.virtual_subject(shown, sex=sex, height=height, mass=mass, age=age)
     if force:
         _forget_simulated(out)
     with progress() as tell:
-        tell(f"simulating {protocol}")
-        folder = front_dance.simulate(Subject(mass, height, sex, age), protocol, out, seed=seed, effects=effect)
+        tell(f"simulating {protocol or dance}")
+        folder = front_dance.simulate(who, protocol, out, seed=seed, effects=effect, dance=shown, performer=performer)
     sys.stdout.write(f"{folder}\n")
     return DONE
 
@@ -49,6 +60,7 @@ def demo_command(*, out: OutOption = Path("demo"), force: ForceOption = False) -
     """Simulate a short session of a person whose truth is known, and report it like a real one."""
     from biodance.lab.session.read import read_session
     from biodance.lab.session.results_folder import results_folder
+    from biodance.pipeline.session import examine
     from biodance.records import Subject
     from biodance.virtual_lab.simulate import simulate_session as write_session
 
@@ -58,7 +70,7 @@ def demo_command(*, out: OutOption = Path("demo"), force: ForceOption = False) -
         tell("simulating a session")
         session = write_session(Subject(62.0, 1.70, "F", 31.0), "short", out / "simulated_session", seed=1)
         folder = results_folder(out / "report", session, force=force)
-        result, found = report_session(read_session(session, tell=tell), folder, tell)
+        result, found = report_session(examine(read_session(session, tell=tell), tell=tell), folder, tell)
     return print_reported(result, folder, found, False)
 
 

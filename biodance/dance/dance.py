@@ -21,12 +21,14 @@ from biodance.dance.problem.splines import basis_at
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State, close_legs
 from biodance.errors import BiodanceError, FileRefused
-from biodance.records import SIDES, Array, Motion, frozen_array
+from biodance.records import SIDES, Array, Motion, Subject, frozen_array
 
 if TYPE_CHECKING:
     import pandas as pd
 
 _VERSION = 1
+_PERSON = ("mass", "stature", "sex", "age")
+"""What is kept of the person for whom a dance was designed; an unknown age is not."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,8 @@ class Dance:
         Of the random numbers.
     notes : tuple of str
         What differs from the plan because a move was impossible.
+    subject : Subject or None
+        For whom it was designed; None for a robot.
 
     Examples
     --------
@@ -86,6 +90,7 @@ class Dance:
     under: tuple[Stance, ...]
     seed: int
     notes: tuple[str, ...] = ()
+    subject: Subject | None = None
 
     def __post_init__(self) -> None:
         count, size = np.shape(self.postures)
@@ -240,6 +245,9 @@ class Dance:
         >>> dance.save("again.npz")
         """
         words = {"biodance_dance": _VERSION, "protocol": self.protocol, "seed": self.seed, "notes": self.notes}
+        if self.subject is not None:
+            who = {name: getattr(self.subject, name) for name in _PERSON}
+            words["subject"] = {name: value for name, value in who.items() if value == value}
         words |= {"stances": [_told(s) for s in self.stances], "under": [_told(s) for s in self.under]}
         arrays = {name: getattr(self, name) for name in ("postures", "hold", "via", "move")}
         np.savez_compressed(
@@ -278,9 +286,9 @@ class Dance:
                 arrays = {name: found[name] for name in ("postures", "hold", "via", "move")}
                 body, _ = parse_body(str(found["body"]), str(path))
             feet: dict[str, Any] = {name: tuple(Stance(**s) for s in words[name]) for name in ("stances", "under")}
-            return cls(
-                words["protocol"], body, seed=words["seed"], notes=tuple(words.get("notes", ())), **feet, **arrays
-            )
+            who = Subject(**words["subject"]) if "subject" in words else None
+            notes = tuple(words.get("notes", ()))
+            return cls(words["protocol"], body, seed=words["seed"], notes=notes, subject=who, **feet, **arrays)
         except OSError as error:
             raise FileRefused(f"{path}: cannot be read ({error.strerror or error}).") from error
         except FileRefused:

@@ -67,23 +67,17 @@ def expected_spread(body: Body, motion: Motion, ends: Array) -> Expectation:
     noise = typical_noise(np.asarray(wrench.cop().mean(axis=0)))
     size = 10 * len(body.segments)
     H, kinematics, plates = np.zeros((size, size)), *np.zeros((2, size, 1))
-    beliefs, start = [_belief(body, H, Mismatch(kinematics, plates))], motion.time[0]
+    beliefs, start = [belief_after(body, H, Mismatch(kinematics, plates))], motion.time[0]
     for end in ends:
         use = (motion.time >= start - 1e-9) & (motion.time < end - 1e-9)
         fit = Fit(f"until {end:.0f} s", motion, wrench, use)
-        H = H + _gram(statistics(body, fit, noise).information(noise))
+        H = H + gram_of(statistics(body, fit, noise).information(noise))
         found = mismatch(body, (fit,), noise)
         kinematics, plates = kinematics + found.kinematics, plates + found.plates
-        beliefs.append(_belief(body, H, Mismatch(kinematics, plates)))
+        beliefs.append(belief_after(body, H, Mismatch(kinematics, plates)))
         start = end
     sd = np.array([[_deviations(belief, 10 * i) for i in range(len(body.segments))] for belief in beliefs])
-    before = np.diag(beliefs[0].prior.covariance).reshape(-1, 10)
-    share = np.array(
-        [
-            [np.mean(row[known > 0]) for row, known in zip(b.information.reshape(-1, 10), before, strict=True)]
-            for b in beliefs
-        ]
-    )
+    share = np.array([shares(belief) for belief in beliefs])
     mass, com, inertia = np.moveaxis(sd, 2, 0)
     return Expectation(body.segments, np.concatenate([[0.0], ends]), mass, com, inertia, share)
 
@@ -107,11 +101,19 @@ def _danced() -> dict[str, Any]:
     return read_toml(locate("anthropometry/uncertainty", "dances"))
 
 
-def _gram(information: Information) -> Array:
+def shares(belief: Posterior) -> Array:
+    """Return the share (N,) of the table's variance that the data removed, mean over the parameters of a segment."""
+    known = np.diag(belief.prior.covariance).reshape(-1, 10) > 0
+    removed = np.where(known, belief.information.reshape(-1, 10), 0.0)
+    return np.asarray(removed.sum(axis=1) / np.maximum(known.sum(axis=1), 1))
+
+
+def gram_of(information: Information) -> Array:
+    """Return the information matrix (p, p)."""
     return information.triangle.T @ information.triangle
 
 
-def _belief(body: Body, H: Array, found: Mismatch) -> Posterior:
+def belief_after(body: Body, H: Array, found: Mismatch) -> Posterior:
     """Return the belief after data of the information ``H`` (p, p) that agree with the table."""
     prior = widened(body.sip)
     scale = np.sqrt(np.maximum(np.diag(H), 1e-300))

@@ -39,6 +39,17 @@ class Difference:
         return self.value - SIGMAS * self.sd, self.value + SIGMAS * self.sd
 
 
+_CERTAIN = 0.05
+"""Probability that any of all changes is called certain though nothing changed (Bonferroni)."""
+
+
+def certain_changes(found: tuple[Difference, ...]) -> tuple[Difference, ...]:
+    """Return those of all differences that are certain: known from data, and too large for the chance of any of
+    them.
+    """
+    return tuple(one for one in found if one.known and one.p < _CERTAIN / len(found))
+
+
 def differences(earlier: Identification, later: Identification) -> tuple[Difference, ...]:
     """Return all differences, later minus earlier, each session with room for what it carries beyond the other.
 

@@ -2,18 +2,26 @@
 alone; how it came about is said.
 """
 
+from dataclasses import replace
 from functools import partial
+
+import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.human.human import human
 from biodance.body.human.limits import with_tracking_limits
 from biodance.body.human.scaling import Scaling, measure_static
-from biodance.errors import TrialRefused
+from biodance.errors import SessionRefused, TrialRefused
+from biodance.identification.rival_bodies import weighing
 from biodance.motion.ik.functional_joints import functional_joints
 from biodance.pipeline.trial import Prepared, attempt
 from biodance.pipeline.trial_result import Step
-from biodance.records import Subject
+from biodance.records import Sip, Subject
 from biodance.settings import Settings
+from biodance.uncertainty.caution import in_other_frames
+
+ANOTHER = 0.15
+"""Share of the body mass by which nobody differs from an earlier session: more is another person."""
 
 
 def body_of(
@@ -75,3 +83,30 @@ def placed_by_movement(scaling: Scaling, read: tuple[Prepared, ...]) -> Scaling:
             "them."
         )
     return functional_joints(scaling, same).scaling
+
+
+def starting_from(known: Body, body: Body, mass: float, source: str) -> tuple[Body, Sip, str]:
+    """Return ``body`` with the inertial parameters of the same person's earlier body ``known``, at today's declared
+    ``mass`` kg, what is known of them before today's data, and where the body comes from in words.
+
+    Raises
+    ------
+    SessionRefused
+        The earlier body has other segments, no uncertainty, or weighs so much less or more that it is another person's.
+    """
+    before = float(known.sip.mass.sum())
+    if known.segments != body.segments or not np.any(known.sip.covariance):
+        raise SessionRefused(
+            f"Body {known.name}: is none that was identified from such a person ({len(known.segments)} segments, "
+            f"{len(body.segments)} here). Give the body.json of `biodance identify`."
+        )
+    if abs(mass / before - 1) > ANOTHER:
+        raise SessionRefused(
+            f"The body that was given weighs {before:.1f} kg, {mass:.1f} kg are declared here: it is of another "
+            f"person. Give the same person's body.json."
+        )
+    prior = in_other_frames(weighing(known.sip, mass), body.joint_errors)
+    words = (
+        f"Its masses and inertias are those of an earlier session ({before:.1f} kg there, {mass:.1f} kg here), which "
+    )
+    return replace(body, sip=prior), prior, f"{source} {words}stand where it says \u201ctable\u201d."

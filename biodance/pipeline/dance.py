@@ -97,6 +97,10 @@ class DanceResult:
     def _repr_html_(self) -> str:
         return display.card(repr(self), self.dance.table() if self.dance is not None else None, self.notes)
 
+    def of_subject(self, subject: Subject) -> "DanceResult":
+        """Return the same, its dance knowing for whom it was designed."""
+        return self if self.dance is None else replace(self, dance=replace(self.dance, subject=subject))
+
     @property
     def feasible(self) -> bool:
         """True where there is a dance and every margin of it is kept."""

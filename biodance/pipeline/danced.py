@@ -1,6 +1,6 @@
 """The session of a virtual person who performs a designed dance: what the laboratory would have recorded."""
 
-import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,22 +10,14 @@ from biodance.dance.metrics import zmp_path
 from biodance.errors import BiodanceError
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion, Subject
+from biodance.virtual_lab.faults.causes import Hidden, hide
 from biodance.virtual_lab.movement.choreography import septic
 from biodance.virtual_lab.movement.dancing import USUAL_PERFORMER, Performer, Shown, copy_dance
 from biodance.virtual_lab.movement.performance import Performance
-from biodance.virtual_lab.movement.protocol import Protocol, read_protocol
-from biodance.virtual_lab.person.person import make_person
-from biodance.virtual_lab.recording.laboratory import (
-    FIRST_VISIT,
-    LabVisit,
-    perform_in,
-    record,
-    scale_reading,
-    set_up,
-    write,
-)
-from biodance.virtual_lab.simulate import TRUTH, session_toml
-from biodance.virtual_lab.truth import truth
+from biodance.virtual_lab.movement.protocol import Protocol, TrialPlan, read_protocol
+from biodance.virtual_lab.person.person import Person
+from biodance.virtual_lab.recording.laboratory import FIRST_VISIT, Instruments, LabVisit, perform_in
+from biodance.virtual_lab.simulate import write_visit
 
 _RATE = 100.0
 LIFT = 0.4
@@ -92,46 +84,39 @@ def simulate_dance(
     *,
     seed: int,
     performer: Performer = USUAL_PERFORMER,
+    hidden: tuple[Hidden, ...] = (),
     visit: LabVisit = FIRST_VISIT,
 ) -> Path:
     """Write the session of a virtual person who dances ``dance``: static, the dance in stretches, two trials of squats
     for validation.
 
-    ``seed`` is the person. The same arguments write the same bytes.
+    ``seed`` is the person; ``hidden`` causes as in `virtual_lab.faults.causes`. The same arguments write the same
+    bytes.
 
     Raises
     ------
     BiodanceError
-        The folder is not empty.
+        The folder is not empty, the dance is on a stool, or the subject is outside the range of the virtual body.
     """
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise BiodanceError(f"{out}: exists and is not an empty folder; nothing was written. Choose another --out.")
-    person = make_person(subject, seed, tolerances=visit.tolerances, session=visit.number)
-    instruments, lab = set_up(person, visit), visit.laboratory
-    done: list[Performance] = [
-        perform_in(instruments, person, trial)
-        for trial in read_protocol(_OTHERS).trials
-        if trial.role in ("static", "validate")
-    ]
-    for shown in stretches(dance):
-        done.append(
-            copy_dance(
-                person,
-                shown,
-                visit.number,
-                centre=np.array(lab.centre),
-                heading=lab.heading,
-                performer=performer,
-                tolerances=visit.tolerances,
-            )
+    shown = {one.name: one for one in stretches(dance)}
+    others = [trial for trial in read_protocol(_OTHERS).trials if trial.role in ("static", "validate")]
+    danced = [one.plan(round(float(np.ptp(one.motion.time)) * performer.pace, 1)) for one in shown.values()]
+    plan = Protocol(dance.protocol, "a designed dance", (*others, *danced))
+    visit, loads = hide(hidden, subject, plan, seed=seed, visit=visit)
+
+    def performed(instruments: Instruments, person: Person, trial: TrialPlan) -> Performance:
+        if trial.name not in shown:
+            return perform_in(instruments, person, trial)
+        lab = instruments.visit.laboratory
+        done = copy_dance(
+            person.with_markers_moved(instruments.visit.marker_shifts),
+            shown[trial.name],
+            instruments.visit.number,
+            centre=np.array(lab.centre),
+            heading=lab.heading,
+            performer=performer,
+            tolerances=instruments.visit.tolerances,
         )
-    out.mkdir(parents=True, exist_ok=True)
-    for performance in done:
-        write(record(performance, instruments), out)
-    plan = Protocol(dance.protocol, "a designed dance", tuple(performance.plan for performance in done))
-    (out / "session.toml").write_text(session_toml(person, plan, scale_reading(person, visit.number, visit.tolerances)))
-    (out / TRUTH).mkdir()
-    (out / TRUTH / "truth.json").write_text(
-        json.dumps(truth(person, dance.protocol, instruments, done), indent=1) + "\n"
-    )
-    return out
+        return replace(done, forces=instruments.visit.forces)
+
+    return write_visit(subject, plan, out, performed, seed=seed, loads=loads, visit=visit)

@@ -177,10 +177,16 @@ def standing_notes(result: SessionResult) -> tuple[str, ...]:
     )
 
 
-def diagnosed(result: SessionResult, *, tell: Callable[[str], None] = lambda _: None) -> SessionDiagnosis | None:
+def diagnosed(
+    result: SessionResult,
+    *,
+    reference: SessionIdentification | None = None,
+    tolerances: Tolerances | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+) -> SessionDiagnosis | None:
     """Return the diagnosis of a session; None where the recordings cannot carry one."""
     try:
-        return diagnose_session(result, tell=tell)
+        return diagnose_session(result, reference=reference, tolerances=tolerances, tell=tell)
     except BiodanceError:
         return None
 
@@ -220,11 +226,11 @@ def _noted(examined: Examined, *notes: str) -> Examined:
 
 
 def _prior(reference: SessionIdentification | None, result: SessionResult) -> Sip | None:
-    """Return what an earlier session lets expect of the body; None without one, or where nothing was identified from
-    it.
+    """Return what an earlier session lets expect of the body, or the body that the session started from; None without
+    either.
     """
     if reference is None or result.identification is None or reference.identification.status == "failed":
-        return None
+        return result.prior
     return expect_unloaded(reference.identification, result.identification.identification)
 
 

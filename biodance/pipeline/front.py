@@ -6,11 +6,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 from biodance import display
+from biodance.body.body import Body
 from biodance.discovery import Chosen
 from biodance.effects import DiscreteEffect, Effect, causes
+from biodance.errors import SessionRefused
+from biodance.identification.sessions import certain_changes, differences
 from biodance.lab.session.read import read_session
+from biodance.pipeline.carry import known_body, read_lab
 from biodance.pipeline.diagnosis import SessionDiagnosis, diagnose_session
-from biodance.pipeline.identification import SessionIdentification, identify_trials
+from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification, identify_trials, trial_fit
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine, identification_of
 from biodance.records import Session
@@ -19,6 +23,8 @@ from biodance.uncertainty.tolerances import Tolerances
 if TYPE_CHECKING:
     import pandas as pd
 
+    from biodance.dance.dance import Dance
+    from biodance.dance.scoring import PerformanceScore
 
 Visit: TypeAlias = Session | SessionResult | str | Path
 """A session: as read, as examined, or its folder."""
@@ -52,12 +58,9 @@ class SessionComparison:
     later: SessionIdentification
 
     def __repr__(self) -> str:
-        sure = [one for one in self.later.changes if one.known and one.p < _CERTAIN / max(1, len(self.later.changes))]
-        told = (
-            ", ".join(f"{one.segment} {one.quantity} {one.value:+.3g} {one.unit}" for one in sure)
-            or "no certain change"
-        )
-        return f"SessionComparison({self.earlier.name!r} -> {self.later.name!r}: {told})"
+        sure = certain_changes(self.later.changes)
+        told = ", ".join(f"{one.segment} {one.quantity} {one.value:+.3g} {one.unit}" for one in sure)
+        return f"SessionComparison({self.earlier.name!r} -> {self.later.name!r}: {told or 'no certain change'})"
 
     def _repr_html_(self) -> str:
         return display.card(repr(self), self.table())
@@ -84,11 +87,15 @@ class SessionComparison:
         )
 
 
-_CERTAIN = 0.05
-"""Probability that any of all changes is called certain though nothing changed (Bonferroni)."""
-
-
-def identify(session: Visit, *, reference: Earlier | None = None, tell: _Tell = _silent) -> SessionIdentification:
+def identify(
+    session: Visit,
+    *,
+    reference: Earlier | None = None,
+    dance: "Dance | str | Path | None" = None,
+    body: Body | str | Path | None = None,
+    lab: str | Path | None = None,
+    tell: _Tell = _silent,
+) -> SessionIdentification:
     """Return what every segment of a person weighs, with intervals, validated on the trials kept.
 
     Parameters
@@ -97,6 +104,12 @@ def identify(session: Visit, *, reference: Earlier | None = None, tell: _Tell = 
         The visit: as `read_session` or `examine` return it, or its folder.
     reference : SessionIdentification, Session, SessionResult, str or pathlib.Path, optional
         An earlier visit of the same person without load: a load is then looked for against it instead of the table.
+    dance : Dance, str or pathlib.Path, optional
+        The dance that was shown (dance.npz): ``performance`` then says how well it was danced.
+    body : Body, str or pathlib.Path, optional
+        The same person's body of an earlier visit (body.json): what is known before, instead of the table.
+    lab : str or pathlib.Path, optional
+        The laboratory's lab.toml: its corrections are made first.
     tell : callable, optional
         Called with what is being done, in words.
 
@@ -109,7 +122,9 @@ def identify(session: Visit, *, reference: Earlier | None = None, tell: _Tell = 
     Raises
     ------
     SessionRefused
-        There is no trial to identify from; the message says why.
+        There is no trial to identify from, or the body is another person's; the message says why.
+    FileRefused
+        A file that was named is none of its kind.
 
     See Also
     --------
@@ -126,10 +141,10 @@ def identify(session: Visit, *, reference: Earlier | None = None, tell: _Tell = 
     >>> identified  # doctest: +ELLIPSIS
     SessionIdentification('visit': solved, 12 segments, 61... kg)
     """
-    result = _examined(session, tell)
-    if reference is None:
-        return identification_of(result)
-    return identification_of(_against(result, _earlier(reference, tell)))
+    before = None if reference is None else _earlier(reference, tell)
+    result = examined_visit(session, reference=before, body=body, lab=lab, tell=tell)
+    found = identification_of(result)
+    return found if dance is None else replace(found, performance=performance_of(result, dance))
 
 
 def diagnose(
@@ -138,6 +153,8 @@ def diagnose(
     reference: Earlier | None = None,
     effects: Chosen[Effect | DiscreteEffect | type[Effect | DiscreteEffect]] = None,
     tolerances: Tolerances | None = None,
+    body: Body | str | Path | None = None,
+    lab: str | Path | None = None,
     tell: _Tell = _silent,
 ) -> SessionDiagnosis:
     """Return what the simulation of a visit gets wrong: cause, size, how sure, what else it could be, and what naming
@@ -154,6 +171,10 @@ def diagnose(
         The causes to look for, by name or as objects of your own; by default all.
     tolerances : Tolerances, optional
         Of everything that is no fault, as learned by a laboratory.
+    body : Body, str or pathlib.Path, optional
+        The same person's body of an earlier visit (body.json): what is known before, instead of the table.
+    lab : str or pathlib.Path, optional
+        The laboratory's lab.toml: its corrections are made first, and its tolerances hold where it has any.
     tell : callable, optional
         Called with what is being done, in words.
 
@@ -186,9 +207,10 @@ def diagnose(
     SessionDiagnosis(nothing wrong)
     """
     asked = causes(effects)
-    result = _examined(session, tell)
     before = None if reference is None else _earlier(reference, tell)
-    return diagnose_session(result, reference=before, tolerances=tolerances, effects=asked, tell=tell)
+    result = examined_visit(session, body=body, lab=lab, tell=tell)
+    known = tolerances or read_lab(lab).tolerances
+    return diagnose_session(result, reference=before, tolerances=known, effects=asked, tell=tell)
 
 
 def compare_sessions(earlier: Earlier, later: Earlier, *, tell: _Tell = _silent) -> SessionComparison:
@@ -219,22 +241,54 @@ def compare_sessions(earlier: Earlier, later: Earlier, *, tell: _Tell = _silent)
     >>> biodance.compare_sessions(identified, identified).table().shape
     (120, 9)
     """
-    from biodance.identification.sessions import differences
-
     first, second = _earlier(earlier, tell), _earlier(later, tell)
     return SessionComparison(first, replace(second, changes=differences(first.identification, second.identification)))
 
 
-def _examined(session: Visit, tell: _Tell) -> SessionResult:
-    """Return the visit with all stages done."""
-    if isinstance(session, SessionResult):
-        return session
-    return examine(session if isinstance(session, Session) else read_session(session, tell=tell), tell=tell)
+def examined_visit(
+    session: Visit,
+    *,
+    reference: SessionIdentification | None = None,
+    body: Body | str | Path | None = None,
+    lab: str | Path | None = None,
+    tell: _Tell = _silent,
+) -> SessionResult:
+    """Return the visit with all stages done; one that was examined already is examined again only where ``body`` or
+    ``lab`` change it.
+    """
+    carried, known = read_lab(lab), known_body(body)
+    if isinstance(session, SessionResult) and known is None and not carried.corrections:
+        return session if reference is None else _against(session, reference)
+    read = session.session if isinstance(session, SessionResult) else session
+    read = read if isinstance(read, Session) else read_session(read, tell=tell)
+    return examine(carried.corrected(read), reference=reference, known=known, tell=tell)
+
+
+def performance_of(result: SessionResult, dance: "Dance | str | Path") -> "PerformanceScore":
+    """Return how well a dance was danced in the trials with role fit of an examined visit.
+
+    Raises
+    ------
+    FileRefused
+        The file is no dance.
+    BiodanceError
+        The dance is of another body, or nothing was recorded.
+    """
+    from biodance.dance.dance import Dance
+    from biodance.dance.scoring import score_performance
+
+    one = dance if isinstance(dance, Dance) else Dance.load(dance)
+    if result.body is None:
+        raise SessionRefused(f"{result.session.folder}: {result.body_source} So nobody knows how the dance was danced.")
+    fits = [trial_fit(trial) for trial in result.trials if trial.trial.role in FITTED_ROLES]
+    return score_performance(one, result.body, tuple((fit.motion, fit.use) for fit in fits if fit))
 
 
 def _earlier(session: Earlier, tell: _Tell) -> SessionIdentification:
     """Return what a visit says about the body."""
-    return session if isinstance(session, SessionIdentification) else identification_of(_examined(session, tell))
+    if isinstance(session, SessionIdentification):
+        return session
+    return identification_of(examined_visit(session, tell=tell))
 
 
 def _against(result: SessionResult, before: SessionIdentification) -> SessionResult:
@@ -242,5 +296,7 @@ def _against(result: SessionResult, before: SessionIdentification) -> SessionRes
     if result.body is None:
         return result
     name = result.session.folder.name
-    again = identify_trials(result.body, result.trials, name=name, reference=before, checks=result.checks)
+    again = identify_trials(
+        result.body, result.trials, name=name, reference=before, checks=result.checks, prior=result.prior
+    )
     return replace(result, identification=again)

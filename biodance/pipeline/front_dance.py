@@ -4,7 +4,10 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from biodance.body.body import Body
+from biodance.errors import BiodanceError, UnknownName
 from biodance.records import Subject
 
 if TYPE_CHECKING:
@@ -12,6 +15,7 @@ if TYPE_CHECKING:
     from biodance.dance.limits import Limit
     from biodance.dance.verify import Margin
     from biodance.pipeline.dance import DanceResult
+    from biodance.virtual_lab.faults.causes import Hidden
 
 
 def design_dance(
@@ -77,7 +81,8 @@ def design_dance(
 
     plan = read_plan(protocol)
     person = read_person(Path(limits)) if limits else HEALTHY
-    return make_dance(dancer(subject, plan), plan, person, limits=own_limits, seed=seed, tell=tell)
+    made = make_dance(dancer(subject, plan), plan, person, limits=own_limits, seed=seed, tell=tell)
+    return made.of_subject(subject)
 
 
 def verify_dance(
@@ -130,7 +135,16 @@ def verify_dance(
     return verify(own, one, plan.limits)
 
 
-def simulate(subject: Subject, protocol: str, out: str | Path, *, seed: int = 0, effects: Iterable[str] = ()) -> Path:
+def simulate(
+    subject: Subject,
+    protocol: str | None,
+    out: str | Path,
+    *,
+    seed: int = 0,
+    effects: Iterable[str] = (),
+    dance: "Dance | str | Path | None" = None,
+    performer: str = "normal",
+) -> Path:
     """Write a simulated visit as a laboratory would have: C3D files and session.toml, the truth apart in
     ``truth/truth.json``.
 
@@ -138,14 +152,21 @@ def simulate(subject: Subject, protocol: str, out: str | Path, *, seed: int = 0,
     ----------
     subject : Subject
         Who is simulated; mass kg, stature m.
-    protocol : str
-        Name of a protocol: dance, short, squat, standing ...; a wrong name lists all.
+    protocol : str or None
+        Name of a protocol: dance, short, squat, standing ...; a wrong name lists all. None with a dance.
     out : str or pathlib.Path
         Folder to write; it must be empty or missing.
     seed : int
         The same seed gives the same person and the same files.
     effects : iterable of str
         Causes to hide, as ``plate_gain:target=Fz,gain=0.04``.
+    dance : Dance, str or pathlib.Path, optional
+        A designed dance (dance.npz), performed instead of a protocol: static, the dance in its stretches, two trials of
+        squats to validate on. Feet stay where they are planted, and the zero-moment point stays in the support.
+    performer : str
+        How well it is copied: "steady" 2 degrees off in every joint (root mean square), "normal" 5, "restless" 7; the
+        tempo wanders by 5, 10, 20 %, about a duration 1.1, 1.2, 1.2 times the planned one; sway 0.7, 1 and 1.5 times
+        the usual.
 
     Returns
     -------
@@ -155,9 +176,11 @@ def simulate(subject: Subject, protocol: str, out: str | Path, *, seed: int = 0,
     Raises
     ------
     UnknownName
-        There is no such protocol or cause.
+        There is no such protocol, cause or performer.
+    FileRefused
+        The file is no dance.
     BiodanceError
-        A cause lacks a parameter, or the folder is not empty.
+        A cause lacks a parameter, the folder is not empty, or both a protocol and a dance are named, or none.
 
     Examples
     --------
@@ -169,6 +192,53 @@ def simulate(subject: Subject, protocol: str, out: str | Path, *, seed: int = 0,
     from biodance.virtual_lab.movement.protocol import read_protocol
     from biodance.virtual_lab.simulate import simulate_session as write_session
 
+    hidden = tuple(parse_cause(text) for text in effects)
+    if (protocol is None) == (dance is None):
+        raise BiodanceError("Simulating needs either a protocol or a dance. Give one of the two.")
+    if dance is not None or protocol is None:
+        return _danced(subject, dance, Path(out), seed=seed, performer=performer, hidden=hidden)
     plan = read_protocol(protocol)
-    visit, loads = hide(tuple(parse_cause(text) for text in effects), subject, plan, seed=seed)
+    visit, loads = hide(hidden, subject, plan, seed=seed)
     return write_session(subject, plan, Path(out), seed=seed, loads=loads, visit=visit)
+
+
+def _danced(
+    subject: Subject,
+    dance: "Dance | str | Path | None",
+    out: Path,
+    *,
+    seed: int,
+    performer: str,
+    hidden: "tuple[Hidden, ...]",
+) -> Path:
+    """Write the visit of a person who performs a dance."""
+    from biodance.dance.dance import Dance
+    from biodance.pipeline.danced import simulate_dance
+    from biodance.virtual_lab.movement.dancing import PERFORMERS
+
+    if performer not in PERFORMERS:
+        raise UnknownName.of("performer", performer, tuple(PERFORMERS))
+    one = dance if isinstance(dance, Dance) else Dance.load(str(dance))
+    return simulate_dance(subject, one, out, seed=seed, performer=PERFORMERS[performer], hidden=hidden)
+
+
+def virtual_subject(
+    dance: "Dance | None", *, sex: str | None, height: float | None, mass: float | None, age: float
+) -> Subject:
+    """Return the person to simulate: as said, else the one for whom the ``dance`` was designed.
+
+    Raises
+    ------
+    BiodanceError
+        Sex, height or mass is missing, and the dance does not know its person either.
+    """
+    known = dance.subject if dance is not None else None
+    said = {"sex": sex, "height": height, "mass": mass}
+    kept = {"sex": known.sex, "height": known.stature, "mass": known.mass} if known else {}
+    who = {name: value if value is not None else kept.get(name) for name, value in said.items()}
+    missing = [name for name, value in who.items() if value is None]
+    if missing:
+        where = "the dance does not say for whom it was designed" if dance is not None else "a protocol is for anybody"
+        raise BiodanceError(f"Simulating needs a person, and {where}: add --{', --'.join(missing)}.")
+    years = known.age if known is not None and np.isnan(age) else age
+    return Subject(float(who["mass"]), float(who["height"]), who["sex"], years)  # type: ignore[arg-type]

@@ -25,11 +25,13 @@ from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.checks import load_doubts
 from biodance.pipeline.trial_result import Check, TrialResult
-from biodance.records import ROLES, SIDES, Role, Wrench
+from biodance.records import ROLES, SIDES, Role, Sip, Wrench
 from biodance.uncertainty.plates import around_zero
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from biodance.dance.scoring import PerformanceScore
 
 UNEXPLAINED = 0.5
 """kg between plates and identified body over the fit trials: more than the scale's uncertainty, shoes and a zero
@@ -61,6 +63,8 @@ class SessionIdentification:
         Since the reference session; () without one.
     torques : TorqueBands or None
         Of the joints in the first trial kept (else fitted); None where the feet's wrenches are not known.
+    performance : PerformanceScore or None
+        How well the dance that was shown was danced; None where none was named.
     notes : tuple of str
         What a person should know.
     failures : mapping
@@ -82,6 +86,7 @@ class SessionIdentification:
     search: LoadSearch
     changes: tuple[Difference, ...] = ()
     torques: TorqueBands | None = None
+    performance: "PerformanceScore | None" = None
     notes: tuple[str, ...] = ()
     failures: Mapping[str, str] = field(default_factory=dict)
 
@@ -145,12 +150,14 @@ def identify_trials(
     name: str,
     reference: SessionIdentification | None = None,
     checks: tuple[Check, ...] = (),
+    prior: Sip | None = None,
 ) -> SessionIdentification:
     """Identify ``body`` from the trials with role fit, validate on those kept, and look for a load.
 
     ``name`` of the session; ``reference`` an earlier, unloaded session of the same person: what changed since is told,
     and a load is looked for against it; without it, against the table. ``checks`` of the session: where they or those
-    of the trials failed, no load is stated (`load_doubts`).
+    of the trials failed, no load is stated (`load_doubts`). ``prior`` is what is known of the body before (by default
+    the table).
 
     Raises
     ------
@@ -164,7 +171,7 @@ def identify_trials(
             f"identified. "
             "Record movement on the plates, or set roles in session.toml."
         )
-    found = identify_body(body, fits)
+    found = identify_body(body, fits, prior=prior)
     failures = {"segments": found.cause} if found.status == "failed" else {}
     if reference is not None and "segments" in reference.failures:
         failures["reference"] = (

@@ -15,7 +15,7 @@ from biodance import display
 from biodance.body.body import Body
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.trial_result import Check, QuietStanding, Step, TrialResult
-from biodance.records import Array, Session, Subject, by_name
+from biodance.records import Array, Session, Sip, Subject, by_name
 from biodance.settings import Settings
 
 if TYPE_CHECKING:
@@ -81,6 +81,8 @@ class SessionResult:
         None where no trial is to be identified from, or it was refused.
     more_stills : tuple of Still
         The frame with the largest residual force, and a load that was found.
+    prior : Sip or None
+        What an earlier session lets expect of the body; None where that is the table.
 
     Examples
     --------
@@ -101,6 +103,7 @@ class SessionResult:
     still: Still | None
     identification: SessionIdentification | None = None
     more_stills: tuple[Still, ...] = ()
+    prior: Sip | None = None
 
     def __repr__(self) -> str:
         return (

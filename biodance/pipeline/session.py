@@ -7,7 +7,7 @@ from functools import partial
 from biodance.body.body import Body
 from biodance.body.tables.choice import reference as reference_person
 from biodance.errors import SessionRefused, TrialRefused
-from biodance.pipeline.body import body_of
+from biodance.pipeline.body import body_of, starting_from
 from biodance.pipeline.checks import mass_check, standing_check, trial_checks
 from biodance.pipeline.identification import SessionIdentification, can_identify, identify_trials
 from biodance.pipeline.results import SessionResult, Still
@@ -24,6 +24,7 @@ def examine(
     session: Session,
     *,
     reference: SessionIdentification | None = None,
+    known: Body | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> SessionResult:
     """Take a session through all stages: prepare, scale, track, compare, identify; one trial that fails never stops the
@@ -37,6 +38,9 @@ def examine(
         As `read_session` returns it, with its settings.
     reference : SessionIdentification, optional
         What an earlier, unloaded session of the same person said: a load is then looked for against it, not the table.
+    known : Body, optional
+        The body as identified in an earlier session (``body.json``): its inertial parameters are then what is known
+        before, not the table's. Lengths and joints are measured anew.
     tell : callable, optional
         Called with what is being done, in words.
 
@@ -69,6 +73,9 @@ def examine(
         read.append(prepare_trial(trial))
     tell("scaling the body")
     body, source = body_of(session.subject, tuple(read), session.settings, steps)
+    prior = None
+    if body is not None and known is not None:
+        body, prior, source = starting_from(known, body, session.subject.mass, source)
     results: list[TrialResult] = []
     try:
         for one in read:
@@ -85,7 +92,9 @@ def examine(
         identification = attempt(
             steps,
             "identify",
-            partial(identify_trials, body, done, name=session.folder.name, reference=reference, checks=checks),
+            partial(
+                identify_trials, body, done, name=session.folder.name, reference=reference, checks=checks, prior=prior
+            ),
         )
     return SessionResult(
         session=session,
@@ -99,6 +108,7 @@ def examine(
         still=attempt(steps, "still", lambda: still_of(body, done)) if body else None,
         identification=identification,
         more_stills=_stills(body, done, identification) if body else (),
+        prior=prior,
     )
 
 

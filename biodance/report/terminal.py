@@ -114,8 +114,22 @@ def print_identification(found: dict[str, Any], console: Console) -> None:
         )
         console.print(f"{escape(row['trial'])}, RMS Fx Fy Fz Mx My Mz: {told}", soft_wrap=True)
     console.print(f"added mass: {escape(found['added_mass_search']['text'])}", soft_wrap=True)
+    if found["performance"]:
+        _print_performance(found["performance"], console)
     for note in found["notes"]:
         console.print(f"note: {escape(note)}", soft_wrap=True)
+
+
+def _print_performance(found: dict[str, Any], console: Console) -> None:
+    """Print how well a dance was danced, and which transitions to dance once more."""
+    console.print(f"dance {escape(found['dance'])}, share of the table's variance removed, reached (planned):")
+    for row in found["excitation"]:
+        console.print(f"  {row['segment']}: {100 * row['reached']:.0f} % ({100 * row['planned']:.0f} %)")
+    for row in found["repetitions"]:
+        console.print(
+            f"repeat: cue {row['transition']} to {row['transition'] + 1} (+{100 * row['gain']:.2f} % in the mean, most "
+            f"in {row['most']})"
+        )
 
 
 def print_foresight(found: dict[str, Any], console: Console) -> None:
@@ -135,6 +149,18 @@ def print_foresight(found: dict[str, Any], console: Console) -> None:
             console.print(f"will confuse: {escape(pair['cause'])} with {escape(pair['other'])}")
     hidden = ", ".join(f"{row['effect']} {row['target']}".strip() for row in found["unobservable"])
     console.print(f"cannot see: {escape(hidden or 'nothing of what it looks for')}", soft_wrap=True)
+
+
+def _print_accepted(found: dict[str, Any], console: Console) -> None:
+    """Print what accepting the findings has written for the next session."""
+    for what in found["corrections"]:
+        console.print(f"accepted: {escape(what)}", soft_wrap=True)
+    for what in found["not_in_recordings"]:
+        console.print(f"accepted in the body only, no recording is corrected: {escape(what)}", soft_wrap=True)
+    written = ", ".join([*found["files"], *(["corrected/"] if found["trials"] else [])])
+    console.print(f"written: {written or 'nothing, there is nothing to accept'}", soft_wrap=True)
+    for why in found["refused"]:
+        console.print(f"look: {escape(why)}", soft_wrap=True)
 
 
 def print_diagnosis(found: dict[str, Any], console: Console) -> None:
@@ -166,6 +192,8 @@ def print_diagnosis(found: dict[str, Any], console: Console) -> None:
         console.print(f"left unexplained: {escape(where)} ({worst['z']:.0f} times what sessions without fault vary)")
     for note in found["notes"]:
         console.print(f"note: {escape(note)}", soft_wrap=True)
+    if "accepted" in found:
+        _print_accepted(found["accepted"], console)
 
 
 def print_findings(findings: Sequence[MachineFinding], console: Console) -> None:

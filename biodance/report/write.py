@@ -4,7 +4,9 @@ from pathlib import Path
 from typing import Any
 
 from biodance.body.body_file import body_text
+from biodance.lab.corrections import PlateCorrection
 from biodance.pipeline.attention import identified_trials, session_attention
+from biodance.pipeline.carry import CORRECTED, LAB, accepted_corrections, lab_text, write_corrected
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.export import BODY, body_of_result
 from biodance.pipeline.identification import SessionIdentification
@@ -58,10 +60,18 @@ def write_identification(result: SessionResult, found: SessionIdentification, fo
     return dict(plain_values(numbers))
 
 
-def write_diagnosis(result: SessionResult, found: SessionDiagnosis, folder: Path, *, accepted: bool) -> dict[str, Any]:
-    """Write ``report.html`` and ``results.json`` of a diagnosis; with ``accepted`` also ``body.json``.
+def write_diagnosis(
+    result: SessionResult,
+    found: SessionDiagnosis,
+    folder: Path,
+    *,
+    accepted: bool,
+    earlier: tuple[PlateCorrection, ...] = (),
+) -> dict[str, Any]:
+    """Write ``report.html`` and ``results.json`` of a diagnosis, and return the numbers.
 
-    Return the numbers.
+    With ``accepted`` also what follows from the findings: ``body.json``, ``lab.toml`` (with the corrections made
+    ``earlier``) and the trials corrected.
     """
     made = provenance(result, created=now())
     failures = {**result.failures, **found.failures}
@@ -71,14 +81,37 @@ def write_diagnosis(result: SessionResult, found: SessionDiagnosis, folder: Path
         "failures": failures,
         "provenance": made.as_dict(),
     }
-    files = {_NUMBERS: to_text(numbers), PAGE: diagnosis_page(result, found, made)}
-    if accepted and found.accepted is not None:
-        named = ", ".join(f"{one.effect} {one.target}".strip() for one in found.diagnosis.findings)
-        files[BODY] = body_text(
-            found.accepted.identified, f"Session {result.session.folder.name}: identified with {named} accepted."
-        )
-    _write(folder, files)
+    files = {PAGE: diagnosis_page(result, found, made)}
+    if accepted:
+        numbers["accepted"], more = _accepted(result, found, folder, earlier)
+        files |= more
+    _write(folder, {_NUMBERS: to_text(numbers), **files})
     return dict(plain_values(numbers))
+
+
+def _accepted(
+    result: SessionResult, found: SessionDiagnosis, folder: Path, earlier: tuple[PlateCorrection, ...]
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """Write the corrected trials; return what acceptance gave in words, and the texts of the files that are left to
+    write.
+    """
+    name, findings, files = result.session.folder.name, found.diagnosis.findings, {}
+    if found.accepted is not None and found.accepted.status == "solved":
+        named = ", ".join(f"{one.effect} {one.target}".strip() for one in findings)
+        files[BODY] = body_text(found.accepted.identified, f"Session {name}: identified with {named} accepted.")
+    made = accepted_corrections(findings, f"session {name}")
+    if text := lab_text(earlier, made):
+        files[LAB] = text
+    written, refused = write_corrected(result.session, earlier, made, folder / CORRECTED) if made else ((), ())
+    others = {(one.effect, one.target) for one in made}
+    told = {
+        "files": sorted(files),
+        "corrections": [str(one) for one in made],
+        "trials": written,
+        "not_in_recordings": [f"{f.effect} {f.target}".strip() for f in findings if (f.effect, f.target) not in others],
+        "refused": refused,
+    }
+    return told, files
 
 
 def _page(result: SessionResult, made: Provenance, diagnosis: SessionDiagnosis | None = None) -> str:

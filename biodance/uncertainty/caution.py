@@ -63,6 +63,20 @@ def about_true_centres(sip: Sip, placed: tuple[JointError, ...] = ()) -> Sip:
     return Sip(sip.segments, sip.phi, covariance)
 
 
+def in_other_frames(sip: Sip, placed: tuple[JointError, ...] = ()) -> Sip:
+    """Return ``sip``, known about the true joint centres of a person, as it is known in the frames of another session:
+    markers glued anew turn them, and its own joint centres are displaced again, as far as the movement that ``placed``
+    them left it.
+    """
+    known = about_true_centres(sip, placed)
+    covariance = np.array(known.covariance)
+    for i, segment in enumerate(sip.segments):
+        cut = slice(10 * i, 10 * i + 10)
+        slope = _turn_slope(sip.phi[cut]) * frame_turn(segment)
+        covariance[cut, cut] += slope @ slope.T
+    return Sip(sip.segments, sip.phi, covariance)
+
+
 def _joint_of(segment: str) -> str:
     """Return the anatomical joint at the origin of a segment of the human, "" for other segments."""
     return next((segment.removesuffix(kind) + joint for kind, joint in JOINT.items() if segment.endswith(kind)), "")

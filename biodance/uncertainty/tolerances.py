@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -131,7 +132,11 @@ def table_sizes() -> dict[str, float]:
 
 def read_tolerances(text: str) -> Tolerances:
     """Return the tolerances from the text of a TOML file."""
-    raw = tomllib.loads(text)
+    return tolerances_of(tomllib.loads(text))
+
+
+def tolerances_of(raw: Mapping[str, Any]) -> Tolerances:
+    """Return the tolerances from the tables of a TOML file."""
     noise, energy, energy_sd = (np.array(raw[name]) for name in ("noise", "energy", "energy_sd"))
     return Tolerances(
         raw.get("sizes", {}),

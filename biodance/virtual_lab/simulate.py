@@ -6,16 +6,19 @@ OUT/truth/truth.json                   what only the simulation knows; no other 
 """
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from biodance.errors import BiodanceError
 from biodance.records import Subject
-from biodance.virtual_lab.movement.protocol import Protocol, read_protocol
+from biodance.virtual_lab.movement.performance import Performance
+from biodance.virtual_lab.movement.protocol import Protocol, TrialPlan, read_protocol
 from biodance.virtual_lab.person.person import AddedLoad, Person, make_person
 from biodance.virtual_lab.recording.laboratory import (
     FIRST_VISIT,
+    Instruments,
     LabVisit,
     perform_in,
     record,
@@ -52,6 +55,27 @@ def simulate_session(
         There is no such protocol.
     """
     plan = protocol if isinstance(protocol, Protocol) else read_protocol(protocol)
+    return write_visit(subject, plan, out, perform_in, seed=seed, loads=loads, visit=visit)
+
+
+def write_visit(
+    subject: Subject,
+    plan: Protocol,
+    out: Path,
+    performed: Callable[[Instruments, Person, TrialPlan], Performance],
+    *,
+    seed: int,
+    loads: tuple[AddedLoad, ...] = (),
+    visit: LabVisit = FIRST_VISIT,
+) -> Path:
+    """Write a session in which every trial of ``plan`` is ``performed``, as `simulate_session` does, and return its
+    folder.
+
+    Raises
+    ------
+    BiodanceError
+        The folder is not empty, or the subject is outside the range that the virtual body covers.
+    """
     _check(subject, out)
     person = make_person(
         subject, seed, tolerances=visit.tolerances, loads=loads, session=visit.number, joint_shifts=visit.joint_shifts
@@ -61,7 +85,7 @@ def simulate_session(
     performances = []
     declared = scale_reading(person, visit.number, visit.tolerances)
     for trial in plan.trials:
-        performance = perform_in(instruments, person, trial)
+        performance = performed(instruments, person, trial)
         recording = record(performance, instruments)
         for fault in visit.faults:
             recording = fault(recording)

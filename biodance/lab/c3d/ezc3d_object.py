@@ -38,14 +38,26 @@ def to_ezc3d(trial: Trial) -> "ezc3d.c3d":
     """
     import ezc3d
 
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "trial.c3d"
+        write_trial(trial, path)
+        return ezc3d.c3d(str(path))
+
+
+def write_trial(trial: Trial, path: Path) -> None:
+    """Write a trial as a C3D file: as `to_ezc3d` says; what it does not hold (other analog channels, events) is left
+    out.
+
+    Raises
+    ------
+    BiodanceError
+        Markers and plates have rates that do not fit, a wrench is not finite, or the file exists.
+    """
     plates = [_recording(plate) for plate in trial.plates]
     rate = trial.plates[0].wrench.rate if trial.plates else 0.0
     said = {"PROCESSING": _measurements(trial)} if trial.measurements else None
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "trial.c3d"
-        first = trial.source.first_frame
-        write_c3d(path, markers=trial.markers, plates=plates, analog_rate=rate, first_frame=first, parameters=said)
-        return ezc3d.c3d(str(path))
+    first = trial.source.first_frame
+    write_c3d(path, markers=trial.markers, plates=plates, analog_rate=rate, first_frame=first, parameters=said)
 
 
 def from_ezc3d(file: "ezc3d.c3d", *, name: str = "trial", role: Role = "fit", subject: str | None = None) -> Trial:

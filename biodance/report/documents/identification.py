@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from biodance.dance.scoring import PerformanceScore
 from biodance.identification.added_mass import LoadSearch
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import Known
@@ -158,6 +159,24 @@ def torques_document(bands: TorqueBands | None) -> dict[str, Any] | None:
     return {"trial": bands.trial, "joints": rows}
 
 
+def performance_document(found: PerformanceScore | None) -> dict[str, Any] | None:
+    """Return how well a dance was danced: share of the table's variance removed, planned and reached; ``repeat`` the
+    transitions to dance once more, by number (n leads from cue n to the next); None where no dance was named.
+    """
+    if found is None:
+        return None
+    return {
+        "dance": found.dance,
+        "seconds": found.seconds,
+        "excitation": [vars(one) for one in found.excitation],
+        "repeat": found.repeat,
+        "repetitions": [
+            {"transition": r.transition, "start_s": r.start, "end_s": r.end, "gain": r.gain, "most": r.most}
+            for r in found.repetitions
+        ],
+    }
+
+
 def identification_document(found: SessionIdentification) -> dict[str, Any]:
     """Return all that identification found.
 
@@ -165,7 +184,8 @@ def identification_document(found: SessionIdentification) -> dict[str, Any]:
     moments about ``about_m``, the mean centre of pressure. ``added_mass`` null: no load is announced;
     ``added_mass_search`` says what was looked for and whether one is "found", there is "none" or one "cannot tell";
     ``joint_torques`` of one trial with what the parameters leave uncertain (not this trial's own skin and plates);
-    ``differences`` to the reference session, empty without one. ``failures`` what could not be computed, with cause and
+    ``differences`` to the reference session, empty without one; ``performance`` how well the dance that was shown was
+    danced, null without one. ``failures`` what could not be computed, with cause and
     cure; after a failed fit (``status``) there are no segments.
     """
     one = found.identification
@@ -190,5 +210,6 @@ def identification_document(found: SessionIdentification) -> dict[str, Any]:
         "added_mass_search": _search(found.search),
         "joint_torques": torques_document(found.torques),
         "differences": [_difference(row) for row in found.changes],
+        "performance": performance_document(found.performance),
         "notes": found.notes,
     }

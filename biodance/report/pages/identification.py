@@ -4,10 +4,12 @@ from importlib.resources import files
 
 from biodance.identification.knowledge import QUANTITIES
 from biodance.identification.load_words import say_load
+from biodance.identification.sessions import certain_changes
 from biodance.pipeline.identification import SessionIdentification
 from biodance.records import CHANNELS
 from biodance.report.documents.identification import information_share, segment_rows, torques_document
 from biodance.report.figures.identification import drawn_joints, forest_figure, torque_figure, validation_figure
+from biodance.report.figures.sessions import changes_figure, excitation_figure
 from biodance.report.figures.style import svg_address
 from biodance.report.wording import format_number, millimetres
 
@@ -55,4 +57,9 @@ def identification_section(found: SessionIdentification) -> str:
         search=found.search,
         load=say_load(found.search),
         changes=[row for row in found.changes if row.quantity == "mass"],
+        comparison=svg_address(changes_figure(found.changes)) if found.changes else "",
+        certain=certain_changes(found.changes),
+        total=len(found.changes),
+        performance=found.performance,
+        danced=svg_address(excitation_figure(found.performance)) if found.performance else "",
     )

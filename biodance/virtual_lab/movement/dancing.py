@@ -48,22 +48,49 @@ AWAY, SOFTNESS = 0.6, 80.0
 @dataclass(frozen=True)
 class Performer:
     """How well somebody copies: ``tracking`` rad, root mean square error of every joint; ``pace`` how many times the
-    planned duration.
+    planned duration; ``timing`` by which share the tempo wanders about it, root mean square; ``sway`` times the usual
+    sway of the centre of pressure.
     """
 
     tracking: float = float(np.radians(7.0))
     pace: float = 1.2
+    timing: float = 0.0
+    sway: float = 1.0
 
     def __post_init__(self) -> None:
-        if not (0 <= self.tracking < 0.6 and 0.5 <= self.pace <= 5):
-            raise BiodanceError(
-                f"Performer: tracking {self.tracking:g} rad, pace {self.pace:g}; legal are 0 to 0.6 rad and 0.5 to 5 "
-                f"times the duration."
-            )
+        legal = (
+            ("tracking", 0.0, 0.6, "rad"),
+            ("pace", 0.5, 5.0, "times the duration"),
+            ("timing", 0.0, 0.4, "of the tempo"),
+            ("sway", 0.0, 4.0, "times the usual sway"),
+        )
+        for name, low, high, unit in legal:
+            if not low <= getattr(self, name) <= high:
+                raise BiodanceError(
+                    f"Performer: {name} = {getattr(self, name):g}; legal are {low:g} to {high:g} {unit}."
+                )
+
+    def clock(self, rng: np.random.Generator, duration: float) -> tuple[float, Array, Array]:
+        """Return the seconds (rounded to a tenth) in which this performer shows what is planned for ``duration`` s,
+        and instants (N,) s of the performance with those of the plan (N,) s that belong to them.
+        """
+        seconds = round(duration * self.pace, 1)
+        time = np.linspace(0.0, seconds, max(2, round(20 * seconds)) + 1)
+        tempo = np.exp(self.timing * smooth_noise(rng, time, columns=1, cutoff=TEMPO)[:, 0])
+        done = np.concatenate([[0.0], np.cumsum(0.5 * (tempo[1:] + tempo[:-1]))])
+        return seconds, time, duration * done / done[-1]
 
 
+TEMPO = 0.2
+"""Hz: how fast the tempo of a person who follows a screen changes."""
 USUAL_PERFORMER = Performer()
 """Seven degrees off in every joint, a fifth slower than shown."""
+PERFORMERS = {
+    "steady": Performer(tracking=float(np.radians(2.0)), pace=1.1, timing=0.05, sway=0.7),
+    "normal": Performer(tracking=float(np.radians(5.0)), pace=1.2, timing=0.1, sway=1.0),
+    "restless": Performer(tracking=float(np.radians(7.0)), pace=1.2, timing=0.2, sway=1.5),
+}
+"""Performers by name: degrees off in every joint, slower than shown, tempo that wanders, sway."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +113,10 @@ class Shown:
         for name, shape in (("ankle", (2, 3)), ("raised", (frames, 2)), ("pressure", (frames, 2))):
             object.__setattr__(self, name, frozen_array(getattr(self, name), shape, f"Shown.{name}"))
 
+    def plan(self, seconds: float) -> TrialPlan:
+        """Return the trial of a performance that takes ``seconds``."""
+        return TrialPlan(self.name, "fit", "parallel", (), seconds / 2)
+
 
 def copy_dance(
     person: Person,
@@ -101,9 +132,12 @@ def copy_dance(
     same motion.
     """
     rng = stream(person.seed, "copy", str(session), shown.name)
-    duration = round((shown.motion.time[-1] - shown.motion.time[0]) * performer.pace, 1)
+    duration, *clock = performer.clock(
+        stream(person.seed, "tempo", str(session), shown.name), float(np.ptp(shown.motion.time))
+    )
     time = -MARGIN + np.arange(round((duration + 2 * MARGIN) * NODE_RATE) + 1) / NODE_RATE
-    when = np.clip(time / performer.pace + shown.motion.time[0], shown.motion.time[0], shown.motion.time[-1])
+    when = shown.motion.time[0] + make_interp_spline(*clock, k=3)(np.clip(time, 0.0, duration))
+    when = np.clip(when, shown.motion.time[0], shown.motion.time[-1])
     smoothed = gaussian_filter1d(shown.pressure, SMOOTH / np.diff(shown.motion.time).mean(), axis=0, mode="nearest")
     values, pressure = (make_interp_spline(shown.motion.time, what, k=5)(when) for what in (_fields(shown), smoothed))
     values[:, RAISED:] = np.clip(values[:, RAISED:], 0.0, 1.0)
@@ -113,16 +147,16 @@ def copy_dance(
     values[:, COLUMNS["pelvis"]] += PELVIS * error[:, COLUMNS["pelvis"]]
     stance, middle, turn = _stand(person, shown, centre, heading, rng)
     target = (
-        centre + (pressure - middle) @ turn[:2, :2].T + tolerances.sway * smooth_noise(rng, time, columns=2, cutoff=0.5)
+        centre
+        + (pressure - middle) @ turn[:2, :2].T
+        + performer.sway * tolerances.sway * smooth_noise(rng, time, columns=2, cutoff=0.5)
     )
     apart = shown.ankle[1, 1] - shown.ankle[0, 1]
     values[:, SHIFT] = np.clip((shown.ankle[1, 1] - pressure[:, 1]) / apart, 0.0, 1.0)
     curves = Curves(time, values)
     pose = upper_body(person, curves, stance, tolerances, rng)
     nodes, missed = keep_balance(person, pose, curves, stance, target, height=_height)
-    return Performance(
-        TrialPlan(shown.name, "fit", "parallel", (), duration / 2), person, stance, curves, time, nodes, missed
-    )
+    return Performance(shown.plan(duration), person, stance, curves, time, nodes, missed)
 
 
 def _fields(shown: Shown) -> Array:
