@@ -123,9 +123,9 @@ def traces(
     """Return (n,) what one unit of a cause adds to value less expectation of the observations ``found`` of a
     recording: the slope between the recordings altered by a step either way; 0 where the witness is blind.
     """
-    out = np.zeros(len(found))
+    asked, out = witnesses(chosen), np.zeros(len(found))
     sides = [
-        {one.key: one.value - one.expected for one in observe(cause.alter(seen, size), chosen)}
+        {one.key: one.value - one.expected for one in observe(cause.alter(seen, size), asked)}
         for size in (-cause.step, cause.step)
     ]
     for i, one in enumerate(found):

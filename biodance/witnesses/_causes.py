@@ -46,17 +46,19 @@ def possible_causes(seen: Recording) -> tuple[Cause, ...]:
     ]
     for plate in seen.trial.plates:
         prefix = "" if single else f"{plate.name}:"
-        found += [Cause("plate_position", f"{plate.name}:{a}", "shift", "m", 0.004, _moved(plate.name, a)) for a in "xy"]
+        found += [
+            Cause("plate_position", f"{plate.name}:{a}", "shift", "m", 0.004, _moved(plate.name, a)) for a in "xy"
+        ]
         found.append(Cause("plate_rotation", f"{plate.name}:z", "angle", "rad", 0.02, _turned(plate.name)))
         for k, name in enumerate(CHANNELS[:5]):
             unit = "N" if k < 3 else "N·m"
-            found.append(Cause("plate_offset", f"{prefix}{name}", "offset", unit, 2.0 if k < 3 else 0.5, _offset(plate.name, k)))
+            found.append(
+                Cause("plate_offset", f"{prefix}{name}", "offset", unit, 2.0 if k < 3 else 0.5, _offset(plate.name, k))
+            )
         for k, name in enumerate(CHANNELS[:3]):
             found.append(Cause("plate_gain", f"{prefix}{name}", "gain", "1", 0.02, _gained(plate.name, k)))
         for k, name in ((3, "Mx"), (4, "My")):
-            found.append(
-                Cause("plate_crosstalk", f"{prefix}Fz->{name}", "ratio", "m", 0.004, _crossed(plate.name, k))
-            )
+            found.append(Cause("plate_crosstalk", f"{prefix}Fz->{name}", "ratio", "m", 0.004, _crossed(plate.name, k)))
     return tuple(found)
 
 

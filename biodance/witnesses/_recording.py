@@ -7,10 +7,10 @@ force comes late, must not hide the very steps that show it.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from biodance.errors import BiodanceError
 from biodance.lab.markers.sets import FAMILY, landmark, read_marker_set
+from biodance.lab.weight import is_still
 from biodance.motion.contact.footing import inside
 from biodance.motion.contact.soles import OUTLINE
 from biodance.records import SIDES, Array, Markers, Plate, Trial, runs
@@ -102,7 +102,8 @@ class Step:
 @dataclass(frozen=True, eq=False)
 class Recording:
     """One ``trial`` with the declared ``mass`` kg of the person (NaN = unknown), both ``feet`` (none where their
-    markers are missing), the ``steps`` on its plates and the ``pelvis`` (T, 3) m at marker times (None = not seen).
+    markers are missing), the ``steps`` on its plates, the ``pelvis`` (T, 3) m at marker times with its ``velocity``
+    (T, 3) m/s below 8 Hz (None = not seen), and whether somebody stands ``still`` throughout.
     """
 
     trial: Trial
@@ -110,6 +111,8 @@ class Recording:
     feet: tuple[Foot, ...]
     steps: tuple[Step, ...]
     pelvis: Array | None
+    velocity: Array | None
+    still: bool
 
     def plate(self, name: str) -> Plate:
         """Return the plate of that name."""
@@ -128,16 +131,10 @@ class Recording:
         return slice(*here[-1])
 
     def pelvis_velocity(self, time: Array) -> Array:
-        """Return (n, 3) m/s of the pelvis at times (n,) s, without its trembling above 8 Hz."""
-        assert self.pelvis is not None
-        assert self.trial.markers is not None
-        return _between(self.trial.markers.time, _velocity(self.trial.markers, self.pelvis), time)
-
-    def swings(self, side: str, time: Array) -> NDArray[np.bool_]:
-        """Return (n,) whether the foot of a side swings at times (n,) s."""
-        foot = self.foot(side)
-        speed = _between(foot.time, foot.speed[:, None], time)[:, 0]
-        return np.nan_to_num(speed) > _STILL
+        """Return (n, 3) m/s of the pelvis at times (n,) s; NaN where it was not seen."""
+        if self.velocity is None or self.trial.markers is None:
+            return np.full((len(time), 3), np.nan)
+        return _between(self.trial.markers.time, self.velocity, time)
 
 
 def recording(trial: Trial, *, mass: float = float("nan")) -> Recording:
@@ -150,7 +147,10 @@ def recording(trial: Trial, *, mass: float = float("nan")) -> Recording:
     steps = tuple(
         step for plate in trial.plates for step in _steps(plate, feet, raised=plate.height > lowest + _RAISED) if feet
     )
-    return Recording(trial, mass, feet, tuple(sorted(steps, key=lambda step: step.middle)), _pelvis(trial.markers))
+    pelvis = _pelvis(trial.markers)
+    velocity = _velocity(trial.markers, pelvis) if trial.markers is not None and pelvis is not None else None
+    steps = tuple(sorted(steps, key=lambda step: step.middle))
+    return Recording(trial, mass, feet, steps, pelvis, velocity, is_still(trial))
 
 
 def _between(known: Array, path: Array, time: Array) -> Array:

@@ -47,7 +47,9 @@ def stance(seen: Recording, step: Step) -> Stance | None:
     ahead, outwards, apart = seen.foot(step.side).in_foot(time, cop)
     length = float(np.nanmedian(apart)) if np.isfinite(apart).any() else float("nan")
     phase = (time - time[0]) / max(time[-1] - time[0], 1e-9)
-    return Stance(phase, time, plate.wrench.force[part], ahead, outwards, length, seen.foot(step.side).axes(step.middle))
+    return Stance(
+        phase, time, plate.wrench.force[part], ahead, outwards, length, seen.foot(step.side).axes(step.middle)
+    )
 
 
 def place_norms(step: Step, axis: Array) -> dict[str, float]:

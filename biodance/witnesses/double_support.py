@@ -22,7 +22,9 @@ class DoubleSupport(Witness):
 
     def look(self, seen: Recording) -> tuple[Observation, ...]:
         """Return one observation of each pair; it is shown only: each foot alone counts already."""
-        alone = {one.what.removesuffix(", alone"): one for one in StrideForce().look(seen) if one.what.endswith("alone")}
+        alone = {
+            one.what.removesuffix(", alone"): one for one in StrideForce().look(seen) if one.what.endswith("alone")
+        }
         found = []
         for first, last in zip(seen.steps, seen.steps[1:], strict=False):
             before, after = alone.get(first.name), alone.get(last.name)

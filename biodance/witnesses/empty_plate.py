@@ -35,7 +35,9 @@ class EmptyPlate(Witness):
         if not was_zeroed(plate):
             return []
         return [
-            Observation(self.name, f"{plate.name} {name}, taken off", seen.trial.name, float(size), _OWN, 0.0, "N", plate.name)
+            Observation(
+                self.name, f"{plate.name} {name}, taken off", seen.trial.name, float(size), _OWN, 0.0, "N", plate.name
+            )
             for name, size in zip(CHANNELS[:3], plate.zero, strict=True)
         ]
 

@@ -59,7 +59,9 @@ class Shear(Witness):
         self, seen: Recording, step: Step, what: str, value: float, sd: float, expected: float, unit: str,
         norms: dict[str, float],
     ) -> Observation:  # fmt: skip
-        return Observation(self.name, f"{step.name}, {what}", seen.trial.name, value, sd, expected, unit, step.plate, norms)
+        return Observation(
+            self.name, f"{step.name}, {what}", seen.trial.name, value, sd, expected, unit, step.plate, norms
+        )
 
 
 def _slope(left: Array, ahead: Array, vertical: Array) -> float:

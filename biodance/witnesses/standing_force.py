@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from biodance.lab.weight import is_still
 from biodance.records import Array
 from biodance.witnesses import Observation, Recording, Witness
 from biodance.witnesses._recording import ONSET
@@ -26,7 +25,7 @@ class StandingForce(Witness):
     def look(self, seen: Recording) -> tuple[Observation, ...]:
         """Return one mass and two horizontal forces of a trial in which somebody stands still."""
         plates = [p for p in seen.trial.plates if p.wrench.time.size and p.wrench.force[:, 2].mean() > ONSET]
-        if not plates or not is_still(seen.trial) or not seen.mass > 0:
+        if not plates or not seen.still or not seen.mass > 0:
             return ()
         total, weight = seen.trial.wrench, seen.mass * seen.trial.settings.gravity
         force = mean_force(total.force)

@@ -6,7 +6,6 @@ the back of the pelvis stands for it: from side to side within some millimetres,
 
 import numpy as np
 
-from biodance.lab.weight import is_still
 from biodance.records import Array
 from biodance.witnesses import Observation, Recording, Witness
 from biodance.witnesses.standing_force import mean_force
@@ -28,7 +27,7 @@ class StandingPlace(Witness):
         """Return two observations of a trial in which somebody stands still on the plates."""
         trial = seen.trial
         plates = [plate for plate in trial.plates if plate.wrench.time.size]
-        if not plates or not is_still(trial) or seen.pelvis is None or not seen.feet:
+        if not plates or not seen.still or seen.pelvis is None or not seen.feet:
             return ()
         force = mean_force(trial.wrench.force)[2]
         ahead = facing(seen)

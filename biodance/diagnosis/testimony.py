@@ -1,0 +1,293 @@
+"""What the witnesses of a session say together: which cause, how big, how sure, what else it could be.
+
+Each observation is what is expected, plus what the causes add (their traces), plus parts of the expectation that
+several observations share (a person's foot, a laboratory's markers), plus its own error. Shared parts and sizes of
+causes are normal before the data; own errors have heavy tails (Student, 4 degrees of freedom), because one step in
+twenty is odd. The evidence of a cause is the integral over all of them by Laplace's method (Bishop 2006, section 4.4).
+Signs of channels have no size: they are undone in the recording, and the witnesses are asked again.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from biodance.diagnosis.candidates import SCALE
+from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
+from biodance.diagnosis.naming import TOGETHER
+from biodance.discovery import Chosen
+from biodance.effects import DiscreteEffect, Effect, causes
+from biodance.records import Array, Session
+from biodance.witnesses import (
+    Cause,
+    Observation,
+    Recording,
+    observe,
+    possible_causes,
+    recording,
+    traces,
+    turned_signs,
+)
+
+THRESHOLD = 4.0
+"""Natural logarithm of the evidence, less that of the number of targets, from which a cause is named."""
+_TAIL = 4.0
+"""Degrees of freedom of an observation's own error."""
+_RARE = 3.0
+"""Natural logarithm: so much rarer than other faults is a channel of the wrong sign."""
+_ROUNDS = 3
+_STEPS = 30
+_SURE = 2.0
+_USUAL = {
+    ("plate_position", "m"): 0.005,
+    ("plate_rotation", "rad"): 0.03,
+    ("plate_gain", "1"): 0.02,
+    ("plate_offset", "N"): 7.0,
+    ("plate_offset", "N·m"): 2.0,
+    ("plate_crosstalk", "m"): 0.005,
+    ("time_delay", "s"): 0.008,
+    ("body_mass", "kg"): 0.7,
+}
+"""Sizes up to which laboratories have a cause without calling it a fault: plates 2 to 5 mm off (Collins 2009), zeros of
+public recordings to 6 N, clocks within a frame, clothes and shoes."""
+_VERTICAL = 18.0
+"""N of vertical zero, which readers take off: public recordings have up to 16."""
+
+
+@dataclass(frozen=True, eq=False)
+class Testimony:
+    """All ``observations`` of a session; ``traces`` of every cause: what one unit adds to each of them (n,);
+    ``turned``: value less expectation (n,) once a channel's sign is turned back, NaN where it is then not seen.
+    """
+
+    observations: tuple[Observation, ...]
+    causes: Mapping[tuple[str, str], Cause]
+    traces: Mapping[tuple[str, str], Array]
+    turned: Mapping[tuple[str, str], Array] = field(default_factory=dict)
+
+    @property
+    def counting(self) -> "Testimony":
+        """Only what counts as evidence."""
+        kept = np.array([one.counts for one in self.observations], dtype=bool)
+        return Testimony(
+            tuple(one for one in self.observations if one.counts),
+            self.causes,
+            {name: trace[kept] for name, trace in self.traces.items()},
+            {name: value[kept] for name, value in self.turned.items()},
+        )
+
+    @property
+    def shared(self) -> Array:
+        """(n, k) what one standard deviation of each shared part of the expectations adds."""
+        names = list(dict.fromkeys(name for one in self.observations for name in one.norms))
+        rows = [[one.norms.get(name, 0.0) for name in names] for one in self.observations]
+        return np.array(rows).reshape(len(self.observations), len(names))
+
+    def seen_by(self, cause: tuple[str, str], *, least: float = 1.0) -> tuple[str, ...]:
+        """Return the witnesses that see the usual fault of a cause at ``least`` standard deviations, all their
+        observations together; none: all are blind to it.
+        """
+        size = self.causes[cause].step * _FAULT
+        total: dict[str, float] = {}
+        for one, trace in zip(self.observations, self.traces[cause], strict=True):
+            total[one.witness] = total.get(one.witness, 0.0) + (size * trace / one.expected_sd) ** 2
+        return tuple(name for name, power in total.items() if power**0.5 >= least)
+
+
+_FAULT = 4.0
+"""A fault in steps of its cause: 16 mm, 16 ms, 8 %, 8 N, 0.08 rad, 2 kg."""
+
+
+def hear(session: Session, chosen: Chosen[Effect | DiscreteEffect] = None) -> Testimony:
+    """Return what the witnesses saw in all trials of a session but the skipped ones; ``chosen`` limits the causes."""
+    asked = causes(chosen)
+    mass = float("nan") if "mass" in session.subject.guessed else session.subject.mass
+    seen = [recording(trial, mass=mass) for trial in session.trials if trial.plates and trial.role != "skip"]
+    found = [observe(one) for one in seen]
+    known = {c.names: c for one in seen for c in possible_causes(one) if c.effect in asked}
+    parts = {name: [np.zeros(len(some)) for some in found] for name in known}
+    turned: dict[tuple[str, str], list[Array]] = {}
+    plain = [np.array([o.value - o.expected for o in some]) for some in found]
+    for i, (one, some) in enumerate(zip(seen, found, strict=True)):
+        for cause in possible_causes(one) if some else ():
+            if cause.names in known:
+                parts[cause.names][i] = traces(one, some, cause)
+        for name, undo in turned_signs(one).items() if one.steps and "axis_error" in asked else ():
+            turned.setdefault(name, [value.copy() for value in plain])[i] = _again(undo(one), some)
+    return Testimony(
+        tuple(o for some in found for o in some),
+        known,
+        {name: np.concatenate([*several, np.empty(0)]) for name, several in parts.items()},
+        {name: np.concatenate([*several, np.empty(0)]) for name, several in turned.items()},
+    )
+
+
+def _again(altered: Recording, before: tuple[Observation, ...]) -> Array:
+    """Return value less expectation (n,) of the same observations in an altered recording; NaN where not seen."""
+    values = {one.key: one.value - one.expected for one in observe(altered)}
+    return np.array([values.get(one.key, np.nan) for one in before])
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """One explanation: its ``log_evidence``, the sizes ``theta`` (p,) of its causes with ``covariance`` (p, p)."""
+
+    log_evidence: float
+    theta: Array
+    covariance: Array
+
+
+def fit(value: Array, sd: Array, shared: Array, Z: Array, size: Array) -> Fit:
+    """Return the explanation of values (n,) less expectation, with own ``sd`` (n,), by ``shared`` (n, k) parts of unit
+    normal size and causes whose columns ``Z`` (n, p) have sizes of standard deviation ``size`` (p,).
+    """
+    A = np.concatenate([shared, Z * size], axis=1)
+    weight, u = np.ones(value.size), np.zeros(A.shape[1])
+    for _ in range(_STEPS):
+        H = (A * (weight / sd**2)[:, None]).T @ A + np.eye(A.shape[1])
+        factor = cho_factor(H, lower=True)
+        new = cho_solve(factor, A.T @ (weight / sd**2 * value))
+        weight = (_TAIL + 1) / (_TAIL + ((value - A @ new) / sd) ** 2)
+        done, u = np.abs(new - u).max(initial=0.0) < 1e-4, new
+        if done:
+            break
+    left = (value - A @ u) / sd
+    tails = -0.5 * (_TAIL + 1) * np.log1p(left**2 / _TAIL).sum()
+    inverse = cho_solve(factor, np.eye(len(u)))
+    p = Z.shape[1]
+    theta, covariance = size * u[len(u) - p :], inverse[len(u) - p :, len(u) - p :] * np.outer(size, size)
+    log_evidence = float(tails - 0.5 * u @ u - np.log(np.diag(factor[0])).sum())
+    return Fit(log_evidence, theta, covariance)
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """A cause beside those named before: its log Bayes factor and ``score`` (less the number of targets); ``found``
+    the sizes of all.
+    """
+
+    names: tuple[str, str]
+    log_bayes_factor: float
+    score: float
+    found: Fit
+
+    @property
+    def alias(self) -> Alias:
+        """The cause with its evidence."""
+        return Alias(*self.names, self.log_bayes_factor)
+
+
+@dataclass(frozen=True, eq=False)
+class Verdicts:
+    """What the witnesses' evidence names: ``findings``; ``left`` the testimony with turned signs put right; ``first``
+    all causes at the first round, most probable first.
+    """
+
+    findings: tuple[Finding, ...]
+    left: Testimony
+    first: tuple[Alias, ...] = ()
+
+
+def weigh(testimony: Testimony) -> Verdicts:
+    """Return the causes that the witnesses' evidence carries, at most three, each with size and look-alikes."""
+    heard = testimony.counting
+    value = np.array([one.value - one.expected for one in heard.observations])
+    if not value.size:
+        return Verdicts((), heard)
+    named: list[tuple[Hypothesis, tuple[Alias, ...]]] = []
+    first: tuple[Alias, ...] = ()
+    for number in range(_ROUNDS):
+        chosen = tuple(one.names for one, _ in named if one.names in heard.causes)
+        ranking = _ranked(heard, value, chosen, signs=number == 0)
+        first = first or tuple(one.alias for one in ranking)
+        best = next((one for one in ranking if one.score >= THRESHOLD and _matters(heard, one)), None)
+        if best is None:
+            break
+        near = [o for o in ranking if o is best or best.score - o.score <= TOGETHER]
+        named.append((best, tuple(o.alias for o in sorted(near, key=lambda o: o is not best))))
+        if best.names in heard.turned:
+            value = np.where(np.isfinite(heard.turned[best.names]), heard.turned[best.names], 0.0)
+    return Verdicts(_findings(heard, value, named), heard, first)
+
+
+def _ranked(heard: Testimony, value: Array, named: tuple[tuple[str, str], ...], *, signs: bool) -> list[Hypothesis]:
+    """Return every cause beside the named ones with its evidence, most probable first."""
+    before = _explained(heard, value, named)
+    count: dict[str, int] = {}
+    for effect, _ in heard.causes:
+        count[effect] = count.get(effect, 0) + 1
+    found = []
+    for names in heard.causes:
+        if names in named or not np.abs(heard.traces[names]).any():
+            continue
+        one = _explained(heard, value, (*named, names))
+        bayes = one.log_evidence - before.log_evidence
+        found.append(Hypothesis(names, bayes, bayes - float(np.log(count[names[0]])), one))
+    for names, turned in heard.turned.items() if signs else ():
+        known = np.isfinite(turned)
+        one = _explained(heard, turned, named, known)
+        bayes = one.log_evidence - _explained(heard, value, named, known).log_evidence
+        found.append(Hypothesis(names, bayes, bayes - _RARE - float(np.log(len(heard.turned))), one))
+    return sorted(found, key=lambda one: -one.score)
+
+
+def _explained(
+    heard: Testimony, value: Array, names: tuple[tuple[str, str], ...], known: Array | None = None
+) -> Fit:
+    kept = np.ones(value.size, dtype=bool) if known is None else known.astype(bool)
+    sd = np.array([one.sd for one in heard.observations])[kept]
+    Z = np.stack([heard.traces[name] for name in names], axis=1) if names else np.empty((value.size, 0))
+    size = np.array([SCALE * _typical(*name) for name in names])
+    return fit(value[kept], sd, heard.shared[kept], Z[kept], size)
+
+
+def _typical(effect: str, target: str) -> float:
+    """Return the typical size of a cause, as the family of effects has it."""
+    kind = causes()[effect]
+    return float(kind.typical[0]) if isinstance(kind, Effect) else 1.0
+
+
+def _matters(heard: Testimony, one: Hypothesis) -> bool:
+    """Return whether the last cause of an explanation is larger than what laboratories have without fault, and sure."""
+    if one.names not in heard.causes:
+        return True
+    cause, size = heard.causes[one.names], abs(float(one.found.theta[-1]))
+    usual = _USUAL.get((cause.effect, cause.unit), 0.0)
+    if cause.effect == "plate_offset" and cause.target.endswith("Fz"):
+        usual = _VERTICAL
+    sd = float(one.found.covariance[-1, -1]) ** 0.5
+    return size > usual and size > _SURE * sd
+
+
+def _findings(
+    heard: Testimony, value: Array, named: list[tuple[Hypothesis, tuple[Alias, ...]]]
+) -> tuple[Finding, ...]:
+    """Return the named causes with their sizes, all fitted together."""
+    sized = tuple(one.names for one, _ in named if one.names in heard.causes)
+    last, found = _explained(heard, value, sized), []
+    for one, near in named:
+        kind, estimates, visible = causes()[one.names[0]], (), 1.0
+        if one.names in sized:
+            i, cause = sized.index(one.names), heard.causes[one.names]
+            sd = float(last.covariance[i, i]) ** 0.5
+            estimates = (Estimate(cause.parameter, float(last.theta[i]), sd, cause.unit),)
+            visible = _visible(heard, one.names)
+        found.append(Finding(*one.names, estimates, near, visible, advice=f"{_said(heard, one.names)} {kind.advice}"))
+    return tuple(found)
+
+
+def _visible(heard: Testimony, names: tuple[str, str]) -> float:
+    """Return the share of a cause that stays visible when all shared parts of the expectations may adapt."""
+    sd = np.array([one.sd for one in heard.observations])
+    z, N = heard.traces[names] / sd, heard.shared / sd[:, None]
+    inner = np.linalg.solve(np.eye(N.shape[1]) + N.T @ N, N.T @ z)
+    return float(np.sqrt(np.clip((z @ z - z @ N @ inner) / max(float(z @ z), 1e-300), 0.0, 1.0)))
+
+
+def _said(heard: Testimony, names: tuple[str, str]) -> str:
+    """Return which witnesses carry a finding, in words."""
+    if names not in heard.causes:
+        return "With this sign turned back, the pressure lies under the feet and a step brakes first and pushes then."
+    seen = heard.seen_by(names)
+    return f"Seen by: {', '.join(name.replace('_', ' ') for name in seen)}." if seen else ""
