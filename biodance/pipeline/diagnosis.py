@@ -23,7 +23,7 @@ from biodance.identification.identification import Identification, identify_body
 from biodance.identification.rival_bodies import expect_unloaded
 from biodance.pipeline.attention import judged_trials, told
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES, SessionIdentification
-from biodance.pipeline.looked_at import Own, left_out, looked_at, looks, own_tolerances
+from biodance.pipeline.looked_at import left_out, looked_at, looks, own_tolerances
 from biodance.pipeline.results import SessionResult
 from biodance.records import Role, Sip
 from biodance.uncertainty.tolerances import Tolerances
@@ -132,13 +132,13 @@ def _diagnosed(
     fitted = looked_at(result.trials)
     tell("checking units, signs, labels and clocks")
     asked = causes(effects)
-    checks = gates(result.session, _cases(result.body, (*fitted, *looks(result.trials, KEPT_ROLES))), chosen=asked)
+    checks = gates(result.session, cases_of(result.body, (*fitted, *looks(result.trials, KEPT_ROLES))), chosen=asked)
     failed = tuple(gate for gate in checks if not gate.ok)
     if result.body is None or not fitted:
         why = f"There is nothing to diagnose. {result.body_source} {_reasons(result)}".strip()
         return SessionDiagnosis(_by_checks(checks) if failed else _cannot_tell(checks, why, *result.doubts))
     tell("looking for causes")
-    own = Own(tolerances) if tolerances else own_tolerances(result.body, fitted, result.session.trials)
+    own = own_tolerances(result.body, fitted, result.session.trials, known=tolerances)
     try:
         examined = diagnose_trials(
             result.body,
@@ -244,7 +244,7 @@ def _untold(reference: SessionIdentification | None) -> tuple[str, ...]:
     )
 
 
-def _cases(body: Body | None, found: tuple[Look, ...]) -> tuple[Case, ...]:
+def cases_of(body: Body | None, found: tuple[Look, ...]) -> tuple[Case, ...]:
     """Return the trials as effects see them, at the rate of the markers, with the table's parameters."""
     if body is None:
         return ()
@@ -355,7 +355,7 @@ def _pairs(result: SessionResult, phi: np.ndarray, roles: tuple[Role, ...]) -> l
     """Return the cases with the parameters found, and where they came from."""
     assert result.body is not None
     found = looks(result.trials, roles)
-    return list(zip((replace(case, phi=phi) for case in _cases(result.body, found)), found, strict=True))
+    return list(zip((replace(case, phi=phi) for case in cases_of(result.body, found)), found, strict=True))
 
 
 def _changes(before: Identification, after: Identification) -> tuple[str, ...]:

@@ -129,6 +129,13 @@ def judge_plates(archive: str | Path, *, tell: _Tell = lambda _: None) -> Plates
     return PlatesJudged(folder, judged, named, refused, notes)
 
 
+def told_failure(why: Exception) -> str:
+    """Return why a session was left out: its own sentence, or that biodance failed on it, which stops no other."""
+    if isinstance(why, BiodanceError):
+        return str(why)
+    return f"biodance failed on it ({type(why).__name__}: {why}). Please report it."
+
+
 def _of_session(path: Path, archive: Path, refused: dict[str, str]) -> list[PlateEvidence]:
     """Return what one session folder says; it is refused with a reason instead of stopping the rest."""
     name = path.relative_to(archive).as_posix() if path != archive else path.resolve().name
@@ -137,8 +144,8 @@ def _of_session(path: Path, archive: Path, refused: dict[str, str]) -> list[Plat
         visit = LabVisit(name, session.subject.name, visit_date(path))
         mass = float("nan") if "mass" in session.subject.guessed else session.subject.mass
         found = list(plate_evidence(session.trials, visit, mass=mass))
-    except BiodanceError as why:
-        refused[name] = str(why)
+    except Exception as why:
+        refused[name] = told_failure(why)
         return []
     refused.update({f"{name}/{file}": why for file, why in session.refused.items()})
     if not found:

@@ -33,3 +33,18 @@ def print_plates(document: dict[str, Any], console: Console) -> None:
         console.print(escape(f"{what} was left out: {why.splitlines()[0]}"), soft_wrap=True)
     for note in document["notes"]:
         console.print(escape(note), soft_wrap=True)
+
+
+def print_learned(document: dict[str, Any], console: Console) -> None:
+    """Print what a laboratory learned: sessions, norms, what changed most."""
+    console.print(f"Learned from {len(document['sessions'])} sessions: {', '.join(document['sessions'])}")
+    table = Table("what", "usual", "sd between sessions", "unit", "sessions")
+    for one in document["norms"]:
+        table.add_row(
+            one["name"], f"{one['value']:.3g}", f"{one['between_sessions_sd']:.2g}", one["unit"], str(one["sessions"])
+        )
+    console.print(table)
+    for one in document["changed_most"]:
+        console.print(f"{one['key']}: {one['size']:.3g} instead of {one['shipped']:.3g}", highlight=False)
+    for what, why in document["left_out"].items():
+        console.print(escape(f"{what} was left out: {why.splitlines()[0]}"), soft_wrap=True)
