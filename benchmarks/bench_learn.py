@@ -1,6 +1,6 @@
 """A laboratory learns from all its sessions but one and judges that one; prints the table of docs/benchmarks/plates.md.
 
-    BIODANCE_DATA=folder python benchmarks/bench_learn.py [ARCHIVE]
+BIODANCE_DATA=folder python benchmarks/bench_learn.py [ARCHIVE]
 """
 
 import argparse
@@ -33,7 +33,9 @@ def limits(found: SessionDiagnosis) -> dict[tuple[str, str], float]:
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("archive", nargs="?", type=Path, default=Path(os.environ.get("BIODANCE_DATA", ".")) / "biomechzoo")
+    parser.add_argument(
+        "archive", nargs="?", type=Path, default=Path(os.environ.get("BIODANCE_DATA", ".")) / "biomechzoo"
+    )
     archive = parser.parse_args().archive
     results = {path.name: examine(read_session(path)) for path in archive_folders(archive)[0]}
     taught: dict[str, LearnedSession] = {}
@@ -42,7 +44,9 @@ def main() -> None:
             taught[name] = learned_session(result)
         except BiodanceError as why:
             print(f"<!-- {name} teaches nothing: {' '.join(str(why).split())[:140]} -->")
-    print("| session | learned from | shipped: verdict | largest z | own: verdict | largest z | limits, own / shipped |")
+    print(
+        "| session | learned from | shipped: verdict | largest z | own: verdict | largest z | limits, own / shipped |"
+    )
     print("|---|---|---|---|---|---|---|")
     for name, result in results.items():
         rest = [one for other, one in taught.items() if other != name]

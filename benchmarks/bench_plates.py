@@ -63,7 +63,8 @@ def row(step: Step, seeds: Iterable[int]) -> str:
             wrong.append(others(found, step) > 0)
         inside += covered(found, step)
     shares = " | ".join(f"{100 * np.mean(right[after]):.0f}" for after in AFTER)
-    return f"| {step.plate} {step.quantity} {step.size:+g} | {shares} | {100 * np.mean(inside or [False]):.0f} | {100 * np.mean(wrong):.0f} |"
+    about = f"{100 * np.mean(inside or [False]):.0f} | {100 * np.mean(wrong):.0f}"
+    return f"| {step.plate} {step.quantity} {step.size:+g} | {shares} | {about} |"
 
 
 def clean(seeds: Iterable[int], say: Callable[[str], None]) -> None:

@@ -1,5 +1,5 @@
 """Archives of visits drawn by chance, for bench_plates.py and its tests: what every trial says of every plate, with a
-truth that is known. Nothing here is imported from the room that judges but the records it takes.
+truth that is known. Only records and the step from steps to places are taken from the room that judges.
 
 Sizes are those measured on real walks (docs/benchmarks/plates.md): errors of steps have heavy tails (Student, 5 degrees
 of freedom) and one step in twenty is plainly wrong; a person's feet have habits of their own, mirrored from left to
@@ -13,10 +13,11 @@ from datetime import date, timedelta
 import numpy as np
 
 from biodance.diagnosis.archive.quantities import LabVisit, PlateEvidence
+from biodance.diagnosis.archive.walking import StepRow, placed
 
 PLATES = ("plate1", "plate2")
-ACROSS, ALONG, ONSET, WEIGHED, EMPTY = 0.0045, 0.006, 0.005, 0.001, 0.1
-"""m, m, s, 1, N: one step or trial."""
+ACROSS, ALONG, ONSET, WEIGHED, EMPTY = 0.0027, 0.0044, 0.005, 0.001, 0.1
+"""m, m, s, 1, N: one step or trial (places: 23 steps of seven children, two of the same foot in one visit)."""
 FOOT, STRIDE, DECLARED, ZEROED = 0.0035, 0.004, 0.003, 0.5
 """m, m, 1, N: a foot across, a person along, a declared mass, a day's zero."""
 
@@ -58,30 +59,33 @@ def _visit(
 ) -> Iterator[PlateEvidence]:
     declared = chance.normal(0, DECLARED)
     zero = chance.normal(0, ZEROED, (len(PLATES), 3))
+    rows: list[StepRow] = []
     for t in range(int(chance.integers(6, 13))):
         first = int(chance.integers(2))
         for p, plate in enumerate(PLATES):
             for axis in range(3):
                 name = f"offset_{'xyz'[axis]}"
                 value = zero[p, axis] + chance.normal(0, EMPTY) + step.of(plate, name, v)
-                yield PlateEvidence(
-                    name, {plate: 1.0}, value, 0.3, visit, f"walk{t}", {}, "empty plate", taken_off=True
-                )
+                yield PlateEvidence(name, {plate: 1.0}, value, 0.3, visit, f"walk{t}", taken_off=True)
             if chance.random() < 0.85:
-                yield from _foot(chance, visit, v, t, plate, (first + p) % 2, habit, step)
+                tail = chance.standard_t(5, 3) / np.sqrt(5 / 3) * (4.0 if chance.random() < 0.05 else 1.0)
+                shift = np.array([step.of(plate, f"place_{axis}", v) for axis in "xy"])
+                rows += _foot(plate, 1 if t % 2 else -1, (first + p) % 2, habit, shift, tail[:2])
+                late = ONSET * tail[2] + step.of(plate, "delay", v)
+                yield PlateEvidence("delay", {plate: 1.0}, late, ONSET, visit, f"walk{t}")
+    yield from placed(rows, visit, "all steps")
     mass = chance.normal(declared, WEIGHED) + step.of("plate1", "gain", v)
     yield PlateEvidence("gain", {"plate1": 1.0}, mass, WEIGHED, visit, "static")
 
 
-def _foot(
-    chance: np.random.Generator, visit: LabVisit, v: int, t: int, plate: str, foot: int, habit: np.ndarray, step: Step
-) -> Iterator[PlateEvidence]:
-    """Yield what one step on one plate says."""
-    wild = 4.0 if chance.random() < 0.05 else 1.0
-    way = 1 if t % 2 else -1
-    tail = wild * chance.standard_t(5, 3) / np.sqrt(5 / 3)
-    y = way * (1 if foot else -1) * habit[foot] + ACROSS * tail[0]
-    x = way * habit[2] + ALONG * tail[1]
-    sizes = {"place_x": (x, ALONG), "place_y": (y, ACROSS), "delay": (ONSET * tail[2], ONSET)}
-    for name, (value, sd) in sizes.items():
-        yield PlateEvidence(name, {plate: 1.0}, value + step.of(plate, name, v), sd, visit, f"walk{t}")
+def _foot(plate: str, way: int, foot: int, habit: np.ndarray, shift: np.ndarray, error: np.ndarray) -> list[StepRow]:
+    """Return what one step says, walking along x (``way`` 1) or back: right foot (1) outwards is -y, left (0) is +y."""
+    outwards = np.array([0.0, -way if foot else way])
+    ahead = np.array([float(way), 0.0])
+    side = "right" if foot else "left"
+    across = float(outwards @ shift + habit[foot] + ACROSS * error[0])
+    along = float(ahead @ shift + habit[2] + ALONG * error[1])
+    return [
+        StepRow(plate, outwards, across, ACROSS, {f"person {side}": FOOT}),
+        StepRow(plate, ahead, along, ALONG, {"person along": STRIDE}),
+    ]

@@ -111,10 +111,21 @@ def learn_laboratory(archive: str | Path, *, tell: _Tell = lambda _: None) -> Le
     References
     ----------
     Expectation maximisation beside the shipped sizes, which count for five sessions; docs/guide/plates.md.
+
+    Examples
+    --------
+    >>> biodance.learn_laboratory("visit")
+    Traceback (most recent call last):
+        ...
+    biodance.errors.SessionRefused: visit: holds 1 session, at least 3 are needed to learn from.
     """
     folder = Path(archive)
     found, left_out = [], {}
-    for path in archive_folders(folder)[0]:
+    sessions = archive_folders(folder)[0]
+    if len(sessions) < FEWEST:
+        held = f"{len(sessions)} session{'s' * (len(sessions) != 1)}"
+        raise SessionRefused(f"{folder}: holds {held}, at least {FEWEST} are needed to learn from.")
+    for path in sessions:
         tell(f"examining {path.name}")
         try:
             found.append(learned_session(examine(read_session(path))))
@@ -138,7 +149,9 @@ def learned_session(result: SessionResult) -> LearnedSession:
     if result.body is None or not looks:
         raise SessionRefused(f"It has no trial that could be judged. {result.body_source}")
     if failed := [gate for gate in gates(session, cases_of(result.body, looks)) if not gate.ok]:
-        raise SessionRefused(f"A check failed ({failed[0].check}), so that it is no session without fault: {failed[0].text}")
+        raise SessionRefused(
+            f"A check failed ({failed[0].check}), so that it is no session without fault: {failed[0].text}"
+        )
     put, known = problem(result.body, looks), shipped()
     null = null_of(put, tuple(one for one in candidates(put) if known.knows(one.effect.name)))
     name = session.folder.resolve().name

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from biodance import display
 from biodance.diagnosis.archive.evidence import plainly_named, plate_evidence
 from biodance.diagnosis.archive.judge import ArchiveJudgement, judge
-from biodance.diagnosis.archive.quantities import PlateEvidence, LabVisit
+from biodance.diagnosis.archive.quantities import LabVisit, PlateEvidence
 from biodance.errors import BiodanceError, SessionRefused
 from biodance.lab.session.archive import archive_folders, iso_date, visit_date
 from biodance.lab.session.index import IndexedTrial, read_index, read_plate_text
@@ -47,10 +47,9 @@ class PlatesJudged:
 
     def __repr__(self) -> str:
         found = self.judgement
-        return (
-            f"PlatesJudged({self.archive.name!r}, {len(found.visits)} visits, {len(found.plates)} plates, "
-            f"{len(found.findings)} findings)"
-        )
+        counts = {"visit": found.visits, "plate": found.plates, "finding": found.findings}
+        told = ", ".join(f"{len(some)} {what}{'s' * (len(some) != 1)}" for what, some in counts.items())
+        return f"PlatesJudged({self.archive.name!r}: {told})"
 
     def _repr_html_(self) -> str:
         said = (f"{card.plate}: {one.text}" for card in self.judgement.plates for one in card.findings)
@@ -100,6 +99,14 @@ def judge_plates(archive: str | Path, *, tell: _Tell = lambda _: None) -> Plates
     References
     ----------
     A mixed model of visits, persons and plates; docs/guide/plates.md.
+
+    Examples
+    --------
+    >>> judged = biodance.judge_plates("visit")
+    >>> judged
+    PlatesJudged('visit': 1 visit, 1 plate, 0 findings)
+    >>> judged.table()["plate"].to_list()
+    ['plate1']
     """
     folder = Path(archive)
     sessions, indices = archive_folders(folder)

@@ -1,8 +1,8 @@
 """``lab.toml``: what a laboratory learned, to be read by people and by ``--lab``.
 
-``[laboratory]`` says when and from what; ``[tolerances]`` is what the diagnosis needs (`uncertainty.tolerances`), every
-size with what it rests on; ``[norms."..."]`` is what is usual of instruments, people and witnesses. Corrections that were
-accepted stand in ``[corrections]`` of the same file.
+``[laboratory]`` says when and from what; ``[tolerances]`` is what the diagnosis needs (`uncertainty.tolerances`),
+every size with what it rests on; ``[norms."..."]`` is what is usual of instruments, people and witnesses. Corrections
+that were accepted stand in ``[corrections]`` of the same file.
 """
 
 import json

@@ -113,7 +113,8 @@ def added_noise(
     body: Body, recorded: Iterable[Trial], postures: Array, about: Array, *, known: Instruments | None = None
 ) -> Array:
     """Return (B, 6, 6): how much larger the covariance of one coefficient is with the cameras and plates of the trials
-    as ``recorded`` than with the ``known`` ones, where tolerances were learned; never smaller: what is quieter may be filtered.
+    as ``recorded`` than with the ``known`` ones, where tolerances were learned; never smaller: what is quieter may be
+    filtered.
     """
     trials = tuple(recorded)
     markers = [one.markers for one in trials if one.markers is not None and one.markers.time.size > 1]

@@ -77,7 +77,7 @@ class Tolerances:
     origin: str = ""
     means: Mapping[str, float] = field(default_factory=dict)
     accuracy: Mapping[str, float] = field(default_factory=dict)
-    instruments: "Instruments" = field(default_factory=lambda: Instruments())
+    instruments: "Instruments" = field(default_factory=Instruments)
 
     def __post_init__(self) -> None:
         bands = len(self.noise)

@@ -2,21 +2,23 @@
 
 Every date between two visits at which one plate, or all together, may have stepped, and every visit or person who may
 stand out, is a column; the one whose studentised effect is largest is believed if chance reaches it less often than
-agreed, over all columns of its kind at once (the distribution of the largest is simulated for just these rows and columns:
-Andrews 1993, doi:10.2307/2951764, without its asymptotics). Then it joins the model, and the search goes on.
+agreed, over all columns of its kind at once (the distribution of the largest is simulated for just these rows and
+columns: Andrews 1993, doi:10.2307/2951764, without its asymptotics). Then it joins the model, and the search goes on.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import solve_triangular
+from scipy.stats import t as student
 
 from biodance.diagnosis.archive.quantities import QUANTITIES, LabVisit
 from biodance.diagnosis.archive.series import Fitted, Series, fit
 from biodance.records import Array
 
-ALARM = 0.05
-"""Probability that an archive without fault raises any alarm; each quantity has its share of it."""
+ALARM = 0.04
+"""Probability that an archive without fault raises any alarm, each quantity with its share of it; measured 5 % at most
+(docs/benchmarks/plates.md), as variances are known from the same few visits."""
 _MOST = 8
 """Steps and strangers looked for in one series."""
 _LEAST = 2
@@ -233,7 +235,8 @@ def _change(series: Series, columns: Array, fitted: Fitted, chosen: list[_Candid
     fall = (directions.T @ data) ** 2
     possible = [other.at for other, gain in zip(dates, fall, strict=True) if fall.max() - gain <= _DATE]
     first, last = (series.visits[v] for v in (min(possible), max(possible)))
-    half = 1.96 * error
+    free = max(1, np.unique(series.visit).size - columns.shape[1])  # visits that tell how much visits differ
+    half = float(student.ppf(0.975, free)) * error
     return Change(
         one.plate,
         series.quantity,

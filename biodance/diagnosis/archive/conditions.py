@@ -1,5 +1,5 @@
-"""What trials of one kind read otherwise than those of another kind on the same day: a pad that nobody zeroed, a shoe, a
-support.
+"""What trials of one kind read otherwise than those of another kind on the same day: a pad that nobody zeroed, a
+shoe, a support.
 
 Within a visit the person and the plate are the same, so that the difference between kinds of trial is neither; what all
 persons share of it lies on the plate, what only one has is that person's.
@@ -13,8 +13,8 @@ from types import MappingProxyType
 import numpy as np
 
 from biodance.diagnosis.archive.changes import ALARM
-from biodance.diagnosis.archive.quantities import QUANTITIES, PlateEvidence, LabVisit
 from biodance.diagnosis.archive.pooling import Pooled, pool
+from biodance.diagnosis.archive.quantities import QUANTITIES, LabVisit, PlateEvidence
 from biodance.records import Array
 
 _BORROWED = 4.0

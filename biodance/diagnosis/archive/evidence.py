@@ -1,9 +1,9 @@
-"""What the recordings of one visit say of its plates without any model of a body: the empty plate, quiet standing, the
-declared mass, and ordinary steps.
+"""What the recordings of one visit say of its plates without any model of a body: the empty plate, quiet standing,
+the declared mass, and ordinary steps.
 
 The empty plate is what a plate reads at its unloaded end, before the reader takes it off. A person who stands still is
-not accelerated: the mean horizontal force is the plates' own. What the plates weigh less what was declared is their gain
-where the empty plate was seen, else a vertical offset, for then nobody can tell the two apart.
+not accelerated: the mean horizontal force is the plates' own. What the plates weigh less what was declared is their
+gain where the empty plate was seen, else a vertical offset, for then nobody can tell the two apart.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,11 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from biodance.diagnosis.archive.quantities import PlateEvidence, LabVisit
-from biodance.diagnosis.archive.walking import of_steps
+from biodance.diagnosis.archive.quantities import LabVisit, PlateEvidence
+from biodance.diagnosis.archive.walking import StepRow, of_steps, placed, step_rows
 from biodance.lab.plates.zero import block_means, find_baseline
 from biodance.lab.weight import is_still, standing_mass
 from biodance.records import Array, Plate, Trial
+from biodance.witnesses import recording
 
 _LOADED = 20.0
 """N: mean vertical force from which on somebody stands on a plate."""
@@ -30,6 +31,7 @@ _GAIN = 0.001
 _SHORTEST = 1.5
 """s of quiet standing from which on its mean horizontal force is used."""
 AXES = "xyz"
+_TOGETHER = "all steps"
 _ROUND = 0.02
 """m to which the sides of a plate are rounded, to know it again."""
 
@@ -55,6 +57,7 @@ def plate_evidence(
         Trial -> what it was, where trials of the visit differ in it.
     """
     found: list[PlateEvidence] = []
+    rows: list[StepRow] = []
     empty = {plate_label(plate) for trial in trials for plate in trial.plates if _empty(plate) is not None}
     for trial in trials:
         kind = (conditions or {}).get(trial.name, {})
@@ -64,8 +67,10 @@ def plate_evidence(
             found += _of_standing(trial, visit, kind, mass, empty)
         elif trial.plates:
             labels = {plate.name: plate_label(plate) for plate in trial.plates}
-            found += of_steps(trial, visit, kind, mass, labels)
-    return tuple(found)
+            seen = recording(trial, mass=mass)
+            found += of_steps(seen, visit, kind, labels)
+            rows += step_rows(seen, labels)
+    return (*found, *placed(rows, visit, _TOGETHER))
 
 
 def plate_label(plate: Plate) -> str:

@@ -4,44 +4,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import f as fisher
 
-from biodance.diagnosis.archive.changes import ALARM, ALL, Change, History, Stranger, history
+from biodance.diagnosis.archive.changes import ALL, Change, History, Stranger, history
 from biodance.diagnosis.archive.conditions import ConditionEffect, condition_effects, without_conditions
-from biodance.diagnosis.archive.quantities import QUANTITIES, PlateEvidence, LabVisit, in_order
+from biodance.diagnosis.archive.findings import (
+    Level,
+    PlateFinding,
+    changed_finding,
+    condition_finding,
+    wandering_findings,
+    wrong_findings,
+)
+from biodance.diagnosis.archive.quantities import QUANTITIES, LabVisit, PlateEvidence, in_order
 from biodance.diagnosis.archive.series import series_of
-
-_HORIZONTAL = ("offset_x", "offset_y")
-"""What may wander; vertically a difference from visit to visit may be the declared mass."""
-_SURE = 3.0
-"""Standard deviations from which on a level is not what the file says."""
-
-
-@dataclass(frozen=True)
-class Level:
-    """A quantity of a plate as it is now (after its last change): ``value``, ``sd``; ``between`` its standard deviation
-    from visit to visit; ``visits`` that tell it; ``taken_off`` share of the trials in which the reader saw and
-    subtracted it.
-    """
-
-    quantity: str
-    value: float
-    sd: float
-    between: float
-    visits: int
-    taken_off: float
-
-
-@dataclass(frozen=True)
-class PlateFinding:
-    """What is wrong with a plate: ``effect`` and ``target`` as in `biodance.effects`, and what to know in words."""
-
-    effect: str
-    target: str
-    text: str
-    quantity: str
-    value: float
-    interval: tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,12 +86,14 @@ def _card(
     levels = tuple(_level(plate, one, observations) for one in own)
     changes = tuple(change for one in own for change in one.changes if change.plate in (plate, ALL))
     findings = [
-        _changed(change, _taken_off(plate, change.quantity, observations)) for change in changes if change.matters
+        changed_finding(change, _taken_off(plate, change.quantity, observations))
+        for change in changes
+        if change.matters
     ]
-    findings += [_condition(one) for one in conditions if plate in one.plate.split("+")]
+    findings += [condition_finding(one) for one in conditions if plate in one.plate.split("+")]
     for level, one in zip(levels, own, strict=True):
-        findings += _wrong(level)
-        findings += _wandering(plate, level, one)
+        findings += wrong_findings(level)
+        findings += wandering_findings(plate, level, one)
     seen = {one.visit for one in observations if plate in one.plates}
     return PlateCard(plate, len(seen), levels, changes, tuple(findings))
 
@@ -133,102 +110,3 @@ def _level(plate: str, one: History, observations: Sequence[PlateEvidence]) -> L
     between = float(np.hypot(one.fitted.between, one.fitted.alone))
     visits = int(np.unique(one.series.visit[rows]).size)
     return Level(one.series.quantity, value, sd, between, visits, _taken_off(plate, one.series.quantity, observations))
-
-
-def said(quantity: str, value: float) -> str:
-    """Return a value of a quantity as a person says it, with its sign."""
-    factor, unit, digits = {"m": (1e3, "mm", 1), "s": (1e3, "ms", 1), "1": (1e2, "%", 2), "N": (1.0, "N", 1)}[
-        QUANTITIES[quantity].unit
-    ]
-    return f"{factor * value:+.{digits}f} {unit}".replace("-", "−")
-
-
-def _changed(change: Change, taken_off: float) -> PlateFinding:
-    """Return a change as a finding."""
-    known, low, high = QUANTITIES[change.quantity], *change.interval
-    when = change.visit.date or f"visit {change.visit.name}"
-    dated = change.earliest.date and change.latest.date
-    between = (
-        f" (95 %: between {change.earliest.date or change.earliest.name} and {change.latest.date or change.latest.name})"
-        if change.earliest != change.latest or not dated
-        else ""
-    )
-    mended = " The reader sees it on the empty plate and takes it off." if taken_off > 0.9 else ""
-    text = (
-        f"{_WORDS[change.quantity]} changed from {said(change.quantity, change.before)} to "
-        f"{said(change.quantity, change.after)} on {when}{between}; step {said(change.quantity, change.after - change.before)}, "
-        f"95 % interval {said(change.quantity, low)} to {said(change.quantity, high)}.{mended}"
-    )
-    return PlateFinding(
-        known.effect, known.target, text, change.quantity, change.after - change.before, change.interval
-    )
-
-
-_WORDS = {
-    "place_x": "The place along x of the laboratory",
-    "place_y": "The place along y of the laboratory",
-    "gain": "What it weighs",
-    "offset_x": "What it reads along x without load",
-    "offset_y": "What it reads along y without load",
-    "offset_z": "What it reads vertically without load",
-    "delay": "The delay of the forces",
-}
-
-
-def _condition(one: ConditionEffect) -> PlateFinding:
-    """Return what a kind of trial reads as a finding."""
-    known, shared = QUANTITIES[one.quantity], one.shared
-    kilograms = f" ({shared.mean / 9.80665:+.2f} kg)".replace("-", "−") if one.quantity == "offset_z" else ""
-    what = (
-        " Something of that weight lies on the plate in these trials and was not zeroed (a pad, a mat): zero the plate "
-        "with it on, or take its weight off."
-        if one.quantity == "offset_z" and shared.mean > 0
-        else ""
-    )
-    text = (
-        f"Trials with {one.factor} {one.level} read {said(one.quantity, shared.mean)}{kilograms} more than those with "
-        f"{one.factor} {one.base} of the same visits, in {len(one.persons)} of {len(one.visits)} persons "
-        f"(95 % interval {said(one.quantity, shared.interval[0])} to {said(one.quantity, shared.interval[1])}; "
-        f"standard deviation between persons {said(one.quantity, shared.spread)[1:]}).{what}"
-    )
-    return PlateFinding(known.effect, known.target, text, one.quantity, shared.mean, shared.interval)
-
-
-def _wrong(level: Level) -> list[PlateFinding]:
-    """Return a level that is not what the file says: certain, and large enough to matter."""
-    known = QUANTITIES[level.quantity]
-    half = 1.96 * level.sd
-    certain = abs(level.value) > _SURE * level.sd and abs(level.value) - half > known.matters
-    if not certain or level.visits < 2 or level.taken_off > 0.5:
-        return []
-    interval = (level.value - half, level.value + half)
-    text = (
-        f"{_WORDS[level.quantity]} is off by {said(level.quantity, level.value)} over {level.visits} visits (95 % interval "
-        f"{said(level.quantity, interval[0])} to {said(level.quantity, interval[1])})."
-    )
-    return [PlateFinding(known.effect, known.target, text, level.quantity, level.value, interval)]
-
-
-def _wandering(plate: str, level: Level, one: History) -> list[PlateFinding]:
-    """Return an offset that differs from day to day more than within a day, and is not taken off."""
-    known, series = QUANTITIES[level.quantity], one.series
-    rows = series.design[:, series.plates.index(plate)] != 0
-    if (
-        level.quantity not in _HORIZONTAL
-        or level.taken_off > 0.5
-        or level.visits < 3
-        or level.between < known.matters / 2
-    ):
-        return []
-    left = (series.value - one.columns @ one.fitted.beta)[rows]
-    free = left.size - np.linalg.matrix_rank(one.columns[rows])
-    ratio = float(np.sum((left / series.sd[rows]) ** 2)) / max(1, free)
-    if free < 1 or fisher.sf(ratio, free, 60) > ALARM * known.share:
-        return []
-    low, high = series.value[rows].min(), series.value[rows].max()
-    text = (
-        f"{_WORDS[level.quantity]} wanders from day to day: {said(level.quantity, low)} to {said(level.quantity, high)}, "
-        f"standard deviation between visits {said(level.quantity, level.between)[1:]}. Zero the plate before every "
-        f"session and record it empty."
-    )
-    return [PlateFinding(known.effect, known.target, text, level.quantity, level.between, (float(low), float(high)))]

@@ -44,8 +44,8 @@ def sway(cop: Array) -> float:
 
 
 def instruments_of(trials: Sequence[Trial], distance: float) -> Instruments:
-    """Return how quiet the recordings of a session are; ``distance`` m of a typical marker to the moving body, NaN where
-    nothing moved.
+    """Return how quiet the recordings of a session are; ``distance`` m of a typical marker to the moving body, NaN
+    where nothing moved.
     """
     markers = [one.markers for one in trials if one.markers is not None and one.markers.time.size > 1]
     density = plate_noise(plate for one in trials for plate in one.plates)
@@ -56,9 +56,7 @@ def usual_instruments(found: Sequence[Instruments]) -> Instruments:
     """Return the middle of several sessions; what none shows is that which comes with biodance."""
     usual = Instruments()
     cameras = [one.camera for one in found if one.camera > 0]
-    plates = [
-        [one.plate[i] for one in found if one.plate[i] > 0] or [usual.plate[i]] for i in range(len(usual.plate))
-    ]
+    plates = [[one.plate[i] for one in found if one.plate[i] > 0] or [usual.plate[i]] for i in range(len(usual.plate))]
     distances = [one.marker_distance for one in found if np.isfinite(one.marker_distance)]
     return Instruments(
         float(np.median(cameras or [usual.camera])),

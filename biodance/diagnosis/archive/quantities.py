@@ -39,7 +39,7 @@ class Quantity:
     norm: float = 0.0
 
     def __post_init__(self) -> None:
-        if not 0 < self.typical:
+        if self.typical <= 0:
             raise ValueError(f"Quantity {self.name}: typical = {self.typical} must be positive.")
 
 
@@ -47,8 +47,8 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
     {
         one.name: one
         for one in (
-            Quantity("place_x", "m", "plate_position", "x", 0.003, 0.003, 0.3, 0.004),
-            Quantity("place_y", "m", "plate_position", "y", 0.003, 0.003, 0.3, 0.004),
+            Quantity("place_x", "m", "plate_position", "x", 0.002, 0.003, 0.3, 0.004),
+            Quantity("place_y", "m", "plate_position", "y", 0.002, 0.003, 0.3, 0.004),
             Quantity("gain", "1", "plate_gain", "Fz", 0.003, 0.01, 0.1),
             Quantity("offset_x", "N", "plate_offset", "Fx", 0.5, 2.0, 0.05),
             Quantity("offset_y", "N", "plate_offset", "Fy", 0.5, 2.0, 0.05),
@@ -57,8 +57,8 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
         )
     }
 )
-"""By name; typical sizes from docs/benchmarks/plates.md (seven real visits of one laboratory) and the re-zeroing rules of
-laboratory guides (+-5 N).
+"""By name; typical sizes from docs/benchmarks/plates.md (seven real visits of one laboratory) and the re-zeroing rules
+of laboratory guides (+-5 N).
 """
 
 
@@ -108,13 +108,13 @@ class PlateEvidence:
 
     def __post_init__(self) -> None:
         if self.quantity not in QUANTITIES:
-            raise UnknownName.of("quantity of a plate", self.quantity, QUANTITIES)
+            raise UnknownName.of("quantity of a plate", self.quantity, list(QUANTITIES))
         if not self.sd > 0:
             raise ValueError(f"PlateEvidence {self.quantity} of {self.trial}: sd = {self.sd} must be positive.")
 
 
 def in_order(observations: Iterable[PlateEvidence]) -> tuple[LabVisit, ...]:
     """Return the visits, each once, by date where all have one, else by name."""
-    visits = set(one.visit for one in observations)
+    visits = {one.visit for one in observations}
     dated = all(visit.date for visit in visits)
     return tuple(sorted(visits, key=lambda visit: (visit.date if dated else "", visit.name)))

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.optimize import minimize
 
-from biodance.diagnosis.archive.quantities import QUANTITIES, PlateEvidence, LabVisit
+from biodance.diagnosis.archive.quantities import QUANTITIES, LabVisit, PlateEvidence
 from biodance.records import Array
 
-_DOUBT = 0.8
+_DOUBT = 1.0
 """Standard deviation of the logarithm of a typical size."""
 _ONE_PLATE = 0.5
 """Share of the typical size that one plate has for itself."""
@@ -43,12 +43,6 @@ class Series:
     design: Array
     visit: NDArray[np.intp]
     person: NDArray[np.intp]
-
-    def without(self, rows: NDArray[np.bool_]) -> "Series":
-        """Return the series without some ``rows`` (n,)."""
-        keep = ~rows
-        kept = (one[keep] for one in (self.value, self.sd, self.design, self.visit, self.person))
-        return Series(self.quantity, self.plates, self.visits, *kept)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,11 +126,11 @@ def fit(series: Series, columns: Array) -> Fitted:
     start = np.log(typical)
 
     def cost(log_sd: Array) -> float:
-        lower = np.linalg.cholesky(_covariance(series, shared, log_sd))
+        lower = np.asarray(np.linalg.cholesky(_covariance(series, shared, log_sd)))
         return _restricted(lower, series.value, columns) + float(np.sum(((log_sd - start) / _DOUBT) ** 2) / 2)
 
     best = minimize(cost, start, method="L-BFGS-B", bounds=[(low - 4, low + 8) for low in start]).x
-    lower = np.linalg.cholesky(_covariance(series, shared, best))
+    lower = np.asarray(np.linalg.cholesky(_covariance(series, shared, best)))
     white = solve_triangular(lower, np.column_stack([columns, series.value]), lower=True)
     factor = cho_factor(white[:, :-1].T @ white[:, :-1] + 1e-12 * np.eye(columns.shape[1]))
     beta = cho_solve(factor, white[:, :-1].T @ white[:, -1])

@@ -1,4 +1,4 @@
-"""What lies in the archive of a laboratory: session folders, and tables that tell whose the recordings beside them are."""
+"""What lies in the archive of a laboratory: session folders, and tables that tell whose recordings lie beside them."""
 
 import re
 from datetime import date, datetime

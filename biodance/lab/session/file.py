@@ -92,7 +92,8 @@ class _Contents(_Entry):
 @dataclass(frozen=True)
 class SessionFile:
     """What all files of the chain say together: ``subject``, ``trials`` by name or pattern (the innermost file first),
-    ``read`` paths, ``visit`` when and where; ``settings`` with what ``[settings]`` changes; ``marker_set`` the name or file of the set that was
+    ``read`` paths, ``visit`` when and where; ``settings`` with what ``[settings]`` changes; ``marker_set`` the name or
+    file of the set that was
     worn, "" where none is said (see `marker_sets.read_marker_set`).
     """
 

@@ -4,7 +4,8 @@ from typing import Any
 
 from biodance.diagnosis.archive.changes import Change, Stranger
 from biodance.diagnosis.archive.conditions import ConditionEffect
-from biodance.diagnosis.archive.judge import Level, PlateCard, PlateFinding, said
+from biodance.diagnosis.archive.findings import Level, PlateFinding, said
+from biodance.diagnosis.archive.judge import PlateCard
 from biodance.diagnosis.archive.quantities import QUANTITIES
 from biodance.pipeline.plates import PlatesJudged
 

@@ -4,7 +4,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from biodance.diagnosis.archive.judge import said
+from biodance.diagnosis.archive.findings import said
 from biodance.pipeline.plates import PlatesJudged
 from biodance.pipeline.provenance import now
 from biodance.report.documents.plates import plates_document
@@ -48,7 +48,9 @@ def _dates(found: PlatesJudged) -> str:
 
 
 def write_plates(found: PlatesJudged, folder: Path) -> dict[str, Any]:
-    """Write ``report.html``, ``results.json`` and ``plates.csv`` into ``folder`` (which exists) and return the numbers."""
+    """Write ``report.html``, ``results.json`` and ``plates.csv`` into ``folder`` (which exists) and return the
+    numbers.
+    """
     document = plates_document(found)
     texts = {
         "results.json": to_text(document),
