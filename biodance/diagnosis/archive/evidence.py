@@ -58,7 +58,7 @@ def plate_evidence(
     """
     found: list[PlateEvidence] = []
     rows: list[StepRow] = []
-    empty = {plate_label(plate) for trial in trials for plate in trial.plates if _empty(plate) is not None}
+    empty = _of_visit(trials)
     for trial in trials:
         kind = (conditions or {}).get(trial.name, {})
         for plate in trial.plates:
@@ -92,6 +92,16 @@ def plainly_named(observations: Sequence[PlateEvidence]) -> tuple[PlateEvidence,
     return tuple(
         replace(one, plates={short[label]: part for label, part in one.plates.items()}) for one in observations
     )
+
+
+def _of_visit(trials: Sequence[Trial]) -> dict[str, float]:
+    """Return what each plate reads vertically without load in a visit, N: the middle of the trials that saw it empty."""
+    seen: dict[str, list[float]] = {}
+    for trial in trials:
+        for plate in trial.plates:
+            if (reads := _empty(plate)) is not None:
+                seen.setdefault(plate_label(plate), []).append(float(reads[2]))
+    return {name: float(np.median(values)) for name, values in seen.items()}
 
 
 def _empty(plate: Plate) -> Array | None:
@@ -129,7 +139,7 @@ def _of_empty(plate: Plate, trial: Trial, visit: LabVisit, kind: Mapping[str, st
 
 
 def _of_standing(
-    trial: Trial, visit: LabVisit, kind: Mapping[str, str], mass: float, empty: set[str]
+    trial: Trial, visit: LabVisit, kind: Mapping[str, str], mass: float, empty: Mapping[str, float]
 ) -> list[PlateEvidence]:
     """Return what quiet standing says: horizontal offsets of plates that were never seen empty, and the weight."""
     on = [plate for plate in trial.plates if plate.wrench.force[:, 2].mean() > _LOADED]
@@ -149,7 +159,9 @@ def _of_standing(
             for axis, value in zip(AXES[:2], mean[:2], strict=True)
         ]
     if np.isfinite(mass):
-        found.append(_weighed(trial, visit, kind, mass, weighed, on, unknown))
+        kept = sum(empty.get(plate_label(plate), 0.0) - plate.zero[2] for plate in on)  # still in what it weighs
+        net = weighed - kept / trial.settings.gravity if not unknown else weighed
+        found.append(_weighed(trial, visit, kind, mass, net, on, unknown))
     return found
 
 

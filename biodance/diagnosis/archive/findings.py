@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as fisher
 
-from biodance.diagnosis.archive.changes import ALARM, Change, History
+from biodance.diagnosis.archive.changes import ALARM, ALL, Change, History
 from biodance.diagnosis.archive.conditions import ConditionEffect
 from biodance.diagnosis.archive.quantities import QUANTITIES
 
@@ -47,7 +47,8 @@ def said(quantity: str, value: float) -> str:
     factor, unit, digits = {"m": (1e3, "mm", 1), "s": (1e3, "ms", 1), "1": (1e2, "%", 2), "N": (1.0, "N", 1)}[
         QUANTITIES[quantity].unit
     ]
-    return f"{factor * value:+.{digits}f} {unit}".replace("-", "−")
+    shown = round(factor * value, digits) + 0.0  # no minus before zero
+    return f"{shown:+.{digits}f} {unit}".replace("-", "−")
 
 
 def changed_finding(change: Change, taken_off: float) -> PlateFinding:
@@ -58,7 +59,7 @@ def changed_finding(change: Change, taken_off: float) -> PlateFinding:
     between = f" (95 %: between {first} and {last})" if first != last else ""
     mended = " The reader sees it on the empty plate and takes it off." if taken_off > 0.9 else ""
     text = (
-        f"{_WORDS[change.quantity]} changed from {said(change.quantity, change.before)} to "
+        f"{_WORDS[change.quantity]}{' of all plates together' if change.plate == ALL else ''} changed from {said(change.quantity, change.before)} to "
         f"{said(change.quantity, change.after)} on {when}{between}; "
         f"step {said(change.quantity, change.after - change.before)}, "
         f"95 % interval {said(change.quantity, low)} to {said(change.quantity, high)}.{mended}"

@@ -88,14 +88,25 @@ def _card(
     findings = [
         changed_finding(change, _taken_off(plate, change.quantity, observations))
         for change in changes
-        if change.matters
+        if change.matters and not _follows(change, changes)
     ]
     findings += [condition_finding(one) for one in conditions if plate in one.plate.split("+")]
     for level, one in zip(levels, own, strict=True):
-        findings += wrong_findings(level)
+        if not any(change.matters and change.quantity == level.quantity for change in changes):
+            findings += wrong_findings(level)
         findings += wandering_findings(plate, level, one)
     seen = {one.visit for one in observations if plate in one.plates}
     return PlateCard(plate, len(seen), levels, changes, tuple(findings))
+
+
+def _follows(change: Change, others: tuple[Change, ...]) -> bool:
+    """Return whether a change of place follows from one of the delay at the same date: a late pressure lags behind the
+    foot that rolls on.
+    """
+    if not change.quantity.startswith("place"):
+        return False
+    late = [one for one in others if one.quantity == "delay" and one.matters]
+    return any(change.earliest.when <= one.latest.when and one.earliest.when <= change.latest.when for one in late)
 
 
 def _taken_off(plate: str, quantity: str, observations: Sequence[PlateEvidence]) -> float:

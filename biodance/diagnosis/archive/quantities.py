@@ -70,6 +70,11 @@ class LabVisit:
     person: str
     date: str = ""
 
+    @property
+    def when(self) -> tuple[str, str]:
+        """What visits are ordered by."""
+        return self.date, self.name
+
 
 @dataclass(frozen=True)
 class PlateEvidence:
