@@ -13,7 +13,7 @@ from biodance.errors import BiodanceError
 from biodance.lab.session.archive import archive_folders
 from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import SessionDiagnosis, diagnose_session
-from biodance.pipeline.learn import LearnedSession, learned, learned_session
+from biodance.pipeline.learn import LearnedSession, learned_session, learned_together
 from biodance.pipeline.session import examine
 from biodance.uncertainty.tolerances import Tolerances
 
@@ -50,7 +50,7 @@ def main() -> None:
     print("|---|---|---|---|---|---|---|")
     for name, result in results.items():
         rest = [one for other, one in taught.items() if other != name]
-        own: Tolerances = learned(archive, rest, {}).tolerances
+        own: Tolerances = learned_together(archive, rest, {}).tolerances
         before, after = diagnose_session(result), diagnose_session(result, tolerances=own)
         old, new = limits(before), limits(after)
         both = [new[key] / old[key] for key in old if key in new]

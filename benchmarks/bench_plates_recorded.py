@@ -45,7 +45,8 @@ def row(kind: str, sessions: list[Path], text: str, *, first: int, pattern: str)
     """Return one line of the table."""
     with tempfile.TemporaryDirectory() as place:
         found = judge_plates(copied(sessions, Path(place), text, first=first, pattern=pattern)).judgement
-    told = "; ".join(f"{card.plate} {one.effect} {one.target}: {one.text}" for card in found.plates for one in card.findings)
+    every = [(card.plate, one) for card in found.plates for one in card.findings]
+    told = "<br>".join(f"{plate} {one.effect} {one.target}: {one.text}" for plate, one in every)
     written = f"{text} from {sessions[first].name} on" if text else "nothing"
     return f"| {kind}, {len(found.visits)} visits | {written} | {told or 'nothing wrong'} |"
 

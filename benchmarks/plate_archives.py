@@ -12,7 +12,7 @@ from datetime import date, timedelta
 
 import numpy as np
 
-from biodance.diagnosis.archive.quantities import LabVisit, PlateEvidence
+from biodance.diagnosis.archive.quantities import PlateEvidence, PlateVisit
 from biodance.diagnosis.archive.walking import StepRow, placed
 
 PLATES = ("plate1", "plate2")
@@ -49,13 +49,13 @@ def draw(seed: int, *, visits: int = 16, step: Step | None = None) -> tuple[Plat
         people += not known
         if person not in habits:
             habits[person] = np.array([*chance.normal(0, FOOT, 2), chance.normal(0, STRIDE)])
-        visit = LabVisit(f"V{v:02d}", f"P{person}", day.isoformat())
+        visit = PlateVisit(f"V{v:02d}", f"P{person}", day.isoformat())
         found += _visit(chance, visit, v, habits[person], step or Step())
     return tuple(found)
 
 
 def _visit(
-    chance: np.random.Generator, visit: LabVisit, v: int, habit: np.ndarray, step: Step
+    chance: np.random.Generator, visit: PlateVisit, v: int, habit: np.ndarray, step: Step
 ) -> Iterator[PlateEvidence]:
     declared = chance.normal(0, DECLARED)
     zero = chance.normal(0, ZEROED, (len(PLATES), 3))

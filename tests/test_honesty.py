@@ -38,7 +38,7 @@ from biodance.uncertainty.session_noise import (
     white_noise,
     with_own_noise,
 )
-from biodance.uncertainty.tolerances import Instruments, shipped, table_sizes, without_habits
+from biodance.uncertainty.tolerances import InstrumentNoise, shipped, table_sizes, without_habits
 
 FAST = ("plate_gain", "plate_offset", "plate_drift", "time_delay", "body_mass", "added_mass")
 FOUND = Finding("plate_gain", "Fz", (Estimate("gain", 0.06, 0.002, "1"),), (Alias("plate_gain", "Fz", 80.0),), 0.9)
@@ -327,7 +327,7 @@ def test_own_noise_is_added_beyond_what_was_learned_and_limits_follow() -> None:
         return (replace(trial, markers=Markers(tuple("abcd"), time, xyz), plates=()),)
 
     q = motion(1).q[:1]
-    assert not added_noise(body(), recorded(0.9 * Instruments().camera), q, np.zeros(3)).any()
+    assert not added_noise(body(), recorded(0.9 * InstrumentNoise().camera), q, np.zeros(3)).any()
     more = added_noise(body(), recorded(3e-4), q, np.zeros(3))
     expected = of_cameras(body(), q, np.zeros(3), noise=np.sqrt(9 - 1) * 1e-4, rate=100.0)
     np.testing.assert_allclose(more, expected, rtol=0.1)

@@ -1,4 +1,4 @@
-"""A laboratory learns its own tolerances: what its sessions show counts beside what was shipped, and lab.toml keeps it."""
+"""A laboratory learns its own tolerances: what its sessions show counts beside what was shipped; lab.toml keeps it."""
 
 import os
 import tomllib
@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from biodance.cli import run
-from biodance.diagnosis.archive.norms import Seen, norms, usual_instruments
+from biodance.diagnosis.archive.norms import Seen, norms, usual_noise
 from biodance.diagnosis.learning import Null, learn_tolerances, shown_by
 from biodance.errors import SessionRefused
 from biodance.lab.session.read import read_session
 from biodance.pipeline.carry import read_lab
-from biodance.pipeline.learn import LearnedLaboratory, LearnedSession, learned, learned_session
+from biodance.pipeline.learn import LearnedLaboratory, LearnedSession, learned_session, learned_together
 from biodance.pipeline.session import examine
 from biodance.report.lab_file import lab_file_text, write_lab_file
-from biodance.uncertainty.tolerances import Instruments, shipped
+from biodance.uncertainty.tolerances import InstrumentNoise, shipped
 
 BAND = np.repeat(np.arange(len(shipped().noise)), 12)
 LOUD, NEVER = "plate_offset Fx", "clock_drift"
@@ -34,11 +34,10 @@ def null(seed: int) -> Null:
 
 @pytest.fixture(scope="module")
 def laboratory(tmp_path_factory) -> LearnedLaboratory:
-    quiet = Instruments(5e-5, (0.01,) * 6, 0.008)
-    sessions = [
-        LearnedSession(f"S{i}", null(i), quiet, (Seen("camera_noise", f"S{i}", 5e-5 + 1e-6 * i, "m"),)) for i in range(20)
-    ]
-    return learned(tmp_path_factory.mktemp("lab") / "archive", sessions, {"S99": "a check failed"})
+    quiet = InstrumentNoise(5e-5, (0.01,) * 6, 0.008)
+    cameras = [Seen("camera_noise", f"S{i}", 5e-5 + 1e-6 * i, "m") for i in range(20)]
+    sessions = [LearnedSession(one.session, null(i), quiet, (one,)) for i, one in enumerate(cameras)]
+    return learned_together(tmp_path_factory.mktemp("lab") / "archive", sessions, {"S99": "a check failed"})
 
 
 def test_sizes_are_the_mean_square_of_sessions_and_what_was_known_before(laboratory):
@@ -87,9 +86,11 @@ def test_corrections_stand_in_the_same_file(laboratory, tmp_path):
 
 
 def test_too_few_sessions_teach_nothing(laboratory, tmp_path, capsys):
-    with pytest.raises(SessionRefused, match="2 of 3 sessions can be learned from, at least 3 are needed. S99: broken"):
-        one = LearnedSession("S", null(0), Instruments(), ())
-        learned(tmp_path, [one, one], {"S99": "broken"})
+    one = LearnedSession("S", null(0), InstrumentNoise(), ())
+    with pytest.raises(
+        SessionRefused, match=r"2 of 3 sessions can be learned from, at least 3 are needed. S99: broken"
+    ):
+        learned_together(tmp_path, [one, one], {"S99": "broken"})
     (tmp_path / "there.toml").write_text("mine")
     assert run(["learn", str(tmp_path), "--out", str(tmp_path / "there.toml")]) == 2
     assert "never overwritten" in capsys.readouterr().err
@@ -100,7 +101,7 @@ def test_norms_are_medians_of_sessions_pooled():
     (found,) = norms([*rows, Seen("alone", "a", 1.0, "m")])
     assert (found.name, found.sessions, found.observations) == ("sway", 2, 4)
     assert found.value == pytest.approx(3.0)
-    assert usual_instruments([Instruments(0.0, (0.0,) * 6), Instruments(2e-4, (0.5,) * 6)]).camera == 2e-4
+    assert usual_noise([InstrumentNoise(0.0, (0.0,) * 6), InstrumentNoise(2e-4, (0.5,) * 6)]).camera == 2e-4
 
 
 def test_a_real_session_teaches_its_own_quiet():

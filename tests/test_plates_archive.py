@@ -1,4 +1,4 @@
-"""Plates over an archive: what changed is found at its date, what did not is left alone, a pad that lay there is named."""
+"""Plates over an archive: what changed is found at its date, what did not is left alone, a forgotten pad is named."""
 
 import csv
 import json
@@ -16,7 +16,7 @@ from plate_archives import Step, draw
 from biodance.cli import run
 from biodance.diagnosis.archive.judge import judge
 from biodance.diagnosis.archive.pooling import pool
-from biodance.diagnosis.archive.quantities import LabVisit, PlateEvidence
+from biodance.diagnosis.archive.quantities import PlateEvidence, PlateVisit
 from biodance.diagnosis.archive.walking import StepRow, places
 from biodance.errors import FileRefused, SessionRefused
 from biodance.lab.session.archive import archive_folders, iso_date, visit_date
@@ -24,6 +24,11 @@ from biodance.lab.session.index import read_index, read_plate_text
 from biodance.pipeline.plates import judge_plates
 
 WEIGHT = 600.0
+
+
+def altered(every, by):
+    """Return evidence with ``by(one)`` added to each value."""
+    return [replace(one, value=one.value + by(one)) for one in every]
 
 
 def changes(found):
@@ -43,8 +48,8 @@ def test_a_step_is_found_soon_with_its_date_and_size(step, visits):
 
 
 def test_a_step_of_all_plates_is_that_of_the_laboratory():
-    here = [replace(one, value=one.value + 0.02 * (one.visit.name >= "V08")) if one.quantity == "place_x" else one for one in draw(2)]
-    assert ("all plates", "place_x") in changes(judge(here))
+    moved = altered(draw(2), lambda one: 0.02 * (one.quantity == "place_x" and one.visit.name >= "V08"))
+    assert ("all plates", "place_x") in changes(judge(moved))
 
 
 def test_an_archive_without_fault_raises_no_alarm():
@@ -52,7 +57,7 @@ def test_an_archive_without_fault_raises_no_alarm():
 
 
 def test_one_strange_visit_is_no_change_of_the_plate():
-    odd = [replace(one, value=one.value + 12.0) if one.visit.name == "V09" and one.quantity == "offset_z" else one for one in draw(4)]
+    odd = altered(draw(4), lambda one: 12.0 * (one.quantity == "offset_z" and one.visit.name == "V09"))
     found = judge(odd)
     assert not changes(found)
     assert {one.visit for one in found.strangers if one.quantity == "offset_z"} == {"V09"}
@@ -69,9 +74,8 @@ def test_pooled_mean_of_values_computed_by_hand():
 
 def test_steps_of_both_feet_tell_the_plate_from_the_foot():
     """Feet that press 4 mm outwards on a plate 6 mm to the left: right steps read 2 mm to the right of it."""
-    rows = [
-        StepRow("plate1", np.array([0.0, y]), 0.004 + 0.006 * y, 0.003, {"person feet": 0.004}) for y in (1.0, -1.0) * 20
-    ]
+    part = {"person feet": 0.004}
+    rows = [StepRow("plate1", np.array([0.0, y]), 0.004 + 0.006 * y, 0.003, part) for y in (1.0, -1.0) * 20]
     place, sd = places(rows)["plate1"]
     assert place[1] == pytest.approx(0.006, abs=2e-4)
     assert sd[1] < 0.001
@@ -100,7 +104,8 @@ def balance(tmp_path_factory):
             pad = 8.0 + 0.3 * person if foam else 0.0
             recording(folder / f"{name}.txt", (along, 0.2 * trial, WEIGHT + 20 * person + pad))
             mass = (WEIGHT + 20 * person) / 9.80665 + 0.05 * (-1) ** person
-            rows.append([name, f"S{person}", "foam" if foam else "firm", "30", f"{mass:.4f}", f"2024-03-{5 + person:02d}"])
+            kind, day = "foam" if foam else "firm", f"2024-03-{5 + person:02d}"
+            rows.append([name, f"S{person}", kind, "30", f"{mass:.4f}", day])
     rows.append(["missing", "S9", "firm", "30", "60", "2024-03-09"])
     with open(folder / "trials.csv", "w", newline="") as stream:
         csv.writer(stream).writerows(rows)
@@ -171,7 +176,7 @@ def test_dates_are_read_and_never_guessed(tmp_path):
 
 
 def test_evidence_without_a_quantity_or_an_error_is_refused():
-    visit = LabVisit("V", "P")
+    visit = PlateVisit("V", "P")
     with pytest.raises(ValueError, match="must be positive"):
         PlateEvidence("gain", {"plate1": 1.0}, 0.0, 0.0, visit, "t")
     with pytest.raises(ValueError, match="not a quantity of a plate"):

@@ -8,11 +8,11 @@ from biodance import display
 from biodance.diagnosis.archive.norms import (
     Norm,
     Seen,
-    instruments_of,
+    noise_of_instruments,
     norms,
     seen_by_witnesses,
     sway,
-    usual_instruments,
+    usual_noise,
 )
 from biodance.diagnosis.candidates import candidates
 from biodance.diagnosis.learning import Null, learn_tolerances, null_of, shown_by
@@ -27,9 +27,9 @@ from biodance.pipeline.plates import told_failure
 from biodance.pipeline.provenance import now
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine
-from biodance.uncertainty.tolerances import Instruments, Tolerances, shipped, without_habits
+from biodance.uncertainty.tolerances import InstrumentNoise, Tolerances, shipped, without_habits
 
-WORTH = 5.0
+_WORTH = 5.0
 """Sessions that the shipped tolerances count for (docs/decisions/2026-11-22-a-laboratory-learns.md)."""
 FEWEST = 3
 """Sessions without which nothing is learned."""
@@ -43,7 +43,7 @@ class LearnedSession:
 
     name: str
     null: Null
-    instruments: Instruments
+    instruments: InstrumentNoise
     seen: tuple[Seen, ...]
 
 
@@ -132,7 +132,7 @@ def learn_laboratory(archive: str | Path, *, tell: _Tell = lambda _: None) -> Le
         except Exception as why:
             left_out[path.relative_to(folder).as_posix()] = told_failure(why)
     tell("learning")
-    return learned(folder, found, left_out)
+    return learned_together(folder, found, left_out)
 
 
 def learned_session(result: SessionResult) -> LearnedSession:
@@ -156,7 +156,7 @@ def learned_session(result: SessionResult) -> LearnedSession:
     null = null_of(put, tuple(one for one in candidates(put) if known.knows(one.effect.name)))
     name = session.folder.resolve().name
     mass = float("nan") if "mass" in session.subject.guessed else session.subject.mass
-    own = instruments_of(session.trials, soft_tissue(looks))
+    own = noise_of_instruments(session.trials, soft_tissue(looks))
     seen = [Seen("camera_noise", name, own.camera, "m"), Seen("plate_noise_fz", name, own.plate[2], "N/rtHz")]
     if result.standing is not None:
         seen += _standing(result, name)
@@ -178,7 +178,7 @@ def _standing(result: SessionResult, name: str) -> list[Seen]:
     return found
 
 
-def learned(archive: Path, sessions: list[LearnedSession], left_out: Mapping[str, str]) -> LearnedLaboratory:
+def learned_together(archive: Path, sessions: list[LearnedSession], left_out: Mapping[str, str]) -> LearnedLaboratory:
     """Return what the sessions teach together; SessionRefused with fewer than three."""
     if len(sessions) < FEWEST:
         why = " ".join(f"{name}: {reason}" for name, reason in list(left_out.items())[:FEWEST])
@@ -187,12 +187,12 @@ def learned(archive: Path, sessions: list[LearnedSession], left_out: Mapping[str
             f"{FEWEST} are needed. {why}"
         )
     nulls, created = [one.null for one in sessions], now()
-    found = without_habits(learn_tolerances(nulls, shipped(), rounds=ROUNDS, worth=WORTH))
+    found = without_habits(learn_tolerances(nulls, shipped(), rounds=ROUNDS, worth=_WORTH))
     origin = (
         f"{len(sessions)} sessions of {archive.resolve().name}, {created[:10]}, beside the shipped sizes as "
-        f"{WORTH:g} sessions more"
+        f"{_WORTH:g} sessions more"
     )
-    tolerances = replace(found, origin=origin, instruments=usual_instruments([one.instruments for one in sessions]))
+    tolerances = replace(found, origin=origin, instruments=usual_noise([one.instruments for one in sessions]))
     return LearnedLaboratory(
         archive,
         created,

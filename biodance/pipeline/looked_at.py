@@ -117,7 +117,8 @@ def own_tolerances(
 ) -> Own:
     """Return the ``known`` tolerances (a laboratory's own; by default the shipped ones) as they hold for these
     recordings: with markers that move more on the body than where they were learned, with the noise of their own
-    cameras and plates as ``recorded`` shows it, and with the unrest of a person who stands still where standing is looked at.
+    cameras and plates as ``recorded`` shows it, and with the unrest of a person who stands still where standing is
+    looked at.
     """
     found, notes = known or shipped(), []
     usable_looks = [look for look in chosen if look.motion.q.size]

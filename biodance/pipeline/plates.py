@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from biodance import display
 from biodance.diagnosis.archive.evidence import plainly_named, plate_evidence
 from biodance.diagnosis.archive.judge import ArchiveJudgement, judge
-from biodance.diagnosis.archive.quantities import LabVisit, PlateEvidence
+from biodance.diagnosis.archive.quantities import PlateEvidence, PlateVisit
 from biodance.errors import BiodanceError, SessionRefused
 from biodance.lab.session.archive import archive_folders, iso_date, visit_date
 from biodance.lab.session.index import IndexedTrial, read_index, read_plate_text
@@ -148,7 +148,7 @@ def _of_session(path: Path, archive: Path, refused: dict[str, str]) -> list[Plat
     name = path.relative_to(archive).as_posix() if path != archive else path.resolve().name
     try:
         session = read_session(path)
-        visit = LabVisit(name, session.subject.name, visit_date(path))
+        visit = PlateVisit(name, session.subject.name, visit_date(path))
         mass = float("nan") if "mass" in session.subject.guessed else session.subject.mass
         found = list(plate_evidence(session.trials, visit, mass=mass))
     except Exception as why:
@@ -171,7 +171,7 @@ def _of_index(path: Path, refused: dict[str, str]) -> list[PlateEvidence]:
     for name in dict.fromkeys(row.visit for row in rows):
         own = [row for row in rows if row.visit == name]
         trials, conditions = _plate_trials(own, refused)
-        visit = LabVisit(name, own[0].person, iso_date(own[0].date))
+        visit = PlateVisit(name, own[0].person, iso_date(own[0].date))
         found += plate_evidence(trials, visit, mass=own[0].mass, conditions=conditions)
     return found
 

@@ -18,7 +18,7 @@ from biodance.records import Array, Markers, Motion, Plate, Trial
 from biodance.spatial import quaternion_matrix
 from biodance.uncertainty.bands import BANDS, Bands
 from biodance.uncertainty.noise import Noise
-from biodance.uncertainty.tolerances import REFERENCE_PERSON, Instruments, Tolerances
+from biodance.uncertainty.tolerances import REFERENCE_PERSON, InstrumentNoise, Tolerances
 
 _ORDER = 4
 _GAIN = np.sqrt(70.0)
@@ -110,7 +110,7 @@ def of_plates(density: Array, count: int, bands: Bands = BANDS) -> Array:
 
 
 def added_noise(
-    body: Body, recorded: Iterable[Trial], postures: Array, about: Array, *, known: Instruments | None = None
+    body: Body, recorded: Iterable[Trial], postures: Array, about: Array, *, known: InstrumentNoise | None = None
 ) -> Array:
     """Return (B, 6, 6): how much larger the covariance of one coefficient is with the cameras and plates of the trials
     as ``recorded`` than with the ``known`` ones, where tolerances were learned; never smaller: what is quieter may be
@@ -119,7 +119,7 @@ def added_noise(
     trials = tuple(recorded)
     markers = [one.markers for one in trials if one.markers is not None and one.markers.time.size > 1]
     cameras, plates = camera_noise(markers), plate_noise(plate for one in trials for plate in one.plates)
-    usual = known or Instruments()
+    usual = known or InstrumentNoise()
     beyond = np.sqrt(max(0.0, cameras**2 - usual.camera**2))
     density = np.sqrt(np.maximum(0.0, plates**2 - np.array(usual.plate) ** 2))
     count = max((len(one.plates) for one in trials), default=1)

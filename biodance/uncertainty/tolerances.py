@@ -32,7 +32,7 @@ CALIBRATED = ("joint_centre", "tilt")
 
 
 @dataclass(frozen=True)
-class Instruments:
+class InstrumentNoise:
     """How quiet the recordings were from which tolerances were learned; those that come with biodance unless said.
 
     Parameters
@@ -77,7 +77,7 @@ class Tolerances:
     origin: str = ""
     means: Mapping[str, float] = field(default_factory=dict)
     accuracy: Mapping[str, float] = field(default_factory=dict)
-    instruments: "Instruments" = field(default_factory=Instruments)
+    instruments: "InstrumentNoise" = field(default_factory=InstrumentNoise)
 
     def __post_init__(self) -> None:
         bands = len(self.noise)
@@ -178,10 +178,10 @@ def tolerances_of(raw: Mapping[str, Any]) -> Tolerances:
     )
 
 
-def _instruments(raw: Mapping[str, Any]) -> Instruments:
+def _instruments(raw: Mapping[str, Any]) -> InstrumentNoise:
     """Return the instruments of a table ``[instruments]``; those that come with biodance without one."""
-    usual = Instruments()
-    return Instruments(
+    usual = InstrumentNoise()
+    return InstrumentNoise(
         float(raw.get("camera_m", usual.camera)),
         tuple(map(float, raw.get("plate_n_per_root_hz", usual.plate))),
         float(raw.get("marker_distance_m", usual.marker_distance)),
@@ -208,7 +208,7 @@ def to_toml(found: Tolerances, *, under: str = "") -> str:
     return "\n".join(lines) + "\n"
 
 
-def _instruments_text(found: Instruments, prefix: str) -> list[str]:
+def _instruments_text(found: InstrumentNoise, prefix: str) -> list[str]:
     """Return the table ``[instruments]``."""
     known = np.isfinite(found.marker_distance)
     return [

@@ -12,8 +12,8 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.stats import t as student
 
-from biodance.diagnosis.archive.quantities import QUANTITIES, LabVisit
-from biodance.diagnosis.archive.series import Fitted, Series, fit
+from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES, PlateVisit
+from biodance.diagnosis.archive.series import Fitted, Series, fit_series
 from biodance.records import Array
 
 ALARM = 0.04
@@ -39,9 +39,9 @@ class Change:
 
     plate: str
     quantity: str
-    visit: LabVisit
-    earliest: LabVisit
-    latest: LabVisit
+    visit: PlateVisit
+    earliest: PlateVisit
+    latest: PlateVisit
     before: float
     after: float
     interval: tuple[float, float]
@@ -49,7 +49,7 @@ class Change:
     @property
     def matters(self) -> bool:
         """Whether it is large enough to be a finding."""
-        return abs(self.after - self.before) >= QUANTITIES[self.quantity].matters
+        return abs(self.after - self.before) >= PLATE_QUANTITIES[self.quantity].matters
 
 
 @dataclass(frozen=True)
@@ -113,13 +113,13 @@ def history(series: Series) -> History:
     """Return what changed and who stands out in a series, each kind with a probability below the quantity's share of
     `ALARM` of being chance.
     """
-    alarm = ALARM * QUANTITIES[series.quantity].share
+    alarm = ALARM * PLATE_QUANTITIES[series.quantity].share
     chosen: list[_Candidate] = []
     while len(chosen) < _MOST and (best := _next(series, _columns(series, chosen), alarm)) is not None:
         chosen.append(best)
     chosen.sort(key=lambda one: (one.kind != "step", one.at))
     columns = _columns(series, chosen)
-    return _told(series, columns, fit(series, columns), chosen)
+    return _told(series, columns, fit_series(series, columns), chosen)
 
 
 def _next(series: Series, columns: Array, alarm: float) -> _Candidate | None:
@@ -128,7 +128,7 @@ def _next(series: Series, columns: Array, alarm: float) -> _Candidate | None:
     """
     possible = [
         one
-        for one in candidates(series)
+        for one in possible_columns(series)
         if np.linalg.matrix_rank(np.column_stack([columns, one.column])) > columns.shape[1]
     ]
     if series.value.size - columns.shape[1] < _FEWEST:
@@ -137,15 +137,17 @@ def _next(series: Series, columns: Array, alarm: float) -> _Candidate | None:
     for kind in (True, False):
         rivals = [one for one in possible if (one.kind == "step") == kind]
         if rivals:
-            first = rivals[int(np.argmax(_studentised(series, columns, rivals, fit(series, columns))))]
-            known = fit(series, np.column_stack([columns, first.column]))  # variances that a step does not blow up
+            first = rivals[int(np.argmax(_studentised(series, columns, rivals, fit_series(series, columns))))]
+            known = fit_series(
+                series, np.column_stack([columns, first.column])
+            )  # variances that a step does not blow up
             size = _studentised(series, columns, rivals, known)
             if _chance(series, columns, rivals, known, float(size.max())) <= alarm:
                 sure.append((float(size.max()), rivals[int(np.argmax(size))]))
     return max(sure, key=lambda pair: pair[0])[1] if sure else None
 
 
-def candidates(series: Series) -> list[_Candidate]:
+def possible_columns(series: Series) -> list[_Candidate]:
     """Return all columns that are looked at: steps with at least two visits on each side, visits, persons with several
     visits; of one plate, and of all plates where there are several.
     """
@@ -230,7 +232,7 @@ def _change(series: Series, columns: Array, fitted: Fitted, chosen: list[_Candid
     ]
     before = float(fitted.beta[series.plates.index(plate)] + sum(fitted.beta[len(series.plates) + j] for j in earlier))
     others = np.delete(columns, k, axis=1)
-    dates = [other for other in candidates(series) if other.kind == "step" and other.plate == one.plate]
+    dates = [other for other in possible_columns(series) if other.kind == "step" and other.plate == one.plate]
     _, directions, data = _white(series, others, dates, fitted)
     fall = (directions.T @ data) ** 2
     possible = [other.at for other, gain in zip(dates, fall, strict=True) if fall.max() - gain <= _DATE]

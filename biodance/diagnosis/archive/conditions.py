@@ -14,7 +14,7 @@ import numpy as np
 
 from biodance.diagnosis.archive.changes import ALARM
 from biodance.diagnosis.archive.pooling import Pooled, pool
-from biodance.diagnosis.archive.quantities import QUANTITIES, LabVisit, PlateEvidence
+from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES, PlateEvidence, PlateVisit
 from biodance.records import Array
 
 _BORROWED = 4.0
@@ -32,7 +32,7 @@ class ConditionEffect:
     factor: str
     level: str
     base: str
-    visits: tuple[LabVisit, ...]
+    visits: tuple[PlateVisit, ...]
     shared: Pooled
 
     @property
@@ -56,7 +56,7 @@ def condition_effects(observations: Sequence[PlateEvidence]) -> tuple[ConditionE
     return tuple(
         one
         for one in tested
-        if one.shared.p < ALARM / len(tested) and abs(one.shared.mean) >= QUANTITIES[one.quantity].matters
+        if one.shared.p < ALARM / len(tested) and abs(one.shared.mean) >= PLATE_QUANTITIES[one.quantity].matters
     )
 
 
@@ -86,7 +86,7 @@ def _effects(some: list[PlateEvidence]) -> list[ConditionEffect]:
     bases = {factor: _base(some, factor) for factor in sorted({name for one in some for name in one.conditions})}
     visits = {visit: [one for one in some if one.visit == visit] for visit in sorted({o.visit for o in some}, key=str)}
     spread = _pooled_scatter(list(visits.values()), bases)
-    found: dict[tuple[str, str], list[tuple[LabVisit, float, float]]] = {}
+    found: dict[tuple[str, str], list[tuple[PlateVisit, float, float]]] = {}
     for visit, own in visits.items():
         for key, value, sd in _differences(own, bases, spread):
             found.setdefault(key, []).append((visit, value, sd))

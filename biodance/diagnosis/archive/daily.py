@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from biodance.diagnosis.archive.quantities import QUANTITIES, PlateEvidence, in_order
+from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES, PlateEvidence, in_order
 
 
 def daily_rows(observations: Sequence[PlateEvidence]) -> list[dict[str, Any]]:
@@ -26,7 +26,7 @@ def daily_rows(observations: Sequence[PlateEvidence]) -> list[dict[str, Any]]:
                 row: dict[str, Any] = {
                     "date": visit.date, "visit": visit.name, "person": visit.person, "plate": plate
                 }  # fmt: skip
-                for name in QUANTITIES:
+                for name in PLATE_QUANTITIES:
                     row |= _cells(name, [one for one in some if one.quantity == name])
                 row["offset_taken_off"] = all(one.taken_off for one in some if one.quantity.startswith("offset"))
                 rows.append(row)
@@ -35,7 +35,7 @@ def daily_rows(observations: Sequence[PlateEvidence]) -> list[dict[str, Any]]:
 
 def _cells(name: str, some: Sequence[PlateEvidence]) -> dict[str, Any]:
     """Return mean, standard error and number of trials of one quantity."""
-    suffix = {"1": "", "m": "_m", "s": "_s", "N": "_n"}[QUANTITIES[name].unit]
+    suffix = {"1": "", "m": "_m", "s": "_s", "N": "_n"}[PLATE_QUANTITIES[name].unit]
     if not some:
         return {f"{name}{suffix}": None, f"{name}_sd{suffix}": None, f"{name}_trials": 0}
     weight = np.array([one.sd**-2.0 for one in some])

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from biodance.diagnosis.archive.quantities import LabVisit, PlateEvidence
+from biodance.diagnosis.archive.quantities import PlateEvidence, PlateVisit
 from biodance.diagnosis.archive.walking import StepRow, of_steps, placed, step_rows
 from biodance.lab.plates.zero import block_means, find_baseline
 from biodance.lab.weight import is_still, standing_mass
@@ -26,7 +26,7 @@ _SWAY_SPEED = 0.02
 """m/s by which the centre of mass may be faster at the end of quiet standing than at its beginning."""
 _LONGEST = 60.0
 """s of standing beyond which the mean force gets no better."""
-_GAIN = 0.001
+_AGAIN = 0.001
 """What two weighings of one person differ by."""
 _SHORTEST = 1.5
 """s of quiet standing from which on its mean horizontal force is used."""
@@ -38,7 +38,7 @@ _ROUND = 0.02
 
 def plate_evidence(
     trials: Sequence[Trial],
-    visit: LabVisit,
+    visit: PlateVisit,
     *,
     mass: float = float("nan"),
     conditions: Mapping[str, Mapping[str, str]] | None = None,
@@ -49,7 +49,7 @@ def plate_evidence(
     ----------
     trials : sequence of Trial
         As read.
-    visit : LabVisit
+    visit : PlateVisit
         Whose they are.
     mass : float
         Declared, kg; NaN where nobody declared it.
@@ -95,7 +95,9 @@ def plainly_named(observations: Sequence[PlateEvidence]) -> tuple[PlateEvidence,
 
 
 def _of_visit(trials: Sequence[Trial]) -> dict[str, float]:
-    """Return what each plate reads vertically without load in a visit, N: the middle of the trials that saw it empty."""
+    """Return what each plate reads vertically without load in a visit, N: the middle of the trials that saw it empty;
+    plates that none saw empty are left out.
+    """
     seen: dict[str, list[float]] = {}
     for trial in trials:
         for plate in trial.plates:
@@ -117,7 +119,7 @@ def _empty(plate: Plate) -> Array | None:
     return np.asarray(plate.zero + force[found.start : found.stop].mean(axis=0))
 
 
-def _of_empty(plate: Plate, trial: Trial, visit: LabVisit, kind: Mapping[str, str]) -> list[PlateEvidence]:
+def _of_empty(plate: Plate, trial: Trial, visit: PlateVisit, kind: Mapping[str, str]) -> list[PlateEvidence]:
     reads = _empty(plate)
     if reads is None:
         return []
@@ -139,7 +141,7 @@ def _of_empty(plate: Plate, trial: Trial, visit: LabVisit, kind: Mapping[str, st
 
 
 def _of_standing(
-    trial: Trial, visit: LabVisit, kind: Mapping[str, str], mass: float, empty: Mapping[str, float]
+    trial: Trial, visit: PlateVisit, kind: Mapping[str, str], mass: float, empty: Mapping[str, float]
 ) -> list[PlateEvidence]:
     """Return what quiet standing says: horizontal offsets of plates that were never seen empty, and the weight."""
     on = [plate for plate in trial.plates if plate.wrench.force[:, 2].mean() > _LOADED]
@@ -167,7 +169,7 @@ def _of_standing(
 
 def _weighed(
     trial: Trial,
-    visit: LabVisit,
+    visit: PlateVisit,
     kind: Mapping[str, str],
     mass: float,
     weighed: float,
@@ -180,4 +182,4 @@ def _weighed(
         return PlateEvidence("offset_z", share, value, _WEIGHS, visit, trial.name, kind, "weight")
     vertical = np.array([plate.wrench.force[:, 2].mean() for plate in on])
     share = {plate_label(plate): float(part) for plate, part in zip(on, vertical / vertical.sum(), strict=True)}
-    return PlateEvidence("gain", share, weighed / mass - 1, _GAIN, visit, trial.name, kind, "weight")
+    return PlateEvidence("gain", share, weighed / mass - 1, _AGAIN, visit, trial.name, kind, "weight")

@@ -7,7 +7,7 @@ from scipy.stats import f as fisher
 
 from biodance.diagnosis.archive.changes import ALARM, ALL, Change, History
 from biodance.diagnosis.archive.conditions import ConditionEffect
-from biodance.diagnosis.archive.quantities import QUANTITIES
+from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES
 
 _HORIZONTAL = ("offset_x", "offset_y")
 """What may wander; vertically a difference from visit to visit may be the declared mass."""
@@ -16,7 +16,7 @@ _SURE = 3.0
 
 
 @dataclass(frozen=True)
-class Level:
+class PlateLevel:
     """A quantity of a plate as it is now (after its last change): ``value``, ``sd``; ``between`` its standard deviation
     from visit to visit; ``visits`` that tell it; ``taken_off`` share of the trials in which the reader saw and
     subtracted it.
@@ -45,7 +45,7 @@ class PlateFinding:
 def said(quantity: str, value: float) -> str:
     """Return a value of a quantity as a person says it, with its sign."""
     factor, unit, digits = {"m": (1e3, "mm", 1), "s": (1e3, "ms", 1), "1": (1e2, "%", 2), "N": (1.0, "N", 1)}[
-        QUANTITIES[quantity].unit
+        PLATE_QUANTITIES[quantity].unit
     ]
     shown = round(factor * value, digits) + 0.0  # no minus before zero
     return f"{shown:+.{digits}f} {unit}".replace("-", "−")
@@ -53,13 +53,14 @@ def said(quantity: str, value: float) -> str:
 
 def changed_finding(change: Change, taken_off: float) -> PlateFinding:
     """Return a change as a finding."""
-    known, low, high = QUANTITIES[change.quantity], *change.interval
+    known, low, high = PLATE_QUANTITIES[change.quantity], *change.interval
     when = change.visit.date or f"visit {change.visit.name}"
     first, last = (one.date or one.name for one in (change.earliest, change.latest))
     between = f" (95 %: between {first} and {last})" if first != last else ""
+    together = " of all plates together" if change.plate == ALL else ""
     mended = " The reader sees it on the empty plate and takes it off." if taken_off > 0.9 else ""
     text = (
-        f"{_WORDS[change.quantity]}{' of all plates together' if change.plate == ALL else ''} changed from {said(change.quantity, change.before)} to "
+        f"{_WORDS[change.quantity]}{together} changed from {said(change.quantity, change.before)} to "
         f"{said(change.quantity, change.after)} on {when}{between}; "
         f"step {said(change.quantity, change.after - change.before)}, "
         f"95 % interval {said(change.quantity, low)} to {said(change.quantity, high)}.{mended}"
@@ -82,7 +83,7 @@ _WORDS = {
 
 def condition_finding(one: ConditionEffect) -> PlateFinding:
     """Return what a kind of trial reads as a finding."""
-    known, shared = QUANTITIES[one.quantity], one.shared
+    known, shared = PLATE_QUANTITIES[one.quantity], one.shared
     kilograms = f" ({shared.mean / 9.80665:+.2f} kg)".replace("-", "−") if one.quantity == "offset_z" else ""
     what = (
         " Something of that weight lies on the plate in these trials and was not zeroed (a pad, a mat): zero the plate "
@@ -99,9 +100,9 @@ def condition_finding(one: ConditionEffect) -> PlateFinding:
     return PlateFinding(known.effect, known.target, text, one.quantity, shared.mean, shared.interval)
 
 
-def wrong_findings(level: Level) -> list[PlateFinding]:
+def wrong_findings(level: PlateLevel) -> list[PlateFinding]:
     """Return a level that is not what the file says: certain, and large enough to matter."""
-    known = QUANTITIES[level.quantity]
+    known = PLATE_QUANTITIES[level.quantity]
     half = 1.96 * level.sd
     certain = abs(level.value) > _SURE * level.sd and abs(level.value) - half > known.matters
     if not certain or level.visits < 2 or level.taken_off > 0.5:
@@ -114,9 +115,9 @@ def wrong_findings(level: Level) -> list[PlateFinding]:
     return [PlateFinding(known.effect, known.target, text, level.quantity, level.value, interval)]
 
 
-def wandering_findings(plate: str, level: Level, one: History) -> list[PlateFinding]:
+def wandering_findings(plate: str, level: PlateLevel, one: History) -> list[PlateFinding]:
     """Return an offset that differs from day to day more than within a day, and is not taken off."""
-    known, series = QUANTITIES[level.quantity], one.series
+    known, series = PLATE_QUANTITIES[level.quantity], one.series
     rows = series.design[:, series.plates.index(plate)] != 0
     if (
         level.quantity not in _HORIZONTAL

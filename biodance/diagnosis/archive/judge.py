@@ -8,14 +8,14 @@ import numpy as np
 from biodance.diagnosis.archive.changes import ALL, Change, History, Stranger, history
 from biodance.diagnosis.archive.conditions import ConditionEffect, condition_effects, without_conditions
 from biodance.diagnosis.archive.findings import (
-    Level,
     PlateFinding,
+    PlateLevel,
     changed_finding,
     condition_finding,
     wandering_findings,
     wrong_findings,
 )
-from biodance.diagnosis.archive.quantities import QUANTITIES, LabVisit, PlateEvidence, in_order
+from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES, PlateEvidence, PlateVisit, in_order
 from biodance.diagnosis.archive.series import series_of
 
 
@@ -25,7 +25,7 @@ class PlateCard:
 
     plate: str
     visits: int
-    levels: tuple[Level, ...]
+    levels: tuple[PlateLevel, ...]
     changes: tuple[Change, ...]
     findings: tuple[PlateFinding, ...]
 
@@ -36,7 +36,7 @@ class ArchiveJudgement:
 
     Parameters
     ----------
-    visits : tuple of LabVisit
+    visits : tuple of PlateVisit
         In order of their date, else of their name.
     plates : tuple of PlateCard
         By name.
@@ -48,7 +48,7 @@ class ArchiveJudgement:
         Of every quantity that was seen.
     """
 
-    visits: tuple[LabVisit, ...]
+    visits: tuple[PlateVisit, ...]
     plates: tuple[PlateCard, ...]
     conditions: tuple[ConditionEffect, ...]
     strangers: tuple[Stranger, ...]
@@ -67,7 +67,7 @@ def judge(observations: Sequence[PlateEvidence]) -> ArchiveJudgement:
     visits = in_order(observations)
     conditions = condition_effects(observations)
     base = without_conditions(observations, conditions)
-    quantities = [name for name in QUANTITIES if any(one.quantity == name for one in base)]
+    quantities = [name for name in PLATE_QUANTITIES if any(one.quantity == name for one in base)]
     histories = tuple(history(series_of(name, base, visits)) for name in quantities)
     plates = sorted({plate for one in observations for plate in one.plates})
     cards = tuple(_card(plate, base, histories, conditions) for plate in plates)
@@ -114,10 +114,12 @@ def _taken_off(plate: str, quantity: str, observations: Sequence[PlateEvidence])
     return float(np.mean(some)) if some else 0.0
 
 
-def _level(plate: str, one: History, observations: Sequence[PlateEvidence]) -> Level:
+def _level(plate: str, one: History, observations: Sequence[PlateEvidence]) -> PlateLevel:
     rows = one.series.design[:, one.series.plates.index(plate)] != 0
     value, error = one.level(plate)
-    sd = float(np.hypot(error, QUANTITIES[one.series.quantity].norm))
+    sd = float(np.hypot(error, PLATE_QUANTITIES[one.series.quantity].norm))
     between = float(np.hypot(one.fitted.between, one.fitted.alone))
     visits = int(np.unique(one.series.visit[rows]).size)
-    return Level(one.series.quantity, value, sd, between, visits, _taken_off(plate, one.series.quantity, observations))
+    return PlateLevel(
+        one.series.quantity, value, sd, between, visits, _taken_off(plate, one.series.quantity, observations)
+    )

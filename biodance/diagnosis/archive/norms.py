@@ -8,7 +8,7 @@ import numpy as np
 from biodance.diagnosis.archive.pooling import pool
 from biodance.records import Array, Trial
 from biodance.uncertainty.session_noise import camera_noise, plate_noise
-from biodance.uncertainty.tolerances import Instruments
+from biodance.uncertainty.tolerances import InstrumentNoise
 from biodance.witnesses import observe, recording
 
 
@@ -43,22 +43,22 @@ def sway(cop: Array) -> float:
     return float(np.sqrt(np.var(cop, axis=0).sum()))
 
 
-def instruments_of(trials: Sequence[Trial], distance: float) -> Instruments:
+def noise_of_instruments(trials: Sequence[Trial], distance: float) -> InstrumentNoise:
     """Return how quiet the recordings of a session are; ``distance`` m of a typical marker to the moving body, NaN
     where nothing moved.
     """
     markers = [one.markers for one in trials if one.markers is not None and one.markers.time.size > 1]
     density = plate_noise(plate for one in trials for plate in one.plates)
-    return Instruments(camera_noise(markers), tuple(density.tolist()), distance if distance > 0 else float("nan"))
+    return InstrumentNoise(camera_noise(markers), tuple(density.tolist()), distance if distance > 0 else float("nan"))
 
 
-def usual_instruments(found: Sequence[Instruments]) -> Instruments:
+def usual_noise(found: Sequence[InstrumentNoise]) -> InstrumentNoise:
     """Return the middle of several sessions; what none shows is that which comes with biodance."""
-    usual = Instruments()
+    usual = InstrumentNoise()
     cameras = [one.camera for one in found if one.camera > 0]
     plates = [[one.plate[i] for one in found if one.plate[i] > 0] or [usual.plate[i]] for i in range(len(usual.plate))]
     distances = [one.marker_distance for one in found if np.isfinite(one.marker_distance)]
-    return Instruments(
+    return InstrumentNoise(
         float(np.median(cameras or [usual.camera])),
         tuple(float(np.median(some)) for some in plates),
         float(np.median(distances or [usual.marker_distance])),

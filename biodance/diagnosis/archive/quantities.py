@@ -43,7 +43,7 @@ class Quantity:
             raise ValueError(f"Quantity {self.name}: typical = {self.typical} must be positive.")
 
 
-QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
+PLATE_QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
     {
         one.name: one
         for one in (
@@ -63,7 +63,7 @@ of laboratory guides (+-5 N).
 
 
 @dataclass(frozen=True)
-class LabVisit:
+class PlateVisit:
     """One visit of one person: its ``name``, the ``person``, and the ``date`` (ISO 8601, "" = not known)."""
 
     name: str
@@ -83,13 +83,13 @@ class PlateEvidence:
     Parameters
     ----------
     quantity : str
-        Of `QUANTITIES`.
+        Of `PLATE_QUANTITIES`.
     plates : mapping
         Which plates read it, and with which share: a person who stands with one foot on each of two plates says half of
         each gain. Usually ``{"plate1": 1.0}``.
     value, sd : float
         In the quantity's unit; ``sd`` is what another trial of the same visit may differ by.
-    visit : LabVisit
+    visit : PlateVisit
         Whose.
     trial : str
         Its name.
@@ -105,20 +105,20 @@ class PlateEvidence:
     plates: Mapping[str, float]
     value: float
     sd: float
-    visit: LabVisit
+    visit: PlateVisit
     trial: str
     conditions: Mapping[str, str] = field(default_factory=dict)
     witness: str = ""
     taken_off: bool = False
 
     def __post_init__(self) -> None:
-        if self.quantity not in QUANTITIES:
-            raise UnknownName.of("quantity of a plate", self.quantity, list(QUANTITIES))
+        if self.quantity not in PLATE_QUANTITIES:
+            raise UnknownName.of("quantity of a plate", self.quantity, list(PLATE_QUANTITIES))
         if not self.sd > 0:
             raise ValueError(f"PlateEvidence {self.quantity} of {self.trial}: sd = {self.sd} must be positive.")
 
 
-def in_order(observations: Iterable[PlateEvidence]) -> tuple[LabVisit, ...]:
+def in_order(observations: Iterable[PlateEvidence]) -> tuple[PlateVisit, ...]:
     """Return the visits, each once, by date where all have one, else by name."""
     visits = {one.visit for one in observations}
     dated = all(visit.date for visit in visits)

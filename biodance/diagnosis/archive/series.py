@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.optimize import minimize
 
-from biodance.diagnosis.archive.quantities import QUANTITIES, LabVisit, PlateEvidence
+from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES, PlateEvidence, PlateVisit
 from biodance.records import Array
 
 _DOUBT = 1.0
@@ -37,7 +37,7 @@ class Series:
 
     quantity: str
     plates: tuple[str, ...]
-    visits: tuple[LabVisit, ...]
+    visits: tuple[PlateVisit, ...]
     value: Array
     sd: Array
     design: Array
@@ -58,7 +58,7 @@ class Fitted:
     alone: float
 
 
-def series_of(quantity: str, observations: Sequence[PlateEvidence], visits: tuple[LabVisit, ...]) -> Series:
+def series_of(quantity: str, observations: Sequence[PlateEvidence], visits: tuple[PlateVisit, ...]) -> Series:
     """Return the ``quantity`` over the visits: trials of one visit about the same plates become one row, their weighted
     mean; its error follows from how much trials of one visit differ in this archive.
     """
@@ -109,14 +109,14 @@ def _mean(some: list[PlateEvidence], scatter: float, quantity: str) -> tuple[flo
     for _ in range(_ROUNDS):
         weight = sd**-2 * np.minimum(1.0, _FAR / np.maximum(np.abs(value - mean) / sd, 1e-12))
         mean = float(weight @ value / weight.sum())
-    return mean, max(float(weight.sum() ** -0.5), _QUIETEST * QUANTITIES[quantity].typical)
+    return mean, max(float(weight.sum() ** -0.5), _QUIETEST * PLATE_QUANTITIES[quantity].typical)
 
 
-def fit(series: Series, columns: Array) -> Fitted:
+def fit_series(series: Series, columns: Array) -> Fitted:
     """Return the generalised least squares of a series on ``columns`` (n, K) at the best variances."""
     shared = [_alike(series.visit)]
     several = series.design.shape[1] > 1
-    typical = [QUANTITIES[series.quantity].typical]
+    typical = [PLATE_QUANTITIES[series.quantity].typical]
     if several:
         shared.append(np.eye(series.value.size))
         typical.append(_ONE_PLATE * typical[0])

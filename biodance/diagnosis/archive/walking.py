@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.diagnosis.archive.quantities import LabVisit, PlateEvidence
+from biodance.diagnosis.archive.quantities import PlateEvidence, PlateVisit
 from biodance.records import Array
 from biodance.witnesses import Observation, Recording, observe, possible_causes, traces
 
@@ -88,7 +88,7 @@ def places(rows: Sequence[StepRow]) -> dict[str, tuple[Array, Array]]:
     return {plate: (found[2 * i : 2 * i + 2], error[2 * i : 2 * i + 2]) for i, plate in enumerate(plates)}
 
 
-def placed(rows: Sequence[StepRow], visit: LabVisit, trial: str) -> list[PlateEvidence]:
+def placed(rows: Sequence[StepRow], visit: PlateVisit, trial: str) -> list[PlateEvidence]:
     """Return the places that the steps of a visit know as evidence, named after ``trial``."""
     return [
         PlateEvidence(f"place_{axis}", {plate: 1.0}, float(place[i]), float(error[i]), visit, trial, {}, "steps")
@@ -99,7 +99,7 @@ def placed(rows: Sequence[StepRow], visit: LabVisit, trial: str) -> list[PlateEv
 
 
 def of_steps(
-    seen: Recording, visit: LabVisit, kind: Mapping[str, str], labels: Mapping[str, str]
+    seen: Recording, visit: PlateVisit, kind: Mapping[str, str], labels: Mapping[str, str]
 ) -> list[PlateEvidence]:
     """Return delay and weight that the steps of a trial say of every plate; none where the feet have no markers or no
     step fell on a plate.

@@ -4,9 +4,9 @@ from typing import Any
 
 from biodance.diagnosis.archive.changes import Change, Stranger
 from biodance.diagnosis.archive.conditions import ConditionEffect
-from biodance.diagnosis.archive.findings import Level, PlateFinding, said
+from biodance.diagnosis.archive.findings import PlateFinding, PlateLevel, said
 from biodance.diagnosis.archive.judge import PlateCard
-from biodance.diagnosis.archive.quantities import QUANTITIES
+from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES
 from biodance.pipeline.plates import PlatesJudged
 
 
@@ -60,14 +60,14 @@ def _card(card: PlateCard) -> dict[str, Any]:
     }
 
 
-def _level(one: Level) -> dict[str, Any]:
+def _level(one: PlateLevel) -> dict[str, Any]:
     return {
         "quantity": one.quantity,
         "value": one.value,
         "sd": one.sd,
         "between_visits_sd": one.between,
         "visits": one.visits,
-        "unit": QUANTITIES[one.quantity].unit,
+        "unit": PLATE_QUANTITIES[one.quantity].unit,
     }
 
 
@@ -83,7 +83,7 @@ def _change(one: Change) -> dict[str, Any]:
         "before": one.before,
         "after": one.after,
         "ci95": list(one.interval),
-        "unit": QUANTITIES[one.quantity].unit,
+        "unit": PLATE_QUANTITIES[one.quantity].unit,
         "matters": one.matters,
     }
 
@@ -96,7 +96,7 @@ def _finding(one: PlateFinding) -> dict[str, Any]:
         "quantity": one.quantity,
         "value": one.value,
         "ci95": list(one.interval),
-        "unit": QUANTITIES[one.quantity].unit,
+        "unit": PLATE_QUANTITIES[one.quantity].unit,
     }
 
 
@@ -118,7 +118,7 @@ def _persons(found: PlatesJudged) -> list[dict[str, Any]]:
 
 
 def _stranger(one: Stranger) -> dict[str, Any]:
-    known = QUANTITIES[one.quantity]
+    known = PLATE_QUANTITIES[one.quantity]
     text = (
         f"{one.visit or 'All visits'}: {one.quantity.replace('_', ' ')} on {one.plate} differs by "
         f"{said(one.quantity, one.value)} from all others."
@@ -127,7 +127,7 @@ def _stranger(one: Stranger) -> dict[str, Any]:
 
 
 def _of_person(one: ConditionEffect, person: str) -> dict[str, Any]:
-    known, (value, sd) = QUANTITIES[one.quantity], one.persons[person]
+    known, (value, sd) = PLATE_QUANTITIES[one.quantity], one.persons[person]
     text = f"{one.factor} {one.level} reads {said(one.quantity, value)} more than {one.factor} {one.base}."
     return _row(known.effect, known.target, text, one.quantity, value, sd)
 
@@ -135,7 +135,7 @@ def _of_person(one: ConditionEffect, person: str) -> dict[str, Any]:
 def _row(effect: str, target: str, text: str, quantity: str, value: float, sd: float) -> dict[str, Any]:
     interval = [value - 1.96 * sd, value + 1.96 * sd]
     row = {"effect": effect, "target": target, "text": text, "quantity": quantity, "value": value, "sd": sd}
-    return {**row, "ci95": interval, "unit": QUANTITIES[quantity].unit}
+    return {**row, "ci95": interval, "unit": PLATE_QUANTITIES[quantity].unit}
 
 
 def _common(one: ConditionEffect) -> dict[str, Any]:
@@ -148,7 +148,7 @@ def _common(one: ConditionEffect) -> dict[str, Any]:
         "value": one.shared.mean,
         "ci95": list(one.shared.interval),
         "between_persons_sd": one.shared.spread,
-        "unit": QUANTITIES[one.quantity].unit,
+        "unit": PLATE_QUANTITIES[one.quantity].unit,
         "persons": len(one.visits),
         "persons_named": sorted(one.persons),
     }

@@ -6,7 +6,7 @@ import numpy as np
 
 from biodance.diagnosis.archive.changes import ALL, History
 from biodance.diagnosis.archive.conditions import ConditionEffect
-from biodance.diagnosis.archive.quantities import QUANTITIES
+from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES
 from biodance.display import BLACK, BLUE, GREY, RED
 from biodance.report.figures.style import figure, look
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _SHOWN = {"m": (1e3, "mm"), "s": (1e3, "ms"), "1": (1e2, "%"), "N": (1.0, "N")}
-TITLES = {
+QUANTITY_TITLES = {
     "place_x": "place along x",
     "place_y": "place along y",
     "gain": "weighs too much",
@@ -39,7 +39,7 @@ def plate_figure(plate: str, histories: tuple[History, ...]) -> "Figure":
 
 def _draw(axes: "Axes", plate: str, one: History) -> None:
     """Draw one quantity: points with 95 % of the visit's own error, steps of the level, people who stand out."""
-    series, (factor, unit) = one.series, _SHOWN[QUANTITIES[one.series.quantity].unit]
+    series, (factor, unit) = one.series, _SHOWN[PLATE_QUANTITIES[one.series.quantity].unit]
     rows = series.design[:, series.plates.index(plate)] != 0
     at, value, sd = series.visit[rows], factor * series.value[rows], factor * series.sd[rows]
     axes.errorbar(at, value, 1.96 * sd, fmt="o", color=BLUE, markersize=3.5, linewidth=0.8)
@@ -52,7 +52,7 @@ def _draw(axes: "Axes", plate: str, one: History) -> None:
             first, last = (series.visits.index(v) for v in (change.earliest, change.latest))
             axes.axvspan(first - 0.5, last - 0.45, color=RED, alpha=0.15, linewidth=0)
     axes.axhline(0, color=GREY, linewidth=0.6)
-    axes.set_ylabel(f"{TITLES[series.quantity]}\n({unit})")
+    axes.set_ylabel(f"{QUANTITY_TITLES[series.quantity]}\n({unit})")
 
 
 def _label(axes: "Axes", one: History) -> None:
@@ -64,7 +64,7 @@ def _label(axes: "Axes", one: History) -> None:
 
 def condition_figure(one: ConditionEffect) -> "Figure":
     """Draw what a kind of trial reads more in every person, and what all share."""
-    factor, unit = _SHOWN[QUANTITIES[one.quantity].unit]
+    factor, unit = _SHOWN[PLATE_QUANTITIES[one.quantity].unit]
     names = [visit.person for visit in one.visits]
     with look():
         drawn = figure(0.9 + 0.22 * len(names), width=5.4)
@@ -76,6 +76,8 @@ def condition_figure(one: ConditionEffect) -> "Figure":
         axes.axvspan(low, high, color=GREY, alpha=0.25, linewidth=0, label="all persons, 95 %")
         axes.axvline(0, color=BLACK, linewidth=0.8)
         axes.set_yticks(range(len(names)), [f"person {name}" for name in names])
-        axes.set_xlabel(f"{one.factor} {one.level} less {one.factor} {one.base}: {TITLES[one.quantity]} ({unit})")
+        axes.set_xlabel(
+            f"{one.factor} {one.level} less {one.factor} {one.base}: {QUANTITY_TITLES[one.quantity]} ({unit})"
+        )
         axes.legend(loc="best")
     return drawn

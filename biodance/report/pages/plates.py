@@ -9,7 +9,7 @@ from biodance.pipeline.plates import PlatesJudged
 from biodance.pipeline.provenance import now
 from biodance.report.documents.plates import plates_document
 from biodance.report.documents.session import plain_values, to_text
-from biodance.report.figures.plates import TITLES, condition_figure, plate_figure
+from biodance.report.figures.plates import QUANTITY_TITLES, condition_figure, plate_figure
 from biodance.report.figures.style import svg_address
 from biodance.version import __version__
 
@@ -35,7 +35,7 @@ def plates_page(found: PlatesJudged, document: dict[str, Any]) -> str:
         figures={card.plate: svg_address(plate_figure(card.plate, judged.histories)) for card in judged.plates},
         conditions=[(one, svg_address(condition_figure(one))) for one in judged.conditions],
         said=said,
-        words=TITLES.__getitem__,
+        words=QUANTITY_TITLES.__getitem__,
         notes=found.notes,
         refused=found.refused,
     )
