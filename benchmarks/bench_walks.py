@@ -76,7 +76,9 @@ def faults_for(session: Session) -> Iterator[Fault]:
     prefix = "" if all(len(one.trial.plates) == 1 for one in seen) else f"{plate}:"
     fz = max(float(one.plate(s.plate).wrench.force[:, 2].max()) for one, s in steps if s.plate == plate)
     at = f"target={plate}"
-    yield Fault("20 mm across", f"plate_position:{at}:{axis},shift=0.02", (("plate_position", f"{plate}:{axis}"),), 0.02)
+    yield Fault(
+        "20 mm across", f"plate_position:{at}:{axis},shift=0.02", (("plate_position", f"{plate}:{axis}"),), 0.02
+    )
     yield Fault("30 ms late", "time_delay:delay=0.03", (("time_delay", ""),), 0.03)
     gain = (("plate_gain", f"{prefix}Fz"), ("body_mass", ""))
     yield Fault("Fz 5 %", f"plate_gain:{at}:Fz,gain=0.05", gain, 0.05)

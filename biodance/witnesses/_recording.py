@@ -24,8 +24,8 @@ _RAISED = 0.05
 """m that a plate stands out above the lowest one: what sticks out over a stair hangs in the air."""
 _BESIDE = 0.04
 """m: a sole that reaches farther over the edge is half beside the plate: its centre of pressure says nothing."""
-_STILL = 0.5
-"""m/s of a foot that stands; the other one swings faster."""
+_STILL, _EVEN = 0.5, 0.35
+"""m/s against the ground or belt of a foot that stands; the other one swings faster."""
 _LIFTED = 0.06
 """m of a foot above its lowest place in the trial from which it cannot stand."""
 _UNSEEN = 0.05
@@ -74,11 +74,16 @@ class Foot:
         return rate_of(self.time)
 
     @property
-    def speed(self) -> Array:
-        """(T,) m/s of the middle between the two markers."""
+    def velocity(self) -> Array:
+        """(T, 3) m/s of the middle between the two markers."""
         if self.time.size < 2:
-            return np.zeros(self.time.size)
-        return np.linalg.norm(np.gradient((self.heel + self.toe) / 2, self.time, axis=0), axis=1)
+            return np.zeros((self.time.size, 3))
+        return np.gradient((self.heel + self.toe) / 2, self.time, axis=0)
+
+    def drift(self, time: Array) -> Array:
+        """Return the median velocity (3,) m/s at some times: that of the belt a foot stands on, or nearly none."""
+        velocity = _between(self.time, self.velocity, time)
+        return np.nanmedian(velocity, axis=0) if np.isfinite(velocity).all(axis=1).any() else np.full(3, np.nan)
 
 
 @dataclass(frozen=True)
@@ -219,7 +224,8 @@ def _steps(plate: Plate, feet: tuple[Foot, ...], *, raised: bool) -> list[Step]:
         time = np.linspace(first + 0.25 * (last - first), first + 0.7 * (last - first), 10)
         over = {foot.side: _over(plate, foot, time, raised=raised) for foot in feet}
         on = [foot for foot in feet if over[foot.side] > -_BESIDE and _stands(foot, time)]
-        other = [foot for foot in feet if foot not in on and _treads(plate, foot, first, last)]
+        belt = on[0].drift(time) if on else np.zeros(3)
+        other = [foot for foot in feet if foot not in on and _treads(plate, foot, first, last, belt)]
         if len(on) == 1 and not other:
             overhang = max(0.0, -over[on[0].side])
             found.append(Step(plate.name, on[0].side, float(time[5]), overhang, _heel_first(on[0], first)))
@@ -236,17 +242,20 @@ def _over(plate: Plate, foot: Foot, time: Array, *, raised: bool) -> float:
 
 
 def _stands(foot: Foot, time: Array) -> bool:
-    """Return whether a foot stands at most of some times."""
-    speed = _between(foot.time, foot.speed[:, None], time)[:, 0]
-    return bool(np.nanmedian(speed) < _STILL) if np.isfinite(speed).any() else False
+    """Return whether a foot stands at most of some times, on the ground or on a moving belt: low, and at one speed."""
+    off = np.linalg.norm(_between(foot.time, foot.velocity, time) - foot.drift(time), axis=1)
+    known = np.isfinite(off)
+    return bool(known.any() and np.median(off[known]) < _EVEN and abs(foot.drift(time)[2]) < _EVEN)
 
 
-def _treads(plate: Plate, foot: Foot, first: float, last: float) -> bool:
-    """Return whether any part of a foot is over the plate, slow and low, at some time of a contact."""
+def _treads(plate: Plate, foot: Foot, first: float, last: float, belt: Array) -> bool:
+    """Return whether any part of a foot is over the plate, low and no faster than
+    the ground (``belt`` (3,) m/s), at some time of a contact.
+    """
     time = np.linspace(first, last, 30)
     with np.errstate(invalid="ignore"):
         near = (inside(plate, foot.outline(time)) > 0.01).mean(axis=1) > 0.3
-        slow = _between(foot.time, foot.speed[:, None], time)[:, 0] < _STILL
+        slow = np.linalg.norm(_between(foot.time, foot.velocity, time) - belt, axis=1) < _STILL
         low = np.minimum(*(path[:, 2] for path in foot.at(time)))
         lowest = min(np.nanmin(foot.heel[:, 2]), np.nanmin(foot.toe[:, 2]))
     return bool((near & slow & (low < lowest + _LIFTED)).sum() >= 3)
@@ -256,7 +265,7 @@ def _heel_first(foot: Foot, first: float) -> bool:
     """Return whether the toe is farther above its standing height than the heel when a contact begins."""
     at = np.array([first])
     heel, toe = (path[0, 2] for path in foot.at(at))
-    flat = foot.speed < 0.1
+    flat = np.abs(foot.velocity[:, 2]) < 0.1
     if not flat.any():
         return False
     rest = [np.nanmedian(path[flat, 2]) for path in (foot.heel, foot.toe)]

@@ -4,7 +4,7 @@ Coarser than across the foot, and it scales with the foot; steps in different di
 """
 
 from biodance.witnesses import Observation, Recording, Step, Witness
-from biodance.witnesses._stance import place_norms, stance
+from biodance.witnesses._stance import stance
 
 _PHASES = {
     "early": (0.04, 0.10, 0.23, 0.030, 0.030, 0.02),
@@ -33,7 +33,6 @@ class FootAlong(Witness):
             norms = {
                 f"person foot along, {phase}": person * part.length,
                 f"laboratory markers along, {phase}": laboratory * part.length,
-                **place_norms(step, part.axes[0]),
             }
             value, own = part.mean(part.ahead, start, stop), ((sd * part.length) ** 2 + step.overhang**2) ** 0.5
             what, expected = f"{step.name}, {phase}", share * part.length

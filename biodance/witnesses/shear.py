@@ -1,4 +1,4 @@
-"""Which way the shear points: a step brakes first and pushes then, and pushes the body inwards; it turns with the plate.
+"""Which way the shear points: a step brakes first and pushes then, and it turns with the plate.
 
 The direction of walking is that of the pelvis over the standing foot, so that it holds on a treadmill, too.
 """
@@ -12,12 +12,12 @@ from biodance.witnesses._stance import Stance, stance
 _PARTS = {
     "braking": (0.08, 0.35, 0, -0.145, 0.030),
     "pushing": (0.65, 0.92, 0, 0.150, 0.035),
-    "inwards": (0.20, 0.80, 1, -0.045, 0.020),
+    "inwards": (0.20, 0.80, 1, -0.045, 0.025),
 }
 """Start and stop as shares of stance, direction (0 ahead, 1 outwards), expected share of the mean vertical force, sd of
 one person."""
 _STEP = 0.015
-_STRAIGHT = 0.35
+_STRAIGHT = 0.2
 """rad between the ways of the first and the second half of a stance: in a turn the shear points to its middle."""
 _SLANT = 0.075
 """rad: sd of the direction in which shear goes from braking to pushing, of one step."""

@@ -41,7 +41,7 @@ class StandingPlace(Witness):
         return tuple(
             Observation(
                 self.name, f"pressure {what} of the pelvis", trial.name, float(away @ axis), _OWN, expected, "m", where,
-                {f"person stands {what}": sd, "laboratory place of plates": 0.003},
+                {f"person stands {what}": sd},
             )
             for what, (axis, (expected, sd)) in axes.items()
         )  # fmt: skip

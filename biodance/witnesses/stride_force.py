@@ -1,8 +1,8 @@
 """What the plates weigh while somebody walks: the mean vertical force over whole steps, and over one foot alone.
 
 From the middle of one stance to the middle of the next the body comes back to the same height and speed: the mean force
-is its weight but for the change of velocity, which the pelvis shows. In the middle of a stance the other foot swings: one plate alone says
-the same a little coarser: plates are told from each other.
+is its weight but for the change of velocity, which the pelvis shows. In the middle of a stance the other foot swings:
+one plate alone says the same a little coarser, and plates are told from each other.
 """
 
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ from biodance.witnesses._recording import ONSET
 
 DECLARED = 0.01
 """Share of the declared mass by which careful declarations are wrong: clothes, shoes, another day."""
-_STEP, _ALONE, _HORIZONTAL = (-0.001, 0.008), (0.009, 0.014), 0.012
+_STEP, _ALONE, _HORIZONTAL = (-0.001, 0.0065), (0.009, 0.013), 0.012
 """Expected error and sd of the mass as shares of it: of a whole step, of one foot alone; sd of the mean horizontal
 force over a step as a share of the weight."""
 _ONE = (0.2, 0.8)
