@@ -19,7 +19,8 @@ from pathlib import Path
 import numpy as np
 
 from biodance.diagnosis.diagnosis import Finding
-from biodance.diagnosis.testimony import hear, weigh
+from biodance.diagnosis.heard import hear
+from biodance.diagnosis.testimony import weigh
 from biodance.effects import gates
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.raw import read_raw

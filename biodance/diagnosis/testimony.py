@@ -7,28 +7,17 @@ twenty is odd. The evidence of a cause is the integral over all of them by Lapla
 Signs of channels have no size: they are undone in the recording, and the witnesses are asked again.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from biodance.diagnosis.candidates import SCALE
 from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
+from biodance.diagnosis.heard import Testimony
 from biodance.diagnosis.naming import TOGETHER
-from biodance.discovery import Chosen
-from biodance.effects import DiscreteEffect, Effect, causes
-from biodance.records import Array, Session
-from biodance.witnesses import (
-    Cause,
-    Observation,
-    Recording,
-    observe,
-    possible_causes,
-    recording,
-    traces,
-    turned_signs,
-)
+from biodance.effects import Effect, causes
+from biodance.records import Array
 
 THRESHOLD = 2.5
 """Natural logarithm of the evidence, less that of the number of targets, from which a cause is named."""
@@ -55,80 +44,6 @@ _ALIKE = {"plate_position": 0.003, "plate_rotation": 0.01, "plate_gain": 0.004, 
 """Standard deviation of what careful laboratories have (same units): no size is surer against "as the file says"."""
 _VERTICAL = 18.0
 """N of vertical zero, which readers take off: public recordings have up to 16."""
-
-
-@dataclass(frozen=True, eq=False)
-class Testimony:
-    """All ``observations`` of a session; ``traces`` of every cause: what one unit adds to each of them (n,);
-    ``turned``: value less expectation (n,) once a channel's sign is turned back, NaN where it is then not seen.
-    """
-
-    observations: tuple[Observation, ...]
-    causes: Mapping[tuple[str, str], Cause]
-    traces: Mapping[tuple[str, str], Array]
-    turned: Mapping[tuple[str, str], Array] = field(default_factory=dict)
-
-    @property
-    def counting(self) -> "Testimony":
-        """Only what counts as evidence."""
-        kept = np.array([one.counts for one in self.observations], dtype=bool)
-        return Testimony(
-            tuple(one for one in self.observations if one.counts),
-            self.causes,
-            {name: trace[kept] for name, trace in self.traces.items()},
-            {name: value[kept] for name, value in self.turned.items()},
-        )
-
-    @property
-    def shared(self) -> Array:
-        """(n, k) what one standard deviation of each shared part of the expectations adds."""
-        names = list(dict.fromkeys(name for one in self.observations for name in one.norms))
-        rows = [[one.norms.get(name, 0.0) for name in names] for one in self.observations]
-        return np.array(rows).reshape(len(self.observations), len(names))
-
-    def seen_by(self, cause: tuple[str, str], *, least: float = 1.0) -> tuple[str, ...]:
-        """Return the witnesses that see the usual fault of a cause at ``least`` standard deviations, all their
-        observations together; none: all are blind to it.
-        """
-        size = self.causes[cause].step * _FAULT
-        total: dict[str, float] = {}
-        for one, trace in zip(self.observations, self.traces[cause], strict=True):
-            total[one.witness] = total.get(one.witness, 0.0) + (size * trace / one.expected_sd) ** 2
-        return tuple(name for name, power in total.items() if power**0.5 >= least)
-
-
-_FAULT = 4.0
-"""A fault in steps of its cause: 16 mm, 16 ms, 8 %, 8 N, 0.08 rad, 2 kg."""
-
-
-def hear(session: Session, chosen: Chosen[Effect | DiscreteEffect] = None) -> Testimony:
-    """Return what the witnesses saw in all trials of a session but the skipped ones; ``chosen`` limits the causes."""
-    asked = causes(chosen)
-    mass = float("nan") if "mass" in session.subject.guessed else session.subject.mass
-    seen = [recording(trial, mass=mass) for trial in session.trials if trial.plates and trial.role != "skip"]
-    found = [observe(one) for one in seen]
-    known = {c.names: c for one in seen for c in possible_causes(one) if c.effect in asked}
-    parts = {name: [np.zeros(len(some)) for some in found] for name in known}
-    turned: dict[tuple[str, str], list[Array]] = {}
-    plain = [np.array([o.value - o.expected for o in some]) for some in found]
-    for i, (one, some) in enumerate(zip(seen, found, strict=True)):
-        for cause in possible_causes(one) if some else ():
-            if cause.names in known:
-                parts[cause.names][i] = traces(one, some, cause)
-        for name, undo in turned_signs(one).items() if one.steps and "axis_error" in asked else ():
-            turned.setdefault(name, [value.copy() for value in plain])[i] = _again(undo(one), some)
-    return Testimony(
-        tuple(o for some in found for o in some),
-        known,
-        {name: np.concatenate([*several, np.empty(0)]) for name, several in parts.items()},
-        {name: np.concatenate([*several, np.empty(0)]) for name, several in turned.items()},
-    )
-
-
-def _again(altered: Recording, before: tuple[Observation, ...]) -> Array:
-    """Return value less expectation (n,) of the same observations in an altered recording; NaN where not seen."""
-    values = {one.key: one.value - one.expected for one in observe(altered)}
-    return np.array([values.get(one.key, np.nan) for one in before])
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,6 +188,16 @@ def _findings(heard: Testimony, value: Array, named: list[tuple[Hypothesis, tupl
             visible = _visible(heard, one.names)
         found.append(Finding(*one.names, estimates, near, visible, advice=f"{_said(heard, one.names)} {kind.advice}"))
     return tuple(found)
+
+
+def size_by(heard: Testimony, names: tuple[str, str]) -> tuple[float, float] | None:
+    """Return the size of a cause and its standard deviation by the witnesses alone; None where they are blind to it."""
+    counting = heard.counting
+    if names not in counting.causes or not counting.seen_by(names):
+        return None
+    value = np.array([one.value - one.expected for one in counting.observations])
+    one = _explained(counting, value, (names,))
+    return float(one.theta[0]), float(np.hypot(one.covariance[0, 0] ** 0.5, _ALIKE.get(names[0], 0.0)))
 
 
 def _visible(heard: Testimony, names: tuple[str, str]) -> float:

@@ -120,7 +120,10 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
             f"Nothing wrong was found in {rests_on}. Faults below the sizes that it could have seen stay unseen."
         )  # fmt: skip
     elif not rests_on:
-        level, text = "warn", f"Cannot tell whether anything is wrong: nothing could be judged{beside}."
+        level, text = (
+            "warn",
+            f"Cannot tell whether anything is wrong: nothing could be judged{beside}.{_witnessed(one)}",
+        )
     elif one.doubt:
         level = "warn"
         text = f"Cannot tell whether anything is wrong in {rests_on}: {_where(one)}, but {one.doubt}{beside}."
@@ -213,6 +216,19 @@ def _listed(names: Sequence[str]) -> str:
 
 def _short(reason: str) -> str:
     return reason.split(". ")[0].rstrip(".")
+
+
+def _witnessed(one: Diagnosis) -> str:
+    """Return what was looked at without a model of the body, as a sentence; "" for nothing."""
+    heard = one.witnesses
+    count = (
+        len({(o.trial, o.what.partition(",")[0]) for o in heard.observations if " foot on " in o.what}) if heard else 0
+    )
+    trials = len({o.trial for o in heard.observations}) if heard else 0
+    if not trials:
+        return ""
+    steps = f"{count} step{'s' if count != 1 else ''} in {trials} trials" if count else f"{trials} trials"
+    return f" Feet, clocks and weights on the plates ({steps}) show nothing wrong of what they can see."
 
 
 def _sentence(beside: str) -> str:

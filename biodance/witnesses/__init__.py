@@ -78,11 +78,12 @@ class Observation:
 
 
 class Witness(ABC):
-    """One piece of evidence: ``name`` that of its file; ``needs`` which movement and markers, in words for the analyst;
-    ``source`` of what it expects.
+    """One piece of evidence: ``name`` that of its file; ``sees`` the effects that it is for; ``needs`` which movement
+    and markers, in words for the analyst; ``source`` of what it expects.
     """
 
     name: ClassVar[str] = ""
+    sees: ClassVar[tuple[str, ...]] = ()
     needs: ClassVar[str] = ""
     source: ClassVar[str] = ""
 
@@ -96,7 +97,7 @@ def lacks(candidate: object) -> tuple[str, ...]:
     kind = candidate if isinstance(candidate, type) else type(candidate)
     if not issubclass(kind, Witness):
         return ("the base class Witness",)
-    missing = [name for name in ("name", "needs", "source") if not getattr(kind, name)]
+    missing = [name for name in ("name", "sees", "needs", "source") if not getattr(kind, name)]
     return (*missing, *(sorted(getattr(kind, "__abstractmethods__", ())) if inspect.isabstract(kind) else ()))
 
 

@@ -17,6 +17,7 @@ class DoubleSupport(Witness):
     """
 
     name = "double_support"
+    sees = ("plate_gain",)
     needs = "Two steps one after the other on two plates; pelvis markers."
     source = "20 pairs of steps of 9 persons of public laboratories"
 

@@ -23,6 +23,7 @@ class EmptyPlate(Witness):
     """Force (N) that the empty plate read and that was taken off, and its change from before to after the steps."""
 
     name = "empty_plate"
+    sees = ("plate_offset", "plate_drift")
     needs = "A trial that begins or ends with nobody on the plate."
     source = "An empty plate reads zero; 35 empty plates of 8 public laboratories were zeroed to 0-6 N (horizontal)."
 

@@ -19,6 +19,7 @@ class Flight(Witness):
     """Mean force (N) of every plate while both feet are in the air."""
 
     name = "flight"
+    sees = ("plate_offset", "plate_drift")
     needs = "A run or a jump on the plates; foot markers."
     source = "Free flight: nothing touches the plates."
 

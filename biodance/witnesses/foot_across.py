@@ -23,6 +23,7 @@ class FootAcross(Witness):
     """Centre of pressure outwards of the line from the heel to the toe marker, m, by phase of stance."""
 
     name = "foot_across"
+    sees = ("plate_position", "plate_rotation", "plate_crosstalk", "axis_error")
     needs = "A step with one whole foot on one plate; heel and toe markers."
     source = "49 steps of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
 

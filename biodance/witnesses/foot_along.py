@@ -18,6 +18,7 @@ class FootAlong(Witness):
     """Centre of pressure ahead of the heel marker along the foot, m, early and late in stance."""
 
     name = "foot_along"
+    sees = ("plate_position", "plate_crosstalk", "axis_error")
     needs = "A step from heel to toe with one whole foot on one plate; heel and toe markers."
     source = "45 steps of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
 

@@ -15,6 +15,7 @@ class FootOutline(Witness):
     """Median distance (m) of the centre of pressure outside the sole that stands there; 0 inside."""
 
     name = "foot_outline"
+    sees = ("plate_position", "axis_error")
     needs = "A step with one whole foot on one plate; heel and toe markers."
     source = "Pressure cannot act where nothing touches; soles by Winter 2009 and ANSUR II 2012."
 

@@ -20,6 +20,7 @@ class ForceEnd(Witness):
     """
 
     name = "force_end"
+    sees = ("time_delay",)
     needs = "Steps that leave an empty plate; markers at 100 Hz or more."
     source = "42 steps of 11 persons of 6 public laboratories (docs/benchmarks/diagnosis.md)"
 

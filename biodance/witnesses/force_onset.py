@@ -22,6 +22,7 @@ class ForceOnset(Witness):
     """Onset of the vertical force (20 N) less the peak of the heel marker's upward acceleration, s."""
 
     name = "force_onset"
+    sees = ("time_delay",)
     needs = "Steps that begin with the heel, on an empty plate; markers at 100 Hz or more."
     source = "42 heel strikes of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
 

@@ -29,6 +29,7 @@ class Shear(Witness):
     """
 
     name = "shear"
+    sees = ("plate_rotation", "axis_error")
     needs = "A walking step with one whole foot on one plate; foot and pelvis markers."
     source = "45 steps of 10 persons of 5 public laboratories; Winter 2009, chapter 5"
 

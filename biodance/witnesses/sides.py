@@ -12,6 +12,7 @@ class Sides(Witness):
     """Centre of pressure outwards in the right foot less that in the left one, m, in each pair of steps."""
 
     name = "sides"
+    sees = ("plate_position",)
     needs = "A step of each foot, each alone on a plate; heel and toe markers."
     source = "6.7 mm between visits of adults, 18 pairs of steps of 9 persons of public laboratories"
 

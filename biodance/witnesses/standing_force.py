@@ -19,6 +19,7 @@ class StandingForce(Witness):
     """Mass (kg) by the mean vertical force in quiet standing, and the mean horizontal forces (N)."""
 
     name = "standing_force"
+    sees = ("body_mass", "plate_gain", "plate_offset")
     needs = "Standing still on the plates with both feet."
     source = "Newton: who stands still is not accelerated; 9 static trials of 3 public laboratories"
 

@@ -30,6 +30,7 @@ class StrideForce(Witness):
     """
 
     name = "stride_force"
+    sees = ("plate_gain", "body_mass", "clipping")
     needs = "Two steps one after the other on two plates, or one step while the other foot swings; pelvis markers."
     source = "21 whole steps and 40 single supports of 10 persons of 5 public laboratories"
 
