@@ -31,13 +31,15 @@ _ALIKE = 0.9
 @dataclass(frozen=True, eq=False)
 class Testimony:
     """All ``observations`` of a session; ``traces`` of every cause: what one unit adds to each of them (n,);
-    ``turned``: value less expectation (n,) once a channel's sign is turned back, NaN where it is then not seen.
+    ``turned``: value less expectation (n,) once a channel's sign is turned back, NaN where it is then not seen;
+    ``seconds`` by trial that one foot stands alone on a plate.
     """
 
     observations: tuple[Observation, ...]
     causes: Mapping[tuple[str, str], Cause]
     traces: Mapping[tuple[str, str], Array]
     turned: Mapping[tuple[str, str], Array] = field(default_factory=dict)
+    seconds: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def counting(self) -> "Testimony":
@@ -48,6 +50,7 @@ class Testimony:
             self.causes,
             {name: trace[kept] for name, trace in self.traces.items()},
             {name: value[kept] for name, value in self.turned.items()},
+            self.seconds,
         )
 
     @property
@@ -134,6 +137,7 @@ def hear(session: Session, chosen: Chosen[Effect | DiscreteEffect] = None) -> Te
         known,
         {name: np.concatenate([*several, np.empty(0)]) for name, several in parts.items()},
         {name: np.concatenate([*several, np.empty(0)]) for name, several in turned.items()},
+        {one.trial.name: one.seconds for one in seen},
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from biodance.diagnosis.adequacy import LIMIT, alarming
 from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Finding
 from biodance.diagnosis.engine import STRANGE
+from biodance.diagnosis.heard import Testimony
 from biodance.diagnosis.problem import Look
 from biodance.identification.added_mass import LoadSearch
 from biodance.pipeline.looked_at import reasons_left_out, seconds_of
@@ -80,6 +81,7 @@ def told(one: Diagnosis, result: SessionResult, judged: tuple[Judged, ...]) -> D
     limit or an unjudged trial.
     """
     outside = tuple(check for check in result.all_checks if not check.inside)
+    judged = stepped(judged, one.witnesses)
     if one.verdict == "named, complete" and (outside or any(row.missed for row in judged)):
         one = replace(one, verdict="named, incomplete")
     first = headline(one, amount(result, judged), judged, outside)
@@ -122,7 +124,7 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
     elif not rests_on:
         level, text = (
             "warn",
-            f"Cannot tell whether anything is wrong: nothing could be judged{beside}.{_witnessed(one)}",
+            f"Cannot tell whether anything is wrong: nothing could be judged{beside}.{_heard(one)}",
         )
     elif one.doubt:
         level = "warn"
@@ -201,10 +203,12 @@ def _level(status: str) -> Level:
 def _beside(judged: tuple[Judged, ...], outside: tuple[Check, ...]) -> str:
     """Return what was not judged and which checks failed, to go on a sentence with."""
     missed: dict[str, list[str]] = {}
+    stepped_only = [row.trial for row in judged if row.missed and row.seconds > 0]
     for row in judged:
-        if row.missed:
+        if row.missed and not row.seconds > 0:
             missed.setdefault(_short(row.why_not), []).append(row.trial)
     parts = [f"; not judged: {_listed(names)}, because: {why}" for why, names in missed.items()]
+    parts += [f"; judged only by steps on plates: {_listed(stepped_only)}"] if stepped_only else []
     checks = [f"{one.what}, {one.where} ({one.value}, should be {one.limit})" for one in outside]
     return "".join(parts) + (f"; outside the limit: {_listed(checks)}" if checks else "")
 
@@ -218,17 +222,23 @@ def _short(reason: str) -> str:
     return reason.split(". ")[0].rstrip(".")
 
 
-def _witnessed(one: Diagnosis) -> str:
-    """Return what was looked at without a model of the body, as a sentence; "" for nothing."""
-    heard = one.witnesses
-    count = (
-        len({(o.trial, o.what.partition(",")[0]) for o in heard.observations if " foot on " in o.what}) if heard else 0
+def _heard(one: Diagnosis) -> str:
+    """Return that the witnesses were asked, as a sentence; "" where they saw nothing."""
+    trials = len({o.trial for o in one.witnesses.observations}) if one.witnesses else 0
+    return f" Plates and clocks show nothing wrong in {trials} trial{'s' * (trials > 1)}." if trials else ""
+
+
+def stepped(rows: tuple[Judged, ...], heard: Testimony | None) -> tuple[Judged, ...]:
+    """Return what a verdict rests on with the steps that only the witnesses could judge: seconds of one foot alone on
+    a plate. Such a trial still misses the comparison with a body.
+    """
+    alone = heard.seconds if heard else {}
+    return tuple(
+        replace(row, seconds=alone[row.trial], why_not=f"only by its steps: {row.why_not}")
+        if row.missed and alone.get(row.trial, 0.0) > 0
+        else row
+        for row in rows
     )
-    trials = len({o.trial for o in heard.observations}) if heard else 0
-    if not trials:
-        return ""
-    steps = f"{count} step{'s' if count != 1 else ''} in {trials} trials" if count else f"{trials} trials"
-    return f" Feet, clocks and weights on the plates ({steps}) show nothing wrong of what they can see."
 
 
 def _sentence(beside: str) -> str:

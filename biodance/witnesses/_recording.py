@@ -135,6 +135,12 @@ class Recording:
             return None
         return slice(*here[-1])
 
+    @property
+    def seconds(self) -> float:
+        """Time s that one foot stands alone on a plate."""
+        parts = [(self.plate(step.plate).wrench.time, self.stance(step)) for step in self.steps]
+        return float(sum(time[part.stop - 1] - time[part.start] for time, part in parts if part is not None))
+
     def pelvis_velocity(self, time: Array) -> Array:
         """Return (n, 3) m/s of the pelvis at times (n,) s; NaN where it was not seen."""
         if self.velocity is None or self.trial.markers is None:
