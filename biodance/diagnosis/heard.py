@@ -121,16 +121,16 @@ def hear(session: Session, chosen: Chosen[Effect | DiscreteEffect] = None) -> Te
     asked = causes(chosen)
     mass = float("nan") if "mass" in session.subject.guessed else session.subject.mass
     seen = [recording(trial, mass=mass) for trial in session.trials if trial.plates and trial.role != "skip"]
-    found = [observe(one) for one in seen]
-    known = {c.names: c for one in seen for c in possible_causes(one) if c.effect in asked}
+    found, single = [observe(one) for one in seen], all(len(one.trial.plates) == 1 for one in seen)
+    known = {c.names: c for one in seen for c in possible_causes(one, single=single) if c.effect in asked}
     parts = {name: [np.zeros(len(some)) for some in found] for name in known}
     turned: dict[tuple[str, str], list[Array]] = {}
     plain = [np.array([o.value - o.expected for o in some]) for some in found]
     for i, (one, some) in enumerate(zip(seen, found, strict=True)):
-        for cause in possible_causes(one) if some else ():
+        for cause in possible_causes(one, single=single) if some else ():
             if cause.names in known:
                 parts[cause.names][i] = traces(one, some, cause)
-        for name, undo in turned_signs(one).items() if one.steps and "axis_error" in asked else ():
+        for name, undo in turned_signs(one, single=single).items() if one.steps and "axis_error" in asked else ():
             turned.setdefault(name, [value.copy() for value in plain])[i] = _again(undo(one), some)
     return Testimony(
         tuple(o for some in found for o in some),

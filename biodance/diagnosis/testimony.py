@@ -24,7 +24,9 @@ THRESHOLD = 2.5
 _TAIL = 4.0
 """Degrees of freedom of an observation's own error."""
 _RARE = 3.0
-"""Natural logarithm: so much rarer than other faults is a channel of the wrong sign."""
+_RARER = {"plate_crosstalk": 1.0}
+"""Natural logarithms: so much rarer than other faults are a channel of the wrong sign, and cross-talk that looks like a
+plate beside its place."""
 _ROUNDS = 3
 _STEPS = 30
 _SURE = 2.0
@@ -40,7 +42,7 @@ _USUAL = {
 }
 """Sizes up to which laboratories have a cause without calling it a fault: plates 2 to 5 mm off (Collins 2009), zeros of
 public recordings to 6 N, clocks within a frame, clothes and shoes."""
-_ALIKE = {"plate_position": 0.003, "plate_rotation": 0.01, "plate_gain": 0.004, "time_delay": 0.002}
+_ALIKE = {"plate_position": 0.005, "plate_rotation": 0.01, "plate_gain": 0.004, "time_delay": 0.002}
 """Standard deviation of what careful laboratories have (same units): no size is surer against "as the file says"."""
 _VERTICAL = 18.0
 """N of vertical zero, which readers take off: public recordings have up to 16."""
@@ -140,7 +142,8 @@ def _ranked(heard: Testimony, value: Array, named: tuple[tuple[str, str], ...], 
             continue
         one = _explained(heard, value, (*named, names))
         bayes = one.log_evidence - before.log_evidence
-        found.append(Hypothesis(names, bayes, bayes - float(np.log(count[names[0]])), one))
+        score = bayes - float(np.log(count[names[0]])) - _RARER.get(names[0], 0.0)
+        found.append(Hypothesis(names, bayes, score, one))
     for names, turned in heard.turned.items() if signs else ():
         known = np.isfinite(turned)
         one = _explained(heard, turned, named, known)
@@ -171,7 +174,7 @@ def _matters(heard: Testimony, one: Hypothesis) -> bool:
     usual = _USUAL.get((cause.effect, cause.unit), 0.0)
     if cause.effect == "plate_offset" and cause.target.endswith("Fz"):
         usual = _VERTICAL
-    sd = float(one.found.covariance[-1, -1]) ** 0.5
+    sd = float(np.hypot(one.found.covariance[-1, -1] ** 0.5, _ALIKE.get(cause.effect, 0.0)))
     return size > usual + sd and size > _SURE * sd
 
 

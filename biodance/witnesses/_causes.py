@@ -37,9 +37,11 @@ class Cause:
         return self.effect, self.target
 
 
-def possible_causes(seen: Recording) -> tuple[Cause, ...]:
-    """Return the causes that witnesses are asked about, in a recording with these plates."""
-    single = len(seen.trial.plates) == 1
+def possible_causes(seen: Recording, *, single: bool | None = None) -> tuple[Cause, ...]:
+    """Return the causes that witnesses are asked about, in a recording with these plates; ``single`` whether targets
+    are named without the plate, because the session has no other (by default: this recording has none).
+    """
+    single = len(seen.trial.plates) == 1 if single is None else single
     found = [
         Cause("time_delay", "", "delay", "s", 0.004, _late),
         Cause("body_mass", "", "error", "kg", 0.5, lambda seen, size: replace(seen, mass=seen.mass - size)),
@@ -62,12 +64,12 @@ def possible_causes(seen: Recording) -> tuple[Cause, ...]:
     return tuple(found)
 
 
-def turned_signs(seen: Recording) -> Mapping[tuple[str, str], Callable[[Recording], Recording]]:
+def turned_signs(seen: Recording, *, single: bool) -> Mapping[tuple[str, str], Callable[[Recording], Recording]]:
     """Return by effect and target what undoes one channel of one plate that has the wrong sign.
 
-    Where that is the vertical force, the reader has turned the whole plate round to make the weight point up.
+    Where that is the vertical force, the reader has turned the whole plate round to make the weight point up. ``single`` as in `possible_causes`.
     """
-    prefix = {plate.name: "" if len(seen.trial.plates) == 1 else f"{plate.name}:" for plate in seen.trial.plates}
+    prefix = {plate.name: "" if single else f"{plate.name}:" for plate in seen.trial.plates}
     return MappingProxyType(
         {
             ("axis_error", f"{prefix[plate.name]}{name}"): _mirrored(plate.name, name)

@@ -28,6 +28,8 @@ _STILL, _EVEN = 0.5, 0.35
 """m/s against the ground or belt of a foot that stands; the other one swings faster."""
 _LIFTED = 0.06
 """m of a foot above its lowest place in the trial from which it cannot stand."""
+_FLAT = 0.03
+"""m of both markers above their lowest place of a foot that stands on a belt."""
 _UNSEEN = 0.05
 """s over which a marker that was not seen is believed to go on straight."""
 
@@ -248,10 +250,15 @@ def _over(plate: Plate, foot: Foot, time: Array, *, raised: bool) -> float:
 
 
 def _stands(foot: Foot, time: Array) -> bool:
-    """Return whether a foot stands at most of some times, on the ground or on a moving belt: low, and at one speed."""
-    off = np.linalg.norm(_between(foot.time, foot.velocity, time) - foot.drift(time), axis=1)
+    """Return whether a foot stands at most of some times: on the ground, or flat on a belt that moves evenly."""
+    drift = foot.drift(time)
+    off = np.linalg.norm(_between(foot.time, foot.velocity, time) - drift, axis=1)
     known = np.isfinite(off)
-    return bool(known.any() and np.median(off[known]) < _EVEN and abs(foot.drift(time)[2]) < _EVEN)
+    if not known.any() or np.median(off[known]) > _EVEN or abs(drift[2]) > _EVEN:
+        return False
+    heights = zip(foot.at(time), (foot.heel, foot.toe), strict=True)
+    flat = all(np.nanmedian(path[:, 2]) < np.nanmin(whole[:, 2]) + _FLAT for path, whole in heights)
+    return bool(np.linalg.norm(drift) < _STILL or flat)
 
 
 def _treads(plate: Plate, foot: Foot, first: float, last: float, belt: Array) -> bool:

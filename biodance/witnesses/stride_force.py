@@ -59,7 +59,7 @@ class StrideForce(Witness):
             return []
         total, g, name = seen.trial.wrench, seen.trial.settings.gravity, f"{first.side} to {last.side} step"
         time, force = total.time[span], total.force[span]
-        what = f"{name} from {time[0]:.2f} s"
+        what = f"{name} from {first.middle:.2f} s"
         found = [_weighed(self.name, what, seen, _mass(seen, time, force[:, 2]), *_STEP)]
         change = seen.mass * _change(seen, time) / (time[-1] - time[0])
         for axis, channel in enumerate(("Fx", "Fy")):
