@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from walking import FOOT, MASS, STANCE, G, Wrong, standing, walk
+from walking import FOOT, MASS, STANCE, Wrong, standing, walk
 
 from biodance.diagnosis.heard import hear, sights
 from biodance.diagnosis.testimony import size_by, weigh
@@ -156,9 +156,8 @@ def test_traces_are_what_a_recording_made_wrong_shows(names: tuple[str, str], sm
     if names[0] == "plate_offset":  # made on both plates
         change = np.where([one.plate == "plate2" for one in found], 0.0, change)
     assert np.abs(change).max() > 0
-    np.testing.assert_allclose(
-        size * traces(here, found, cause), change, atol=0.25 * max(one.sd for one in found if one.unit == "m")
-    )
+    sd = np.array([one.sd for one in found])
+    np.testing.assert_allclose(size * traces(here, found, cause) / sd, change / sd, atol=0.2)
 
 
 def test_clean_walks_and_standing_name_nothing() -> None:
@@ -231,7 +230,5 @@ def test_objects_join_and_strangers_are_refused() -> None:
         witnesses([object()])  # type: ignore[list-item]
 
 
-def test_weights_are_in_newtons_and_seconds_of_single_contact_count() -> None:
-    heard = hear(session(walk()))
-    assert heard.seconds["walk"] == pytest.approx(2 * STANCE, abs=0.02)
-    assert G * MASS == pytest.approx(588.4, abs=0.1)
+def test_seconds_of_single_contact_count() -> None:
+    assert hear(session(walk())).seconds["walk"] == pytest.approx(2 * STANCE, abs=0.02)

@@ -19,7 +19,7 @@ from biodance.diagnosis.naming import TOGETHER
 from biodance.effects import Effect, causes
 from biodance.records import Array
 
-THRESHOLD = 2.5
+THRESHOLD = 2.0
 """Natural logarithm of the evidence, less that of the number of targets, from which a cause is named."""
 _TAIL = 4.0
 """Degrees of freedom of an observation's own error."""
