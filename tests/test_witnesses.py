@@ -50,7 +50,7 @@ def test_steps_are_found_from_markers_whatever_the_plates_say() -> None:
 
 def test_a_foot_half_beside_its_plate_is_no_step() -> None:
     trial = walk()
-    near = [replace(plate, corners=plate.corners + [0.27, 0, 0]) for plate in trial.plates]
+    near = [replace(plate, corners=plate.corners + np.array([0.27, 0, 0])) for plate in trial.plates]
     assert recording(replace(trial, plates=tuple(near))).steps == ()
 
 

@@ -183,7 +183,8 @@ def _findings(heard: Testimony, value: Array, named: list[tuple[Hypothesis, tupl
     sized = tuple(one.names for one, _ in named if one.names in heard.causes)
     last, found = _explained(heard, value, sized), []
     for one, near in named:
-        kind, estimates, visible = causes()[one.names[0]], (), 1.0
+        kind, visible = causes()[one.names[0]], 1.0
+        estimates: tuple[Estimate, ...] = ()
         if one.names in sized:
             i, cause = sized.index(one.names), heard.causes[one.names]
             sd = float(np.hypot(last.covariance[i, i] ** 0.5, _ALIKE.get(cause.effect, 0.0)))

@@ -67,7 +67,8 @@ def possible_causes(seen: Recording, *, single: bool | None = None) -> tuple[Cau
 def turned_signs(seen: Recording, *, single: bool) -> Mapping[tuple[str, str], Callable[[Recording], Recording]]:
     """Return by effect and target what undoes one channel of one plate that has the wrong sign.
 
-    Where that is the vertical force, the reader has turned the whole plate round to make the weight point up. ``single`` as in `possible_causes`.
+    Where that is the vertical force, the reader has turned the whole plate round to make the weight point up.
+    ``single`` as in `possible_causes`.
     """
     prefix = {plate.name: "" if single else f"{plate.name}:" for plate in seen.trial.plates}
     return MappingProxyType(

@@ -181,9 +181,12 @@ def _between(known: Array, path: Array, time: Array) -> Array:
 
 def _feet(markers: Markers | None) -> tuple[Foot, ...]:
     """Return both feet by the landmarks heel and toe of the first marker set that has all four; () without."""
-    for name in FAMILY.files() if markers is not None and markers.time.size else ():
-        places = {(s, p): _landmark(markers, name, f"{s}_{p}") for s in SIDES for p in ("heel", "toe")}
-        if all(path is not None and np.isfinite(path).any() for path in places.values()):
+    if markers is None or not markers.time.size:
+        return ()
+    for name in FAMILY.files():
+        found = {(s, p): _landmark(markers, name, f"{s}_{p}") for s in SIDES for p in ("heel", "toe")}
+        places = {key: path for key, path in found.items() if path is not None and np.isfinite(path).any()}
+        if len(places) == len(found):
             return tuple(Foot(s, markers.time, places[s, "heel"], places[s, "toe"]) for s in SIDES)
     return ()
 
@@ -198,10 +201,10 @@ def _landmark(markers: Markers, set_name: str, name: str) -> Array | None:
 def _pelvis(markers: Markers | None) -> Array | None:
     """Return the middle (T, 3) m of the front and back of the pelvis; None where no set has them."""
     for name in FAMILY.files() if markers is not None else ():
-        front = [_landmark(markers, name, f"{side}_asis") for side in SIDES]
-        back = _landmark(markers, name, "mid_psis")
-        if back is not None and all(path is not None for path in front):
-            middle = (np.mean(front, axis=0) + back) / 2
+        assert markers is not None
+        right, left, back = (_landmark(markers, name, place) for place in ("right_asis", "left_asis", "mid_psis"))
+        if right is not None and left is not None and back is not None:
+            middle = ((right + left) / 2 + back) / 2
             return middle if np.isfinite(middle).any() else None
     return None
 

@@ -29,7 +29,8 @@ class FootOutline(Witness):
         if part is None:
             return None
         count, plate = part.stop - part.start, seen.plate(step.plate)
-        span = np.unique(np.linspace(*(part.start + share * count for share in _STEADY), 25).astype(int))
+        first, last = (part.start + share * count for share in _STEADY)
+        span = np.unique(np.linspace(first, last, 25).astype(int))
         sole = seen.foot(step.side).outline(plate.wrench.time[span])
         cop = plate.wrench.cop(height=plate.height)[span, :2]
         known = np.isfinite(sole).all(axis=(1, 2)) & np.isfinite(cop).all(axis=1)

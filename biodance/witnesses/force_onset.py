@@ -57,7 +57,7 @@ def heel_strike(foot: Foot, middle: float, near: float) -> float:
         return float("nan")
     low = height < np.nanmedian(stands) + _NEAR
     peaks = [
-        i
+        int(i)
         for i in np.flatnonzero((np.abs(foot.time - near) < _AROUND) & low)
         if 2 <= i < height.size - 2 and rise[i] >= max(rise[i - 1], rise[i + 1]) and rise[i] > 0
     ]
