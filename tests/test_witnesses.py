@@ -15,7 +15,7 @@ from biodance.records import Session, Subject, Trial
 from biodance.witnesses import (
     FAMILY,
     Observation,
-    Recording,
+    SeenTrial,
     Witness,
     observe,
     possible_causes,
@@ -222,7 +222,7 @@ def test_objects_join_and_strangers_are_refused() -> None:
 
         name, sees, needs, source = "loud", ("time_delay",), "Silence.", "nobody"
 
-        def look(self, seen: Recording) -> tuple[Observation, ...]:
+        def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
             return (Observation("loud", "noise", seen.trial.name, 1.0, 1.0, 0.0, "1"),)
 
     assert [one.witness for one in observe(recording(walk()), ["foot_outline", Loud()])][-1] == "loud"

@@ -9,9 +9,9 @@ from biodance.discovery import Chosen
 from biodance.effects import DiscreteEffect, Effect, causes
 from biodance.records import Array, Session
 from biodance.witnesses import (
-    Cause,
+    Alteration,
     Observation,
-    Recording,
+    SeenTrial,
     observe,
     possible_causes,
     recording,
@@ -36,7 +36,7 @@ class Testimony:
     """
 
     observations: tuple[Observation, ...]
-    causes: Mapping[tuple[str, str], Cause]
+    causes: Mapping[tuple[str, str], Alteration]
     traces: Mapping[tuple[str, str], Array]
     turned: Mapping[tuple[str, str], Array] = field(default_factory=dict)
     seconds: Mapping[str, float] = field(default_factory=dict)
@@ -141,7 +141,7 @@ def hear(session: Session, chosen: Chosen[Effect | DiscreteEffect] = None) -> Te
     )
 
 
-def _again(altered: Recording, before: tuple[Observation, ...]) -> Array:
+def _again(altered: SeenTrial, before: tuple[Observation, ...]) -> Array:
     """Return value less expectation (n,) of the same observations in an altered recording; NaN where not seen."""
     values = {one.key: one.value - one.expected for one in observe(altered)}
     return np.array([values.get(one.key, np.nan) for one in before])

@@ -49,7 +49,7 @@ _VERTICAL = 18.0
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class Explanation:
     """One explanation: its ``log_evidence``, the sizes ``theta`` (p,) of its causes with ``covariance`` (p, p)."""
 
     log_evidence: float
@@ -57,7 +57,7 @@ class Fit:
     covariance: Array
 
 
-def fit(value: Array, sd: Array, shared: Array, Z: Array, size: Array) -> Fit:
+def fit(value: Array, sd: Array, shared: Array, Z: Array, size: Array) -> Explanation:
     """Return the explanation of values (n,) less expectation, with own ``sd`` (n,), by ``shared`` (n, k) parts of unit
     normal size and causes whose columns ``Z`` (n, p) have sizes of standard deviation ``size`` (p,).
     """
@@ -77,7 +77,7 @@ def fit(value: Array, sd: Array, shared: Array, Z: Array, size: Array) -> Fit:
     p = Z.shape[1]
     theta, covariance = size * u[len(u) - p :], inverse[len(u) - p :, len(u) - p :] * np.outer(size, size)
     log_evidence = float(tails - 0.5 * u @ u - np.log(np.diag(factor[0])).sum())
-    return Fit(log_evidence, theta, covariance)
+    return Explanation(log_evidence, theta, covariance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +89,7 @@ class Hypothesis:
     names: tuple[str, str]
     log_bayes_factor: float
     score: float
-    found: Fit
+    found: Explanation
 
     @property
     def alias(self) -> Alias:
@@ -152,7 +152,9 @@ def _ranked(heard: Testimony, value: Array, named: tuple[tuple[str, str], ...], 
     return sorted(found, key=lambda one: -one.score)
 
 
-def _explained(heard: Testimony, value: Array, names: tuple[tuple[str, str], ...], known: Array | None = None) -> Fit:
+def _explained(
+    heard: Testimony, value: Array, names: tuple[tuple[str, str], ...], known: Array | None = None
+) -> Explanation:
     kept = np.ones(value.size, dtype=bool) if known is None else known.astype(bool)
     sd = np.array([one.sd for one in heard.observations])[kept]
     Z = np.stack([heard.traces[name] for name in names], axis=1) if names else np.empty((value.size, 0))

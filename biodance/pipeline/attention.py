@@ -121,11 +121,9 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
         text = f"Nothing wrong in what could be judged ({rests_on}){beside}." if beside or one.doubt else (
             f"Nothing wrong was found in {rests_on}. Faults below the sizes that it could have seen stay unseen."
         )  # fmt: skip
-    elif not rests_on:
-        level, text = (
-            "warn",
-            f"Cannot tell whether anything is wrong: nothing could be judged{beside}.{_heard(one)}",
-        )
+    elif not one.adequacy:
+        level, where = "warn", f" in {rests_on}: no movement could be compared with a body" if rests_on else ""
+        text = f"Cannot tell whether anything is wrong{where or ': nothing could be judged'}{beside}.{_heard(one)}"
     elif one.doubt:
         level = "warn"
         text = f"Cannot tell whether anything is wrong in {rests_on}: {_where(one)}, but {one.doubt}{beside}."
@@ -265,4 +263,8 @@ def _incomplete(one: Diagnosis, rests_on: str) -> str:
     """Return what is more to say of a diagnosis that is not complete."""
     if STRANGE in one.notes or alarming(one.adequacy) > LIMIT:
         return f"Something more is wrong in {rests_on} that no known cause explains: {_where(one)}."
-    return f"What else there is to see in {rests_on} is as without fault." if rests_on else "Nothing else was judged."
+    return (
+        f"What else there is to see in {rests_on} is as without fault."
+        if rests_on and one.adequacy
+        else ("Nothing else was judged.")
+    )

@@ -17,15 +17,15 @@ from typing import ClassVar
 import numpy as np
 
 from biodance.discovery import Chosen, Family
-from biodance.witnesses._causes import Cause, Key, possible_causes, turned_signs
-from biodance.witnesses._recording import Foot, Recording, Step, recording
+from biodance.witnesses._causes import Alteration, possible_causes, turned_signs
+from biodance.witnesses._recording import FootPath, FootStep, SeenTrial, recording
 
 __all__ = [
-    "Cause",
-    "Foot",
+    "Alteration",
+    "FootPath",
+    "FootStep",
     "Observation",
-    "Recording",
-    "Step",
+    "SeenTrial",
     "Witness",
     "observe",
     "possible_causes",
@@ -62,7 +62,7 @@ class Observation:
         object.__setattr__(self, "norms", MappingProxyType(dict(self.norms)))
 
     @property
-    def key(self) -> Key:
+    def key(self) -> tuple[str, str, str]:
         """Witness, trial and what: the same in an altered recording."""
         return self.witness, self.trial, self.what
 
@@ -88,7 +88,7 @@ class Witness(ABC):
     source: ClassVar[str] = ""
 
     @abstractmethod
-    def look(self, seen: Recording) -> tuple[Observation, ...]:
+    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return what it saw in one trial; () where the trial does not hold what it needs."""
 
 
@@ -112,14 +112,14 @@ def witnesses(chosen: Chosen[Witness | type[Witness]] = None) -> Mapping[str, Wi
     return MappingProxyType({name: one() if isinstance(one, type) else one for name, one in found.items()})
 
 
-def observe(seen: Recording, chosen: Chosen[Witness | type[Witness]] = None) -> tuple[Observation, ...]:
+def observe(seen: SeenTrial, chosen: Chosen[Witness | type[Witness]] = None) -> tuple[Observation, ...]:
     """Return all that the witnesses saw in one trial, finite values only."""
     found = (one for witness in witnesses(chosen).values() for one in witness.look(seen))
     return tuple(one for one in found if np.isfinite([one.value, one.expected, one.sd]).all())
 
 
 def traces(
-    seen: Recording, found: tuple[Observation, ...], cause: Cause, chosen: Chosen[Witness | type[Witness]] = None
+    seen: SeenTrial, found: tuple[Observation, ...], cause: Alteration, chosen: Chosen[Witness | type[Witness]] = None
 ) -> np.ndarray:
     """Return (n,) what one unit of a cause adds to value less expectation of the observations ``found`` of a
     recording: the slope between the recordings altered by a step either way; 0 where the witness is blind.

@@ -35,7 +35,7 @@ _UNSEEN = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Foot:
+class FootPath:
     """One foot: ``time`` (T,) s; ``heel``, ``toe`` (T, 3) m of its markers, lab frame, NaN = not seen."""
 
     side: str
@@ -89,7 +89,7 @@ class Foot:
 
 
 @dataclass(frozen=True)
-class Step:
+class FootStep:
     """One foot alone on one plate: ``plate`` its name; ``side``; ``middle`` s, a time at which it stands; ``overhang``
     m that the sole may reach over the edge; ``heel_first`` whether the heel came down first.
     """
@@ -107,7 +107,7 @@ class Step:
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class SeenTrial:
     """One ``trial`` with the declared ``mass`` kg of the person (NaN = unknown), both ``feet`` (none where their
     markers are missing), the ``steps`` on its plates, the ``pelvis`` (T, 3) m at marker times with its ``velocity``
     (T, 3) m/s below 8 Hz (None = not seen), and whether somebody stands ``still`` throughout.
@@ -115,8 +115,8 @@ class Recording:
 
     trial: Trial
     mass: float
-    feet: tuple[Foot, ...]
-    steps: tuple[Step, ...]
+    feet: tuple[FootPath, ...]
+    steps: tuple[FootStep, ...]
     pelvis: Array | None
     velocity: Array | None
     still: bool
@@ -125,11 +125,11 @@ class Recording:
         """Return the plate of that name."""
         return next(plate for plate in self.trial.plates if plate.name == name)
 
-    def foot(self, side: str) -> Foot:
+    def foot(self, side: str) -> FootPath:
         """Return the foot of that side."""
         return next(foot for foot in self.feet if foot.side == side)
 
-    def stance(self, step: Step) -> slice | None:
+    def stance(self, step: FootStep) -> slice | None:
         """Return the samples of a step's plate while the foot stands on it; None where the force does not show it."""
         wrench = self.plate(step.plate).wrench
         here = [run for run in runs(wrench.force[:, 2] > ONSET) if wrench.time[run[0]] <= step.middle]
@@ -150,7 +150,7 @@ class Recording:
         return _between(self.trial.markers.time, self.velocity, time)
 
 
-def recording(trial: Trial, *, mass: float = float("nan")) -> Recording:
+def recording(trial: Trial, *, mass: float = float("nan")) -> SeenTrial:
     """Return a trial as witnesses look at it; as read (forces at their own rate) it says most.
 
     ``mass`` kg as declared, NaN = unknown. Without foot markers or plates there are no steps; nothing is raised.
@@ -163,7 +163,7 @@ def recording(trial: Trial, *, mass: float = float("nan")) -> Recording:
     pelvis = _pelvis(trial.markers)
     velocity = _velocity(trial.markers, pelvis) if trial.markers is not None and pelvis is not None else None
     steps = tuple(sorted(steps, key=lambda step: step.middle))
-    return Recording(trial, mass, feet, steps, pelvis, velocity, is_still(trial))
+    return SeenTrial(trial, mass, feet, steps, pelvis, velocity, is_still(trial))
 
 
 def _between(known: Array, path: Array, time: Array) -> Array:
@@ -179,7 +179,7 @@ def _between(known: Array, path: Array, time: Array) -> Array:
     return out
 
 
-def _feet(markers: Markers | None) -> tuple[Foot, ...]:
+def _feet(markers: Markers | None) -> tuple[FootPath, ...]:
     """Return both feet by the landmarks heel and toe of the first marker set that has all four; () without."""
     if markers is None or not markers.time.size:
         return ()
@@ -187,7 +187,7 @@ def _feet(markers: Markers | None) -> tuple[Foot, ...]:
         found = {(s, p): _landmark(markers, name, f"{s}_{p}") for s in SIDES for p in ("heel", "toe")}
         places = {key: path for key, path in found.items() if path is not None and np.isfinite(path).any()}
         if len(places) == len(found):
-            return tuple(Foot(s, markers.time, places[s, "heel"], places[s, "toe"]) for s in SIDES)
+            return tuple(FootPath(s, markers.time, places[s, "heel"], places[s, "toe"]) for s in SIDES)
     return ()
 
 
@@ -224,7 +224,7 @@ def _velocity(markers: Markers, path: Array) -> Array:
     return velocity
 
 
-def _steps(plate: Plate, feet: tuple[Foot, ...], *, raised: bool) -> list[Step]:
+def _steps(plate: Plate, feet: tuple[FootPath, ...], *, raised: bool) -> list[FootStep]:
     """Return the steps on one plate: one foot stands wholly over it while it is loaded, the other one is not on it."""
     found = []
     wrench = plate.wrench
@@ -239,11 +239,11 @@ def _steps(plate: Plate, feet: tuple[Foot, ...], *, raised: bool) -> list[Step]:
         other = [foot for foot in feet if foot not in on and _treads(plate, foot, first, last, belt)]
         if len(on) == 1 and not other:
             overhang = max(0.0, -over[on[0].side])
-            found.append(Step(plate.name, on[0].side, float(time[5]), overhang, _heel_first(on[0], first)))
+            found.append(FootStep(plate.name, on[0].side, float(time[5]), overhang, _heel_first(on[0], first)))
     return found
 
 
-def _over(plate: Plate, foot: Foot, time: Array, *, raised: bool) -> float:
+def _over(plate: Plate, foot: FootPath, time: Array, *, raised: bool) -> float:
     """Return how far the sole is inside the plate, m: its outermost point (its middle on a ``raised`` plate), the
     median over times; negative outside.
     """
@@ -252,7 +252,7 @@ def _over(plate: Plate, foot: Foot, time: Array, *, raised: bool) -> float:
     return float(np.nanmedian(distance)) if np.isfinite(distance).any() else -np.inf
 
 
-def _stands(foot: Foot, time: Array) -> bool:
+def _stands(foot: FootPath, time: Array) -> bool:
     """Return whether a foot stands at most of some times: on the ground, or flat on a belt that moves evenly."""
     drift = foot.drift(time)
     off = np.linalg.norm(_between(foot.time, foot.velocity, time) - drift, axis=1)
@@ -264,7 +264,7 @@ def _stands(foot: Foot, time: Array) -> bool:
     return bool(np.linalg.norm(drift) < _STILL or flat)
 
 
-def _treads(plate: Plate, foot: Foot, first: float, last: float, belt: Array) -> bool:
+def _treads(plate: Plate, foot: FootPath, first: float, last: float, belt: Array) -> bool:
     """Return whether any part of a foot is over the plate, low and no faster than
     the ground (``belt`` (3,) m/s), at some time of a contact.
     """
@@ -277,7 +277,7 @@ def _treads(plate: Plate, foot: Foot, first: float, last: float, belt: Array) ->
     return bool((near & slow & (low < lowest + _LIFTED)).sum() >= 3)
 
 
-def _heel_first(foot: Foot, first: float) -> bool:
+def _heel_first(foot: FootPath, first: float) -> bool:
     """Return whether the toe is farther above its standing height than the heel when a contact begins."""
     at = np.array([first])
     heel, toe = (path[0, 2] for path in foot.at(at))

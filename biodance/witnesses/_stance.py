@@ -5,14 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.records import Array
-from biodance.witnesses._recording import Recording, Step
+from biodance.witnesses._recording import FootStep, SeenTrial
 
 _SEEN = 0.8
 """Share of a phase in which foot and pressure must be known."""
 
 
 @dataclass(frozen=True, eq=False)
-class Stance:
+class StepCourse:
     """One step sample by sample: ``phase`` (n,) 0 at the first contact to 1 at the last; ``time`` (n,) s; ``force``
     (n, 3) N of its plate; ``ahead`` of the heel marker and ``outwards`` of the line to the toe marker (n,) m: the
     centre of pressure in the foot; ``length`` m between the markers.
@@ -32,7 +32,7 @@ class Stance:
         return float(here[known].mean()) if here.size and known.mean() >= _SEEN else float("nan")
 
 
-def stance(seen: Recording, step: Step) -> Stance | None:
+def step_course(seen: SeenTrial, step: FootStep) -> StepCourse | None:
     """Return one step sample by sample; None where its plate's force does not show it."""
     part = seen.stance(step)
     if part is None:
@@ -43,4 +43,4 @@ def stance(seen: Recording, step: Step) -> Stance | None:
     ahead, outwards, apart = seen.foot(step.side).in_foot(time, cop)
     length = float(np.nanmedian(apart)) if np.isfinite(apart).any() else float("nan")
     phase = (time - time[0]) / max(time[-1] - time[0], 1e-9)
-    return Stance(phase, time, plate.wrench.force[part], ahead, outwards, length)
+    return StepCourse(phase, time, plate.wrench.force[part], ahead, outwards, length)

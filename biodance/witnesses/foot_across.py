@@ -4,8 +4,8 @@ One ordinary step shows the plate's place across the foot; right and left feet, 
 from where the laboratory puts its toe marker. A turned plate shows as a slant of the pressure's path.
 """
 
-from biodance.witnesses import Observation, Recording, Step, Witness
-from biodance.witnesses._stance import stance
+from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
+from biodance.witnesses._stance import step_course
 
 _PHASES = {
     "early": (0.04, 0.20, 0.000, 0.0030, 0.0025, 0.0020),
@@ -27,12 +27,12 @@ class FootAcross(Witness):
     needs = "A step with one whole foot on one plate; heel and toe markers."
     source = "49 steps of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
 
-    def look(self, seen: Recording) -> tuple[Observation, ...]:
+    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return three observations of each step, the early one only where the heel came down first."""
         return tuple(one for step in seen.steps for one in self._of_step(seen, step))
 
-    def _of_step(self, seen: Recording, step: Step) -> list[Observation]:
-        part, found = stance(seen, step), []
+    def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
+        part, found = step_course(seen, step), []
         if part is None:
             return []
         for phase, (start, stop, expected, sd, foot, laboratory) in _PHASES.items():

@@ -3,8 +3,8 @@
 Coarser than across the foot, and it scales with the foot; steps in different directions tell plate from foot.
 """
 
-from biodance.witnesses import Observation, Recording, Step, Witness
-from biodance.witnesses._stance import stance
+from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
+from biodance.witnesses._stance import step_course
 
 _PHASES = {
     "early": (0.04, 0.10, 0.23, 0.030, 0.030, 0.02),
@@ -22,12 +22,12 @@ class FootAlong(Witness):
     needs = "A step from heel to toe with one whole foot on one plate; heel and toe markers."
     source = "45 steps of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
 
-    def look(self, seen: Recording) -> tuple[Observation, ...]:
+    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return two observations of each step in which the heel came down first."""
         return tuple(one for step in seen.steps if step.heel_first for one in self._of_step(seen, step))
 
-    def _of_step(self, seen: Recording, step: Step) -> list[Observation]:
-        part, found = stance(seen, step), []
+    def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
+        part, found = step_course(seen, step), []
         if part is None:
             return []
         for phase, (start, stop, share, sd, person, laboratory) in _PHASES.items():

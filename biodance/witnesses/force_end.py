@@ -6,7 +6,7 @@ Coarser than the heel strike, but every step has it: stairs, runs and toes first
 import numpy as np
 
 from biodance.records import Array
-from biodance.witnesses import Foot, Observation, Recording, Step, Witness
+from biodance.witnesses import FootPath, FootStep, Observation, SeenTrial, Witness
 
 _AROUND = 0.1
 """s before and after the end of the force in which the toe leaves."""
@@ -24,11 +24,11 @@ class ForceEnd(Witness):
     needs = "Steps that leave an empty plate; markers at 100 Hz or more."
     source = "42 steps of 11 persons of 6 public laboratories (docs/benchmarks/diagnosis.md)"
 
-    def look(self, seen: Recording) -> tuple[Observation, ...]:
+    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return one observation of each step that ends within the recording."""
         return tuple(one for step in seen.steps for one in self._of_step(seen, step))
 
-    def _of_step(self, seen: Recording, step: Step) -> list[Observation]:
+    def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part, time = seen.stance(step), seen.plate(step.plate).wrench.time
         if part is None or part.stop >= time.size:
             return []
@@ -37,7 +37,7 @@ class ForceEnd(Witness):
         return [Observation(self.name, step.name, seen.trial.name, value, _STEP, _EXPECTED, "s", step.plate, norms)]
 
 
-def toe_pulled(foot: Foot, middle: float, near: float) -> float:
+def toe_pulled(foot: FootPath, middle: float, near: float) -> float:
     """Return the time s at which a toe is accelerated most away from its place at ``middle`` s, within 0.1 s of
     ``near``; NaN where the peak is not seen whole.
     """

@@ -7,7 +7,7 @@ the back of the pelvis stands for it: from side to side within some millimetres,
 import numpy as np
 
 from biodance.records import Array
-from biodance.witnesses import Observation, Recording, Witness
+from biodance.witnesses import Observation, SeenTrial, Witness
 from biodance.witnesses.standing_force import mean_force
 
 _ASIDE, _AHEAD = (0.0, 0.006, 0.003), (0.02, 0.015, 0.030)
@@ -27,14 +27,14 @@ class StandingPlace(Witness):
         "8 static trials of 2 public laboratories, 4 of a simulated one; Winter 1995, doi:10.1016/0966-6362(96)82849-9"
     )
 
-    def look(self, seen: Recording) -> tuple[Observation, ...]:
+    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return two observations of a trial in which somebody stands still on the plates."""
         trial = seen.trial
         plates = [plate for plate in trial.plates if plate.wrench.time.size]
         if not plates or not seen.still or seen.pelvis is None or not seen.feet:
             return ()
         force = mean_force(trial.wrench.force)[2]
-        ahead = facing(seen)
+        ahead = _facing(seen)
         if not force > 0.75 * seen.mass * trial.settings.gravity or ahead is None:
             return ()
         height = float(np.mean([plate.height for plate in plates]))
@@ -51,7 +51,7 @@ class StandingPlace(Witness):
         )  # fmt: skip
 
 
-def facing(seen: Recording) -> Array | None:
+def _facing(seen: SeenTrial) -> Array | None:
     """Return the unit vector (2,) along which both feet point on average; None where they are not seen."""
     both = np.mean([np.nanmedian(foot.toe - foot.heel, axis=0)[:2] for foot in seen.feet], axis=0)
     length = float(np.linalg.norm(both))
