@@ -17,15 +17,15 @@ from typing import ClassVar
 import numpy as np
 
 from biodance.discovery import Chosen, Family
-from biodance.witnesses._causes import Cause, Key, possible_causes, turned_signs
-from biodance.witnesses._recording import Foot, Recording, Step, recording
+from biodance.witnesses._causes import Alteration, possible_causes, turned_signs
+from biodance.witnesses._recording import FootPath, FootStep, SeenTrial, recording
 
 __all__ = [
-    "Cause",
-    "Foot",
+    "Alteration",
+    "FootPath",
+    "FootStep",
     "Observation",
-    "Recording",
-    "Step",
+    "SeenTrial",
     "Witness",
     "observe",
     "possible_causes",
@@ -62,7 +62,7 @@ class Observation:
         object.__setattr__(self, "norms", MappingProxyType(dict(self.norms)))
 
     @property
-    def key(self) -> Key:
+    def key(self) -> tuple[str, str, str]:
         """Witness, trial and what: the same in an altered recording."""
         return self.witness, self.trial, self.what
 
@@ -78,16 +78,17 @@ class Observation:
 
 
 class Witness(ABC):
-    """One piece of evidence: ``name`` that of its file; ``needs`` which movement and markers, in words for the analyst;
-    ``source`` of what it expects.
+    """One piece of evidence: ``name`` that of its file; ``sees`` the effects that it is for; ``needs`` which movement
+    and markers, in words for the analyst; ``source`` of what it expects.
     """
 
     name: ClassVar[str] = ""
+    sees: ClassVar[tuple[str, ...]] = ()
     needs: ClassVar[str] = ""
     source: ClassVar[str] = ""
 
     @abstractmethod
-    def look(self, seen: Recording) -> tuple[Observation, ...]:
+    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return what it saw in one trial; () where the trial does not hold what it needs."""
 
 
@@ -96,7 +97,7 @@ def lacks(candidate: object) -> tuple[str, ...]:
     kind = candidate if isinstance(candidate, type) else type(candidate)
     if not issubclass(kind, Witness):
         return ("the base class Witness",)
-    missing = [name for name in ("name", "needs", "source") if not getattr(kind, name)]
+    missing = [name for name in ("name", "sees", "needs", "source") if not getattr(kind, name)]
     return (*missing, *(sorted(getattr(kind, "__abstractmethods__", ())) if inspect.isabstract(kind) else ()))
 
 
@@ -111,14 +112,14 @@ def witnesses(chosen: Chosen[Witness | type[Witness]] = None) -> Mapping[str, Wi
     return MappingProxyType({name: one() if isinstance(one, type) else one for name, one in found.items()})
 
 
-def observe(seen: Recording, chosen: Chosen[Witness | type[Witness]] = None) -> tuple[Observation, ...]:
+def observe(seen: SeenTrial, chosen: Chosen[Witness | type[Witness]] = None) -> tuple[Observation, ...]:
     """Return all that the witnesses saw in one trial, finite values only."""
     found = (one for witness in witnesses(chosen).values() for one in witness.look(seen))
     return tuple(one for one in found if np.isfinite([one.value, one.expected, one.sd]).all())
 
 
 def traces(
-    seen: Recording, found: tuple[Observation, ...], cause: Cause, chosen: Chosen[Witness | type[Witness]] = None
+    seen: SeenTrial, found: tuple[Observation, ...], cause: Alteration, chosen: Chosen[Witness | type[Witness]] = None
 ) -> np.ndarray:
     """Return (n,) what one unit of a cause adds to value less expectation of the observations ``found`` of a
     recording: the slope between the recordings altered by a step either way; 0 where the witness is blind.

@@ -24,16 +24,18 @@ _RAISED = 0.05
 """m that a plate stands out above the lowest one: what sticks out over a stair hangs in the air."""
 _BESIDE = 0.04
 """m: a sole that reaches farther over the edge is half beside the plate: its centre of pressure says nothing."""
-_STILL = 0.5
-"""m/s of a foot that stands; the other one swings faster."""
+_STILL, _EVEN = 0.5, 0.35
+"""m/s against the ground or belt of a foot that stands; the other one swings faster."""
 _LIFTED = 0.06
 """m of a foot above its lowest place in the trial from which it cannot stand."""
+_FLAT = 0.03
+"""m of both markers above their lowest place of a foot that stands on a belt."""
 _UNSEEN = 0.05
 """s over which a marker that was not seen is believed to go on straight."""
 
 
 @dataclass(frozen=True, eq=False)
-class Foot:
+class FootPath:
     """One foot: ``time`` (T,) s; ``heel``, ``toe`` (T, 3) m of its markers, lab frame, NaN = not seen."""
 
     side: str
@@ -74,15 +76,20 @@ class Foot:
         return rate_of(self.time)
 
     @property
-    def speed(self) -> Array:
-        """(T,) m/s of the middle between the two markers."""
+    def velocity(self) -> Array:
+        """(T, 3) m/s of the middle between the two markers."""
         if self.time.size < 2:
-            return np.zeros(self.time.size)
-        return np.linalg.norm(np.gradient((self.heel + self.toe) / 2, self.time, axis=0), axis=1)
+            return np.zeros((self.time.size, 3))
+        return np.gradient((self.heel + self.toe) / 2, self.time, axis=0)
+
+    def drift(self, time: Array) -> Array:
+        """Return the median velocity (3,) m/s at some times: that of the belt a foot stands on, or nearly none."""
+        velocity = _between(self.time, self.velocity, time)
+        return np.nanmedian(velocity, axis=0) if np.isfinite(velocity).all(axis=1).any() else np.full(3, np.nan)
 
 
 @dataclass(frozen=True)
-class Step:
+class FootStep:
     """One foot alone on one plate: ``plate`` its name; ``side``; ``middle`` s, a time at which it stands; ``overhang``
     m that the sole may reach over the edge; ``heel_first`` whether the heel came down first.
     """
@@ -100,7 +107,7 @@ class Step:
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class SeenTrial:
     """One ``trial`` with the declared ``mass`` kg of the person (NaN = unknown), both ``feet`` (none where their
     markers are missing), the ``steps`` on its plates, the ``pelvis`` (T, 3) m at marker times with its ``velocity``
     (T, 3) m/s below 8 Hz (None = not seen), and whether somebody stands ``still`` throughout.
@@ -108,8 +115,8 @@ class Recording:
 
     trial: Trial
     mass: float
-    feet: tuple[Foot, ...]
-    steps: tuple[Step, ...]
+    feet: tuple[FootPath, ...]
+    steps: tuple[FootStep, ...]
     pelvis: Array | None
     velocity: Array | None
     still: bool
@@ -118,17 +125,23 @@ class Recording:
         """Return the plate of that name."""
         return next(plate for plate in self.trial.plates if plate.name == name)
 
-    def foot(self, side: str) -> Foot:
+    def foot(self, side: str) -> FootPath:
         """Return the foot of that side."""
         return next(foot for foot in self.feet if foot.side == side)
 
-    def stance(self, step: Step) -> slice | None:
+    def stance(self, step: FootStep) -> slice | None:
         """Return the samples of a step's plate while the foot stands on it; None where the force does not show it."""
         wrench = self.plate(step.plate).wrench
         here = [run for run in runs(wrench.force[:, 2] > ONSET) if wrench.time[run[0]] <= step.middle]
         if not here or wrench.time[here[-1][1] - 1] < step.middle:
             return None
         return slice(*here[-1])
+
+    @property
+    def seconds(self) -> float:
+        """Time s that one foot stands alone on a plate."""
+        parts = [(self.plate(step.plate).wrench.time, self.stance(step)) for step in self.steps]
+        return float(sum(time[part.stop - 1] - time[part.start] for time, part in parts if part is not None))
 
     def pelvis_velocity(self, time: Array) -> Array:
         """Return (n, 3) m/s of the pelvis at times (n,) s; NaN where it was not seen."""
@@ -137,7 +150,7 @@ class Recording:
         return _between(self.trial.markers.time, self.velocity, time)
 
 
-def recording(trial: Trial, *, mass: float = float("nan")) -> Recording:
+def recording(trial: Trial, *, mass: float = float("nan")) -> SeenTrial:
     """Return a trial as witnesses look at it; as read (forces at their own rate) it says most.
 
     ``mass`` kg as declared, NaN = unknown. Without foot markers or plates there are no steps; nothing is raised.
@@ -150,7 +163,7 @@ def recording(trial: Trial, *, mass: float = float("nan")) -> Recording:
     pelvis = _pelvis(trial.markers)
     velocity = _velocity(trial.markers, pelvis) if trial.markers is not None and pelvis is not None else None
     steps = tuple(sorted(steps, key=lambda step: step.middle))
-    return Recording(trial, mass, feet, steps, pelvis, velocity, is_still(trial))
+    return SeenTrial(trial, mass, feet, steps, pelvis, velocity, is_still(trial))
 
 
 def _between(known: Array, path: Array, time: Array) -> Array:
@@ -166,12 +179,15 @@ def _between(known: Array, path: Array, time: Array) -> Array:
     return out
 
 
-def _feet(markers: Markers | None) -> tuple[Foot, ...]:
+def _feet(markers: Markers | None) -> tuple[FootPath, ...]:
     """Return both feet by the landmarks heel and toe of the first marker set that has all four; () without."""
-    for name in FAMILY.files() if markers is not None and markers.time.size else ():
-        places = {(s, p): _landmark(markers, name, f"{s}_{p}") for s in SIDES for p in ("heel", "toe")}
-        if all(path is not None and np.isfinite(path).any() for path in places.values()):
-            return tuple(Foot(s, markers.time, places[s, "heel"], places[s, "toe"]) for s in SIDES)
+    if markers is None or not markers.time.size:
+        return ()
+    for name in FAMILY.files():
+        found = {(s, p): _landmark(markers, name, f"{s}_{p}") for s in SIDES for p in ("heel", "toe")}
+        places = {key: path for key, path in found.items() if path is not None and np.isfinite(path).any()}
+        if len(places) == len(found):
+            return tuple(FootPath(s, markers.time, places[s, "heel"], places[s, "toe"]) for s in SIDES)
     return ()
 
 
@@ -185,10 +201,10 @@ def _landmark(markers: Markers, set_name: str, name: str) -> Array | None:
 def _pelvis(markers: Markers | None) -> Array | None:
     """Return the middle (T, 3) m of the front and back of the pelvis; None where no set has them."""
     for name in FAMILY.files() if markers is not None else ():
-        front = [_landmark(markers, name, f"{side}_asis") for side in SIDES]
-        back = _landmark(markers, name, "mid_psis")
-        if back is not None and all(path is not None for path in front):
-            middle = (np.mean(front, axis=0) + back) / 2
+        assert markers is not None
+        right, left, back = (_landmark(markers, name, place) for place in ("right_asis", "left_asis", "mid_psis"))
+        if right is not None and left is not None and back is not None:
+            middle = ((right + left) / 2 + back) / 2
             return middle if np.isfinite(middle).any() else None
     return None
 
@@ -208,7 +224,7 @@ def _velocity(markers: Markers, path: Array) -> Array:
     return velocity
 
 
-def _steps(plate: Plate, feet: tuple[Foot, ...], *, raised: bool) -> list[Step]:
+def _steps(plate: Plate, feet: tuple[FootPath, ...], *, raised: bool) -> list[FootStep]:
     """Return the steps on one plate: one foot stands wholly over it while it is loaded, the other one is not on it."""
     found = []
     wrench = plate.wrench
@@ -219,14 +235,15 @@ def _steps(plate: Plate, feet: tuple[Foot, ...], *, raised: bool) -> list[Step]:
         time = np.linspace(first + 0.25 * (last - first), first + 0.7 * (last - first), 10)
         over = {foot.side: _over(plate, foot, time, raised=raised) for foot in feet}
         on = [foot for foot in feet if over[foot.side] > -_BESIDE and _stands(foot, time)]
-        other = [foot for foot in feet if foot not in on and _treads(plate, foot, first, last)]
+        belt = on[0].drift(time) if on else np.zeros(3)
+        other = [foot for foot in feet if foot not in on and _treads(plate, foot, first, last, belt)]
         if len(on) == 1 and not other:
             overhang = max(0.0, -over[on[0].side])
-            found.append(Step(plate.name, on[0].side, float(time[5]), overhang, _heel_first(on[0], first)))
+            found.append(FootStep(plate.name, on[0].side, float(time[5]), overhang, _heel_first(on[0], first)))
     return found
 
 
-def _over(plate: Plate, foot: Foot, time: Array, *, raised: bool) -> float:
+def _over(plate: Plate, foot: FootPath, time: Array, *, raised: bool) -> float:
     """Return how far the sole is inside the plate, m: its outermost point (its middle on a ``raised`` plate), the
     median over times; negative outside.
     """
@@ -235,28 +252,36 @@ def _over(plate: Plate, foot: Foot, time: Array, *, raised: bool) -> float:
     return float(np.nanmedian(distance)) if np.isfinite(distance).any() else -np.inf
 
 
-def _stands(foot: Foot, time: Array) -> bool:
-    """Return whether a foot stands at most of some times."""
-    speed = _between(foot.time, foot.speed[:, None], time)[:, 0]
-    return bool(np.nanmedian(speed) < _STILL) if np.isfinite(speed).any() else False
+def _stands(foot: FootPath, time: Array) -> bool:
+    """Return whether a foot stands at most of some times: on the ground, or flat on a belt that moves evenly."""
+    drift = foot.drift(time)
+    off = np.linalg.norm(_between(foot.time, foot.velocity, time) - drift, axis=1)
+    known = np.isfinite(off)
+    if not known.any() or np.median(off[known]) > _EVEN or abs(drift[2]) > _EVEN:
+        return False
+    heights = zip(foot.at(time), (foot.heel, foot.toe), strict=True)
+    flat = all(np.nanmedian(path[:, 2]) < np.nanmin(whole[:, 2]) + _FLAT for path, whole in heights)
+    return bool(np.linalg.norm(drift) < _STILL or flat)
 
 
-def _treads(plate: Plate, foot: Foot, first: float, last: float) -> bool:
-    """Return whether any part of a foot is over the plate, slow and low, at some time of a contact."""
+def _treads(plate: Plate, foot: FootPath, first: float, last: float, belt: Array) -> bool:
+    """Return whether any part of a foot is over the plate, low and no faster than
+    the ground (``belt`` (3,) m/s), at some time of a contact.
+    """
     time = np.linspace(first, last, 30)
     with np.errstate(invalid="ignore"):
         near = (inside(plate, foot.outline(time)) > 0.01).mean(axis=1) > 0.3
-        slow = _between(foot.time, foot.speed[:, None], time)[:, 0] < _STILL
+        slow = np.linalg.norm(_between(foot.time, foot.velocity, time) - belt, axis=1) < _STILL
         low = np.minimum(*(path[:, 2] for path in foot.at(time)))
         lowest = min(np.nanmin(foot.heel[:, 2]), np.nanmin(foot.toe[:, 2]))
     return bool((near & slow & (low < lowest + _LIFTED)).sum() >= 3)
 
 
-def _heel_first(foot: Foot, first: float) -> bool:
+def _heel_first(foot: FootPath, first: float) -> bool:
     """Return whether the toe is farther above its standing height than the heel when a contact begins."""
     at = np.array([first])
     heel, toe = (path[0, 2] for path in foot.at(at))
-    flat = foot.speed < 0.1
+    flat = np.abs(foot.velocity[:, 2]) < 0.1
     if not flat.any():
         return False
     rest = [np.nanmedian(path[flat, 2]) for path in (foot.heel, foot.toe)]

@@ -5,20 +5,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.records import Array
-from biodance.witnesses._recording import Recording, Step
+from biodance.witnesses._recording import FootStep, SeenTrial
 
 _SEEN = 0.8
 """Share of a phase in which foot and pressure must be known."""
-_PLACED = 0.003
-"""m: plates lie 2 to 5 mm off in laboratories that check (Collins 2009, doi:10.1016/j.gaitpost.2008.10.060)."""
 
 
 @dataclass(frozen=True, eq=False)
-class Stance:
+class StepCourse:
     """One step sample by sample: ``phase`` (n,) 0 at the first contact to 1 at the last; ``time`` (n,) s; ``force``
     (n, 3) N of its plate; ``ahead`` of the heel marker and ``outwards`` of the line to the toe marker (n,) m: the
-    centre of pressure in the foot; ``length`` m between the markers; ``axes`` (2, 2) unit vectors ahead and outwards in
-    the middle of the stance, lab frame.
+    centre of pressure in the foot; ``length`` m between the markers.
     """
 
     phase: Array
@@ -27,7 +24,6 @@ class Stance:
     ahead: Array
     outwards: Array
     length: float
-    axes: Array
 
     def mean(self, values: Array, start: float, stop: float) -> float:
         """Return the mean of ``values`` (n,) over a part of the stance; NaN where too little of it is known."""
@@ -36,7 +32,7 @@ class Stance:
         return float(here[known].mean()) if here.size and known.mean() >= _SEEN else float("nan")
 
 
-def stance(seen: Recording, step: Step) -> Stance | None:
+def step_course(seen: SeenTrial, step: FootStep) -> StepCourse | None:
     """Return one step sample by sample; None where its plate's force does not show it."""
     part = seen.stance(step)
     if part is None:
@@ -47,11 +43,4 @@ def stance(seen: Recording, step: Step) -> Stance | None:
     ahead, outwards, apart = seen.foot(step.side).in_foot(time, cop)
     length = float(np.nanmedian(apart)) if np.isfinite(apart).any() else float("nan")
     phase = (time - time[0]) / max(time[-1] - time[0], 1e-9)
-    return Stance(
-        phase, time, plate.wrench.force[part], ahead, outwards, length, seen.foot(step.side).axes(step.middle)
-    )
-
-
-def place_norms(step: Step, axis: Array) -> dict[str, float]:
-    """Return how far the plate of a step lies off along a horizontal ``axis`` (2,) in careful laboratories, m."""
-    return {f"{step.plate} place {name}": _PLACED * float(part) for name, part in zip("xy", axis, strict=True)}
+    return StepCourse(phase, time, plate.wrench.force[part], ahead, outwards, length)

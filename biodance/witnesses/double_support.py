@@ -4,7 +4,7 @@ Each plate weighs the same person while one foot stands alone on it: the two mas
 plates' gains, whatever the person weighs.
 """
 
-from biodance.witnesses import Observation, Recording, Witness
+from biodance.witnesses import Observation, SeenTrial, Witness
 from biodance.witnesses.stride_force import StrideForce
 
 _OWN = 0.02
@@ -17,10 +17,11 @@ class DoubleSupport(Witness):
     """
 
     name = "double_support"
+    sees = ("plate_gain",)
     needs = "Two steps one after the other on two plates; pelvis markers."
     source = "20 pairs of steps of 9 persons of public laboratories"
 
-    def look(self, seen: Recording) -> tuple[Observation, ...]:
+    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return one observation of each pair; it is shown only: each foot alone counts already."""
         alone = {
             one.what.removesuffix(", alone"): one for one in StrideForce().look(seen) if one.what.endswith("alone")

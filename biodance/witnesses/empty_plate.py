@@ -7,7 +7,7 @@ told all the same, because a trial in which the plate is never empty keeps it.
 import numpy as np
 
 from biodance.records import CHANNELS, Plate
-from biodance.witnesses import Observation, Recording, Witness
+from biodance.witnesses import Observation, SeenTrial, Witness
 from biodance.witnesses._causes import was_zeroed
 from biodance.witnesses._recording import ONSET
 
@@ -23,15 +23,16 @@ class EmptyPlate(Witness):
     """Force (N) that the empty plate read and that was taken off, and its change from before to after the steps."""
 
     name = "empty_plate"
+    sees = ("plate_offset", "plate_drift")
     needs = "A trial that begins or ends with nobody on the plate."
     source = "An empty plate reads zero; 35 empty plates of 8 public laboratories were zeroed to 0-6 N (horizontal)."
 
-    def look(self, seen: Recording) -> tuple[Observation, ...]:
+    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return three zeros of every plate that has one, and three changes of every plate seen before and after."""
         plates = [plate for plate in seen.trial.plates if plate.wrench.time.size > 1]
         return tuple(one for plate in plates for one in (*self._zero(seen, plate), *self._change(seen, plate)))
 
-    def _zero(self, seen: Recording, plate: Plate) -> list[Observation]:
+    def _zero(self, seen: SeenTrial, plate: Plate) -> list[Observation]:
         if not was_zeroed(plate):
             return []
         return [
@@ -41,7 +42,7 @@ class EmptyPlate(Witness):
             for name, size in zip(CHANNELS[:3], plate.zero, strict=True)
         ]
 
-    def _change(self, seen: Recording, plate: Plate) -> list[Observation]:
+    def _change(self, seen: SeenTrial, plate: Plate) -> list[Observation]:
         wrench = plate.wrench
         loaded = np.flatnonzero(np.abs(wrench.force[:, 2]) > ONSET)
         margin, least = round(_SETTLES * wrench.rate), round(_SHORTEST * wrench.rate)

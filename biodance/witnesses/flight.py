@@ -3,7 +3,7 @@
 import numpy as np
 
 from biodance.records import Array, runs
-from biodance.witnesses import Foot, Observation, Recording, Witness
+from biodance.witnesses import FootPath, Observation, SeenTrial, Witness
 
 _HIGH = 0.06
 """m above their lowest place in the trial that both markers of a foot in flight are."""
@@ -19,10 +19,11 @@ class Flight(Witness):
     """Mean force (N) of every plate while both feet are in the air."""
 
     name = "flight"
+    sees = ("plate_offset", "plate_drift")
     needs = "A run or a jump on the plates; foot markers."
     source = "Free flight: nothing touches the plates."
 
-    def look(self, seen: Recording) -> tuple[Observation, ...]:
+    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return three observations of each plate that was loaded in the trial, over all its flight."""
         heights = [plate.height for plate in seen.trial.plates]
         if not seen.feet or not heights or max(heights) - min(heights) > _LEVEL:
@@ -42,7 +43,7 @@ class Flight(Witness):
         return tuple(found)
 
 
-def _height(foot: Foot) -> Array:
+def _height(foot: FootPath) -> Array:
     """Return (T,) m how far the lower one of a foot's markers is above its lowest place; -inf where not seen."""
     each = [path[:, 2] - np.nanmin(path[:, 2]) for path in (foot.heel, foot.toe)]
     return np.nan_to_num(np.minimum(*each), nan=-np.inf)

@@ -7,7 +7,7 @@ swing: only the peaks near the ground count, and of these the one that is highes
 import numpy as np
 
 from biodance.records import Array
-from biodance.witnesses import Foot, Observation, Recording, Step, Witness
+from biodance.witnesses import FootPath, FootStep, Observation, SeenTrial, Witness
 from biodance.witnesses._recording import ONSET
 
 _AROUND = 0.08
@@ -22,14 +22,15 @@ class ForceOnset(Witness):
     """Onset of the vertical force (20 N) less the peak of the heel marker's upward acceleration, s."""
 
     name = "force_onset"
+    sees = ("time_delay",)
     needs = "Steps that begin with the heel, on an empty plate; markers at 100 Hz or more."
     source = "42 heel strikes of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
 
-    def look(self, seen: Recording) -> tuple[Observation, ...]:
+    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return one observation of each heel strike."""
         return tuple(one for step in seen.steps if step.heel_first for one in self._of_step(seen, step))
 
-    def _of_step(self, seen: Recording, step: Step) -> list[Observation]:
+    def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part = seen.stance(step)
         if part is None or part.start == 0:
             return []
@@ -44,7 +45,7 @@ class ForceOnset(Witness):
         return [Observation(self.name, step.name, seen.trial.name, value, own, _EXPECTED, "s", step.plate, norms)]
 
 
-def heel_strike(foot: Foot, middle: float, near: float) -> float:
+def heel_strike(foot: FootPath, middle: float, near: float) -> float:
     """Return the time s at which a heel strikes within 0.08 s of ``near``; ``middle`` s the foot stands. NaN where
     no peak shows it.
     """
@@ -56,7 +57,7 @@ def heel_strike(foot: Foot, middle: float, near: float) -> float:
         return float("nan")
     low = height < np.nanmedian(stands) + _NEAR
     peaks = [
-        i
+        int(i)
         for i in np.flatnonzero((np.abs(foot.time - near) < _AROUND) & low)
         if 2 <= i < height.size - 2 and rise[i] >= max(rise[i - 1], rise[i + 1]) and rise[i] > 0
     ]

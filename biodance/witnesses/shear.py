@@ -1,4 +1,4 @@
-"""Which way the shear points: a step brakes first and pushes then, and pushes the body inwards; it turns with the plate.
+"""Which way the shear points: a step brakes first and pushes then, and it turns with the plate.
 
 The direction of walking is that of the pelvis over the standing foot, so that it holds on a treadmill, too.
 """
@@ -6,18 +6,18 @@ The direction of walking is that of the pelvis over the standing foot, so that i
 import numpy as np
 
 from biodance.records import Array
-from biodance.witnesses import Observation, Recording, Step, Witness
-from biodance.witnesses._stance import Stance, stance
+from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
+from biodance.witnesses._stance import StepCourse, step_course
 
 _PARTS = {
     "braking": (0.08, 0.35, 0, -0.145, 0.030),
     "pushing": (0.65, 0.92, 0, 0.150, 0.035),
-    "inwards": (0.20, 0.80, 1, -0.045, 0.020),
+    "inwards": (0.20, 0.80, 1, -0.045, 0.025),
 }
 """Start and stop as shares of stance, direction (0 ahead, 1 outwards), expected share of the mean vertical force, sd of
 one person."""
 _STEP = 0.015
-_STRAIGHT = 0.35
+_STRAIGHT = 0.2
 """rad between the ways of the first and the second half of a stance: in a turn the shear points to its middle."""
 _SLANT = 0.075
 """rad: sd of the direction in which shear goes from braking to pushing, of one step."""
@@ -29,17 +29,18 @@ class Shear(Witness):
     """
 
     name = "shear"
+    sees = ("plate_rotation", "axis_error")
     needs = "A walking step with one whole foot on one plate; foot and pelvis markers."
     source = "45 steps of 10 persons of 5 public laboratories; Winter 2009, chapter 5"
 
-    def look(self, seen: Recording) -> tuple[Observation, ...]:
+    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return four observations of each step that begins with the heel."""
         if seen.pelvis is None:
             return ()
         return tuple(one for step in seen.steps if step.heel_first for one in self._of_step(seen, step))
 
-    def _of_step(self, seen: Recording, step: Step) -> list[Observation]:
-        part = stance(seen, step)
+    def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
+        part = step_course(seen, step)
         ahead = way(seen, step, part) if part is not None else None
         if part is None or ahead is None:
             return []
@@ -56,7 +57,7 @@ class Shear(Witness):
         return [*found, self._observation(seen, step, "slant", slant, _SLANT, 0.02, "rad", norms)]
 
     def _observation(
-        self, seen: Recording, step: Step, what: str, value: float, sd: float, expected: float, unit: str,
+        self, seen: SeenTrial, step: FootStep, what: str, value: float, sd: float, expected: float, unit: str,
         norms: dict[str, float],
     ) -> Observation:  # fmt: skip
         return Observation(
@@ -69,7 +70,7 @@ def _slope(left: Array, ahead: Array, vertical: Array) -> float:
     return float(np.linalg.lstsq(np.stack([ahead, vertical], axis=1), left, rcond=None)[0][0])
 
 
-def way(seen: Recording, step: Step, part: Stance) -> Array | None:
+def way(seen: SeenTrial, step: FootStep, part: StepCourse) -> Array | None:
     """Return the unit vector (2,) along which the pelvis goes over the foot in the middle of a stance; None where it
     hardly goes, or turns.
     """

@@ -3,7 +3,7 @@
 import numpy as np
 
 from biodance.records import Array
-from biodance.witnesses import Observation, Recording, Witness
+from biodance.witnesses import Observation, SeenTrial, Witness
 from biodance.witnesses._recording import ONSET
 from biodance.witnesses.stride_force import DECLARED
 
@@ -19,10 +19,11 @@ class StandingForce(Witness):
     """Mass (kg) by the mean vertical force in quiet standing, and the mean horizontal forces (N)."""
 
     name = "standing_force"
+    sees = ("body_mass", "plate_gain", "plate_offset")
     needs = "Standing still on the plates with both feet."
     source = "Newton: who stands still is not accelerated; 9 static trials of 3 public laboratories"
 
-    def look(self, seen: Recording) -> tuple[Observation, ...]:
+    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return one mass and two horizontal forces of a trial in which somebody stands still."""
         plates = [p for p in seen.trial.plates if p.wrench.time.size and p.wrench.force[:, 2].mean() > ONSET]
         if not plates or not seen.still or not seen.mass > 0:

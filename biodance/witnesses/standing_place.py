@@ -7,11 +7,12 @@ the back of the pelvis stands for it: from side to side within some millimetres,
 import numpy as np
 
 from biodance.records import Array
-from biodance.witnesses import Observation, Recording, Witness
+from biodance.witnesses import Observation, SeenTrial, Witness
 from biodance.witnesses.standing_force import mean_force
 
-_ASIDE, _AHEAD = (0.0, 0.006), (0.0, 0.015)
-"""m: expected place and sd of one person: pressure to the left of the pelvis's middle; ahead of it."""
+_ASIDE, _AHEAD = (0.0, 0.006, 0.003), (0.02, 0.015, 0.030)
+"""m: expected place, sd of one person, sd of one laboratory (shoes, posture asked for, where the pelvis markers sit):
+pressure to the left of the pelvis's middle; ahead of it."""
 _OWN = 0.003
 """m: sway in a short trial."""
 
@@ -20,17 +21,20 @@ class StandingPlace(Witness):
     """Centre of pressure to the left of the middle of the pelvis, and ahead of it, in quiet standing, m."""
 
     name = "standing_place"
+    sees = ("plate_position", "plate_crosstalk")
     needs = "Standing still on the plates with both feet; pelvis and foot markers."
-    source = "8 static trials of 2 public laboratories; Winter 1995, doi:10.1016/0966-6362(96)82849-9"
+    source = (
+        "8 static trials of 2 public laboratories, 4 of a simulated one; Winter 1995, doi:10.1016/0966-6362(96)82849-9"
+    )
 
-    def look(self, seen: Recording) -> tuple[Observation, ...]:
+    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return two observations of a trial in which somebody stands still on the plates."""
         trial = seen.trial
         plates = [plate for plate in trial.plates if plate.wrench.time.size]
         if not plates or not seen.still or seen.pelvis is None or not seen.feet:
             return ()
         force = mean_force(trial.wrench.force)[2]
-        ahead = facing(seen)
+        ahead = _facing(seen)
         if not force > 0.75 * seen.mass * trial.settings.gravity or ahead is None:
             return ()
         height = float(np.mean([plate.height for plate in plates]))
@@ -41,13 +45,13 @@ class StandingPlace(Witness):
         return tuple(
             Observation(
                 self.name, f"pressure {what} of the pelvis", trial.name, float(away @ axis), _OWN, expected, "m", where,
-                {f"person stands {what}": sd, "laboratory place of plates": 0.003},
+                {f"person stands {what}": person, f"laboratory stands {what}": laboratory},
             )
-            for what, (axis, (expected, sd)) in axes.items()
+            for what, (axis, (expected, person, laboratory)) in axes.items()
         )  # fmt: skip
 
 
-def facing(seen: Recording) -> Array | None:
+def _facing(seen: SeenTrial) -> Array | None:
     """Return the unit vector (2,) along which both feet point on average; None where they are not seen."""
     both = np.mean([np.nanmedian(foot.toe - foot.heel, axis=0)[:2] for foot in seen.feet], axis=0)
     length = float(np.linalg.norm(both))
