@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
 from biodance.body.human.human import human
 from biodance.body.human.limits import joint_limits
@@ -23,8 +24,8 @@ from biodance.errors import BiodanceError
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.pipeline.danced import simulate_dance, stretches
-from biodance.records import Subject
-from biodance.virtual_lab.movement.dancing import _JOINTS, Performer, copy_dance
+from biodance.records import SIDES, Subject
+from biodance.virtual_lab.movement.dancing import _JOINTS, PERFORMERS, Performer, copy_dance
 from biodance.virtual_lab.movement.performance import true_wrench
 from biodance.virtual_lab.person.person import make_person
 from biodance.virtual_lab.tolerances import PERFECT
@@ -92,6 +93,32 @@ def test_the_usual_performer_is_five_to_ten_degrees_off_and_slower(dance: Dance)
     assert 4.0 < np.degrees(np.sqrt(np.mean(np.square(off)))) < 10.0
 
 
+def test_the_restless_one_keeps_the_zero_moment_point_in_the_support_and_the_tempo_wanders(dance: Dance) -> None:
+    person = make_person(SUBJECT, 3)
+    (shown,) = stretches(dance)
+    restless = PERFORMERS["restless"]
+    done = copy_dance(person, shown, 0, centre=np.zeros(2), performer=restless)
+    time = np.arange(0.0, done.plan.duration, 0.05)
+    motion = done.motion(time)
+    point = true_wrench(person, motion).cop()[:, :2]
+    pose, up = poses(person.body, motion.q), np.stack([done.curves.raised(side) for side in SIDES], axis=1)
+    up = up[np.searchsorted(done.curves.time, time)]
+    for k in range(time.size):
+        corners = [
+            pose.position[k, person.body.segment_index(f"{side}_foot"), :2]
+            + BODY.feet[side].outline[:, [0, 2]] * [1, -1]
+            for side, raised in zip(SIDES, up[k], strict=True)
+            if raised < 0.02
+        ]
+        hull = ConvexHull(np.concatenate(corners))
+        assert (hull.equations[:, :2] @ point[k] + hull.equations[:, 2]).max() < 0.0
+    seconds, at, plan = restless.clock(np.random.default_rng(0), 60.0)
+    tempo = np.gradient(plan, at) * restless.pace
+    assert seconds == 72.0
+    assert (plan[0], plan[-1]) == (0.0, 60.0)
+    assert 0.1 < tempo.std() < 0.3
+
+
 def test_a_danced_session_is_read_like_any_other(dance: Dance, tmp_path: Path) -> None:
     folder = simulate_dance(SUBJECT, dance, tmp_path / "session", seed=3)
     session = read_session(folder)
@@ -107,6 +134,8 @@ def test_a_danced_session_is_read_like_any_other(dance: Dance, tmp_path: Path) -
 def test_what_cannot_be_copied_is_refused(dance: Dance) -> None:
     with pytest.raises(BiodanceError, match=r"0 to 0\.6 rad"):
         Performer(tracking=1.0)
+    with pytest.raises(BiodanceError, match=r"timing = 0\.9"):
+        Performer(timing=0.9)
     stool = seat(BODY)
     seated = replace(dance, stances=(stool,) * len(dance.stances), under=(stool,) * len(dance.under))
     with pytest.raises(BiodanceError, match="virtual persons stand"):

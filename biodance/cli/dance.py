@@ -67,6 +67,41 @@ def dance_command(
     return DONE if result.feasible and result.complete else NEEDS_A_PERSON
 
 
+@app.command(name="play")
+def play_command(
+    dance: Path,
+    *,
+    out: Annotated[Path, Parameter(name="--out", help="The film to write: .gif, or .mp4 where ffmpeg is installed.")],
+    hold: Annotated[float, Parameter(help="Longest hold of a posture, s.")] = 0.5,
+    friction: Annotated[float, Parameter(help="Of the soles on the floor.")] = 0.5,
+    json: JsonOption = False,
+    force: ForceOption = False,
+) -> int:
+    """Play a designed dance in MuJoCo, the body on its own feet, and film it beside the plan.
+
+    Parameters
+    ----------
+    dance
+        The file dance.npz that `biodance dance` wrote.
+    """
+    from biodance.dance.dance import Dance
+    from biodance.dance.rehearsal import rehearse
+    from biodance.report.dance_write import playback_document
+    from biodance.report.figures.film import film_path, write_film
+
+    place, one = film_path(out, force=force), Dance.load(dance)
+    with counted_progress() as tell:
+        tell("playing in MuJoCo", 0, 0)
+        found = rehearse(one, hold=hold, friction=friction)
+        tell("drawing the film", 0, 0)
+        write_film(found, place)
+    if json:
+        print_json(playback_document(found, place))
+    else:
+        sys.stdout.write(f"{found.table()}\n{place}\n")
+    return DONE if found.playback.stays_up else NEEDS_A_PERSON
+
+
 def _who(
     sex: Literal["F", "M"] | None,
     height: float | None,

@@ -56,7 +56,8 @@ class Playback:
     """What became of a plan, at its own instants ``time`` (T,) s up to the fall.
 
     ``angle_error`` (T, n) rad joints, ``root_error`` (T,) m, ``tilt_error`` (T,) rad of the root; ``wrench`` of the
-    floor on the body about the lab origin, ``planned_wrench`` what the plan needs; ``fell`` s, NaN if it did not.
+    floor on the body about the lab origin, ``planned_wrench`` what the plan needs; ``fell`` s, NaN if it did not; ``q``
+    (T, nq) where the body was.
     """
 
     time: Array
@@ -66,6 +67,7 @@ class Playback:
     wrench: Wrench
     planned_wrench: Wrench
     fell: float
+    q: Array
 
     @property
     def stays_up(self) -> bool:
@@ -163,13 +165,13 @@ def play(body: Body, motion: Motion, *, friction: float = 0.5, down: NDArray[np.
     for frame in range(motion.time.size):
         if frame:
             _advance(mujoco, driver, data, motion, torque, frame)
-        rows.append((*driver.gap(data, motion.q[frame]), _floor_wrench(mujoco, model, data)))
+        rows.append((*driver.gap(data, motion.q[frame]), _floor_wrench(mujoco, model, data), driver.place_of(data)))
         if data.qpos[2] < FALLEN * motion.q[frame, 2]:
             fell = float(motion.time[frame])
             break
-    angle, root, tilt, floor = (np.array(column) for column in zip(*rows, strict=True))
+    angle, root, tilt, floor, q = (np.array(column) for column in zip(*rows, strict=True))
     time = motion.time[: len(rows)]
-    return Playback(time, angle, root, tilt, Wrench(time, floor), Wrench(time, wrench.value[: len(rows)]), fell)
+    return Playback(time, angle, root, tilt, Wrench(time, floor), Wrench(time, wrench.value[: len(rows)]), fell, q)
 
 
 def _advance(mujoco: Any, driver: "_Driver", data: Any, motion: Motion, torque: Array, frame: int) -> None:
@@ -208,6 +210,10 @@ class _Driver:
         data.qvel[:3] = quaternion_matrix(q[None, 3:7])[0] @ v[:3]
         data.qvel[3:6] = v[3:6]
         data.qpos[self.q_place], data.qvel[self.v_place] = q[7:], v[6:]
+
+    def place_of(self, data: Any) -> Array:
+        """Return the configuration (nq,) in Pinocchio's order."""
+        return np.concatenate([data.qpos[:3], data.qpos[[4, 5, 6, 3]], data.qpos[self.q_place]])
 
     def drive(self, data: Any, angle: Array, rate: Array, torque: Array) -> None:
         """Set the joint torques of a plan; the damper itself is in the model, where MuJoCo integrates it implicitly."""

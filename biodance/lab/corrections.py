@@ -41,7 +41,7 @@ class PlateCorrection:
 
     def __str__(self) -> str:
         name = f"{self.effect} {self.target}".replace("_", " ").strip()
-        return f"{name} ({PARAMETERS[self.effect]} {self.value:.4g} {UNITS[self.effect]})".replace(" 1)", ")")
+        return f"{name} ({PARAMETER_OF[self.effect]} {self.value:.4g} {_UNIT_OF[self.effect]})".replace(" 1)", ")")
 
     def of(self, plate: str, plates: tuple[str, ...]) -> bool:
         """Return whether ``plate`` is meant; a target without a plate means the only one, a delay all of them."""
@@ -113,9 +113,9 @@ _METHODS: dict[str, Callable[[Plate, PlateCorrection], Plate]] = {
     "plate_offset": _zeroed,
     "time_delay": _earlier,
 }
-PARAMETERS = dict(zip(_METHODS, ("shift", "angle", "gain", "ratio", "offset", "delay"), strict=True))
+PARAMETER_OF = dict(zip(_METHODS, ("shift", "angle", "gain", "ratio", "offset", "delay"), strict=True))
 """Name of the one parameter of every cause that can be corrected in a recording."""
-UNITS = dict(zip(_METHODS, ("m", "rad", "1", "1", "N or N·m", "s"), strict=True))
+_UNIT_OF = dict(zip(_METHODS, ("m", "rad", "1", "1", "N or N·m", "s"), strict=True))
 LASTING = ("plate_position", "plate_rotation", "plate_gain", "plate_crosstalk", "time_delay")
 """Causes that stay with a laboratory from one session to the next: what an offset was today it is not tomorrow."""
 
@@ -180,10 +180,10 @@ def _correction(path: str | Path, effect: str, target: str, said: Any) -> PlateC
     where = f"{path}: [corrections.{effect}.{target!r}]"
     if effect not in _METHODS:
         raise FileRefused(f"{where} is nothing that can be corrected. Legal causes: {', '.join(_METHODS)}.")
-    name = PARAMETERS[effect]
+    name = PARAMETER_OF[effect]
     value = said.get(name) if isinstance(said, dict) else None
     if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value) or value == -1.0:
-        raise FileRefused(f"{where} {name} = {value!r}; expected a number in {UNITS[effect]}.")
+        raise FileRefused(f"{where} {name} = {value!r}; expected a number in {_UNIT_OF[effect]}.")
     if not _legal(effect, target):
         legal = "plate1:x" if effect in ("plate_position", "plate_rotation") else "Fz, plate1:Fz or Fz->My"
         raise FileRefused(f"{where} has no such target. Expected for example {legal}.")
@@ -205,7 +205,7 @@ def corrections_text(corrections: Iterable[PlateCorrection]) -> str:
     lines = []
     for one in corrections:
         key = f'corrections.{one.effect}."{one.target}"'
-        lines += [f"[{key}]", f"{PARAMETERS[one.effect]} = {one.value:.6g}  # {UNITS[one.effect]}"]
+        lines += [f"[{key}]", f"{PARAMETER_OF[one.effect]} = {one.value:.6g}  # {_UNIT_OF[one.effect]}"]
         lines += [f"sd = {one.sd:.3g}"] * bool(np.isfinite(one.sd)) + [f"source = {json.dumps(one.source)}", ""]
     return "\n".join(lines)
 

@@ -16,7 +16,7 @@ from biodance.lab.c3d.ezc3d_object import write_trial
 from biodance.lab.corrections import (
     APPLIED,
     LASTING,
-    PARAMETERS,
+    PARAMETER_OF,
     PlateCorrection,
     corrected_session,
     corrected_trial,
@@ -82,7 +82,7 @@ def accepted_corrections(findings: Iterable[Finding], source: str) -> tuple[Plat
     """Return the ``findings`` that can be corrected in recordings, found in ``source``."""
     out = []
     for one in findings:
-        size = {p.name: p for p in one.parameters}.get(PARAMETERS.get(one.effect, ""))
+        size = {p.name: p for p in one.parameters}.get(PARAMETER_OF.get(one.effect, ""))
         if size is not None and np.isfinite(size.value):
             out.append(PlateCorrection(one.effect, one.target, size.value, size.sd, source))
     return tuple(out)

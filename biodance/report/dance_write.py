@@ -11,6 +11,7 @@ import numpy as np
 from biodance.dance.cues import cue_sheet
 from biodance.dance.dance import Dance
 from biodance.dance.problem.stance import Stance, stance_words
+from biodance.dance.rehearsal import Rehearsal
 from biodance.dance.verify import Margin
 from biodance.lab.c3d.write import write_c3d
 from biodance.motion.kinematics import poses
@@ -97,6 +98,22 @@ def dance_document(result: DanceResult) -> dict[str, Any]:
         "notes": (*result.notes, *(dance.notes if dance else ())),
         "seed": dance.seed if dance else None,
         "compute_s": result.seconds,
+    }
+
+
+def playback_document(found: Rehearsal, film: Path) -> dict[str, Any]:
+    """Return what became of a dance that was played: until when it stands, and how far it is from its plan."""
+    p = found.playback
+    return {
+        "film": str(film),
+        "stays_up": p.stays_up,
+        "fell_s": p.fell,
+        "played_s": float(p.time[-1]),
+        "angle_rms_rad": float(np.sqrt(np.mean(p.angle_error**2))),
+        "tilt_worst_rad": float(p.tilt_error.max()),
+        "pelvis_worst_m": float(p.root_error.max()),
+        "cop_rms_m": float(np.sqrt(np.nanmean(p.zmp_error**2))),
+        "cop_inside_least_m": float(np.nanmin(found.inside)),
     }
 
 

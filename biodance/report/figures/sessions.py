@@ -17,15 +17,17 @@ _PANELS = (("mass", 1.0, "mass (kg)"), ("com y", 1000.0, "centre of mass along t
 """Quantity, factor and title of each panel of the changes."""
 
 
-def changes_figure(changes: "tuple[Difference, ...]") -> "Figure":
-    """Draw what changed in every segment, later less earlier, with 95 % intervals; open where nothing is known."""
+def changes_figure(changes: "tuple[Difference, ...]", certain: "tuple[Difference, ...]") -> "Figure":
+    """Draw what changed in every segment, later less earlier, with 95 % intervals: red what is ``certain``, open where
+    nothing is known.
+    """
     segments = list(dict.fromkeys(row.segment for row in changes))
     place = np.arange(len(segments))[::-1]
     with look():
         drawn = figure(0.8 + 0.22 * len(segments))
         for axes, (quantity, factor, title) in zip(drawn.subplots(1, 2, sharey=True), _PANELS, strict=True):
             for y, row in zip(place, (row for row in changes if row.quantity == quantity), strict=True):
-                colour = (RED if min(row.interval) * max(row.interval) > 0 else BLUE) if row.known else GREY
+                colour = RED if row in certain else BLUE if row.known else GREY
                 axes.plot(factor * np.array(row.interval), [y, y], color=colour, linewidth=1.6)
                 axes.plot(factor * row.value, y, "o", color=colour, markerfacecolor=colour if row.known else "white")
             axes.axvline(0.0, color=BLACK, linewidth=0.7)

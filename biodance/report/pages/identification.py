@@ -36,7 +36,7 @@ def identification_section(found: SessionIdentification) -> str:
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters.update(number=format_number, mm=millimetres, spaced=spaced, small=small)
     template = (files("biodance.report") / "templates" / "identification.html.j2").read_text(encoding="utf-8")
-    one = found.identification
+    one, sure = found.identification, certain_changes(found.changes)
     rows = [(name, segment_rows(one, name)) for name in one.sip.segments] if one.status == "solved" else []
     shown = found.validations or found.fitted[:1]
     return environment.from_string(template).render(
@@ -57,8 +57,8 @@ def identification_section(found: SessionIdentification) -> str:
         search=found.search,
         load=say_load(found.search),
         changes=[row for row in found.changes if row.quantity == "mass"],
-        comparison=svg_address(changes_figure(found.changes)) if found.changes else "",
-        certain=certain_changes(found.changes),
+        comparison=svg_address(changes_figure(found.changes, sure)) if found.changes else "",
+        certain=sure,
         total=len(found.changes),
         performance=found.performance,
         danced=svg_address(excitation_figure(found.performance)) if found.performance else "",

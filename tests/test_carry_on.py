@@ -1,0 +1,132 @@
+"""What one session gives to the next, as commands and functions: a dance performed, a body, a laboratory's file."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from identified_sessions import SUBJECT, body, session_result
+from small_dances import small_dance
+from test_lab_corrections import CORNERS, POINT, trial
+
+import biodance
+from biodance.body.body_file import body_text
+from biodance.cli import run
+from biodance.dance.dance import Dance
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
+from biodance.errors import BiodanceError, SessionRefused, UnknownName
+from biodance.identification.identification import identify_body
+from biodance.pipeline.body import starting_from
+from biodance.pipeline.carry import known_body
+from biodance.pipeline.diagnosis import SessionDiagnosis
+from biodance.pipeline.front_dance import virtual_subject
+from biodance.pipeline.identification import trial_fit
+from biodance.records import Session, Subject
+from biodance.report.write import _accepted
+
+NAN = float("nan")
+
+
+@pytest.fixture(scope="module")
+def danced(tmp_path_factory) -> Path:
+    """Return a folder with a dance and the session of somebody steady who danced it."""
+    folder = tmp_path_factory.mktemp("danced")
+    replace(small_dance(), subject=Subject(65.0, 1.75, "F")).save(folder / "dance.npz")
+    words = ["simulate", "--dance", str(folder / "dance.npz"), "--performer", "steady", "--seed", "3"]
+    assert run([*words, "--out", str(folder / "visit")]) == 0
+    return folder
+
+
+def test_a_dance_is_performed_by_the_person_it_was_designed_for(danced: Path) -> None:
+    names = sorted(path.name for path in (danced / "visit").iterdir())
+    assert names == ["dance_1.c3d", "session.toml", "squat_1.c3d", "squat_2.c3d", "static.c3d", "truth"]
+    truth = json.loads((danced / "visit" / "truth" / "truth.json").read_text())
+    assert truth["subject"] == {"mass_kg": 65.0, "height_m": 1.75, "sex": "F"}
+    assert [one["role"] for one in truth["trials"]] == ["static", "validate", "validate", "fit"]
+    assert Dance.load(danced / "dance.npz").subject.stature == 1.75
+
+
+def test_identify_says_how_well_it_was_danced(danced: Path, capsys: pytest.CaptureFixture[str], monkeypatch) -> None:
+    monkeypatch.setattr("biodance.report.write.page", lambda *_, **__: "a page")
+    words = ["identify", str(danced / "visit"), "--dance", str(danced / "dance.npz"), "--out", str(danced / "out")]
+    assert run([*words, "--json"]) in (0, 1)
+    told = json.loads(capsys.readouterr().out)["performance"]
+    assert told["repeat"] == [1]
+    rows = {row["segment"]: row for row in told["excitation"]}
+    assert len(rows) == 12
+    assert 0 < rows["left_upper_arm"]["reached"] < 1
+    assert rows["left_upper_arm"]["planned"] > rows["right_upper_arm"]["planned"]
+
+
+def test_who_dances_must_be_known() -> None:
+    with pytest.raises(BiodanceError, match="--sex, --height, --mass"):
+        virtual_subject(None, sex=None, height=None, mass=None, age=NAN)
+    with pytest.raises(BiodanceError, match="does not say for whom"):
+        virtual_subject(small_dance(), sex="F", height=None, mass=65.0, age=NAN)
+    known = replace(small_dance(), subject=Subject(65.0, 1.75, "F", 33.0))
+    assert virtual_subject(known, sex=None, height=None, mass=60.0, age=NAN) == Subject(60.0, 1.75, "F", 33.0)
+    with pytest.raises(UnknownName, match="restless"):
+        biodance.simulate(SUBJECT, None, "nowhere", dance=small_dance(), performer="sloppy")
+    with pytest.raises(BiodanceError, match="either a protocol or a dance"):
+        biodance.simulate(SUBJECT, "squat", "nowhere", dance=small_dance())
+
+
+def test_a_body_carried_on_is_known_better_than_the_table(tmp_path: Path) -> None:
+    first, second = session_result(seed=1), session_result(seed=5)
+    assert first.identification is not None
+    one = first.identification.identification
+    (tmp_path / "body.json").write_text(body_text(one.identified, "test"))
+    known = known_body(tmp_path)
+    assert known is not None
+    started, prior, words = starting_from(known, body(), SUBJECT.mass, "Scaled.")
+    assert started.sip.mass.sum() == pytest.approx(SUBJECT.mass)
+    assert "earlier session" in words
+    fits = tuple(fit for t in second.trials if t.trial.role == "fit" and (fit := trial_fit(t)))
+    fresh, carried = identify_body(body(), fits), identify_body(started, fits, prior=prior)
+    mass_sd = [np.sqrt(np.diag(found.belief.covariance)[::10]) for found in (fresh, carried)]
+    assert (mass_sd[1] < 1.001 * mass_sd[0]).all()
+    assert np.median(mass_sd[1] / mass_sd[0]) < 0.98
+    with pytest.raises(SessionRefused, match="another person"):
+        starting_from(known, body(), 90.0, "")
+    with pytest.raises(SessionRefused, match="Give the body"):
+        starting_from(replace(known, sip=replace(known.sip, covariance=0 * known.sip.covariance)), body(), 62.0, "")
+
+
+def test_accepting_writes_lab_file_and_corrected_trials(tmp_path: Path) -> None:
+    shift = np.array([0.03, 0.0, 0.0])
+    wrong = trial(point=POINT + shift, corners=CORNERS + shift)
+    session = Session(SUBJECT, (wrong,), Path("/lab/S01"))
+    cause = Alias("plate_position", "plate1:x", 50.0)
+    place = Finding("plate_position", "plate1:x", (Estimate("shift", 0.03, 0.001, "m"),), (cause,), 1.0, advice="")
+    zero = replace(place, effect="plate_offset", target="Fx", parameters=(Estimate("offset", 5.0, 0.3, "N"),))
+    load = replace(place, effect="added_mass", target="trunk_head", parameters=(Estimate("mass", 2.0, 0.1, "kg"),))
+    found = SessionDiagnosis(Diagnosis(verdict="named, complete", findings=(place, zero, load)))
+    told, files = _accepted(replace(session_result(), session=session), found, tmp_path, ())
+    assert told["trials"] == ("t",)
+    assert told["not_in_recordings"] == ["added_mass trunk_head"]
+    assert "plate_position" in files["lab.toml"]
+    assert "plate_offset" not in files["lab.toml"]  # of today only
+    assert sorted(path.name for path in (tmp_path / "corrected").iterdir()) == [
+        "corrected.toml",
+        "session.toml",
+        "t.c3d",
+    ]
+
+
+def test_a_dance_is_played_and_filmed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("mujoco", reason="MuJoCo is not installed (extra peers)")
+    from PIL import Image
+
+    small_dance().save(tmp_path / "dance.npz")
+    words = ["play", str(tmp_path / "dance.npz"), "--out"]
+    assert run([*words, str(tmp_path / "film.gif"), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["stays_up"]
+    assert told["played_s"] == pytest.approx(3.0)
+    with Image.open(tmp_path / "film.gif") as film:
+        assert film.n_frames == pytest.approx(3.0 * 12.5, abs=2)
+    assert run([*words, str(tmp_path / "film.gif")]) == 2
+    assert "--force" in capsys.readouterr().err
+    assert run([*words, str(tmp_path / "film.avi")]) == 2
+    assert ".gif or .mp4" in capsys.readouterr().err

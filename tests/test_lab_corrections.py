@@ -1,0 +1,129 @@
+"""What was accepted as wrong with a plate is taken off the recordings exactly: the faults are made here, by hand."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from biodance.errors import FileRefused
+from biodance.lab.c3d.ezc3d_object import write_trial
+from biodance.lab.corrections import (
+    PlateCorrection,
+    corrected_session,
+    corrected_trial,
+    corrections_text,
+    joined_corrections,
+    read_corrections,
+)
+from biodance.lab.read import read_trial
+from biodance.pipeline.carry import read_lab, write_corrected
+from biodance.records import Markers, Plate, Session, Source, Subject, Trial, Wrench
+
+TIME = np.arange(0.0, 2.0, 0.001)
+CORNERS = np.array([[0.7, 0.5, 0.0], [0.1, 0.5, 0.0], [0.1, -0.1, 0.0], [0.7, -0.1, 0.0]])
+CENTRE = CORNERS.mean(axis=0)
+SWING = np.sin(2 * np.pi * 0.7 * TIME)
+FORCE = np.stack([30 * SWING, -20 * SWING, 650 + 60 * SWING], axis=1)
+POINT = CENTRE + np.stack([0.1 + 0.04 * SWING, -0.05 + 0.02 * SWING, 0 * SWING], axis=1)
+
+
+def trial(force=FORCE, point=POINT, corners=CORNERS) -> Trial:
+    """Return a trial in which ``force`` (T, 3) N acts at ``point`` (T, 3) m."""
+    wrench = Wrench(TIME, np.hstack([force, np.cross(point, force)]))
+    feet = Markers(("LHEE",), TIME[::10], np.tile([0.4, 0.2, 0.05], (TIME[::10].size, 1, 1)))
+    source = Source(Path("t.c3d"), "", "C3D", 100.0, 1000.0)
+    return Trial("t", "fit", feet, (Plate("plate1", 2, corners, wrench),), source)
+
+
+def off(one: Trial, correction: PlateCorrection) -> float:
+    """Return the largest difference, N or N·m, of the corrected trial from the true one, the delay's ends left out."""
+    found = corrected_trial(one, [correction]).plates[0].wrench.value
+    return float(np.abs(found - trial().plates[0].wrench.value)[50:-50].max())
+
+
+def test_a_plate_that_the_file_puts_elsewhere_is_moved_back() -> None:
+    shift = np.array([0.03, 0.0, 0.0])
+    wrong = trial(point=POINT + shift, corners=CORNERS + shift)
+    correction = PlateCorrection("plate_position", "plate1:x", 0.03)
+    assert off(wrong, correction) < 1e-9
+    np.testing.assert_allclose(corrected_trial(wrong, [correction]).plates[0].corners, CORNERS, atol=1e-12)
+    assert "plate position plate1:x (shift 0.03 m)" in corrected_trial(wrong, [correction]).history[-1]
+
+
+def test_a_turned_plate_is_turned_back() -> None:
+    turn = np.array([[np.cos(0.05), -np.sin(0.05), 0], [np.sin(0.05), np.cos(0.05), 0], [0, 0, 1]])
+    wrong = trial(force=FORCE @ turn.T, point=CENTRE + (POINT - CENTRE) @ turn.T)
+    assert off(wrong, PlateCorrection("plate_rotation", "plate1:z", 0.05)) < 1e-9
+
+
+def test_gain_crosstalk_offset_and_delay_are_taken_off() -> None:
+    local = np.hstack([FORCE, np.cross(POINT - CENTRE, FORCE)])
+    changed = {
+        ("plate_gain", "Fz", 0.04): local * [1, 1, 1.04, 1, 1, 1],
+        ("plate_crosstalk", "Fz->My", 0.01): local + 0.01 * local[:, 2:3] * np.eye(6)[4],
+        ("plate_offset", "plate1:Fx", -6.0): local - 6.0 * np.eye(6)[0],
+    }
+    for cause, value in changed.items():
+        wrench = Wrench(TIME, np.hstack([value[:, :3], value[:, 3:] + np.cross(CENTRE, value[:, :3])]))
+        one = replace(trial(), plates=(Plate("plate1", 2, CORNERS, wrench),))
+        assert off(one, PlateCorrection(*cause)) < 1e-9
+    late = trial()
+    plate = late.plates[0]
+    late = replace(late, plates=(replace(plate, wrench=Wrench(TIME, np.roll(plate.wrench.value, 12, axis=0))),))
+    assert off(late, PlateCorrection("time_delay", "", 0.012)) < 1e-6
+
+
+def test_a_plate_that_is_not_meant_stays_as_it_is() -> None:
+    same = corrected_trial(trial(), [PlateCorrection("plate_position", "plate2:x", 0.03)])
+    np.testing.assert_array_equal(same.plates[0].wrench.value, trial().plates[0].wrench.value)
+    assert not same.history
+
+
+def test_a_lab_file_comes_back_and_adds_up(tmp_path: Path) -> None:
+    first = (PlateCorrection("plate_position", "plate1:x", 0.03, 0.001, 'session "A"'),)
+    later = (PlateCorrection("plate_position", "plate1:x", 0.002), PlateCorrection("plate_gain", "Fz", 0.04))
+    both = joined_corrections(first, later)
+    path = tmp_path / "lab.toml"
+    path.write_text(corrections_text(both))
+    again = read_corrections(path)
+    assert [(one.effect, one.target, round(one.value, 6)) for one in again] == [
+        ("plate_position", "plate1:x", 0.032),
+        ("plate_gain", "Fz", 0.04),
+    ]
+    assert again[0].source.startswith('session "A"')
+    assert read_lab(path).corrections == again
+    assert read_lab(None).corrections == ()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('[corrections.added_mass."trunk"]\nmass = 1', "nothing that can be corrected"),
+        ('[corrections.plate_position."plate1:x"]\nshift = "far"', "expected a number in m"),
+        ('[corrections.plate_position."x"]\nshift = 0.03', "no such target"),
+        ("corrections = 3", "expected tables"),
+        ("[corrections", "is not TOML"),
+    ],
+)
+def test_a_wrong_lab_file_is_refused_in_a_sentence(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "lab.toml").write_text(text)
+    with pytest.raises(FileRefused, match=said):
+        read_corrections(tmp_path / "lab.toml")
+
+
+def test_corrected_trials_are_a_session_that_is_not_corrected_twice(tmp_path: Path) -> None:
+    shift = np.array([0.03, 0.0, 0.0])
+    wrong = trial(point=POINT + shift, corners=CORNERS + shift)
+    write_trial(wrong, tmp_path / "t.c3d")
+    session = Session(Subject(66.0, 1.7, "F", 30.0), (replace(wrong, role="fit"),), tmp_path)
+    made = (PlateCorrection("plate_position", "plate1:x", 0.03),)
+    written, refused = write_corrected(session, (), made, tmp_path / "corrected")
+    assert (written, refused) == (("t",), ())
+    back = read_trial(tmp_path / "corrected" / "t.c3d", role="fit")
+    np.testing.assert_allclose(back.plates[0].wrench.value, trial().plates[0].wrench.value, atol=0.01)
+    folder = replace(session, trials=(back,), folder=tmp_path / "corrected")
+    assert corrected_session(folder, made).trials[0].history == back.history
+    once = corrected_session(session, made)
+    assert corrected_session(once, made).trials[0].history == once.trials[0].history
+    assert (tmp_path / "t.c3d").stat().st_mtime <= (tmp_path / "corrected" / "t.c3d").stat().st_mtime
