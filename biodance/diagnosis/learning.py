@@ -45,9 +45,7 @@ def null_of(problem: Problem, causes: tuple[Candidate, ...]) -> Null:
     return Null(problem.target, every, own + keys, problem.spectrum.band, marker_keys(problem), mass, own + mean_keys)
 
 
-def learn_tolerances(
-    nulls: Iterable[Null], start: Tolerances, *, rounds: int = 10, worth: float = 0.0
-) -> Tolerances:
+def learn_tolerances(nulls: Iterable[Null], start: Tolerances, *, rounds: int = 10, worth: float = 0.0) -> Tolerances:
     """Return the sizes, means and noise under which the null sessions are most probable after ``rounds`` of expectation
     maximisation, and the energies that they leave. Only what has a size in ``start`` is learned; ``start`` is believed
     like ``worth`` sessions more.

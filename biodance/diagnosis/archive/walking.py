@@ -13,7 +13,7 @@ import numpy as np
 
 from biodance.diagnosis.archive.quantities import PlateEvidence, PlateVisit
 from biodance.records import Array
-from biodance.witnesses import Observation, Recording, observe, possible_causes, traces
+from biodance.witnesses import Observation, SeenTrial, observe, possible_causes, traces
 
 _PLACE, _ONSET, _WEIGHT = ("foot_across", "foot_along"), "force_onset", "stride_force"
 _BLIND = 0.03
@@ -39,7 +39,7 @@ class StepRow:
     parts: Mapping[str, float]
 
 
-def step_rows(seen: Recording, labels: Mapping[str, str]) -> list[StepRow]:
+def step_rows(seen: SeenTrial, labels: Mapping[str, str]) -> list[StepRow]:
     """Return what the steps of a trial say of the places of its plates; ``labels`` plate -> by what it is known
     again.
     """
@@ -99,7 +99,7 @@ def placed(rows: Sequence[StepRow], visit: PlateVisit, trial: str) -> list[Plate
 
 
 def of_steps(
-    seen: Recording, visit: PlateVisit, kind: Mapping[str, str], labels: Mapping[str, str]
+    seen: SeenTrial, visit: PlateVisit, kind: Mapping[str, str], labels: Mapping[str, str]
 ) -> list[PlateEvidence]:
     """Return delay and weight that the steps of a trial say of every plate; none where the feet have no markers or no
     step fell on a plate.
