@@ -52,6 +52,8 @@ if TYPE_CHECKING:
     from biodance.pipeline.front_dance import simulate as simulate
     from biodance.pipeline.front_dance import verify_dance as verify_dance
     from biodance.pipeline.identification import SessionIdentification as SessionIdentification
+    from biodance.pipeline.learn import learn_laboratory as learn_laboratory
+    from biodance.pipeline.plates import judge_plates as judge_plates
     from biodance.pipeline.results import SessionResult as SessionResult
     from biodance.pipeline.session import examine as examine
     from biodance.records import Markers as Markers
@@ -84,6 +86,8 @@ HOMES = {
     "pipeline.front": ("SessionComparison", "compare_sessions", "diagnose", "identify"),
     "pipeline.front_dance": ("design_dance", "simulate", "verify_dance"),
     "pipeline.identification": ("SessionIdentification",),
+    "pipeline.learn": ("learn_laboratory",),
+    "pipeline.plates": ("judge_plates",),
     "pipeline.results": ("SessionResult",),
     "pipeline.session": ("examine",),
     "records": ("Markers", "Motion", "Plate", "Session", "Sip", "Subject", "Trial", "Wrench"),

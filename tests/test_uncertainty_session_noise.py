@@ -10,7 +10,6 @@ from biodance.diagnosis.engine import diagnose_trials
 from biodance.records import Markers, Plate, Wrench
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.session_noise import (
-    LEARNED_CAMERAS,
     added_noise,
     camera_noise,
     of_cameras,
@@ -19,6 +18,7 @@ from biodance.uncertainty.session_noise import (
     white_noise,
     with_own_noise,
 )
+from biodance.uncertainty.tolerances import InstrumentNoise
 
 # 5 ---- noise from the session
 
@@ -76,7 +76,7 @@ def test_own_noise_is_added_beyond_what_was_learned_and_limits_follow() -> None:
         return (replace(trial, markers=Markers(tuple("abcd"), time, xyz), plates=()),)
 
     q = motion(1).q[:1]
-    assert not added_noise(body(), recorded(0.9 * LEARNED_CAMERAS), q, np.zeros(3)).any()
+    assert not added_noise(body(), recorded(0.9 * InstrumentNoise().camera), q, np.zeros(3)).any()
     more = added_noise(body(), recorded(3e-4), q, np.zeros(3))
     expected = of_cameras(body(), q, np.zeros(3), noise=np.sqrt(9 - 1) * 1e-4, rate=100.0)
     np.testing.assert_allclose(more, expected, rtol=0.1)

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+    from biodance.diagnosis.heard import Testimony
     from biodance.effects import Gate
 
 
@@ -213,6 +214,8 @@ class Diagnosis:
         What the verdict rests on.
     doubt : str
         Why no cause can be told from what was judged (only standing, markers too far from the body); "" where one can.
+    witnesses : Testimony or None
+        What needs no model of the body: feet on plates, clocks, weights; None where there was nothing to see.
 
     Examples
     --------
@@ -233,6 +236,7 @@ class Diagnosis:
     attention: tuple[Attention, ...] = ()
     judged: tuple[Judged, ...] = ()
     doubt: str = ""
+    witnesses: "Testimony | None" = None
 
     def __repr__(self) -> str:
         return f"Diagnosis({self.told})"

@@ -45,15 +45,46 @@ def null_of(problem: Problem, causes: tuple[Candidate, ...]) -> Null:
     return Null(problem.target, every, own + keys, problem.spectrum.band, marker_keys(problem), mass, own + mean_keys)
 
 
-def learn_tolerances(nulls: Iterable[Null], start: Tolerances, *, rounds: int = 10) -> Tolerances:
+def learn_tolerances(nulls: Iterable[Null], start: Tolerances, *, rounds: int = 10, worth: float = 0.0) -> Tolerances:
     """Return the sizes, means and noise under which the null sessions are most probable after ``rounds`` of expectation
-    maximisation, and the energies that they leave. Only what has a size in ``start`` is learned.
+    maximisation, and the energies that they leave. Only what has a size in ``start`` is learned; ``start`` is believed
+    like ``worth`` sessions more.
     """
     sessions = tuple(nulls)
-    found = maximise(start, lambda known: _improved(sessions, known), lambda known: known.noise, rounds=rounds)
+
+    def improved(known: Tolerances) -> Tolerances:
+        return _beside(start, worth, _improved(sessions, known), len(sessions))
+
+    found = maximise(start, improved, lambda known: known.noise, rounds=rounds)
     left = np.array([_energy(null, found) for null in sessions])
     spread = left.std(axis=0, ddof=1) if len(sessions) > 1 else found.energy_sd
-    return replace(found, energy=left.mean(axis=0), energy_sd=spread)
+    share = worth / (worth + len(sessions))
+    mean = (1 - share) * left.mean(axis=0) + share * start.energy
+    apart = share * (1 - share) * (left.mean(axis=0) - start.energy) ** 2
+    variance = (1 - share) * spread**2 + share * start.energy_sd**2 + apart
+    return replace(found, energy=mean, energy_sd=np.sqrt(variance))
+
+
+def _beside(start: Tolerances, worth: float, learned: Tolerances, count: int) -> Tolerances:
+    """Return what ``count`` sessions say beside what ``worth`` sessions said before: mean squares."""
+    share = worth / (worth + count)
+    sizes = {
+        key: float(np.sqrt((1 - share) * size**2 + share * start.size(key) ** 2)) for key, size in learned.sizes.items()
+    }
+    return replace(learned, sizes=sizes, noise=(1 - share) * learned.noise + share * start.noise)
+
+
+def shown_by(nulls: Iterable[Null], found: Tolerances) -> dict[str, float]:
+    """Return by key how many coefficients of its size the sessions show: 1 for each that is known far better than its
+    size, 0 for one that no movement showed.
+    """
+    count: dict[str, float] = {}
+    for null in nulls:
+        some = _posterior(null, found)
+        for key, variance in zip(null.keys, some.variance, strict=True):
+            if key and np.isfinite(variance):
+                count[key] = count.get(key, 0.0) + max(0.0, 1 - float(variance) / found.size(key) ** 2)
+    return count
 
 
 @dataclass(frozen=True, eq=False)

@@ -88,6 +88,7 @@ def flat_level(values: Array, rate: float) -> float | None:
     lengths, levels = stops - starts, values[starts]
     highest, lowest = values.max(), values.min()
     between = (levels < highest - 2 * _SAME * span) & (levels > lowest + 2 * _SAME * span)
+    between &= np.abs(levels) > AT_ZERO * np.abs(values).max()  # an empty plate that is set to zero is flat, too
     elsewhere = lengths[between].max(initial=1)
     for extreme in (highest, lowest):
         at = np.abs(levels - extreme) <= 2 * _SAME * span

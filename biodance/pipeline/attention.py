@@ -10,6 +10,7 @@ import numpy as np
 from biodance.diagnosis.adequacy import LIMIT, alarming
 from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Finding
 from biodance.diagnosis.engine import STRANGE
+from biodance.diagnosis.heard import Testimony
 from biodance.diagnosis.problem import Look
 from biodance.identification.added_mass import LoadSearch
 from biodance.pipeline.looked_at import reasons_left_out, seconds_of
@@ -83,6 +84,7 @@ def told(one: Diagnosis, result: SessionResult, judged: tuple[Judged, ...]) -> D
     off as well.
     """
     outside = tuple(check for check in result.all_checks if not check.inside)
+    judged = stepped(judged, one.witnesses)
     found = [finding.target.replace("_", " ") for finding in one.findings if finding.target]
     doubts = [text for text in result.doubts if not any(target in text for target in found)]
     if one.verdict == "named, complete" and (outside or doubts or any(row.missed for row in judged)):
@@ -126,8 +128,9 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
         text = f"Nothing wrong in what could be judged ({rests_on}){beside}." if beside or one.doubt else (
             f"Nothing wrong was found in {rests_on}. Faults below the sizes that it could have seen stay unseen."
         )  # fmt: skip
-    elif not rests_on:
-        level, text = "warn", f"Cannot tell whether anything is wrong: nothing could be judged{beside}."
+    elif not one.adequacy:
+        level, where = "warn", f" in {rests_on}: no movement could be compared with a body" if rests_on else ""
+        text = f"Cannot tell whether anything is wrong{where or ': nothing could be judged'}{beside}.{_heard(one)}"
     elif one.doubt.startswith(_FITS):
         level, text = "warn", f"Cannot tell whether anything is wrong in {rests_on}: {one.doubt}{beside}."
     elif one.doubt:
@@ -212,10 +215,12 @@ def _level(status: str) -> Level:
 def _beside(judged: tuple[Judged, ...], outside: tuple[Check, ...]) -> str:
     """Return what was not judged and which checks failed, to go on a sentence with."""
     missed: dict[str, list[str]] = {}
+    stepped_only = [row.trial for row in judged if row.missed and row.seconds > 0]
     for row in judged:
-        if row.missed:
+        if row.missed and not row.seconds > 0:
             missed.setdefault(_short(row.why_not), []).append(row.trial)
     parts = [f"; not judged: {_listed(names)}, because: {why}" for why, names in missed.items()]
+    parts += [f"; judged only by steps on plates: {_listed(stepped_only)}"] if stepped_only else []
     checks = [f"{one.what}, {one.where} ({one.value}, should be {one.limit})" for one in outside]
     return "".join(parts) + (f"; outside the limit: {_listed(checks)}" if checks else "")
 
@@ -227,6 +232,25 @@ def _listed(names: Sequence[str]) -> str:
 
 def _short(reason: str) -> str:
     return reason.split(". ")[0].rstrip(".")
+
+
+def _heard(one: Diagnosis) -> str:
+    """Return that the witnesses were asked, as a sentence; "" where they saw nothing."""
+    trials = len({o.trial for o in one.witnesses.observations}) if one.witnesses else 0
+    return f" Plates and clocks show nothing wrong in {trials} trial{'s' * (trials > 1)}." if trials else ""
+
+
+def stepped(rows: tuple[Judged, ...], heard: Testimony | None) -> tuple[Judged, ...]:
+    """Return what a verdict rests on with the steps that only the witnesses could judge: seconds of one foot alone on
+    a plate. Such a trial still misses the comparison with a body.
+    """
+    alone = heard.seconds if heard else {}
+    return tuple(
+        replace(row, seconds=alone[row.trial], why_not=f"only by its steps: {row.why_not}")
+        if row.missed and alone.get(row.trial, 0.0) > 0
+        else row
+        for row in rows
+    )
 
 
 def _sentence(beside: str) -> str:
@@ -253,4 +277,8 @@ def _incomplete(one: Diagnosis, rests_on: str) -> str:
     """Return what is more to say of a diagnosis that is not complete."""
     if STRANGE in one.notes or alarming(one.adequacy) > LIMIT:
         return f"Something more is wrong in {rests_on} that no known cause explains: {_where(one)}."
-    return f"What else there is to see in {rests_on} is as without fault." if rests_on else "Nothing else was judged."
+    return (
+        f"What else there is to see in {rests_on} is as without fault."
+        if rests_on and one.adequacy
+        else ("Nothing else was judged.")
+    )

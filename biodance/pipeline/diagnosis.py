@@ -14,7 +14,10 @@ from biodance.diagnosis.accept import Residuals, accept, case_fit, gain_by_namin
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
 from biodance.diagnosis.engine import Examined, diagnose_trials, without_names
 from biodance.diagnosis.foresight import Foresight, foresee, session_of
+from biodance.diagnosis.heard import hear
+from biodance.diagnosis.joined import with_witnesses
 from biodance.diagnosis.problem import Look
+from biodance.diagnosis.testimony import weigh
 from biodance.discovery import Chosen
 from biodance.effects import Case, DiscreteEffect, Effect, Gate, causes, gates
 from biodance.errors import BiodanceError, NotSolved, TrialRefused
@@ -22,7 +25,7 @@ from biodance.identification.identification import Identification, identify_body
 from biodance.identification.rival_bodies import expect_unloaded
 from biodance.pipeline.attention import judged_trials, told
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES, SessionIdentification
-from biodance.pipeline.looked_at import Own, all_looks, cases_of, left_out, looked_at, looks, own_tolerances
+from biodance.pipeline.looked_at import all_looks, cases_of, left_out, looked_at, looks, own_tolerances
 from biodance.pipeline.results import SessionResult
 from biodance.records import Role, Sip
 from biodance.threads import one_thread
@@ -122,10 +125,13 @@ def diagnose_session(
     Where nothing can be judged, the verdict is "unexplained", and the first sentence says "Cannot tell".
     """
     found = _diagnosed(result, reference=reference, tolerances=tolerances, effects=effects, tell=tell)
+    tell("asking the witnesses: feet on plates, clocks, weights")
+    heard = hear(result.session, effects)
+    whole = with_witnesses(found.diagnosis, weigh(heard), heard, judged=found.examined is not None)
     if mended:
-        found = replace(found, diagnosis=_with_mended_labels(found.diagnosis, mended), mended=result)
+        whole, found = _with_mended_labels(whole, mended), replace(found, mended=result)
     used = looked_at(result.trials) if found.examined else ()
-    return replace(found, diagnosis=told(found.diagnosis, result, judged_trials(result, used)))
+    return replace(found, diagnosis=told(whole, result, judged_trials(result, used)))
 
 
 def _with_mended_labels(diagnosis: Diagnosis, checks: tuple[Gate, ...]) -> Diagnosis:
@@ -159,10 +165,10 @@ def _diagnosed(
     checks = gates(result.session, cases_of(result.body, all_looks(result.trials)), chosen=asked)
     failed = tuple(gate for gate in checks if not gate.ok)
     if result.body is None or not fitted:
-        why = f"There is nothing to diagnose. {result.body_source} {_reasons(result)}".strip()
+        why = f"No movement could be compared with a body. {result.body_source} {_reasons(result)}".strip()
         return SessionDiagnosis(_by_checks(checks) if failed else _cannot_tell(checks, why, *result.doubts))
     tell("looking for causes")
-    own = Own(tolerances) if tolerances else own_tolerances(result.body, fitted, result.session.trials)
+    own = own_tolerances(result.body, fitted, result.session.trials, known=tolerances)
     try:
         examined = diagnose_trials(
             result.body,

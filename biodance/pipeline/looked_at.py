@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.body.tables.error_sizes import error_size
 from biodance.diagnosis.problem import Look
 from biodance.diagnosis.spectrum import SHORTEST_RUN, spectrum, thinned
 from biodance.effects import Case
@@ -128,18 +127,22 @@ def seconds_of(look: Look) -> float:
     return float(sum(stop - start for start, stop in runs(look.use) if stop - start >= SHORTEST_RUN * rate) / rate)
 
 
-def own_tolerances(body: Body, chosen: tuple[Look, ...], recorded: tuple[Trial, ...] = ()) -> Own:
-    """Return the shipped tolerances as they hold for these recordings: with markers that move more on the body than
-    those of virtual sessions, with the noise of their own cameras and plates as ``recorded`` shows it, and with the
-    unrest of a person who stands still where standing is looked at.
+def own_tolerances(
+    body: Body, chosen: tuple[Look, ...], recorded: tuple[Trial, ...] = (), *, known: Tolerances | None = None
+) -> Own:
+    """Return the ``known`` tolerances (a laboratory's own; by default the shipped ones) as they hold for these
+    recordings: with markers that move more on the body than where they were learned, with the noise of their own
+    cameras and plates as ``recorded`` shows it, and with the unrest of a person who stands still where standing is
+    looked at.
     """
-    found, notes = shipped(), []
+    found, notes = known or shipped(), []
     usable_looks = [look for look in chosen if look.motion.q.size]
     if recorded and usable_looks:
         middle = np.array([look.motion.q[len(look.motion.q) // 2] for look in usable_looks[:_POSTURES]])
-        added = added_noise(body, recorded, middle, standing_point(tuple(map(_fit, chosen))))
+        about = standing_point(tuple(map(_fit, chosen)))
+        added = added_noise(body, recorded, middle, about, known=found.instruments)
         found = with_own_noise(found, added, float(body.sip.mass.sum()))
-    factor = soft_tissue(chosen) / error_size("marker_distance", "first quartile", state="after")
+    factor = soft_tissue(chosen) / found.instruments.distance
     if factor > MORE:
         sizes = {key: size * (factor if key.startswith(_SOFT) else 1.0) for key, size in found.sizes.items()}
         found = replace(found, sizes=sizes)
@@ -148,7 +151,7 @@ def own_tolerances(body: Body, chosen: tuple[Look, ...], recorded: tuple[Trial, 
             f"quartile): soft "
             "tissue and joints may err as much more, and no cause is named from such movement. Tolerances learned on "
             "sessions of your own "
-            "laboratory without fault (biodance.diagnosis.learning) hold for it."
+            "laboratory without fault (biodance learn) hold for it."
         )
     standing = tuple(look for look in chosen if look.trial.role == "static" and seconds_of(look) > 0)
     if standing:

@@ -214,10 +214,29 @@ def print_diagnosis(found: dict[str, Any], console: Console) -> None:
         low, high = worst["band_hz"]
         where = f"{worst['channel']}, {low:g} to {high:g} Hz, trial {worst['trial']}"
         console.print(f"left unexplained: {escape(where)} ({worst['z']:.0f} times what sessions without fault vary)")
+    _print_witnesses(found, console)
     for note in found["notes"]:
         console.print(f"note: {escape(note)}", soft_wrap=True)
     if "accepted" in found:
         _print_accepted(found["accepted"], console)
+
+
+def _print_witnesses(found: dict[str, Any], console: Console) -> None:
+    """Print which causes the witnesses saw, how well, what they could not tell apart, and to what they were blind."""
+    seen = [row for row in found["witness_table"] if row["witnesses"]]
+    if not found["witnesses"]:
+        return
+    table = Table(box=None, pad_edge=False)
+    for heading in ("cause", "seen to", "by the witnesses", "not told from"):
+        table.add_column(heading)
+    for row in seen:
+        by = ", ".join(name.replace("_", " ") for name in row["witnesses"])
+        cause = f"{row['effect'].replace('_', ' ')} {row['target']}"
+        table.add_row(escape(cause), escape(f"± {row['sd']:.2g} {row['unit']}"), by, escape(", ".join(row["alike"])))
+    console.print(table)
+    blind = [f"{row['effect'].replace('_', ' ')} {row['target']}" for row in found["witness_table"] if row not in seen]
+    if blind:
+        console.print(f"witnesses are blind to: {escape(', '.join(blind))}", soft_wrap=True)
 
 
 def print_findings(findings: Sequence[MachineFinding], console: Console) -> None:

@@ -18,7 +18,7 @@ from biodance.records import Array, Markers, Motion, Plate, Trial
 from biodance.spatial import quaternion_matrix
 from biodance.uncertainty.bands import BANDS, Bands
 from biodance.uncertainty.noise import Noise
-from biodance.uncertainty.tolerances import REFERENCE_PERSON, Tolerances
+from biodance.uncertainty.tolerances import REFERENCE_PERSON, InstrumentNoise, Tolerances
 
 _ORDER = 4
 _GAIN = np.sqrt(70.0)
@@ -29,10 +29,6 @@ _ENOUGH = 50
 """Samples below which no noise is estimated."""
 _LEVER = 0.03
 """m: a joint whose markers move less than this per rad is not carried by them alone; its neighbours in time hold it."""
-LEARNED_CAMERAS = 1.0e-4
-"""m per axis: what `camera_noise` says of the sessions from which ``null_sessions.toml`` was learned."""
-LEARNED_PLATES = np.array([0.0077, 0.0077, 0.0304, 0.0068, 0.0099, 0.0032])
-"""N, N·m per root Hz: what `plate_noise` says of the same sessions."""
 
 
 def white_noise(samples: Array) -> Array:
@@ -113,15 +109,19 @@ def of_plates(density: Array, count: int, bands: Bands = BANDS) -> Array:
     return np.diag(count * density**2 * bands.rate / 2)
 
 
-def added_noise(body: Body, recorded: Iterable[Trial], postures: Array, about: Array) -> Array:
+def added_noise(
+    body: Body, recorded: Iterable[Trial], postures: Array, about: Array, *, known: InstrumentNoise | None = None
+) -> Array:
     """Return (B, 6, 6): how much larger the covariance of one coefficient is with the cameras and plates of the trials
-    as ``recorded`` than where tolerances were learned; never smaller: what is quieter may be filtered.
+    as ``recorded`` than with the ``known`` ones, where tolerances were learned; never smaller: what is quieter may be
+    filtered.
     """
     trials = tuple(recorded)
     markers = [one.markers for one in trials if one.markers is not None and one.markers.time.size > 1]
     cameras, plates = camera_noise(markers), plate_noise(plate for one in trials for plate in one.plates)
-    beyond = np.sqrt(max(0.0, cameras**2 - LEARNED_CAMERAS**2))
-    density = np.sqrt(np.maximum(0.0, plates**2 - LEARNED_PLATES**2))
+    usual = known or InstrumentNoise()
+    beyond = np.sqrt(max(0.0, cameras**2 - usual.camera**2))
+    density = np.sqrt(np.maximum(0.0, plates**2 - np.array(usual.plate) ** 2))
     count = max((len(one.plates) for one in trials), default=1)
     out = np.tile(of_plates(density, count), (len(BANDS), 1, 1))
     if beyond > 0:

@@ -33,6 +33,32 @@ CALIBRATED = ("joint_centre", "tilt")
 """Quantities that a functional calibration changes."""
 
 
+@dataclass(frozen=True)
+class InstrumentNoise:
+    """How quiet the recordings were from which tolerances were learned; those that come with biodance unless said.
+
+    Parameters
+    ----------
+    camera : float
+        m per axis, white noise of a marker (`session_noise.camera_noise`).
+    plate : tuple of float
+        (6,) N, N·m per root Hz, noise density of a plate (`session_noise.plate_noise`).
+    marker_distance : float
+        m: root mean square distance of a marker to the body, first quartile over the markers; NaN = that of the table
+        of sizes.
+    """
+
+    camera: float = 1.0e-4
+    plate: tuple[float, ...] = (0.0077, 0.0077, 0.0304, 0.0068, 0.0099, 0.0032)
+    marker_distance: float = float("nan")
+
+    @property
+    def distance(self) -> float:
+        """m: the distance of a marker to the body that is usual."""
+        known = np.isfinite(self.marker_distance)
+        return self.marker_distance if known else error_size("marker_distance", "first quartile", state="after")
+
+
 @dataclass(frozen=True, eq=False)
 class Tolerances:
     """``sizes`` standard deviation by key: an effect and its target (``plate_gain Fz``), a group of elementary errors
@@ -53,6 +79,7 @@ class Tolerances:
     origin: str = ""
     means: Mapping[str, float] = field(default_factory=dict)
     accuracy: Mapping[str, float] = field(default_factory=dict)
+    instruments: "InstrumentNoise" = field(default_factory=InstrumentNoise)
 
     def __post_init__(self) -> None:
         bands = len(self.noise)
@@ -151,23 +178,49 @@ def tolerances_of(raw: Mapping[str, Any]) -> Tolerances:
         raw["origin"],
         raw.get("means", {}),
         raw.get("accuracy", {}),
+        _instruments(raw.get("instruments", {})),
     )
 
 
-def to_toml(found: Tolerances) -> str:
-    """Return the tolerances as the text of a TOML file that `read_tolerances` reads."""
-    lines = [f'origin = "{found.origin}"', f"threshold = {found.threshold:.4g}"]
+def _instruments(raw: Mapping[str, Any]) -> InstrumentNoise:
+    """Return the instruments of a table ``[instruments]``; those that come with biodance without one."""
+    usual = InstrumentNoise()
+    return InstrumentNoise(
+        float(raw.get("camera_m", usual.camera)),
+        tuple(map(float, raw.get("plate_n_per_root_hz", usual.plate))),
+        float(raw.get("marker_distance_m", usual.marker_distance)),
+    )
+
+
+def to_toml(found: Tolerances, *, under: str = "") -> str:
+    """Return the tolerances as the text of a TOML file that `read_tolerances` reads; ``under`` the name of a table
+    that holds them ("" for none).
+    """
+    prefix = f"{under}." if under else ""
+    head = [f"[{under}]"] if under else []
+    lines = [*head, f'origin = "{found.origin}"', f"threshold = {found.threshold:.4g}"]
     for name in ("energy", "energy_sd"):
         rows = [f"  [{', '.join(f'{x:.4g}' for x in row)}]," for row in getattr(found, name)]
         lines += [f"{name} = [", *rows, "]"]
     lines.append("noise = [")
     for band in found.noise:
         lines += ["  [", *(f"    [{', '.join(f'{x:.5g}' for x in row)}]," for row in band), "  ],"]
-    lines += ["]", "", "[sizes]"]
+    lines += ["]", "", *_instruments_text(found.instruments, prefix), "", f"[{prefix}sizes]"]
     lines += [f'"{key}" = {value:.9g}' for key, value in sorted(found.sizes.items())]
-    lines += ["", "[means]"] + [f'"{key}" = {value:.4g}' for key, value in sorted(found.means.items())]
-    lines += ["", "[accuracy]"] + [f'"{key}" = {value:.4g}' for key, value in sorted(found.accuracy.items())]
+    lines += ["", f"[{prefix}means]"] + [f'"{key}" = {value:.4g}' for key, value in sorted(found.means.items())]
+    lines += ["", f"[{prefix}accuracy]"] + [f'"{key}" = {value:.4g}' for key, value in sorted(found.accuracy.items())]
     return "\n".join(lines) + "\n"
+
+
+def _instruments_text(found: InstrumentNoise, prefix: str) -> list[str]:
+    """Return the table ``[instruments]``."""
+    known = np.isfinite(found.marker_distance)
+    return [
+        f"[{prefix}instruments]",
+        f"camera_m = {found.camera:.4g}",
+        f"plate_n_per_root_hz = [{', '.join(f'{x:.4g}' for x in found.plate)}]",
+        *([f"marker_distance_m = {found.marker_distance:.4g}"] if known else []),
+    ]
 
 
 def key_of(name: str, target: str) -> str:

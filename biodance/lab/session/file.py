@@ -19,11 +19,15 @@ filter.cutoff = 6
 ``[markers] map = {LASI = "left_asis", BACK4 = "trunk_head"}`` says it here: which label is which landmark, or sits on
 which segment.
 
+``[session]`` may say ``date`` (2026-03-05), ``lab``, ``operator`` and ``condition``.
+
 A ``subject.toml`` or ``session.toml`` in the folder above (the subject's folder) has the same keys and fills in what
 the session's own file leaves out.
 """
 
 from dataclasses import dataclass, field
+from datetime import date as day
+from datetime import datetime
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -68,7 +72,17 @@ class MarkersEntry(_Entry):
     map: dict[str, str] | None = None
 
 
+class VisitEntry(_Entry):
+    """The table ``[session]``: when, where and by whom it was recorded."""
+
+    date: str | datetime | day | None = None
+    lab: str | None = None
+    operator: str | None = None
+    condition: str | None = None
+
+
 class _Contents(_Entry):
+    session: VisitEntry = VisitEntry()
     subject: SubjectEntry = SubjectEntry()
     markers: MarkersEntry = MarkersEntry()
     trials: dict[str, TrialEntry] = {}
@@ -78,7 +92,8 @@ class _Contents(_Entry):
 @dataclass(frozen=True)
 class SessionFile:
     """What all files of the chain say together: ``subject``, ``trials`` by name or pattern (the innermost file first),
-    ``read`` paths, ``settings`` with what ``[settings]`` changes; ``marker_set`` the name or file of the set that was
+    ``read`` paths, ``visit`` when and where; ``settings`` with what ``[settings]`` changes; ``marker_set`` the name or
+    file of the set that was
     worn, "" where none is said (see `marker_sets.read_marker_set`).
     """
 
@@ -87,6 +102,7 @@ class SessionFile:
     read: tuple[Path, ...] = field(default=())
     settings: Settings = USUAL
     marker_set: str = ""
+    visit: VisitEntry = field(default_factory=VisitEntry)
 
     def role(self, name: str) -> Role | None:
         """Return the role of a trial: by its exact name, else by the first pattern that fits; upper and lower case
@@ -122,11 +138,20 @@ def read_session_file(folder: Path) -> SessionFile:
     paths = [place / name for place in (folder.parent, folder) for name in FILES if (place / name).is_file()]
     contents = [_read(path) for path in paths]
     said: dict[str, Any] = {}
+    visit: dict[str, Any] = {}
     for content in contents:
         said |= content.subject.model_dump(exclude_none=True)
+        visit |= content.session.model_dump(exclude_none=True)
     trials = tuple((key, entry) for content in reversed(contents) for key, entry in content.trials.items())
     worn = [name for path, content in zip(paths, contents, strict=True) if (name := _marker_set(path, content.markers))]
-    return SessionFile(SubjectEntry(**said), trials, tuple(paths), _settings(paths, contents), worn[-1] if worn else "")
+    return SessionFile(
+        SubjectEntry(**said),
+        trials,
+        tuple(paths),
+        _settings(paths, contents),
+        worn[-1] if worn else "",
+        VisitEntry(**visit),
+    )
 
 
 def _settings(paths: list[Path], contents: list[_Contents]) -> Settings:
@@ -182,7 +207,12 @@ def _sentence(path: Path, fault: Any) -> str:
 
 
 def _legal_keys(table: list[str]) -> list[str]:
-    models: dict[str, type[BaseModel]] = {"subject": SubjectEntry, "trials": TrialEntry, "markers": MarkersEntry}
+    models: dict[str, type[BaseModel]] = {
+        "session": VisitEntry,
+        "subject": SubjectEntry,
+        "trials": TrialEntry,
+        "markers": MarkersEntry,
+    }
     return list(models.get(table[0] if table else "", _Contents).model_fields)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from biodance.diagnosis.diagnosis import Alias, Finding, Gain, Unobservable
 from biodance.diagnosis.foresight import Foresight
+from biodance.diagnosis.heard import Testimony, sights
 from biodance.identification.identification import Identification
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.records.attention import Attention, Judged
@@ -129,4 +130,43 @@ def diagnosis_document(found: SessionDiagnosis) -> dict[str, Any]:
         "masses": {"before": _masses(found.before), "accepted": _masses(found.accepted)},
         "failures": found.failures,
         "notes": one.notes,
+        "witnesses": _witnesses(one.witnesses),
+        "witness_table": _sights(one.witnesses),
     }
+
+
+def _witnesses(heard: Testimony | None) -> list[dict[str, Any]]:
+    """Return every observation; ``cause`` is the one that it sees best, "" where it is blind to all."""
+    return [
+        {
+            "witness": o.witness,
+            "cause": " ".join(filter(None, heard.strongest(i))),
+            "what": o.what,
+            "value": o.value,
+            "sd": o.sd,
+            "unit": o.unit,
+            "expected": o.expected,
+            "expected_sd": o.expected_sd,
+            "z": o.z,
+            "trial": o.trial,
+            "counts": o.counts,
+        }
+        for i, o in enumerate(heard.observations if heard else ())
+        if heard
+    ]
+
+
+def _sights(heard: Testimony | None) -> list[dict[str, Any]]:
+    """Return how well each cause was seen; an ``sd`` of null: every witness was blind to it."""
+    return [
+        {
+            "effect": s.effect,
+            "target": s.target,
+            "sd": s.sd,
+            "unit": s.unit,
+            "witnesses": s.witnesses,
+            "alike": [f"{effect} {target}".strip() for effect, target in s.alike],
+            "would_be_seen_by": s.would,
+        }
+        for s in (sights(heard) if heard else ())
+    ]

@@ -5,8 +5,10 @@ what changes.
 import sys
 from dataclasses import dataclass
 from importlib.resources import files
+from typing import Any
 
 from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Estimate
+from biodance.diagnosis.heard import Testimony, sights
 from biodance.effects import discrete_effects, effects
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.provenance import Provenance
@@ -144,4 +146,22 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
         adequacy=svg_address(adequacy_figure(one.adequacy)) if one.adequacy else "",
         limits=svg_address(limits_figure(one.limits)) if one.limits else "",
         gain=one.findings[0].gain if one.findings else None,
+        witnesses=_witnesses(one.witnesses),
     )
+
+
+def _witnesses(heard: Testimony | None) -> dict[str, Any] | None:
+    """Return the table causes x witnesses with its blind rows in words, and all observations; None without any."""
+    if heard is None:
+        return None
+    rows = sights(heard)
+    blind: dict[str, list[str]] = {}
+    for row in rows:
+        if not row.witnesses:
+            blind.setdefault(" ".join(row.would), []).append(named(row.effect, row.target))
+    return {
+        "names": list(dict.fromkeys(name for row in rows for name in row.witnesses)),
+        "seen": [row for row in rows if row.witnesses],
+        "blind": [("; ".join(causes), would) for would, causes in blind.items()],
+        "observations": sorted(heard.observations, key=lambda one: -abs(one.z)),
+    }

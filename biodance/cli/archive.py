@@ -1,0 +1,71 @@
+"""Commands on the archive of a laboratory: its plates over time, its own tolerances."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from biodance.cli.app import DONE, NEEDS_A_PERSON, ForceOption, JsonOption, OutOption, app, print_json, progress
+
+
+@app.command(name="plates")
+def plates_command(archive: Path, *, out: OutOption, json: JsonOption = False, force: ForceOption = False) -> int:
+    """Judge the sessions of one laboratory together: a card per plate over time, what changed when, who stands out.
+
+    Parameters
+    ----------
+    archive
+        Folder with session folders at any depth, or with a table trials.csv beside text recordings of one plate.
+    """
+    from rich.console import Console
+
+    from biodance.lab.session.results_folder import results_folder
+    from biodance.pipeline.plates import judge_plates
+    from biodance.report.pages.plates import write_plates
+    from biodance.report.terminal_plates import print_plates
+
+    with progress() as tell:
+        folder = results_folder(out, archive, force=force)
+        found = judge_plates(archive, tell=tell)
+        tell("writing the page")
+        document = write_plates(found, folder)
+    if json:
+        print_json(document)
+    else:
+        print_plates(document, Console())
+        sys.stdout.write(f"{folder / 'report.html'}\n")
+    return NEEDS_A_PERSON if found.judgement.findings or found.refused else DONE
+
+
+@app.command(name="learn")
+def learn_command(
+    archive: Path,
+    *,
+    out: Annotated[Path, Parameter(name="--out", help="The file to write, lab.toml; never over an existing one.")],
+    json: JsonOption = False,
+) -> int:
+    """Learn from a laboratory's own sessions without fault how large everything is that is no fault.
+
+    Parameters
+    ----------
+    archive
+        Folder with session folders at any depth.
+    """
+    from rich.console import Console
+
+    from biodance.pipeline.learn import learn_laboratory
+    from biodance.report.lab_file import learned_document, refuse_existing, write_lab_file
+    from biodance.report.terminal_plates import print_learned
+
+    refuse_existing(out)
+    with progress() as tell:
+        found = learn_laboratory(archive, tell=tell)
+        write_lab_file(found, out)
+    document = learned_document(found)
+    if json:
+        print_json(document)
+    else:
+        print_learned(document, Console())
+        sys.stdout.write(f"{out}\n")
+    return NEEDS_A_PERSON if found.left_out else DONE

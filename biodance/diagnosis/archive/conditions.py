@@ -1,0 +1,157 @@
+"""What trials of one kind read otherwise than those of another kind on the same day: a pad that nobody zeroed, a
+shoe, a support.
+
+Within a visit the person and the plate are the same, so that the difference between kinds of trial is neither; what all
+persons share of it lies on the plate, what only one has is that person's.
+"""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from biodance.diagnosis.archive.changes import ALARM
+from biodance.diagnosis.archive.pooling import Pooled, pool
+from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES, PlateEvidence, PlateVisit
+from biodance.records import Array
+
+_BORROWED = 4.0
+"""Degrees of freedom that a visit borrows from the others' scatter."""
+
+
+@dataclass(frozen=True, eq=False)
+class ConditionEffect:
+    """What trials with ``factor`` = ``level`` read more of ``quantity`` on ``plate`` than those with ``base``: in each
+    of the ``visits``, and ``shared`` by them.
+    """
+
+    plate: str
+    quantity: str
+    factor: str
+    level: str
+    base: str
+    visits: tuple[PlateVisit, ...]
+    shared: Pooled
+
+    @property
+    def persons(self) -> Mapping[str, tuple[float, float]]:
+        """Person -> value and standard deviation, of those whose 95 % interval keeps the sign of what all share."""
+        sign = np.sign(self.shared.mean)
+        return MappingProxyType(
+            {
+                visit.person: (float(value), float(sd))
+                for visit, value, sd in zip(self.visits, self.shared.own, self.shared.own_sd, strict=True)
+                if sign * value - 1.96 * sd > 0
+            }
+        )
+
+
+def condition_effects(observations: Sequence[PlateEvidence]) -> tuple[ConditionEffect, ...]:
+    """Return the effects of conditions that matter and that chance does not explain, each quantity, plate and level
+    tested with its share of the alarm rate; one visit alone tells none, for its zero may have jumped in between.
+    """
+    tested = [effect for some in _kinds(observations) for effect in _effects(some)]
+    return tuple(
+        one
+        for one in tested
+        if one.shared.p < ALARM / len(tested) and abs(one.shared.mean) >= PLATE_QUANTITIES[one.quantity].matters
+    )
+
+
+def without_conditions(
+    observations: Sequence[PlateEvidence], effects: Sequence[ConditionEffect]
+) -> tuple[PlateEvidence, ...]:
+    """Return the observations of the base conditions: the others read what is not the plate's."""
+    odd = {(one.quantity, one.factor, one.level) for one in effects}
+    return tuple(
+        one
+        for one in observations
+        if not any((one.quantity, factor, level) in odd for factor, level in one.conditions.items())
+    )
+
+
+def _kinds(observations: Sequence[PlateEvidence]) -> list[list[PlateEvidence]]:
+    """Return the observations apart by quantity and plates, where trials say in what they differ."""
+    kinds: dict[tuple[str, tuple[str, ...]], list[PlateEvidence]] = {}
+    for one in observations:
+        if one.conditions:
+            kinds.setdefault((one.quantity, tuple(sorted(one.plates))), []).append(one)
+    return list(kinds.values())
+
+
+def _effects(some: list[PlateEvidence]) -> list[ConditionEffect]:
+    """Return what every level of every factor changes, pooled over the visits that have it beside the base."""
+    bases = {factor: _base(some, factor) for factor in sorted({name for one in some for name in one.conditions})}
+    visits = {visit: [one for one in some if one.visit == visit] for visit in sorted({o.visit for o in some}, key=str)}
+    spread = _pooled_scatter(list(visits.values()), bases)
+    found: dict[tuple[str, str], list[tuple[PlateVisit, float, float]]] = {}
+    for visit, own in visits.items():
+        for key, value, sd in _differences(own, bases, spread):
+            found.setdefault(key, []).append((visit, value, sd))
+    return [
+        ConditionEffect(
+            "+".join(sorted(some[0].plates)),
+            some[0].quantity,
+            factor,
+            level,
+            bases[factor],
+            tuple(row[0] for row in rows),
+            pool(np.array([row[1] for row in rows]), np.array([row[2] for row in rows])),
+        )
+        for (factor, level), rows in sorted(found.items())
+        if len({row[0].person for row in rows}) > 1
+    ]
+
+
+def _base(some: list[PlateEvidence], factor: str) -> str:
+    """Return the level that most trials have; of equally frequent ones that which reads nearest to nothing wrong."""
+    count = Counter(one.conditions[factor] for one in some if factor in one.conditions)
+    most = [level for level, n in count.items() if n >= 0.9 * max(count.values())]
+    middle = {
+        level: abs(float(np.median([one.value for one in some if one.conditions.get(factor) == level])))
+        for level in most
+    }
+    return min(most, key=lambda level: (middle[level], level))
+
+
+def _dummies(own: list[PlateEvidence], bases: Mapping[str, str]) -> tuple[Array, list[tuple[str, str]]]:
+    """Return the columns (n, 1 + m) of a visit's mean and levels, and which level each of the m is."""
+    levels = sorted(
+        {(f, one.conditions[f]) for one in own for f in bases if f in one.conditions and one.conditions[f] != bases[f]}
+    )
+    columns = [np.ones(len(own))]
+    kept = []
+    for factor, level in levels:
+        column = np.array([float(one.conditions.get(factor) == level) for one in own])
+        if np.linalg.matrix_rank(np.column_stack([*columns, column])) > len(columns):
+            columns.append(column)
+            kept.append((factor, level))
+    return np.column_stack(columns), kept
+
+
+def _left(own: list[PlateEvidence], columns: Array) -> tuple[Array, float, int]:
+    """Return least squares of a visit: coefficients, residual sum of squares, degrees of freedom."""
+    value = np.array([one.value for one in own])
+    beta = np.linalg.lstsq(columns, value, rcond=None)[0]
+    return beta, float(np.sum((value - columns @ beta) ** 2)), len(own) - columns.shape[1]
+
+
+def _pooled_scatter(visits: list[list[PlateEvidence]], bases: Mapping[str, str]) -> float:
+    """Return the variance of one trial about its visit and conditions, over all visits."""
+    rows = [_left(own, _dummies(own, bases)[0])[1:] for own in visits]
+    free = sum(row[1] for row in rows)
+    known = float(np.median([one.sd**2 for own in visits for one in own]))
+    return max(known, sum(row[0] for row in rows) / free) if free else known
+
+
+def _differences(
+    own: list[PlateEvidence], bases: Mapping[str, str], spread: float
+) -> list[tuple[tuple[str, str], float, float]]:
+    """Return (factor, level), value and standard error of every difference that one visit knows."""
+    columns, levels = _dummies(own, bases)
+    beta, square, free = _left(own, columns)
+    variance = (square + _BORROWED * spread) / (free + _BORROWED)
+    error = np.sqrt(variance * np.diag(np.linalg.inv(columns.T @ columns)))
+    return [(level, float(beta[i]), float(error[i])) for i, level in enumerate(levels, start=1)]

@@ -1,0 +1,95 @@
+"""What is usual in a laboratory: how quiet its instruments are, how its people stand, what its witnesses see."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance.diagnosis.archive.pooling import pool
+from biodance.records import Array, Trial
+from biodance.uncertainty.session_noise import camera_noise, plate_noise
+from biodance.uncertainty.tolerances import InstrumentNoise
+from biodance.witnesses import observe, recording
+
+
+@dataclass(frozen=True)
+class Norm:
+    """What is usual of one thing: the ``value`` that sessions share with its ``sd``, the standard deviation ``between``
+    sessions, of ``sessions`` and ``observations``.
+    """
+
+    name: str
+    value: float
+    sd: float
+    between: float
+    unit: str
+    sessions: int
+    observations: int
+
+
+@dataclass(frozen=True)
+class Seen:
+    """One number that one ``session`` shows of ``name``."""
+
+    name: str
+    session: str
+    value: float
+    unit: str
+    sd: float = float("nan")
+
+
+def sway(cop: Array) -> float:
+    """Return how far the centre of pressure ``cop`` (T, 2) m of quiet standing strays, m root mean square."""
+    return float(np.sqrt(np.var(cop, axis=0).sum()))
+
+
+def noise_of_instruments(trials: Sequence[Trial], distance: float) -> InstrumentNoise:
+    """Return how quiet the recordings of a session are; ``distance`` m of a typical marker to the moving body, NaN
+    where nothing moved.
+    """
+    markers = [one.markers for one in trials if one.markers is not None and one.markers.time.size > 1]
+    density = plate_noise(plate for one in trials for plate in one.plates)
+    return InstrumentNoise(camera_noise(markers), tuple(density.tolist()), distance if distance > 0 else float("nan"))
+
+
+def usual_noise(found: Sequence[InstrumentNoise]) -> InstrumentNoise:
+    """Return the middle of several sessions; what none shows is that which comes with biodance."""
+    usual = InstrumentNoise()
+    cameras = [one.camera for one in found if one.camera > 0]
+    plates = [[one.plate[i] for one in found if one.plate[i] > 0] or [usual.plate[i]] for i in range(len(usual.plate))]
+    distances = [one.marker_distance for one in found if np.isfinite(one.marker_distance)]
+    return InstrumentNoise(
+        float(np.median(cameras or [usual.camera])),
+        tuple(float(np.median(some)) for some in plates),
+        float(np.median(distances or [usual.marker_distance])),
+    )
+
+
+def seen_by_witnesses(trials: Sequence[Trial], session: str, mass: float) -> list[Seen]:
+    """Return what the witnesses of a session see beyond what they expect, each kind of observation by its name."""
+    found = []
+    for trial in trials:
+        for one in observe(recording(trial, mass=mass)) if trial.plates else ():
+            _, comma, phase = one.what.rpartition(", ")
+            name = f"{one.witness} {phase}" if comma else one.witness
+            found.append(Seen(name, session, one.value - one.expected, one.unit, one.sd))
+    return found
+
+
+def norms(found: Sequence[Seen]) -> tuple[Norm, ...]:
+    """Return what is usual of everything that two sessions or more show, by name."""
+    names: dict[str, dict[str, list[Seen]]] = {}
+    for one in found:
+        names.setdefault(one.name, {}).setdefault(one.session, []).append(one)
+    return tuple(_norm(name, sessions) for name, sessions in sorted(names.items()) if len(sessions) > 1)
+
+
+def _norm(name: str, sessions: Mapping[str, Sequence[Seen]]) -> Norm:
+    """Return what is usual of one thing: medians of the sessions, pooled."""
+    value = np.array([np.median([one.value for one in some]) for some in sessions.values()])
+    known = np.array([np.mean([one.sd for one in some]) / np.sqrt(len(some)) for some in sessions.values()])
+    scatter = max(float(np.std(value, ddof=1)), 1e-12)
+    shared = pool(value, np.where(np.isfinite(known), known, 0.1 * scatter))
+    count = sum(len(some) for some in sessions.values())
+    unit = next(iter(sessions.values()))[0].unit
+    return Norm(name, shared.mean, shared.sd, float(np.std(value, ddof=1)), unit, len(sessions), count)

@@ -1,0 +1,147 @@
+"""What the witnesses of a session saw: their observations, and what every cause would add to each of them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from biodance.discovery import Chosen
+from biodance.effects import DiscreteEffect, Effect, causes
+from biodance.records import Array, Session
+from biodance.witnesses import (
+    Alteration,
+    Observation,
+    SeenTrial,
+    observe,
+    possible_causes,
+    recording,
+    traces,
+    turned_signs,
+    witnesses,
+)
+
+_FAULT = 4.0
+"""A fault in steps of its cause: 16 mm, 16 ms, 8 %, 8 N, 0.08 rad, 2 kg."""
+_BLIND = 0.2
+"""Standard deviations that a usual fault adds to an observation that is blind to it."""
+_ALIKE = 0.9
+"""Correlation of what two causes add from which they cannot be told apart."""
+
+
+@dataclass(frozen=True, eq=False)
+class Testimony:
+    """All ``observations`` of a session; ``traces`` of every cause: what one unit adds to each of them (n,);
+    ``turned``: value less expectation (n,) once a channel's sign is turned back, NaN where it is then not seen;
+    ``seconds`` by trial that one foot stands alone on a plate.
+    """
+
+    observations: tuple[Observation, ...]
+    causes: Mapping[tuple[str, str], Alteration]
+    traces: Mapping[tuple[str, str], Array]
+    turned: Mapping[tuple[str, str], Array] = field(default_factory=dict)
+    seconds: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def counting(self) -> "Testimony":
+        """Only what counts as evidence."""
+        kept = np.array([one.counts for one in self.observations], dtype=bool)
+        return Testimony(
+            tuple(one for one in self.observations if one.counts),
+            self.causes,
+            {name: trace[kept] for name, trace in self.traces.items()},
+            {name: value[kept] for name, value in self.turned.items()},
+            self.seconds,
+        )
+
+    @property
+    def shared(self) -> Array:
+        """(n, k) what one standard deviation of each shared part of the expectations adds."""
+        names = list(dict.fromkeys(name for one in self.observations for name in one.norms))
+        rows = [[one.norms.get(name, 0.0) for name in names] for one in self.observations]
+        return np.array(rows).reshape(len(self.observations), len(names))
+
+    def strongest(self, index: int) -> tuple[str, str]:
+        """Return the cause that an observation sees best, by its usual fault; empty names where it is blind to all."""
+        size = {name: abs(c.step * self.traces[name][index]) for name, c in self.causes.items()}
+        best = max(size, key=lambda name: size[name], default=("", ""))
+        return best if size.get(best, 0.0) * _FAULT > _BLIND * self.observations[index].expected_sd else ("", "")
+
+    def seen_by(self, cause: tuple[str, str], *, least: float = 1.0) -> tuple[str, ...]:
+        """Return the witnesses that see the usual fault of a cause at ``least`` standard deviations, all their
+        observations together; none: all are blind to it.
+        """
+        size = self.causes[cause].step * _FAULT
+        total: dict[str, float] = {}
+        for one, trace in zip(self.observations, self.traces[cause], strict=True):
+            total[one.witness] = total.get(one.witness, 0.0) + (size * trace / one.expected_sd) ** 2
+        return tuple(name for name, power in total.items() if power**0.5 >= least)
+
+
+@dataclass(frozen=True)
+class Sight:
+    """How well the witnesses of one session see one cause: ``sd`` of its size in ``unit`` from all of them together
+    (infinite: they are blind to it), by which ``witnesses``; ``alike`` causes that they cannot tell from it; ``would``
+    what else would see it, in words.
+    """
+
+    effect: str
+    target: str
+    unit: str
+    sd: float
+    witnesses: tuple[str, ...]
+    alike: tuple[tuple[str, str], ...]
+    would: tuple[str, ...]
+
+
+def sights(heard: Testimony) -> tuple[Sight, ...]:
+    """Return how well each cause is seen, the blind rows last."""
+    counting, family = heard.counting, witnesses()
+    sd = np.array([one.sd for one in counting.observations])
+    inner = np.diag(sd**2) + counting.shared @ counting.shared.T
+    white = {name: np.linalg.solve(inner, trace) if trace.size else trace for name, trace in counting.traces.items()}
+    power = {name: float(counting.traces[name] @ white[name]) for name in counting.traces}
+    found = []
+    for name, cause in heard.causes.items():
+        seen = counting.seen_by(name)
+        alike = tuple(
+            other
+            for other in heard.causes
+            if other != name
+            and seen
+            and abs(counting.traces[other] @ white[name]) > _ALIKE * (power[other] * power[name]) ** 0.5 > 0
+        )
+        silent = [one for one in family.values() if cause.effect in one.sees and one.name not in seen]
+        size = power[name] ** -0.5 if seen else float("inf")
+        found.append(Sight(*name, cause.unit, size, seen, alike, tuple(one.needs for one in silent)))
+    return tuple(sorted(found, key=lambda one: not one.witnesses))
+
+
+def hear(session: Session, chosen: Chosen[Effect | DiscreteEffect] = None) -> Testimony:
+    """Return what the witnesses saw in all trials of a session but the skipped ones; ``chosen`` limits the causes."""
+    asked = causes(chosen)
+    mass = float("nan") if "mass" in session.subject.guessed else session.subject.mass
+    seen = [recording(trial, mass=mass) for trial in session.trials if trial.plates and trial.role != "skip"]
+    found, single = [observe(one) for one in seen], all(len(one.trial.plates) == 1 for one in seen)
+    known = {c.names: c for one in seen for c in possible_causes(one, single=single) if c.effect in asked}
+    parts = {name: [np.zeros(len(some)) for some in found] for name in known}
+    turned: dict[tuple[str, str], list[Array]] = {}
+    plain = [np.array([o.value - o.expected for o in some]) for some in found]
+    for i, (one, some) in enumerate(zip(seen, found, strict=True)):
+        for cause in possible_causes(one, single=single) if some else ():
+            if cause.names in known:
+                parts[cause.names][i] = traces(one, some, cause)
+        for name, undo in turned_signs(one, single=single).items() if one.steps and "axis_error" in asked else ():
+            turned.setdefault(name, [value.copy() for value in plain])[i] = _again(undo(one), some)
+    return Testimony(
+        tuple(o for some in found for o in some),
+        known,
+        {name: np.concatenate([*several, np.empty(0)]) for name, several in parts.items()},
+        {name: np.concatenate([*several, np.empty(0)]) for name, several in turned.items()},
+        {one.trial.name: one.seconds for one in seen},
+    )
+
+
+def _again(altered: SeenTrial, before: tuple[Observation, ...]) -> Array:
+    """Return value less expectation (n,) of the same observations in an altered recording; NaN where not seen."""
+    values = {one.key: one.value - one.expected for one in observe(altered)}
+    return np.array([values.get(one.key, np.nan) for one in before])

@@ -1,0 +1,79 @@
+"""The findings of the witnesses beside those of the simulation: one diagnosis.
+
+Errors of the two are independent: the witnesses look at feet, clocks and weights, the simulation at the wrench that the
+whole body needs. A cause that both name has one size, weighted by their precisions; what the witnesses name explains
+what the simulation could only resemble; a size that they exclude is taken back.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
+from biodance.diagnosis.heard import Testimony
+from biodance.diagnosis.testimony import Verdicts, size_by
+
+_FAR = 3.0
+"""Standard deviations between two sizes of one cause from which they contradict each other."""
+_RAW = ("clipping", "axis_error", "unit_error", "frame_rate")
+"""Causes that a check finds in the raw channels: what witnesses measure in such recordings has no size."""
+
+
+def with_witnesses(one: Diagnosis, said: Verdicts, heard: Testimony, *, judged: bool) -> Diagnosis:
+    """Return the diagnosis with what the witnesses found; ``judged``: whether the simulation could be asked at all."""
+    one = replace(one, witnesses=heard if heard.observations else None)
+    raw = any(finding.effect in _RAW for finding in one.findings)
+    if not said.findings or raw:
+        return _checked(one, heard) if not raw else one
+    names = {(alias.effect, alias.target) for finding in said.findings for alias in finding.set}
+    same = {(f.effect, f.target): f for f in one.findings}
+    mine = tuple(_together(finding, same.get((finding.effect, finding.target))) for finding in said.findings)
+    rest = tuple(f for f in _checked(one, heard).findings if (f.effect, f.target) not in names)
+    findings = (*mine, *rest)
+    told: Verdict = "named, incomplete"
+    if judged and not rest and one.verdict in ("nothing wrong", "named, complete") and not one.doubt:
+        told = "named, complete"
+    kept = tuple(f for f in one.resembles if (f.effect, f.target) not in names)
+    return replace(one, verdict=told, findings=findings, resembles=kept)
+
+
+def _together(by_witnesses: Finding, by_simulation: Finding | None) -> Finding:
+    """Return a finding with the size from both, where both named it."""
+    if by_simulation is None or not by_simulation.parameters or not by_witnesses.parameters:
+        return by_witnesses
+    first, last = by_witnesses.parameters[0], by_simulation.parameters[0]
+    if not (first.sd > 0 and last.sd > 0) or first.unit != last.unit:
+        return by_witnesses
+    weight = np.array([first.sd**-2, last.sd**-2])
+    value = float(weight @ [first.value, last.value] / weight.sum())
+    bayes = by_witnesses.log_bayes_factor + max(0.0, by_simulation.log_bayes_factor)
+    return replace(
+        by_simulation,
+        parameters=(
+            Estimate(first.name, value, float(weight.sum() ** -0.5), first.unit),
+            *by_simulation.parameters[1:],
+        ),
+        set=(Alias(by_witnesses.effect, by_witnesses.target, bayes), *by_witnesses.set[1:]),
+        advice=by_witnesses.advice,
+    )
+
+
+def _checked(one: Diagnosis, heard: Testimony) -> Diagnosis:
+    """Return the diagnosis without the sizes that the witnesses exclude."""
+    gone = tuple(finding for finding in one.findings if _excluded(finding, heard))
+    if not gone:
+        return one
+    left = tuple(finding for finding in one.findings if finding not in gone)
+    said = "{} {} was taken back: feet and weight on the plates exclude its size."
+    notes = tuple(said.format(finding.effect.replace("_", " "), finding.target) for finding in gone)
+    told: Verdict = "named, incomplete" if left else "unexplained"
+    return replace(one, verdict=told, findings=left, resembles=(*gone, *one.resembles), notes=(*one.notes, *notes))
+
+
+def _excluded(finding: Finding, heard: Testimony) -> bool:
+    """Return whether the witnesses measure the size of a finding well enough to say that it is another one."""
+    mine = size_by(heard, (finding.effect, finding.target))
+    if mine is None or not finding.parameters:
+        return False
+    size, sd = finding.parameters[0].value, finding.parameters[0].sd
+    return bool(abs(size) > _FAR * mine[1] and abs(size - mine[0]) > _FAR * np.hypot(mine[1], sd if sd == sd else 0.0))

@@ -1,0 +1,203 @@
+"""A laboratory learns from its own sessions without fault how large everything is that is no fault."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from biodance import display
+from biodance.diagnosis.archive.norms import (
+    Norm,
+    Seen,
+    noise_of_instruments,
+    norms,
+    seen_by_witnesses,
+    sway,
+    usual_noise,
+)
+from biodance.diagnosis.candidates import candidates
+from biodance.diagnosis.learning import Null, learn_tolerances, null_of, shown_by
+from biodance.diagnosis.problem import problem
+from biodance.effects import gates
+from biodance.errors import SessionRefused
+from biodance.lab.session.archive import archive_folders
+from biodance.lab.session.read import read_session
+from biodance.pipeline.looked_at import cases_of, looked_at, soft_tissue
+from biodance.pipeline.plates import told_failure
+from biodance.pipeline.provenance import now
+from biodance.pipeline.results import SessionResult
+from biodance.pipeline.session import examine
+from biodance.uncertainty.tolerances import InstrumentNoise, Tolerances, shipped, without_habits
+
+_WORTH = 5.0
+"""Sessions that the shipped tolerances count for (docs/decisions/2026-11-22-a-laboratory-learns.md)."""
+FEWEST = 3
+"""Sessions without which nothing is learned."""
+ROUNDS = 10
+_Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class LearnedSession:
+    """What one session teaches: its ``null``, ``instruments``, and numbers ``seen``."""
+
+    name: str
+    null: Null
+    instruments: InstrumentNoise
+    seen: tuple[Seen, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class LearnedLaboratory:
+    """What a laboratory learned from its own sessions.
+
+    Parameters
+    ----------
+    archive : pathlib.Path
+        Its folder.
+    created : str
+        UTC time, ISO 8601.
+    tolerances : Tolerances
+        For `diagnose`.
+    norms : tuple of Norm
+        What is usual of instruments, people and witnesses.
+    sessions : tuple of str
+        That it rests on.
+    shown : mapping
+        Key of a size -> how many coefficients the sessions show of it; 0 = as shipped.
+    left_out : mapping
+        Session -> why nothing was learned from it.
+    """
+
+    archive: Path
+    created: str
+    tolerances: Tolerances
+    norms: tuple[Norm, ...]
+    sessions: tuple[str, ...]
+    shown: Mapping[str, float] = field(default_factory=dict)
+    left_out: Mapping[str, str] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        return f"LearnedLaboratory({self.archive.name!r}, {len(self.sessions)} sessions, {self.created})"
+
+    def _repr_html_(self) -> str:
+        return display.card(repr(self), None, tuple(f"{name}: {why}" for name, why in self.left_out.items()))
+
+
+def learn_laboratory(archive: str | Path, *, tell: _Tell = lambda _: None) -> LearnedLaboratory:
+    """Return the tolerances and norms of a laboratory, from all its sessions without fault.
+
+    Parameters
+    ----------
+    archive : str or pathlib.Path
+        Folder with session folders at any depth. A session in which a check fails teaches nothing.
+    tell : callable, optional
+        Called with what is being done, in words.
+
+    Returns
+    -------
+    LearnedLaboratory
+        ``tolerances`` for `diagnose`, ``norms`` of instruments, people and witnesses, and what all that rests on.
+
+    Raises
+    ------
+    SessionRefused
+        Fewer than three sessions can be learned from; the message says why of each.
+
+    See Also
+    --------
+    judge_plates : The plates of the same archive over time.
+
+    References
+    ----------
+    Expectation maximisation beside the shipped sizes, which count for five sessions; docs/guide/plates.md.
+
+    Examples
+    --------
+    >>> biodance.learn_laboratory("visit")
+    Traceback (most recent call last):
+        ...
+    biodance.errors.SessionRefused: visit: holds 1 session, at least 3 are needed to learn from.
+    """
+    folder = Path(archive)
+    found, left_out = [], {}
+    sessions = archive_folders(folder)[0]
+    if len(sessions) < FEWEST:
+        held = f"{len(sessions)} session{'s' * (len(sessions) != 1)}"
+        raise SessionRefused(f"{folder}: holds {held}, at least {FEWEST} are needed to learn from.")
+    for path in sessions:
+        tell(f"examining {path.name}")
+        try:
+            found.append(learned_session(examine(read_session(path))))
+        except Exception as why:
+            left_out[path.relative_to(folder).as_posix()] = told_failure(why)
+    tell("learning")
+    return learned_together(folder, found, left_out)
+
+
+def learned_session(result: SessionResult) -> LearnedSession:
+    """Return what one examined session teaches.
+
+    Raises
+    ------
+    SessionRefused
+        It cannot be judged, or a check failed in it.
+    TrialRefused
+        It has no second of believable, fully measured frames.
+    """
+    looks, session = looked_at(result.trials), result.session
+    if result.body is None or not looks:
+        raise SessionRefused(f"It has no trial that could be judged. {result.body_source}")
+    if failed := [gate for gate in gates(session, cases_of(result.body, looks)) if not gate.ok]:
+        raise SessionRefused(
+            f"A check failed ({failed[0].check}), so that it is no session without fault: {failed[0].text}"
+        )
+    put, known = problem(result.body, looks), shipped()
+    null = null_of(put, tuple(one for one in candidates(put) if known.knows(one.effect.name)))
+    name = session.folder.resolve().name
+    mass = float("nan") if "mass" in session.subject.guessed else session.subject.mass
+    own = noise_of_instruments(session.trials, soft_tissue(looks))
+    seen = [Seen("camera_noise", name, own.camera, "m"), Seen("plate_noise_fz", name, own.plate[2], "N/rtHz")]
+    if result.standing is not None:
+        seen += _standing(result, name)
+    return LearnedSession(name, null, own, (*seen, *seen_by_witnesses(session.trials, name, mass)))
+
+
+def _standing(result: SessionResult, name: str) -> list[Seen]:
+    """Return how the person of a session stands."""
+    one = result.standing
+    assert one is not None
+    found = [Seen("standing sway", name, sway(one.cop), "m")]
+    if one.com.size:
+        found += [
+            Seen("standing centre of mass ahead of pressure", name, one.com_ahead, "m"),
+            Seen("standing centre of mass left of pressure", name, one.com_left, "m"),
+        ]
+    if "mass" not in result.session.subject.guessed:
+        found.append(Seen("plates less declared mass", name, one.mass - result.session.subject.mass, "kg"))
+    return found
+
+
+def learned_together(archive: Path, sessions: list[LearnedSession], left_out: Mapping[str, str]) -> LearnedLaboratory:
+    """Return what the sessions teach together; SessionRefused with fewer than three."""
+    if len(sessions) < FEWEST:
+        why = " ".join(f"{name}: {reason}" for name, reason in list(left_out.items())[:FEWEST])
+        raise SessionRefused(
+            f"{archive}: {len(sessions)} of {len(sessions) + len(left_out)} sessions can be learned from, at least "
+            f"{FEWEST} are needed. {why}"
+        )
+    nulls, created = [one.null for one in sessions], now()
+    found = without_habits(learn_tolerances(nulls, shipped(), rounds=ROUNDS, worth=_WORTH))
+    origin = (
+        f"{len(sessions)} sessions of {archive.resolve().name}, {created[:10]}, beside the shipped sizes as "
+        f"{_WORTH:g} sessions more"
+    )
+    tolerances = replace(found, origin=origin, instruments=usual_noise([one.instruments for one in sessions]))
+    return LearnedLaboratory(
+        archive,
+        created,
+        tolerances,
+        norms([row for one in sessions for row in one.seen]),
+        tuple(one.name for one in sessions),
+        shown_by(nulls, tolerances),
+        dict(left_out),
+    )

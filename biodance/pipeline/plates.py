@@ -1,0 +1,192 @@
+"""The sessions of one laboratory read and judged together; what cannot be read is said, the rest goes on."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from biodance import display
+from biodance.diagnosis.archive.evidence import plainly_named, plate_evidence
+from biodance.diagnosis.archive.judge import ArchiveJudgement, judge
+from biodance.diagnosis.archive.quantities import PlateEvidence, PlateVisit
+from biodance.errors import BiodanceError, SessionRefused
+from biodance.lab.session.archive import archive_folders, iso_date, visit_date
+from biodance.lab.session.index import IndexedTrial, read_index, read_plate_text
+from biodance.lab.session.read import read_session
+from biodance.records import Trial
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class PlatesJudged:
+    """The plates of a laboratory over all its visits.
+
+    Parameters
+    ----------
+    archive : pathlib.Path
+        Its folder.
+    judgement : ArchiveJudgement
+        Cards of the plates, changes, kinds of trial, people who stand out.
+    observations : tuple of PlateEvidence
+        What every trial says of every plate.
+    refused : mapping
+        Session or recording -> why it was left out.
+    notes : tuple of str
+        What was guessed.
+    """
+
+    archive: Path
+    judgement: ArchiveJudgement
+    observations: tuple[PlateEvidence, ...]
+    refused: Mapping[str, str]
+    notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        found = self.judgement
+        counts = {"visit": found.visits, "plate": found.plates, "finding": found.findings}
+        told = ", ".join(f"{len(some)} {what}{'s' * (len(some) != 1)}" for what, some in counts.items())
+        return f"PlatesJudged({self.archive.name!r}: {told})"
+
+    def _repr_html_(self) -> str:
+        said = (f"{card.plate}: {one.text}" for card in self.judgement.plates for one in card.findings)
+        return display.card(repr(self), self.table(), tuple(said))
+
+    def table(self) -> "pd.DataFrame":
+        """Return one row for each visit and plate: what the visit says of it, for the laboratory's own records.
+
+        Returns
+        -------
+        pandas.DataFrame
+            date, visit, person, plate, and of every quantity the mean over the trials of the visit, its standard error
+            and the number of trials: ``place_x_m``, ``place_x_sd_m``, ``place_x_trials`` ...
+        """
+        import pandas as pd
+
+        from biodance.diagnosis.archive.daily import daily_rows
+
+        return pd.DataFrame(daily_rows(self.observations))
+
+
+def judge_plates(archive: str | Path, *, tell: _Tell = lambda _: None) -> PlatesJudged:
+    """Return what all sessions of a laboratory say of its plates.
+
+    Parameters
+    ----------
+    archive : str or pathlib.Path
+        Folder with session folders at any depth, or with a table ``trials.csv`` beside text recordings of one plate.
+    tell : callable, optional
+        Called with what is being done, in words.
+
+    Returns
+    -------
+    PlatesJudged
+        A card per plate (place m, gain, offset N, delay s), change points with date and interval, kinds of trial that
+        read otherwise, people who stand out.
+
+    Raises
+    ------
+    SessionRefused
+        There is no session in the folder, or none says anything of a plate.
+
+    See Also
+    --------
+    learn_laboratory : The tolerances of the same archive.
+
+    References
+    ----------
+    A mixed model of visits, persons and plates; docs/guide/plates.md.
+
+    Examples
+    --------
+    >>> judged = biodance.judge_plates("visit")
+    >>> judged
+    PlatesJudged('visit': 1 visit, 1 plate, 0 findings)
+    >>> judged.table()["plate"].to_list()
+    ['plate1']
+    """
+    folder = Path(archive)
+    sessions, indices = archive_folders(folder)
+    refused: dict[str, str] = {}
+    observations: list[PlateEvidence] = []
+    for path in sessions:
+        tell(f"reading {path.name}")
+        observations += _of_session(path, folder, refused)
+    for path in indices:
+        tell(f"reading what {path.name} names")
+        observations += _of_index(path, refused)
+    if not observations:
+        why = next(iter(refused.values()), "No plate is ever empty, and nobody stands still on one.")
+        raise SessionRefused(f"{folder}: no session says anything of a plate. {why}")
+    tell("judging the plates")
+    named = plainly_named(observations)
+    judged = judge(named)
+    undated = [visit.name for visit in judged.visits if not visit.date]
+    notes = (
+        (
+            f"{len(undated)} of {len(judged.visits)} visits have no date: all are in the order of their names. Write "
+            f"[session] date into session.toml.",
+        )
+        if undated
+        else ()
+    )
+    return PlatesJudged(folder, judged, named, refused, notes)
+
+
+def told_failure(why: Exception) -> str:
+    """Return why a session was left out: its own sentence, or that biodance failed on it, which stops no other."""
+    if isinstance(why, BiodanceError):
+        return str(why)
+    return f"biodance failed on it ({type(why).__name__}: {why}). Please report it."
+
+
+def _of_session(path: Path, archive: Path, refused: dict[str, str]) -> list[PlateEvidence]:
+    """Return what one session folder says; it is refused with a reason instead of stopping the rest."""
+    name = path.relative_to(archive).as_posix() if path != archive else path.resolve().name
+    try:
+        session = read_session(path)
+        visit = PlateVisit(name, session.subject.name, visit_date(path))
+        mass = float("nan") if "mass" in session.subject.guessed else session.subject.mass
+        found = list(plate_evidence(session.trials, visit, mass=mass))
+    except Exception as why:
+        refused[name] = told_failure(why)
+        return []
+    refused.update({f"{name}/{file}": why for file, why in session.refused.items()})
+    if not found:
+        refused[name] = "says nothing of a plate: none is ever empty, and nobody stands still on one."
+    return found
+
+
+def _of_index(path: Path, refused: dict[str, str]) -> list[PlateEvidence]:
+    """Return what the recordings that a table names say."""
+    try:
+        rows = read_index(path)
+    except BiodanceError as why:
+        refused[path.name] = str(why)
+        return []
+    found: list[PlateEvidence] = []
+    for name in dict.fromkeys(row.visit for row in rows):
+        own = [row for row in rows if row.visit == name]
+        trials, conditions = _plate_trials(own, refused)
+        visit = PlateVisit(name, own[0].person, iso_date(own[0].date))
+        found += plate_evidence(trials, visit, mass=own[0].mass, conditions=conditions)
+    return found
+
+
+def _plate_trials(
+    rows: list[IndexedTrial], refused: dict[str, str]
+) -> tuple[list[Trial], dict[str, Mapping[str, str]]]:
+    """Return the recordings of a visit that can be read, and the conditions of each."""
+    trials: list[Trial] = []
+    conditions: dict[str, Mapping[str, str]] = {}
+    for row in rows:
+        try:
+            trials.append(read_plate_text(row.path))
+        except BiodanceError as why:
+            refused[row.path.name] = str(why)
+            continue
+        conditions[trials[-1].name] = row.conditions
+    return trials, conditions

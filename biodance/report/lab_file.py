@@ -1,0 +1,120 @@
+"""``lab.toml``: what a laboratory learned, to be read by people and by ``--lab``.
+
+``[laboratory]`` says when and from what; ``[tolerances]`` is what the diagnosis needs (`uncertainty.tolerances`),
+every size with what it rests on; ``[norms."..."]`` is what is usual of instruments, people and witnesses. Corrections
+that were accepted stand in ``[corrections]`` of the same file.
+"""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+from biodance.errors import SessionRefused
+from biodance.pipeline.learn import LearnedLaboratory
+from biodance.uncertainty.tolerances import shipped, to_toml
+
+_HARDLY = 0.5
+"""Coefficients below which a size is the shipped one."""
+_SIZE = re.compile(r'^"(?P<key>[^"]+)" = (?P<value>[-+.\deE]+)$')
+
+
+def lab_file_text(found: LearnedLaboratory) -> str:
+    """Return the text of lab.toml."""
+    head = [
+        "# What this laboratory learned from its own sessions without fault; for biodance diagnose --lab.",
+        "# Learn again when cameras, plates or marker sets change.",
+        "",
+        "[laboratory]",
+        f"learned_utc = {found.created}",
+        f"archive = {json.dumps(found.archive.resolve().name)}",
+        f"sessions = {json.dumps(list(found.sessions), ensure_ascii=False)}",
+        *[f"# left out: {name}: {_one_line(why)}" for name, why in found.left_out.items()],
+        "",
+    ]
+    return "\n".join([*head, *_tolerances(found), "", *_norms(found)]).rstrip() + "\n"
+
+
+def _tolerances(found: LearnedLaboratory) -> list[str]:
+    """Return the lines of ``[tolerances]``, every size with what it rests on."""
+    lines, before, within = [], shipped(), ""
+    for line in to_toml(found.tolerances, under="tolerances").splitlines():
+        within = line if line.startswith("[") else within
+        size = _SIZE.match(line) if within == "[tolerances.sizes]" else None
+        lines.append(f"{line}  # {_rests(size['key'], found, before.size(size['key']))}" if size else line)
+    return lines
+
+
+def _rests(key: str, found: LearnedLaboratory, before: float) -> str:
+    count = found.shown.get(key, 0.0)
+    if count < _HARDLY:
+        return "as shipped: no session shows it"
+    return f"{count:.1f} values in {len(found.sessions)} sessions; shipped {before:.4g}"
+
+
+def _norms(found: LearnedLaboratory) -> list[str]:
+    """Return the tables of norms."""
+    lines = []
+    for one in found.norms:
+        lines += [
+            f"[norms.{json.dumps(one.name)}]",
+            f"value = {one.value:.4g}",
+            f"sd = {one.sd:.4g}",
+            f"between_sessions_sd = {one.between:.4g}",
+            f"unit = {json.dumps(one.unit, ensure_ascii=False)}",
+            f"sessions = {one.sessions}",
+            f"observations = {one.observations}",
+            "",
+        ]
+    return lines
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def write_lab_file(found: LearnedLaboratory, path: Path) -> None:
+    """Write lab.toml; refuse where there is a file already.
+
+    Raises
+    ------
+    SessionRefused
+        The file exists, or cannot be written.
+    """
+    try:
+        with open(path, "x", encoding="utf-8", newline="\n") as stream:
+            stream.write(lab_file_text(found))
+    except FileExistsError:
+        refuse_existing(path)
+    except OSError as why:
+        raise SessionRefused(f"{path}: cannot be written ({why.strerror or why}). Choose another place.") from why
+
+
+def refuse_existing(path: Path) -> None:
+    """Raise SessionRefused where ``path`` exists: before long work starts, and never over an existing file."""
+    if path.exists():
+        raise SessionRefused(f"{path}: exists already and is never overwritten. Choose another name, or move it away.")
+
+
+def learned_document(found: LearnedLaboratory) -> dict[str, Any]:
+    """Return what was learned as plain values: sessions, norms, and the sizes that changed most."""
+    before = shipped()
+    ratio = {
+        key: size / before.size(key)
+        for key, size in found.tolerances.sizes.items()
+        if before.size(key) > 0 and found.shown.get(key, 0.0) >= _HARDLY
+    }
+    most = sorted(ratio, key=lambda key: -max(ratio[key], 1 / ratio[key]))[:10]
+    return {
+        "sessions": list(found.sessions),
+        "left_out": dict(found.left_out),
+        "learned_utc": found.created,
+        "norms": [
+            {"name": n.name, "value": n.value, "sd": n.sd, "between_sessions_sd": n.between, "unit": n.unit,
+             "sessions": n.sessions, "observations": n.observations} for n in found.norms
+        ],
+        "changed_most": [
+            {"key": key, "size": found.tolerances.size(key), "shipped": before.size(key), "values": found.shown[key]}
+            for key in most
+        ],
+    }  # fmt: skip

@@ -1,0 +1,135 @@
+"""FAMILY: one piece of evidence per file that needs no model of the body, found automatically.
+
+A witness says where the centre of pressure lies in the foot that stands there, when the force comes, what the plates
+weigh over a step, what they read empty. It needs a static trial, foot markers and plates: no inverse kinematics, no
+segment masses. It is given as ``WITNESS`` by its file, others come by the entry points ``biodance.witnesses``. What a
+cause (a plate that lies elsewhere, a late force ...) does to its value is not written by its author: the recording is
+altered as the cause would alter it, and the witness is asked again (`traces`).
+"""
+
+import inspect
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import ClassVar
+
+import numpy as np
+
+from biodance.discovery import Chosen, Family
+from biodance.witnesses._causes import Alteration, possible_causes, turned_signs
+from biodance.witnesses._recording import FootPath, FootStep, SeenTrial, recording
+
+__all__ = [
+    "Alteration",
+    "FootPath",
+    "FootStep",
+    "Observation",
+    "SeenTrial",
+    "Witness",
+    "observe",
+    "possible_causes",
+    "recording",
+    "traces",
+    "turned_signs",
+    "witnesses",
+]
+
+
+@dataclass(frozen=True)
+class Observation:
+    """One value that a witness saw.
+
+    ``witness`` its name; ``what`` of which foot, plate and phase; ``trial``; ``value`` with the standard deviation
+    ``sd`` of this one observation, in ``unit``; ``expected`` of a recording without fault; ``norms`` how uncertain that
+    expectation is, each part with a name: observations that share a name err together ("person" parts within one
+    person, "laboratory" parts in all persons of one laboratory, others with their plate). ``counts`` False: it is
+    shown, and adds nothing to the evidence, because others hold it already.
+    """
+
+    witness: str
+    what: str
+    trial: str
+    value: float
+    sd: float
+    expected: float
+    unit: str
+    plate: str = ""
+    norms: Mapping[str, float] = field(default_factory=dict)
+    counts: bool = True
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "norms", MappingProxyType(dict(self.norms)))
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """Witness, trial and what: the same in an altered recording."""
+        return self.witness, self.trial, self.what
+
+    @property
+    def expected_sd(self) -> float:
+        """Standard deviation of what is expected of one such observation in a recording without fault."""
+        return float(np.sqrt(self.sd**2 + sum(size**2 for size in self.norms.values())))
+
+    @property
+    def z(self) -> float:
+        """Distance from what is expected in its standard deviations."""
+        return (self.value - self.expected) / self.expected_sd
+
+
+class Witness(ABC):
+    """One piece of evidence: ``name`` that of its file; ``sees`` the effects that it is for; ``needs`` which movement
+    and markers, in words for the analyst; ``source`` of what it expects.
+    """
+
+    name: ClassVar[str] = ""
+    sees: ClassVar[tuple[str, ...]] = ()
+    needs: ClassVar[str] = ""
+    source: ClassVar[str] = ""
+
+    @abstractmethod
+    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+        """Return what it saw in one trial; () where the trial does not hold what it needs."""
+
+
+def lacks(candidate: object) -> tuple[str, ...]:
+    """Return what an object or class lacks to be a witness."""
+    kind = candidate if isinstance(candidate, type) else type(candidate)
+    if not issubclass(kind, Witness):
+        return ("the base class Witness",)
+    missing = [name for name in ("name", "sees", "needs", "source") if not getattr(kind, name)]
+    return (*missing, *(sorted(getattr(kind, "__abstractmethods__", ())) if inspect.isabstract(kind) else ()))
+
+
+FAMILY: Family[Witness | type[Witness]] = Family(
+    "witness", "biodance.witnesses", __name__, "WITNESS", lacks, lambda kind: kind.name
+)
+
+
+def witnesses(chosen: Chosen[Witness | type[Witness]] = None) -> Mapping[str, Witness]:
+    """Return the witnesses by name: all, or the ``chosen`` ones (names; objects and classes join)."""
+    found = FAMILY.choose(chosen)
+    return MappingProxyType({name: one() if isinstance(one, type) else one for name, one in found.items()})
+
+
+def observe(seen: SeenTrial, chosen: Chosen[Witness | type[Witness]] = None) -> tuple[Observation, ...]:
+    """Return all that the witnesses saw in one trial, finite values only."""
+    found = (one for witness in witnesses(chosen).values() for one in witness.look(seen))
+    return tuple(one for one in found if np.isfinite([one.value, one.expected, one.sd]).all())
+
+
+def traces(
+    seen: SeenTrial, found: tuple[Observation, ...], cause: Alteration, chosen: Chosen[Witness | type[Witness]] = None
+) -> np.ndarray:
+    """Return (n,) what one unit of a cause adds to value less expectation of the observations ``found`` of a
+    recording: the slope between the recordings altered by a step either way; 0 where the witness is blind.
+    """
+    asked, out = witnesses(chosen), np.zeros(len(found))
+    sides = [
+        {one.key: one.value - one.expected for one in observe(cause.alter(seen, size), asked)}
+        for size in (-cause.step, cause.step)
+    ]
+    for i, one in enumerate(found):
+        if all(one.key in side for side in sides):
+            out[i] = (sides[1][one.key] - sides[0][one.key]) / (2 * cause.step)
+    return out

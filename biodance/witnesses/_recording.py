@@ -1,0 +1,288 @@
+"""One trial as witnesses look at it: where each foot was, which steps fell on which plate, which way the person went.
+
+The steps are sorted from the markers, not from the forces: a plate that lies elsewhere than the file says, or whose
+force comes late, must not hide the very steps that show it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance.errors import BiodanceError
+from biodance.lab.markers.sets import FAMILY, landmark, read_marker_set
+from biodance.lab.weight import is_still
+from biodance.motion.contact.footing import inside
+from biodance.motion.contact.soles import OUTLINE
+from biodance.records import SIDES, Array, Markers, Plate, Trial, runs
+from biodance.records.arrays import rate_of
+
+ONSET = 20.0
+"""N of vertical force from which a foot counts as down (Zeni et al. 2008, doi:10.1016/j.gaitpost.2007.07.007)."""
+_SHORTEST, _LONGEST = 0.2, 2.5
+"""s that one foot stands on a plate in a step."""
+_RAISED = 0.05
+"""m that a plate stands out above the lowest one: what sticks out over a stair hangs in the air."""
+_BESIDE = 0.04
+"""m: a sole that reaches farther over the edge is half beside the plate: its centre of pressure says nothing."""
+_STILL, _EVEN = 0.5, 0.35
+"""m/s against the ground or belt of a foot that stands; the other one swings faster."""
+_LIFTED = 0.06
+"""m of a foot above its lowest place in the trial from which it cannot stand."""
+_FLAT = 0.03
+"""m of both markers above their lowest place of a foot that stands on a belt."""
+_UNSEEN = 0.05
+"""s over which a marker that was not seen is believed to go on straight."""
+
+
+@dataclass(frozen=True, eq=False)
+class FootPath:
+    """One foot: ``time`` (T,) s; ``heel``, ``toe`` (T, 3) m of its markers, lab frame, NaN = not seen."""
+
+    side: str
+    time: Array
+    heel: Array
+    toe: Array
+
+    def at(self, time: Array) -> tuple[Array, Array]:
+        """Return heel and toe (n, 3) m at other times (n,) s; NaN beside frames in which they were not seen."""
+        return _between(self.time, self.heel, time), _between(self.time, self.toe, time)
+
+    def outline(self, time: Array) -> Array:
+        """Return the sole (n, P, 2) m seen from above, from heel and toe marker."""
+        heel, toe = (path[:, :2] for path in self.at(time))
+        ahead = toe - heel
+        left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
+        return heel[:, None] + OUTLINE[:, :1] * ahead[:, None] + OUTLINE[:, 1:] * left[:, None]
+
+    def axes(self, time: float) -> Array:
+        """Return the horizontal unit vectors (2, 2) from heel to toe marker and outwards of it, at ``time`` s."""
+        heel, toe = (path[0, :2] for path in self.at(np.array([time])))
+        ahead = (toe - heel) / np.linalg.norm(toe - heel)
+        return np.stack([ahead, np.array([ahead[1], -ahead[0]]) * (1.0 if self.side == "right" else -1.0)])
+
+    def in_foot(self, time: Array, point: Array) -> tuple[Array, Array, Array]:
+        """Return how far ``point`` (n, 2) m lies ahead of the heel marker and outwards of the line to the toe marker,
+        m (n,), and the horizontal distance of the two markers (n,) m.
+        """
+        heel, toe = (path[:, :2] for path in self.at(time))
+        length = np.linalg.norm(toe - heel, axis=1)
+        ahead = (toe - heel) / length[:, None]
+        out = np.stack([ahead[:, 1], -ahead[:, 0]], axis=1) * (1.0 if self.side == "right" else -1.0)
+        return np.sum((point - heel) * ahead, axis=1), np.sum((point - heel) * out, axis=1), length
+
+    @property
+    def rate(self) -> float:
+        """Hz of the markers."""
+        return rate_of(self.time)
+
+    @property
+    def velocity(self) -> Array:
+        """(T, 3) m/s of the middle between the two markers."""
+        if self.time.size < 2:
+            return np.zeros((self.time.size, 3))
+        return np.gradient((self.heel + self.toe) / 2, self.time, axis=0)
+
+    def drift(self, time: Array) -> Array:
+        """Return the median velocity (3,) m/s at some times: that of the belt a foot stands on, or nearly none."""
+        velocity = _between(self.time, self.velocity, time)
+        return np.nanmedian(velocity, axis=0) if np.isfinite(velocity).all(axis=1).any() else np.full(3, np.nan)
+
+
+@dataclass(frozen=True)
+class FootStep:
+    """One foot alone on one plate: ``plate`` its name; ``side``; ``middle`` s, a time at which it stands; ``overhang``
+    m that the sole may reach over the edge; ``heel_first`` whether the heel came down first.
+    """
+
+    plate: str
+    side: str
+    middle: float
+    overhang: float
+    heel_first: bool
+
+    @property
+    def name(self) -> str:
+        """The step in words."""
+        return f"{self.side} foot on {self.plate} at {self.middle:.2f} s"
+
+
+@dataclass(frozen=True, eq=False)
+class SeenTrial:
+    """One ``trial`` with the declared ``mass`` kg of the person (NaN = unknown), both ``feet`` (none where their
+    markers are missing), the ``steps`` on its plates, the ``pelvis`` (T, 3) m at marker times with its ``velocity``
+    (T, 3) m/s below 8 Hz (None = not seen), and whether somebody stands ``still`` throughout.
+    """
+
+    trial: Trial
+    mass: float
+    feet: tuple[FootPath, ...]
+    steps: tuple[FootStep, ...]
+    pelvis: Array | None
+    velocity: Array | None
+    still: bool
+
+    def plate(self, name: str) -> Plate:
+        """Return the plate of that name."""
+        return next(plate for plate in self.trial.plates if plate.name == name)
+
+    def foot(self, side: str) -> FootPath:
+        """Return the foot of that side."""
+        return next(foot for foot in self.feet if foot.side == side)
+
+    def stance(self, step: FootStep) -> slice | None:
+        """Return the samples of a step's plate while the foot stands on it; None where the force does not show it."""
+        wrench = self.plate(step.plate).wrench
+        here = [run for run in runs(wrench.force[:, 2] > ONSET) if wrench.time[run[0]] <= step.middle]
+        if not here or wrench.time[here[-1][1] - 1] < step.middle:
+            return None
+        return slice(*here[-1])
+
+    @property
+    def seconds(self) -> float:
+        """Time s that one foot stands alone on a plate."""
+        parts = [(self.plate(step.plate).wrench.time, self.stance(step)) for step in self.steps]
+        return float(sum(time[part.stop - 1] - time[part.start] for time, part in parts if part is not None))
+
+    def pelvis_velocity(self, time: Array) -> Array:
+        """Return (n, 3) m/s of the pelvis at times (n,) s; NaN where it was not seen."""
+        if self.velocity is None or self.trial.markers is None:
+            return np.full((len(time), 3), np.nan)
+        return _between(self.trial.markers.time, self.velocity, time)
+
+
+def recording(trial: Trial, *, mass: float = float("nan")) -> SeenTrial:
+    """Return a trial as witnesses look at it; as read (forces at their own rate) it says most.
+
+    ``mass`` kg as declared, NaN = unknown. Without foot markers or plates there are no steps; nothing is raised.
+    """
+    feet = _feet(trial.markers)
+    lowest = min((plate.height for plate in trial.plates), default=0.0)
+    steps = tuple(
+        step for plate in trial.plates for step in _steps(plate, feet, raised=plate.height > lowest + _RAISED) if feet
+    )
+    pelvis = _pelvis(trial.markers)
+    velocity = _velocity(trial.markers, pelvis) if trial.markers is not None and pelvis is not None else None
+    steps = tuple(sorted(steps, key=lambda step: step.middle))
+    return SeenTrial(trial, mass, feet, steps, pelvis, velocity, is_still(trial))
+
+
+def _between(known: Array, path: Array, time: Array) -> Array:
+    """Return a path (T, n) at other times, straight between frames; NaN where no frame near is known."""
+    seen = np.isfinite(path).all(axis=1)
+    if not seen.any():
+        return np.full((len(time), path.shape[1]), np.nan)
+    at, values = known[seen], path[seen]
+    out = np.stack([np.interp(time, at, column) for column in values.T], axis=1)
+    after = np.clip(np.searchsorted(at, time), 0, at.size - 1)
+    near = np.minimum(np.abs(time - at[after]), np.abs(time - at[np.maximum(after - 1, 0)]))
+    out[near > _UNSEEN] = np.nan
+    return out
+
+
+def _feet(markers: Markers | None) -> tuple[FootPath, ...]:
+    """Return both feet by the landmarks heel and toe of the first marker set that has all four; () without."""
+    if markers is None or not markers.time.size:
+        return ()
+    for name in FAMILY.files():
+        found = {(s, p): _landmark(markers, name, f"{s}_{p}") for s in SIDES for p in ("heel", "toe")}
+        places = {key: path for key, path in found.items() if path is not None and np.isfinite(path).any()}
+        if len(places) == len(found):
+            return tuple(FootPath(s, markers.time, places[s, "heel"], places[s, "toe"]) for s in SIDES)
+    return ()
+
+
+def _landmark(markers: Markers, set_name: str, name: str) -> Array | None:
+    try:
+        return landmark(markers, read_marker_set(set_name), name)
+    except BiodanceError:
+        return None
+
+
+def _pelvis(markers: Markers | None) -> Array | None:
+    """Return the middle (T, 3) m of the front and back of the pelvis; None where no set has them."""
+    for name in FAMILY.files() if markers is not None else ():
+        assert markers is not None
+        right, left, back = (_landmark(markers, name, place) for place in ("right_asis", "left_asis", "mid_psis"))
+        if right is not None and left is not None and back is not None:
+            middle = ((right + left) / 2 + back) / 2
+            return middle if np.isfinite(middle).any() else None
+    return None
+
+
+def _velocity(markers: Markers, path: Array) -> Array:
+    """Return the velocity (T, 3) m/s of a path (T, 3) m below 8 Hz; NaN where it was not seen."""
+    from scipy.signal import butter, sosfiltfilt
+
+    seen = np.isfinite(path).all(axis=1)
+    rate = markers.rate
+    if seen.sum() < 12 or not rate > 20:
+        return np.full(path.shape, np.nan)
+    filled = np.stack([np.interp(markers.time, markers.time[seen], column) for column in path[seen].T], axis=1)
+    smooth = sosfiltfilt(butter(2, 8.0, fs=rate, output="sos"), filled, axis=0, padlen=min(20, len(filled) - 1))
+    velocity = np.gradient(smooth, markers.time, axis=0)
+    velocity[~seen] = np.nan
+    return velocity
+
+
+def _steps(plate: Plate, feet: tuple[FootPath, ...], *, raised: bool) -> list[FootStep]:
+    """Return the steps on one plate: one foot stands wholly over it while it is loaded, the other one is not on it."""
+    found = []
+    wrench = plate.wrench
+    for start, stop in runs(wrench.force[:, 2] > ONSET):
+        first, last = wrench.time[start], wrench.time[stop - 1]
+        if not _SHORTEST <= last - first <= _LONGEST:
+            continue
+        time = np.linspace(first + 0.25 * (last - first), first + 0.7 * (last - first), 10)
+        over = {foot.side: _over(plate, foot, time, raised=raised) for foot in feet}
+        on = [foot for foot in feet if over[foot.side] > -_BESIDE and _stands(foot, time)]
+        belt = on[0].drift(time) if on else np.zeros(3)
+        other = [foot for foot in feet if foot not in on and _treads(plate, foot, first, last, belt)]
+        if len(on) == 1 and not other:
+            overhang = max(0.0, -over[on[0].side])
+            found.append(FootStep(plate.name, on[0].side, float(time[5]), overhang, _heel_first(on[0], first)))
+    return found
+
+
+def _over(plate: Plate, foot: FootPath, time: Array, *, raised: bool) -> float:
+    """Return how far the sole is inside the plate, m: its outermost point (its middle on a ``raised`` plate), the
+    median over times; negative outside.
+    """
+    distance = inside(plate, foot.outline(time))
+    distance = distance.mean(axis=1) if raised else distance.min(axis=1)
+    return float(np.nanmedian(distance)) if np.isfinite(distance).any() else -np.inf
+
+
+def _stands(foot: FootPath, time: Array) -> bool:
+    """Return whether a foot stands at most of some times: on the ground, or flat on a belt that moves evenly."""
+    drift = foot.drift(time)
+    off = np.linalg.norm(_between(foot.time, foot.velocity, time) - drift, axis=1)
+    known = np.isfinite(off)
+    if not known.any() or np.median(off[known]) > _EVEN or abs(drift[2]) > _EVEN:
+        return False
+    heights = zip(foot.at(time), (foot.heel, foot.toe), strict=True)
+    flat = all(np.nanmedian(path[:, 2]) < np.nanmin(whole[:, 2]) + _FLAT for path, whole in heights)
+    return bool(np.linalg.norm(drift) < _STILL or flat)
+
+
+def _treads(plate: Plate, foot: FootPath, first: float, last: float, belt: Array) -> bool:
+    """Return whether any part of a foot is over the plate, low and no faster than
+    the ground (``belt`` (3,) m/s), at some time of a contact.
+    """
+    time = np.linspace(first, last, 30)
+    with np.errstate(invalid="ignore"):
+        near = (inside(plate, foot.outline(time)) > 0.01).mean(axis=1) > 0.3
+        slow = np.linalg.norm(_between(foot.time, foot.velocity, time) - belt, axis=1) < _STILL
+        low = np.minimum(*(path[:, 2] for path in foot.at(time)))
+        lowest = min(np.nanmin(foot.heel[:, 2]), np.nanmin(foot.toe[:, 2]))
+    return bool((near & slow & (low < lowest + _LIFTED)).sum() >= 3)
+
+
+def _heel_first(foot: FootPath, first: float) -> bool:
+    """Return whether the toe is farther above its standing height than the heel when a contact begins."""
+    at = np.array([first])
+    heel, toe = (path[0, 2] for path in foot.at(at))
+    flat = np.abs(foot.velocity[:, 2]) < 0.1
+    if not flat.any():
+        return False
+    rest = [np.nanmedian(path[flat, 2]) for path in (foot.heel, foot.toe)]
+    return bool(toe - rest[1] > heel - rest[0] + 0.01)

@@ -1,0 +1,46 @@
+"""Means over a part of the stance of one step: the centre of pressure in the foot's own frame, the plate's force."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance.records import Array
+from biodance.witnesses._recording import FootStep, SeenTrial
+
+_SEEN = 0.8
+"""Share of a phase in which foot and pressure must be known."""
+
+
+@dataclass(frozen=True, eq=False)
+class StepCourse:
+    """One step sample by sample: ``phase`` (n,) 0 at the first contact to 1 at the last; ``time`` (n,) s; ``force``
+    (n, 3) N of its plate; ``ahead`` of the heel marker and ``outwards`` of the line to the toe marker (n,) m: the
+    centre of pressure in the foot; ``length`` m between the markers.
+    """
+
+    phase: Array
+    time: Array
+    force: Array
+    ahead: Array
+    outwards: Array
+    length: float
+
+    def mean(self, values: Array, start: float, stop: float) -> float:
+        """Return the mean of ``values`` (n,) over a part of the stance; NaN where too little of it is known."""
+        here = values[(self.phase >= start) & (self.phase <= stop)]
+        known = np.isfinite(here)
+        return float(here[known].mean()) if here.size and known.mean() >= _SEEN else float("nan")
+
+
+def step_course(seen: SeenTrial, step: FootStep) -> StepCourse | None:
+    """Return one step sample by sample; None where its plate's force does not show it."""
+    part = seen.stance(step)
+    if part is None:
+        return None
+    plate = seen.plate(step.plate)
+    time = plate.wrench.time[part]
+    cop = plate.wrench.cop(height=plate.height)[part, :2]
+    ahead, outwards, apart = seen.foot(step.side).in_foot(time, cop)
+    length = float(np.nanmedian(apart)) if np.isfinite(apart).any() else float("nan")
+    phase = (time - time[0]) / max(time[-1] - time[0], 1e-9)
+    return StepCourse(phase, time, plate.wrench.force[part], ahead, outwards, length)

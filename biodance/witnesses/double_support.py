@@ -1,0 +1,40 @@
+"""Plate against plate: the load goes over from one plate to the next in double support, and the sum stays smooth.
+
+Each plate weighs the same person while one foot stands alone on it: the two masses differ by the difference of the
+plates' gains, whatever the person weighs.
+"""
+
+from biodance.witnesses import Observation, SeenTrial, Witness
+from biodance.witnesses.stride_force import StrideForce
+
+_OWN = 0.02
+"""Share of the mass: sd of one difference."""
+
+
+class DoubleSupport(Witness):
+    """Mass (kg) by one plate less that by the next one, each under one foot alone, in two steps with double support
+    between.
+    """
+
+    name = "double_support"
+    sees = ("plate_gain",)
+    needs = "Two steps one after the other on two plates; pelvis markers."
+    source = "20 pairs of steps of 9 persons of public laboratories"
+
+    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+        """Return one observation of each pair; it is shown only: each foot alone counts already."""
+        alone = {
+            one.what.removesuffix(", alone"): one for one in StrideForce().look(seen) if one.what.endswith("alone")
+        }
+        found = []
+        for first, last in zip(seen.steps, seen.steps[1:], strict=False):
+            before, after = alone.get(first.name), alone.get(last.name)
+            if first.plate == last.plate or before is None or after is None:
+                continue
+            what = f"{first.plate} less {last.plate} from {first.middle:.2f} s"
+            value, sd = before.value - after.value, _OWN * seen.mass
+            found.append(Observation(self.name, what, seen.trial.name, value, sd, 0.0, "kg", counts=False))
+        return tuple(found)
+
+
+WITNESS = DoubleSupport

@@ -1,0 +1,52 @@
+"""Flight: nobody touches anything, so every plate reads exactly zero and gravity is the only force."""
+
+import numpy as np
+
+from biodance.records import Array, runs
+from biodance.witnesses import FootPath, Observation, SeenTrial, Witness
+
+_HIGH = 0.06
+"""m above their lowest place in the trial that both markers of a foot in flight are."""
+_LEVEL = 0.05
+"""m between plates: on stairs a high foot may stand."""
+_SHORTEST = 0.06
+"""s of flight."""
+_OWN = {"Fx": 1.5, "Fy": 1.5, "Fz": 4.0}
+"""N: how exactly zero a plate reads so soon after a load."""
+
+
+class Flight(Witness):
+    """Mean force (N) of every plate while both feet are in the air."""
+
+    name = "flight"
+    sees = ("plate_offset", "plate_drift")
+    needs = "A run or a jump on the plates; foot markers."
+    source = "Free flight: nothing touches the plates."
+
+    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+        """Return three observations of each plate that was loaded in the trial, over all its flight."""
+        heights = [plate.height for plate in seen.trial.plates]
+        if not seen.feet or not heights or max(heights) - min(heights) > _LEVEL:
+            return ()
+        air = np.min([_height(foot) for foot in seen.feet], axis=0) > _HIGH
+        time = seen.feet[0].time
+        spans = [(time[a], time[b - 1]) for a, b in runs(air) if b - a >= max(2, _SHORTEST * seen.feet[0].rate)]
+        found = []
+        for plate in seen.trial.plates:
+            wrench = plate.wrench
+            inside = np.any([(wrench.time >= a) & (wrench.time <= b) for a, b in spans], axis=0) if spans else []
+            if not np.any(inside) or wrench.force[:, 2].max() < 100.0:
+                continue
+            for axis, (channel, sd) in enumerate(_OWN.items()):
+                value, what = float(wrench.force[inside, axis].mean()), f"{plate.name} {channel} in flight"
+                found.append(Observation(self.name, what, seen.trial.name, value, sd, 0.0, "N", plate.name))
+        return tuple(found)
+
+
+def _height(foot: FootPath) -> Array:
+    """Return (T,) m how far the lower one of a foot's markers is above its lowest place; -inf where not seen."""
+    each = [path[:, 2] - np.nanmin(path[:, 2]) for path in (foot.heel, foot.toe)]
+    return np.nan_to_num(np.minimum(*each), nan=-np.inf)
+
+
+WITNESS = Flight

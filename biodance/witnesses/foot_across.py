@@ -1,0 +1,52 @@
+"""Where the pressure lies across the foot that stands there: under the heel early, near the foot's line in the middle.
+
+One ordinary step shows the plate's place across the foot; right and left feet, and steps in other directions, tell it
+from where the laboratory puts its toe marker. A turned plate shows as a slant of the pressure's path.
+"""
+
+from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
+from biodance.witnesses._stance import step_course
+
+_PHASES = {
+    "early": (0.04, 0.20, 0.000, 0.0030, 0.0025, 0.0020),
+    "middle": (0.20, 0.60, -0.001, 0.0040, 0.0045, 0.0025),
+    "late": (0.60, 0.80, -0.006, 0.0055, 0.0070, 0.0040),
+}
+"""Start and stop of the phase as shares of stance; expected m outwards; m sd of one step, of one foot of one person, of
+one laboratory's markers."""
+
+_TOES_FIRST = 0.025
+"""m: on stairs, and where toes come down first, persons tread on the outer side (35 mm in the one laboratory seen)."""
+
+
+class FootAcross(Witness):
+    """Centre of pressure outwards of the line from the heel to the toe marker, m, by phase of stance."""
+
+    name = "foot_across"
+    sees = ("plate_position", "plate_rotation", "plate_crosstalk", "axis_error")
+    needs = "A step with one whole foot on one plate; heel and toe markers."
+    source = "49 steps of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
+
+    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+        """Return three observations of each step, the early one only where the heel came down first."""
+        return tuple(one for step in seen.steps for one in self._of_step(seen, step))
+
+    def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
+        part, found = step_course(seen, step), []
+        if part is None:
+            return []
+        for phase, (start, stop, expected, sd, foot, laboratory) in _PHASES.items():
+            if phase == "early" and not step.heel_first:
+                continue
+            norms = {f"person {step.side} foot across, {phase}": foot}
+            if step.heel_first:
+                norms[f"laboratory markers across, {phase}"] = laboratory
+            else:
+                norms["laboratory toes first, across"] = _TOES_FIRST
+            value, own = part.mean(part.outwards, start, stop), (sd**2 + step.overhang**2) ** 0.5
+            what = f"{step.name}, {phase}"
+            found.append(Observation(self.name, what, seen.trial.name, value, own, expected, "m", step.plate, norms))
+        return found
+
+
+WITNESS = FootAcross

@@ -1,0 +1,44 @@
+"""Where the pressure lies along the foot that stands there: ahead of the heel marker early, under the toes late.
+
+Coarser than across the foot, and it scales with the foot; steps in different directions tell plate from foot.
+"""
+
+from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
+from biodance.witnesses._stance import step_course
+
+_PHASES = {
+    "early": (0.04, 0.10, 0.23, 0.030, 0.030, 0.02),
+    "late": (0.80, 0.92, 0.95, 0.030, 0.030, 0.05),
+}
+"""Start and stop of the phase as shares of stance; expected distance ahead of the heel marker in units of the distance
+from heel to toe marker; sd of one step, of one person, of one laboratory's markers in the same unit."""
+
+
+class FootAlong(Witness):
+    """Centre of pressure ahead of the heel marker along the foot, m, early and late in stance."""
+
+    name = "foot_along"
+    sees = ("plate_position", "plate_crosstalk", "axis_error")
+    needs = "A step from heel to toe with one whole foot on one plate; heel and toe markers."
+    source = "45 steps of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
+
+    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+        """Return two observations of each step in which the heel came down first."""
+        return tuple(one for step in seen.steps if step.heel_first for one in self._of_step(seen, step))
+
+    def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
+        part, found = step_course(seen, step), []
+        if part is None:
+            return []
+        for phase, (start, stop, share, sd, person, laboratory) in _PHASES.items():
+            norms = {
+                f"person foot along, {phase}": person * part.length,
+                f"laboratory markers along, {phase}": laboratory * part.length,
+            }
+            value, own = part.mean(part.ahead, start, stop), ((sd * part.length) ** 2 + step.overhang**2) ** 0.5
+            what, expected = f"{step.name}, {phase}", share * part.length
+            found.append(Observation(self.name, what, seen.trial.name, value, own, expected, "m", step.plate, norms))
+        return found
+
+
+WITNESS = FootAlong

@@ -1,0 +1,55 @@
+"""When the force goes: its end against the instant in which the toe is pulled forwards.
+
+Coarser than the heel strike, but every step has it: stairs, runs and toes first, too.
+"""
+
+import numpy as np
+
+from biodance.records import Array
+from biodance.witnesses import FootPath, FootStep, Observation, SeenTrial, Witness
+
+_AROUND = 0.1
+"""s before and after the end of the force in which the toe leaves."""
+_EXPECTED, _STEP, _PERSON = -0.024, 0.010, 0.009
+"""s: end less peak, its sd of one step and of one person."""
+
+
+class ForceEnd(Witness):
+    """End of the vertical force (20 N) less the peak of the toe marker's horizontal acceleration away from where it
+    stood, s.
+    """
+
+    name = "force_end"
+    sees = ("time_delay",)
+    needs = "Steps that leave an empty plate; markers at 100 Hz or more."
+    source = "42 steps of 11 persons of 6 public laboratories (docs/benchmarks/diagnosis.md)"
+
+    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+        """Return one observation of each step that ends within the recording."""
+        return tuple(one for step in seen.steps for one in self._of_step(seen, step))
+
+    def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
+        part, time = seen.stance(step), seen.plate(step.plate).wrench.time
+        if part is None or part.stop >= time.size:
+            return []
+        end, foot = float(time[part.stop - 1]), seen.foot(step.side)
+        value, norms = end - toe_pulled(foot, step.middle, end), {"person toe off": _PERSON}
+        return [Observation(self.name, step.name, seen.trial.name, value, _STEP, _EXPECTED, "s", step.plate, norms)]
+
+
+def toe_pulled(foot: FootPath, middle: float, near: float) -> float:
+    """Return the time s at which a toe is accelerated most away from its place at ``middle`` s, within 0.1 s of
+    ``near``; NaN where the peak is not seen whole.
+    """
+    place: Array = foot.toe[np.argmin(np.abs(foot.time - middle)), :2]
+    away = np.linalg.norm(foot.toe[:, :2] - place, axis=1)
+    pull = np.full(away.size, np.nan)
+    pull[1:-1] = (away[2:] - 2 * away[1:-1] + away[:-2]) * foot.rate**2
+    here = np.flatnonzero(np.abs(foot.time - near) < _AROUND)
+    if not here.size or not np.isfinite(pull[here]).all():
+        return float("nan")
+    best = here[np.argmax(pull[here])]
+    return float(foot.time[best]) if here[0] < best < here[-1] else float("nan")
+
+
+WITNESS = ForceEnd

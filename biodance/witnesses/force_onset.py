@@ -1,0 +1,74 @@
+"""When the force comes: its onset against the instant in which the ground stops the heel.
+
+The heel marker's upward acceleration peaks where the heel strikes. A larger peak lies before it, at the end of the
+swing: only the peaks near the ground count, and of these the one that is highest.
+"""
+
+import numpy as np
+
+from biodance.records import Array
+from biodance.witnesses import FootPath, FootStep, Observation, SeenTrial, Witness
+from biodance.witnesses._recording import ONSET
+
+_AROUND = 0.08
+"""s before and after the onset in which the heel strikes."""
+_NEAR = 0.02
+"""m above its lowest place from which a heel strikes the ground."""
+_EXPECTED, _STEP, _LABORATORY = -0.002, 0.005, 0.003
+"""s: onset less peak, its sd of one step and of one laboratory (filters of markers, thresholds of forces)."""
+
+
+class ForceOnset(Witness):
+    """Onset of the vertical force (20 N) less the peak of the heel marker's upward acceleration, s."""
+
+    name = "force_onset"
+    sees = ("time_delay",)
+    needs = "Steps that begin with the heel, on an empty plate; markers at 100 Hz or more."
+    source = "42 heel strikes of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
+
+    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+        """Return one observation of each heel strike."""
+        return tuple(one for step in seen.steps if step.heel_first for one in self._of_step(seen, step))
+
+    def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
+        part = seen.stance(step)
+        if part is None or part.start == 0:
+            return []
+        wrench = seen.plate(step.plate).wrench
+        before, after = wrench.force[part.start - 1, 2], wrench.force[part.start, 2]
+        share = (ONSET - before) / (after - before) if after > before else 1.0
+        onset = wrench.time[part.start - 1] + share * (wrench.time[part.start] - wrench.time[part.start - 1])
+        struck = heel_strike(seen.foot(step.side), step.middle, onset)
+        own = float(np.hypot(_STEP, 0.25 / seen.foot(step.side).rate))
+        norms = {"laboratory onset": _LABORATORY}
+        value = onset - struck
+        return [Observation(self.name, step.name, seen.trial.name, value, own, _EXPECTED, "s", step.plate, norms)]
+
+
+def heel_strike(foot: FootPath, middle: float, near: float) -> float:
+    """Return the time s at which a heel strikes within 0.08 s of ``near``; ``middle`` s the foot stands. NaN where
+    no peak shows it.
+    """
+    height = foot.heel[:, 2]
+    rise = np.full(height.size, np.nan)
+    rise[1:-1] = (height[2:] - 2 * height[1:-1] + height[:-2]) * foot.rate**2
+    stands = height[np.abs(foot.time - middle) < 0.05]
+    if not np.isfinite(stands).any():
+        return float("nan")
+    low = height < np.nanmedian(stands) + _NEAR
+    peaks = [
+        int(i)
+        for i in np.flatnonzero((np.abs(foot.time - near) < _AROUND) & low)
+        if 2 <= i < height.size - 2 and rise[i] >= max(rise[i - 1], rise[i + 1]) and rise[i] > 0
+    ]
+    return _vertex(foot.time, rise, max(peaks, key=lambda i: rise[i])) if peaks else float("nan")
+
+
+def _vertex(time: Array, value: Array, i: int) -> float:
+    """Return the time of the top of the parabola through three samples around ``i``."""
+    before, top, after = value[i - 1 : i + 2]
+    bend = before - 2 * top + after
+    return float(time[i] + (0.5 * (before - after) / bend if bend < 0 else 0.0) * (time[i + 1] - time[i]))
+
+
+WITNESS = ForceOnset

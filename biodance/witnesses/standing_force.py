@@ -1,0 +1,51 @@
+"""What the plates weigh and push while somebody stands still: the mass, and no horizontal force at all."""
+
+import numpy as np
+
+from biodance.records import Array
+from biodance.witnesses import Observation, SeenTrial, Witness
+from biodance.witnesses._recording import ONSET
+from biodance.witnesses.stride_force import DECLARED
+
+_ON_PLATES = (0.75, 1.35)
+"""Share of the declared mass between which somebody stands on the plates with both feet and in the right unit."""
+_MASS, _SWAY = 0.002, 0.0015
+"""sd as a share of the weight: of the mass, of the mean horizontal force (sway)."""
+_SHORTEST = 0.4
+"""s of standing."""
+
+
+class StandingForce(Witness):
+    """Mass (kg) by the mean vertical force in quiet standing, and the mean horizontal forces (N)."""
+
+    name = "standing_force"
+    sees = ("body_mass", "plate_gain", "plate_offset")
+    needs = "Standing still on the plates with both feet."
+    source = "Newton: who stands still is not accelerated; 9 static trials of 3 public laboratories"
+
+    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+        """Return one mass and two horizontal forces of a trial in which somebody stands still."""
+        plates = [p for p in seen.trial.plates if p.wrench.time.size and p.wrench.force[:, 2].mean() > ONSET]
+        if not plates or not seen.still or not seen.mass > 0:
+            return ()
+        total, weight = seen.trial.wrench, seen.mass * seen.trial.settings.gravity
+        force = mean_force(total.force)
+        if total.time.size < _SHORTEST * total.rate or not _ON_PLATES[0] < force[2] / weight < _ON_PLATES[1]:
+            return ()
+        where = plates[0].name if len(plates) == 1 else ""
+        mass = force[2] / seen.trial.settings.gravity
+        norms, trial = {"person declared mass": DECLARED * seen.mass}, seen.trial.name
+        found = [Observation(self.name, "mass", trial, mass, _MASS * seen.mass, seen.mass, "kg", where, norms)]
+        sd = _SWAY * weight / max(1.0, (total.time[-1] - total.time[0])) ** 0.5
+        for axis, channel in enumerate(("Fx", "Fy")):
+            value = float(force[axis])
+            found.append(Observation(self.name, f"mean {channel}", trial, value, max(sd, 0.5), 0.0, "N", where))
+        return tuple(found)
+
+
+def mean_force(force: Array) -> Array:
+    """Return the mean (3,) N of forces (S, 3) N, NaN samples left out."""
+    return np.asarray(np.nanmean(force, axis=0))
+
+
+WITNESS = StandingForce

@@ -1,0 +1,61 @@
+"""The centre of pressure under the body in quiet standing.
+
+Who stands still has the centre of mass over the centre of pressure. Without a body the middle between the front and
+the back of the pelvis stands for it: from side to side within some millimetres, ahead within a centimetre or two.
+"""
+
+import numpy as np
+
+from biodance.records import Array
+from biodance.witnesses import Observation, SeenTrial, Witness
+from biodance.witnesses.standing_force import mean_force
+
+_ASIDE, _AHEAD = (0.0, 0.006, 0.003), (0.02, 0.015, 0.030)
+"""m: expected place, sd of one person, sd of one laboratory (shoes, posture asked for, where the pelvis markers sit):
+pressure to the left of the pelvis's middle; ahead of it."""
+_OWN = 0.003
+"""m: sway in a short trial."""
+
+
+class StandingPlace(Witness):
+    """Centre of pressure to the left of the middle of the pelvis, and ahead of it, in quiet standing, m."""
+
+    name = "standing_place"
+    sees = ("plate_position", "plate_crosstalk")
+    needs = "Standing still on the plates with both feet; pelvis and foot markers."
+    source = (
+        "8 static trials of 2 public laboratories, 4 of a simulated one; Winter 1995, doi:10.1016/0966-6362(96)82849-9"
+    )
+
+    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+        """Return two observations of a trial in which somebody stands still on the plates."""
+        trial = seen.trial
+        plates = [plate for plate in trial.plates if plate.wrench.time.size]
+        if not plates or not seen.still or seen.pelvis is None or not seen.feet:
+            return ()
+        force = mean_force(trial.wrench.force)[2]
+        ahead = _facing(seen)
+        if not force > 0.75 * seen.mass * trial.settings.gravity or ahead is None:
+            return ()
+        height = float(np.mean([plate.height for plate in plates]))
+        away = np.nanmean(trial.wrench.cop(height=height)[:, :2], axis=0) - np.nanmean(seen.pelvis[:, :2], axis=0)
+        loaded = [plate.name for plate in plates if plate.wrench.force[:, 2].mean() > 0.05 * force]
+        where = loaded[0] if len(loaded) == 1 else ""
+        axes = {"to the left": (np.array([-ahead[1], ahead[0]]), _ASIDE), "ahead": (ahead, _AHEAD)}
+        return tuple(
+            Observation(
+                self.name, f"pressure {what} of the pelvis", trial.name, float(away @ axis), _OWN, expected, "m", where,
+                {f"person stands {what}": person, f"laboratory stands {what}": laboratory},
+            )
+            for what, (axis, (expected, person, laboratory)) in axes.items()
+        )  # fmt: skip
+
+
+def _facing(seen: SeenTrial) -> Array | None:
+    """Return the unit vector (2,) along which both feet point on average; None where they are not seen."""
+    both = np.mean([np.nanmedian(foot.toe - foot.heel, axis=0)[:2] for foot in seen.feet], axis=0)
+    length = float(np.linalg.norm(both))
+    return both / length if length > 0.05 else None
+
+
+WITNESS = StandingPlace

@@ -1,0 +1,234 @@
+"""Witnesses see what was made, hide no fault, and the family keeps its contract."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from walking import FOOT, MASS, STANCE, Wrong, standing, walk
+
+from biodance.diagnosis.heard import hear, sights
+from biodance.diagnosis.testimony import size_by, weigh
+from biodance.effects import causes
+from biodance.errors import BiodanceError
+from biodance.records import Session, Subject, Trial
+from biodance.witnesses import (
+    FAMILY,
+    Observation,
+    SeenTrial,
+    Witness,
+    observe,
+    possible_causes,
+    recording,
+    traces,
+    witnesses,
+)
+
+NAMES = tuple(path.stem for path in Path(FAMILY.package.replace(".", "/")).glob("[a-z]*.py"))
+
+
+def seen(trial: Trial, witness: str, mass: float = MASS) -> dict[str, Observation]:
+    return {one.what: one for one in observe(recording(trial, mass=mass), [witness])}
+
+
+def session(*trials: Trial, mass: float = MASS) -> Session:
+    return Session(Subject(mass=mass, stature=1.7, sex="F"), trials, Path("made"))
+
+
+def values(trial: Trial, witness: str, ending: str = "") -> list[float]:
+    return [one.value for what, one in seen(trial, witness).items() if what.endswith(ending)]
+
+
+def test_steps_are_found_from_markers_whatever_the_plates_say() -> None:
+    for wrong in (Wrong(), Wrong(late=0.03), Wrong(moved=(0, 0.02)), Wrong(signs=(-1, -1, 1, -1, -1, -1))):
+        steps = recording(walk(wrong)).steps
+        assert [(step.side, step.plate, step.heel_first) for step in steps] == [
+            ("right", "plate1", True),
+            ("left", "plate2", True),
+        ]
+
+
+def test_a_foot_half_beside_its_plate_is_no_step() -> None:
+    trial = walk()
+    near = [replace(plate, corners=plate.corners + np.array([0.27, 0, 0])) for plate in trial.plates]
+    assert recording(replace(trial, plates=tuple(near))).steps == ()
+
+
+def test_two_feet_on_one_plate_are_no_step() -> None:
+    trial = walk()
+    wide = replace(trial.plates[0], corners=trial.plates[0].corners * [4, 4, 0] - [1.5, 0, 0])
+    assert not [step for step in recording(replace(trial, plates=(wide,))).steps if step.side == "left"]
+
+
+def test_pressure_in_the_foot_is_where_it_was_put() -> None:
+    found = walk(outwards=0.007)
+    np.testing.assert_allclose(values(found, "foot_across"), 0.007, atol=1e-4)
+    early = np.array(values(found, "foot_along", "early"))
+    np.testing.assert_allclose(early, FOOT * (0.22 + 0.73 * 0.07), atol=0.002)
+    np.testing.assert_allclose(values(found, "foot_along", "late"), FOOT * (0.22 + 0.73 * 0.86), atol=0.002)
+    assert values(found, "foot_outline") == [0.0, 0.0]
+    np.testing.assert_allclose(values(found, "sides"), 0.0, atol=1e-4)
+
+
+def test_a_moved_plate_moves_the_pressure_in_its_foot_only() -> None:
+    right, left = values(walk(Wrong(moved=(0.0, 0.02))), "foot_across", "early")
+    assert right == pytest.approx(-0.02, abs=1e-3)
+    assert left == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("witness", ["force_onset", "force_end"])
+def test_clocks_run_late_by_what_was_made(witness: str) -> None:
+    before, after = (np.array(values(walk(Wrong(late=late)), witness)) for late in (0.0, 0.03))
+    assert len(before) == 2
+    np.testing.assert_allclose(after - before, 0.03, atol=0.0015)
+    if witness == "force_onset":
+        np.testing.assert_allclose(before, 0.0, atol=0.006)
+    else:
+        np.testing.assert_allclose(before, -0.025, atol=0.01)
+
+
+def test_strides_weigh_the_person_and_each_plate() -> None:
+    whole = [
+        one.value for what, one in seen(walk(), "stride_force").items() if "step from" in what and one.unit == "kg"
+    ]
+    assert whole == [pytest.approx(MASS, rel=0.004)]
+    alone, other = values(walk(Wrong(gain=0.05)), "stride_force", "alone")
+    clean, same = values(walk(), "stride_force", "alone")
+    assert alone / clean == pytest.approx(1.05, abs=1e-6)
+    assert other == pytest.approx(same)
+    assert values(walk(Wrong(gain=0.05)), "double_support")[0] == pytest.approx(0.05 * clean + clean - same, abs=0.01)
+
+
+def test_shear_brakes_first_and_pushes_then() -> None:
+    trial = seen(walk(), "shear")
+    braking, pushing = (
+        [one.value for what, one in trial.items() if what.endswith(end)] for end in ("braking", "pushing")
+    )
+    assert max(braking) < 0 < min(pushing)
+    slant = [one.value for what, one in trial.items() if what.endswith("slant")]
+    np.testing.assert_allclose(slant, 0.0, atol=1e-6)
+
+
+def test_standing_weighs_pushes_and_lies_under_the_pelvis() -> None:
+    found = seen(standing(push=4.0, weight=62.0), "standing_force")
+    assert found["mass"].value == pytest.approx(62.0)
+    assert found["mean Fx"].value == pytest.approx(4.0)
+    assert found["mean Fy"].value == pytest.approx(0.0)
+    np.testing.assert_allclose(values(standing(), "standing_place"), 0.0, atol=1e-9)
+
+
+def test_empty_plates_tell_what_was_taken_off() -> None:
+    found = seen(walk(Wrong(zero=(3.0, -2.0, 12.0))), "empty_plate")
+    assert [found[f"plate1 {c}, taken off"].value for c in ("Fx", "Fy", "Fz")] == [3.0, -2.0, 12.0]
+    assert found["plate2 Fz, after less before"].value == pytest.approx(0.0)
+
+
+def test_flight_reads_what_a_plate_leaves() -> None:
+    trial = walk()
+    names = trial.markers.names
+    up = np.array(trial.markers.xyz)
+    frames = (trial.markers.time > 2.3) & (trial.markers.time < 2.6)
+    up[np.ix_(frames, [names.index(n) for n in ("LHEE", "RHEE", "LTOE", "RTOE")], [2])] = 0.3
+    left = np.array(trial.plates[0].wrench.value)
+    left[trial.plates[0].wrench.time > 2.2, 1] = 7.0
+    plate = replace(trial.plates[0], wrench=replace(trial.plates[0].wrench, value=left))
+    flown = replace(trial, markers=replace(trial.markers, xyz=up), plates=(plate, trial.plates[1]))
+    found = seen(flown, "flight")
+    assert found["plate1 Fy in flight"].value == pytest.approx(7.0)
+    assert found["plate2 Fz in flight"].value == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize(
+    ("names", "small", "size"),
+    [
+        (("plate_position", "plate1:y"), Wrong(moved=(0, 0.01)), 0.01),
+        (("plate_gain", "plate1:Fz"), Wrong(gain=0.02), 0.02),
+        (("time_delay", ""), Wrong(late=0.005), 0.005),
+        (("plate_offset", "plate1:Fx"), Wrong(zero=(6, 0, 0)), 6.0),
+    ],
+)
+def test_traces_are_what_a_recording_made_wrong_shows(names: tuple[str, str], small: Wrong, size: float) -> None:
+    here = recording(walk(), mass=MASS)
+    found = observe(here)
+    cause = next(one for one in possible_causes(here) if one.names == names)
+    made = {one.key: one.value - one.expected for one in observe(replace(here, trial=walk(small)))}
+    change = np.array([made[one.key] - one.value + one.expected for one in found])
+    if names[0] == "plate_offset":  # made on both plates
+        change = np.where([one.plate == "plate2" for one in found], 0.0, change)
+    assert np.abs(change).max() > 0
+    sd = np.array([one.sd for one in found])
+    np.testing.assert_allclose(size * traces(here, found, cause) / sd, change / sd, atol=0.2)
+
+
+def test_clean_walks_and_standing_name_nothing() -> None:
+    heard = hear(session(standing(), walk(), walk(name="again")))
+    assert weigh(heard).findings == ()
+    rows = {(row.effect, row.target): row for row in sights(heard)}
+    assert rows["plate_position", "plate1:y"].sd < 0.004
+    assert ("plate_crosstalk", "plate1:Fz->Mx") in rows["plate_position", "plate1:y"].alike
+    assert rows["plate_gain", "plate2:Fx"].witnesses == ()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "names", "size"),
+    [
+        (Wrong(moved=(0.0, 0.02)), ("plate_position", "plate1:y"), 0.02),
+        (Wrong(late=0.03), ("time_delay", ""), 0.03),
+        (Wrong(gain=0.06), ("plate_gain", "plate1:Fz"), 0.06),
+        (Wrong(signs=(-1, -1, 1, -1, -1, -1)), ("axis_error", "plate1:Fz"), None),
+    ],
+)
+def test_what_is_wrong_in_two_walks_is_named(wrong: Wrong, names: tuple[str, str], size: float | None) -> None:
+    found = weigh(hear(session(standing(wrong), walk(wrong), walk(wrong, name="again")))).findings
+    assert [(one.effect, one.target) for one in found] == [names]
+    if size is not None:
+        low, high = found[0].parameters[0].interval
+        assert low <= size <= high
+        assert found[0].parameters[0].sd < 0.3 * size
+
+
+def test_an_unknown_mass_and_missing_feet_are_silence_not_an_error() -> None:
+    heard = hear(session(walk(), mass=float("nan")))
+    assert "stride_force" not in {one.witness for one in heard.observations}
+    trial = walk()
+    bare = replace(trial, markers=trial.markers.select(["SACR"]))
+    assert {one.witness for one in observe(recording(bare, mass=MASS))} == {"empty_plate"}
+    assert size_by(hear(session(replace(bare, markers=None))), ("time_delay", "")) is None
+
+
+def test_one_odd_step_names_nothing() -> None:
+    odd = walk(Wrong(late=0.03))
+    others = [walk(name=f"walk{i}") for i in range(3)]
+    shifted = weigh(hear(session(*others, odd))).findings
+    assert not [one for one in shifted if one.effect != "time_delay"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_file_of_the_folder_is_a_witness(name: str) -> None:
+    member = witnesses()[name]
+    assert member.name == name
+    assert set(member.sees) <= set(causes())
+    assert member.needs.endswith(".")
+    assert member.look(recording(replace(walk(), markers=None, plates=()))) == ()
+    for one in member.look(recording(walk(), mass=MASS)):
+        assert one.witness == name
+        assert one.sd > 0
+        assert one.expected_sd >= one.sd
+
+
+def test_objects_join_and_strangers_are_refused() -> None:
+    class Loud(Witness):
+        """Hears one thing."""
+
+        name, sees, needs, source = "loud", ("time_delay",), "Silence.", "nobody"
+
+        def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+            return (Observation("loud", "noise", seen.trial.name, 1.0, 1.0, 0.0, "1"),)
+
+    assert [one.witness for one in observe(recording(walk()), ["foot_outline", Loud()])][-1] == "loud"
+    with pytest.raises(BiodanceError, match="it is no witness"):
+        witnesses([object()])  # type: ignore[list-item]
+
+
+def test_seconds_of_single_contact_count() -> None:
+    assert hear(session(walk())).seconds["walk"] == pytest.approx(2 * STANCE, abs=0.02)
