@@ -2,9 +2,11 @@
 refused or guessed.
 """
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from statistics import median
 
 from biodance.discovery import Chosen
 from biodance.errors import BiodanceError, SessionRefused
@@ -21,7 +23,7 @@ from biodance.lab.session.recordings import (
     role_by_name,
     vicon_notes,
 )
-from biodance.lab.session.subject import identify_subject
+from biodance.lab.session.subject import declared_mass, declared_stature, identify_subject
 from biodance.lab.vicon import EclipseNotes
 from biodance.lab.weight import is_still, movement
 from biodance.records import Role, Session, Trial
@@ -111,6 +113,7 @@ def read_session(
         reasons[trials[-1].name] = reason
     if not trials:
         raise SessionRefused(_nothing_left(folder, refused, readers))
+    _refuse_several_people(folder, trials)
     trials = _settle_static(trials, file_says, reasons, notes)
     if marker_set is None:
         trials, guessed = dress(trials)
@@ -132,6 +135,21 @@ def _checked(folder: Path) -> Path:
             f"{folder}: is a file; a session is a folder with a static trial and trials. Give the folder."
         )
     return folder
+
+
+def _refuse_several_people(folder: Path, trials: Sequence[Trial]) -> None:
+    """Raise SessionRefused where the recordings of two parts of a session declare masses or statures of two people."""
+    for said, of, unit, alike in ((declared_mass, "mass", "kg", 1.1), (declared_stature, "stature", "m", 1.04)):
+        parts: dict[Path, list[float]] = {}
+        for trial in trials:
+            if math.isfinite(value := said(trial.measurements)):
+                parts.setdefault(trial.source.path.parent, []).append(value)
+        known = sorted((median(values), part.name) for part, values in parts.items())
+        if known and known[-1][0] > alike * known[0][0]:
+            raise SessionRefused(
+                f"{folder}: its folders hold several people: {of} {known[0][0]:.4g} {unit} in {known[0][1]}, "
+                f"{known[-1][0]:.4g} {unit} in {known[-1][1]}. Point at one of them; `biodance batch` goes through all."
+            )
 
 
 def _role(file: Path, folder: Path, settings: SessionFile, operator: EclipseNotes | None) -> tuple[Role, str]:
