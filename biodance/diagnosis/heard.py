@@ -96,6 +96,7 @@ class Sight:
 def sights(heard: Testimony) -> tuple[Sight, ...]:
     """Return how well each cause is seen, the blind rows last."""
     counting, family = heard.counting, witnesses()
+    spoke = {one.witness for one in heard.observations}
     sd = np.array([one.sd for one in counting.observations])
     inner = np.diag(sd**2) + counting.shared @ counting.shared.T
     white = {name: np.linalg.solve(inner, trace) if trace.size else trace for name, trace in counting.traces.items()}
@@ -110,7 +111,7 @@ def sights(heard: Testimony) -> tuple[Sight, ...]:
             and seen
             and abs(counting.traces[other] @ white[name]) > _ALIKE * (power[other] * power[name]) ** 0.5 > 0
         )
-        silent = [one for one in family.values() if cause.effect in one.sees and one.name not in seen]
+        silent = [one for one in family.values() if cause.effect in one.sees and one.name not in spoke]
         size = power[name] ** -0.5 if seen else float("inf")
         found.append(Sight(*name, cause.unit, size, seen, alike, tuple(one.needs for one in silent)))
     return tuple(sorted(found, key=lambda one: not one.witnesses))

@@ -23,8 +23,12 @@ def with_witnesses(one: Diagnosis, said: Verdicts, heard: Testimony, *, judged: 
     """Return the diagnosis with what the witnesses found; ``judged``: whether the simulation could be asked at all."""
     one = replace(one, witnesses=heard if heard.observations else None)
     raw = any(finding.effect in _RAW for finding in one.findings)
-    if not said.findings or raw:
-        return _checked(one, heard) if not raw else one
+    if raw:
+        known = {(finding.effect, finding.target) for finding in one.findings}
+        signs = tuple(f for f in said.findings if f.effect in _RAW and (f.effect, f.target) not in known)
+        return replace(one, findings=(*one.findings, *signs))
+    if not said.findings:
+        return _checked(one, heard)
     names = {(alias.effect, alias.target) for finding in said.findings for alias in finding.set}
     same = {(f.effect, f.target): f for f in one.findings}
     mine = tuple(_together(finding, same.get((finding.effect, finding.target))) for finding in said.findings)

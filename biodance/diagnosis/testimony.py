@@ -42,7 +42,13 @@ _USUAL = {
 }
 """Sizes up to which laboratories have a cause without calling it a fault: plates 2 to 5 mm off (Collins 2009), zeros of
 public recordings to 6 N, clocks within a frame, clothes and shoes."""
-_ALIKE = {"plate_position": 0.005, "plate_rotation": 0.01, "plate_gain": 0.004, "time_delay": 0.002}
+_ALIKE = {
+    "plate_position": 0.005,
+    "plate_crosstalk": 0.005,
+    "plate_rotation": 0.01,
+    "plate_gain": 0.004,
+    "time_delay": 0.002,
+}
 """Standard deviation of what careful laboratories have (same units): no size is surer against "as the file says"."""
 _VERTICAL = 18.0
 """N of vertical zero, which readers take off: public recordings have up to 16."""
