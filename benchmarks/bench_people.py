@@ -13,6 +13,7 @@ static trial and taken into the model's segment frame there: no misplaced joint 
 import argparse
 import json
 import os
+import random
 import subprocess
 import sys
 from pathlib import Path
@@ -40,9 +41,10 @@ def session_of(seed: int, folder: Path) -> Path:
     """Return the session of a person in a real room, generated if it is not there."""
     place = folder / f"P{seed}"
     if not place.with_name(f"P{seed}.truth.json").is_file():
-        rng, sex = np.random.default_rng(seed), "FM"[seed % 2]
-        height = round(float(rng.uniform(*((1.52, 1.75) if sex == "F" else (1.64, 1.95)))), 2)
-        words = {"seed": seed, "sex": sex, "height": height, "mass": round(rng.uniform(19.5, 28.5) * height**2, 1)}
+        rng, sex = random.Random(seed), "FM"[seed % 2]
+        height = round(rng.uniform(*((1.52, 1.75) if sex == "F" else (1.64, 1.95))), 2)
+        mass = round(rng.uniform(19.5, 28.5) * height**2, 1)
+        words: Row = {"seed": seed, "sex": sex, "height": height, "mass": mass}
         words |= {"noise": 0.6, "camera": 0.3, "out": place}
         asked = [str(text) for name, value in words.items() for text in (f"--{name}", value)]
         program = Path(os.environ["BIODANCE_FOREIGN_LAB"]) / "foreign_lab.py"
@@ -78,7 +80,8 @@ def person(seed: int, folder: Path) -> Row:
     place = session_of(seed, folder)
     result = examine(read_session(place))
     body, found = result.body, result.identification
-    assert body is not None and found is not None and found.gain is not None
+    assert body is not None and found is not None
+    assert found.gain is not None
     static = next(one.motion for one in result.trials if one.trial.role == "static")
     true = json.loads(place.with_name(f"P{seed}.truth.json").read_text())["segments"]
     mass, com = truth(body, static, true)
@@ -97,9 +100,7 @@ def table(rows: list[Row]) -> list[str]:
     """Return the table of a group of people as lines of Markdown."""
     names = rows[0]["segments"]
     of = {key: np.array([row[key] for row in rows]) for key in rows[0] if key != "segments"}
-    mass, com = (
-        {w: of[f"{w}_{what}"] - of[what] for w in ("table", "found")} for what in ("mass", "com")
-    )
+    mass, com = ({w: of[f"{w}_{what}"] - of[what] for w in ("table", "found")} for what in ("mass", "com"))
     e_mass = {w: np.abs(x) for w, x in mass.items()}
     e_com = {w: 1e3 * np.linalg.norm(x, axis=2) for w, x in com.items()}
     z, z_com = mass["found"] / of["sd"][:, :, 0], com["found"] / of["sd"][:, :, 1:]
@@ -119,8 +120,8 @@ def table(rows: list[Row]) -> list[str]:
         "",
         f"{len(rows)} people: mass {e_mass['table'].mean():.3f} -> {e_mass['found'].mean():.3f} kg ({ratio[0]:.2f} x), "
         f"CoM {e_com['table'].mean():.1f} -> {e_com['found'].mean():.1f} mm ({ratio[1]:.2f} x). 95 % intervals hold "
-        f"{_within(z):.1f} % of the masses, {_within(z_com):.1f} % of the CoM, {_within(z[:, hip]):.1f} % of pelvis and "
-        f"thighs. Thigh right less left, off by: largest {1e3 * np.abs(of['thigh'] - of['true_thigh']).max():.0f} mm, "
+        f"{_within(z):.1f} % of the masses, {_within(z_com):.1f} % of the CoM, {_within(z[:, hip]):.1f} % of pelvis "
+        f"and thighs. Thigh right less left, off by: largest {1e3 * np.abs(of['thigh'] - of['true_thigh']).max():.0f} mm, "
         f"model's own {1e3 * np.abs(of['thigh']).max():.0f} mm. Squats, table over identified, median: force "
         f"{np.median(of['gain'][:, 0]):.2f}, moment {np.median(of['gain'][:, 1]):.2f}; the interval excludes 1 in "
         f"{100 * of['sure'].mean():.0f} %. Loads announced: {of['alarm'].sum():.0f}.",

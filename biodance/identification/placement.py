@@ -42,6 +42,6 @@ def more_probable_place(data: Information, table: Sip, body: Body) -> tuple[Sip,
     apart = 1e3 * float(np.linalg.norm((both[1].com - both[0].com)[trunk]))
     where = "is taken along with the joint" if gain > 0 else "stays where the table has it"
     return both[int(gain > 0)], (
-        f"The trunk turns {apart:.0f} mm from where the table cuts it from the pelvis. Its matter {where}: more probable "
-        f"by a natural logarithm of {abs(gain):.1f}."
+        f"The trunk turns {apart:.0f} mm from where the table cuts it from the pelvis. Its matter {where}: more "
+        f"probable by a natural logarithm of {abs(gain):.1f}."
     )

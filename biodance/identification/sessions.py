@@ -62,9 +62,7 @@ def differences(earlier: Identification, later: Identification) -> tuple[Differe
         )
     mass = float(earlier.belief.prior.mass.sum())
     along = goes_along(earlier.belief.prior, earlier.body)
-    first, second = (
-        _with_room(one, other, mass, along=along) for one, other in ((earlier, later), (later, earlier))
-    )
+    first, second = (_with_room(one, other, mass, along=along) for one, other in ((earlier, later), (later, earlier)))
     mutual = _owed(first) @ earlier.belief.prior.covariance @ _owed(second).T
     spread = first.covariance + second.covariance - mutual - mutual.T
     values = [_possible(belief, one) for belief, one in ((first, earlier), (second, later))]

@@ -147,8 +147,8 @@ def scaled_lumps(reference: Reference, skeleton: Skeleton, subject: Subject) -> 
 
 
 def cut_at_joint(skeleton: Skeleton) -> Skeleton:
-    """Return the skeleton of which the table cuts pelvis from trunk at the joint: the trunk's matter goes along with the
-    joint, the pelvis reaches up to it.
+    """Return the skeleton of which the table cuts pelvis from trunk at the joint: the trunk's matter goes along with
+    the joint, the pelvis reaches up to it.
     """
     pelvis = float(np.linalg.norm(skeleton.origins["trunk"]))
     return replace(skeleton, cut={}, lengths={**skeleton.lengths, "pelvis": pelvis})

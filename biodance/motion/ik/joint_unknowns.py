@@ -16,7 +16,7 @@ from biodance.spatial import axis_rotation, skew
 
 HINGES = ("right_knee", "left_knee", "right_elbow", "left_elbow")
 ABOVE = {"knee": "hip", "elbow": "shoulder"}
-_LIMBS = (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"))
+_LIMBS = (("hip", "knee"), ("knee", "ankle"))
 """Joints at the ends of the limbs that a person has equally long on both sides, within `error_size("side_length")`."""
 _TURNS = 3 * len(JOINTS)
 SIZE = _TURNS + len(HINGES)
@@ -70,9 +70,9 @@ class JointUnknowns:
         return np.asarray(axis_rotation(self.bone(hinge), theta[[own_turn(hinge)]])[0])
 
     def prior(self, theta: Array) -> tuple[Array, Array]:
-        """Return residuals (40,) in standard deviations and their slope (40, 37): how far joints are from their static
+        """Return residuals (39,) in standard deviations and their slope (39, 37): how far joints are from their static
         places, knees and elbows from where the lateral marker sees them when the axis turns, and how much longer
-        thigh, shank and upper arm are on the right than on the left (`_sides`).
+        thigh and shank are on the right than on the left (`_sides`).
         """
         residual, slope = np.empty(SIZE), np.zeros((SIZE, SIZE))
         for joint in JOINTS:
@@ -91,8 +91,8 @@ class JointUnknowns:
         return np.concatenate([residual, apart]), np.concatenate([slope, apart_slope])
 
     def _sides(self, theta: Array) -> tuple[Array, Array]:
-        """Return by how many standard deviations the limbs of ``_LIMBS`` are longer on the right (3,), and the slope
-        (3, 37).
+        """Return by how many standard deviations the limbs of ``_LIMBS`` are longer on the right (2,), and the slope
+        (2, 37).
         """
         more, slope = np.zeros(len(_LIMBS)), np.zeros((len(_LIMBS), SIZE))
         for row, (upper, lower) in enumerate(_LIMBS):

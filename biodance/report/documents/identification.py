@@ -7,7 +7,7 @@ import numpy as np
 
 from biodance.identification.added_mass import LoadSearch
 from biodance.identification.identification import Identification
-from biodance.identification.knowledge import Known
+from biodance.identification.knowledge import SIGMAS, Known, known_together
 from biodance.identification.load_words import say_load
 from biodance.identification.sessions import Difference
 from biodance.identification.torques import TorqueBands
