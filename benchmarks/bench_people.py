@@ -80,7 +80,8 @@ def person(seed: int, folder: Path) -> Row:
     place = session_of(seed, folder)
     result = examine(read_session(place))
     body, found = result.body, result.identification
-    assert body is not None and found is not None
+    assert body is not None
+    assert found is not None
     assert found.gain is not None
     static = next(one.motion for one in result.trials if one.trial.role == "static")
     true = json.loads(place.with_name(f"P{seed}.truth.json").read_text())["segments"]
@@ -121,8 +122,8 @@ def table(rows: list[Row]) -> list[str]:
         f"{len(rows)} people: mass {e_mass['table'].mean():.3f} -> {e_mass['found'].mean():.3f} kg ({ratio[0]:.2f} x), "
         f"CoM {e_com['table'].mean():.1f} -> {e_com['found'].mean():.1f} mm ({ratio[1]:.2f} x). 95 % intervals hold "
         f"{_within(z):.1f} % of the masses, {_within(z_com):.1f} % of the CoM, {_within(z[:, hip]):.1f} % of pelvis "
-        f"and thighs. Thigh right less left, off by: largest {1e3 * np.abs(of['thigh'] - of['true_thigh']).max():.0f} mm, "
-        f"model's own {1e3 * np.abs(of['thigh']).max():.0f} mm. Squats, table over identified, median: force "
+        f"and thighs. Thigh right less left, largest: {1e3 * np.abs(of['thigh']).max():.0f} mm, off by "
+        f"{1e3 * np.abs(of['thigh'] - of['true_thigh']).max():.0f} mm. Squats, table over identified, median: force "
         f"{np.median(of['gain'][:, 0]):.2f}, moment {np.median(of['gain'][:, 1]):.2f}; the interval excludes 1 in "
         f"{100 * of['sure'].mean():.0f} %. Loads announced: {of['alarm'].sum():.0f}.",
     ]

@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from test_motion_functional_joints import displaced, hidden, scaling
 
 from biodance.body.body import Body
 from biodance.body.body_file import body_text, parse_body
@@ -14,7 +15,6 @@ from biodance.identification.placement import goes_along, more_probable_place, p
 from biodance.motion.ik.joint_unknowns import JointUnknowns, own_centre
 from biodance.records import Sip
 from biodance.uncertainty.caution import widened
-from test_motion_functional_joints import displaced, hidden, scaling
 
 TRUNK = 7
 
