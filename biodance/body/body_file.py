@@ -61,7 +61,7 @@ def _body(found: dict[str, Any]) -> Body:
         name=found["name"],
         segments=tuple(found["segments"]),
         joints=tuple(Joint(**joint) for joint in found["joints"]),
-        sip=Sip(**{**found["sip"], "segments": tuple(found["sip"]["segments"])}),
+        sip=_sip(found["sip"]),
         limits=JointLimits(**found["limits"]),
         markers=_markers(found["markers"]),
         boxes=found["boxes"],
@@ -71,7 +71,12 @@ def _body(found: dict[str, Any]) -> Body:
         notes=tuple(found["notes"]),
         joint_errors=tuple(JointError(*error) for error in found["joint_errors"]),
         **({"gravity": found["gravity"]} if "gravity" in found else {}),
+        at_joint=_sip(found["at_joint"]) if found.get("at_joint") else None,
     )
+
+
+def _sip(found: dict[str, Any]) -> Sip:
+    return Sip(**{**found, "segments": tuple(found["segments"])})
 
 
 def _markers(found: dict[str, Any]) -> SegmentMarkers:

@@ -139,6 +139,7 @@ def branch_off(body: Body, cut: Cut) -> Body:
         boxes=np.concatenate([body.boxes, body.boxes[[old]] - cut.place]),
         com_boxes=_com_boxes(body, cut),
         notes=(*body.notes, f"{cut.name} moves on {cut.segment}."),
+        at_joint=None,
     )  # fmt: skip
     return extended
 

@@ -16,11 +16,12 @@ from biodance.body.body import Body
 from biodance.errors import NotSolved, TrialRefused, UnknownName
 from biodance.identification.base_parameters import BaseEstimate, estimate_base, structural_base
 from biodance.identification.information import Information
-from biodance.identification.knowledge import QUANTITIES, Known, knowledge, mass_interval
+from biodance.identification.knowledge import QUANTITIES, Known, knowledge, known_together, mass_interval
 from biodance.identification.learning import learn_noise
 from biodance.identification.loads import may_carry
 from biodance.identification.mismatch import Mismatch, Sizes, evident_sizes, mismatch, temper
 from biodance.identification.physical import FailedFit, PhysicalFit, physical_fit
+from biodance.identification.placement import more_probable_place
 from biodance.identification.posterior import Posterior, posterior
 from biodance.identification.statistics import Fit, Statistics, believable, empty, layout_for, statistics
 from biodance.records import Array, Sip
@@ -181,9 +182,8 @@ class Identification:
     @property
     def identified(self) -> Body:
         """The body with the identified parameters; raises `NotSolved` like `sip`."""
-        return replace(
-            self.body, sip=self.sip, notes=(*self.body.notes, f"SIP identified from {', '.join(self.trials)}.")
-        )
+        notes = (*self.body.notes, f"SIP identified from {', '.join(self.trials)}.")
+        return replace(self.body, sip=self.sip, notes=notes, at_joint=None)
 
     @property
     def unknown(self) -> tuple[Known, ...]:
@@ -261,11 +261,12 @@ def conclude(
     if found is not None:
         sizes = evident_sizes(data, found, may_carry(body, before))
         data = temper(data, found, sizes)
+    before, placed = more_probable_place(data, before, body) if prior is None else (before, "")
     belief = posterior(data, before)
     fit = physical_fit(belief, body)
     base = estimate_base(data, structural_base(body))
     known: tuple[Known, ...] = ()
-    words: tuple[str, ...] = () if found else (NOISE_ALONE,)
+    words: tuple[str, ...] = (*(() if found else (NOISE_ALONE,)), *((placed,) if placed else ()))
     if fit.status == "solved":
         fit = replace(fit, sip=about_true_centres(fit.sip, body.joint_errors))
         known = knowledge(fit.sip, about_true_centres(before, body.joint_errors), belief)
@@ -289,6 +290,8 @@ def _notes(known: tuple[Known, ...], fit: PhysicalFit) -> tuple[str, ...]:
     ]
     if lost:
         notes.append(f"Cannot be known from this session (the table's value stands): {', '.join(lost)}.")
+    pair = known_together(fit.sip)
+    notes += [str(pair)] if pair else []
     moved = [name for name, acts in zip(fit.sip.segments, fit.moved, strict=True) if acts]
     if moved:
         notes.append(f"At the edge of what a body can be: {', '.join(moved)}.")

@@ -118,6 +118,40 @@ def knowledge(after: Sip, before: Sip, belief: Posterior | None = None) -> tuple
     return tuple(rows)
 
 
+@dataclass(frozen=True)
+class Together:
+    """Masses (kg, with standard deviations) of neighbours that a joint's place lets trade mass: ``mass`` of all of
+    ``segments``, known to ``sd``; ``first`` that of the first, which alone is known to ``first_sd``.
+    """
+
+    segments: tuple[str, ...]
+    mass: float
+    sd: float
+    first: float
+    first_sd: float
+
+    def __str__(self) -> str:
+        first, *rest = self.segments
+        return (
+            f"{first} and {' and '.join(rest)} are known together, not apart: {self.mass:.1f} ± {SIGMAS * self.sd:.1f} "
+            f"kg, of which {first} {self.first:.1f} ± {SIGMAS * self.first_sd:.1f} kg (mass at a joint belongs to "
+            f"either side of it; where tables cut differs)."
+        )
+
+
+def known_together(sip: Sip) -> Together | None:
+    """Return pelvis and thighs where their masses are less certain than the sum is: what one gains the others lose."""
+    names = ("pelvis", "right_thigh", "left_thigh")
+    if not set(names) <= set(sip.segments):
+        return None
+    at = [10 * sip.segments.index(name) for name in names]
+    cov = np.asarray(sip.covariance)[np.ix_(at, at)]
+    sd, alone = float(np.sqrt(max(cov.sum(), 0.0))), float(np.sqrt(np.trace(cov)))
+    if sd >= alone:
+        return None
+    return Together(names, float(sip.phi[at].sum()), sd, float(sip.phi[at[0]]), float(np.sqrt(cov[0, 0])))
+
+
 def _deviation(slope: Array, covariance: Array) -> Array:
     return np.sqrt(np.maximum(np.diag(slope @ covariance @ slope.T), 0.0))
 

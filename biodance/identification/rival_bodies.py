@@ -5,6 +5,7 @@ from scipy.linalg import solve_triangular
 
 from biodance.identification.identification import Identification
 from biodance.identification.information import Information
+from biodance.identification.placement import goes_along, placed_as
 from biodance.identification.posterior import prior_factor
 from biodance.records import Array, Sip
 
@@ -18,15 +19,17 @@ def expect_unloaded(reference: Identification, session: Identification) -> Sip:
     """Return what ``reference`` lets expect of the unloaded body in ``session``, with covariance.
 
     The belief of the reference, moved by what the table itself changed between the sessions (another static trial,
-    other lengths). The session's table counts at the mass of the reference: the mass that the session declares may hold
-    the load.
+    other lengths), with the trunk's matter in the same of its two places. The session's table counts at the mass of the
+    reference: the mass that the session declares may hold the load.
 
     Raises
     ------
     NotSolved
         The reference contradicts every possible body, so its belief is none of a body.
     """
-    table = weighing(session.belief.prior, float(reference.belief.prior.mass.sum()))
+    along = goes_along(reference.belief.prior, reference.body)
+    same = placed_as(session.belief.prior, session.body, along=along)
+    table = weighing(same, float(reference.belief.prior.mass.sum()))
     shift = table.phi - reference.belief.prior.phi
     return Sip(reference.sip.segments, reference.belief.mean + shift, reference.belief.covariance)
 

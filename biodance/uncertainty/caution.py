@@ -5,11 +5,16 @@ tens of degrees), and a CoM that is off by d adds m d² to the inertia about the
 leaves out.
 """
 
+import functools
+
 import numpy as np
 
 from biodance.body.inertia import TENSOR
 from biodance.body.parts import JointError
+from biodance.body.tables.choice import BASE
+from biodance.body.tables.de_leva import PARTS
 from biodance.body.tables.error_sizes import error_size, joint_size
+from biodance.body.tables.segment_data import read_segment_table
 from biodance.records import Array, Sip
 from biodance.spatial import skew
 
@@ -99,11 +104,8 @@ def _mass_spread(prior: Sip) -> Array:
     """
     table, variance = prior.phi.reshape(-1, 10), np.diag(prior.covariance)[::10]
     mass = np.maximum(table[:, 0], 1e-12)
-    missing = (
-        np.sqrt(np.maximum(error_size("segment_mass", "floor") ** 2 - variance / mass**2, 0.0))
-        * (table[:, 0] > 0)
-        * (variance > 0)
-    )
+    least = error_size("segment_mass", "floor") * np.array([_averaged(name) for name in prior.segments])
+    missing = np.sqrt(np.maximum(least**2 - variance / mass**2, 0.0)) * (table[:, 0] > 0) * (variance > 0)
     names = [name.removeprefix("right_").removeprefix("left_") for name in prior.segments]
     sides = error_size("left_right_correlation", "mass")
     alike = np.array(
@@ -115,6 +117,18 @@ def _mass_spread(prior: Sip) -> Array:
     return np.asarray(
         np.kron(masses, np.ones((10, 10))) * np.outer(prior.phi / np.repeat(mass, 10), prior.phi / np.repeat(mass, 10))
     )
+
+
+@functools.cache
+def _averaged(segment: str) -> float:
+    """Return how much less a segment of several parts may be off than a part (1 of one part): relative errors of parts
+    are independent and average (trunk and head of three parts: 0.61).
+    """
+    parts = PARTS.get(segment.removeprefix("right_").removeprefix("left_"), ())
+    if len(parts) < 2:
+        return 1.0
+    mass = np.array([read_segment_table(BASE).value(part, "mass", sex="M") for part in parts])
+    return float(np.linalg.norm(mass) / mass.sum())
 
 
 def _turn_slope(phi: Array) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.human.limits import joint_limits
-from biodance.body.human.prior import child_widening, com_sd, is_child, prior
+from biodance.body.human.prior import child_widening, com_sd, cut_at_joint, is_child, prior
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, generic_skeleton, joint_tree, kind_of, side_of
 from biodance.body.parts import Foot, SegmentMarkers
 from biodance.body.tables.anthropometry import read_table, row_numbers
@@ -128,7 +128,10 @@ def assemble(
     gravity: float = STANDARD_GRAVITY,
 ) -> Body:
     """Return the Body of a skeleton: joint tree, prior SIP, limits, boxes and soles."""
-    sip, boxes = prior(reference(table, subject), skeleton, subject), shape_boxes(skeleton)
+    usual, boxes = reference(table, subject), shape_boxes(skeleton)
+    sip = prior(usual, skeleton, subject)
+    along = prior(usual, cut_at_joint(skeleton), subject) if skeleton.cut else None
+    rooms = np.array([com_boxes(one, skeleton, boxes) for one in (sip, along) if one])
     return Body(
         name=subject.name or "human",
         segments=SEGMENTS,
@@ -137,10 +140,11 @@ def assemble(
         limits=joint_limits(subject),
         markers=markers,
         boxes=boxes,
-        com_boxes=com_boxes(sip, skeleton, boxes),
+        com_boxes=np.stack([rooms[:, :, 0].min(axis=0), rooms[:, :, 1].max(axis=0)], axis=1),
         feet={side: sole(skeleton, subject, side) for side in SIDES},
         notes=(*notes, *_prior_notes(subject, table)),
         gravity=np.array([0.0, 0.0, -gravity]),
+        at_joint=along,
     )
 
 

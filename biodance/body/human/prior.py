@@ -172,6 +172,14 @@ def scaled_lumps(reference: Reference, skeleton: Skeleton, subject: Subject) -> 
     return tuple(lumps)
 
 
+def cut_at_joint(skeleton: Skeleton) -> Skeleton:
+    """Return the skeleton of which the table cuts pelvis from trunk at the joint: the trunk's matter goes along with
+    the joint, the pelvis reaches up to it.
+    """
+    pelvis = float(np.linalg.norm(skeleton.origins["trunk"]))
+    return replace(skeleton, cut={}, lengths={**skeleton.lengths, "pelvis": pelvis})
+
+
 def _upright_to(point: Array) -> Array:
     """Return the rotation (3, 3) about z that turns y towards a point in the sagittal plane."""
     sine, cosine = point[:2] / np.linalg.norm(point[:2])

@@ -17,6 +17,8 @@ from biodance.spatial import axis_rotation, skew
 
 HINGES = ("right_knee", "left_knee", "right_elbow", "left_elbow")
 ABOVE = {"knee": "hip", "elbow": "shoulder"}
+_LIMBS = (("hip", "knee"), ("knee", "ankle"))
+"""Joints at the ends of the limbs that a person has equally long on both sides, within `error_size("side_length")`."""
 _TURNS = 3 * len(JOINTS)
 SIZE = _TURNS + len(HINGES)
 """Unknowns: 3 m per joint of ``JOINTS`` (displacement, lab axes, in the static posture), then rad per hinge about
@@ -69,8 +71,9 @@ class JointUnknowns:
         return np.asarray(axis_rotation(self.bone(hinge), theta[[own_turn(hinge)]])[0])
 
     def prior(self, theta: Array) -> tuple[Array, Array]:
-        """Return residuals (37,) in standard deviations and their slope (37, 37): how far joints are from their static
-        places, and knees and elbows from where the lateral marker sees them when the axis turns.
+        """Return residuals (39,) in standard deviations and their slope (39, 37): how far joints are from their static
+        places, knees and elbows from where the lateral marker sees them when the axis turns, and how much longer
+        thigh and shank are on the right than on the left (`_sides`).
         """
         residual, slope = np.empty(SIZE), np.zeros((SIZE, SIZE))
         for joint in JOINTS:
@@ -85,7 +88,25 @@ class JointUnknowns:
             residual[rows] -= (swung - arm) / about
             slope[rows, k] = -np.cross(self.bone(hinge), swung) / about
             residual[k], slope[k, k] = theta[k] / sd, 1 / sd
-        return residual, slope
+        apart, apart_slope = self._sides(theta)
+        return np.concatenate([residual, apart]), np.concatenate([slope, apart_slope])
+
+    def _sides(self, theta: Array) -> tuple[Array, Array]:
+        """Return by how many standard deviations the limbs of ``_LIMBS`` are longer on the right (2,), and the slope
+        (2, 37).
+        """
+        more, slope = np.zeros(len(_LIMBS)), np.zeros((len(_LIMBS), SIZE))
+        for row, (upper, lower) in enumerate(_LIMBS):
+            for side, sign in (("right", 1.0), ("left", -1.0)):
+                ends = [f"{side}_{joint}" for joint in (upper, lower)]
+                above, below = (self.centres.place[end] + theta[own_centre(end)] for end in ends)
+                length = np.linalg.norm(below - above)
+                along = sign * (below - above) / length
+                more[row] += sign * length
+                slope[row, own_centre(ends[0])] -= along
+                slope[row, own_centre(ends[1])] += along
+        sd = error_size("side_length", "limb")
+        return more / sd, slope / sd
 
     def axis(self, hinge: str, theta: Array) -> tuple[Array, Array]:
         """Return the unit flexion axis z (3,) of a hinge in the lab, static posture, and its slope (3, 37): square to

@@ -8,7 +8,7 @@ import numpy as np
 from biodance.dance.scoring import PerformanceScore
 from biodance.identification.added_mass import LoadSearch
 from biodance.identification.identification import Identification
-from biodance.identification.knowledge import Known
+from biodance.identification.knowledge import SIGMAS, Known, known_together
 from biodance.identification.load_words import say_load
 from biodance.identification.sessions import Difference
 from biodance.identification.torques import TorqueBands
@@ -122,6 +122,14 @@ def _search(search: LoadSearch) -> dict[str, Any]:
     }
 
 
+def _together(one: Identification) -> dict[str, Any] | None:
+    pair = known_together(one.sip) if one.status == "solved" else None
+    if pair is None:
+        return None
+    low, high = pair.mass - SIGMAS * pair.sd, pair.mass + SIGMAS * pair.sd
+    return {"segments": pair.segments, "mass_kg": pair.mass, "mass_sd_kg": pair.sd, "mass_ci95_kg": (low, high)}
+
+
 def _difference(row: Difference) -> dict[str, Any]:
     return {
         "segment": row.segment,
@@ -182,6 +190,7 @@ def identification_document(found: SessionIdentification) -> dict[str, Any]:
 
     CoM in the segment's axes from its proximal joint centre; inertia about the CoM, order xx xy yy xz yz zz; validation
     moments about ``about_m``, the mean centre of pressure. ``added_mass`` null: no load is announced;
+    ``known_together`` the mass of neighbours that is more certain than their own, null if none;
     ``added_mass_search`` says what was looked for and whether one is "found", there is "none" or one "cannot tell";
     ``joint_torques`` of one trial with what the parameters leave uncertain (not this trial's own skin and plates);
     ``differences`` to the reference session, empty without one; ``performance`` how well the dance that was shown was
@@ -208,6 +217,7 @@ def identification_document(found: SessionIdentification) -> dict[str, Any]:
         "gain": _gain(found.gain),
         "added_mass": added_mass_document(found.search),
         "added_mass_search": _search(found.search),
+        "known_together": _together(one),
         "joint_torques": torques_document(found.torques),
         "differences": [_difference(row) for row in found.changes],
         "performance": performance_document(found.performance),

@@ -1,0 +1,99 @@
+"""The trunk's matter at the table's cut or along with the joint: chosen by evidence; what is known together is said."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from test_motion_functional_joints import displaced, hidden, scaling
+
+from biodance.body.body import Body
+from biodance.body.body_file import body_text, parse_body
+from biodance.identification.information import Information
+from biodance.identification.knowledge import known_together
+from biodance.identification.placement import goes_along, more_probable_place, placed_as
+from biodance.motion.ik.joint_unknowns import JointUnknowns, own_centre
+from biodance.records import Sip
+from biodance.uncertainty.caution import widened
+
+TRUNK = 7
+
+
+@cache
+def low_joint() -> Body:
+    """Return a person whose trunk turns 6 cm below the table's cut."""
+    return displaced(hidden()).body()[0]
+
+
+def moments(body: Body, true: Sip, seed: int = 0) -> Information:
+    """Return data that show the trunk's ten parameters of ``true`` with a relative noise of 1 %."""
+    rows = np.zeros((10, 121))
+    sd = 0.01 * np.maximum(np.abs(true.phi[10 * TRUNK : 10 * TRUNK + 10]), 0.01)
+    rows[:, 10 * TRUNK : 10 * TRUNK + 10] = np.diag(1 / sd)
+    noise = np.random.default_rng(seed).normal(size=10)
+    rows[:, -1] = rows[:, :-1] @ true.phi + noise
+    square = np.linalg.qr(np.vstack([rows, np.zeros((121, 121))]), mode="r")
+    return Information(square, 10)
+
+
+def test_matter_along_with_the_joint_keeps_its_mass_and_its_place_over_the_joint() -> None:
+    body = low_joint()
+    assert body.at_joint is not None
+    np.testing.assert_allclose(body.at_joint.mass, body.sip.mass)
+    lower = (body.sip.com - body.at_joint.com)[TRUNK]
+    assert lower[1] == pytest.approx(0.06, abs=0.01)
+    limbs = [i for i in range(12) if i not in (0, TRUNK)]
+    np.testing.assert_allclose(body.at_joint.com[limbs], body.sip.com[limbs], atol=1e-12)
+    assert 0 < body.at_joint.com[0, 1] < body.sip.com[0, 1]  # the pelvis ends lower
+    assert (body.com_boxes[:, 0] <= np.minimum(body.sip.com, body.at_joint.com)).all()
+
+
+@pytest.mark.parametrize("along", [False, True])
+@pytest.mark.parametrize("seed", range(5))
+def test_the_more_probable_place_is_kept(along: bool, seed: int) -> None:
+    body = low_joint()
+    true = body.at_joint if along else body.sip
+    found, words = more_probable_place(moments(body, true, seed), widened(body.sip), body)
+    assert goes_along(found, body) == along
+    assert ("along with the joint" in words) == along
+
+
+def test_a_prior_of_another_mass_is_placed_at_that_mass_and_back_again() -> None:
+    body = low_joint()
+    heavy = Sip(body.segments, 1.1 * widened(body.sip).phi, 1.21 * np.asarray(widened(body.sip).covariance))
+    there = placed_as(heavy, body, along=True)
+    np.testing.assert_allclose(there.com, body.at_joint.com, atol=1e-12)
+    assert there.mass.sum() == pytest.approx(heavy.mass.sum())
+    back = placed_as(there, body, along=False)
+    np.testing.assert_allclose(back.phi, heavy.phi)
+    np.testing.assert_allclose(back.covariance, heavy.covariance)
+    assert placed_as(heavy, replace(body, at_joint=None), along=True) is heavy
+
+
+def test_a_body_file_keeps_both_places() -> None:
+    body = low_joint()
+    again = parse_body(body_text(body, "test"), "here")[0]
+    np.testing.assert_array_equal(again.at_joint.phi, body.at_joint.phi)
+
+
+def test_pelvis_and_thighs_are_known_together_where_one_gains_what_the_others_lose() -> None:
+    body = low_joint()
+    covariance = np.zeros((120, 120))
+    trade = np.zeros(120)
+    trade[[0, 10, 40]] = 2.0, -1.0, -1.0
+    covariance += np.outer(trade, trade)
+    covariance[0, 0] += 0.01
+    pair = known_together(Sip(body.segments, body.sip.phi, covariance))
+    assert pair.sd == pytest.approx(0.1)
+    assert pair.first_sd == pytest.approx(np.sqrt(4.01))
+    assert "together, not apart" in str(pair)
+    assert known_together(Sip(body.segments, body.sip.phi, np.eye(120))) is None
+
+
+def test_one_leg_longer_than_the_other_is_held_against_the_joints() -> None:
+    unknowns, theta = JointUnknowns(scaling().centres), np.zeros(37)
+    theta[own_centre("right_knee")] = [0.0, 0.0, -0.0047]  # thigh longer, shank shorter
+    residual, slope = unknowns.prior(theta)
+    np.testing.assert_allclose(residual[-2:] - unknowns.prior(np.zeros(37))[0][-2:], [1.0, -1.0], atol=0.05)
+    step = 1e-6 * np.random.default_rng(1).normal(size=37)
+    np.testing.assert_allclose(unknowns.prior(theta + step)[0] - residual, slope @ step, atol=1e-7)
