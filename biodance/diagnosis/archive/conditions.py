@@ -13,8 +13,8 @@ from types import MappingProxyType
 import numpy as np
 
 from biodance.diagnosis.archive.changes import ALARM
-from biodance.diagnosis.archive.quantities import QUANTITIES, PlateEvidence, LabVisit
 from biodance.diagnosis.archive.pooling import Pooled, pool
+from biodance.diagnosis.archive.quantities import QUANTITIES, LabVisit, PlateEvidence
 from biodance.records import Array
 
 _BORROWED = 4.0

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from biodance.diagnosis.archive.quantities import PlateEvidence, LabVisit
+from biodance.diagnosis.archive.quantities import LabVisit, PlateEvidence
 from biodance.diagnosis.archive.walking import of_steps
 from biodance.lab.plates.zero import block_means, find_baseline
 from biodance.lab.weight import is_still, standing_mass

@@ -8,7 +8,7 @@ from scipy.stats import f as fisher
 
 from biodance.diagnosis.archive.changes import ALARM, ALL, Change, History, Stranger, history
 from biodance.diagnosis.archive.conditions import ConditionEffect, condition_effects, without_conditions
-from biodance.diagnosis.archive.quantities import QUANTITIES, PlateEvidence, LabVisit, in_order
+from biodance.diagnosis.archive.quantities import QUANTITIES, LabVisit, PlateEvidence, in_order
 from biodance.diagnosis.archive.series import series_of
 
 _HORIZONTAL = ("offset_x", "offset_y")

@@ -36,7 +36,7 @@ class Quantity:
     norm: float = 0.0
 
     def __post_init__(self) -> None:
-        if not 0 < self.typical:
+        if not self.typical > 0:
             raise ValueError(f"Quantity {self.name}: typical = {self.typical} must be positive.")
 
 
