@@ -43,8 +43,6 @@ class Ledger:
             raise BiodanceError(
                 f"{folder}: holds files that are not of a batch run; nothing is overwritten. Choose another --out."
             )
-        if folder.resolve() == archive.resolve() or folder.resolve() in archive.resolve().parents:
-            raise BiodanceError(f"{folder}: results must not lie among the recordings. Choose another --out.")
         folder.mkdir(parents=True, exist_ok=True)
         self._lock = (folder / _LOCK).open("w", encoding="utf-8")
         try:

@@ -109,6 +109,8 @@ def run_batch(
     """
     archive, folder = Path(archive), Path(out)
     assignments(chosen)
+    if folder.resolve() in (archive.resolve(), *archive.resolve().parents):
+        raise BiodanceError(f"{folder}: results must not lie among the recordings. Choose another --out.")
     if workers is not None and workers < 1:
         raise BiodanceError(f"--workers {workers}: at least one process is needed. Leave it out for one a core.")
     sessions, indices = archive_folders(archive)
@@ -120,7 +122,8 @@ def run_batch(
         for name in [_name(path, archive)]
     ]
     if not tasks:
-        raise BiodanceError(f"{archive}: holds no session, only plates ({indices[0]}). See biodance plates.")
+        left = f"only recordings of plates ({indices[0]}): see biodance plates" if indices else "only results"
+        raise BiodanceError(f"{archive}: holds no session, {left}.")
     with Ledger(folder, archive) as ledger:
         fresh = _work_off(tasks, ledger, workers, scheduler, work, tell)
         outcomes = tuple(found for task in tasks if (found := outcome_of(task) or ledger.told(task)))
