@@ -23,9 +23,11 @@ from biodance.report.pages.session import page
 PAGE, _NUMBERS = "report.html", "results.json"
 
 
-def write_report(result: SessionResult, folder: Path, *, diagnosis: SessionDiagnosis | None = None) -> dict[str, Any]:
-    """Write ``report.html`` and ``results.json`` into ``folder`` (which exists) and return the content of the
-    latter.
+def write_report(
+    result: SessionResult, folder: Path, *, diagnosis: SessionDiagnosis | None = None, drawn: bool = True
+) -> dict[str, Any]:
+    """Write ``report.html`` (where ``drawn``) and ``results.json`` into ``folder`` (which exists) and return the
+    content of the latter.
     """
     made = provenance(result, created=now())
     first = diagnosis.diagnosis.attention if diagnosis else session_attention(result)
@@ -36,7 +38,7 @@ def write_report(result: SessionResult, folder: Path, *, diagnosis: SessionDiagn
         "attention": attention_document(first),
         "judged": judged_document(judged),
     }
-    _write(folder, {_NUMBERS: to_text(found), PAGE: _page(result, made, diagnosis)})
+    _write(folder, {_NUMBERS: to_text(found)} | ({PAGE: _page(result, made, diagnosis)} if drawn else {}))
     return dict(plain_values(found))
 
 

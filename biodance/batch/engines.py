@@ -1,0 +1,121 @@
+"""Where sessions are worked on: processes of this machine, or a Dask cluster; both survive the death of a worker."""
+
+import multiprocessing
+import os
+import threading
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+
+from biodance.batch.work import Outcome, SessionStatus, Task, untold
+from biodance.errors import BiodanceError
+
+Work = Callable[[Task], Outcome]
+TRIES = 3
+"""Times that a session may lose its process before it is given up."""
+_FRESH = 50
+"""Sessions after which a process is replaced, so that memory stays flat."""
+
+
+def run_here(tasks: Iterable[Task], work: Work, *, workers: int) -> Iterator[tuple[Task, Outcome]]:
+    """Yield every task with its outcome, worked on by processes of this machine, as they are finished.
+
+    A process that dies (killed, out of memory) is replaced; the sessions that may have been its cause are tried again
+    one at a time, and given up when alone they lose their process `TRIES` times.
+    """
+    waiting, lost = deque(tasks), Counter[str]()
+    while waiting:
+        pool, flying = _pool(workers), dict[Future[Outcome], Task]()
+        try:
+            yield from _until_broken(pool, work, workers, waiting, flying, lost)
+        except BrokenProcessPool:
+            gone = tuple(flying.values())
+            for task in gone:
+                lost[task.name] += 1 if len(gone) == 1 or not lost[task.name] else 0
+                if lost[task.name] < TRIES:
+                    waiting.append(task)
+                else:
+                    yield task, _killed(task)
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _until_broken(
+    pool: ProcessPoolExecutor,
+    work: Work,
+    workers: int,
+    waiting: deque[Task],
+    flying: dict[Future[Outcome], Task],
+    lost: Counter[str],
+) -> Iterator[tuple[Task, Outcome]]:
+    """Yield what is finished until all is, or until a process dies: then ``flying`` are the tasks that may be why.
+
+    A task that lost a process before is worked on alone.
+    """
+    while waiting or flying:
+        while waiting and (not flying or _together(waiting[0], flying, workers, lost)):
+            flying[pool.submit(work, waiting[0])] = waiting[0]
+            waiting.popleft()
+        finished, _ = wait(flying, return_when=FIRST_COMPLETED)
+        for future in sorted(finished, key=lambda one: one.exception() is not None):
+            outcome = future.result()
+            yield flying.pop(future), outcome
+
+
+def _together(task: Task, flying: dict[Future[Outcome], Task], workers: int, lost: Counter[str]) -> bool:
+    """Return whether a task may be worked on beside those that are."""
+    return len(flying) < workers and not any(lost[one.name] for one in (task, *flying.values()))
+
+
+def _killed(task: Task) -> Outcome:
+    """Return the outcome of a session that nobody survives."""
+    why = f"Its process was ended from outside {TRIES} times (memory?). Report it alone to see why."
+    return untold(task.name, task.fingerprint, SessionStatus.FAILED, why)
+
+
+def _pool(workers: int) -> ProcessPoolExecutor:
+    """Return processes that end with us, even when we are killed."""
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["biodance.pipeline.front", "biodance.report.write"])
+    return ProcessPoolExecutor(workers, mp_context=context, initializer=end_with_parent, max_tasks_per_child=_FRESH)
+
+
+def end_with_parent() -> None:
+    """End this process as soon as the one that asked for it is gone."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+
+        def watch() -> None:
+            parent.join()
+            os._exit(1)
+
+        threading.Thread(target=watch, daemon=True).start()
+
+
+def run_on_dask(tasks: Iterable[Task], work: Work, *, scheduler: str) -> Iterator[tuple[Task, Outcome]]:
+    """Yield every task with its outcome, worked on by the Dask cluster at the address ``scheduler``.
+
+    Recordings and results must lie where all workers see them under the same names. Dask replaces workers that die.
+
+    Raises
+    ------
+    BiodanceError
+        Dask is not installed, or nobody answers at the address.
+    """
+    try:
+        import distributed as dask
+    except ImportError as error:
+        raise BiodanceError("--scheduler needs Dask: pip install 'biodance[dask]'.") from error
+    try:
+        client = dask.Client(scheduler, timeout="10s")
+    except (OSError, ValueError) as error:
+        raise BiodanceError(f"--scheduler {scheduler}: no Dask scheduler answers there ({error}).") from error
+    with client:
+        flying = {client.submit(work, task, key=f"{task.name}-{task.fingerprint}"): task for task in tasks}
+        for future in dask.as_completed(list(flying)):
+            task = flying.pop(future)
+            try:
+                yield task, future.result()
+            except dask.KilledWorker:
+                yield task, _killed(task)

@@ -1,0 +1,141 @@
+"""All sessions of an archive in one table and on one page."""
+
+from collections.abc import Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from biodance.batch.rows import COLUMNS
+from biodance.batch.work import Outcome
+from biodance.display import BLUE, RED
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+_PAGE = "report.html"
+_FAR = 3.0
+"""Robust standard deviations from the archive's median at which a session stands out."""
+_KEY = {
+    "mass_difference_percent": ("mass on the plates against declared", "%", 1.0),
+    "marker_rms_m": ("distance of markers", "mm", 1e3),
+    "fz_rms_table_n": ("vertical force against the table's body", "N", 1.0),
+}
+
+
+def table_of(outcomes: Sequence[Outcome]) -> "pd.DataFrame":
+    """Return one row for each trial of every session; a session that was not read has one row with its reason."""
+    import pandas as pd
+
+    rows = [
+        {
+            **row,
+            "session": one.name,
+            "session_status": one.status,
+            "reason": row.get("reason") or "",
+            "seconds": one.seconds,
+            "memory_mb": one.memory_mb,
+        }
+        for one in outcomes
+        for row in (one.rows or ({"trial": "", "status": one.status, "reason": one.reason},))
+    ]
+    return pd.DataFrame(rows, columns=list(COLUMNS)).astype(COLUMNS)
+
+
+def write_summary(folder: Path, name: str, outcomes: Sequence[Outcome], left_out: Sequence[str] = ()) -> None:
+    """Write ``summary.parquet``, ``summary.csv`` and ``report.html`` of an archive into ``folder``; an earlier summary
+    is replaced whole.
+    """
+    table = table_of(outcomes)
+    parquet, text = folder / ".summary.parquet.part", folder / ".summary.csv.part"
+    table.to_parquet(parquet, index=False)
+    table.to_csv(text, index=False, lineterminator="\n")
+    parquet.replace(folder / "summary.parquet")
+    text.replace(folder / "summary.csv")
+    page = folder / f".{_PAGE}.part"
+    page.write_text(_page(name, outcomes, table, left_out), encoding="utf-8")
+    page.replace(folder / _PAGE)
+
+
+def outliers(table: "pd.DataFrame") -> "list[dict[str, Any]]":
+    """Return what stands out from the archive's own median by more than `_FAR` robust standard deviations (MAD): one
+    entry for each session and quantity, the worst trial; at least eight sessions are needed to call one strange.
+    """
+    found = []
+    for column, (what, unit, factor) in _KEY.items():
+        known = table[["session", "trial", column]].dropna()
+        if known["session"].nunique() < 8:
+            continue
+        value = known[column].to_numpy() * factor
+        middle = float(np.median(value))
+        spread = 1.4826 * float(np.median(np.abs(value - middle)))
+        far = known.assign(value=value, away=np.abs(value - middle) / max(spread, 1e-12))
+        worst = far[far["away"] > _FAR].sort_values("away", ascending=False).drop_duplicates("session")
+        found += [
+            {
+                "session": one.session,
+                "trial": one.trial,
+                "what": what,
+                "value": f"{one.value:.1f} {unit}",
+                "usual": f"{middle:.1f} ± {spread:.1f} {unit}",
+            }
+            for one in worst.itertuples()
+        ]
+    return found
+
+
+def _figure(table: "pd.DataFrame") -> "Figure | None":
+    """Draw the key figures of all sessions as histograms; None where there is nothing to draw."""
+    from biodance.report.figures.style import figure, look
+
+    shown = {name: table.dropna(subset=[name]).groupby("session")[name].median() for name in _KEY}
+    shown = {name: found for name, found in shown.items() if len(found) > 1}
+    if not shown:
+        return None
+    with look():
+        drawn = figure(2.2)
+        for axes, (name, found) in zip(np.atleast_1d(drawn.subplots(1, len(shown))), shown.items(), strict=True):
+            what, unit, factor = _KEY[name]
+            axes.hist(found.to_numpy() * factor, bins=min(30, max(5, len(found) // 2)), color=BLUE)
+            axes.axvline(float(np.median(found)) * factor, color=RED, linewidth=1)
+            axes.set(xlabel=f"{what}, {unit}", ylabel="sessions")
+    return drawn
+
+
+def _page(name: str, outcomes: Sequence[Outcome], table: "pd.DataFrame", left_out: Sequence[str]) -> str:
+    """Return the page of an archive as HTML text."""
+    from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
+
+    from biodance.pipeline.provenance import now
+    from biodance.report.figures.style import svg_address
+    from biodance.version import __version__
+
+    folder = files("biodance.report") / "templates"
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    drawn = _figure(table)
+    first = table.drop_duplicates("session").set_index("session")
+    return environment.from_string((folder / "archive.html.j2").read_text(encoding="utf-8")).render(
+        style=Markup((folder / "page.css").read_text(encoding="utf-8")),
+        name=name,
+        version=__version__,
+        created=now(),
+        outcomes=outcomes,
+        unread=[one for one in outcomes if one.unread],
+        counts={
+            status: sum(one.status == status for one in outcomes) for status in sorted({o.status for o in outcomes})
+        },
+        verdicts=first["verdict"].dropna().value_counts().to_dict(),
+        findings=first.loc[first["findings"].fillna("") != "", "findings"].to_dict(),
+        mass=first["mass_difference_percent"].dropna().to_dict(),
+        verdict=first["verdict"].dropna().to_dict(),
+        strange=outliers(table),
+        figure=svg_address(drawn) if drawn else "",
+        left_out=left_out,
+        trials=len(table),
+        seconds=sum(one.seconds for one in outcomes),
+        memory=max((one.memory_mb for one in outcomes), default=0.0),
+        sessions="sessions",
+    )

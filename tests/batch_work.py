@@ -1,0 +1,46 @@
+"""Stand-ins for the work on one session, for processes that import them: quick, deadly, slow."""
+
+import json
+import os
+import signal
+import time
+from dataclasses import asdict, replace
+from pathlib import Path
+
+from biodance.batch.work import OUTCOME, Outcome, SessionStatus, Task, outcome_of, process_session
+
+
+def count(task: Task) -> Outcome:
+    """Write down who worked on a session, and its outcome; nothing else."""
+    if found := outcome_of(task):
+        return found
+    with (Path(task.session) / "worked.log").open("a") as log:
+        log.write(f"{os.getpid()}\n")
+    outcome = Outcome(task.name, task.fingerprint, SessionStatus.DONE, rows=({"trial": "walk", "status": "ok"},))
+    Path(task.out).mkdir(parents=True, exist_ok=True)
+    (Path(task.out) / OUTCOME).write_text(json.dumps(asdict(outcome)))
+    return outcome
+
+
+def die_in_s2(task: Task) -> Outcome:
+    """Be killed in session s2, each time."""
+    if task.name == "s2":
+        os.kill(os.getpid(), signal.SIGKILL)
+    return count(task)
+
+
+def die_once(task: Task) -> Outcome:
+    """Be killed in every session at the first try."""
+    mark = Path(task.session) / "tried"
+    if not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return count(task)
+
+
+def slow(task: Task) -> Outcome:
+    """Go through a session that is refused, then wait to be killed with the one that asked."""
+    if (found := outcome_of(task)) is None:
+        found = process_session(replace(task, pages=False))
+    time.sleep(30.0 if task.name == "s3" else 0.0)
+    return found

@@ -1,0 +1,180 @@
+"""Archives go through whole: nothing twice, nothing lost, whatever dies."""
+
+import json
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import batch_work
+import pandas as pd
+import pytest
+
+import biodance
+from biodance.batch.ledger import LEDGER, Ledger
+from biodance.batch.rows import COLUMNS
+from biodance.batch.run import run_batch
+from biodance.batch.summary import outliers, table_of
+from biodance.batch.work import Outcome, SessionStatus, Task, process_session
+from biodance.cli import run
+from biodance.errors import BiodanceError
+
+
+def archive_of(folder: Path, count: int) -> Path:
+    """Return an archive of sessions that hold one file which is no recording."""
+    for k in range(count):
+        (folder / f"s{k}").mkdir(parents=True)
+        (folder / f"s{k}" / "walk.c3d").write_bytes(b"no recording")
+    return folder
+
+
+def worked(archive: Path) -> dict[str, int]:
+    """Return how many times each session was worked on."""
+    return {path.parent.name: len(path.read_text().splitlines()) for path in archive.rglob("worked.log")}
+
+
+def test_every_session_once_and_a_second_call_does_nothing(tmp_path: Path) -> None:
+    archive = archive_of(tmp_path / "a", 6)
+    tasks = [Task(f"s{k}", str(archive / f"s{k}"), "", "f") for k in range(6)]
+    first = run_batch(archive, tmp_path / "out", workers=2, work=process_session, pages=False)
+    assert (first.fresh, first.counts) == (6, {"refused": 6})
+    assert len(tasks) == len(first.outcomes)
+    assert all("walk.c3d" in one.reason for one in first.outcomes)
+    again = run_batch(archive, tmp_path / "out", workers=2, work=batch_work.die_in_s2)
+    assert again.fresh == 0
+    assert again.outcomes == first.outcomes
+    (archive / "s4" / "walk.c3d").write_bytes(b"another recording")
+    assert run_batch(archive, tmp_path / "out", workers=1, pages=False).fresh == 1
+
+
+def test_a_session_that_kills_its_process_takes_nobody_along(tmp_path: Path) -> None:
+    archive = archive_of(tmp_path / "a", 5)
+    found = run_batch(archive, tmp_path / "out", workers=2, work=batch_work.die_in_s2)
+    status = {one.name: one.status for one in found.outcomes}
+    assert status["s2"] == "failed"
+    with sqlite3.connect(tmp_path / "out" / LEDGER) as book:
+        known = dict(book.execute("SELECT name, status FROM sessions"))
+    assert known == {"s0": "done", "s1": "done", "s2": "failed", "s3": "done", "s4": "done"}
+    assert worked(archive) == {"s0": 1, "s1": 1, "s3": 1, "s4": 1}
+
+
+def test_processes_that_die_once_are_replaced(tmp_path: Path) -> None:
+    archive = archive_of(tmp_path / "a", 4)
+    run_batch(archive, tmp_path / "out", workers=2, work=batch_work.die_once)
+    assert worked(archive) == {f"s{k}": 1 for k in range(4)}
+
+
+def test_the_client_is_killed_and_its_processes_with_it(tmp_path: Path) -> None:
+    archive, out = archive_of(tmp_path / "a", 6), tmp_path / "out"
+    program = (
+        "import sys; sys.path.insert(0, sys.argv[3]); import batch_work; from biodance.batch.run import run_batch\n"
+        "if __name__ == '__main__': run_batch(sys.argv[1], sys.argv[2], workers=2, work=batch_work.slow)"
+    )
+    script = tmp_path / "client.py"
+    script.write_text(program)
+    client = subprocess.Popen([sys.executable, str(script), str(archive), str(out), str(Path(__file__).parent)])
+    finished = out / "sessions" / "s5" / "outcome.json"
+    give_up = time.monotonic() + 120
+    while not finished.exists() and client.poll() is None and time.monotonic() < give_up:
+        time.sleep(0.05)
+    with pytest.raises(BiodanceError, match="another run is writing here"):
+        Ledger(out, archive)
+    client.send_signal(signal.SIGKILL)
+    client.wait()
+    assert finished.exists()
+    while time.monotonic() < give_up and _alive(script):
+        time.sleep(0.05)
+    assert not _alive(script)
+    found = run_batch(archive, out, workers=2, work=batch_work.count)
+    assert "s5" not in worked(archive), "what has an outcome is not worked on again"
+    assert found.counts["refused"] == 6 - found.fresh
+    assert sum(found.counts.values()) == 6
+
+
+def _alive(script: Path) -> bool:
+    """Return whether a process of the client that was killed is left (they carry its name in their environment)."""
+    mine = str(script).encode()
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            if mine in path.read_bytes() and path.parent.name != str(os.getpid()):
+                return True
+        except OSError:
+            continue
+    return False
+
+
+def test_a_folder_that_is_taken_is_refused(tmp_path: Path) -> None:
+    archive, other = archive_of(tmp_path / "a", 1), archive_of(tmp_path / "b", 1)
+    run_batch(archive, tmp_path / "out", work=batch_work.count)
+    with pytest.raises(BiodanceError, match=r"results of another archive \(.*a\)"):
+        run_batch(other, tmp_path / "out", work=batch_work.count)
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.txt").write_text("dear")
+    with pytest.raises(BiodanceError, match="nothing is overwritten"):
+        run_batch(archive, tmp_path / "mine", work=batch_work.count)
+    with pytest.raises(BiodanceError, match="among the recordings"):
+        run_batch(other, tmp_path, work=batch_work.count)
+    with pytest.raises(BiodanceError, match="at least one process"):
+        run_batch(archive, tmp_path / "o", workers=0)
+
+
+def test_a_session_that_takes_too_long_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("biodance.batch.work._examined", lambda *_: time.sleep(20))
+    session = archive_of(tmp_path / "a", 1) / "s0"
+    found = process_session(Task("s0", str(session), str(tmp_path / "out" / "s0"), "f", limit=0.2))
+    assert (found.status, found.reason) == ("failed", "Given up after 0 s; see --limit.")
+    assert "Given up" in (tmp_path / "out" / "s0" / "log.txt").read_text()
+
+
+def test_real_sessions_end_in_tables_and_on_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    archive = archive_of(tmp_path / "a", 1)
+    biodance.simulate(biodance.Subject(61.0, 1.68, "F", 30.0), "standing", archive / "good", seed=3)
+    out = tmp_path / "out"
+    code = run(["batch", str(archive), "--out", str(out), "--workers", "1", "--no-pages", "--json"])
+    found = json.loads(capsys.readouterr().out)
+    assert code == 1
+    assert (found["sessions"], found["fresh"]) == (2, 2)
+    assert [one["session"] for one in found["not_done"]] == ["s0"]
+    table = pd.read_parquet(out / "summary.parquet")
+    assert list(table.columns) == list(COLUMNS)
+    good = table[table["session"] == "good"]
+    assert good["declared_mass_kg"].to_numpy() == pytest.approx(61.0, abs=2.0)
+    assert good["mass_difference_percent"].abs().max() < 2.0
+    assert set(table.loc[table["session"] == "s0", "session_status"]) == {"refused"}
+    assert len(pd.read_csv(out / "summary.csv")) == len(table)
+    page = (out / "report.html").read_text()
+    assert "2 sessions" in page
+    assert "walk.c3d" in page
+    assert (out / "sessions" / "good" / "results.json").exists()
+    assert not (out / "sessions" / "good" / "report.html").exists()
+
+
+def test_what_stands_out_is_measured_by_the_archive_itself() -> None:
+    def session(name: str, mass: float) -> Outcome:
+        row = {"trial": "static", "status": "ok", "mass_difference_percent": mass}
+        return Outcome(name, "f", SessionStatus.DONE, rows=(row,))
+
+    usual = [session(f"s{k}", 0.1 * (-1) ** k) for k in range(9)]
+    (strange,) = outliers(table_of([*usual, session("odd", 2.4)]))
+    assert (strange["session"], strange["value"]) == ("odd", "2.4 %")
+    assert outliers(table_of([*usual[:6], session("odd", 2.4)])) == []
+
+
+def test_a_cluster_that_exists_is_used(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    archive = archive_of(tmp_path / "a", 3)
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+    ) as cluster:
+        found = run_batch(archive, tmp_path / "out", scheduler=cluster.scheduler_address, work=batch_work.count)
+    assert found.fresh == 3
+    assert worked(archive) == {"s0": 1, "s1": 1, "s2": 1}
+
+
+def test_an_address_where_nobody_answers_is_one_sentence(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    with pytest.raises(BiodanceError, match="no Dask scheduler answers there"):
+        run_batch(archive_of(tmp_path / "a", 1), tmp_path / "out", scheduler="nobody://x", work=batch_work.count)
