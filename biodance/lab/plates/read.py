@@ -16,8 +16,10 @@ from biodance.records import Array, Markers, Plate, Wrench
 from biodance.settings import TOUCH_FORCE, CheckLimits, StandingRules
 
 AS_POUNDS = 0.03
-STUCK = 2e-3  # share of its mean by which the vertical of a loaded plate varies at least, whoever moves on it
+_STUCK = 2e-3  # share of its mean by which the vertical of a loaded plate varies at least, whoever moves on it
 
+_SAME_PLACE = 0.001
+"""m: standard deviation of a centre of pressure that nobody moves."""
 ReadPlates = tuple[tuple[Plate, ...], tuple[str, ...]]
 
 
@@ -78,15 +80,17 @@ def _readings(raw: RawC3d, count: int, metres: float, turn: Array) -> tuple[list
 
 
 def _alive(readings: list[PlateReading], markers: Markers | None) -> tuple[list[PlateReading], list[str]]:
-    """Return the readings without plates that carry the same load for the whole trial, though the person moves; a
-    sentence for each of these.
+    """Return the readings without plates that carry the same load at the same place for the whole trial, though the
+    person moves (whoever stands and lifts an arm moves the centre of pressure); a sentence for each of these.
     """
     alive, said = [], []
     moves = markers is not None and movement(markers) > StandingRules.still
     for reading in readings:
         vertical = reading.sensor[reading.known, 2]
         mean, spread = float(vertical.mean()), float(vertical.std())
-        if not (moves and abs(mean) > TOUCH_FORCE and spread < STUCK * abs(mean)):
+        wanders = float(reading.sensor[reading.known, 3:5].std(axis=0).max())
+        same = spread < _STUCK * abs(mean) and wanders < _SAME_PLACE * abs(mean)
+        if not (moves and abs(mean) > TOUCH_FORCE and same):
             alive.append(reading)
             continue
         wires = ", ".join(str(c + 1) for c in reading.plate.channels)
