@@ -29,7 +29,7 @@ def tables_folder(folder: Path, session: Path, *, force: bool) -> Path:
         raise SessionRefused(f"{folder}: tables must not lie among the recordings. Give another folder for --tables.")
     if folder.exists() and not folder.is_dir():
         raise SessionRefused(f"{folder}: is a file; the tables need a folder. Choose another name for --tables.")
-    files = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
+    files = sorted(path.name for path in folder.iterdir() if not path.name.startswith(".")) if folder.is_dir() else []
     other = [name for name in files if Path(name).suffix not in ENDINGS]
     if files and (other or not force):
         wanted = "Give another folder for --tables" if other else "Give another folder, or --force"

@@ -49,7 +49,8 @@ def results_folder(out: str | Path | None, session: str | Path, *, force: bool =
         raise SessionRefused(
             f"{folder}: holds files that biodance did not write ({files[0].name}). Give another folder."
         )
-    return made_folder(folder)
+    _lock(made_folder(folder))
+    return folder
 
 
 def made_folder(folder: Path) -> Path:
@@ -60,7 +61,6 @@ def made_folder(folder: Path) -> Path:
         raise SessionRefused(
             f"{folder}: cannot be made ({error.strerror or error}). Choose a place where you may write."
         ) from error
-    _lock(folder)
     return folder
 
 
