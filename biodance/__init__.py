@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from biodance.pipeline.front_dance import simulate as simulate
     from biodance.pipeline.front_dance import verify_dance as verify_dance
     from biodance.pipeline.identification import SessionIdentification as SessionIdentification
+    from biodance.pipeline.registration import register as register
     from biodance.pipeline.results import SessionResult as SessionResult
     from biodance.pipeline.session import examine as examine
     from biodance.records import Markers as Markers
@@ -61,6 +62,7 @@ if TYPE_CHECKING:
     from biodance.records import Subject as Subject
     from biodance.records import Trial as Trial
     from biodance.records import Wrench as Wrench
+    from biodance.registration.registration import Registration as Registration
     from biodance.settings import Settings as Settings
 
 HOMES = {
@@ -82,9 +84,11 @@ HOMES = {
     "pipeline.front": ("SessionComparison", "compare_sessions", "diagnose", "identify"),
     "pipeline.front_dance": ("design_dance", "simulate", "verify_dance"),
     "pipeline.identification": ("SessionIdentification",),
+    "pipeline.registration": ("register",),
     "pipeline.results": ("SessionResult",),
     "pipeline.session": ("examine",),
     "records": ("Markers", "Motion", "Plate", "Session", "Sip", "Subject", "Trial", "Wrench"),
+    "registration.registration": ("Registration",),
     "settings": ("Settings",),
 }
 """Module -> the names of the front door that live there; each is loaded when it is first asked for."""

@@ -10,10 +10,10 @@ from collections.abc import Sequence
 
 from cyclopts import CycloptsError
 
-from biodance.cli import dance, diagnose, machine, session, virtual
+from biodance.cli import dance, diagnose, machine, register, session, virtual
 from biodance.cli.app import DONE, NOT_DONE, STOPPED, app, say
 
-__all__ = ["app", "dance", "diagnose", "machine", "main", "run", "session", "virtual"]
+__all__ = ["app", "dance", "diagnose", "machine", "main", "register", "run", "session", "virtual"]
 
 
 def run(tokens: Sequence[str] | None = None) -> int:
