@@ -17,6 +17,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import ezc3d
 import numpy as np
@@ -41,7 +42,9 @@ BARS = {"across_mm": 5.0, "along_mm": 10.0, "yaw_deg": 0.5, "delay_ms": 5.0}
 
 @dataclass(frozen=True)
 class Cut:
-    """One recording in two files: ``markers``, ``forces``; the truth: ``plates`` in the room and ``delay`` s."""
+    """One recording in two files: ``markers``, ``forces``; the truth: ``plates`` in the room and ``delay`` s;
+    ``forwards`` (2,) the direction in which the person faces.
+    """
 
     name: str
     lab: str
@@ -49,6 +52,7 @@ class Cut:
     forces: Path
     plates: tuple[Plate, ...]
     delay: float
+    forwards: np.ndarray
 
 
 def cut(source: Path, folder: Path, lab: str, rng: np.random.Generator) -> Cut:
@@ -73,7 +77,10 @@ def cut(source: Path, folder: Path, lab: str, rng: np.random.Generator) -> Cut:
                 shutil.copy(other, folder / "markers" / other.name)
     forces = folder / "forces.c3d"
     moved_forces(source, forces, frames * per - samples, per, rng)
-    return Cut(f"{source.parent.name}/{source.stem}", lab, out, forces, trial.plates, samples / per / rate)
+    left, right = next(pair for pair in (("LASI", "RASI"), ("L_IAS", "R_IAS")) if pair[0] in trial.markers)
+    aside = np.nanmean(trial.markers[left] - trial.markers[right], axis=0)[:2]
+    ahead = np.array([aside[1], -aside[0]]) / np.linalg.norm(aside)
+    return Cut(f"{source.parent.name}/{source.stem}", lab, out, forces, trial.plates, samples / per / rate, ahead)
 
 
 def moved_forces(source: Path, out: Path, skip: int, per: int, rng: np.random.Generator) -> None:
@@ -102,10 +109,10 @@ def moved_forces(source: Path, out: Path, skip: int, per: int, rng: np.random.Ge
     file.write(str(out))
 
 
-def measured(one: Cut, forces: Path) -> dict[str, object]:
+def measured(one: Cut, forces: Path) -> dict[str, Any]:
     """Return status, errors and intervals of one registration."""
     start = time.process_time()
-    row: dict[str, object] = {"name": one.name, "lab": one.lab}
+    row: dict[str, Any] = {"name": one.name, "lab": one.lab}
     try:
         found = biodance.register(one.markers, forces)
     except biodance.BiodanceError as error:
@@ -115,25 +122,21 @@ def measured(one: Cut, forces: Path) -> dict[str, object]:
         return row
     error, sd = [], []
     for plate, true in zip(found.plates, one.plates, strict=True):
-        if not plate.loaded:
-            continue
-        away = (plate.position - true.centre)[:2]
-        side = true.corners[[0, 3]].mean(axis=0) - true.corners[[1, 2]].mean(axis=0)
-        turn = np.angle(np.exp(1j * (plate.yaw - np.arctan2(side[1], side[0]))))
-        error.append([*(1e3 * away), np.degrees(turn)])
-        sd.append([*(1e3 * plate.sd[:2]), np.degrees(plate.yaw_sd)])
-    late = 1e3 * (found.pose.delay - one.delay)
-    axes = np.abs(np.mean(error, axis=0))
-    worst, better = max(axes[:2]), min(axes[:2])
-    z = np.abs(np.array(error) / np.array(sd))
+        if plate.loaded:
+            side = true.corners[[0, 3]].mean(axis=0) - true.corners[[1, 2]].mean(axis=0)
+            turn = np.angle(np.exp(1j * (plate.yaw - np.arctan2(side[1], side[0]))))
+            error.append([*(1e3 * (plate.position - true.centre)), np.degrees(turn)])
+            sd.append([*(1e3 * plate.sd), np.degrees(plate.yaw_sd)])
+    mean, late, late_sd = np.mean(error, axis=0), 1e3 * (found.pose.delay - one.delay), 1e3 * found.delay_sd
+    aside = np.array([-one.forwards[1], one.forwards[0]])
+    values = (mean[:2] @ aside, mean[:2] @ one.forwards, mean[3], late)
+    z = [*np.abs(np.array(error) / np.array(sd))[:, [0, 1, 3]].max(axis=0), abs(late) / late_sd]
     return row | {
-        "along_mm": round(float(worst), 2),
-        "across_mm": round(float(better), 2),
-        "yaw_deg": round(float(axes[2]), 3),
-        "delay_ms": round(float(late), 2),
-        "sd": [round(float(x), 2) for x in (*np.mean(sd, axis=0), 1e3 * found.delay_sd)],
-        "z": [round(float(x), 2) for x in (*z.max(axis=0), abs(late) / (1e3 * found.delay_sd))],
-        "height_mm": round(float(1e3 * np.mean([p.position[2] - t.centre[2] for p, t in zip(found.plates, one.plates, strict=True)])), 1),
+        **{key: round(float(value), 3) for key, value in zip(BARS, values, strict=True)},
+        "height_mm": round(float(mean[2]), 1),
+        "sd": [round(float(x), 2) for x in (*np.mean(sd, axis=0)[[0, 1, 3]], late_sd)],
+        "z": [round(float(x), 2) for x in z],
+        "within": all(abs(value) <= bar for value, bar in zip(values, BARS.values(), strict=True)),
     }
 
 
@@ -153,6 +156,22 @@ def sources(arguments: argparse.Namespace, work: Path) -> Iterator[tuple[Path, s
     if arguments.real:
         for name in REAL:
             yield Path(os.environ["BIODANCE_DATA"]) / f"{name}.c3d", "real"
+
+
+def table(rows: list[dict[str, Any]]) -> str:
+    """Return one line of Markdown for each laboratory."""
+    lines = ["| recordings | registered | within all bars | refused | RMS across, along mm | yaw deg | delay ms | covered |"]
+    for lab in dict.fromkeys(row["lab"] for row in rows):
+        mine = [row for row in rows if row["lab"] == lab]
+        done = [row for row in mine if row["status"] == "registered"]
+        told = [row for row in mine if "z" in row and "A second" not in row["reason"]]
+        size = [float(np.sqrt(np.mean([row[key] ** 2 for row in told]))) for key in BARS] if told else [np.nan] * 4
+        inside = np.mean([x < 1.96 for row in told for x in row["z"]]) if told else np.nan
+        lines.append(
+            f"| {lab} {len(mine)} | {len(done)} | {sum(row['within'] for row in done)} | {len(mine) - len(done)} | "
+            f"{size[0]:.1f}, {size[1]:.1f} | {size[2]:.2f} | {size[3]:.1f} | {100 * inside:.0f} % |"
+        )
+    return "\n".join(lines)
 
 
 def main() -> None:
@@ -178,6 +197,7 @@ def main() -> None:
             rows.append(row)
             print({key: value for key, value in row.items() if key != "reason"}, str(row.get("reason", ""))[:100], flush=True)
             Path(arguments.out).write_text(json.dumps(rows, indent=1))
+    print(table(rows))
 
 
 if __name__ == "__main__":

@@ -23,6 +23,7 @@ from biodance.registration.alignment import Alignment, alignments
 from biodance.registration.pose import Forces, forces_of, registered_plates
 from biodance.registration.refinement import floor_of, refined, with_height
 from biodance.registration.registration import Limits, Registration, concluded, refused
+from biodance.registration.rivals import rivals
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances
 
@@ -104,12 +105,13 @@ def register(
     try:
         hypotheses = _hypotheses(moving, measured)
         tell("refining the pose")
-        best = hypotheses[0].pose
         judge = partial(_tolerances, moving.body, recorded)
-        found = refined(moving.body, moving.trial, moving.motion, measured, best, judge)
+        refine = partial(refined, moving.body, moving.trial, moving.motion, measured, tolerances=judge)
+        found = refine(hypotheses[0].pose)
+        others = rivals(hypotheses, found, refine)
     except TrialRefused as why:
         return refused(str(why))
-    registration = concluded(measured, hypotheses, found, limits=limits or Limits(), rough=rough)
+    registration = concluded(measured, hypotheses[0], found, others, limits=limits or Limits(), rough=rough)
     if folder is not None and registration.status != "refused":
         tell("writing the session")
         assert registration.pose is not None

@@ -14,8 +14,6 @@ from biodance.registration.refinement import HEIGHT_SD, Refined
 if TYPE_CHECKING:
     import pandas as pd
 
-_RIVAL = 0.85
-"""Share of the best hypothesis' gain from which on another one is not clearly worse."""
 _STRANGE = 7.5
 """Misfit of a loaded sample (of 12) above which the movement is not the one that the plates felt: 39 true pairs have up
 to 6.6."""
@@ -167,12 +165,18 @@ def refused(reason: str) -> Registration:
 
 
 def concluded(
-    forces: Forces, hypotheses: tuple[Alignment, ...], found: Refined, *, limits: Limits, rough: bool = False
+    forces: Forces,
+    best: Alignment,
+    found: Refined,
+    rivals: tuple[Alignment, ...],
+    *,
+    limits: Limits,
+    rough: bool = False,
 ) -> Registration:
-    """Return the registration, refused where another hypothesis is nearly as good, where the movement is not the one
+    """Return the registration, refused where one of ``rivals`` is nearly as good, where the movement is not the one
     that the plates felt, or where it shows the pose less exactly than ``limits`` (unless ``rough`` is enough).
     """
-    doubt = _doubt(hypotheses, found)
+    doubt = _doubt(best, rivals, found)
     wide = _too_wide(found.covariance, limits)
     status: Literal["registered", "rough", "refused"] = "registered"
     if doubt or (wide and not rough):
@@ -192,15 +196,13 @@ def _kept_together(plates: tuple[PlacedPlate, ...]) -> tuple[str, ...]:
     return (f"The {len(plates)} plates keep the places relative to one another that their file gives.",)
 
 
-def _doubt(hypotheses: tuple[Alignment, ...], found: Refined) -> str:
+def _doubt(best: Alignment, rivals: tuple[Alignment, ...], found: Refined) -> str:
     """Return why the pose is not believed at all; "" where it is."""
-    best = hypotheses[0]
     if best.misfit > _STRANGE:
         return (
             f"The forces do not fit this movement (misfit {best.misfit:.1f} of at most 12, {_STRANGE:g} allowed): they are "
             "of another trial or person, or the body's mass is wrong. Give the two files of one trial."
         )
-    rivals = [one for one in hypotheses[1:] if one.gain > _RIVAL * best.gain]
     if rivals:
         return _rivalry(best, rivals[0])
     if found.misfit > _ODD_FEET:
