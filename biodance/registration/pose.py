@@ -15,6 +15,9 @@ _UP = np.array([0.0, 0.0, 1.0])
 _RATE = 200.0
 """Hz at which low-passed forces are kept between two looks: ten times the default cut-off."""
 
+_UNSIZED = ("MOT",)
+"""Formats of recordings that do not say where a plate ends."""
+
 
 @dataclass(frozen=True, eq=False)
 class Pose:
@@ -63,13 +66,15 @@ class Pose:
 @dataclass(frozen=True, eq=False)
 class Forces:
     """What some plates recorded, low-passed, in the frame and clock of their own file: ``plates`` with ``time`` (S,) s
-    and ``value`` (P, S, 6) N, N·m about the file's origin; ``at`` their spline over time.
+    and ``value`` (P, S, 6) N, N·m about the file's origin; ``at`` their spline over time; ``sized`` whether the file says
+    how large the plates are (a table of forces does not).
     """
 
     plates: tuple[Plate, ...]
     time: Array
     value: Array
     at: Callable[[Array], Array]
+    sized: bool = True
 
     @property
     def height(self) -> float:
@@ -106,7 +111,7 @@ def forces_of(trial: Trial, settings: Settings) -> Forces:
     rate, step = trial.plates[0].wrench.rate, max(1, int(trial.plates[0].wrench.rate // _RATE))
     value = np.stack([low_pass(one, rate, force_filter(settings)) for one in raw])[:, ::step]
     spline = make_interp_spline(time[::step], value, k=3, axis=1)
-    return Forces(trial.plates, time[::step], value, spline)
+    return Forces(trial.plates, time[::step], value, spline, trial.source.format not in _UNSIZED)
 
 
 def placed(trial: Trial, motion: Motion, forces: Forces, pose: Pose) -> tuple[Trial, Motion]:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.body.tables.error_sizes import error_size
@@ -11,8 +12,9 @@ from biodance.diagnosis.problem import Look
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.errors import TrialRefused
 from biodance.motion.contact.contact import Contact, ground_contact
-from biodance.motion.contact.footing import speeds
+from biodance.motion.contact.footing import dilate, speeds
 from biodance.motion.contact.soles import Soles, soles_from_body
+from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion, Trial, runs
 from biodance.registration.by_feet import feet_pull
 from biodance.registration.by_wrench import wrench_pull
@@ -28,14 +30,18 @@ _INSTALLED = np.array([0.001, 0.001, np.radians(0.1), 0.001])
 """m, m, rad, s: what no evidence here can see of an installed plate: its level, its own axes, its amplifier's filter."""
 _AHEAD = 0.0035
 """m: by how much a table's centre of mass lies wrong along the direction in which a person faces, beyond its sd."""
-_REAL = np.array([0.012, 0.012, np.radians(0.2), 0.008])
+_REAL = np.array([0.012, 0.012, np.radians(0.5), 0.008])
 """m, m, rad, s beyond its own for the wrench of real people and of contacts shorter than a second: the table's centre of
 mass lies up to 40 mm from theirs, and flesh lags (ten walks: 13 mm and 8 ms root mean square, always late)."""
+_FEW = 60
+"""Rows of the wrench (some 0.5 s of contact) below which its yaw errs by more, in proportion."""
 _LIKE_MODEL = 2.3
 """Times the usual distance of markers to the body above which a recording counts as of a real person: simulated ones
 have up to 2.3, real ones 2.4 to 4.8."""
 _PRESSED, _SLOW = 100.0, 0.3
 """N and m/s: a foot that stands on a plate."""
+_TENTH, _AROUND = 0.1, 0.1
+"""Share of the weight, and s."""
 _ROUNDS = 3
 HEIGHT_SD = 0.008
 """m: soles of the body against the ground (92 recordings: 6 mm root mean square, mostly too low)."""
@@ -142,10 +148,20 @@ def _look(body: Body, trial: Trial, motion: Motion, forces: Forces, pose: Pose) 
     there, cut = placed(trial, motion, forces, pose)
     soles = soles_from_body(body, cut)
     look = Look(there, cut, np.zeros(cut.time.size, dtype=bool), 0.0, 1.0)
-    use = _contact(body, look, soles).measured & cut.determined
+    measured = _contact(body, look, soles).measured if forces.sized else _carried(body, look)
+    use = measured & cut.determined
     height = float(np.mean([plate.height for plate in there.plates]))
     about = np.nanmean(there.wrench.cop(height=height, threshold=_PRESSED), axis=0)
     return replace(look, use=use), soles, about
+
+
+def _carried(body: Body, look: Look) -> NDArray[np.bool_]:
+    """Return the frames (T,) in which plates of unknown size carry the whole body: the vertical force is the needed one
+    within a tenth of the weight, for a while before and after.
+    """
+    needed, force = predict_wrench(body, look.motion).force[:, 2], look.trial.wrench.force[:, 2]
+    apart = np.abs(force - needed) > _TENTH * abs(float(body.gravity[2])) * float(body.sip.mass.sum())
+    return ~dilate(apart | (force < _PRESSED), int(np.ceil(_AROUND * look.motion.rate)))
 
 
 def _honest(pull: Pull, look: Look) -> Pull:
@@ -159,7 +175,8 @@ def _honest(pull: Pull, look: Look) -> Pull:
     worse = max(1.0, pull.misfit)
     scaled = replace(pull, information=pull.information / worse, vector=pull.vector / worse)
     if real or longest < SHORTEST_RUN:
-        return scaled.less_sure(worse * np.diag(_REAL**2))
+        few = np.array([1.0, 1.0, max(1.0, _FEW / pull.rows), 1.0])
+        return scaled.less_sure(worse * np.diag((few * _REAL) ** 2))
     ahead = quaternion_matrix(look.motion.q[:, 3:7])[:, :2, 0].mean(axis=0)
     forwards = np.array([*ahead / max(float(np.linalg.norm(ahead)), 1e-9), 0.0, 0.0])
     return scaled.less_sure(_AHEAD**2 * np.outer(forwards, forwards))
