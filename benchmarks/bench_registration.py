@@ -72,9 +72,9 @@ def cut(source: Path, folder: Path, lab: str, rng: np.random.Generator) -> Cut:
     write_c3d(out, markers=kept, parameters={"PROCESSING": dict(measures)} if measures else None)
     for other in source.parent.iterdir():
         words = other.stem.lower()
-        if other.suffix == ".toml" or "static" in words or words.endswith(("01", "_st")) and lab == "real":
-            if other.name != source.name and other.is_file():
-                shutil.copy(other, folder / "markers" / other.name)
+        beside = other.suffix == ".toml" or "static" in words or (words.endswith(("01", "_st")) and lab == "real")
+        if beside and other.is_file() and other.name != source.name:
+            shutil.copy(other, folder / "markers" / other.name)
     forces = folder / "forces.c3d"
     moved_forces(source, forces, frames * per - samples, per, rng)
     left, right = next(pair for pair in (("LASI", "RASI"), ("L_IAS", "R_IAS")) if pair[0] in trial.markers)
@@ -160,7 +160,9 @@ def sources(arguments: argparse.Namespace, work: Path) -> Iterator[tuple[Path, s
 
 def table(rows: list[dict[str, Any]]) -> str:
     """Return one line of Markdown for each laboratory."""
-    lines = ["| recordings | registered | within all bars | refused | RMS across, along mm | yaw deg | delay ms | covered |"]
+    lines = [
+        "| recordings | registered | within all bars | refused | RMS across, along mm | yaw deg | delay ms | covered |"
+    ]
     for lab in dict.fromkeys(row["lab"] for row in rows):
         mine = [row for row in rows if row["lab"] == lab]
         done = [row for row in mine if row["status"] == "registered"]
@@ -188,14 +190,18 @@ def main() -> None:
     rng, rows = np.random.default_rng(arguments.seed), []
     with tempfile.TemporaryDirectory() as made:
         work = Path(made)
-        cuts = [
-            cut(path, work / f"cut{k}", lab, rng) for k, (path, lab) in enumerate(sources(arguments, work))
-        ]
+        cuts = [cut(path, work / f"cut{k}", lab, rng) for k, (path, lab) in enumerate(sources(arguments, work))]
         for k, one in enumerate(cuts):
-            same = [other for other in cuts if other.lab == one.lab and other.name.split("/")[0] != one.name.split("/")[0]]
+            same = [
+                other for other in cuts if other.lab == one.lab and other.name.split("/")[0] != one.name.split("/")[0]
+            ]
             row = measured(one, same[k % len(same)].forces if arguments.swap else one.forces)
             rows.append(row)
-            print({key: value for key, value in row.items() if key != "reason"}, str(row.get("reason", ""))[:100], flush=True)
+            print(
+                {key: value for key, value in row.items() if key != "reason"},
+                str(row.get("reason", ""))[:100],
+                flush=True,
+            )
             Path(arguments.out).write_text(json.dumps(rows, indent=1))
     print(table(rows))
 

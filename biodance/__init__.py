@@ -12,8 +12,8 @@ A visit is diagnosed in a few lines::
 
 SI units (m, kg, s, N, N·m, rad); lab frame with z up; a wrench is the ground's action on the subject about the lab
 origin, force first. The examples of this package share a simulated visit: ``session = read_session("visit")``, ``result
-= examine(session)``, ``identified = identify(result)``, ``found = diagnose(result)``, and a short ``dance``; what they
-print is checked by the tests.
+= examine(session)``, ``identified = identify(result)``, ``found = diagnose(result)``, ``registered = register(...)``
+and a short ``dance``; what they print is checked by the tests.
 """
 
 from importlib import import_module

@@ -54,8 +54,8 @@ class Spectrum:
 def spectrum(
     cases: tuple[Case, ...], uses: tuple[NDArray[np.bool_], ...], about: Array, *, shortest: float = SHORTEST_RUN
 ) -> Spectrum:
-    """Return the rows of ``cases`` whose frames ``uses`` (T,) may be compared, moments about ``about`` (3,) m, from runs
-    of at least ``shortest`` s.
+    """Return the rows of ``cases`` whose frames ``uses`` (T,) may be compared, moments about ``about`` (3,) m, from
+    runs of at least ``shortest`` s.
 
     Raises
     ------
@@ -76,8 +76,7 @@ def spectrum(
     if not band:
         names = ", ".join(case.trial.name for case in cases)
         raise TrialRefused(
-            f"No trial of {names} has {shortest:g} s of fully measured ground contact, so there is nothing to "
-            f"diagnose."
+            f"No trial of {names} has {shortest:g} s of fully measured ground contact, so there is nothing to diagnose."
         )
     return Spectrum(Noise.unit(about, BANDS), tuple(picks), rates, np.concatenate(band), np.concatenate(trial), seconds)
 

@@ -33,8 +33,8 @@ _RAISED = 0.03
 
 @dataclass(frozen=True, eq=False)
 class _Moving:
-    """Who moved how: the ``session`` of the markers, its trial as ``recorded`` and ``trial`` prepared without plates, the
-    ``body`` and its ``motion``.
+    """Who moved how: the ``session`` of the markers, its trial as ``recorded`` and ``trial`` prepared without plates,
+    the ``body`` and its ``motion``.
     """
 
     session: Session
@@ -92,8 +92,8 @@ def register(
 
     Examples
     --------
-    >>> found = biodance.register("visit/squat_1.c3d", "visit/squat_1.c3d")
-    >>> found.status
+    >>> registered = biodance.register("visit/dance_1.c3d", "visit/dance_1.c3d")
+    >>> registered.status
     'registered'
     """
     folder = None if out is None else registered_folder(Path(out), force=force)
@@ -158,8 +158,8 @@ def _chosen(session: Session, markers: Path, forces: Path) -> Trial:
     if len(alike) != 1:
         names = ", ".join(trial.name for trial in moving) or "none"
         raise SessionRefused(
-            f"{markers}: holds {len(moving)} moving trials ({names}), and none is called {forces.stem}. Give the marker "
-            "file that belongs to the forces."
+            f"{markers}: holds {len(moving)} moving trials ({names}), and none is called {forces.stem}. Give the "
+            "marker file that belongs to the forces."
         )
     return alike[0]
 

@@ -1,2 +1,3 @@
-"""Where did the plates lie, and how late was their clock? Pose and delay of a force recording of which neither is known,
-from how the body moved."""
+"""Where did the plates lie, and how late was their clock? Pose and delay of a force recording of which neither is
+known, from how the body moved.
+"""

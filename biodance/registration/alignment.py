@@ -1,9 +1,9 @@
-"""The search over all delays: for each the planar pose that carries the measured centre of pressure and shear onto those
-that the motion needs, in closed form: for one delay there is one best yaw.
+"""The search over all delays: for each the planar pose that carries the measured centre of pressure and shear onto
+those that the motion needs, in closed form: for one delay there is one best yaw.
 
 With c the measured centre of pressure and f the shear as complex numbers in the plates' frame, p and g those that the
-motion needs, the yaw is the argument of ``sum w conj(c - c0) (p - p0) / s_c² + sum w conj(f) g / s_f²`` (Procrustes in
-the plane), and the weights w of samples that do not fit (a foot beside the plates) sink from round to round
+motion needs, the yaw is the argument of ``sum w conj(c - c0) (p - p0) / s_c² + sum w conj(f) g / s_f²`` (Procrustes
+in the plane), and the weights w of samples that do not fit (a foot beside the plates) sink from round to round
 (Geman and McClure).
 """
 
@@ -44,7 +44,7 @@ class Alignment:
 
 @dataclass(frozen=True, eq=False)
 class _Samples:
-    """Complex numbers and forces over the loaded samples: measured ``cop`` m, ``shear`` N; needed the same; ``lift`` the
+    """Complex numbers over the loaded samples: measured ``cop`` m, ``shear`` N; needed the same; ``lift`` the
     squared misfit of the vertical force.
     """
 
@@ -71,8 +71,8 @@ class _Samples:
 def alignments(motion: Motion, needed: Array, forces: Forces, *, floor: float) -> tuple[Alignment, ...]:
     """Return the hypotheses, best first, each different from all before it.
 
-    ``needed`` (T, 6) N, N·m wrench that ``motion`` needs about the room's origin; ``floor`` m the height in the room on
-    which the feet stand.
+    ``needed`` (T, 6) N, N·m wrench that ``motion`` needs about the room's origin; ``floor`` m the height in the room
+    on which the feet stand.
 
     Raises
     ------
@@ -127,5 +127,5 @@ def _samples(motion: Motion, needed: Array, forces: Forces, delay: float, height
     use = np.isfinite(measured).all(axis=1) & np.isfinite(here).all(axis=1) & np.isfinite(there).all(axis=1)
     if use.sum() * _EVERY < _LEAST:
         return None
-    flat = [x[use, 0] + 1j * x[use, 1] for x in (here, measured, there, value)]
-    return _Samples(*flat, ((value[use, 2] - measured[use, 2]) / _VERTICAL) ** 2)
+    a, b, c, d = (x[use, 0] + 1j * x[use, 1] for x in (here, measured, there, value))
+    return _Samples(a, b, c, d, ((value[use, 2] - measured[use, 2]) / _VERTICAL) ** 2)

@@ -28,8 +28,8 @@ _UNKNOWN = np.array([0.1, 0.1, np.radians(5.0), 0.05])
 
 
 def wrench_pull(body: Body, look: Look, tolerances: Tolerances, about: Array) -> Pull:
-    """Return what the wrench of one trial, placed by the pose so far, says of a change of that pose about ``about`` (3,)
-    m.
+    """Return what the wrench of one trial, placed by the pose so far, says of a change of that pose about ``about``
+    (3,) m.
 
     Raises
     ------

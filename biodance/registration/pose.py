@@ -66,8 +66,8 @@ class Pose:
 @dataclass(frozen=True, eq=False)
 class Forces:
     """What some plates recorded, low-passed, in the frame and clock of their own file: ``plates`` with ``time`` (S,) s
-    and ``value`` (P, S, 6) N, N·m about the file's origin; ``at`` their spline over time; ``sized`` whether the file says
-    how large the plates are (a table of forces does not).
+    and ``value`` (P, S, 6) N, N·m about the file's origin; ``at`` their spline over time; ``sized`` whether the file
+    says how large the plates are (a table of forces does not).
     """
 
     plates: tuple[Plate, ...]
@@ -79,7 +79,9 @@ class Forces:
     @property
     def height(self) -> float:
         """Height m of the plates that are loaded (all of them where none is), the mean, in the file's frame."""
-        loaded = [plate.height for plate, value in zip(self.plates, self.value, strict=True) if value[:, 2].max() > 50.0]
+        loaded = [
+            plate.height for plate, value in zip(self.plates, self.value, strict=True) if value[:, 2].max() > 50.0
+        ]
         return float(np.mean(loaded or [plate.height for plate in self.plates]))
 
     def during(self, time: Array) -> Array:

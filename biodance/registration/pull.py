@@ -25,7 +25,7 @@ class Pull:
         covariance = np.linalg.pinv(self.information)
         change = covariance @ self.vector
         wider = np.linalg.inv(covariance + added)
-        return Pull(wider, wider @ change, self.misfit, self.rows)
+        return Pull(np.asarray(wider), wider @ change, self.misfit, self.rows)
 
 
 def together(pulls: Iterable[Pull]) -> tuple[Array, Array]:

@@ -27,12 +27,12 @@ from biodance.uncertainty.tolerances import Tolerances
 _ALIGNED = np.array([0.05, 0.05, np.radians(3.0), 0.03])
 """m, m, rad, s: how far an alignment is off (16 real walks, 23 simulated trials: up to 22 mm, 3 degrees, 20 ms)."""
 _INSTALLED = np.array([0.001, 0.001, np.radians(0.1), 0.001])
-"""m, m, rad, s: what no evidence here can see of an installed plate: its level, its own axes, its amplifier's filter."""
+"""m, m, rad, s: what no evidence here can see of an installed plate: level, axes, the filter of its amplifier."""
 _AHEAD = 0.0035
 """m: by how much a table's centre of mass lies wrong along the direction in which a person faces, beyond its sd."""
 _REAL = np.array([0.012, 0.012, np.radians(0.5), 0.008])
-"""m, m, rad, s beyond its own for the wrench of real people and of contacts shorter than a second: the table's centre of
-mass lies up to 40 mm from theirs, and flesh lags (ten walks: 13 mm and 8 ms root mean square, always late)."""
+"""m, m, rad, s beyond its own for the wrench of real people and of contacts shorter than a second: the table's centre
+of mass lies up to 40 mm from theirs, and flesh lags (ten walks: 13 mm and 8 ms root mean square, always late)."""
 _FEW = 60
 """Rows of the wrench (some 0.5 s of contact) below which its yaw errs by more, in proportion."""
 _LIKE_MODEL = 2.3
@@ -49,9 +49,9 @@ HEIGHT_SD = 0.008
 
 @dataclass(frozen=True, eq=False)
 class Refined:
-    """The ``pose``, the ``covariance`` (4, 4) of x, y m, yaw rad and delay s about ``about`` (3,) m; how many ``seconds``
-    of fully measured contact and ``steps`` it rests on; ``misfit`` of the feet (1 expected; NaN without steps); ``fit``,
-    the mean square of the ``rows`` of the wrench; ``notes``.
+    """The ``pose``, the ``covariance`` (4, 4) of x, y m, yaw rad and delay s about ``about`` (3,) m; how many
+    ``seconds`` of fully measured contact and ``steps`` it rests on; ``misfit`` of the feet (1 expected; NaN without
+    steps); ``fit``, the mean square of the ``rows`` of the wrench; ``notes``.
     """
 
     pose: Pose
@@ -73,7 +73,7 @@ def floor_of(soles: Soles) -> float:
     TrialRefused
         No foot is ever slow.
     """
-    slow = (speeds(soles) < _SLOW).all(axis=2)
+    slow = np.asarray((speeds(soles) < _SLOW).all(axis=2))
     if not slow.any():
         raise TrialRefused("No foot ever stands still in these markers, so nobody can tell where a plate could be.")
     return float(np.median(soles.outline[..., 2].min(axis=2)[slow]))
@@ -82,7 +82,7 @@ def floor_of(soles: Soles) -> float:
 def with_height(pose: Pose, soles: Soles, forces: Forces) -> Pose:
     """Return the pose with the height that the soles on loaded plates ask for."""
     gaps = []
-    low, slow = soles.outline[..., 2].min(axis=2), (speeds(soles) < _SLOW).all(axis=2)
+    low, slow = soles.outline[..., 2].min(axis=2), np.asarray((speeds(soles) < _SLOW).all(axis=2))
     for plate, value in zip(forces.plates, forces.during(soles.time + pose.delay), strict=True):
         there = zero_moment_point(pose.wrench(np.nan_to_num(value)), height=plate.height + pose.shift[2])
         away = np.linalg.norm((soles.centre - there[:, None])[..., :2], axis=2)
@@ -102,8 +102,8 @@ def refined(
     start: Pose,
     tolerances: Callable[[Look], Tolerances],
 ) -> Refined:
-    """Return the pose that wrench and feet ask for, beginning at ``start``; ``tolerances`` of what is no fault in a look
-    at the placed trial.
+    """Return the pose that wrench and feet ask for, beginning at ``start``; ``tolerances`` of what is no fault in a
+    look at the placed trial.
 
     Raises
     ------

@@ -86,7 +86,7 @@ class Registration:
 
     Examples
     --------
-    >>> biodance.register("visit/squat_1.c3d", "visit/squat_1.c3d")  # doctest: +ELLIPSIS
+    >>> registered  # doctest: +ELLIPSIS
     Registration(registered: delay ... ms, plate1 at ...)
     """
 
@@ -105,9 +105,8 @@ class Registration:
             f"{np.degrees(one.yaw):.1f} ± {np.degrees(one.yaw_sd):.1f} deg"
             for one in self.plates
         )
-        return (
-            f"Registration({self.status}: delay {1e3 * self.pose.delay:.1f} ± {1e3 * self.delay_sd:.1f} ms, {where})"
-        )
+        late = f"delay {1e3 * self.pose.delay:.1f} ± {1e3 * self.delay_sd:.1f} ms"
+        return f"Registration({self.status}: {late}, {where})"
 
     def _repr_html_(self) -> str:
         return display.card(repr(self), self.table(), (*([self.reason] if self.reason else []), *self.notes))
@@ -122,7 +121,7 @@ class Registration:
 
         Examples
         --------
-        >>> biodance.register("visit/squat_1.c3d", "visit/squat_1.c3d").document()["plates"][0]["name"]
+        >>> registered.document()["plates"][0]["name"]
         'plate1'
         """
         level, pose = "fail" if self.status == "refused" else "warn", self.pose
@@ -134,7 +133,9 @@ class Registration:
             "plates": [one.document() for one in self.plates],
             "file_frame": None if pose is None else {"shift_m": pose.shift.tolist(), "yaw_rad": _within(pose.yaw)},
             "notes": list(self.notes),
-            "attention": [{"level": level, "text": self.reason, "trial": "", "about": "register"}] if self.reason else [],
+            "attention": [{"level": level, "text": self.reason, "trial": "", "about": "register"}]
+            if self.reason
+            else [],
         }
 
     def table(self) -> "pd.DataFrame":
@@ -147,7 +148,7 @@ class Registration:
 
         Examples
         --------
-        >>> len(biodance.register("visit/squat_1.c3d", "visit/squat_1.c3d").table())
+        >>> len(registered.table())
         1
         """
         import pandas as pd
@@ -203,8 +204,8 @@ def _doubt(best: Alignment, rivals: tuple[Alignment, ...], found: Refined) -> st
     """Return why the pose is not believed at all; "" where it is."""
     if best.misfit > _STRANGE:
         return (
-            f"The forces do not fit this movement (misfit {best.misfit:.1f} of at most 12, {_STRANGE:g} allowed): they are "
-            "of another trial or person, or the body's mass is wrong. Give the two files of one trial."
+            f"The forces do not fit this movement (misfit {best.misfit:.1f} of at most 12, {_STRANGE:g} allowed): they "
+            "are of another trial or person, or the body's mass is wrong. Give the two files of one trial."
         )
     if rivals:
         return _rivalry(best, rivals[0])
@@ -220,8 +221,8 @@ def _rivalry(best: Alignment, other: Alignment) -> str:
     late, turned = other.pose.delay - best.pose.delay, _within(other.pose.yaw - best.pose.yaw)
     return (
         f"A second solution is nearly as good ({100 * other.gain / best.gain:.0f} % of what the best one explains): "
-        f"{late:+.2f} s of delay and {np.degrees(turned):+.0f} degrees of yaw from the best. Record a movement that does "
-        "not repeat itself: a step aside, a one-leg stance, one fast squat."
+        f"{late:+.2f} s of delay and {np.degrees(turned):+.0f} degrees of yaw from the best. Record a movement that "
+        "does not repeat itself: a step aside, a one-leg stance, one fast squat."
     )
 
 

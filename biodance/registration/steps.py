@@ -79,7 +79,9 @@ def _covered(motion: Motion, time: Array) -> bool:
 
 
 def _foot(trial: Trial, contact: Contact, soles: Soles, number: int, time: Array) -> int | None:
-    """Return the foot (0 right, 1 left) that stands on a plate alone and whole in the middle of a step; None otherwise."""
+    """Return the foot (0 right, 1 left) that stands on a plate alone and whole in the middle of a step; None
+    otherwise.
+    """
     length = time[-1] - time[0]
     middle = (contact.time > time[0] + 0.25 * length) & (contact.time < time[0] + 0.75 * length)
     over = contact.on_plate[middle, :, number].mean(axis=0)
@@ -109,8 +111,11 @@ def _step(
     ahead, beside = (np.einsum("ti,ti->t", away, axis) for axis in (forwards, outwards))
     onset = time[0] - heel_strike(frames, heel[:, 2], time[0], float(time.mean()))
     known = np.isfinite(ahead)
-    picked = (x[known] for x in (phase, place, forwards, outwards, ahead, beside))
-    return PlateStep(number, SIDES[foot], *picked, float(np.median(apart)), onset)
+    phase, place, forwards, outwards, ahead, beside = (
+        x[known] for x in (phase, place, forwards, outwards, ahead, beside)
+    )
+    length = float(np.median(apart))
+    return PlateStep(number, SIDES[foot], phase, place, forwards, outwards, ahead, beside, length, onset)
 
 
 def heel_strike(time: Array, height: Array, near: float, middle: float) -> float:

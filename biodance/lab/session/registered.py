@@ -36,7 +36,9 @@ def registered_folder(folder: Path, *, force: bool) -> Path:
         raise SessionRefused(f"{folder}: is a file; a session needs a folder. Choose another name.")
     files = sorted(folder.iterdir()) if folder.is_dir() else []
     if files and not (folder / MARK).is_file():
-        raise SessionRefused(f"{folder}: holds files that biodance did not write ({files[0].name}). Choose another name.")
+        raise SessionRefused(
+            f"{folder}: holds files that biodance did not write ({files[0].name}). Choose another name."
+        )
     if files and not force:
         raise SessionRefused(f"{folder}: holds an earlier registration. Choose another name, or --force.")
     return folder
