@@ -23,7 +23,7 @@ from biodance.registration.alignment import Alignment, alignments
 from biodance.registration.pose import Forces, forces_of, registered_plates
 from biodance.registration.refinement import floor_of, refined, with_height
 from biodance.registration.registration import Limits, Registration, concluded, refused
-from biodance.registration.rivals import rivals
+from biodance.registration.rivals import rival_delays
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances
 
@@ -78,7 +78,7 @@ def register(
     Returns
     -------
     Registration
-        Pose of every plate and delay with standard deviations; `status` and `reason`.
+        FramePose of every plate and delay with standard deviations; `status` and `reason`.
 
     Raises
     ------
@@ -108,7 +108,7 @@ def register(
         judge = partial(_tolerances, moving.body, recorded)
         refine = partial(refined, moving.body, moving.trial, moving.motion, measured, tolerances=judge)
         found = refine(hypotheses[0].pose)
-        others = rivals(hypotheses, found, refine)
+        others = rival_delays(hypotheses, found, refine)
     except TrialRefused as why:
         return refused(str(why))
     registration = concluded(measured, hypotheses[0], found, others, limits=limits or Limits(), rough=rough)

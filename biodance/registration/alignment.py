@@ -14,7 +14,7 @@ import numpy as np
 
 from biodance.errors import TrialRefused
 from biodance.records import Array, Motion
-from biodance.registration.pose import Forces, Pose
+from biodance.registration.pose import Forces, FramePose
 from biodance.settings import COP_FORCE
 from biodance.spatial import zero_moment_point
 
@@ -37,7 +37,7 @@ class Alignment:
     one, times `_OUTLIER`), and the ``misfit`` per sample, 0 to `_OUTLIER`.
     """
 
-    pose: Pose
+    pose: FramePose
     gain: float
     misfit: float
 
@@ -113,7 +113,7 @@ def _scanned(
 
 
 def _alignment(samples: _Samples, delay: float, height: float, turn: complex, shift: complex, loss: Array) -> Alignment:
-    pose = Pose(delay, float(np.angle(turn)), np.array([shift.real, shift.imag, height]))
+    pose = FramePose(delay, float(np.angle(turn)), np.array([shift.real, shift.imag, height]))
     return Alignment(pose, float(_EVERY * np.sum(_OUTLIER - loss)), float(loss.mean()))
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.records import Array
-from biodance.registration.pull import Pull
+from biodance.registration.pull import PoseEvidence
 from biodance.registration.steps import PlateStep
 
 _ACROSS = (
@@ -39,7 +39,7 @@ class _Row:
     shared: dict[str, float]
 
 
-def feet_pull(steps: tuple[PlateStep, ...], about: Array) -> Pull | None:
+def feet_pull(steps: tuple[PlateStep, ...], about: Array) -> PoseEvidence | None:
     """Return what the feet say of a change of the pose about ``about`` (3,) m; None without a step."""
     rows = [row for step in steps for row in _rows(step, about) if np.isfinite(row.value)]
     if not rows:
@@ -53,7 +53,7 @@ def feet_pull(steps: tuple[PlateStep, ...], about: Array) -> Pull | None:
     information, vector = slope.T @ weight @ slope, -slope.T @ weight @ value
     left = value + slope @ (np.linalg.pinv(information) @ vector)
     free = max(1, len(rows) - np.linalg.matrix_rank(slope))
-    return Pull(information, vector, float(left @ weight @ left) / free, len(rows))
+    return PoseEvidence(information, vector, float(left @ weight @ left) / free, len(rows))
 
 
 def _rows(step: PlateStep, about: Array) -> list[_Row]:

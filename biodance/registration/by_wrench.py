@@ -15,7 +15,7 @@ from biodance.diagnosis.model import model
 from biodance.diagnosis.problem import Look, problem
 from biodance.effects import Case
 from biodance.records import Array
-from biodance.registration.pull import Pull
+from biodance.registration.pull import PoseEvidence
 from biodance.spatial import cross, wrench_about_origin, wrench_about_point
 from biodance.uncertainty.tolerances import Tolerances
 
@@ -27,7 +27,7 @@ _UNKNOWN = np.array([0.1, 0.1, np.radians(5.0), 0.05])
 """m, m, rad, s: how far a first alignment can be off; keeps a direction that nothing shows from running away."""
 
 
-def wrench_pull(body: Body, look: Look, tolerances: Tolerances, about: Array) -> Pull:
+def wrench_pull(body: Body, look: Look, tolerances: Tolerances, about: Array) -> PoseEvidence:
     """Return what the wrench of one trial, placed by the pose so far, says of a change of that pose about ``about``
     (3,) m.
 
@@ -42,7 +42,7 @@ def wrench_pull(body: Body, look: Look, tolerances: Tolerances, about: Array) ->
     rows = put.spectrum.rows((_columns(put.cases[0], about),)).reshape(-1, 4)
     rows = np.concatenate([rows, np.zeros((len(put.target) - len(rows), 4))])
     vector, information = found.belief.score(found.white(rows))
-    return Pull(
+    return PoseEvidence(
         information + np.diag(_UNKNOWN**-2.0),
         -vector,
         float(found.belief.left @ found.belief.left) / len(found.belief.y),

@@ -20,7 +20,7 @@ _UNSIZED = ("MOT",)
 
 
 @dataclass(frozen=True, eq=False)
-class Pose:
+class FramePose:
     """Where the frame of a force file lies in the room, and how late its clock is.
 
     Parameters
@@ -38,7 +38,7 @@ class Pose:
     shift: Array
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "shift", frozen_array(self.shift, (3,), "Pose.shift"))
+        object.__setattr__(self, "shift", frozen_array(self.shift, (3,), "FramePose.shift"))
 
     @property
     def turn(self) -> Array:
@@ -54,13 +54,13 @@ class Pose:
         turned = np.concatenate([value[..., :3] @ self.turn.T, value[..., 3:] @ self.turn.T], axis=-1)
         return wrench_about_origin(turned, self.shift)
 
-    def changed(self, change: Array, about: Array) -> "Pose":
+    def changed(self, change: Array, about: Array) -> "FramePose":
         """Return the pose after a ``change`` (4,): x, y m, yaw rad about the vertical through ``about`` (3,) m, delay
         s.
         """
         x, y, yaw, delay = change
         turned = axis_rotation(_UP, np.array([yaw]))[0] @ (self.shift - about) + about
-        return Pose(self.delay + delay, self.yaw + yaw, turned + np.array([x, y, 0.0]))
+        return FramePose(self.delay + delay, self.yaw + yaw, turned + np.array([x, y, 0.0]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +116,7 @@ def forces_of(trial: Trial, settings: Settings) -> Forces:
     return Forces(trial.plates, time[::step], value, spline, trial.source.format not in _UNSIZED)
 
 
-def placed(trial: Trial, motion: Motion, forces: Forces, pose: Pose) -> tuple[Trial, Motion]:
+def placed(trial: Trial, motion: Motion, forces: Forces, pose: FramePose) -> tuple[Trial, Motion]:
     """Return a prepared trial with the plates in the room at the times of ``motion``, and the motion, both cut to the
     time that the force file knows.
 
@@ -149,7 +149,7 @@ def placed(trial: Trial, motion: Motion, forces: Forces, pose: Pose) -> tuple[Tr
     return replace(trial, plates=plates, markers=seen), cut
 
 
-def registered_plates(plates: tuple[Plate, ...], pose: Pose) -> tuple[Plate, ...]:
+def registered_plates(plates: tuple[Plate, ...], pose: FramePose) -> tuple[Plate, ...]:
     """Return plates as recorded (not filtered) in the room, on the markers' clock."""
     return tuple(
         replace(

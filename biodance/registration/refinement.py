@@ -18,8 +18,8 @@ from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion, Trial, runs
 from biodance.registration.by_feet import feet_pull
 from biodance.registration.by_wrench import wrench_pull
-from biodance.registration.pose import Forces, Pose, placed
-from biodance.registration.pull import Pull, together
+from biodance.registration.pose import Forces, FramePose, placed
+from biodance.registration.pull import PoseEvidence, together
 from biodance.registration.steps import plate_steps
 from biodance.spatial import quaternion_matrix, zero_moment_point
 from biodance.uncertainty.tolerances import Tolerances
@@ -54,7 +54,7 @@ class Refined:
     steps); ``fit``, the mean square of the ``rows`` of the wrench; ``notes``.
     """
 
-    pose: Pose
+    pose: FramePose
     covariance: Array
     about: Array
     seconds: float
@@ -79,7 +79,7 @@ def floor_of(soles: Soles) -> float:
     return float(np.median(soles.outline[..., 2].min(axis=2)[slow]))
 
 
-def with_height(pose: Pose, soles: Soles, forces: Forces) -> Pose:
+def with_height(pose: FramePose, soles: Soles, forces: Forces) -> FramePose:
     """Return the pose with the height that the soles on loaded plates ask for."""
     gaps = []
     low, slow = soles.outline[..., 2].min(axis=2), np.asarray((speeds(soles) < _SLOW).all(axis=2))
@@ -91,7 +91,7 @@ def with_height(pose: Pose, soles: Soles, forces: Forces) -> Pose:
         use = (np.nan_to_num(value[:, 2]) > _PRESSED) & slow[rows, foot] & (away[rows, foot] < 0.3)
         gaps.append(low[rows, foot][use] - plate.height)
     found = np.concatenate(gaps)
-    return pose if not found.size else Pose(pose.delay, pose.yaw, np.array([*pose.shift[:2], np.median(found)]))
+    return pose if not found.size else FramePose(pose.delay, pose.yaw, np.array([*pose.shift[:2], np.median(found)]))
 
 
 def refined(
@@ -99,7 +99,7 @@ def refined(
     trial: Trial,
     motion: Motion,
     forces: Forces,
-    start: Pose,
+    start: FramePose,
     tolerances: Callable[[Look], Tolerances],
 ) -> Refined:
     """Return the pose that wrench and feet ask for, beginning at ``start``; ``tolerances`` of what is no fault in a
@@ -133,15 +133,15 @@ def refined(
     return Refined(pose, covariance, about, seconds, len(steps), feet.misfit if feet else np.nan, *fit, notes)
 
 
-def _weak() -> Pull:
-    return Pull(np.diag(_ALIGNED**-2.0), np.zeros(4), 0.0, 0)
+def _weak() -> PoseEvidence:
+    return PoseEvidence(np.diag(_ALIGNED**-2.0), np.zeros(4), 0.0, 0)
 
 
 def _contact(body: Body, look: Look, soles: Soles) -> Contact:
     return ground_contact(look.trial, soles, mass=float(body.sip.mass.sum()))
 
 
-def _look(body: Body, trial: Trial, motion: Motion, forces: Forces, pose: Pose) -> tuple[Look, Soles, Array]:
+def _look(body: Body, trial: Trial, motion: Motion, forces: Forces, pose: FramePose) -> tuple[Look, Soles, Array]:
     """Return the trial under a pose with the frames that are fully measured, the soles, and the mean centre of
     pressure.
     """
@@ -164,7 +164,7 @@ def _carried(body: Body, look: Look) -> NDArray[np.bool_]:
     return ~dilate(apart | (force < _PRESSED), int(np.ceil(_AROUND * look.motion.rate)))
 
 
-def _honest(pull: Pull, look: Look) -> Pull:
+def _honest(pull: PoseEvidence, look: Look) -> PoseEvidence:
     """Return the pull of the wrench with what its body does not know: much for real people and short contacts, and more
     where it fits badly.
     """

@@ -8,7 +8,7 @@ import numpy as np
 from biodance import display
 from biodance.records import Array, Plate, frozen_array
 from biodance.registration.alignment import Alignment
-from biodance.registration.pose import Forces, Pose
+from biodance.registration.pose import Forces, FramePose
 from biodance.registration.refinement import HEIGHT_SD, Refined
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ class Registration:
         "registered": as exact as asked for; "rough": less exact, and written because that was asked for.
     reason : str
         Why it is not "registered"; "" where it is.
-    pose : Pose or None
+    pose : FramePose or None
         Of the force file's frame and clock; None where there is not even a guess.
     delay_sd : float
         s.
@@ -92,7 +92,7 @@ class Registration:
 
     status: Literal["registered", "rough", "refused"]
     reason: str
-    pose: Pose | None = None
+    pose: FramePose | None = None
     delay_sd: float = float("nan")
     plates: tuple[PlacedPlate, ...] = ()
     notes: tuple[str, ...] = field(default=())

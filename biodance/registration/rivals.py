@@ -8,7 +8,7 @@ import numpy as np
 
 from biodance.errors import TrialRefused
 from biodance.registration.alignment import Alignment
-from biodance.registration.pose import Pose
+from biodance.registration.pose import FramePose
 from biodance.registration.refinement import Refined
 
 _NEARLY = 0.85
@@ -20,15 +20,15 @@ _ENOUGH, _CLEARLY = 300, 10.0
 """Rows of the wrench (some two seconds) from which on it decides, by so many natural logarithms."""
 
 
-def rivals(
-    hypotheses: tuple[Alignment, ...], found: Refined, refine: Callable[[Pose], Refined]
+def rival_delays(
+    hypotheses: tuple[Alignment, ...], found: Refined, refine: Callable[[FramePose], Refined]
 ) -> tuple[Alignment, ...]:
     """Return the hypotheses after the first, refined to ``found``, that are not clearly worse."""
     near = [one for one in hypotheses[1:] if one.gain > _NEARLY * hypotheses[0].gain][:_MOST]
     return tuple(one for one in near if _remains(one, found, refine))
 
 
-def _remains(one: Alignment, found: Refined, refine: Callable[[Pose], Refined]) -> bool:
+def _remains(one: Alignment, found: Refined, refine: Callable[[FramePose], Refined]) -> bool:
     if found.rows < _ENOUGH:
         return True
     try:

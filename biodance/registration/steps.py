@@ -11,7 +11,7 @@ from biodance.motion.contact.contact import Contact
 from biodance.motion.contact.footing import inside
 from biodance.motion.contact.soles import Soles
 from biodance.records import SIDES, Array, Motion, Trial, Wrench, runs
-from biodance.registration.pose import Forces, Pose
+from biodance.registration.pose import Forces, FramePose
 
 _ONSET = 20.0
 """N: a plate that carries more is stepped on."""
@@ -49,7 +49,7 @@ class PlateStep:
 
 
 def plate_steps(
-    trial: Trial, motion: Motion, contact: Contact, soles: Soles, forces: Forces, pose: Pose
+    trial: Trial, motion: Motion, contact: Contact, soles: Soles, forces: Forces, pose: FramePose
 ) -> tuple[PlateStep, ...]:
     """Return the steps of a trial that is placed by ``pose``; none without heel and toe markers."""
     if trial.markers is None or not trial.marker_set:
