@@ -43,6 +43,8 @@ _PRESSED, _SLOW = 100.0, 0.3
 _TENTH, _AROUND = 0.1, 0.1
 """Share of the weight, and s."""
 _ROUNDS = 3
+ENOUGH_ROWS = 300
+"""Rows of the wrench (some two seconds) from which on it alone can judge."""
 HEIGHT_SD = 0.008
 """m: soles of the body against the ground (92 recordings: 6 mm root mean square, mostly too low)."""
 
@@ -121,7 +123,9 @@ def refined(
             why = str(error)
         pulls = [one for one in (_honest(wrench, look) if wrench else None, feet) if one is not None]
         if not pulls:
-            raise TrialRefused(f"{why} Nor is there a step of one whole foot on one plate.")
+            raise TrialRefused(
+                f"Neither the body's wrench nor a step tells where the plates lie; are these the files of one trial? {why}"
+            )
         change, covariance = together([*pulls, _weak()])
         pose = pose.changed(change, about)
         if turn and (np.abs(change) < 0.1 * np.sqrt(np.diag(covariance))).all():

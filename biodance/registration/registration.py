@@ -9,7 +9,7 @@ from biodance import display
 from biodance.records import Array, Plate, frozen_array
 from biodance.registration.alignment import Alignment
 from biodance.registration.pose import Forces, FramePose
-from biodance.registration.refinement import HEIGHT_SD, Refined
+from biodance.registration.refinement import ENOUGH_ROWS, HEIGHT_SD, Refined
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,6 +20,8 @@ simulated trials that pass 26 are within all limits."""
 _STRANGE = 7.5
 """Misfit of a loaded sample (of 12) above which the movement is not the one that the plates felt: 39 true pairs have up
 to 6.6."""
+_STRANGE_WRENCH = 5.0
+"""Mean square of the wrench's whitened rows above which it is not this movement: true pairs have up to 2."""
 _ODD_FEET = 6.0
 """Mean square of the feet's whitened rows above which the plates do not lie as their file says."""
 
@@ -202,6 +204,11 @@ def _kept_together(plates: tuple[PlacedPlate, ...]) -> tuple[str, ...]:
 
 def _doubt(best: Alignment, rivals: tuple[Alignment, ...], found: Refined) -> str:
     """Return why the pose is not believed at all; "" where it is."""
+    if found.rows >= ENOUGH_ROWS and found.fit > _STRANGE_WRENCH:
+        return (
+            f"The forces do not fit this movement (the whole body's wrench misses by {np.sqrt(found.fit):.1f} times what is "
+            "usual): they are of another trial or person, or something else is wrong. Give the two files of one trial."
+        )
     if best.misfit > _STRANGE:
         return (
             f"The forces do not fit this movement (misfit {best.misfit:.1f} of at most 12, {_STRANGE:g} allowed): they "

@@ -9,15 +9,15 @@ import numpy as np
 from biodance.errors import TrialRefused
 from biodance.registration.alignment import Alignment
 from biodance.registration.pose import FramePose
-from biodance.registration.refinement import Refined
+from biodance.registration.refinement import ENOUGH_ROWS, Refined
 
 _NEARLY = 0.85
 """Share of the best alignment's gain from which on another one is looked at."""
 _MOST = 3
 _SAME = 0.03
 """s between the delays of two refined poses that are one."""
-_ENOUGH, _CLEARLY = 300, 10.0
-"""Rows of the wrench (some two seconds) from which on it decides, by so many natural logarithms."""
+_CLEARLY = 10.0
+"""Natural logarithms by which the wrench must prefer one to the other."""
 
 
 def rival_delays(
@@ -29,7 +29,7 @@ def rival_delays(
 
 
 def _remains(one: Alignment, found: Refined, refine: Callable[[FramePose], Refined]) -> bool:
-    if found.rows < _ENOUGH:
+    if found.rows < ENOUGH_ROWS:
         return True
     try:
         other = refine(one.pose)
@@ -38,4 +38,4 @@ def _remains(one: Alignment, found: Refined, refine: Callable[[FramePose], Refin
     if abs(other.pose.delay - found.pose.delay) < _SAME:
         return False
     worse = 0.5 * min(found.rows, other.rows) * (other.fit - found.fit)
-    return other.rows >= _ENOUGH and not (np.isfinite(worse) and worse > _CLEARLY)
+    return other.rows >= ENOUGH_ROWS and not (np.isfinite(worse) and worse > _CLEARLY)
