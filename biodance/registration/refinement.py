@@ -124,7 +124,7 @@ def refined(
         pulls = [one for one in (_honest(wrench, look) if wrench else None, feet) if one is not None]
         if not pulls:
             raise TrialRefused(
-                f"Neither the body's wrench nor a step tells where the plates lie; are these the files of one trial? {why}"
+                f"Neither the body's wrench nor a step tells where the plates lie; are these files of one trial? {why}"
             )
         change, covariance = together([*pulls, _weak()])
         pose = pose.changed(change, about)

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _SURE = 1.645
-"""Standard deviations that must fit into a limit. At the limit one in ten errs beyond it; most lie well below: of 27
-simulated trials that pass 26 are within all limits."""
+"""Standard deviations that must fit into a limit. At the limit one in ten errs beyond it; most lie well below: of 24
+simulated trials that pass 23 are within all limits."""
 _STRANGE = 7.5
 """Misfit of a loaded sample (of 12) above which the movement is not the one that the plates felt: 39 true pairs have up
 to 6.6."""
@@ -206,8 +206,8 @@ def _doubt(best: Alignment, rivals: tuple[Alignment, ...], found: Refined) -> st
     """Return why the pose is not believed at all; "" where it is."""
     if found.rows >= ENOUGH_ROWS and found.fit > _STRANGE_WRENCH:
         return (
-            f"The forces do not fit this movement (the whole body's wrench misses by {np.sqrt(found.fit):.1f} times what is "
-            "usual): they are of another trial or person, or something else is wrong. Give the two files of one trial."
+            f"The forces do not fit this movement (the wrench misses by {np.sqrt(found.fit):.1f} times "
+            "what is usual): they are of another trial or person. Give the two files of one trial."
         )
     if best.misfit > _STRANGE:
         return (
