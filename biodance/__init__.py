@@ -12,8 +12,8 @@ A visit is diagnosed in a few lines::
 
 SI units (m, kg, s, N, N·m, rad); lab frame with z up; a wrench is the ground's action on the subject about the lab
 origin, force first. The examples of this package share a simulated visit: ``session = read_session("visit")``, ``result
-= examine(session)``, ``identified = identify(result)``, ``found = diagnose(result)``, and a short ``dance``; what they
-print is checked by the tests.
+= examine(session)``, ``identified = identify(result)``, ``found = diagnose(result)``, ``registered = register(...)``
+and a short ``dance``; what they print is checked by the tests.
 """
 
 from importlib import import_module
@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from biodance.pipeline.identification import SessionIdentification as SessionIdentification
     from biodance.pipeline.learn import learn_laboratory as learn_laboratory
     from biodance.pipeline.plates import judge_plates as judge_plates
+    from biodance.pipeline.registration import register as register
     from biodance.pipeline.results import SessionResult as SessionResult
     from biodance.pipeline.session import examine as examine
     from biodance.records import Markers as Markers
@@ -64,6 +65,7 @@ if TYPE_CHECKING:
     from biodance.records import Subject as Subject
     from biodance.records import Trial as Trial
     from biodance.records import Wrench as Wrench
+    from biodance.registration.registration import Registration as Registration
     from biodance.settings import Settings as Settings
 
 HOMES = {
@@ -88,9 +90,11 @@ HOMES = {
     "pipeline.identification": ("SessionIdentification",),
     "pipeline.learn": ("learn_laboratory",),
     "pipeline.plates": ("judge_plates",),
+    "pipeline.registration": ("register",),
     "pipeline.results": ("SessionResult",),
     "pipeline.session": ("examine",),
     "records": ("Markers", "Motion", "Plate", "Session", "Sip", "Subject", "Trial", "Wrench"),
+    "registration.registration": ("Registration",),
     "settings": ("Settings",),
 }
 """Module -> the names of the front door that live there; each is loaded when it is first asked for."""

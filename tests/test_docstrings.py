@@ -28,6 +28,7 @@ def names(tmp_path_factory):
         "result": result,
         "identified": biodance.identify(result),
         "found": biodance.diagnose(result),
+        "registered": biodance.register("visit/dance_1.c3d", "visit/dance_1.c3d"),
     }
     small_dance().save("dance.npz")
     yield {"biodance": biodance, "dance": small_dance(), **shared}

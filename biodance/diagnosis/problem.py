@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.diagnosis.spectrum import Spectrum, spectrum, thinned
+from biodance.diagnosis.spectrum import SHORTEST_RUN, Spectrum, spectrum, thinned
 from biodance.discovery import Chosen
 from biodance.effects import Case, Effect, effects
 from biodance.identification.identification import usable
@@ -123,16 +123,23 @@ class Problem:
         return replace(self, kinematics=np.concatenate([rows, markers, np.zeros((len(self.shown), rows.shape[1]))]))
 
 
-def problem(body: Body, looks: tuple[Look, ...], *, prior: Sip | None = None, chosen: Chosen[Effect] = None) -> Problem:
+def problem(
+    body: Body,
+    looks: tuple[Look, ...],
+    *,
+    prior: Sip | None = None,
+    chosen: Chosen[Effect] = None,
+    shortest: float = SHORTEST_RUN,
+) -> Problem:
     """Return the problem of ``looks`` at a session of ``body``; ``prior`` of its parameters, by default the table's
-    with widened sd.
+    with widened sd; runs of frames shorter than ``shortest`` s are left out.
 
     What the markers show by themselves is read for the whole family and for the ``chosen`` effects (`effects`).
 
     Raises
     ------
     TrialRefused
-        No trial has a second of believable, fully measured frames.
+        No trial has ``shortest`` s of believable, fully measured frames.
     """
     before = prior or widened(body.sip)
     fits = tuple(Fit(look.trial.name, look.motion, look.trial.wrench, look.use) for look in looks)
@@ -144,7 +151,7 @@ def problem(body: Body, looks: tuple[Look, ...], *, prior: Sip | None = None, ch
             time = np.linspace(look.start, look.end, look.motion.time.size)
             pairs.append(thinned(Case(body, look.trial, look.motion, before.phi, time), kept[look.trial.name]))
     cases = tuple(case for case, _ in pairs)
-    where = spectrum(cases, tuple(use for _, use in pairs), about)
+    where = spectrum(cases, tuple(use for _, use in pairs), about, shortest=shortest)
     factor = prior_factor(before)
     W = where.rows(tuple(case.regressor @ factor for case in cases))
     errors = _errors(body, cases, where)

@@ -51,19 +51,22 @@ class Spectrum:
         return np.concatenate(parts) if parts else np.empty((0, 6, samples.shape[2]))
 
 
-def spectrum(cases: tuple[Case, ...], uses: tuple[NDArray[np.bool_], ...], about: Array) -> Spectrum:
-    """Return the rows of ``cases`` whose frames ``uses`` (T,) may be compared, moments about ``about`` (3,) m.
+def spectrum(
+    cases: tuple[Case, ...], uses: tuple[NDArray[np.bool_], ...], about: Array, *, shortest: float = SHORTEST_RUN
+) -> Spectrum:
+    """Return the rows of ``cases`` whose frames ``uses`` (T,) may be compared, moments about ``about`` (3,) m, from
+    runs of at least ``shortest`` s.
 
     Raises
     ------
     TrialRefused
-        No trial has a run of `SHORTEST` s.
+        No trial has such a run.
     """
     picks, band, trial, seconds = [], [], [], 0.0
     rates = tuple(case.motion.rate for case in cases)
     for index, (rate, use) in enumerate(zip(rates, uses, strict=True)):
         there = BANDS.at(rate)
-        runs = tuple(pick for pick in BANDS.runs(use, rate) if pick.size >= SHORTEST_RUN * there.rate)
+        runs = tuple(pick for pick in BANDS.runs(use, rate) if pick.size >= shortest * there.rate)
         picks.append(runs)
         for pick in runs:
             own = there.of(pick.size)
@@ -73,8 +76,7 @@ def spectrum(cases: tuple[Case, ...], uses: tuple[NDArray[np.bool_], ...], about
     if not band:
         names = ", ".join(case.trial.name for case in cases)
         raise TrialRefused(
-            f"No trial of {names} has {SHORTEST_RUN:g} s of fully measured ground contact, so there is nothing to "
-            f"diagnose."
+            f"No trial of {names} has {shortest:g} s of fully measured ground contact, so there is nothing to diagnose."
         )
     return Spectrum(Noise.unit(about, BANDS), tuple(picks), rates, np.concatenate(band), np.concatenate(trial), seconds)
 
