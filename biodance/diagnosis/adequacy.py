@@ -24,6 +24,8 @@ STRAINED = 3.5
 """Standard deviations by which the body may be more unlike the table than people are (sessions without fault: 1.4 at
 most of 14).
 """
+STRETCHED = 6.0
+"""Standard deviations beyond which no tolerance of a cause that is not named is believed (STRETCHED_SEEN)."""
 
 _SECONDS = 70.0
 """s of measured contact in the sessions from which the spread of null sessions was learned; in a shorter one chance
@@ -129,6 +131,15 @@ def strain(found: Model) -> float:
         return 0.0
     spread = 2 / 9 * float(np.sum(weight**2) / weight.sum() ** 2)
     return float((np.cbrt(u @ u / weight.sum()) - 1 + spread) / np.sqrt(spread))
+
+
+def stretch(found: Model) -> float:
+    """Return the largest deviation that any tolerance of a cause had to take, in its standard deviations: a cause that
+    nobody looks for leaves no residual if it may be as large as it likes.
+    """
+    named = sum(course.size for one in found.named for course in one.course.values())
+    start = found.problem.factor.shape[1] + found.problem.kinematics.shape[1]
+    return float(np.abs(found.belief.mean[start : found.belief.mean.size - named]).max(initial=0.0))
 
 
 def verdict(named: int, worst: float, gates: "tuple[Gate, ...]", *, strained: bool = False) -> Verdict:

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.diagnosis.adequacy import STRAINED, adequacy, alarming, strain, verdict
+from biodance.diagnosis.adequacy import STRAINED, STRETCHED, adequacy, alarming, strain, stretch, verdict
 from biodance.diagnosis.consequence import matters, unit_at
 from biodance.diagnosis.diagnosis import Diagnosis, Estimate, Finding, Unobservable
-from biodance.diagnosis.model import NamedCause
+from biodance.diagnosis.model import Model, NamedCause
 from biodance.diagnosis.naming import Naming, Round, less_one, name_causes, named_of, suspicious
 from biodance.diagnosis.observability import detection_limits, hidden, visibility
 from biodance.diagnosis.passing import with_passing
@@ -28,7 +28,10 @@ STRANGE = (
     "a load that nobody noted, a gain, or the declared mass or stature."
 )
 
-
+UNASKED = (
+    "What the plates measured fits only if something that is small in every laboratory is many times as large here, "
+    "and none of the causes looked for is it."
+)
 STANDING = (
     "Only quiet standing was judged: sway, soft tissue and a plate's zero look alike there, so no cause that has a "
     "size is named from it. A few squats or steps on the plates tell them apart."
@@ -95,8 +98,7 @@ def diagnose_trials(
         candidates=tuple(one.alias for one in naming.screening.suspects),
     )
     found = judged(Examined(bare, naming))
-    strange = [STRANGE] if strain(naming.found) > STRAINED else []
-    notes = (*put.notes, *strange, *([STANDING] if quiet else []))
+    notes = (*put.notes, *_strange(naming.found), *([STANDING] if quiet else []))
     return replace(found, diagnosis=replace(found.diagnosis, notes=notes))
 
 
@@ -105,21 +107,30 @@ def judged(examined: Examined) -> Examined:
     without fault.
     """
     naming, one = examined.naming, examined.diagnosis
-    left, strained = adequacy(naming.found), strain(naming.found) > STRAINED
+    left, strained = adequacy(naming.found), bool(_strange(naming.found))
     put, known = naming.found.problem, naming.found.tolerances
     named = tuple(_measured(cause, put, known) for cause in naming.found.named)
     every = [(cause, _finding(cause, r, known)) for cause, r in zip(named, naming.accepted, strict=True)]
-    findings = tuple(finding for cause, finding in every if matters(cause.effect, cause.theta))
-    told = verdict(len(findings), alarming(left), one.gates, strained=strained)
+    large = [pair for pair in every if matters(pair[0].effect, pair[0].theta)]
+    told = verdict(len(large), alarming(left), one.gates, strained=strained)
+    trusted = [] if told == "unexplained" else [pair for pair in large if not _one_of_several(pair[0], named)]
+    if len(trusted) < len(large):
+        told = "named, incomplete" if trusted else "unexplained"
     found = replace(
         one,
         verdict=told,
-        findings=() if told == "unexplained" else findings,
-        resembles=findings if told == "unexplained" else (),
+        findings=tuple(finding for _, finding in trusted),
+        resembles=tuple(finding for pair in large if pair not in trusted for finding in pair[1:]),
         tolerated=tuple(finding for cause, finding in every if not matters(cause.effect, cause.theta)),
         adequacy=left,
     )
-    return Examined(found, naming, tuple(cause for cause in named if matters(cause.effect, cause.theta)))
+    causes = trusted if trusted else large
+    return Examined(found, naming, tuple(cause for cause, _ in causes))
+
+
+def _one_of_several(one: NamedCause, named: tuple[NamedCause, ...]) -> bool:
+    """Return whether a cause that is believed only alone (`Effect.single`) was named at several targets."""
+    return one.effect.single and sum(other.effect.name == one.effect.name for other in named) > 1
 
 
 def moves(case: Case) -> bool:
@@ -152,6 +163,12 @@ def without_name(examined: Examined, index: int) -> Examined:
     found = judged(replace(examined, naming=less_one(examined.naming, names.index((gone.effect, gone.target)))))
     resembles = (*found.diagnosis.resembles, gone, *one.resembles)
     return replace(found, diagnosis=replace(found.diagnosis, resembles=resembles))
+
+
+def _strange(found: Model) -> tuple[str, ...]:
+    """Say what had to be unlike people or laboratories for the rest to fit."""
+    body, rest = strain(found) > STRAINED, stretch(found) > STRETCHED
+    return (*((STRANGE,) if body else ()), *((UNASKED,) if rest else ()))
 
 
 def _relative(row: Unobservable) -> float:
