@@ -116,7 +116,10 @@ def answered(column: str, effect: str, hidden: str, result: SessionResult, *, wi
         if "KEEP" in os.environ:
             import pickle
             from dataclasses import replace
-            pickle.dump(replace(one, witnesses=None), open(f"{os.environ['KEEP']}/{column}-{effect}-{without}.pkl", "wb"))
+
+            pickle.dump(
+                replace(one, witnesses=None), open(f"{os.environ['KEEP']}/{column}-{effect}-{without}.pkl", "wb")
+            )
     except BiodanceError as error:
         return Answer(column, effect, hidden, without, "refused", (), (), 0.0, str(error), 0.0)
     head = next((said.text for said in one.attention if said.about == "diagnosis"), one.told)

@@ -32,6 +32,10 @@ UNASKED = (
     "What the plates measured fits only if something that is small in every laboratory is many times as large here, "
     "and none of the causes looked for is it."
 )
+SEVERAL = (
+    "Several channels would have to disturb each other at once. That is what a plate looks like that lies or is turned "
+    "otherwise than the file says, or whose matrix is another one: none of these cross-talks is named."
+)
 STANDING = (
     "Only quiet standing was judged: sway, soft tissue and a plate's zero look alike there, so no cause that has a "
     "size is named from it. A few squats or steps on the plates tell them apart."
@@ -40,8 +44,8 @@ STANDING = (
 
 @dataclass(frozen=True, eq=False)
 class Examined:
-    """A diagnosis with what it was made from: ``naming`` all rounds, with the problem; ``named`` the causes that
-    matter, with their sizes.
+    """A diagnosis with what it was made from: ``naming`` all rounds, with the problem; ``named`` the causes of
+    the findings, with their sizes.
     """
 
     diagnosis: Diagnosis
@@ -98,7 +102,7 @@ def diagnose_trials(
         candidates=tuple(one.alias for one in naming.screening.suspects),
     )
     found = judged(Examined(bare, naming))
-    notes = (*put.notes, *_strange(naming.found), *([STANDING] if quiet else []))
+    notes = (*found.diagnosis.notes, *([STANDING] if quiet else []))
     return replace(found, diagnosis=replace(found.diagnosis, notes=notes))
 
 
@@ -114,18 +118,20 @@ def judged(examined: Examined) -> Examined:
     large = [pair for pair in every if matters(pair[0].effect, pair[0].theta)]
     told = verdict(len(large), alarming(left), one.gates, strained=strained)
     trusted = [] if told == "unexplained" else [pair for pair in large if not _one_of_several(pair[0], named)]
-    if len(trusted) < len(large):
+    several = any(_one_of_several(cause, named) for cause, _ in large)
+    if several and told != "unexplained":
         told = "named, incomplete" if trusted else "unexplained"
+    said = (*_strange(naming.found), *((SEVERAL,) if several else ()))
     found = replace(
         one,
         verdict=told,
+        notes=(*(note for note in one.notes if note not in (STRANGE, UNASKED, SEVERAL)), *said),
         findings=tuple(finding for _, finding in trusted),
         resembles=tuple(finding for pair in large if pair not in trusted for finding in pair[1:]),
         tolerated=tuple(finding for cause, finding in every if not matters(cause.effect, cause.theta)),
         adequacy=left,
     )
-    causes = trusted if trusted else large
-    return Examined(found, naming, tuple(cause for cause, _ in causes))
+    return Examined(found, naming, tuple(cause for cause, _ in trusted))
 
 
 def _one_of_several(one: NamedCause, named: tuple[NamedCause, ...]) -> bool:
