@@ -25,8 +25,9 @@ STRAINED = 3.5
 most of 14).
 """
 STRETCHED = 6.0
-"""Standard deviations beyond which no tolerance of a cause that is not named is believed (with the right cause named: at most 5.7 in 16 sessions, own and foreign; with it out of the
-family 7.7 to 19.7 in 10 of 16)."""
+"""Standard deviations beyond which no tolerance of a cause is believed: with the right cause named at most 5.7 in 16
+sessions (own and foreign laboratory), with it out of the family 7.7 to 19.7 in 9 of 16.
+"""
 
 _SECONDS = 70.0
 """s of measured contact in the sessions from which the spread of null sessions was learned; in a shorter one chance
