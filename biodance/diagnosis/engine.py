@@ -45,7 +45,7 @@ STANDING = (
 @dataclass(frozen=True, eq=False)
 class Examined:
     """A diagnosis with what it was made from: ``naming`` all rounds, with the problem; ``named`` the causes of
-    the findings, with their sizes.
+    the findings (without any: those that it resembles), with their sizes.
     """
 
     diagnosis: Diagnosis
@@ -131,7 +131,7 @@ def judged(examined: Examined) -> Examined:
         tolerated=tuple(finding for cause, finding in every if not matters(cause.effect, cause.theta)),
         adequacy=left,
     )
-    return Examined(found, naming, tuple(cause for cause, _ in trusted))
+    return Examined(found, naming, tuple(cause for cause, _ in trusted or large))
 
 
 def _one_of_several(one: NamedCause, named: tuple[NamedCause, ...]) -> bool:
