@@ -38,9 +38,11 @@ def with_witnesses(one: Diagnosis, said: Verdicts, heard: Testimony, *, judged: 
             shadows.append(finding)
         else:
             mine.append(_together(finding, alike))
+    known = {_names(f) for f in checked.resembles}
+    shadows = [shadow for shadow in shadows if _names(shadow) not in known]
     if not mine:
         return replace(checked, resembles=(*checked.resembles, *shadows))
-    names = {_names(alias) for finding in (*said.findings, *mine) for alias in finding.set if finding not in shadows}
+    names = {_names(alias) for finding in mine for alias in finding.set}
     rest = tuple(f for f in checked.findings if _names(f) not in names)
     told: Verdict = "named, incomplete"
     if judged and not rest and one.verdict in ("nothing wrong", "named, complete") and not one.doubt:
