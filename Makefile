@@ -4,12 +4,16 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: demo test lint docs tutorials clean
+.PHONY: demo test hidden lint docs tutorials clean
 demo: $(STAMP)
 	$(BIN)/biodance demo --out demo --force || [ $$? -eq 1 ] # 1: done, and something needs a person
 
 test: $(STAMP)
 	$(BIN)/python -m pytest -n 2
+
+PART ?= 1/1
+hidden: $(STAMP) # every cause hidden in a session and found again; PART=2/7: every seventh
+	BIODANCE_HIDDEN=$(PART) $(BIN)/python -m pytest -n 2 tests/test_hidden_causes.py
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

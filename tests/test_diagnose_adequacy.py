@@ -49,7 +49,7 @@ def test_a_body_as_people_are_is_no_strain_and_a_strange_one_is() -> None:
 
 def test_a_strained_body_is_never_complete() -> None:
     assert verdict(1, 1.0, ()) == "named, complete"
-    assert verdict(1, 1.0, (), strained=True) == "named, incomplete"
+    assert verdict(1, 1.0, (), strained=True) == "unexplained"
     assert verdict(0, 1.0, (), strained=True) == "unexplained"
 
 

@@ -24,6 +24,10 @@ STRAINED = 3.5
 """Standard deviations by which the body may be more unlike the table than people are (sessions without fault: 1.4 at
 most of 14).
 """
+STRETCHED = 7.0
+"""Standard deviations beyond which no tolerance of a cause is believed: with the right cause named at most 6.1 in 22
+sessions (own and foreign laboratory), with it out of the family 7.8 to 24 wherever it had hidden there.
+"""
 
 _SECONDS = 70.0
 """s of measured contact in the sessions from which the spread of null sessions was learned; in a shorter one chance
@@ -131,13 +135,23 @@ def strain(found: Model) -> float:
     return float((np.cbrt(u @ u / weight.sum()) - 1 + spread) / np.sqrt(spread))
 
 
+def stretch(found: Model) -> float:
+    """Return the largest deviation that any tolerance of a cause had to take, in its standard deviations: a cause that
+    nobody looks for leaves no residual if it may be as large as it likes.
+    """
+    named = sum(course.size for one in found.named for course in one.course.values())
+    start = found.problem.factor.shape[1] + found.problem.kinematics.shape[1]
+    return float(np.abs(found.belief.mean[start : found.belief.mean.size - named]).max(initial=0.0))
+
+
 def verdict(named: int, worst: float, gates: "tuple[Gate, ...]", *, strained: bool = False) -> Verdict:
     """Return the verdict from how many causes were named, the ``worst`` z that is left where it matters (`alarming`),
-    the gates, and whether the body is ``strained``.
+    the gates, and whether body or tolerances are ``strained``: a name beside which they must be strange is only
+    resembled.
     """
     failed = any(not gate.ok for gate in gates)
     if worst <= LIMIT and not strained:
         return "named, complete" if named or failed else "nothing wrong"
-    if (named or failed) and worst <= _BEYOND:
+    if (failed or (named and not strained)) and worst <= _BEYOND:
         return "named, incomplete"
     return "unexplained"

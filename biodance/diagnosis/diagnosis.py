@@ -62,8 +62,8 @@ class Estimate:
 
 @dataclass(frozen=True, eq=False)
 class Gain:
-    """What a finding gains on trials that were not used to find it, against the model in use (identified body, nominal
-    laboratory).
+    """What a finding gains on trials that were not used to find it: all findings accepted, against all but this one
+    with the rest fitted again (a single one: against the model in use, identified body and nominal laboratory).
 
     ``rms_before``, ``rms_after`` (6,) N, N·m, root mean square residual per channel; ``channels`` (6, 2) 95 % interval
     of the share of it that the finding removes (0.2 = a fifth, negative = it adds); ``ci95`` (2,) the same for all
@@ -107,7 +107,7 @@ class Finding:
         Share of its effect that remains visible when the body's own parameters and tolerances may adapt (0 = hides in
         the body).
     gain : Gain or None
-        On trials that were kept; None without one.
+        Its own on trials that were kept: accepted with all others, against the others alone; None without one.
     advice : str
         What settles it in the laboratory.
     changes : tuple of str

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.diagnosis.adequacy import STRAINED, adequacy, alarming, strain, verdict
+from biodance.diagnosis.adequacy import STRAINED, STRETCHED, adequacy, alarming, strain, stretch, verdict
 from biodance.diagnosis.consequence import matters, unit_at
 from biodance.diagnosis.diagnosis import Diagnosis, Estimate, Finding, Unobservable
-from biodance.diagnosis.model import NamedCause
-from biodance.diagnosis.naming import Naming, Round, name_causes, suspicious
+from biodance.diagnosis.model import Model, NamedCause
+from biodance.diagnosis.naming import Naming, Round, less_one, name_causes, named_of, suspicious
 from biodance.diagnosis.observability import detection_limits, hidden, visibility
 from biodance.diagnosis.passing import with_passing
 from biodance.diagnosis.problem import Look, Problem, problem
@@ -28,7 +28,14 @@ STRANGE = (
     "a load that nobody noted, a gain, or the declared mass or stature."
 )
 
-
+UNASKED = (
+    "What the plates measured fits only if something that is small in every laboratory is many times as large here, "
+    "and none of the causes looked for is it."
+)
+SEVERAL = (
+    "Several channels would have to disturb each other at once. That is what a plate looks like that lies or is turned "
+    "otherwise than the file says, or whose matrix is another one: none of these cross-talks is named."
+)
 STANDING = (
     "Only quiet standing was judged: sway, soft tissue and a plate's zero look alike there, so no cause that has a "
     "size is named from it. A few squats or steps on the plates tell them apart."
@@ -37,8 +44,8 @@ STANDING = (
 
 @dataclass(frozen=True, eq=False)
 class Examined:
-    """A diagnosis with what it was made from: ``naming`` all rounds, with the problem; ``named`` the causes that
-    matter, with their sizes.
+    """A diagnosis with what it was made from: ``naming`` all rounds, with the problem; ``named`` the causes of
+    the findings (without any: those that it resembles), with their sizes.
     """
 
     diagnosis: Diagnosis
@@ -84,25 +91,52 @@ def diagnose_trials(
     else:
         naming = name_causes(put, known, asked, rounds=0)
     rows = detection_limits(visibility(naming.first, naming.first_causes), body, known.threshold)
-    left, strained = adequacy(naming.found), strain(naming.found) > STRAINED
-    named = tuple(_measured(one, put, known) for one in naming.found.named)
-    every = [(one, _finding(one, r, known)) for one, r in zip(named, naming.accepted, strict=True)]
-    findings = tuple(finding for one, finding in every if matters(one.effect, one.theta))
-    told = verdict(len(findings), alarming(left), gates, strained=strained)
-    found = Diagnosis(
-        verdict=told,
-        findings=() if told == "unexplained" else findings,
-        resembles=findings if told == "unexplained" else (),
-        tolerated=tuple(finding for one, finding in every if not matters(one.effect, one.theta)),
+    bare = Diagnosis(
+        verdict="nothing wrong",
+        findings=(),
         gates=gates,
-        adequacy=left,
         unobservable=hidden(rows),
         limits=tuple(sorted(rows, key=_relative)),
-        notes=(*put.notes, *([STRANGE] if strained else []), *([STANDING] if quiet else [])),
+        notes=put.notes,
         doubt="standing alone tells no cause" if quiet else "",
         candidates=tuple(one.alias for one in naming.screening.suspects),
     )
-    return Examined(found, naming, tuple(one for one in named if matters(one.effect, one.theta)))
+    found = judged(Examined(bare, naming))
+    notes = (*found.diagnosis.notes, *([STANDING] if quiet else []))
+    return replace(found, diagnosis=replace(found.diagnosis, notes=notes))
+
+
+def judged(examined: Examined) -> Examined:
+    """Return the same session with what its naming says: verdict, findings, and how far what is left is from sessions
+    without fault.
+    """
+    naming, one = examined.naming, examined.diagnosis
+    left, strained = adequacy(naming.found), bool(_strange(naming.found))
+    put, known = naming.found.problem, naming.found.tolerances
+    named = tuple(_measured(cause, put, known) for cause in naming.found.named)
+    every = [(cause, _finding(cause, r, known)) for cause, r in zip(named, naming.accepted, strict=True)]
+    large = [pair for pair in every if matters(pair[0].effect, pair[0].theta)]
+    told = verdict(len(large), alarming(left), one.gates, strained=strained)
+    trusted = [] if told == "unexplained" else [pair for pair in large if not _one_of_several(pair[0], named)]
+    several = any(_one_of_several(cause, named) for cause, _ in large)
+    if several and told != "unexplained":
+        told = "named, incomplete" if trusted else "unexplained"
+    said = (*_strange(naming.found), *((SEVERAL,) if several else ()))
+    found = replace(
+        one,
+        verdict=told,
+        notes=(*(note for note in one.notes if note not in (STRANGE, UNASKED, SEVERAL)), *said),
+        findings=tuple(finding for _, finding in trusted),
+        resembles=tuple(finding for pair in large if pair not in trusted for finding in pair[1:]),
+        tolerated=tuple(finding for cause, finding in every if not matters(cause.effect, cause.theta)),
+        adequacy=left,
+    )
+    return Examined(found, naming, tuple(cause for cause, _ in trusted or large))
+
+
+def _one_of_several(one: NamedCause, named: tuple[NamedCause, ...]) -> bool:
+    """Return whether a cause that is believed only alone (`Effect.single`) was named at several targets."""
+    return one.effect.single and sum(other.effect.name == one.effect.name for other in named) > 1
 
 
 def moves(case: Case) -> bool:
@@ -118,14 +152,29 @@ def without_names(examined: Examined, gates: tuple[Gate, ...] = ()) -> Examined:
     """Return the same session with no cause named: what was named is only what it resembles, and what is left is
     judged without it.
     """
-    naming, one = examined.naming, examined.diagnosis
-    bare = replace(naming, found=naming.bare, accepted=())
-    left, strained = adequacy(naming.bare), strain(naming.bare) > STRAINED
-    told = verdict(0, alarming(left), gates, strained=strained)
-    found = replace(
-        one, verdict=told, findings=(), resembles=(*one.findings, *one.resembles), tolerated=(), adequacy=left
+    naming, one = examined.naming, replace(examined.diagnosis, gates=gates)
+    found = judged(Examined(one, replace(naming, found=naming.bare, accepted=())))
+    told = replace(
+        found.diagnosis, gates=examined.diagnosis.gates, resembles=(*one.findings, *one.resembles), tolerated=()
     )
-    return Examined(found, bare)
+    return replace(found, diagnosis=told)
+
+
+def without_name(examined: Examined, index: int) -> Examined:
+    """Return the same session without the finding ``index``, which is only what it resembles; the sizes of all other
+    causes are fitted again, and what is left is judged without it.
+    """
+    gone, one = examined.diagnosis.findings[index], examined.diagnosis
+    names = [named_of(cause) for cause in examined.naming.found.named]
+    found = judged(replace(examined, naming=less_one(examined.naming, names.index((gone.effect, gone.target)))))
+    resembles = (*found.diagnosis.resembles, gone, *one.resembles)
+    return replace(found, diagnosis=replace(found.diagnosis, resembles=resembles))
+
+
+def _strange(found: Model) -> tuple[str, ...]:
+    """Say what had to be unlike people or laboratories for the rest to fit."""
+    body, rest = strain(found) > STRAINED, stretch(found) > STRETCHED
+    return (*((STRANGE,) if body else ()), *((UNASKED,) if rest else ()))
 
 
 def _relative(row: Unobservable) -> float:

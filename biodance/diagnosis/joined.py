@@ -29,20 +29,49 @@ def with_witnesses(one: Diagnosis, said: Verdicts, heard: Testimony, *, judged: 
         return replace(one, findings=(*one.findings, *signs))
     if not said.findings:
         return _checked(one, heard)
-    names = {(alias.effect, alias.target) for finding in said.findings for alias in finding.set}
-    same = {(f.effect, f.target): f for f in one.findings}
-    mine = tuple(_together(finding, same.get((finding.effect, finding.target))) for finding in said.findings)
-    rest = tuple(f for f in _checked(one, heard).findings if (f.effect, f.target) not in names)
-    findings = (*mine, *rest)
+    checked = _checked(one, heard) if judged else one
+    same = {(f.effect, f.target): f for f in checked.findings}
+    mine, shadows = [], []
+    for finding in said.findings:
+        alike = next((same[alias.effect, alias.target] for alias in finding.set if _names(alias) in same), None)
+        if alike is None and judged and _explained_without(finding, checked):
+            shadows.append(finding)
+        else:
+            mine.append(_together(finding, alike))
+    known = {_names(f) for f in checked.resembles}
+    shadows = [shadow for shadow in shadows if _names(shadow) not in known]
+    if not mine:
+        return replace(checked, resembles=(*checked.resembles, *shadows))
+    names = {_names(alias) for finding in mine for alias in finding.set}
+    rest = tuple(f for f in checked.findings if _names(f) not in names)
     told: Verdict = "named, incomplete"
     if judged and not rest and one.verdict in ("nothing wrong", "named, complete") and not one.doubt:
         told = "named, complete"
-    kept = tuple(f for f in one.resembles if (f.effect, f.target) not in names)
-    return replace(one, verdict=told, findings=findings, resembles=kept)
+    kept = tuple(f for f in checked.resembles if _names(f) not in names)
+    return replace(checked, verdict=told, findings=(*mine, *rest), resembles=(*kept, *shadows))
+
+
+def _names(one: Finding | Alias) -> tuple[str, str]:
+    """Return effect and target."""
+    return one.effect, one.target
+
+
+def _explained_without(finding: Finding, one: Diagnosis) -> bool:
+    """Return whether the simulation found something else wrong, though it would see a cause of this size: a load is
+    weight to the plates, and a hand that carries it moves where people stand.
+    """
+    if one.doubt or not finding.parameters or one.verdict == "nothing wrong":
+        return False
+    limits = {(row.effect, row.target): row.limit for row in one.limits}
+    return abs(finding.parameters[0].value) > limits.get(_names(finding), float("inf"))
 
 
 def _together(by_witnesses: Finding, by_simulation: Finding | None) -> Finding:
-    """Return a finding with the size from both, where both named it."""
+    """Return a finding with the size from both, where both named it; what the simulation tells from its look-alikes
+    is named as it does.
+    """
+    if by_simulation is not None and _names(by_simulation) != _names(by_witnesses):
+        return by_simulation
     if by_simulation is None or not by_simulation.parameters or not by_witnesses.parameters:
         return by_witnesses
     first, last = by_witnesses.parameters[0], by_simulation.parameters[0]

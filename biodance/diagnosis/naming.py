@@ -148,6 +148,20 @@ def held(found: Model, accepted: tuple[Round, ...]) -> tuple[Model, tuple[Round,
     return found, accepted
 
 
+def less_one(naming: Naming, index: int) -> Naming:
+    """Return the naming without its cause ``index``, the sizes of all others fitted again; beside one that comes and
+    goes they keep their sizes, because its course takes part in the belief.
+    """
+    gone, named = naming.found.named[index], naming.found.named
+    rest = (*named[:index], *named[index + 1 :])
+    accepted = (*naming.accepted[:index], *naming.accepted[index + 1 :])
+    if any(one.course for one in rest):
+        steady = tuple(one for one in rest if not one.course)
+        return replace(naming, found=replace(naming.found.less(steady), named=rest), accepted=accepted)
+    base = naming.bare if gone.course or not rest else naming.found
+    return replace(naming, found=settle(base, rest), accepted=accepted)
+
+
 def needed(found: Model, visible: float) -> float:
     """Return the evidence that a cause needs of which the share ``visible`` is seen."""
     return found.tolerances.threshold * (1.0 if visible >= SEEN else OVERWHELMING)

@@ -20,6 +20,7 @@ class PlateCrosstalk(Effect):
 
     name = "plate_crosstalk"
     parameters = (Parameter("ratio", "1 or m or 1/m", 0.01, "maker's limit of 2 % for classic strain-gauge plates"),)
+    single = True
     separated_by = "Squats, which change Fz, at several places of the plate."
     advice = "Load the plate with dead weights at its middle and corners; enter the maker's full calibration matrix."
 

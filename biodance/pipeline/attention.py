@@ -9,7 +9,7 @@ import numpy as np
 
 from biodance.diagnosis.adequacy import LIMIT, alarming
 from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Finding
-from biodance.diagnosis.engine import STRANGE
+from biodance.diagnosis.engine import SEVERAL, STRANGE, UNASKED
 from biodance.diagnosis.heard import Testimony
 from biodance.diagnosis.problem import Look
 from biodance.identification.added_mass import LoadSearch
@@ -264,6 +264,10 @@ def _where(one: Diagnosis) -> str:
     rows = [row for row in one.adequacy if row.matters and row.z > LIMIT] or list(one.adequacy)
     if STRANGE in one.notes and alarming(one.adequacy) <= LIMIT:
         return "what the plates measured fits only a body that is more unlike the table than people are"
+    if UNASKED in one.notes and alarming(one.adequacy) <= LIMIT:
+        return "what the plates measured fits only if something that is small elsewhere is many times as large here"
+    if SEVERAL in one.notes and alarming(one.adequacy) <= LIMIT:
+        return "what the plates measured fits only several cross-talks at once, as of a plate that lies elsewhere"
     if not rows:
         return "what is left is unlike sessions without fault"
     row = rows[0]

@@ -10,24 +10,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from biodance import display
-from biodance.diagnosis.accept import Residuals, accept, case_fit, gain_by_naming, residuals_of
-from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
+from biodance.diagnosis.accept import Residuals
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Gain, Verdict
 from biodance.diagnosis.engine import Examined, diagnose_trials, without_names
 from biodance.diagnosis.foresight import Foresight, foresee, session_of
 from biodance.diagnosis.heard import hear
 from biodance.diagnosis.joined import with_witnesses
-from biodance.diagnosis.problem import Look
 from biodance.diagnosis.testimony import weigh
 from biodance.discovery import Chosen
-from biodance.effects import Case, DiscreteEffect, Effect, Gate, causes, gates
-from biodance.errors import BiodanceError, NotSolved, TrialRefused
-from biodance.identification.identification import Identification, identify_body, standing_point
+from biodance.effects import DiscreteEffect, Effect, Gate, causes, gates
+from biodance.errors import BiodanceError, TrialRefused
+from biodance.identification.identification import Identification
 from biodance.identification.rival_bodies import expect_unloaded
 from biodance.pipeline.attention import judged_trials, told
-from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES, SessionIdentification
-from biodance.pipeline.looked_at import all_looks, cases_of, left_out, looked_at, looks, own_tolerances
+from biodance.pipeline.gains import accepted, noted
+from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification
+from biodance.pipeline.looked_at import all_looks, cases_of, left_out, looked_at, own_tolerances
 from biodance.pipeline.results import SessionResult
-from biodance.records import Role, Sip
+from biodance.records import Sip
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances
 
@@ -58,6 +58,8 @@ class SessionDiagnosis:
         What could not be computed ("what accepting changes"), with cause and cure.
     mended : SessionResult or None
         The copy with its labels exchanged, in which all else was found; None where no labels were mended.
+    gain : Gain or None
+        Of all findings together on the kept trials; each has its own.
 
     Examples
     --------
@@ -72,6 +74,7 @@ class SessionDiagnosis:
     left: tuple[Residuals, Residuals] | None = None
     failures: Mapping[str, str] = field(default_factory=dict)
     mended: SessionResult | None = None
+    gain: Gain | None = None
 
     def __repr__(self) -> str:
         return f"SessionDiagnosis({self.diagnosis.told})"
@@ -181,7 +184,7 @@ def _diagnosed(
         )
     except TrialRefused as why:
         return SessionDiagnosis(_by_checks(checks) if failed else _cannot_tell(checks, str(why), *result.doubts))
-    examined = _noted(
+    examined = noted(
         examined, *_untold(reference), *result.doubts, *standing_notes(result), *left_out(result.trials), *own.notes
     )
     if failed:
@@ -250,11 +253,6 @@ def _disbelieved(one: Diagnosis) -> Diagnosis:
     return replace(one, notes=(*one.notes, f"What is left resembles {alike}, which is not believed."))
 
 
-def _noted(examined: Examined, *notes: str) -> Examined:
-    """Return the same with more ``notes`` for the reader."""
-    return replace(examined, diagnosis=replace(examined.diagnosis, notes=(*examined.diagnosis.notes, *notes)))
-
-
 def _prior(reference: SessionIdentification | None, result: SessionResult) -> Sip | None:
     """Return what an earlier session lets expect of the body, or the body that the session started from; None without
     either.
@@ -316,75 +314,7 @@ def _with_gains(result: SessionResult, examined: Examined) -> SessionDiagnosis:
     before = result.identification.identification if result.identification else None
     if not examined.diagnosis.findings or before is None:
         return SessionDiagnosis(examined.diagnosis, examined, before)
-    try:
-        return _gained(_accepted(result, examined, before), examined, before)
-    except TrialRefused as why:  # named in standing, and no movement to identify from
-        return SessionDiagnosis(
-            _noted(examined, f"What accepting the findings changes is not known. {why}").diagnosis, examined, before
-        )
-    except NotSolved as why:
-        return SessionDiagnosis(examined.diagnosis, examined, before, failures={"what accepting changes": str(why)})
-
-
-def _gained(found: SessionDiagnosis, examined: Examined, before: Identification) -> SessionDiagnosis:
-    """Return the diagnosis, without its names where accepting them makes trials worse that were not used: the whole
-    interval of the gain lies below zero.
-    """
-    gain = next((one.gain for one in found.findings if one.gain), None)
-    if gain is None or gain.ci95[1] >= 0:
-        return found
-    bare = without_names(replace(examined, diagnosis=found.diagnosis))
-    low, high = (-100 * x for x in reversed(gain.ci95))
+    found = accepted(result, examined, before)
     return SessionDiagnosis(
-        _noted(
-            bare, f"What was named made trials that were not used {low:.0f} to {high:.0f} % worse and was taken back."
-        ).diagnosis,
-        bare,
-        before,
-    )
-
-
-def _accepted(result: SessionResult, examined: Examined, before: Identification) -> SessionDiagnosis:
-    """Return the diagnosis with gains: identified again from the corrected trials, judged on the kept ones."""
-    assert result.body is not None
-    named, phi = examined.named, examined.naming.found.phi
-    fitted, kept = ([(c, look.use) for c, look in _pairs(result, phi, roles)] for roles in (FITTED_ROLES, KEPT_ROLES))
-    mended = [(accept(case, named), use) for case, use in fitted]
-    after = identify_body(mended[0][0].body, tuple(case_fit(*pair) for pair in mended))
-    findings = tuple(replace(one, changes=_changes(before, after)) for one in examined.diagnosis.findings)
-    if not kept:
-        return SessionDiagnosis(replace(examined.diagnosis, findings=findings), examined, before, after)
-    as_is, better = (
-        tuple(case_fit(*pair) for pair in some) for some in (kept, [(accept(case, named), use) for case, use in kept])
-    )
-    about = standing_point(as_is)
-    left = residuals_of(before.identified, as_is, about), residuals_of(after.identified, better, about)
-    used = (
-        residuals_of(before.identified, tuple(case_fit(*pair) for pair in fitted), about),
-        residuals_of(after.identified, tuple(case_fit(*pair) for pair in mended), about),
-    )
-    try:
-        measured = gain_by_naming(*left, fitted=used)
-    except BiodanceError:
-        measured = None
-    findings = tuple(replace(one, gain=measured) for one in findings)
-    return SessionDiagnosis(replace(examined.diagnosis, findings=findings), examined, before, after, left)
-
-
-def _pairs(result: SessionResult, phi: np.ndarray, roles: tuple[Role, ...]) -> list[tuple[Case, Look]]:
-    """Return the cases with the parameters found, and where they came from."""
-    assert result.body is not None
-    found = looks(result.trials, roles)
-    return list(zip((replace(case, phi=phi) for case in cases_of(result.body, found)), found, strict=True))
-
-
-def _changes(before: Identification, after: Identification) -> tuple[str, ...]:
-    """Say which segment masses change most when the findings are accepted."""
-    then, now = (dict(zip(one.sip.segments, one.sip.mass.tolist(), strict=True)) for one in (before, after))
-    change = {name: now.get(name, 0.0) - mass for name, mass in then.items()}
-    most = sorted(change, key=lambda name: -abs(change[name]))[:3]
-    return tuple(
-        f"{name.replace('_', ' ')}: {then[name]:.2f} kg becomes {now.get(name, 0.0):.2f} kg"
-        for name in most
-        if abs(change[name]) >= 0.01
+        found.examined.diagnosis, found.examined, before, found.identified, found.left, found.failures, gain=found.gain
     )

@@ -192,6 +192,7 @@ def print_diagnosis(found: dict[str, Any], console: Console) -> None:
     console.print(f"verdict: [bold]{found['verdict']}[/]{_judged_part(found)}")
     print_attention(found["attention"], console)
     _print_failures(found["failures"], console)
+    beside = " beside the others" if len(found["findings"]) > 1 else ""
     for finding in found["findings"]:
         sizes = ", ".join(
             f"{name} {p['value']:.4g} {p['unit']}" + (f" ± {p['sd']:.2g}" if p["sd"] is not None else "")
@@ -206,7 +207,8 @@ def print_diagnosis(found: dict[str, Any], console: Console) -> None:
         if finding["gain"]:
             low, high = (100 * x for x in finding["gain"]["ci95"])
             console.print(
-                f"  accepting it removes {low:.0f} to {high:.0f} % of the difference on trials not used", soft_wrap=True
+                f"  accepting it{beside} removes {low:.0f} to {high:.0f} % of the difference on trials not used",
+                soft_wrap=True,
             )
         console.print(f"  {escape(finding['advice'])}", soft_wrap=True)
     if found["verdict"] in ("unexplained", "named, incomplete") and found["adequacy"]:

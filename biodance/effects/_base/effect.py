@@ -48,6 +48,10 @@ class Effect:
     """Whether joints that a movement placed (`motion.functional_joints`) have taken up a part of this cause before
     anybody looks.
     """
+    single: ClassVar[bool] = False
+    """Whether it is named only alone: several at once (cross-talks of a plate that lies elsewhere) are what a cause
+    looks like that nobody described.
+    """
     advice: ClassVar[str] = ""
     """What to do in the laboratory to settle it, and how it is mended."""
 

@@ -127,6 +127,7 @@ def diagnosis_document(found: SessionDiagnosis) -> dict[str, Any]:
         "unobservable": [_limit(row) for row in one.unobservable],
         "limits": [_limit(row) for row in one.limits],
         "candidates": [_alias(a) for a in one.candidates],
+        "gain": _gain(found.gain),
         "masses": {"before": _masses(found.before), "accepted": _masses(found.accepted)},
         "failures": found.failures,
         "notes": one.notes,

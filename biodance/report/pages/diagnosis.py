@@ -145,7 +145,7 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
         left=svg_address(left_figure(found.left)) if found.left else "",
         adequacy=svg_address(adequacy_figure(one.adequacy)) if one.adequacy else "",
         limits=svg_address(limits_figure(one.limits)) if one.limits else "",
-        gain=one.findings[0].gain if one.findings else None,
+        gain=found.gain,
         witnesses=_witnesses(one.witnesses),
     )
 

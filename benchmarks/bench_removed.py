@@ -1,0 +1,147 @@
+"""Take one effect out of the family: how often is an innocent named when the culprit is not among the candidates.
+
+    BIODANCE_FOREIGN_LAB=folder PYTHONPATH=tests python benchmarks/bench_removed.py --run NAME [--only own foreign]
+        [--match TEXT]
+
+One clear fault a session: the causes of tests/test_hidden_causes.py in the own laboratory (three trials), and their
+likes in an independent one (four trials, real rooms: ``--noise 0.6 --camera 0.3``). Each session is diagnosed without
+the culprit's effect and with the whole family. Answers are kept per ``--run`` (`hidden_sessions.CACHE`), so that a run
+that was stopped goes on; the table in docs/benchmarks/diagnosis.md is printed from all of them.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from unittest.mock import patch
+
+from bench_honesty import PEOPLE, ROOM
+from hidden_sessions import CACHE
+from test_hidden_causes import CAUSES
+from test_hidden_effects import hidden
+
+from biodance.effects import causes
+from biodance.lab.session.read import read_session
+from biodance.pipeline.diagnosis import diagnose_session
+from biodance.pipeline.results import SessionResult
+from biodance.pipeline.session import examine
+
+FOREIGN = (
+    ("plate_position", "plate_position", "0.03", "x"), ("plate_rotation", "plate_rotation", "5", "z"),
+    ("time_delay", "time_delay", "0.02", ""), ("plate_gain", "plate_gain", "0.05", "Fz"),
+    ("added_mass", "added_mass", "2.4", "l_farm"), ("plate_offset", "plate_offset", "25", "Fz"),
+    ("plate_crosstalk", "plate_crosstalk", "0.025", "Fx"), ("body_mass", "body_mass", "0.08", ""),
+    ("lab_tilt", "lab_tilt", "3", "x"), ("plate_drift", "plate_drift", "15", "Mx"),
+    ("external_contact", "external_contact", "30", "R"), ("body_weight_support", "body_weight_support", "", ""),
+    ("clock_drift", "clock_drift", "0.03", ""), ("sloshing_load", "sloshing_load", "", ""),
+    ("head_joint", "head_joint", "15", ""), ("marker_misplaced", "marker_misplaced", "0.06", "RKNE:x"),
+    ("plate_hysteresis", "plate_hysteresis", "", ""), ("wobbling_mass", "wobbling_mass", "", ""),
+    ("filter_mismatch", "force_filter", "3", ""), ("trunk_joint", "trunk_joint", "10", ""),
+)  # fmt: skip
+"""Effect here, cause of the foreign laboratory, its size ("" its own) and target."""
+SAME = {"joint_centre": {"segment_length"}, "segment_length": {"joint_centre"}}
+"""Other names of the same thing: a bone of another length is a joint elsewhere."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What one session was told: ``named`` and ``resembled`` effects with their targets, ``z`` of what is left."""
+
+    column: str
+    effect: str
+    hidden: str
+    without: bool
+    verdict: str
+    named: tuple[str, ...]
+    resembled: tuple[str, ...]
+    z: float
+
+    @property
+    def innocents(self) -> tuple[str, ...]:
+        """Named causes that are not the culprit."""
+        guilty = {self.effect, *SAME.get(self.effect, ())}
+        return tuple(name for name in self.named if name.split()[0] not in guilty)
+
+
+def own(text: str, folder: Path) -> SessionResult:
+    """Return a session of the own laboratory."""
+    return examine(read_session(hidden(folder / "s", text)))
+
+
+def foreign(index: int, folder: Path) -> SessionResult:
+    """Return a session of the independent laboratory."""
+    _, cause, size, target = FOREIGN[index]
+    sex, height, mass = PEOPLE[index % 4]
+    given = {"--sex": sex, "--height": height, "--mass": mass, "--cause": cause, "--size": size, "--target": target}
+    told = [str(text) for pair in given.items() if pair[1] for text in pair]
+    script = Path(os.environ["BIODANCE_FOREIGN_LAB"]) / "foreign_lab.py"
+    command = [sys.executable, str(script), "--seed", str(601 + index), *ROOM, *told, "--trials", "4"]
+    subprocess.run([*command, "--out", str(folder / "s")], check=True, stdout=subprocess.DEVNULL)
+    for squat in (folder / "s").glob("squat*"):
+        squat.unlink()
+    return examine(read_session(folder / "s"))
+
+
+def answered(column: str, effect: str, said: str, result: SessionResult, *, without: bool) -> Answer:
+    """Diagnose a session and say what it was told."""
+    chosen = tuple(name for name in causes() if name != effect) if without else None
+    one = diagnose_session(result, effects=chosen).diagnosis
+    named, like = (tuple(f"{f.effect} {f.target}".strip() for f in some) for some in (one.findings, one.resembles))
+    return Answer(column, effect, said, without, one.verdict, named, like, one.worst)
+
+
+def jobs() -> list[tuple[str, str, str, Callable[[Path], SessionResult]]]:
+    """Return column, effect, what is hidden and how to get the session."""
+    mine = [("own", text.partition(":")[0], text, lambda f, t=text: own(t, f)) for text in CAUSES]
+    theirs = [
+        ("foreign", row[0], " ".join(filter(None, row[1:])), lambda f, k=k: foreign(k, f))
+        for k, row in enumerate(FOREIGN)
+    ]
+    return [*mine, *theirs]
+
+
+def table(found: list[Answer]) -> None:
+    """Print the sums, and every session in which an innocent was named without the culprit."""
+    for column in ("own", "foreign"):
+        for without in (True, False):
+            some = [one for one in found if (one.column, one.without) == (column, without)]
+            blamed = [one for one in some if one.innocents]
+            print(f"{column}, {'without' if without else 'with'} the culprit's effect: {len(some)} sessions, innocents "
+                  f"in {len(blamed)}, {dict(Counter(one.verdict for one in some))}")  # fmt: skip
+            for one in blamed:
+                print(f"- {one.hidden}: {one.verdict} [{', '.join(one.named)}]")
+
+
+def main() -> None:
+    """Run what is not there yet and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--run", required=True)
+    parser.add_argument("--only", nargs="+", default=["own", "foreign"])
+    parser.add_argument("--match", default="")
+    asked = parser.parse_args()
+    kept, found = CACHE / f"removed-{asked.run}.jsonl", []
+    kept.parent.mkdir(parents=True, exist_ok=True)
+    if kept.is_file():
+        found = [Answer(**json.loads(line)) for line in kept.read_text().splitlines()]
+    known = {(one.column, one.hidden) for one in found}
+    for column, effect, said, session in jobs():
+        if column not in asked.only or asked.match not in said or (column, said) in known:
+            continue
+        with tempfile.TemporaryDirectory() as folder, patch("biodance.pipeline.session.can_identify", lambda _: False):
+            result = session(Path(folder))
+            both = [answered(column, effect, said, result, without=without) for without in (True, False)]
+        with kept.open("a") as stream:
+            stream.writelines(json.dumps(asdict(one)) + "\n" for one in both)
+        found += both
+        print(*both, sep="\n", flush=True)
+    table(found)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,64 @@
+"""Every finding has its own gain: a culprit gains much, one that nobody hid gains nothing and is taken back."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from diagnosed_sessions import about_plate, body, known, looks
+
+from biodance.diagnosis.accept import case_fit
+from biodance.diagnosis.engine import Examined, diagnose_trials, judged
+from biodance.diagnosis.model import NamedCause
+from biodance.effects import effect
+from biodance.identification.identification import identify_body
+from biodance.pipeline import gains
+from biodance.pipeline.looked_at import cases_of
+
+
+def faulty(local, session):
+    """Fz reads 5 % too much, Fy 25 N."""
+    local[:, 2] *= 1.05
+    local[:, 1] += 25.0
+    return local
+
+
+def diagnosed(monkeypatch: pytest.MonkeyPatch) -> tuple[Examined, gains.Accepted]:
+    """Return the diagnosis of a session with two faults, and what accepting them and a third one changes."""
+    every = looks(1, trials=4, hidden=about_plate(faulty))
+    by_role = {"fit": every[:2], "validate": every[2:]}
+    monkeypatch.setattr(gains, "looks", lambda _, roles: by_role[roles[0]])
+    found = diagnose_trials(
+        body(), by_role["fit"], tolerances=known(), effects=("plate_gain", "plate_offset", "plate_drift")
+    )
+    fits = tuple(case_fit(case, look.use) for case, look in zip(cases_of(body(), every[:2]), every[:2], strict=True))
+    result = SimpleNamespace(body=body(), trials=())
+    return found, gains.accepted(result, with_bogus(found), identify_body(body(), fits))  # type: ignore[arg-type]
+
+
+def with_bogus(examined: Examined) -> Examined:
+    """Return the diagnosis with a drift of 20 N named that nobody hid, before the culprits."""
+    naming = examined.naming
+    drift = NamedCause(effect("plate_drift").at("Fx", naming.found.problem.cases[0]), np.array([20.0]), np.eye(1))
+    found = replace(naming.found, named=(drift, *naming.found.named))
+    return judged(
+        replace(examined, naming=replace(naming, found=found, accepted=(naming.accepted[0], *naming.accepted)))
+    )
+
+
+def test_culprits_gain_each_their_own_and_a_bogus_companion_is_taken_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, one = diagnosed(monkeypatch)
+    told = one.examined.diagnosis
+    gain = {f"{f.effect} {f.target}": f.gain for f in told.findings}
+    assert set(gain) == {"plate_gain Fz", "plate_offset Fy"}
+    assert all(own.proven for own in gain.values())
+    assert one.gain.proven
+    fy, fz = 1, 2
+    without = {name: own.rms_before for name, own in gain.items()}
+    assert without["plate_offset Fy"][fy] > 3 * without["plate_gain Fz"][fy]
+    assert without["plate_gain Fz"][fz] > 1.5 * without["plate_offset Fy"][fz]
+    np.testing.assert_allclose(gain["plate_gain Fz"].rms_after, gain["plate_offset Fy"].rms_after)
+    assert [(f.effect, f.target) for f in told.resembles] == [("plate_drift", "Fx")]
+    assert told.resembles[0].gain.ci95[1] <= 0
+    assert any(note.startswith("plate drift Fx was taken back") for note in told.notes)
+    assert told.verdict == found.diagnosis.verdict

@@ -1,0 +1,72 @@
+"""The culprit's effect is not in the family: no innocent is named in its place, and "nothing wrong" is not said."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosed_sessions import about_plate, body, known, looks
+
+from biodance.diagnosis import heard
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Unobservable
+from biodance.diagnosis.engine import SEVERAL, UNASKED, diagnose_trials
+from biodance.diagnosis.joined import with_witnesses
+from biodance.diagnosis.testimony import Verdicts
+
+
+def shifted(local, session):
+    """The plate lies 60 mm from where the file has it, towards +x of the laboratory."""
+    local[:, 3:] -= np.cross([0.06, 0.0, 0.0], local[:, :3])
+    return local
+
+
+def gained(local, session):
+    local[:, 2] *= 1.05
+    return local
+
+
+def test_several_crosstalks_are_a_plate_that_lies_elsewhere() -> None:
+    some = looks(1, trials=2, hidden=about_plate(shifted))
+    one = diagnose_trials(body(), some, tolerances=known(), effects=("plate_crosstalk",)).diagnosis
+    assert (one.verdict, one.findings) == ("unexplained", ())
+    assert {f.effect for f in one.resembles} == {"plate_crosstalk"}
+    assert len(one.resembles) > 1
+    assert SEVERAL in one.notes
+
+
+def test_what_nobody_looks_for_does_not_hide_in_its_tolerance() -> None:
+    """A gain of 5 % is 25 times what these plates have."""
+    some = looks(1, trials=2, hidden=about_plate(gained))
+    one = diagnose_trials(body(), some, tolerances=known(), effects=("time_delay",)).diagnosis
+    assert (one.verdict, one.findings) == ("unexplained", ())
+    assert UNASKED in one.notes
+
+
+def finding(effect: str, target: str, value: float, unit: str, *alike: tuple[str, str]) -> Finding:
+    aliases = tuple(Alias(*names, 30.0) for names in ((effect, target), *alike))
+    return Finding(effect, target, (Estimate("size", value, 0.05 * abs(value), unit),), aliases, 0.5)
+
+
+HEARD = heard.Testimony((), {}, {}, {})
+LOAD = finding("added_mass", "right_forearm_hand", 2.4, "kg")
+WEIGHT = finding("body_mass", "", 2.5, "kg", ("plate_gain", "Fz"))
+BY_SIMULATION = Diagnosis("named, complete", (LOAD,), limits=(Unobservable("body_mass", "", 1.6, "kg"),))
+
+
+def test_the_weight_of_a_load_that_the_simulation_names_is_no_second_cause() -> None:
+    one = with_witnesses(BY_SIMULATION, Verdicts((WEIGHT,), HEARD), HEARD, judged=True)
+    assert (one.verdict, one.findings, one.resembles) == ("named, complete", (LOAD,), (WEIGHT,))
+
+
+@pytest.mark.parametrize(("limit", "verdict"), [(3.0, "named, complete"), (1.6, "nothing wrong")])
+def test_a_witness_is_believed_where_the_simulation_is_blind_or_finds_nothing_wrong(limit: float, verdict: str) -> None:
+    limits = (Unobservable("body_mass", "", limit, "kg"),)
+    simulation = replace(BY_SIMULATION, verdict=verdict, findings=(), limits=limits)
+    one = with_witnesses(simulation, Verdicts((WEIGHT,), HEARD), HEARD, judged=True)
+    assert [f.effect for f in one.findings] == ["body_mass"]
+
+
+def test_what_the_simulation_tells_from_its_look_alikes_keeps_its_name() -> None:
+    gain = finding("plate_gain", "Fz", 0.05, "1")
+    one = with_witnesses(replace(BY_SIMULATION, findings=(gain,)), Verdicts((WEIGHT,), HEARD), HEARD, judged=True)
+    assert one.findings == (gain,)
+    assert one.verdict == "named, complete"
