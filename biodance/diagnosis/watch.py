@@ -1,0 +1,152 @@
+"""Checks that run while a session is recorded: is a marker suddenly off the body, does the wrench jump away from what
+the body needs, does a plate fall silent, does an empty plate read a load?
+
+Each looks for a CHANGE within the recording, so that a body that the table describes badly raises no alarm; what was
+wrong from the start is the business of `diagnose`.
+"""
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from biodance.records import CHANNELS, Array, Plate
+from biodance.spatial import wrench_about_point
+
+FAST, REFERENCE, LEAST = 10, 100, 20
+"""Tenths of a second: mean that is judged, the most and the fewest before it that it is held against."""
+SIGMAS_OF_A_JUMP = 6.0
+"""Standard deviations: with a test every 0.1 s on six channels a false alarm must be rarer than one an hour."""
+_FLOOR = 0.01
+"""Share of body weight (and of body weight times 1 m): jumps this small are not worth an interruption."""
+MARKER_OFF = 0.03
+"""m: least distance between marker and body that is a fault; soft tissue moves a skin marker by up to 25 mm."""
+_TIMES, _SWAPPED = 2.5, 0.3
+"""A marker is off at so many times its usual distance; an exchange explains it that leaves at most this share."""
+EMPTY_LOAD = 15.0
+"""N that an empty plate may read."""
+_GONE = 0.2
+"""Share of body weight that must be missing for a constant plate to count as gone."""
+
+
+@dataclass(frozen=True)
+class LiveWarning:
+    """What was noticed at ``time_s``: an ``effect`` (of the family of causes, or plate_gone) on a ``target``, in words
+    with what to do.
+    """
+
+    time_s: float
+    effect: str
+    target: str
+    text: str
+
+
+@dataclass
+class MarkerWatch:
+    """Distances of markers: ``usual`` (K,) m² running mean square of each while nothing is wrong; ``off`` (K,) those
+    that are off now.
+    """
+
+    usual: Array
+    count: int = 0
+    off: Array = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+    def look(self, distances: Array) -> Array:
+        """Return (K,) True for markers that are off, from the last ``distances`` (n, K) m, a quarter of a second."""
+        seen = np.isfinite(distances)
+        now = np.where(seen.any(axis=0), np.nanmedian(np.where(seen.any(axis=0), distances, 0.0), axis=0), 0.0)
+        limit = np.maximum(MARKER_OFF, _TIMES * np.sqrt(self.usual)) if self.count >= FAST else np.inf
+        self.off = now > limit
+        if not self.off.any():
+            self.count += 1
+            self.usual = self.usual + (now**2 - self.usual) / min(self.count, REFERENCE)
+        return self.off
+
+
+def said_of_markers(time: float, worst: Sequence[str], pair: tuple[str, str, float] | None) -> LiveWarning:
+    """Return the warning about the markers that are off, the ``worst`` first; ``pair`` the best exchange and what it
+    leaves.
+    """
+    if pair and pair[2] < _SWAPPED:
+        one, other = sorted(pair[:2])
+        text = f"{one} and {other} carry each other's label: look at the labelling of the live model."
+        return LiveWarning(time, "labels_swapped", f"{one}/{other}", text)
+    text = f"{worst[0]} is away from where the body has it: is it still on the skin, and rightly labelled?"
+    return LiveWarning(time, "marker_misplaced", worst[0], text)
+
+
+@dataclass
+class WrenchWatch:
+    """Innovations of the wrench: means over a tenth of a second, with the variance that the parameters explain.
+
+    ``weight`` N of the body.
+    """
+
+    weight: float
+    means: deque[Array] = field(default_factory=lambda: deque(maxlen=FAST + REFERENCE))
+
+    def look(self, innovation: Array, variance: Array) -> tuple[Array, Array] | None:
+        """Return the jump (6,) N, N·m of the last second against the time before, and its size in standard deviations
+        (6,); None where there is none or too little to tell.
+
+        ``innovation`` (n, 6) measured minus expected, over a tenth of a second; ``variance`` (6,) of the expectation.
+        """
+        self.means.append(innovation.mean(axis=0))
+        if len(self.means) < FAST + LEAST:
+            return None
+        values = np.array(self.means)
+        before, jump = values[:-FAST], values[-FAST:].mean(axis=0) - values[:-FAST].mean(axis=0)
+        sd = np.sqrt(before.var(axis=0) + variance + (_FLOOR * self.weight / SIGMAS_OF_A_JUMP) ** 2)
+        size = np.abs(jump) / sd
+        return (jump, size) if (size > SIGMAS_OF_A_JUMP).any() else None
+
+    @property
+    def noise(self) -> Array:
+        """(6,) variance of the innovations of late; generous before there are some."""
+        if len(self.means) < LEAST:
+            return np.full(6, (0.03 * self.weight) ** 2)
+        return np.asarray(np.var(self.means, axis=0)) + (_FLOOR * self.weight / 2) ** 2
+
+
+def said_of_jump(time: float, plates: Sequence[Plate], about: Array, jump: Array, size: Array) -> LiveWarning:
+    """Return the warning about a jump (6,) about the point ``about`` (3,) m: its strongest channel, and the plate
+    about whose centre it has the smallest moment.
+    """
+    moments = [
+        float(np.linalg.norm(wrench_about_point(jump[None], np.asarray(plate.centre) - about)[0, 3:]))
+        for plate in plates
+    ]
+    plate = plates[int(np.argmin(moments))]
+    forces = size[:3] > SIGMAS_OF_A_JUMP
+    channel = int(np.argmax(np.where(forces, size[:3], 0.0))) if forces.any() else 3 + int(np.argmax(size[3:]))
+    unit = "N" if channel < 3 else "N·m"
+    text = (
+        f"{plate.name}: {CHANNELS[channel]} jumped by {jump[channel]:+.0f} {unit} and stays. Did the person pick "
+        f"something up, or touch something? If not, zero the plate while nobody stands on it."
+    )
+    return LiveWarning(time, "plate_offset", f"{plate.name}:{CHANNELS[channel]}", text)
+
+
+def silent_plates(time: float, plates: Sequence[Plate], on_plate: Array, missing: float, weight: float) -> list[LiveWarning]:
+    """Return a warning for every plate with a foot over it (``on_plate`` (P,) bool) whose raw channels did not change
+    at all in the last time, or are unknown, while ``missing`` N of the ``weight`` are not carried.
+    """
+    found = []
+    for plate, under in zip(plates, on_plate, strict=True):
+        value = plate.wrench.value
+        still = bool(np.isnan(value).all() or (np.nanmax(value, axis=0) == np.nanmin(value, axis=0)).all())
+        if still and under and missing > _GONE * weight:
+            text = f"{plate.name} says nothing any more while a foot is on it: check its cable and amplifier."
+            found.append(LiveWarning(time, "plate_gone", plate.name, text))
+    return found
+
+
+def loaded_while_empty(time: float, plate: Plate, value: Array) -> LiveWarning | None:
+    """Return a warning where an empty plate reads a force: ``value`` (n, 6) N, N·m, its filtered wrench meanwhile."""
+    mean = value[:, :3].mean(axis=0)
+    channel = int(np.argmax(np.abs(mean)))
+    if not np.abs(mean[channel]) > EMPTY_LOAD:
+        return None
+    text = f"{plate.name} reads {mean[channel]:+.0f} N in {CHANNELS[channel]} while nobody is on it: zero it."
+    return LiveWarning(time, "plate_offset", f"{plate.name}:{CHANNELS[channel]}", text)
