@@ -10,10 +10,23 @@ from collections.abc import Sequence
 
 from cyclopts import CycloptsError
 
-from biodance.cli import archive, batch, dance, diagnose, init, machine, session, virtual
+from biodance.cli import archive, batch, dance, diagnose, init, live, machine, session, virtual
 from biodance.cli.app import DONE, NOT_DONE, STOPPED, app, say
 
-__all__ = ["app", "archive", "batch", "dance", "diagnose", "init", "machine", "main", "run", "session", "virtual"]
+__all__ = [
+    "app",
+    "archive",
+    "batch",
+    "dance",
+    "diagnose",
+    "init",
+    "live",
+    "machine",
+    "main",
+    "run",
+    "session",
+    "virtual",
+]
 
 
 def run(tokens: Sequence[str] | None = None) -> int:

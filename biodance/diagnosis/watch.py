@@ -1,5 +1,5 @@
-"""Checks that run while a session is recorded: is a marker suddenly off the body, does the wrench jump away from what
-the body needs, does a plate fall silent, does an empty plate read a load?
+"""Checks that run while a session is recorded: a marker suddenly off the body, a wrench that jumps away from what the
+body needs, a plate that falls silent, an empty plate that reads a load.
 
 Each looks for a CHANGE within the recording, so that a body that the table describes badly raises no alarm; what was
 wrong from the start is the business of `diagnose`.
@@ -11,17 +11,20 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from biodance.identification.running import RunningBelief
 from biodance.records import CHANNELS, Array, Plate
 from biodance.spatial import wrench_about_point
 
 FAST, REFERENCE, LEAST = 10, 100, 20
 """Tenths of a second: mean that is judged, the most and the fewest before it that it is held against."""
+_HALF = 5
+"""Tenths of a second."""
 SIGMAS_OF_A_JUMP = 6.0
 """Standard deviations: with a test every 0.1 s on six channels a false alarm must be rarer than one an hour."""
 _FLOOR = 0.01
 """Share of body weight (and of body weight times 1 m): jumps this small are not worth an interruption."""
-MARKER_OFF = 0.03
-"""m: least distance between marker and body that is a fault; soft tissue moves a skin marker by up to 25 mm."""
+MARKER_OFF = 0.05
+"""m: least distance between marker and body that is a fault; soft tissue moves a skin marker by up to 40 mm (thigh)."""
 _TIMES, _SWAPPED = 2.5, 0.3
 """A marker is off at so many times its usual distance; an exchange explains it that leaves at most this share."""
 EMPTY_LOAD = 15.0
@@ -76,37 +79,57 @@ def said_of_markers(time: float, worst: Sequence[str], pair: tuple[str, str, flo
     return LiveWarning(time, "marker_misplaced", worst[0], text)
 
 
+def _slow_variance(values: Array) -> Array:
+    """Return the variance (6,) of means over half a second of ``values`` (n, 6), a tenth of a second each: what moves
+    faster hardly shows in the mean of a second.
+    """
+    blocks = len(values) // _HALF
+    return np.asarray(values[-blocks * _HALF :].reshape(blocks, _HALF, -1).mean(axis=1).var(axis=0))
+
+
 @dataclass
 class WrenchWatch:
-    """Innovations of the wrench: means over a tenth of a second, with the variance that the parameters explain.
+    """Means over a tenth of a second of regressor (6, p) and measured wrench (6,): those ``before``, from while nothing
+    was wrong, and those of the last second, ``now``.
 
     ``weight`` N of the body.
     """
 
     weight: float
-    means: deque[Array] = field(default_factory=lambda: deque(maxlen=FAST + REFERENCE))
+    before: deque[tuple[Array, Array]] = field(default_factory=lambda: deque(maxlen=REFERENCE))
+    now: deque[tuple[Array, Array]] = field(default_factory=deque)
+    wrong: bool = False
 
-    def look(self, innovation: Array, variance: Array) -> tuple[Array, Array] | None:
+    def look(self, W: Array, wrench: Array, belief: RunningBelief) -> tuple[Array, Array] | None:
         """Return the jump (6,) N, N·m of the last second against the time before, and its size in standard deviations
         (6,); None where there is none or too little to tell.
 
-        ``innovation`` (n, 6) measured minus expected, over a tenth of a second; ``variance`` (6,) of the expectation.
+        ``W`` (n, 6, p) and ``wrench`` (n, 6) of a tenth of a second, about a point that stays. What is not known of the
+        body counts as far as the body stood otherwise before.
         """
-        self.means.append(innovation.mean(axis=0))
-        if len(self.means) < FAST + LEAST:
+        self.now.append((W.mean(axis=0), wrench.mean(axis=0)))
+        if len(self.now) > FAST:
+            oldest = self.now.popleft()
+            if not self.wrong:
+                self.before.append(oldest)
+        if len(self.before) < LEAST:
             return None
-        values = np.array(self.means)
-        before, jump = values[:-FAST], values[-FAST:].mean(axis=0) - values[:-FAST].mean(axis=0)
-        sd = np.sqrt(before.var(axis=0) + variance + (_FLOOR * self.weight / SIGMAS_OF_A_JUMP) ** 2)
+        W0, then = (np.array(part) for part in zip(*self.before, strict=True))
+        W1, late = (np.array(part) for part in zip(*self.now, strict=True))
+        usual, latest = then - W0 @ belief.mean, late - W1 @ belief.mean
+        jump = latest.mean(axis=0) - usual.mean(axis=0)
+        _, unknown = belief.expected(W1.mean(axis=0) - W0.mean(axis=0))
+        sd = np.sqrt(_slow_variance(usual) + unknown + (_FLOOR * self.weight / SIGMAS_OF_A_JUMP) ** 2)
         size = np.abs(jump) / sd
-        return (jump, size) if (size > SIGMAS_OF_A_JUMP).any() else None
+        self.wrong = bool((size > SIGMAS_OF_A_JUMP).any())
+        return (jump, size) if self.wrong else None
 
-    @property
-    def noise(self) -> Array:
-        """(6,) variance of the innovations of late; generous before there are some."""
-        if len(self.means) < LEAST:
+    def noise(self, belief: RunningBelief) -> Array:
+        """Return (6,) the variance of what the body leaves of late; generous before there is enough."""
+        if len(self.before) < LEAST:
             return np.full(6, (0.03 * self.weight) ** 2)
-        return np.asarray(np.var(self.means, axis=0)) + (_FLOOR * self.weight / 2) ** 2
+        W, wrench = (np.array(part) for part in zip(*self.before, strict=True))
+        return np.asarray((wrench - W @ belief.mean).var(axis=0)) + (_FLOOR * self.weight / 2) ** 2
 
 
 def said_of_jump(time: float, plates: Sequence[Plate], about: Array, jump: Array, size: Array) -> LiveWarning:
@@ -128,18 +151,22 @@ def said_of_jump(time: float, plates: Sequence[Plate], about: Array, jump: Array
     return LiveWarning(time, "plate_offset", f"{plate.name}:{CHANNELS[channel]}", text)
 
 
-def silent_plates(time: float, plates: Sequence[Plate], on_plate: Array, missing: float, weight: float) -> list[LiveWarning]:
-    """Return a warning for every plate with a foot over it (``on_plate`` (P,) bool) whose raw channels did not change
-    at all in the last time, or are unknown, while ``missing`` N of the ``weight`` are not carried.
+def silent_plates(
+    time: float, plates: Sequence[Plate], under: Array, missing: float, weight: float
+) -> tuple[LiveWarning, ...]:
+    """Return a warning for every plate with a foot over it (``under`` (P,) bool) whose raw channels do not change at
+    all, or are unknown, while it reads a load or ``missing`` N of the ``weight`` are not carried.
     """
     found = []
-    for plate, under in zip(plates, on_plate, strict=True):
+    for plate, foot in zip(plates, under, strict=True):
         value = plate.wrench.value
-        still = bool(np.isnan(value).all() or (np.nanmax(value, axis=0) == np.nanmin(value, axis=0)).all())
-        if still and under and missing > _GONE * weight:
+        unknown = bool(np.isnan(value).any())
+        still = unknown or bool((value.max(axis=0) == value.min(axis=0)).all())
+        loaded = unknown or abs(value[-1, 2]) > _FLOOR * weight
+        if still and foot and (loaded or missing > _GONE * weight):
             text = f"{plate.name} says nothing any more while a foot is on it: check its cable and amplifier."
             found.append(LiveWarning(time, "plate_gone", plate.name, text))
-    return found
+    return tuple(found)
 
 
 def loaded_while_empty(time: float, plate: Plate, value: Array) -> LiveWarning | None:

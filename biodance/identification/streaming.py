@@ -152,7 +152,9 @@ def begin(body: Body, *, rate: float, verdicts: bool = True) -> Stream:
     if not (np.isfinite(rate) and rate > 0):
         raise BiodanceError(f"A stream needs a frame rate over 0 Hz, got {rate}.")
     total = empty(10 * len(body.segments), layout_for(np.zeros(3)))
-    return Stream(body, rate, total, nothing(body), np.empty((0, 8 + body.nq + 2 * body.nv)), np.zeros(4), verdicts=verdicts)
+    return Stream(
+        body, rate, total, nothing(body), np.empty((0, 8 + body.nq + 2 * body.nv)), np.zeros(4), verdicts=verdicts
+    )
 
 
 def about(found: Statistics, point: Array) -> Statistics:

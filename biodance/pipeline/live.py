@@ -5,8 +5,7 @@ house runs forwards and backwards over the last `WINDOW`, so that its middle is 
 cut into steps that different frames do, so that no frame waits for all of it.
 """
 
-import time as clock
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -21,7 +20,6 @@ from biodance.diagnosis.watch import (
     said_of_markers,
     silent_plates,
 )
-from biodance.errors import TrialRefused
 from biodance.identification.identification import Identification
 from biodance.identification.running import RunningBelief, belief_before
 from biodance.identification.statistics import Fit, believable
@@ -34,7 +32,7 @@ from biodance.motion.ik.follow import Follower
 from biodance.motion.regressor import regressor
 from biodance.motion.smoothing import smooth
 from biodance.motion.upright import upright_trunk
-from biodance.records import Array, Markers, Motion, Trial, Wrench
+from biodance.records import Array, Markers, Motion, Plate, Trial, Wrench
 from biodance.spatial import wrench_about_point
 from biodance.uncertainty.caution import widened
 
@@ -42,6 +40,8 @@ WINDOW, DELAY, HOP = 1.0, 0.3, 0.1
 """s: what the filter sees, how long it waits for what follows, how often."""
 _EVERY = 3
 """Frames between two steps of a window's work."""
+_SILENT = 0.2
+"""s without any change of a raw channel: no amplifier is so quiet."""
 _SLOW = 10.0
 """Samples of the running belief count as if only so many-th of them were independent: errors last about a second."""
 
@@ -83,7 +83,7 @@ class _Emitted:
 class LiveSession:
     """A session while it is recorded: `push` one frame after the other, then `finish`.
 
-    ``trial`` with its set's markers alone (see `as_stream`); only what lies before the frame that was pushed is looked
+    ``trial`` with its set's markers alone (see `replay`); only what lies before the frame that was pushed is looked
     at.
     """
 
@@ -105,6 +105,7 @@ class LiveSession:
         self._marker_watch = MarkerWatch(np.zeros(len(self._follower.names)))
         self._wrench_watch = WrenchWatch(self._weight)
         self._sound = self._follower.q
+        self._point: Array | None = None
         self._suspect: dict[str, LiveWarning] = {}
         self.warnings: list[LiveWarning] = []
 
@@ -170,7 +171,9 @@ class LiveSession:
         low_pass = force_filter(self.trial.settings)
         filtered = replace(raw, plates=tuple(at_marker_times(plate, raw.markers, low_pass) for plate in raw.plates))
         yield
-        contact = ground_contact(filtered, soles_from_body(self.body, motion), mass=self._weight / -self.body.gravity[2])
+        contact = ground_contact(
+            filtered, soles_from_body(self.body, motion), mass=self._weight / -self.body.gravity[2]
+        )
         yield
         new = slice(self._done - start, until - start)
         self._done = until
@@ -211,7 +214,7 @@ class LiveSession:
             use = np.zeros_like(use)
         if use.any():
             last = int(np.flatnonzero(use)[-1])
-            variance = _SLOW * self._wrench_watch.noise
+            variance = _SLOW * self._wrench_watch.noise(self.belief)
             self.belief = self.belief.updated(W[last], wrench.value[last], variance)
         self.stream = self.stream.feed(part, wrench, use)
         self._out.motions.append(part)
@@ -230,27 +233,48 @@ class LiveSession:
     ) -> None:
         """Look for a plate that fell silent, and for one that reads a load with nobody on it."""
         now, on = float(raw.plates[0].wrench.time[-1]), contact.on_plate
-        short = round(0.2 * self.markers.rate)
-        missing = (W[-1] @ self.belief.mean)[2] - np.nan_to_num(wrench.value[-1])[2]
-        tail = self._cut(len(self._q) - short, len(self._q)) if len(self._q) > short else raw
-        for said in silent_plates(now, tail.plates, on[-1].any(axis=0), float(missing), self._weight):
-            self._warn(f"silent {said.target}", said)
-        for index, plate in enumerate(filtered.plates):
-            empty = contact.touching[:, :].any() and not on[:, :, index].any() and len(on) >= self._window
-            said = loaded_while_empty(now, plate, plate.wrench.value) if empty else None
-            if said:
-                self._warn(f"offset {plate.name}", said)
+        missing = float((W[-1] @ self.belief.mean)[2] - np.nan_to_num(wrench.value[-1])[2])
+        silent = {
+            f"silent {said.target}": said
+            for said in silent_plates(now, self._last(raw), on[-1].any(axis=0), missing, self._weight)
+        }
+        empty = {
+            f"empty {plate.name}": said
+            for index, plate in enumerate(filtered.plates)
+            if len(on) >= self._window
+            and not on[:, :, index].any()
+            and (said := loaded_while_empty(now, plate, plate.wrench.value))
+        }
+        for key in [key for key in self._suspect if key.startswith(("silent", "empty"))]:
+            if key not in silent | empty:
+                del self._suspect[key]
+        for key, said in (silent | empty).items():
+            self._warn(key, said)
+
+    def _last(self, raw: Trial) -> list[Plate]:
+        """Return the plates over the last `_SILENT` s of a window, as they came."""
+        cut = []
+        for plate in raw.plates:
+            count = max(3, round(_SILENT * plate.wrench.rate))
+            cut.append(replace(plate, wrench=Wrench(plate.wrench.time[-count:], plate.wrench.value[-count:])))
+        return cut
 
     def _watch_wrench(self, W: Array, wrench: Array, now: float) -> None:
-        """Look for a jump of measured against expected wrench, about the standing point."""
-        point = self.stream.standing_point
-        expected, variance = self.belief.expected(W)
-        innovation = wrench_about_point(wrench - expected, point)
-        found = self._wrench_watch.look(innovation, variance[-1])
+        """Look for a jump of measured against expected wrench, about the first standing point."""
+        if any(key != "wrench" for key in self._suspect):
+            return
+        if self._point is None:
+            self._point = self.stream.standing_point if self.stream.pressure[3] else _middle(self.trial)
+        about = self._point
+        turned = np.swapaxes(wrench_about_point(np.swapaxes(W, 1, 2), about), 1, 2)
+        moved, found = wrench_about_point(wrench, about), None
+        for first in range(0, len(W), self._hop):
+            cut = slice(first, first + self._hop)
+            found = self._wrench_watch.look(turned[cut], moved[cut], self.belief)
         if found is None:
             self._suspect.pop("wrench", None)
         elif "wrench" not in self._suspect:
-            self._warn("wrench", said_of_jump(now, self.trial.plates, point, *found))
+            self._warn("wrench", said_of_jump(now, self.trial.plates, about, *found))
 
     def _warn(self, key: str, said: LiveWarning) -> None:
         known = {(w.effect, w.target) for w in self.warnings}
@@ -281,37 +305,6 @@ class LiveSession:
         return Fit("stream", motion, wrench, np.concatenate(self._out.uses), self.trial.settings.outlier)
 
 
-def replay(
-    body: Body,
-    trial: Trial,
-    *,
-    real_time: bool = False,
-    tell: Callable[[LiveState], None] = lambda _: None,
-    warn: Callable[[LiveWarning], None] = lambda _: None,
-) -> LiveResult:
-    """Return what a stream of the frames of ``trial`` (of which only its own set's markers are kept) tells of ``body``.
-
-    ``real_time`` waits for the rate of the recording; ``tell`` is called once a second of the recording, ``warn`` as
-    soon as something is noticed.
-
-    Raises
-    ------
-    TrialRefused
-        The trial has no plates, or its first frame does not show the posture.
-    """
-    if trial.markers is None or not trial.plates:
-        raise TrialRefused(f"Trial {trial.name}: a stream needs markers and force plates, and one of them is missing.")
-    session, count = LiveSession(body, trial), trial.markers.time.size
-    spent, wall = np.zeros(count), np.zeros(count)
-    started, second = clock.perf_counter(), max(1, round(trial.markers.rate))
-    for frame in range(count):
-        if real_time:
-            clock.sleep(max(0.0, started + frame / trial.markers.rate - clock.perf_counter()))
-        began, mine = clock.perf_counter(), clock.thread_time()
-        found = session.push()
-        spent[frame], wall[frame] = clock.thread_time() - mine, clock.perf_counter() - began
-        for said in found:
-            warn(said)
-        if frame % second == second - 1:
-            tell(session.state())
-    return session.finish(spent, wall)
+def _middle(trial: Trial) -> Array:
+    """Return the middle (3,) m of all plates."""
+    return np.asarray(np.mean([plate.centre for plate in trial.plates], axis=0))
