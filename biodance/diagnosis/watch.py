@@ -10,12 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.identification.running import RunningBelief
 from biodance.records import CHANNELS, Array, Plate
 from biodance.spatial import wrench_about_point
 
-FAST, REFERENCE, LEAST = 10, 100, 20
+_FAST, _REFERENCE, _LEAST = 10, 100, 20
 """Tenths of a second: mean that is judged, the most and the fewest before it that it is held against."""
 _HALF = 5
 """Tenths of a second."""
@@ -47,24 +48,23 @@ class LiveWarning:
 
 @dataclass
 class MarkerWatch:
-    """Distances of markers: ``usual`` (K,) m² running mean square of each while nothing is wrong; ``off`` (K,) those
-    that are off now.
+    """Distances of markers: ``usual`` (K,) m² running mean square of each while nothing is wrong, over
+    ``count`` looks.
     """
 
     usual: Array
     count: int = 0
-    off: Array = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
-    def look(self, distances: Array) -> Array:
+    def look(self, distances: Array) -> NDArray[np.bool_]:
         """Return (K,) True for markers that are off, from the last ``distances`` (n, K) m, a quarter of a second."""
         seen = np.isfinite(distances)
         now = np.where(seen.any(axis=0), np.nanmedian(np.where(seen.any(axis=0), distances, 0.0), axis=0), 0.0)
-        limit = np.maximum(MARKER_OFF, _TIMES * np.sqrt(self.usual)) if self.count >= FAST else np.inf
-        self.off = now > limit
-        if not self.off.any():
+        limit = np.maximum(MARKER_OFF, _TIMES * np.sqrt(self.usual)) if self.count >= _FAST else np.inf
+        off = now > limit
+        if not off.any():
             self.count += 1
-            self.usual = self.usual + (now**2 - self.usual) / min(self.count, REFERENCE)
-        return self.off
+            self.usual = self.usual + (now**2 - self.usual) / min(self.count, _REFERENCE)
+        return np.asarray(off)
 
 
 def said_of_markers(time: float, worst: Sequence[str], pair: tuple[str, str, float] | None) -> LiveWarning:
@@ -96,7 +96,7 @@ class WrenchWatch:
     """
 
     weight: float
-    before: deque[tuple[Array, Array]] = field(default_factory=lambda: deque(maxlen=REFERENCE))
+    before: deque[tuple[Array, Array]] = field(default_factory=lambda: deque(maxlen=_REFERENCE))
     now: deque[tuple[Array, Array]] = field(default_factory=deque)
     wrong: bool = False
 
@@ -108,11 +108,11 @@ class WrenchWatch:
         body counts as far as the body stood otherwise before.
         """
         self.now.append((W.mean(axis=0), wrench.mean(axis=0)))
-        if len(self.now) > FAST:
+        if len(self.now) > _FAST:
             oldest = self.now.popleft()
             if not self.wrong:
                 self.before.append(oldest)
-        if len(self.before) < LEAST:
+        if len(self.before) < _LEAST:
             return None
         W0, then = (np.array(part) for part in zip(*self.before, strict=True))
         W1, late = (np.array(part) for part in zip(*self.now, strict=True))
@@ -126,7 +126,7 @@ class WrenchWatch:
 
     def noise(self, belief: RunningBelief) -> Array:
         """Return (6,) the variance of what the body leaves of late; generous before there is enough."""
-        if len(self.before) < LEAST:
+        if len(self.before) < _LEAST:
             return np.full(6, (0.03 * self.weight) ** 2)
         W, wrench = (np.array(part) for part in zip(*self.before, strict=True))
         return np.asarray((wrench - W @ belief.mean).var(axis=0)) + (_FLOOR * self.weight / 2) ** 2

@@ -15,8 +15,8 @@ from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.results import SessionResult
 from biodance.records import Subject
 
-STOPPED, NOTHING, IMPOSSIBLE = "the run was stopped", "nothing to identify from", "no possible body"
-DOUBTED, FAULTY = "doubts about the body", "something wrong in the recording"
+WHY_STOPPED, WHY_NOTHING, WHY_IMPOSSIBLE = "the run was stopped", "nothing to identify from", "no possible body"
+WHY_DOUBTED, WHY_FAULTY = "doubts about the body", "something wrong in the recording"
 """Reasons for withholding beside the names of checks."""
 
 
@@ -78,15 +78,15 @@ def account_for(result: SessionResult, diagnosis: SessionDiagnosis | None = None
 def _withheld(result: SessionResult, diagnosis: SessionDiagnosis | None) -> tuple[str, ...]:
     """Return every reason why no mass may be said: failed checks by name, each once."""
     found = result.identification
-    reasons = [STOPPED] if result.stopped else []
+    reasons = [WHY_STOPPED] if result.stopped else []
     if found is None:
-        reasons.append(NOTHING)
+        reasons.append(WHY_NOTHING)
     elif found.identification.status == "failed":
-        reasons.append(IMPOSSIBLE)
+        reasons.append(WHY_IMPOSSIBLE)
     reasons += [check.what for check in result.all_checks if not check.inside]
-    reasons += [DOUBTED] if result.doubts else []
+    reasons += [WHY_DOUBTED] if result.doubts else []
     if diagnosis and (diagnosis.diagnosis.findings or diagnosis.diagnosis.verdict == "unexplained"):
-        reasons.append(FAULTY)
+        reasons.append(WHY_FAULTY)
     return tuple(dict.fromkeys(reasons))
 
 

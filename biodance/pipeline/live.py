@@ -1,14 +1,15 @@
 """A recording as a stream: every frame tracked as it comes, the wrench watched, the body identified on the way.
 
-Tracking has no delay. What needs the filter (velocities, forces, contact) follows after `DELAY`: the low-pass of the
-house runs forwards and backwards over the last `WINDOW`, so that its middle is as in the batch. The work of a window is
+Tracking has no delay. What needs the filter (velocities, forces, contact) follows after `_DELAY`: the low-pass of the
+house runs forwards and backwards over the last `_WINDOW`, so that its middle is as in the batch. The work of a window is
 cut into steps that different frames do, so that no frame waits for all of it.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.diagnosis.watch import (
@@ -21,6 +22,7 @@ from biodance.diagnosis.watch import (
     silent_plates,
 )
 from biodance.identification.identification import Identification
+from biodance.identification.knowledge import Knowability
 from biodance.identification.running import RunningBelief, belief_before
 from biodance.identification.statistics import Fit, believable
 from biodance.identification.streaming import Stream, begin
@@ -36,10 +38,8 @@ from biodance.records import Array, Markers, Motion, Plate, Trial, Wrench
 from biodance.spatial import wrench_about_point
 from biodance.uncertainty.caution import widened
 
-WINDOW, DELAY, HOP = 1.0, 0.3, 0.1
+_WINDOW, _DELAY, _HOP = 1.0, 0.3, 0.1
 """s: what the filter sees, how long it waits for what follows, how often."""
-_EVERY = 3
-"""Frames between two steps of a window's work."""
 _SILENT = 0.2
 """s without any change of a raw channel: no amplifier is so quiet."""
 _SLOW = 10.0
@@ -53,7 +53,7 @@ class LiveState:
     """
 
     time: float
-    verdicts: dict[str, str]
+    verdicts: Mapping[str, Knowability]
     suspect: tuple[str, ...]
     advice: str
 
@@ -77,7 +77,7 @@ class LiveResult:
 class _Emitted:
     motions: list[Motion] = field(default_factory=list)
     wrenches: list[Wrench] = field(default_factory=list)
-    uses: list[Array] = field(default_factory=list)
+    uses: list[NDArray[np.bool_]] = field(default_factory=list)
 
 
 class LiveSession:
@@ -91,7 +91,7 @@ class LiveSession:
         assert trial.markers is not None
         self.body, self.trial, self.markers = body, trial, trial.markers
         rate = self.markers.rate
-        self._window, self._delay, self._hop = (max(2, round(s * rate)) for s in (WINDOW, DELAY, HOP))
+        self._window, self._delay, self._hop = (max(2, round(s * rate)) for s in (_WINDOW, _DELAY, _HOP))
         self._follower = Follower(body, self.markers.names)
         self._xyz = self.markers.select(self._follower.names).xyz
         self._q: list[Array] = []
@@ -109,6 +109,11 @@ class LiveSession:
         self._suspect: dict[str, LiveWarning] = {}
         self.warnings: list[LiveWarning] = []
 
+    @property
+    def _now(self) -> float:
+        """s, time of the last frame that came."""
+        return float(self.markers.time[max(len(self._q) - 1, 0)])
+
     def push(self) -> tuple[LiveWarning, ...]:
         """Take in the next frame and return what it gave reason to warn of."""
         frame, before = len(self._q), len(self.warnings)
@@ -120,15 +125,14 @@ class LiveSession:
             self._watch_markers(frame)
         if self._work is None and frame + 1 >= self._window and (frame + 1 - self._window) % self._hop == 0:
             self._work = self._take(frame + 1, frame + 1 - self._delay)
-        if self._work is not None and frame % _EVERY == 0:
+        if self._work is not None:
             self._work = self._work if next(self._work, self) is not self else None
         return tuple(self.warnings[before:])
 
     def state(self) -> LiveState:
         """Return what is known, suspect and to be done now."""
         verdicts = dict(self.belief.verdicts())
-        at = float(self.markers.time[max(len(self._q) - 1, 0)])
-        return LiveState(at, verdicts, tuple(w.text for w in self._suspect.values()), self._advice(verdicts))
+        return LiveState(self._now, verdicts, tuple(w.text for w in self._suspect.values()), self._advice(verdicts))
 
     def finish(self, frame_s: Array, wall_s: Array) -> LiveResult:
         """Take in what the filter still held back, and return all that was found."""
@@ -158,7 +162,7 @@ class LiveSession:
         now = np.nan_to_num(self._distance[-1])
         worst = [self._follower.names[i] for i in np.argsort(-now)[:5] if now[i] > 0]
         pair = self._follower.exchange(self._xyz[frame], worst, self._sound)
-        self._warn("markers", said_of_markers(float(self.markers.time[frame]), worst, pair))
+        self._warn("markers", said_of_markers(self._now, worst, pair))
 
     def _take(self, stop: int, until: int) -> Iterator[None]:
         """Do the work of the window that ends before frame ``stop`` for the frames not yet done before ``until``."""
@@ -177,7 +181,7 @@ class LiveSession:
         yield
         new = slice(self._done - start, until - start)
         self._done = until
-        self._fold(raw, filtered, contact, motion, new, start)
+        yield from self._fold(raw, filtered, contact, motion, new, start)
 
     def _cut(self, start: int, stop: int) -> Trial:
         """Return the frames ``start`` to ``stop`` as a trial, plates as they came."""
@@ -191,7 +195,9 @@ class LiveSession:
             plates.append(replace(plate, wrench=Wrench(at[pick], plate.wrench.value[pick])))
         return replace(self.trial, markers=markers, plates=tuple(plates))
 
-    def _fold(self, raw: Trial, filtered: Trial, contact: Contact, motion: Motion, new: slice, start: int) -> None:
+    def _fold(
+        self, raw: Trial, filtered: Trial, contact: Contact, motion: Motion, new: slice, start: int
+    ) -> Iterator[None]:
         """Watch the wrench of the frames ``new`` of the window and let those that are sound tell of the body."""
         cut = slice(start + new.start, start + new.stop)
         part = Motion(
@@ -206,10 +212,12 @@ class LiveSession:
         wrench = Wrench(part.time, filtered.wrench.value[new])
         W = regressor(self.body, part)
         measured = contact.measured[new] & np.array(self._determined[cut]) & np.isfinite(wrench.value).all(axis=1)
-        self._watch_plates(raw, filtered, contact, W, wrench, new)
+        self._watch_plates(raw, filtered, contact, W, wrench)
+        yield
         use = self._believed(part, wrench, measured)
         if use.any():
-            self._watch_wrench(W[use], wrench.value[use], float(part.time[-1]))
+            self._watch_wrench(W[use], wrench.value[use])
+        yield
         if self._suspect:
             use = np.zeros_like(use)
         if use.any():
@@ -221,18 +229,16 @@ class LiveSession:
         self._out.wrenches.append(wrench)
         self._out.uses.append(use)
 
-    def _believed(self, part: Motion, wrench: Wrench, measured: Array) -> Array:
+    def _believed(self, part: Motion, wrench: Wrench, measured: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return the measured frames without those that table and plates contradict, as the batch leaves them out."""
         if not measured.any():
             return measured
         fit = Fit("stream", part, wrench, measured, self.trial.settings.outlier)
         return believable(self.body, fit, self.stream.standing_point)[0].use
 
-    def _watch_plates(
-        self, raw: Trial, filtered: Trial, contact: Contact, W: Array, wrench: Wrench, new: slice
-    ) -> None:
+    def _watch_plates(self, raw: Trial, filtered: Trial, contact: Contact, W: Array, wrench: Wrench) -> None:
         """Look for a plate that fell silent, and for one that reads a load with nobody on it."""
-        now, on = float(raw.plates[0].wrench.time[-1]), contact.on_plate
+        now, on = self._now, contact.on_plate
         missing = float((W[-1] @ self.belief.mean)[2] - np.nan_to_num(wrench.value[-1])[2])
         silent = {
             f"silent {said.target}": said
@@ -259,7 +265,7 @@ class LiveSession:
             cut.append(replace(plate, wrench=Wrench(plate.wrench.time[-count:], plate.wrench.value[-count:])))
         return cut
 
-    def _watch_wrench(self, W: Array, wrench: Array, now: float) -> None:
+    def _watch_wrench(self, W: Array, wrench: Array) -> None:
         """Look for a jump of measured against expected wrench, about the first standing point."""
         if any(key != "wrench" for key in self._suspect):
             return
@@ -274,7 +280,7 @@ class LiveSession:
         if found is None:
             self._suspect.pop("wrench", None)
         elif "wrench" not in self._suspect:
-            self._warn("wrench", said_of_jump(now, self.trial.plates, about, *found))
+            self._warn("wrench", said_of_jump(self._now, self.trial.plates, about, *found))
 
     def _warn(self, key: str, said: LiveWarning) -> None:
         known = {(w.effect, w.target) for w in self.warnings}
@@ -282,7 +288,7 @@ class LiveSession:
         if (said.effect, said.target) not in known:
             self.warnings.append(said)
 
-    def _advice(self, verdicts: dict[str, str]) -> str:
+    def _advice(self, verdicts: Mapping[str, Knowability]) -> str:
         if self._suspect:
             return "Mend what is suspect first: frames do not count until then."
         rows = np.diag(self.belief.covariance)[::10] / np.maximum(np.diag(self.belief.prior.covariance)[::10], 1e-12)

@@ -18,7 +18,6 @@ from biodance.pipeline.live import LiveResult, LiveSession, LiveState
 from biodance.pipeline.trial import prepare_trial
 from biodance.pipeline.trial_result import Step
 from biodance.records import Subject, Trial
-from biodance.settings import Value
 from biodance.threads import one_thread
 
 
@@ -29,7 +28,7 @@ def body_and_stream(
     static: Path | None = None,
     subject: str | None = None,
     markers: str | None = None,
-    settings: Mapping[str, Value] | None = None,
+    settings: Mapping[str, object] | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> tuple[Body, Trial]:
     """Return the body that moves in a recording, scaled on its ``static`` (by default that of its folder), and the

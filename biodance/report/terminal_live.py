@@ -1,5 +1,7 @@
 """What `biodance live` prints while a stream runs, and at its end."""
 
+from typing import Any
+
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -22,7 +24,7 @@ def warning_line(said: LiveWarning) -> str:
     return f"{said.time_s:.2f} s, {said.effect} {said.target}: {said.text}"
 
 
-def print_live(found: LiveResult, document: dict, console: Console) -> None:
+def print_live(found: LiveResult, document: dict[str, Any], console: Console) -> None:
     """Print what is known of every segment, what is suspect, and what to do next."""
     if found.identification is not None and found.identification.known:
         table = Table("segment", "mass (kg)", "95 % interval", "verdict", box=None)

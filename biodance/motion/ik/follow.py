@@ -75,7 +75,7 @@ class Follower:
         return best
 
     def _problem(self, xyz: Array) -> tuple[MarkerProblem, NDArray[np.bool_]]:
-        seen = np.isfinite(xyz).all(axis=1)
+        seen = np.asarray(np.isfinite(xyz).all(axis=1))
         at = np.ascontiguousarray(np.where(seen[:, None], xyz, 0.0))[None]
         return replace(self._empty, xyz=at, weight=(seen * self._weight)[None]), seen
 

@@ -24,11 +24,11 @@ PLAIN_NAMES = {
     "left_forearm_hand": "left lower arm and hand",
 }
 _WHY = {
-    for_subject.STOPPED: "The work was stopped before its end.",
-    for_subject.NOTHING: "We have no test in which you moved while both feet were on our plates.",
-    for_subject.IMPOSSIBLE: "The numbers did not fit any real body. So something went wrong in the test.",
-    for_subject.DOUBTED: "The small balls on your skin did not tell us well where your joints are.",
-    for_subject.FAULTY: "The plates and the cameras did not agree. We must first find out why.",
+    for_subject.WHY_STOPPED: "The work was stopped before its end.",
+    for_subject.WHY_NOTHING: "We have no test in which you moved while both feet were on our plates.",
+    for_subject.WHY_IMPOSSIBLE: "The numbers did not fit any real body. So something went wrong in the test.",
+    for_subject.WHY_DOUBTED: "The small balls on your skin did not tell us well where your joints are.",
+    for_subject.WHY_FAULTY: "The plates and the cameras did not agree. We must first find out why.",
     "mass on the plates": "The weight on our plates was not the weight we wrote down.",
     "centre of mass off": "The plates and the cameras did not agree on where you stood.",
     "marker distance": "The small balls on your skin were not where our model of you had them.",
