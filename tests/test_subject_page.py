@@ -105,5 +105,6 @@ def test_the_command_writes_it_beside_the_report(result, tmp_path, monkeypatch, 
     monkeypatch.setattr("biodance.pipeline.session.examine", lambda session, **_: result)
     monkeypatch.setattr("biodance.pipeline.diagnosis.diagnosed", lambda *_, **__: None)
     monkeypatch.setattr("biodance.report.write.page", lambda *_, **__: "a page")
-    assert run(["report", str(tmp_path), "--out", str(tmp_path / "out"), "--subject-page", "--json"]) in (DONE, NEEDS_A_PERSON)
+    told = run(["report", str(tmp_path), "--out", str(tmp_path / "out"), "--subject-page", "--json"])
+    assert told in (DONE, NEEDS_A_PERSON)
     assert "What your body parts weigh" in (tmp_path / "out" / "subject.html").read_text(encoding="utf-8")

@@ -1,7 +1,7 @@
 """A recording as a stream: every frame tracked as it comes, the wrench watched, the body identified on the way.
 
-Tracking has no delay. What needs the filter (velocities, forces, contact) follows after `_DELAY`: the low-pass of the
-house runs forwards and backwards over the last `_WINDOW`, so that its middle is as in the batch. The work of a window is
+Tracking has no delay. What needs the filter (velocities, forces, contact) follows after 0.3 s: the low-pass of the
+house runs forwards and backwards over the last second, so that its middle is as in the batch. The work of a window is
 cut into steps that different frames do, so that no frame waits for all of it.
 """
 
@@ -93,6 +93,7 @@ class LiveSession:
         rate = self.markers.rate
         self._window, self._delay, self._hop = (max(2, round(s * rate)) for s in (_WINDOW, _DELAY, _HOP))
         self._follower = Follower(body, self.markers.names)
+        self._follower.warm_up()
         self._xyz = self.markers.select(self._follower.names).xyz
         self._q: list[Array] = []
         self._distance: list[Array] = []

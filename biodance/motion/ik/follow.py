@@ -13,6 +13,7 @@ from biodance.errors import TrialRefused
 from biodance.motion.ik.determination import determination
 from biodance.motion.ik.marker_problem import MarkerProblem, Minimum, marker_distances, marker_problem, minimise_markers
 from biodance.motion.ik.search import MORE_SHARES, SHARES, from_markers
+from biodance.motion.kinematics import poses
 from biodance.records import Array
 
 _TOLERANCE = 1e-7
@@ -59,6 +60,13 @@ class Follower:
         else:
             self.q = self._descend(problem).q[0]
         return self.q, np.where(seen, marker_distances(problem, self.q[None])[0], np.nan), determined
+
+    def warm_up(self) -> None:
+        """Load what the first frame would wait for, by following the body in its neutral posture."""
+        at = poses(self.body, self.body.neutral).points(self._empty.segment, self._empty.chain.local)
+        if self._fixes(np.ones(len(self.names), dtype=bool)):
+            self.follow(at[0])
+        self.q = np.full(self.body.nq, np.nan)
 
     def exchange(self, xyz: Array, suspects: Sequence[str], start: Array) -> tuple[str, str, float] | None:
         """Return the pair among ``suspects`` whose exchange brings the markers ``xyz`` (K, 3) m nearest to the body,
