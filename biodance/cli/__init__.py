@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from cyclopts import CycloptsError
 
 from biodance.cli import archive, batch, dance, diagnose, init, machine, register, session, virtual
+from biodance.cli import archive, batch, dance, diagnose, init, live, machine, session, virtual
 from biodance.cli.app import DONE, NOT_DONE, STOPPED, app, say
 
 __all__ = [
@@ -20,6 +21,7 @@ __all__ = [
     "dance",
     "diagnose",
     "init",
+    "live",
     "machine",
     "main",
     "register",

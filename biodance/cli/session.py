@@ -68,13 +68,14 @@ def report_session(
     tables: Path | None = None,
     reference: "SessionIdentification | None" = None,
     tolerances: "Tolerances | None" = None,
+    for_subject: bool = False,
 ) -> "tuple[SessionResult, dict[str, Any]]":
-    """Report an examined session into ``folder``, as tables into ``tables``; return the result and the content of
-    results.json.
+    """Report an examined session into ``folder``, as tables into ``tables``, ``for_subject`` with the page for the
+    person who was measured; return the result and the content of results.json.
     """
     from biodance.pipeline.diagnosis import diagnosed
     from biodance.pipeline.session import stopped_before
-    from biodance.report.write import write_report
+    from biodance.report.write import write_report, write_subject_page
 
     try:
         stopped = result.stopped
@@ -83,6 +84,8 @@ def report_session(
         found, result = None, stopped_before(result, "the diagnosis")
     tell("writing the page")
     tabled(result, tables, found.diagnosis if found else None)
+    if for_subject:
+        write_subject_page(result, folder, diagnosis=found)
     return result, write_report(result, folder, diagnosis=found)
 
 
@@ -199,6 +202,10 @@ def report_command(
     markers: MarkersFile = None,
     chosen: Set = (),
     tables: Tables = None,
+    subject_page: Annotated[
+        bool,
+        Parameter(name="--subject-page", negative="", help="Also write subject.html, for the person who was measured."),
+    ] = False,
     json: JsonOption = False,
     force: ForceOption = False,
 ) -> int:
@@ -218,7 +225,9 @@ def report_command(
         options, place = Reading(subject, markers, chosen, reference, body, lab), ready(tables, session, force=force)
         result, before, folder = examine_with_reference(session, out, options, force=force, tell=tell)
         known = read_lab(lab).tolerances
-        result, found = report_session(result, folder, tell, tables=place, reference=before, tolerances=known)
+        result, found = report_session(
+            result, folder, tell, tables=place, reference=before, tolerances=known, for_subject=subject_page
+        )
     return print_reported(result, folder, found, json)
 
 

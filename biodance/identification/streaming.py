@@ -37,7 +37,7 @@ class Stream:
     closed (so that verdicts on the way are as careful as the last one); ``pending`` (n < BLOCK_SAMPLES, 1 + nq + 2 nv
     + 6 + 1) thinned frames of the running block: time, q, v, a, wrench, RMS marker distance; ``pressure`` (4,) sum
     over the loaded frames of the centre of pressure m, and their number; ``run`` frames since the run of used frames
-    began; ``last`` s, time of the last frame.
+    began; ``last`` s, time of the last frame; ``verdicts`` False: disturbances are not followed on the way (`begin`).
     """
 
     body: Body
@@ -48,6 +48,7 @@ class Stream:
     pressure: Array
     run: int = 0
     last: float = -np.inf
+    verdicts: bool = True
 
     @property
     def statistics(self) -> Statistics:
@@ -100,7 +101,7 @@ class Stream:
             raise TrialRefused(
                 "No frame of this stream could be used yet: ground contact not measured, or markers hidden."
             )
-        one = conclude(self.body, found, ("stream",), found=settled.disturbed)
+        one = conclude(self.body, found, ("stream",), found=settled.disturbed if self.verdicts else None)
         if one.status == "failed":
             return Progress((), (), one.cause)
         open_ = {k.segment for k in one.known if k.quantity in _ENOUGH and k.verdict != "known"}
@@ -137,8 +138,11 @@ class Progress:
         return tuple((k.segment, k.quantity) for k in sorted(open_, key=lambda k: k.from_data))
 
 
-def begin(body: Body, *, rate: float) -> Stream:
+def begin(body: Body, *, rate: float, verdicts: bool = True) -> Stream:
     """Return an empty stream for frames of ``body`` at ``rate`` Hz.
+
+    ``verdicts`` False spares, at the end of every block, the work that `Stream.progress` needs for honest intervals on
+    the way; the identification at the end is the same.
 
     Raises
     ------
@@ -148,7 +152,9 @@ def begin(body: Body, *, rate: float) -> Stream:
     if not (np.isfinite(rate) and rate > 0):
         raise BiodanceError(f"A stream needs a frame rate over 0 Hz, got {rate}.")
     total = empty(10 * len(body.segments), layout_for(np.zeros(3)))
-    return Stream(body, rate, total, nothing(body), np.empty((0, 8 + body.nq + 2 * body.nv)), np.zeros(4))
+    return Stream(
+        body, rate, total, nothing(body), np.empty((0, 8 + body.nq + 2 * body.nv)), np.zeros(4), verdicts=verdicts
+    )
 
 
 def about(found: Statistics, point: Array) -> Statistics:
@@ -217,7 +223,7 @@ def _close(stream: Stream) -> Stream:
 def _settle(stream: Stream) -> Stream:
     """Return the closed stream, with what twins and plates make of the block."""
     closed = _close(stream)
-    if len(stream.pending) < SHORTEST:
+    if len(stream.pending) < SHORTEST or not stream.verdicts:
         return closed
     noise, _ = learn_noise(closed.statistics, may_carry(stream.body, widened(stream.body.sip)))
     more = mismatch(stream.body, (_pending_fit(stream),), noise)

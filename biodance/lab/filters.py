@@ -8,6 +8,7 @@ tan(pi f_cutoff / rate) c, for a Butterworth filter with c = (sqrt(2) - 1)^(-1 /
 """
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +59,7 @@ def force_filter(settings: Settings) -> LowPass:
     return same if chosen == "same" else replace(same, cutoff=float(chosen))
 
 
+@lru_cache(maxsize=32)
 def design_low_pass(settings: LowPass, rate: float) -> Array:
     """Return the second-order sections (S, 6) of one of the two passes at the sampling ``rate`` in Hz.
 

@@ -46,7 +46,7 @@ def prepare(trial: Trial) -> Trial:
             history += said
             markers, said, warned = _fill(markers, trial.marker_set, trial.settings.gaps)
             history, warnings = history + said, warned
-        plates = tuple(_plate(plate, markers, low_pass) for plate in trial.plates)
+        plates = tuple(at_marker_times(plate, markers, low_pass) for plate in trial.plates)
     except TrialRefused:
         raise
     except BiodanceError as error:
@@ -114,7 +114,7 @@ def _sentences(gaps: tuple[Gap, ...], time: Array) -> list[str]:
     return said or ["No marker has a gap."]
 
 
-def _plate(plate: Plate, markers: Markers | None, low_pass: LowPass) -> Plate:
+def at_marker_times(plate: Plate, markers: Markers | None, low_pass: LowPass) -> Plate:
     """Return the plate with its wrench filtered and at marker times; the last decision says how."""
     wrench = plate.wrench
     if wrench.time.size < 2 or wrench.time.size < low_pass.shortest(wrench.rate):

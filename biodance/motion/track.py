@@ -52,7 +52,7 @@ def track(body: Body, trial: Trial) -> Motion:
             f"Trial {trial.name}: no markers were recorded, so there is no motion. Export the trial with its markers."
         )
     try:
-        followed, held = _hold_open(body, trial.markers)
+        followed, held = hold_open(body, trial.markers)
         found = solve_ik(followed, trial.markers)
         rate = trial.markers.rate if trial.markers.time.size > 1 else 1.0
         postures = upright_trunk(followed, found.q, rate)
@@ -71,7 +71,7 @@ def track(body: Body, trial: Trial) -> Motion:
 _LEGS = ("hip", "knee", "ankle")
 
 
-def _hold_open(body: Body, markers: Markers) -> tuple[Body, tuple[str, ...]]:
+def hold_open(body: Body, markers: Markers) -> tuple[Body, tuple[str, ...]]:
     """Return the body for one trial, joints of trunk and arms that its markers leave open held in the neutral posture,
     and a warning that names them; unchanged where pelvis or legs are open too.
     """

@@ -10,6 +10,7 @@ from biodance.pipeline.attention import identified_trials, session_attention
 from biodance.pipeline.carry import CORRECTED, LAB, accepted_corrections, lab_text, write_corrected
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.export import BODY, body_of_result
+from biodance.pipeline.for_subject import account_for
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.provenance import Provenance, now, provenance
 from biodance.pipeline.results import SessionResult
@@ -19,8 +20,9 @@ from biodance.report.documents.session import plain_values, results_document, to
 from biodance.report.figures.solid import still_addresses
 from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
 from biodance.report.pages.session import page
+from biodance.report.pages.subject import subject_page
 
-PAGE, _NUMBERS = "report.html", "results.json"
+PAGE, SUBJECT_PAGE, _NUMBERS = "report.html", "subject.html", "results.json"
 
 
 def write_report(
@@ -40,6 +42,12 @@ def write_report(
     }
     _write(folder, {_NUMBERS: to_text(found)} | ({PAGE: _page(result, made, diagnosis)} if drawn else {}))
     return dict(plain_values(found))
+
+
+def write_subject_page(result: SessionResult, folder: Path, *, diagnosis: SessionDiagnosis | None = None) -> Path:
+    """Write ``subject.html``, the page for the person who was measured, into ``folder`` and return its path."""
+    _write(folder, {SUBJECT_PAGE: subject_page(account_for(result, diagnosis))})
+    return folder / SUBJECT_PAGE
 
 
 def write_identification(result: SessionResult, found: SessionIdentification, folder: Path) -> dict[str, Any]:

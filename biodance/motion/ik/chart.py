@@ -3,6 +3,7 @@ interpolation.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -157,6 +158,7 @@ class Chart:
         return np.concatenate([smooth.place, _unit(smooth.root), angles]) if self.n_root else angles
 
 
+@lru_cache(maxsize=8)
 def chart_of(body: Body) -> Chart:
     """Return the chart of ``body``."""
     joints, limits = balls(body), body.limits

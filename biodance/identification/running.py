@@ -1,0 +1,56 @@
+"""What is believed of the inertial parameters after every frame: a Kalman filter over the wrench, for an operator who
+watches.
+
+The same table and the same regressor as the identification, with a plainer noise (independent samples of one variance
+a channel): quick enough for every frame, and rougher. Verdicts at the end come from `streaming`.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from biodance.identification.knowledge import KNOWN, PARTLY, Knowability
+from biodance.records import Array, Sip
+
+
+@dataclass(frozen=True, eq=False)
+class RunningBelief:
+    """Gaussian belief: ``prior`` as given, ``mean`` (p,) and ``covariance`` (p, p) after the samples so far."""
+
+    prior: Sip
+    mean: Array
+    covariance: Array
+
+    def expected(self, W: Array) -> tuple[Array, Array]:
+        """Return the expected wrench (..., 6) N, N·m for regressors ``W`` (..., 6, p), and its variance from what is
+        not known of the parameters.
+        """
+        return W @ self.mean, np.einsum("...ij,jk,...ik->...i", W, self.covariance, W, optimize=True)
+
+    def updated(self, W: Array, wrench: Array, variance: Array) -> "RunningBelief":
+        """Return the belief after one sample: ``W`` (6, p), ``wrench`` (6,) N, N·m with noise of ``variance`` (6,).
+
+        Source: Kalman 1960, doi:10.1115/1.3662552, with a state that stays.
+        """
+        seen = self.covariance @ W.T
+        gain = np.linalg.solve(W @ seen + np.diag(variance), seen.T).T
+        covariance = self.covariance - gain @ seen.T
+        return replace(
+            self,
+            mean=self.mean + gain @ (wrench - W @ self.mean),
+            covariance=(covariance + covariance.T) / 2,
+        )
+
+    def verdicts(self) -> dict[str, Knowability]:
+        """Return for every segment how well its mass is known, as `knowledge` has it."""
+        first, now = np.diag(self.prior.covariance)[::10], np.diag(self.covariance)[::10]
+        share = 1 - np.divide(now, first, out=np.ones_like(now), where=first > 0)
+        return {
+            name: "known" if part >= KNOWN else "partly known" if part >= PARTLY else "cannot be known"
+            for name, part in zip(self.prior.segments, share, strict=True)
+        }
+
+
+def belief_before(prior: Sip) -> RunningBelief:
+    """Return the belief before the first sample."""
+    return RunningBelief(prior, np.array(prior.phi), np.array(prior.covariance))

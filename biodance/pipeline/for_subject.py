@@ -1,0 +1,103 @@
+"""What may be said to the person who was measured: which body parts' masses the session carries, or why none is said.
+
+The rule is one of withholding: a mass stands here only where the session was identified, no check failed, no lasting
+doubt about the body is left and the diagnosis found nothing wrong.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.identification.knowledge import SIGMAS, Known, Together, known_together
+from biodance.lab.session.file import VisitEntry, read_session_file
+from biodance.pipeline.diagnosis import SessionDiagnosis
+from biodance.pipeline.results import SessionResult
+from biodance.records import Subject
+
+WHY_STOPPED, WHY_NOTHING, WHY_IMPOSSIBLE = "the run was stopped", "nothing to identify from", "no possible body"
+WHY_DOUBTED, WHY_FAULTY = "doubts about the body", "something wrong in the recording"
+"""Reasons for withholding beside the names of checks."""
+
+
+@dataclass(frozen=True)
+class PartMass:
+    """The mass of ``segments`` (one, or several that are only known together): ``low`` to ``high`` kg, a 95 % interval,
+    or ``measured`` False where the session does not tell it (then both are NaN); ``sure`` False where the table still
+    says half of it.
+    """
+
+    segments: tuple[str, ...]
+    low: float = float("nan")
+    high: float = float("nan")
+    sure: bool = True
+
+    @property
+    def measured(self) -> bool:
+        """Whether there is a range to show."""
+        return bool(np.isfinite(self.low))
+
+
+@dataclass(frozen=True, eq=False)
+class SubjectAccount:
+    """All that the subject's page shows: ``subject`` and ``visit`` as declared; ``weight`` kg, a 95 % interval of the
+    whole body on the plates (NaN = not told); ``parts`` in the body's order, () where masses are withheld; ``together``
+    of parts that are known only as a sum; ``withheld`` why no mass is said, () where they are; ``body`` to draw.
+    """
+
+    subject: Subject
+    visit: VisitEntry
+    weight: tuple[float, float] = (float("nan"), float("nan"))
+    parts: tuple[PartMass, ...] = ()
+    together: PartMass | None = None
+    withheld: tuple[str, ...] = ()
+    body: Body | None = field(default=None)
+
+
+def account_for(result: SessionResult, diagnosis: SessionDiagnosis | None = None) -> SubjectAccount:
+    """Return what the subject may be told of a session, and of its ``diagnosis`` where one was made.
+
+    Raises
+    ------
+    SessionRefused
+        ``session.toml`` cannot be read.
+    """
+    visit = read_session_file(result.session.folder).visit
+    withheld = _withheld(result, diagnosis)
+    if withheld or result.identification is None:
+        return SubjectAccount(result.subject, visit, withheld=withheld, body=result.body)
+    one, standing = result.identification.identification, result.standing
+    masses = tuple(_part(known) for known in one.known if known.quantity == "mass")
+    reach = SIGMAS * standing.mass_sd if standing else 0.0
+    weight = (standing.mass - reach, standing.mass + reach) if standing else SubjectAccount.weight
+    pair = known_together(one.sip)
+    together = _together(pair) if pair and not masses[0].measured else None
+    return SubjectAccount(result.subject, visit, weight, masses, together, body=result.body)
+
+
+def _withheld(result: SessionResult, diagnosis: SessionDiagnosis | None) -> tuple[str, ...]:
+    """Return every reason why no mass may be said: failed checks by name, each once."""
+    found = result.identification
+    reasons = [WHY_STOPPED] if result.stopped else []
+    if found is None:
+        reasons.append(WHY_NOTHING)
+    elif found.identification.status == "failed":
+        reasons.append(WHY_IMPOSSIBLE)
+    reasons += [check.what for check in result.all_checks if not check.inside]
+    reasons += [WHY_DOUBTED] if result.doubts else []
+    if diagnosis and (diagnosis.diagnosis.findings or diagnosis.diagnosis.verdict == "unexplained"):
+        reasons.append(WHY_FAULTY)
+    return tuple(dict.fromkeys(reasons))
+
+
+def _part(known: Known) -> PartMass:
+    """Return the range of one segment, none where the session cannot know it."""
+    if known.verdict == "cannot be known":
+        return PartMass((known.segment,))
+    low, high = known.interval
+    return PartMass((known.segment,), max(low, 0.0), high, known.verdict == "known")
+
+
+def _together(pair: Together) -> PartMass:
+    reach = SIGMAS * pair.sd
+    return PartMass(pair.segments, pair.mass - reach, pair.mass + reach)

@@ -1,0 +1,132 @@
+"""A recording as a stream: the end is the batch, faults injected half way are named within 5 s, and none elsewhere."""
+
+import json
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from biodance.cli import run
+from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE
+from biodance.identification.identification import identify_body
+from biodance.identification.running import belief_before
+from biodance.pipeline.live import LiveSession
+from biodance.pipeline.replay import body_and_stream, replay
+from biodance.records import Markers, Sip, Subject, Wrench
+from biodance.virtual_lab.simulate import simulate_session
+
+FAULT = 6.0
+"""s at which faults begin."""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    place = tmp_path_factory.mktemp("live")
+    simulate_session(Subject(63.0, 1.68, "F", 30.0), "short", place / "visit", seed=5)
+    return place / "visit"
+
+
+@pytest.fixture(scope="module")
+def streamed(folder):
+    return body_and_stream(folder / "dance_1.c3d")
+
+
+def until(trial, seconds: float):
+    """Return the trial's first seconds."""
+    keep = trial.markers.time < seconds
+    markers = Markers(trial.markers.names, trial.markers.time[keep], trial.markers.xyz[keep])
+    return replace(trial, markers=markers)
+
+
+def on_plate(trial, change):
+    """Return the trial with the wrench of its plate changed by ``change(value, rows)`` from FAULT on."""
+    (plate,) = trial.plates
+    value = np.array(plate.wrench.value)
+    change(value, np.flatnonzero(plate.wrench.time >= FAULT))
+    return replace(trial, plates=(replace(plate, wrench=Wrench(plate.wrench.time, value)),))
+
+
+def push(value, rows):
+    value[rows, 2] += 30.0
+
+
+def silence(value, rows):
+    value[rows] = value[rows[0] - 1]
+
+
+def exchange(trial, one, other):
+    markers, xyz = trial.markers, np.array(trial.markers.xyz)
+    i, k, rows = markers.names.index(one), markers.names.index(other), markers.time >= FAULT
+    xyz[np.ix_(rows, [i, k])] = xyz[np.ix_(rows, [k, i])]
+    return replace(trial, markers=Markers(markers.names, markers.time, xyz))
+
+
+FAULTS = {
+    ("plate_offset", "plate1:Fz"): lambda trial: on_plate(trial, push),
+    ("plate_gone", "plate1"): lambda trial: on_plate(trial, silence),
+    ("labels_swapped", "LASI/RASI"): lambda trial: exchange(trial, "LASI", "RASI"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_half_way_is_named_in_time_and_its_frames_do_not_count(streamed, fault):
+    body, trial = streamed
+    session = LiveSession(body, until(FAULTS[fault](trial), FAULT + 2.0))
+    said = [one for _ in range(session.markers.time.size) for one in session.push()]
+    assert [(one.effect, one.target) for one in said] == [fault]
+    assert FAULT < said[0].time_s <= FAULT + 5.0
+    state = session.state()
+    assert state.suspect == (said[0].text,)
+    assert "Mend what is suspect" in state.advice
+
+
+def test_the_end_is_the_batch_of_the_same_frames_and_frames_are_quick(streamed):
+    body, trial = streamed
+    found = replay(body, until(trial, 10.0))
+    batch = identify_body(body, (found.fit,))
+    assert found.warnings == ()
+    assert found.fit.use.all()
+    assert found.fit.motion.time.size == 1000
+    np.testing.assert_allclose(found.identification.sip.phi, batch.sip.phi, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(
+        np.sqrt(np.diag(found.identification.sip.covariance)), np.sqrt(np.diag(batch.sip.covariance)), atol=1e-9
+    )
+    assert [one.verdict for one in found.identification.known] == [one.verdict for one in batch.known]
+    assert np.median(found.frame_s) < 0.005
+
+
+def test_the_running_belief_is_least_squares_with_the_prior():
+    rng = np.random.default_rng(0)
+    prior = Sip(("one",), rng.normal(size=10), np.diag(rng.uniform(0.5, 2, 10)))
+    rows, seen = rng.normal(size=(40, 6, 10)), rng.normal(size=(40, 6))
+    variance, belief = np.array([1.0, 2.0, 3.0, 0.5, 1.5, 2.5]), belief_before(prior)
+    for W, wrench in zip(rows, seen, strict=True):
+        belief = belief.updated(W, wrench, variance)
+    weight = np.tile(1 / variance, 40)
+    flat, at_once = rows.reshape(-1, 10), np.linalg.inv(np.array(prior.covariance))
+    information = at_once + flat.T @ (weight[:, None] * flat)
+    mean = np.linalg.solve(information, at_once @ prior.phi + flat.T @ (weight * seen.ravel()))
+    np.testing.assert_allclose(belief.mean, mean, atol=1e-10)
+    np.testing.assert_allclose(belief.covariance, np.linalg.inv(information), atol=1e-10)
+
+
+def test_the_command(folder, tmp_path, capsys):
+    squat = folder / "squat_1.c3d"
+    assert run(["live", str(squat), "--json"]) == DONE
+    found = json.loads(capsys.readouterr().out)
+    assert found["warnings"] == []
+    assert found["frames"] == found["frames_used"]
+    assert 0 < found["frame_ms"]["median"] <= found["frame_ms"]["p99"]
+    assert {row["quantity"] for row in found["known"]} == {"mass", "com x", "com y", "com z"}
+
+    alone = tmp_path / "alone"
+    alone.mkdir()
+    shutil.copy(squat, alone)
+    (alone / "session.toml").write_text('[subject]\nmass_kg = 63\nheight_m = 1.68\nsex = "F"\n', encoding="utf-8")
+    assert run(["live", str(alone / squat.name)]) == NOT_DONE
+    assert "--static FILE" in capsys.readouterr().err
+    static = ["--static", str(folder / "static.c3d")]
+    assert run(["live", str(alone / squat.name), *static]) in (DONE, NEEDS_A_PERSON)
+    assert "next: " in capsys.readouterr().out
+    assert run(["live", str(alone / "none.c3d")]) == NOT_DONE

@@ -1,0 +1,110 @@
+"""The subject's page: short words, ranges first, and no mass where a check failed."""
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import pytest
+from identified_sessions import session_result
+
+from biodance.cli import run
+from biodance.cli.app import DONE, NEEDS_A_PERSON
+from biodance.pipeline.for_subject import account_for
+from biodance.pipeline.trial_result import Check
+from biodance.report.pages.subject import PLAIN_NAMES, subject_page
+
+JARGON = ("segment", "inertia", "interval", "marker", "prior", "posterior", "regress", "diagnos", "wrench", "95 %")
+VISIT = '[session]\nlab = "Gait Lab"\noperator = "Ana Ruiz"\ndate = 2026-11-22\n'
+
+
+class Prose(HTMLParser):
+    """Collects the text of paragraphs, list items and headings: one block each."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.blocks, self.inside = [], False
+
+    def handle_starttag(self, tag, attrs):
+        if tag in ("p", "li", "h1", "h2", "figcaption"):
+            self.inside = True
+            self.blocks.append("")
+
+    def handle_endtag(self, tag):
+        self.inside = self.inside and tag not in ("p", "li", "h1", "h2", "figcaption")
+
+    def handle_data(self, data):
+        if self.inside:
+            self.blocks[-1] += data
+
+
+def syllables(word: str) -> int:
+    """Count groups of vowels; a silent e at the end is none."""
+    word = re.sub(r"(?<=[^aeiouyl])e[sd]?$", "", word.lower())
+    return max(1, len(re.findall(r"[aeiouy]+", word)))
+
+
+def grade(html: str) -> float:
+    """Return the Flesch-Kincaid grade (Kincaid et al. 1975) of the page's prose."""
+    prose = Prose()
+    prose.feed(html)
+    sentences = [s for block in prose.blocks for s in re.split(r"[.!?]+", block) if re.search(r"[a-z]", s)]
+    words = [word for s in sentences for word in re.findall(r"[A-Za-z']+", s)]
+    return 0.39 * len(words) / len(sentences) + 11.8 * sum(map(syllables, words)) / len(words) - 15.59
+
+
+@pytest.fixture
+def result(tmp_path):
+    (tmp_path / "session.toml").write_text(VISIT, encoding="utf-8")
+    found = session_result()
+    return replace(found, session=replace(found.session, folder=tmp_path))
+
+
+def test_the_measure_of_reading_tells_plain_from_learned():
+    assert syllables("identification") == 6
+    assert syllables("plates") == 1
+    assert grade("<p>The cat sat on the mat. It was warm.</p>") < 2
+    assert grade("<p>Segmental inertial parameters necessitate careful probabilistic interpretation.</p>") > 12
+
+
+def test_every_part_has_a_range_or_an_honest_word(result):
+    html, known = subject_page(account_for(result)), result.identification.identification.known
+    masses = [k for k in known if k.quantity == "mass"]
+    assert html.count("We could not measure this well.</td>") == sum(k.verdict == "cannot be known" for k in masses) > 0
+    for one in masses:
+        low, high = one.interval
+        row = re.search(rf"<th>{PLAIN_NAMES[one.segment]}</th>\s*<td>([\d.]+) to ([\d.]+) kg", html)
+        assert (row is None) is (one.verdict == "cannot be known")
+        if row:
+            assert float(row[1]) <= low <= float(row[1]) + 0.1
+            assert float(row[2]) - 0.1 <= high <= float(row[2])
+    assert html.index(" kg") < html.index("How to read this")
+    assert "data:image/svg" in html
+    assert all(f"<dd>{said}</dd>" in html for said in ("Gait Lab", "Ana Ruiz", "2026-11-22"))
+    assert grade(html) <= 7
+    assert not [word for word in JARGON if word in re.sub(r"base64,\S+|<style>.*?</style>", "", html, flags=re.S)]
+
+
+@pytest.mark.parametrize("what", ["marker distance, RMS", "mass on the plates against declared", "a new check"])
+def test_a_failed_check_gives_no_mass(result, what):
+    failed = Check(what, "fit_0", "30 mm", "at most 20 mm", False)
+    html = subject_page(account_for(replace(result, checks=(failed,))))
+    assert "We can not give you numbers this time" in html
+    assert " kg" not in html
+    assert "data:image" not in html
+    assert grade(html) <= 7
+
+
+def test_a_session_without_identification_says_so(result):
+    html = subject_page(account_for(replace(result, identification=None)))
+    assert "no test in which you moved" in html
+    assert " kg" not in html
+
+
+def test_the_command_writes_it_beside_the_report(result, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("biodance.lab.session.read.read_session", lambda folder, **_: result.session)
+    monkeypatch.setattr("biodance.pipeline.session.examine", lambda session, **_: result)
+    monkeypatch.setattr("biodance.pipeline.diagnosis.diagnosed", lambda *_, **__: None)
+    monkeypatch.setattr("biodance.report.write.page", lambda *_, **__: "a page")
+    told = run(["report", str(tmp_path), "--out", str(tmp_path / "out"), "--subject-page", "--json"])
+    assert told in (DONE, NEEDS_A_PERSON)
+    assert "What your body parts weigh" in (tmp_path / "out" / "subject.html").read_text(encoding="utf-8")
