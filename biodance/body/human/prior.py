@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from biodance.body.human.girths import girth_opinions, opinion_rows
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of, side_of
 from biodance.body.inertia import TENSOR, RigidInertia, inertial_parameters, mirror_inertia, turn_inertia
 from biodance.body.tables.choice import measured_whole, reference, studies
@@ -111,18 +112,47 @@ MIRROR = np.array([1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0])
 
 
 def prior(reference: Reference, skeleton: Skeleton, subject: Subject) -> Sip:
-    """Return the prior SIP of a person with covariance (120, 120); the masses sum to the subject's mass."""
+    """Return the prior SIP of a person with covariance (120, 120); the masses sum to the subject's mass.
+
+    The table scaled to the skeleton; girths of the subject are one more opinion, weighted with its precision.
+    """
     lumps = scaled_lumps(reference, skeleton, subject)
-    jacobian = np.zeros((10 * len(lumps), 10 * len(lumps)))
-    for i, lump in enumerate(lumps):
-        jacobian[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] = parameter_jacobian(lump)
     others = tuple(
         scaled_lumps(reference_of(name, subject), skeleton, subject)
         for name in measured_whole()
         if name != reference.table
     )
-    covariance = child_widening(subject) ** 2 * (jacobian @ primitive_covariance(lumps, skeleton, others) @ jacobian.T)
+    covariance = child_widening(subject) ** 2 * primitive_covariance(lumps, skeleton, others)
+    if subject.girths:
+        opinions = girth_opinions(reference, skeleton, subject)
+        lumps, covariance = weigh_opinions(lumps, covariance, *opinion_rows(opinions, lumps, skeleton))
+    jacobian = np.zeros((10 * len(lumps), 10 * len(lumps)))
+    for i, lump in enumerate(lumps):
+        jacobian[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] = parameter_jacobian(lump)
+    covariance = jacobian @ covariance @ jacobian.T
     return Sip(SEGMENTS, np.concatenate([inertial_parameters(lump) for lump in lumps]), (covariance + covariance.T) / 2)
+
+
+def weigh_opinions(
+    lumps: tuple[RigidInertia, ...], covariance: Array, where: Array, values: Array, noise: Array
+) -> tuple[tuple[RigidInertia, ...], Array]:
+    """Return segments and covariance (120, 120) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] after measuring the entries
+    ``where`` (n,) as ``values`` (n,) with covariance ``noise`` (n, n); the sum of the masses is kept.
+    """
+    theta = np.concatenate([_primitives(lump) for lump in lumps])
+    total = theta[::10].sum()
+    gain = np.linalg.solve(covariance[np.ix_(where, where)] + noise, covariance[where]).T
+    theta = theta + gain @ (values - theta[where])
+    theta[::10] *= total / theta[::10].sum()
+    return tuple(_lump(row) for row in theta.reshape(-1, 10)), covariance - gain @ covariance[where]
+
+
+def _lump(row: Array) -> RigidInertia:
+    """Return the segment of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz]; the inverse of `_primitives`."""
+    inertia = np.zeros((3, 3))
+    for value, (i, j) in zip(row[4:], TENSOR, strict=True):
+        inertia[i, j] = inertia[j, i] = row[0] * value
+    return RigidInertia(float(row[0]), row[1:4], inertia)
 
 
 CHILD_AGE, CHILD_STATURE = 18.0, 1.50

@@ -1,0 +1,214 @@
+"""What girths say about segments: the table's mean person reshaped to the tape, as one more opinion beside the tables.
+
+A part's mass is what the table gives the mean person of a survey of girths, times the volume of the part's stack of
+stadium solids over that of the mean person's: density and the place of the table's cuts enter only by how they differ
+between people.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of
+from biodance.body.inertia import TENSOR, RigidInertia
+from biodance.body.stadium import stadium_stack
+from biodance.body.tables.anthropometry import read_table, row_numbers
+from biodance.body.tables.de_leva import PARTS
+from biodance.body.tables.de_leva import parts as table_parts
+from biodance.body.tables.error_sizes import error_size
+from biodance.body.tables.reference import Reference, Sex
+from biodance.errors import SessionRefused
+from biodance.lab.girths import legal_girths, usual_girths
+from biodance.records import Array, Subject
+
+_CONTRADICTION = 0.15
+"""Share of the body mass by which the girths may miss it."""
+_TRUNK = ("pelvis", "trunk_head")
+_HEAD = 0.16
+"""Of the stature: from the middle of the neck to the vertex."""
+_STEP = 0.01
+"""Of a girth: the step of a difference quotient."""
+
+
+@dataclass(frozen=True, eq=False)
+class PartSolid:
+    """One part of a person: its stack ``solid`` with the girths, ``mean`` that of the survey's mean person of the same
+    length, ``ratio`` of its mass to the mean person's, ``sd`` of the girths' share in it (relative), ``said`` by which
+    girths.
+    """
+
+    solid: RigidInertia
+    mean: RigidInertia
+    ratio: float
+    sd: float
+    said: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentOpinion:
+    """What girths say about one segment: ``mass`` kg with ``mass_sd``; ``along`` m, how much farther up the CoM lies
+    than the table's, ``radii`` (3,) times the table's radii of gyration about x, y, z, both None where only the mass is
+    known; ``said`` by which girths.
+    """
+
+    mass: float
+    mass_sd: float
+    along: float | None
+    radii: Array | None
+    said: tuple[str, ...]
+
+
+def girth_opinions(reference: Reference, skeleton: Skeleton, subject: Subject) -> dict[str, SegmentOpinion]:
+    """Return what the subject's girths say, by segment; segments of which no girth was measured are not in it.
+
+    Raises
+    ------
+    SessionRefused
+        A girth is not known or impossible, or all together miss the body mass by more than 15 %.
+    """
+    girths = legal_girths(subject.girths)
+    found = {segment: _opinion(segment, reference, skeleton, subject, girths) for segment in SEGMENTS}
+    opinions = {segment: one for segment, one in found.items() if one.said}
+    total = sum(one.mass for one in found.values())
+    if abs(total / subject.mass - 1) > _CONTRADICTION:
+        raise SessionRefused(_contradiction(total, found, reference, subject))
+    return opinions
+
+
+def opinion_words(opinions: Mapping[str, SegmentOpinion]) -> str:
+    """Return which girths said something about which segments, for the reader; "" for none."""
+    said = [f"{segment.replace('_', ' ')} by {', '.join(one.said)}" for segment, one in opinions.items()]
+    return "; ".join(said).replace("upper_", "upper ")
+
+
+def _contradiction(
+    total: float, found: Mapping[str, SegmentOpinion], reference: Reference, subject: Subject
+) -> str:
+    over = {
+        segment: one.mass - reference.segments[kind_of(segment)].mass * subject.mass
+        for segment, one in found.items()
+        if one.said
+    }
+    worst = max(over, key=lambda segment: abs(over[segment]))
+    return (
+        f"[subject] girths_cm: the girths make a body of {total:.1f} kg, but the body mass is {subject.mass:.1f} kg "
+        f"({100 * (total / subject.mass - 1):+.0f} %, at most {100 * _CONTRADICTION:.0f} % is believed). Farthest from "
+        f"the table: {worst} by {over[worst]:+.1f} kg ({', '.join(found[worst].said)}). Measure these girths again, or "
+        f"correct mass_kg."
+    )
+
+
+def _opinion(
+    segment: str, reference: Reference, skeleton: Skeleton, subject: Subject, girths: Mapping[str, float]
+) -> SegmentOpinion:
+    kind, side = kind_of(segment), segment.removesuffix(kind_of(segment))
+    mine = {name: girths.get(f"{side}{name}", girths.get(name)) for name in usual_girths()}
+    person = {kind_of(one): length for one, length in skeleton.lengths.items() if one.startswith(side)}
+    people = read_table("human", "girths").provenance["people"]
+    mass = variance = 0.0
+    solids = []
+    for part, share in _shares(kind, subject.sex).items():
+        solid = _part_solid(part, reference, subject, person | {"stature": skeleton.stature}, mine)
+        fraction = share * reference.segments[kind].mass
+        own = fraction * (people["mass_kg"][subject.sex] * solid.ratio if solid else subject.mass)
+        shape = error_size("solid_mass", "trunk" if kind in _TRUNK else "limb")
+        mass += own
+        variance += own**2 * (shape**2 + solid.sd**2 if solid else error_size("solid_mass", "untold part") ** 2)
+        solids.append(solid)
+    said = tuple(dict.fromkeys(name for solid in solids if solid for name in solid.said))
+    along, radii = _shape(solids[0]) if len(solids) == 1 and solids[0] and kind not in _TRUNK else (None, None)
+    return SegmentOpinion(mass, float(np.sqrt(variance)), along, radii, said)
+
+
+def _shape(one: PartSolid) -> tuple[float, Array]:
+    """Return how the person's solid differs from the mean person's: centroid m, radii of gyration (3,) times."""
+    radii = np.diag(one.solid.inertia) / one.solid.mass / (np.diag(one.mean.inertia) / one.mean.mass)
+    return float(one.solid.com[1] - one.mean.com[1]), np.sqrt(radii)
+
+
+def _shares(kind: str, sex: Sex) -> dict[str, float]:
+    """Return the parts of a segment that tapes go round, with their shares in its mass (de Leva 1996); from navel to
+    neck is one.
+    """
+    masses = {part: lump.mass for part, lump in table_parts(sex).items()}
+    shares: dict[str, float] = {}
+    for part in PARTS[kind]:
+        name = "upper_trunk" if part == "middle_trunk" else part
+        shares[name] = shares.get(name, 0.0) + masses[part] / sum(masses[one] for one in PARTS[kind])
+    return shares
+
+
+def _part_length(part: str, reference: Reference, sizes: Mapping[str, float]) -> float:
+    """Return the length of a part, m, of somebody of these lengths (by kind of segment) and ``stature``."""
+    cut = reference.lengths["pelvis"] / reference.lengths["trunk_head"]
+    trunk = {"lower_trunk": cut, "upper_trunk": 1 - cut}
+    if part in trunk:
+        return trunk[part] * sizes["trunk_head"]
+    return _HEAD * sizes["stature"] if part == "head" else sizes["forearm_hand" if part == "forearm" else part]
+
+
+def _part_solid(
+    part: str, reference: Reference, subject: Subject, sizes: Mapping[str, float], girths: Mapping[str, float | None]
+) -> PartSolid | None:
+    """Return a part's stacks; None where no girth of it was measured or no tape goes round it.
+
+    A girth that was not measured is the mean person's times the geometric mean of the measured ones' ratios.
+    """
+    table = read_table("human", "girths")
+    rows = table.where(part=part)
+    given = np.array([girths[row["girth"]] is not None for row in rows])
+    if not given.any():
+        return None
+    level, aspect, usual = np.array([row_numbers(row, f"level aspect {subject.sex}") for row in rows]).T
+    measured = np.array([girths[row["girth"]] or one for row, one in zip(rows, usual, strict=True)])
+    predict = np.where(given[:, None], np.eye(len(rows)), given / given.sum())
+    girth = usual * np.exp(predict @ np.log(measured / usual))
+    grown = table.provenance["people"]["stature_m"][subject.sex] / reference.stature
+    people = {kind: grown * length for kind, length in reference.lengths.items()}
+    length = _part_length(part, reference, sizes)
+    usual_length = _part_length(part, reference, people | {"stature": grown * reference.stature})
+    scale = length / usual_length
+    solid = stadium_stack(level, girth, aspect, length=length)
+    mean = stadium_stack(level, scale * usual, aspect, length=length)
+    tape, untold = error_size("girth", "tape"), error_size("girth", "untold")
+    covariance = predict @ np.diag(given * tape**2) @ predict.T + np.diag(~given * untold**2)
+    slope = [
+        np.log(stadium_stack(level, girth * np.exp(_STEP * one), aspect, length=length).mass / solid.mass) / _STEP
+        for one in np.eye(len(rows))
+    ]
+    said = tuple(row["girth"] for row, is_given in zip(rows, given, strict=True) if is_given)
+    return PartSolid(
+        solid, mean, solid.mass * scale**3 / mean.mass, float(np.sqrt(slope @ covariance @ np.array(slope))), said
+    )
+
+
+def opinion_rows(
+    opinions: Mapping[str, SegmentOpinion], lumps: tuple[RigidInertia, ...], skeleton: Skeleton
+) -> tuple[Array, Array, Array]:
+    """Return what the opinions measure of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] of all segments (kg, m, m²): indices
+    (n,), values (n,) and their covariance (n, n).
+
+    ``lumps`` are the table's segments that the solids reshape. The two sides err together: same tape, same shape of
+    muscle.
+    """
+    joint = error_size("joint_centre", "other", state="before")
+    rows: list[tuple[int, float, float]] = []
+    for index, (segment, lump) in enumerate(zip(SEGMENTS, lumps, strict=True)):
+        one = opinions.get(segment)
+        if one is None:
+            continue
+        rows.append((10 * index, one.mass, one.mass_sd))
+        if one.along is not None and one.radii is not None:
+            sd = float(np.hypot(error_size("solid_com", "limb") * skeleton.lengths[segment], joint))
+            rows.append((10 * index + 2, lump.com[1] + one.along, sd))
+            for axis in range(3):
+                moment = lump.inertia[axis, axis] / lump.mass * one.radii[axis] ** 2
+                place = 10 * index + 4 + TENSOR.index((axis, axis))
+                rows.append((place, moment, 2 * error_size("solid_radius", "limb") * moment))
+    where, values, sds = (np.array(column) for column in zip(*rows, strict=True))
+    quantity, kind = where % 10, np.array([kind_of(SEGMENTS[index // 10]) for index in where])
+    alike = (quantity[:, None] == quantity) & (kind[:, None] == kind)
+    together = np.where(alike, error_size("left_right_correlation", "mass"), 0.0)
+    np.fill_diagonal(together, 1.0)
+    return where, values, together * np.outer(sds, sds)
