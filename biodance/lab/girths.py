@@ -63,7 +63,7 @@ def _refuse_impossible(said: str, value: float, usual: float) -> None:
         return
     units = {"mm": value / 10, "m": value * 100, "inch": value * 2.54}
     unit = next((unit for unit, one in units.items() if 0.6 * usual <= one <= 1.6 * usual), "")
-    hint = f" It looks like {unit}: write {100 * units[unit]:.1f}." if unit else " Measure again."
+    hint = f" It looks like {unit}: write {100 * units[unit]:.1f}." if unit else " Measure again, in cm."
     raise SessionRefused(
-        f"girths_cm: {said} = {100 * value:g} cm is no person's; legal are {100 * low:.0f} to {100 * high:.0f} cm.{hint}"
+        f"girths_cm: {said} = {100 * value:g} cm is no person's. Legal: {100 * low:.0f} to {100 * high:.0f} cm.{hint}"
     )

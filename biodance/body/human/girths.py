@@ -1,8 +1,8 @@
-"""What girths say about segments: the table's mean person reshaped to the tape, as one more opinion beside the tables.
+"""What girths say about masses: the mean person of a survey reshaped to the tape, one more opinion beside the table.
 
-A part's mass is what the table gives the mean person of a survey of girths, times the volume of the part's stack of
-stadium solids over that of the mean person's: density and the place of the table's cuts enter only by how they differ
-between people.
+A part's mass is what all tables and studies give the mean person of a survey of girths, times the volume of the part's
+stack of stadium solids over that of the mean person's: density and the place of cuts enter only by how they differ
+between people. Its standard deviation: that of the mean of the tables, of the solid, of the tape.
 """
 
 from collections.abc import Mapping
@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from biodance.body.human.fractions import MAN, WOMAN, mean_fraction
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of
-from biodance.body.inertia import TENSOR, RigidInertia
 from biodance.body.stadium import stadium_stack
 from biodance.body.tables.anthropometry import read_table, row_numbers
 from biodance.body.tables.de_leva import PARTS
@@ -20,7 +20,7 @@ from biodance.body.tables.error_sizes import error_size
 from biodance.body.tables.reference import Reference, Sex
 from biodance.errors import SessionRefused
 from biodance.lab.girths import legal_girths, usual_girths
-from biodance.records import Array, Subject
+from biodance.records import Subject
 
 _CONTRADICTION = 0.15
 """Share of the body mass by which the girths may miss it."""
@@ -33,13 +33,10 @@ _STEP = 0.01
 
 @dataclass(frozen=True, eq=False)
 class PartSolid:
-    """One part of a person: its stack ``solid`` with the girths, ``mean`` that of the survey's mean person of the same
-    length, ``ratio`` of its mass to the mean person's, ``sd`` of the girths' share in it (relative), ``said`` by which
-    girths.
+    """One part of a person: ``ratio`` of its volume to the mean person's, ``sd`` relative, of what the tape leaves
+    uncertain in it, ``said`` by which girths.
     """
 
-    solid: RigidInertia
-    mean: RigidInertia
     ratio: float
     sd: float
     said: tuple[str, ...]
@@ -47,15 +44,10 @@ class PartSolid:
 
 @dataclass(frozen=True, eq=False)
 class SegmentOpinion:
-    """What girths say about one segment: ``mass`` kg with ``mass_sd``; ``along`` m, how much farther up the CoM lies
-    than the table's, ``radii`` (3,) times the table's radii of gyration about x, y, z, both None where only the mass is
-    known; ``said`` by which girths.
-    """
+    """What girths say about one segment: ``mass`` kg with ``mass_sd``, ``said`` by which of them."""
 
     mass: float
     mass_sd: float
-    along: float | None
-    radii: Array | None
     said: tuple[str, ...]
 
 
@@ -82,9 +74,7 @@ def opinion_words(opinions: Mapping[str, SegmentOpinion]) -> str:
     return "; ".join(said).replace("upper_", "upper ")
 
 
-def _contradiction(
-    total: float, found: Mapping[str, SegmentOpinion], reference: Reference, subject: Subject
-) -> str:
+def _contradiction(total: float, found: Mapping[str, SegmentOpinion], reference: Reference, subject: Subject) -> str:
     over = {
         segment: one.mass - reference.segments[kind_of(segment)].mass * subject.mass
         for segment, one in found.items()
@@ -105,26 +95,20 @@ def _opinion(
     kind, side = kind_of(segment), segment.removesuffix(kind_of(segment))
     mine = {name: girths.get(f"{side}{name}", girths.get(name)) for name in usual_girths()}
     person = {kind_of(one): length for one, length in skeleton.lengths.items() if one.startswith(side)}
-    people = read_table("human", "girths").provenance["people"]
+    survey = read_table("human", "girths").provenance["people"]["mass_kg"][subject.sex]
+    mean, mean_sd = mean_fraction(kind, MAN if subject.sex == "M" else WOMAN)
+    own = np.hypot(mean_sd, error_size("solid_mass", "trunk" if kind in _TRUNK else "limb"))
     mass = variance = 0.0
-    solids = []
+    said: tuple[str, ...] = ()
     for part, share in _shares(kind, subject.sex).items():
         solid = _part_solid(part, reference, subject, person | {"stature": skeleton.stature}, mine)
-        fraction = share * reference.segments[kind].mass
-        own = fraction * (people["mass_kg"][subject.sex] * solid.ratio if solid else subject.mass)
-        shape = error_size("solid_mass", "trunk" if kind in _TRUNK else "limb")
-        mass += own
-        variance += own**2 * (shape**2 + solid.sd**2 if solid else error_size("solid_mass", "untold part") ** 2)
-        solids.append(solid)
-    said = tuple(dict.fromkeys(name for solid in solids if solid for name in solid.said))
-    along, radii = _shape(solids[0]) if len(solids) == 1 and solids[0] and kind not in _TRUNK else (None, None)
-    return SegmentOpinion(mass, float(np.sqrt(variance)), along, radii, said)
-
-
-def _shape(one: PartSolid) -> tuple[float, Array]:
-    """Return how the person's solid differs from the mean person's: centroid m, radii of gyration (3,) times."""
-    radii = np.diag(one.solid.inertia) / one.solid.mass / (np.diag(one.mean.inertia) / one.mean.mass)
-    return float(one.solid.com[1] - one.mean.com[1]), np.sqrt(radii)
+        if solid is None:
+            one, sd = share * reference.segments[kind].mass * subject.mass, error_size("solid_mass", "untold part")
+        else:
+            one, sd = share * mean * survey * solid.ratio, np.hypot(own, solid.sd)
+            said += tuple(name for name in solid.said if name not in said)
+        mass, variance = mass + one, variance + (one * sd) ** 2
+    return SegmentOpinion(mass, float(np.sqrt(variance)), said)
 
 
 def _shares(kind: str, sex: Sex) -> dict[str, float]:
@@ -168,47 +152,11 @@ def _part_solid(
     people = {kind: grown * length for kind, length in reference.lengths.items()}
     length = _part_length(part, reference, sizes)
     usual_length = _part_length(part, reference, people | {"stature": grown * reference.stature})
-    scale = length / usual_length
-    solid = stadium_stack(level, girth, aspect, length=length)
-    mean = stadium_stack(level, scale * usual, aspect, length=length)
+    volume = stadium_stack(level, girth, aspect, length=length).mass
+    mean = stadium_stack(level, usual, aspect, length=usual_length).mass
+    more = [girth * np.exp(_STEP * one) for one in np.eye(len(rows))]
+    slope = np.array([np.log(stadium_stack(level, one, aspect, length=length).mass / volume) / _STEP for one in more])
     tape, untold = error_size("girth", "tape"), error_size("girth", "untold")
     covariance = predict @ np.diag(given * tape**2) @ predict.T + np.diag(~given * untold**2)
-    slope = [
-        np.log(stadium_stack(level, girth * np.exp(_STEP * one), aspect, length=length).mass / solid.mass) / _STEP
-        for one in np.eye(len(rows))
-    ]
     said = tuple(row["girth"] for row, is_given in zip(rows, given, strict=True) if is_given)
-    return PartSolid(
-        solid, mean, solid.mass * scale**3 / mean.mass, float(np.sqrt(slope @ covariance @ np.array(slope))), said
-    )
-
-
-def opinion_rows(
-    opinions: Mapping[str, SegmentOpinion], lumps: tuple[RigidInertia, ...], skeleton: Skeleton
-) -> tuple[Array, Array, Array]:
-    """Return what the opinions measure of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] of all segments (kg, m, m²): indices
-    (n,), values (n,) and their covariance (n, n).
-
-    ``lumps`` are the table's segments that the solids reshape. The two sides err together: same tape, same shape of
-    muscle.
-    """
-    joint = error_size("joint_centre", "other", state="before")
-    rows: list[tuple[int, float, float]] = []
-    for index, (segment, lump) in enumerate(zip(SEGMENTS, lumps, strict=True)):
-        one = opinions.get(segment)
-        if one is None:
-            continue
-        rows.append((10 * index, one.mass, one.mass_sd))
-        if one.along is not None and one.radii is not None:
-            sd = float(np.hypot(error_size("solid_com", "limb") * skeleton.lengths[segment], joint))
-            rows.append((10 * index + 2, lump.com[1] + one.along, sd))
-            for axis in range(3):
-                moment = lump.inertia[axis, axis] / lump.mass * one.radii[axis] ** 2
-                place = 10 * index + 4 + TENSOR.index((axis, axis))
-                rows.append((place, moment, 2 * error_size("solid_radius", "limb") * moment))
-    where, values, sds = (np.array(column) for column in zip(*rows, strict=True))
-    quantity, kind = where % 10, np.array([kind_of(SEGMENTS[index // 10]) for index in where])
-    alike = (quantity[:, None] == quantity) & (kind[:, None] == kind)
-    together = np.where(alike, error_size("left_right_correlation", "mass"), 0.0)
-    np.fill_diagonal(together, 1.0)
-    return where, values, together * np.outer(sds, sds)
+    return PartSolid(volume / mean, float(np.sqrt(slope @ covariance @ slope)), said)

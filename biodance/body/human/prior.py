@@ -3,15 +3,16 @@ as a covariance.
 """
 
 import functools
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from biodance.body.human.girths import girth_opinions, opinion_rows
+from biodance.body.human.fractions import MAN, WOMAN, published_fractions
+from biodance.body.human.girths import SegmentOpinion, girth_opinions
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of, side_of
 from biodance.body.inertia import TENSOR, RigidInertia, inertial_parameters, mirror_inertia, turn_inertia
-from biodance.body.tables.choice import measured_whole, reference, studies
+from biodance.body.tables.choice import measured_whole, reference
 from biodance.body.tables.choice import reference as reference_of
 from biodance.body.tables.de_leva import PARTS
 from biodance.body.tables.de_leva import lengths as reference_lengths
@@ -20,8 +21,6 @@ from biodance.body.tables.published import regression, study_masses
 from biodance.body.tables.reference import Reference
 from biodance.records import Array, Sip, Subject
 
-WOMAN, MAN = Subject(65.0, 1.70, "F"), Subject(75.0, 1.75, "M")
-LIVING = ("adult", "older")
 _AXES = ("sagittal", "longitudinal", "transverse")
 
 
@@ -48,8 +47,7 @@ def table_spread(kind: str) -> Spread:
     tables = (*((name, who) for name in ("de_leva_1996", "dumas_2018") for who in (WOMAN, MAN)), ("winter_2009", MAN))
     people = [reference(*table) for table in tables]
     units = [_in_lengths(person, kind) for person in people]
-    masses = [person.segments[kind].mass for person in people]
-    masses += [study_masses(name, who)[kind] for who in (WOMAN, MAN) for name in _with_own(kind, who)]
+    masses = [fraction for who in (WOMAN, MAN) for fraction in published_fractions(kind, who)]
     inner = _within(kind)
     tensor = np.array([unit.inertia for unit in units])
     return Spread(
@@ -62,20 +60,6 @@ def table_spread(kind: str) -> Spread:
 
 def _sd(values: Iterable[Array]) -> Array:
     return np.asarray(np.std(np.array(list(values)), axis=0, ddof=1))
-
-
-def _with_own(kind: str, who: Subject) -> list[str]:
-    """Return the studies of living adults; for the trunk only those that cut the pelvis themselves (Zatsiorsky's
-    data are de Leva's).
-    """
-    living = [
-        name for name, group in studies(who.sex).items() if group in LIVING and name != "zatsiorsky_seluyanov_1979"
-    ]
-    return [
-        name
-        for name in living
-        if kind not in ("pelvis", "trunk_head") or name in ("chen_2011", "ma_2011", "pavol_2002")
-    ]
 
 
 def _in_lengths(person: Reference, kind: str) -> RigidInertia:
@@ -124,8 +108,7 @@ def prior(reference: Reference, skeleton: Skeleton, subject: Subject) -> Sip:
     )
     covariance = child_widening(subject) ** 2 * primitive_covariance(lumps, skeleton, others)
     if subject.girths:
-        opinions = girth_opinions(reference, skeleton, subject)
-        lumps, covariance = weigh_opinions(lumps, covariance, *opinion_rows(opinions, lumps, skeleton))
+        lumps, covariance = _weigh(lumps, covariance, girth_opinions(reference, skeleton, subject))
     jacobian = np.zeros((10 * len(lumps), 10 * len(lumps)))
     for i, lump in enumerate(lumps):
         jacobian[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] = parameter_jacobian(lump)
@@ -133,16 +116,24 @@ def prior(reference: Reference, skeleton: Skeleton, subject: Subject) -> Sip:
     return Sip(SEGMENTS, np.concatenate([inertial_parameters(lump) for lump in lumps]), (covariance + covariance.T) / 2)
 
 
-def weigh_opinions(
-    lumps: tuple[RigidInertia, ...], covariance: Array, where: Array, values: Array, noise: Array
+def _weigh(
+    lumps: tuple[RigidInertia, ...], covariance: Array, opinions: Mapping[str, SegmentOpinion]
 ) -> tuple[tuple[RigidInertia, ...], Array]:
-    """Return segments and covariance (120, 120) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] after measuring the entries
-    ``where`` (n,) as ``values`` (n,) with covariance ``noise`` (n, n); the sum of the masses is kept.
+    """Return segments and covariance (120, 120) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] after opinions on masses.
+
+    The sum of the masses is kept. The sides err together: same tape, same shape of muscle.
     """
-    theta = np.concatenate([_primitives(lump) for lump in lumps])
-    total = theta[::10].sum()
+    where = np.array([10 * SEGMENTS.index(segment) for segment in opinions])
+    kinds = np.array([kind_of(segment) for segment in opinions])
+    sds = np.array([one.mass_sd for one in opinions.values()])
+    together = np.where(kinds[:, None] == kinds, error_size("left_right_correlation", "mass"), 0.0)
+    np.fill_diagonal(together, 1.0)
+    noise = together * np.outer(sds, sds)
+    masses = np.array([lump.mass for lump in lumps])
+    total = masses.sum()
     gain = np.linalg.solve(covariance[np.ix_(where, where)] + noise, covariance[where]).T
-    theta = theta + gain @ (values - theta[where])
+    step = gain @ (np.array([one.mass for one in opinions.values()]) - masses[where // 10])
+    theta = np.concatenate([_primitives(lump) for lump in lumps]) + step
     theta[::10] *= total / theta[::10].sum()
     return tuple(_lump(row) for row in theta.reshape(-1, 10)), covariance - gain @ covariance[where]
 
