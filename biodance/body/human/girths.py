@@ -68,12 +68,6 @@ def girth_opinions(reference: Reference, skeleton: Skeleton, subject: Subject) -
     return opinions
 
 
-def opinion_words(opinions: Mapping[str, SegmentOpinion]) -> str:
-    """Return which girths said something about which segments, for the reader; "" for none."""
-    said = [f"{segment.replace('_', ' ')} by {', '.join(one.said)}" for segment, one in opinions.items()]
-    return "; ".join(said).replace("upper_", "upper ")
-
-
 def _contradiction(total: float, found: Mapping[str, SegmentOpinion], reference: Reference, subject: Subject) -> str:
     over = {
         segment: one.mass - reference.segments[kind_of(segment)].mass * subject.mass
