@@ -91,7 +91,8 @@ def _opinion(
     person = {kind_of(one): length for one, length in skeleton.lengths.items() if one.startswith(side)}
     survey = read_table("human", "girths").provenance["people"]["mass_kg"][subject.sex]
     mean, mean_sd = mean_fraction(kind, MAN if subject.sex == "M" else WOMAN)
-    own = np.hypot(mean_sd, error_size("solid_mass", "trunk" if kind in _TRUNK else "limb"))
+    shape, survey_sd = (error_size("solid_mass", what) for what in ("trunk" if kind in _TRUNK else "limb", "survey"))
+    own = np.linalg.norm([mean_sd, shape, survey_sd])
     mass = variance = 0.0
     said: tuple[str, ...] = ()
     for part, share in _shares(kind, subject.sex).items():

@@ -108,7 +108,8 @@ def prior(reference: Reference, skeleton: Skeleton, subject: Subject) -> Sip:
     )
     covariance = child_widening(subject) ** 2 * primitive_covariance(lumps, skeleton, others)
     if subject.girths:
-        lumps, covariance = _weigh(lumps, covariance, girth_opinions(reference, skeleton, subject))
+        apart = child_widening(subject) ** 2 * primitive_covariance(lumps, skeleton, ())
+        lumps, covariance = _weigh(lumps, covariance, apart, girth_opinions(reference, skeleton, subject))
     jacobian = np.zeros((10 * len(lumps), 10 * len(lumps)))
     for i, lump in enumerate(lumps):
         jacobian[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] = parameter_jacobian(lump)
@@ -117,11 +118,13 @@ def prior(reference: Reference, skeleton: Skeleton, subject: Subject) -> Sip:
 
 
 def _weigh(
-    lumps: tuple[RigidInertia, ...], covariance: Array, opinions: Mapping[str, SegmentOpinion]
+    lumps: tuple[RigidInertia, ...], covariance: Array, apart: Array, opinions: Mapping[str, SegmentOpinion]
 ) -> tuple[tuple[RigidInertia, ...], Array]:
     """Return segments and covariance (120, 120) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] after opinions on masses.
 
-    The sum of the masses is kept. The sides err together: same tape, same shape of muscle.
+    The sum of the masses is kept. The sides err together: same tape, same shape of muscle. The weights are those of
+    ``apart`` (120, 120), in which segments hang together by the body mass alone: that a thigh is like another table's
+    says nothing about the foot. The covariance is that of these weights (Joseph form).
     """
     where = np.array([10 * SEGMENTS.index(segment) for segment in opinions])
     kinds = np.array([kind_of(segment) for segment in opinions])
@@ -131,11 +134,13 @@ def _weigh(
     noise = together * np.outer(sds, sds)
     masses = np.array([lump.mass for lump in lumps])
     total = masses.sum()
-    gain = np.linalg.solve(covariance[np.ix_(where, where)] + noise, covariance[where]).T
+    gain = np.linalg.solve(apart[np.ix_(where, where)] + noise, apart[where]).T
+    keep = np.eye(len(covariance))
+    keep[:, where] -= gain
     step = gain @ (np.array([one.mass for one in opinions.values()]) - masses[where // 10])
     theta = np.concatenate([_primitives(lump) for lump in lumps]) + step
     theta[::10] *= total / theta[::10].sum()
-    return tuple(_lump(row) for row in theta.reshape(-1, 10)), covariance - gain @ covariance[where]
+    return tuple(_lump(row) for row in theta.reshape(-1, 10)), keep @ covariance @ keep.T + gain @ noise @ gain.T
 
 
 def _lump(row: Array) -> RigidInertia:
