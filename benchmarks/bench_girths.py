@@ -15,8 +15,10 @@ from generated_people import GeneratedPerson, generate_person
 from biodance.body.human.prior import prior
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, generic_skeleton, kind_of
 from biodance.body.tables.choice import reference
+from biodance.errors import SessionRefused
 from biodance.records import Array, Sip, Subject
 from biodance.settings import Settings
+from biodance.uncertainty.caution import widened
 
 _FEW = ("thigh", "shank", "upper_arm", "forearm", "waist", "hip", "chest")
 _KINDS = ("pelvis", "thigh", "shank", "foot", "trunk_head", "upper_arm", "forearm_hand")
@@ -46,15 +48,21 @@ def skeleton(person: GeneratedPerson, generic: Skeleton, rng: np.random.Generato
 
 
 def compare(count: int, first: int = 1) -> tuple[Array, Array]:
-    """Return errors and standard deviations of the masses (count, 3, 12), kg: table, seven girths, all girths."""
-    error, sd = np.zeros((2, count, 3, len(SEGMENTS)))
-    for k in range(count):
-        person = generate_person(first + k)
+    """Return errors and standard deviations of the masses (people, 3, 12), kg: table, seven girths, all girths; as
+    identification takes them (`widened`), without the people whose girths are refused.
+    """
+    errors, sds = [], []
+    for seed in range(first, first + count):
+        person = generate_person(seed)
         truth = np.array([person.masses[segment] for segment in SEGMENTS])
-        for way, sip in enumerate(priors(person, np.random.default_rng(first + k))):
-            error[k, way] = sip.mass - truth
-            sd[k, way] = np.sqrt(np.diag(sip.covariance)[::10])
-    return error, sd
+        try:
+            found = [widened(sip) for sip in priors(person, np.random.default_rng(seed))]
+        except SessionRefused as refused:
+            print(f"person {seed}: {refused}", file=sys.stderr)
+            continue
+        errors.append([sip.mass - truth for sip in found])
+        sds.append([np.sqrt(np.diag(sip.covariance)[::10]) for sip in found])
+    return np.array(errors), np.array(sds)
 
 
 def main() -> None:

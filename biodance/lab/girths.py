@@ -10,7 +10,7 @@ from biodance.errors import SessionRefused
 from biodance.library import locate
 from biodance.records import SIDES
 
-OTHER_NAMES = {"calf": "shank"}
+_ALIASES = {"calf": "shank"}
 """What else a girth is called."""
 _LEGAL = (0.4, 2.2)
 """Of the usual girth: smaller or larger ones are another unit or a slip of the pen."""
@@ -37,7 +37,7 @@ def legal_girths(given: Mapping[str, float]) -> dict[str, float]:
     for said, value in given.items():
         side = next((f"{side}_" for side in SIDES if said.startswith(f"{side}_")), "")
         short = said.removeprefix(side)
-        name = OTHER_NAMES.get(short, short)
+        name = _ALIASES.get(short, short)
         if name not in usual_girths() or (side and name in _MIDDLE):
             raise SessionRefused(_unknown(said))
         if f"{side}{name}" in found:
@@ -48,7 +48,7 @@ def legal_girths(given: Mapping[str, float]) -> dict[str, float]:
 
 
 def _unknown(said: str) -> str:
-    legal = (*usual_girths(), *OTHER_NAMES)
+    legal = (*usual_girths(), *_ALIASES)
     close = get_close_matches(said, legal, n=1)
     hint = f" Did you mean {close[0]!r}?" if close else ""
     return (

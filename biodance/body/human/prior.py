@@ -106,15 +106,20 @@ def prior(reference: Reference, skeleton: Skeleton, subject: Subject) -> Sip:
         for name in measured_whole()
         if name != reference.table
     )
-    covariance = child_widening(subject) ** 2 * primitive_covariance(lumps, skeleton, others)
-    if subject.girths:
-        apart = child_widening(subject) ** 2 * primitive_covariance(lumps, skeleton, ())
-        lumps, covariance = _weigh(lumps, covariance, apart, girth_opinions(reference, skeleton, subject))
+    opinions = girth_opinions(reference, skeleton, subject) if subject.girths else {}
+    least = error_size("segment_mass", "floor") if opinions else 0.0
+    covariance, apart = (
+        child_widening(subject) ** 2 * primitive_covariance(lumps, skeleton, tables, least=least)
+        for tables in (others, ())
+    )
+    if opinions:
+        lumps, covariance = _weigh(lumps, covariance, apart, opinions)
     jacobian = np.zeros((10 * len(lumps), 10 * len(lumps)))
     for i, lump in enumerate(lumps):
         jacobian[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] = parameter_jacobian(lump)
     covariance = jacobian @ covariance @ jacobian.T
-    return Sip(SEGMENTS, np.concatenate([inertial_parameters(lump) for lump in lumps]), (covariance + covariance.T) / 2)
+    phi = np.concatenate([inertial_parameters(lump) for lump in lumps])
+    return Sip(SEGMENTS, phi, (covariance + covariance.T) / 2, tuple(opinions))
 
 
 def _weigh(
@@ -230,16 +235,22 @@ def _primitives(lump: RigidInertia) -> Array:
 
 
 def primitive_covariance(
-    lumps: tuple[RigidInertia, ...], skeleton: Skeleton, others: tuple[tuple[RigidInertia, ...], ...]
+    lumps: tuple[RigidInertia, ...],
+    skeleton: Skeleton,
+    others: tuple[tuple[RigidInertia, ...], ...],
+    *,
+    least: float = 0.0,
 ) -> Array:
     """Return the covariance (120, 120) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] of all segments (kg, m, m²); ``others``
-    other tables'.
+    other tables'; ``least`` relative sd of the mass of a segment of one part.
 
     The variance of ``primitive_sd`` is divided: what the disagreement of the tables explains moves together, the rest
     on its own.
     """
     ways = np.array([disagreement(lumps, other) for other in others]).reshape(-1, 10 * len(lumps))
     variance = np.concatenate([primitive_sd(s, lump, skeleton) for s, lump in zip(SEGMENTS, lumps, strict=True)]) ** 2
+    floor = [least * lump.mass * (len(PARTS[kind_of(s)]) == 1) for s, lump in zip(SEGMENTS, lumps, strict=True)]
+    variance[::10] = np.maximum(variance[::10], np.square(floor))
     own = np.sqrt(np.maximum(variance - np.sum(ways**2, axis=0), error_size("own_share", "variance") * variance))
     together = np.eye(len(SEGMENTS))
     for i, segment in enumerate(SEGMENTS):
