@@ -10,8 +10,6 @@ from typing import Literal
 
 import numpy as np
 
-from biodance.records import Array
-
 _KNOTS = {
     "thigh": ((0, 0.2, 0.4, 0.6, 0.8, 1), (94, 89, 83, 74, 63, 57)),
     "shank": ((0, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 1), (56, 55, 57, 51, 42, 35.5, 33, 35)),

@@ -1,4 +1,4 @@
-"""Girths of a person: exact solids, refusals with a sentence, and a prior that covers people whom it was not made of."""
+"""Girths of a person: exact solids, refusals with a sentence, and a prior that covers people it was not made of."""
 
 import math
 import sys
