@@ -6,7 +6,7 @@ by +90 deg about x. A joint with several degrees of freedom is a chain of one-do
 no segment.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
@@ -60,6 +60,8 @@ class Body:
     at_joint : Sip, optional
         The same table with the trunk's matter along with its joint, which movement may put elsewhere than the table
         cuts the trunk from the pelvis; None where both are one.
+    girths : mapping
+        By segment, the girths of the person that its mass in ``sip`` takes in beside the table.
 
     Examples
     --------
@@ -81,6 +83,7 @@ class Body:
     joint_errors: tuple[JointError, ...] = ()
     gravity: Array = field(default_factory=GRAVITY.copy)
     at_joint: Sip | None = None
+    girths: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         count = len(self.segments)

@@ -72,6 +72,7 @@ def _body(found: dict[str, Any]) -> Body:
         joint_errors=tuple(JointError(*error) for error in found["joint_errors"]),
         **({"gravity": found["gravity"]} if "gravity" in found else {}),
         at_joint=_sip(found["at_joint"]) if found.get("at_joint") else None,
+        girths={segment: tuple(said) for segment, said in found.get("girths", {}).items()},
     )
 
 

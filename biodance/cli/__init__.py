@@ -10,8 +10,7 @@ from collections.abc import Sequence
 
 from cyclopts import CycloptsError
 
-from biodance.cli import archive, batch, dance, diagnose, init, machine, register, session, virtual
-from biodance.cli import archive, batch, dance, diagnose, init, live, machine, session, virtual
+from biodance.cli import archive, batch, dance, diagnose, init, live, machine, register, session, virtual
 from biodance.cli.app import DONE, NOT_DONE, STOPPED, app, say
 
 __all__ = [

@@ -36,6 +36,8 @@ class Sip:
         kg·m, kg·m²; first moment and inertia about and in the segment's JOINT frame.
     covariance : array_like
         (10N, 10N) in the same units.
+    measured : tuple of str
+        Segments whose masses more than a table told: girths of the person.
 
     Raises
     ------
@@ -52,6 +54,7 @@ class Sip:
     segments: tuple[str, ...]
     phi: Array
     covariance: Array
+    measured: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         n = 10 * len(self.segments)
@@ -60,6 +63,7 @@ class Sip:
             segments=tuple(self.segments),
             phi=frozen_array(self.phi, (n,), "Sip.phi"),
             covariance=frozen_array(self.covariance, (n, n), "Sip.covariance"),
+            measured=tuple(self.measured),
         )
 
     def __repr__(self) -> str:

@@ -32,6 +32,8 @@ class Subject:
         Other measures by name, m and kg.
     guessed : tuple of str
         What nobody declared: "mass", "stature", "sex".
+    girths : mapping
+        Girths m by name: ``thigh`` of both sides or ``right_thigh`` of one; see docs/guide/record.md.
 
     Examples
     --------
@@ -46,6 +48,7 @@ class Subject:
     name: str = ""
     measurements: Mapping[str, float] = field(default_factory=dict)
     guessed: tuple[str, ...] = ()
+    girths: Mapping[str, float] = field(default_factory=dict)
 
     def require(self, *quantities: Literal["mass", "stature", "age"]) -> None:
         """Refuse to go on where a quantity is not known.

@@ -99,12 +99,14 @@ def _shift_slope(phi: Array) -> Array:
 
 
 def _mass_spread(prior: Sip) -> Array:
-    """Return the covariance (p, p) that raises every relative mass sd to the floor, sides alike, the total mass
-    unchanged.
+    """Return the covariance (p, p) that raises every relative mass sd to the floor of a table, sides alike, the total
+    mass unchanged; masses that girths told have none.
     """
     table, variance = prior.phi.reshape(-1, 10), np.diag(prior.covariance)[::10]
     mass = np.maximum(table[:, 0], 1e-12)
-    least = error_size("segment_mass", "floor") * np.array([_averaged(name) for name in prior.segments])
+    least = error_size("segment_mass", "floor") * np.array(
+        [0.0 if name in prior.measured else _averaged(name) for name in prior.segments]
+    )
     missing = np.sqrt(np.maximum(least**2 - variance / mass**2, 0.0)) * (table[:, 0] > 0) * (variance > 0)
     names = [name.removeprefix("right_").removeprefix("left_") for name in prior.segments]
     sides = error_size("left_right_correlation", "mass")

@@ -2,9 +2,12 @@
 skeleton.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.body.human.girths import girth_opinions
 from biodance.body.human.limits import joint_limits
 from biodance.body.human.prior import child_widening, com_sd, cut_at_joint, is_child, prior
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, generic_skeleton, joint_tree, kind_of, side_of
@@ -131,6 +134,8 @@ def assemble(
     usual, boxes = reference(table, subject), shape_boxes(skeleton)
     sip = prior(usual, skeleton, subject)
     along = prior(usual, cut_at_joint(skeleton), subject) if skeleton.cut else None
+    opinions = girth_opinions(usual, skeleton, subject) if subject.girths else {}
+    girths = {segment: one.said for segment, one in opinions.items()}
     rooms = np.array([com_boxes(one, skeleton, boxes) for one in (sip, along) if one])
     return Body(
         name=subject.name or "human",
@@ -142,9 +147,24 @@ def assemble(
         boxes=boxes,
         com_boxes=np.stack([rooms[:, :, 0].min(axis=0), rooms[:, :, 1].max(axis=0)], axis=1),
         feet={side: sole(skeleton, subject, side) for side in SIDES},
-        notes=(*notes, *_prior_notes(subject, table)),
+        notes=(*notes, *_prior_notes(subject, table), *_girth_notes(girths)),
         gravity=np.array([0.0, 0.0, -gravity]),
         at_joint=along,
+        girths=girths,
+    )
+
+
+def _girth_notes(girths: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
+    """Return which girths say something about which masses."""
+    if not girths:
+        return ()
+    said: dict[str, list[str]] = {}
+    for segment, names in girths.items():
+        said.setdefault(", ".join(names), []).append(segment)
+    words = "; ".join(f"{names} for {' and '.join(segments)}" for names, segments in said.items()).replace("_", " ")
+    return (
+        f"Girths weigh beside the table in the prior masses ({words}): stadium solids (Yeadon 1990) about the mean of "
+        "all tables; other segments keep the table's opinion under the same body mass.",
     )
 
 

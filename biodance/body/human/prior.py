@@ -3,14 +3,16 @@ as a covariance.
 """
 
 import functools
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from biodance.body.human.fractions import MAN, WOMAN, published_fractions
+from biodance.body.human.girths import SegmentOpinion, girth_opinions
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of, side_of
 from biodance.body.inertia import TENSOR, RigidInertia, inertial_parameters, mirror_inertia, turn_inertia
-from biodance.body.tables.choice import measured_whole, reference, studies
+from biodance.body.tables.choice import measured_whole, reference
 from biodance.body.tables.choice import reference as reference_of
 from biodance.body.tables.de_leva import PARTS
 from biodance.body.tables.de_leva import lengths as reference_lengths
@@ -19,8 +21,6 @@ from biodance.body.tables.published import regression, study_masses
 from biodance.body.tables.reference import Reference
 from biodance.records import Array, Sip, Subject
 
-WOMAN, MAN = Subject(65.0, 1.70, "F"), Subject(75.0, 1.75, "M")
-LIVING = ("adult", "older")
 _AXES = ("sagittal", "longitudinal", "transverse")
 
 
@@ -47,8 +47,7 @@ def table_spread(kind: str) -> Spread:
     tables = (*((name, who) for name in ("de_leva_1996", "dumas_2018") for who in (WOMAN, MAN)), ("winter_2009", MAN))
     people = [reference(*table) for table in tables]
     units = [_in_lengths(person, kind) for person in people]
-    masses = [person.segments[kind].mass for person in people]
-    masses += [study_masses(name, who)[kind] for who in (WOMAN, MAN) for name in _with_own(kind, who)]
+    masses = [fraction for who in (WOMAN, MAN) for fraction in published_fractions(kind, who)]
     inner = _within(kind)
     tensor = np.array([unit.inertia for unit in units])
     return Spread(
@@ -61,20 +60,6 @@ def table_spread(kind: str) -> Spread:
 
 def _sd(values: Iterable[Array]) -> Array:
     return np.asarray(np.std(np.array(list(values)), axis=0, ddof=1))
-
-
-def _with_own(kind: str, who: Subject) -> list[str]:
-    """Return the studies of living adults; for the trunk only those that cut the pelvis themselves (Zatsiorsky's
-    data are de Leva's).
-    """
-    living = [
-        name for name, group in studies(who.sex).items() if group in LIVING and name != "zatsiorsky_seluyanov_1979"
-    ]
-    return [
-        name
-        for name in living
-        if kind not in ("pelvis", "trunk_head") or name in ("chen_2011", "ma_2011", "pavol_2002")
-    ]
 
 
 def _in_lengths(person: Reference, kind: str) -> RigidInertia:
@@ -111,18 +96,64 @@ MIRROR = np.array([1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0])
 
 
 def prior(reference: Reference, skeleton: Skeleton, subject: Subject) -> Sip:
-    """Return the prior SIP of a person with covariance (120, 120); the masses sum to the subject's mass."""
+    """Return the prior SIP of a person with covariance (120, 120); the masses sum to the subject's mass.
+
+    The table scaled to the skeleton; girths of the subject are one more opinion, weighted with its precision.
+    """
     lumps = scaled_lumps(reference, skeleton, subject)
-    jacobian = np.zeros((10 * len(lumps), 10 * len(lumps)))
-    for i, lump in enumerate(lumps):
-        jacobian[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] = parameter_jacobian(lump)
     others = tuple(
         scaled_lumps(reference_of(name, subject), skeleton, subject)
         for name in measured_whole()
         if name != reference.table
     )
-    covariance = child_widening(subject) ** 2 * (jacobian @ primitive_covariance(lumps, skeleton, others) @ jacobian.T)
-    return Sip(SEGMENTS, np.concatenate([inertial_parameters(lump) for lump in lumps]), (covariance + covariance.T) / 2)
+    opinions = girth_opinions(reference, skeleton, subject) if subject.girths else {}
+    least = error_size("segment_mass", "floor") if opinions else 0.0
+    covariance, apart = (
+        child_widening(subject) ** 2 * primitive_covariance(lumps, skeleton, tables, least=least)
+        for tables in (others, ())
+    )
+    if opinions:
+        lumps, covariance = _weigh(lumps, covariance, apart, opinions)
+    jacobian = np.zeros((10 * len(lumps), 10 * len(lumps)))
+    for i, lump in enumerate(lumps):
+        jacobian[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] = parameter_jacobian(lump)
+    covariance = jacobian @ covariance @ jacobian.T
+    phi = np.concatenate([inertial_parameters(lump) for lump in lumps])
+    return Sip(SEGMENTS, phi, (covariance + covariance.T) / 2, tuple(opinions))
+
+
+def _weigh(
+    lumps: tuple[RigidInertia, ...], covariance: Array, apart: Array, opinions: Mapping[str, SegmentOpinion]
+) -> tuple[tuple[RigidInertia, ...], Array]:
+    """Return segments and covariance (120, 120) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] after opinions on masses.
+
+    The sum of the masses is kept. The sides err together: same tape, same shape of muscle. The weights are those of
+    ``apart`` (120, 120), in which segments hang together by the body mass alone: that a thigh is like another table's
+    says nothing about the foot. The covariance is that of these weights (Joseph form).
+    """
+    where = np.array([10 * SEGMENTS.index(segment) for segment in opinions])
+    kinds = np.array([kind_of(segment) for segment in opinions])
+    sds = np.array([one.mass_sd for one in opinions.values()])
+    together = np.where(kinds[:, None] == kinds, error_size("left_right_correlation", "mass"), 0.0)
+    np.fill_diagonal(together, 1.0)
+    noise = together * np.outer(sds, sds)
+    masses = np.array([lump.mass for lump in lumps])
+    total = masses.sum()
+    gain = np.linalg.solve(apart[np.ix_(where, where)] + noise, apart[where]).T
+    keep = np.eye(len(covariance))
+    keep[:, where] -= gain
+    step = gain @ (np.array([one.mass for one in opinions.values()]) - masses[where // 10])
+    theta = np.concatenate([_primitives(lump) for lump in lumps]) + step
+    theta[::10] *= total / theta[::10].sum()
+    return tuple(_lump(row) for row in theta.reshape(-1, 10)), keep @ covariance @ keep.T + gain @ noise @ gain.T
+
+
+def _lump(row: Array) -> RigidInertia:
+    """Return the segment of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz]; the inverse of `_primitives`."""
+    inertia = np.zeros((3, 3))
+    for value, (i, j) in zip(row[4:], TENSOR, strict=True):
+        inertia[i, j] = inertia[j, i] = row[0] * value
+    return RigidInertia(float(row[0]), row[1:4], inertia)
 
 
 CHILD_AGE, CHILD_STATURE = 18.0, 1.50
@@ -204,16 +235,22 @@ def _primitives(lump: RigidInertia) -> Array:
 
 
 def primitive_covariance(
-    lumps: tuple[RigidInertia, ...], skeleton: Skeleton, others: tuple[tuple[RigidInertia, ...], ...]
+    lumps: tuple[RigidInertia, ...],
+    skeleton: Skeleton,
+    others: tuple[tuple[RigidInertia, ...], ...],
+    *,
+    least: float = 0.0,
 ) -> Array:
     """Return the covariance (120, 120) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] of all segments (kg, m, m²); ``others``
-    other tables'.
+    other tables'; ``least`` relative sd of the mass of a segment of one part.
 
     The variance of ``primitive_sd`` is divided: what the disagreement of the tables explains moves together, the rest
     on its own.
     """
     ways = np.array([disagreement(lumps, other) for other in others]).reshape(-1, 10 * len(lumps))
     variance = np.concatenate([primitive_sd(s, lump, skeleton) for s, lump in zip(SEGMENTS, lumps, strict=True)]) ** 2
+    floor = [least * lump.mass * (len(PARTS[kind_of(s)]) == 1) for s, lump in zip(SEGMENTS, lumps, strict=True)]
+    variance[::10] = np.maximum(variance[::10], np.square(floor))
     own = np.sqrt(np.maximum(variance - np.sum(ways**2, axis=0), error_size("own_share", "variance") * variance))
     together = np.eye(len(SEGMENTS))
     for i, segment in enumerate(SEGMENTS):

@@ -19,6 +19,8 @@ filter.cutoff = 6
 ``[markers] map = {LASI = "left_asis", BACK4 = "trunk_head"}`` says it here: which label is which landmark, or sits on
 which segment.
 
+``[subject] girths_cm = {thigh = 54, right_shank = 37}`` says how thick the person is (`lab.girths`).
+
 ``[session]`` may say ``date`` (2026-03-05), ``lab``, ``operator`` and ``condition``.
 
 A ``subject.toml`` or ``session.toml`` in the folder above (the subject's folder) has the same keys and fills in what
@@ -36,6 +38,7 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from biodance.errors import BiodanceError, SessionRefused
+from biodance.lab.girths import legal_girths
 from biodance.library import read_toml
 from biodance.records import Role
 from biodance.settings import USUAL, Settings
@@ -55,6 +58,12 @@ class SubjectEntry(_Entry):
     sex: Literal["F", "M"] | None = None
     age: Annotated[float, Field(ge=0, le=120)] | None = None
     name: str | None = None
+    girths_cm: dict[str, float] | None = None
+
+    @property
+    def girths(self) -> dict[str, float]:
+        """Girths in m by name, checked when the file was read."""
+        return legal_girths({name: value / 100 for name, value in (self.girths_cm or {}).items()})
 
 
 class TrialEntry(_Entry):
@@ -179,7 +188,11 @@ def _marker_set(path: Path, said: MarkersEntry) -> str:
 def _read(path: Path) -> _Contents:
     raw = read_toml(path)
     try:
-        return _Contents.model_validate(_whole_numbers_are_numbers(raw))
+        found = _Contents.model_validate(_whole_numbers_are_numbers(raw))
+        _ = found.subject.girths
+        return found
+    except SessionRefused as error:
+        raise SessionRefused(f"{path}: [subject] {error}") from None
     except ValidationError as error:
         raise SessionRefused(" ".join(_sentence(path, fault) for fault in error.errors())) from None
 
@@ -221,6 +234,7 @@ _HELP = {
     "height_m": "Give the stature in m.",
     "sex": 'Write "F" or "M".',
     "age": "Give the age in years.",
+    "girths_cm": "Write {thigh = 54, right_shank = 37}, in cm.",
     "file": 'Write the path of a marker set, for example "my_set.toml".',
     "map": 'Write {LABEL = "left_asis", ...}.',
     "role": f"Legal are {', '.join(get_args(Role))}.",

@@ -78,7 +78,14 @@ def identify_subject(
     for values in sources.values():
         measures = {**values, **measures}
     return Subject(
-        mass, stature, sex, age, typed.name or name, measures, tuple(what for what in known if not known[what])
+        mass,
+        stature,
+        sex,
+        age,
+        typed.name or name,
+        measures,
+        tuple(what for what in known if not known[what]),
+        typed.girths,
     ), tuple(notes)
 
 

@@ -36,6 +36,12 @@ def information_share(rows: Sequence[Known]) -> float:
     return float(np.mean([row.from_data for row in rows if row.quantity in ASKED]))
 
 
+def prior_source(found: Identification, name: str) -> str:
+    """Return where the prior mass of a segment comes from: "table", or "table and girths (thigh, knee)"."""
+    said = found.body.girths.get(name, ())
+    return f"table and girths ({', '.join(said).replace('_', ' ')})" if said else "table"
+
+
 def _segment(found: Identification, name: str) -> dict[str, Any]:
     rows = segment_rows(found, name)
     mass, com, inertia = rows[0], rows[1:4], rows[4:]
@@ -45,6 +51,7 @@ def _segment(found: Identification, name: str) -> dict[str, Any]:
         "mass_sd_kg": mass.sd,
         "mass_prior_kg": mass.table,
         "mass_prior_sd_kg": mass.table_sd,
+        "mass_prior_source": prior_source(found, name),
         "com_m": [row.value for row in com],
         "com_sd_m": [row.sd for row in com],
         "com_prior_m": [row.table for row in com],

@@ -43,6 +43,7 @@ def identification_section(found: SessionIdentification) -> str:
         one=one,
         notes=[note for note in found.notes if not note.startswith(LISTED)],
         failures=found.failures,
+        girths="; ".join(f"{spaced(name)}: {spaced(', '.join(said))}" for name, said in one.body.girths.items()),
         forest=svg_address(forest_figure(one)) if rows else "",
         segments=[(name, known, information_share(known)) for name, known in rows],
         quantities=QUANTITIES,
