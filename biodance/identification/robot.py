@@ -6,11 +6,12 @@ known to what the drawing's own errors allow. All of this enters as independent 
 intervals hold with them.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.identification.base_parameters import BaseEstimate, estimate_base
 from biodance.identification.identification import Identification, conclude, usable
 from biodance.identification.learning import START, learn_noise
 from biodance.identification.mismatch import SHORTEST, Mismatch
@@ -68,8 +69,9 @@ def surprise(body: Body, one: RobotMotion) -> float:
 
 
 @one_thread()
-def identify_robot(body: Body, trials: tuple[RobotMotion, ...]) -> Identification:
-    """Return the parameters of a robot from its ``trials``, with ``body.sip`` (the drawing) as prior.
+def identify_links(body: Body, trials: tuple[RobotMotion, ...]) -> tuple[Identification, BaseEstimate]:
+    """Return the parameters of a robot from its ``trials``, with ``body.sip`` (the drawing) as prior; and the base
+    parameters as the paper counts them, with the noise alone.
 
     Raises
     ------
@@ -85,7 +87,8 @@ def identify_robot(body: Body, trials: tuple[RobotMotion, ...]) -> Identificatio
     by_name = {fit.name: fit for fit in fits}
     found = _errors(body, tuple((by_name[one.fit.name], one) for one in trials if one.fit.name in by_name), noise)
     done = conclude(body, total, tuple(by_name), noise=noise, found=found, prior=body.sip, machine=True)
-    return Identification(**{**vars(done), "notes": (*notes, *done.notes)})
+    alone = estimate_base(total.information(noise), done.base.base)
+    return replace(done, notes=(*notes, *done.notes)), alone
 
 
 def _start(body: Body) -> Array:

@@ -133,3 +133,11 @@ def _peak(values: Array, k: int) -> float:
     before, here, after = values[k - 1 : k + 2]
     bend = before - 2 * here + after
     return float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5)) if bend < 0 else 0.0
+
+
+def onto_plate(wrench: Array, fit: PlateFit) -> Array:
+    """Return a wrench (T, 6) in the frame of the first standing sole in that of the plate; the inverse of `placed`."""
+    c, s = np.cos(fit.yaw), np.sin(fit.yaw)
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    turned = np.concatenate([wrench[:, :3] @ turn.T, wrench[:, 3:] @ turn.T], axis=1)
+    return wrench_about_point(turned, -np.array([*fit.place, 0.0]))
