@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from biodance.pipeline.learn import learn_laboratory as learn_laboratory
     from biodance.pipeline.plates import judge_plates as judge_plates
     from biodance.pipeline.results import SessionResult as SessionResult
+    from biodance.pipeline.robot import identify_robot as identify_robot
     from biodance.pipeline.session import examine as examine
     from biodance.records import Markers as Markers
     from biodance.records import Motion as Motion
@@ -89,6 +90,7 @@ HOMES = {
     "pipeline.learn": ("learn_laboratory",),
     "pipeline.plates": ("judge_plates",),
     "pipeline.results": ("SessionResult",),
+    "pipeline.robot": ("identify_robot",),
     "pipeline.session": ("examine",),
     "records": ("Markers", "Motion", "Plate", "Session", "Sip", "Subject", "Trial", "Wrench"),
     "settings": ("Settings",),

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.identification.base_parameters import BaseEstimate, estimate_base
+from biodance.identification.base_parameters import BaseEstimate, BaseParameters, estimate_base
 from biodance.identification.identification import Identification, conclude, usable
 from biodance.identification.learning import START, learn_noise
 from biodance.identification.mismatch import SHORTEST, Mismatch
@@ -21,6 +21,7 @@ from biodance.motion.regressor import predict_wrench, regressor
 from biodance.records import Array, Motion, Wrench
 from biodance.spatial import cross
 from biodance.threads import one_thread
+from biodance.uncertainty.bands import WHITE
 from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.plates import plate_errors, plate_sources
 from biodance.uncertainty.tolerances import REFERENCE_PERSON
@@ -71,7 +72,7 @@ def surprise(body: Body, one: RobotMotion) -> float:
 @one_thread()
 def identify_links(body: Body, trials: tuple[RobotMotion, ...]) -> tuple[Identification, BaseEstimate]:
     """Return the parameters of a robot from its ``trials``, with ``body.sip`` (the drawing) as prior; and the base
-    parameters as the paper counts them, with the noise alone.
+    parameters as the paper counts them: every frame independent, noise alone.
 
     Raises
     ------
@@ -87,8 +88,17 @@ def identify_links(body: Body, trials: tuple[RobotMotion, ...]) -> tuple[Identif
     by_name = {fit.name: fit for fit in fits}
     found = _errors(body, tuple((by_name[one.fit.name], one) for one in trials if one.fit.name in by_name), noise)
     done = conclude(body, total, tuple(by_name), noise=noise, found=found, prior=body.sip, machine=True)
-    alone = estimate_base(total.information(noise), done.base.base)
-    return replace(done, notes=(*notes, *done.notes)), alone
+    return replace(done, notes=(*notes, *done.notes)), _as_the_paper(body, fits, about, done.base.base)
+
+
+def _as_the_paper(body: Body, fits: tuple[Fit, ...], about: Array, base: BaseParameters) -> BaseEstimate:
+    """Return the base parameters by weighted least squares on frames that count as independent (paper eq. 7)."""
+    layout = layout_for(about, WHITE)
+    total = empty(10 * len(body.segments), layout)
+    for fit in fits:
+        total = total + statistics(body, fit, layout)
+    noise, _ = learn_noise(total, body.sip, start=_start(body))
+    return estimate_base(total.information(noise), base)
 
 
 def _start(body: Body) -> Array:

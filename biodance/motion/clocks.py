@@ -91,8 +91,10 @@ def _path(wrench: Array) -> NDArray[np.complex128]:
     """Return the centre of pressure (T,) as x + i y, m; NaN where hardly anything presses."""
     force = wrench[:, 2]
     least = 0.2 * np.nanmedian(np.abs(force))
-    safe = np.where(np.abs(force) > max(least, 1e-9), force, np.nan)
-    return np.asarray((-wrench[:, 4] + 1j * wrench[:, 3]) / safe)
+    path = np.full(force.size, complex(np.nan, np.nan))
+    some = np.abs(force) > max(least, 1e-9)
+    path[some] = (-wrench[some, 4] + 1j * wrench[some, 3]) / force[some]
+    return path
 
 
 def _correlated(

@@ -62,8 +62,8 @@ class MatchedTrial:
 
 @dataclass(frozen=True, eq=False)
 class RobotResult:
-    """What a recording says about a robot: ``identified`` as of people, ``alone`` the base parameters with the noise
-    alone (the paper's count), ``trials``, ``attention``, ``judged``, and the ``urdf``.
+    """What a recording says about a robot: ``identified`` as of people, ``alone`` the base parameters as
+    the paper counts them (every frame independent), ``trials``, ``attention``, ``judged``, and the ``urdf``.
     """
 
     recording: RobotRecording
@@ -118,13 +118,7 @@ def identify_robot(
     tell("reading the robot")
     body = read_urdf(urdf, feet=feet)
     found = read_robot_recording(recording, tuple(joint.name for joint in body.joints))
-    trials, refused = list[MatchedTrial](), dict[str, str]()
-    for one in found.trials:
-        tell(f"{one.name}: bringing plate and encoders together")
-        try:
-            trials.append(_matched(body, one, found.fixed))
-        except BiodanceError as why:
-            refused[one.name] = str(why)
+    trials, refused = bring_together(body, found, tell=tell)
     fitted, kept = _parted(trials)
     if not fitted:
         reasons = " ".join(refused.values()) or "No trial has the role fit."
@@ -133,10 +127,24 @@ def identify_robot(
     done, alone = identify_links(body, tuple(one.motion for one in fitted))
     tell("validating")
     identified = _validated(found.folder.name, done, fitted, kept)
-    said = strongest_first([*_refusals(refused), *_said(trials), *_weights(done)])
+    said = strongest_first([*_refusals(refused), *told_of(trials), *_weights(done)])
     judged = tuple(Judged(one.recorded.name, float(one.motion.fit.use.sum()) / RATE) for one in trials)
     lost = tuple(Judged(name, 0.0, why, missed=True) for name, why in refused.items())
     return RobotResult(found, Path(urdf), body, tuple(trials), identified, alone, said, (*judged, *lost))
+
+
+def bring_together(
+    body: Body, recording: RobotRecording, *, tell: Callable[[str], None] = lambda _: None
+) -> tuple[list[MatchedTrial], dict[str, str]]:
+    """Return the trials in which plate and encoders are of one motion, and why others are not, by name."""
+    trials, refused = list[MatchedTrial](), dict[str, str]()
+    for one in recording.trials:
+        tell(f"{one.name}: bringing plate and encoders together")
+        try:
+            trials.append(_matched(body, one, recording.fixed))
+        except BiodanceError as why:
+            refused[one.name] = str(why)
+    return trials, refused
 
 
 def _matched(body: Body, one: RobotTrial, fixed: dict[str, float]) -> MatchedTrial:
@@ -172,7 +180,7 @@ def _matched(body: Body, one: RobotTrial, fixed: dict[str, float]) -> MatchedTri
             f"{fit.scale:.2f}, legal {_SCALES[0]:g} to {_SCALES[1]:g}). Pair the files of one run; else look for a wrong "
             f"sign or zero of an encoder, or hands on the robot."
         )
-    return MatchedTrial(one, motion, fit, measured, odd)
+    return MatchedTrial(replace(one, encoders=encoders), motion, fit, measured, odd)
 
 
 def _exchanged(
@@ -270,8 +278,8 @@ def _refusals(refused: dict[str, str]) -> list[Attention]:
     return [Attention("warn", why, name, "trial") for name, why in refused.items()]
 
 
-def _said(trials: list[MatchedTrial]) -> list[Attention]:
-    """Return what the recordings are and are not."""
+def told_of(trials: list[MatchedTrial]) -> list[Attention]:
+    """Return what a person should know of the recordings: clocks, plates, encoders, what contradicts the drawing."""
     out = []
     for one in trials:
         name, late = one.recorded.name, one.plate.delay
