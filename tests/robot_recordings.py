@@ -67,7 +67,9 @@ def danced(body: Body, seed: int, seconds: float) -> tuple[Array, Array, Array]:
     return time[1:-1], angle[1:-1], np.array(out)
 
 
-def recorded(folder: Path, *, seed: int = 0, seconds: float = 11.0, lab: RobotLab | None = None, name: str = "run") -> Path:
+def recorded(
+    folder: Path, *, seed: int = 0, seconds: float = 11.0, lab: RobotLab | None = None, name: str = "run"
+) -> Path:
     """Write a recording and return its folder."""
     body = real_robot()
     time, angle, wrench = danced(body, seed, seconds)

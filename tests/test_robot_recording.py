@@ -51,7 +51,9 @@ def matched(folder: Path, place: Path) -> tuple[MatchedTrial, list[Attention]]:
     return trials[0], told_of(trials)
 
 
-def test_a_missing_cover_is_found_from_files_alone(place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_missing_cover_is_found_from_files_alone(
+    place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     asked = ["identify", str(place / "good"), "--urdf", str(place / "hoap3.urdf"), "--feet", ",".join(FEET)]
     assert run([*asked, "--out", str(tmp_path / "out"), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
@@ -95,7 +97,9 @@ def test_time_and_place_of_a_plate_follow_from_the_path_alone() -> None:
 
 
 def test_clocks_apart_by_seconds_are_brought_together_and_said(place: Path, tmp_path: Path) -> None:
-    folder = table(place / "good", tmp_path / "late", lambda frame: frame.assign(**{"time (s)": frame["time (s)"] + 7.25}))
+    folder = table(
+        place / "good", tmp_path / "late", lambda frame: frame.assign(**{"time (s)": frame["time (s)"] + 7.25})
+    )
     one, told = matched(folder, place)
     assert one.plate.delay == pytest.approx(RobotLab().ahead - 7.25, abs=0.01)
     (clocks,) = (said for said in told if said.about == "time_delay")

@@ -233,7 +233,9 @@ def identify_command(
     ] = None,
     body: BodyOption = None,
     lab: LabOption = None,
-    urdf: Annotated[Path | None, Parameter(help="URDF file of the robot that was recorded instead of a person.")] = None,
+    urdf: Annotated[
+        Path | None, Parameter(help="URDF file of the robot that was recorded instead of a person.")
+    ] = None,
     feet: Annotated[str | None, Parameter(help="Links of the robot's right and left foot: RIGHT,LEFT.")] = None,
     subject: str | None = None,
     chosen: Set = (),

@@ -137,7 +137,7 @@ def _zeros(body: Body, one: RobotMotion) -> Array:
     for j in range(one.angle.shape[1]):
         moved = np.array(one.angle)
         moved[:, j] += _ZERO
-        after = ground(body, motion.time, moved).motion
+        after = ground(body, motion.time, moved, lean=one.grounded.lean).motion
         out[:, :, j] = predict_wrench(body, _picked(after, every)).value - before
     return out
 

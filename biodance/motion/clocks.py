@@ -59,14 +59,20 @@ def fit_plate(needed: Wrench, measured: Wrench, use: NDArray[np.bool_]) -> Plate
     size = np.abs(correlation)
     k = int(np.argmax(size))
     if size[k] == 0:
-        raise TrialRefused(f"Plate and encoders overlap for less than half of {min(path.size, other.size) / rate:.1f} s.")
+        raise TrialRefused(
+            f"Plate and encoders overlap for less than half of {min(path.size, other.size) / rate:.1f} s."
+        )
     part = _peak(size, k)
     lag = k - (path.size - 1) + part
     turn = slope[k] / abs(slope[k])
     place = second[k] - turn * first[k]
     delay = clock[0] - needed.time[0] + lag / rate
     return PlateFit(
-        float(delay), (float(place.real), float(place.imag)), float(np.angle(turn)), float(size[k]), float(abs(slope[k]))
+        float(delay),
+        (float(place.real), float(place.imag)),
+        float(np.angle(turn)),
+        float(size[k]),
+        float(abs(slope[k])),
     )
 
 

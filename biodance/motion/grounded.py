@@ -33,12 +33,15 @@ RATE = 100.0
 @dataclass(frozen=True, eq=False)
 class Grounded:
     """The ``motion`` of a robot in the frame of its first standing sole, ``foot`` (T,) which stands (0 right, 1 left),
-    ``use`` (T,) where one certainly does.
+    ``use`` (T,) where one certainly does; ``unclear`` whether angles alone leave that open at times, and ``lean`` the
+    foot that was taken to stand then (None: the one that did before).
     """
 
     motion: Motion
     foot: NDArray[np.intp]
     use: NDArray[np.bool_]
+    unclear: bool = False
+    lean: int | None = None
 
     @property
     def supports(self) -> tuple[tuple[str, float, float], ...]:
@@ -65,10 +68,13 @@ def even_angles(encoders: Encoders, *, rate: float = RATE) -> tuple[Array, Array
     return time, np.stack([np.interp(time, even, one) for one in angle.T], axis=1)
 
 
-def ground(body: Body, time: Array, angle: Array, *, settings: LowPass | None = None) -> Grounded:
+def ground(
+    body: Body, time: Array, angle: Array, *, settings: LowPass | None = None, lean: int | None = None
+) -> Grounded:
     """Return the motion of ``body`` with joint ``angle`` (T, n) rad at ``time`` (T,) s, evenly spaced.
 
-    ``settings`` of the low-pass, as for people by default.
+    ``settings`` of the low-pass, as for people by default; ``lean`` the foot (0 right, 1 left) that stands where a
+    lifted foot is so tilted that either could, None the one that stood before.
 
     Raises
     ------
@@ -78,10 +84,15 @@ def ground(body: Body, time: Array, angle: Array, *, settings: LowPass | None = 
     if set(body.feet) != set(SIDES):
         raise TrialRefused(f"{body.name}: has no right and left foot, so nothing tells where it is.")
     turn, place, height = _soles(body, angle)
-    foot, use = _standing(height, float(1.0 / (time[1] - time[0])), _UNDER * _leg(body))
+    under = _UNDER * _leg(body)
+    stands = height > -under
+    unclear = stands.all(axis=0) & (height > under).any(axis=0)
+    if lean is not None:
+        stands[1 - lean] &= ~unclear
+    foot, use = _standing(stands, float(1.0 / (time[1] - time[0])))
     rotation, position = _chained(turn, place, foot)
     q = np.concatenate([position, _quaternions(rotation), angle], axis=1)
-    return Grounded(smooth(body, time, q, settings=settings), foot, use)
+    return Grounded(smooth(body, time, q, settings=settings), foot, use, bool(unclear.any()), lean)
 
 
 def _leg(body: Body) -> float:
@@ -108,21 +119,18 @@ def _soles(body: Body, angle: Array) -> tuple[Array, Array, Array]:
         turn.append(rotation[1:] @ np.stack([ahead, np.cross(up, ahead), up], axis=1))
         place.append(position[1:] + rotation[1:] @ foot.outline.mean(axis=0))
         corners.append(position[1:, None] + foot.outline @ np.swapaxes(rotation[1:], 1, 2))
-    height = [
-        np.einsum("tkj,tj->tk", corners[1 - s] - place[s][:, None], turn[s][:, :, 2]).min(axis=1) for s in (0, 1)
-    ]
+    height = [np.einsum("tkj,tj->tk", corners[1 - s] - place[s][:, None], turn[s][:, :, 2]).min(axis=1) for s in (0, 1)]
     return np.array(turn), np.array(place), np.array(height)
 
 
-def _standing(height: Array, rate: float, under: float) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Return which foot stands (T,) and where that is certain (T,)."""
-    stands = height > -under
+def _standing(stands: NDArray[np.bool_], rate: float) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Return which foot stands (T,) and where that is certain (T,); ``stands`` (2, T) which could."""
     if not stands.any():
         raise TrialRefused(
             "At no time does a foot stand flat: each sole lies under the other's plane. Are columns swapped, or signs "
             "turned?"
         )
-    foot, now = np.zeros(height.shape[1], dtype=np.intp), int(np.argmax(stands.sum(axis=1)))
+    foot, now = np.zeros(stands.shape[1], dtype=np.intp), int(np.argmax(stands.sum(axis=1)))
     starts = np.flatnonzero(stands.any(axis=0))
     now = int(np.argmax(stands[:, starts[0]])) if not stands[:, starts[0]].all() else now
     for t in range(foot.size):

@@ -17,13 +17,13 @@ from biodance.identification.base_parameters import BaseEstimate
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import SIGMAS
 from biodance.identification.robot import RobotMotion, identify_links, robot_fit, surprise
-from biodance.identification.validation import ResidualRatio, TrialValidation, residual_ratio
+from biodance.identification.validation import TrialValidation, residual_ratio
 from biodance.lab.filters import LowPass, low_pass
 from biodance.lab.robot.encoders import for_joints
 from biodance.lab.robot.recording import RobotRecording, RobotTrial, read_robot_recording
 from biodance.motion.clocks import PlateFit, fit_plate, on_motion_clock, onto_plate
 from biodance.motion.comparison import compare
-from biodance.motion.grounded import RATE, even_angles, ground
+from biodance.motion.grounded import RATE, Grounded, even_angles, ground
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.identification import SessionIdentification
 from biodance.records import Array, Wrench
@@ -36,13 +36,15 @@ _SCALES = (0.7, 1.4)
 """Legal sizes of the measured path over the needed one."""
 _WEIGHTS = (0.5, 2.0)
 """Legal weight on the plate over that of the drawing."""
-_ODD, _BETTER = 1.6, 0.6
-"""From this surprise on exchanged columns are looked for; they are named if they leave so much of it."""
+_ODD, _FAITHFUL = 1.6, 0.99
+"""Beyond this surprise, or below this correlation, exchanged columns are looked for."""
+_BETTER = 0.25
+"""They are named if, exchanged back, they leave so much of what the correlation lacks to one."""
 _APART = 1.0
 """s: clocks further apart are said first."""
 _KEPT = 0.2
 """Share of every trial, at its end, that is kept where no trial is."""
-_COARSE = 10.0
+_COARSE = 20.0
 """Hz at which exchanged columns are looked for."""
 _NO_SEARCH = "Of a robot, what differs from the drawing is told link by link instead."
 
@@ -153,7 +155,6 @@ def _matched(body: Body, one: RobotTrial, fixed: dict[str, float]) -> MatchedTri
     limits = (np.asarray(body.limits.lower), np.asarray(body.limits.upper))
     encoders = for_joints(one.encoders, tuple(j.name for j in body.joints), limits, where=where, fixed=fixed)
     time, angle = even_angles(encoders)
-    grounded = ground(body, time, angle)
     measured = Wrench(one.wrench.time, low_pass(one.wrench.value, one.wrench.rate, LowPass()))
     carried = float(np.median(measured.value[:, 2])) / -float(body.gravity[2])
     weight = float(body.sip.mass.sum())
@@ -162,12 +163,12 @@ def _matched(body: Body, one: RobotTrial, fixed: dict[str, float]) -> MatchedTri
             f"{one.files[1]}: carries {carried:.2f} kg (median), {body.name} weighs {weight:.2f} kg. Is it the plate of "
             f"this robot, in N, zeroed while empty?"
         )
-    fit = fit_plate(predict_wrench(body, grounded.motion), measured, grounded.use)
+    grounded, fit = _stood(body, time, angle, measured)
     motion = robot_fit(one.name, grounded, angle, on_motion_clock(measured, time, fit))
     odd = surprise(body, motion)
     foreign = fit.correlation < _SAME or not _SCALES[0] < fit.scale < _SCALES[1]
-    if foreign or odd > _ODD:
-        pair = _exchanged(body, time, angle, measured, limits, odd if not foreign else np.inf)
+    if odd > _ODD or fit.correlation < _FAITHFUL:
+        pair = _exchanged(body, time, angle, measured, limits, 1 - fit.correlation)
         if pair:
             raise TrialRefused(
                 f"{where}: the columns of {pair[0]} and {pair[1]} are exchanged: exchanged back, the motion needs what "
@@ -183,36 +184,47 @@ def _matched(body: Body, one: RobotTrial, fixed: dict[str, float]) -> MatchedTri
     return MatchedTrial(replace(one, encoders=encoders), motion, fit, measured, odd)
 
 
+def _stood(
+    body: Body, time: Array, angle: Array, measured: Wrench, *, settings: LowPass | None = None
+) -> tuple[Grounded, PlateFit]:
+    """Return the motion and its place on the plate; where the angles leave open which foot stands, the plate tells."""
+    tried = []
+    for lean in (None, 0, 1):
+        found = ground(body, time, angle, settings=settings, lean=lean)
+        tried.append((found, fit_plate(predict_wrench(body, found.motion), measured, found.use)))
+        if not found.unclear:
+            break
+    return max(tried, key=lambda pair: pair[1].correlation)
+
+
 def _exchanged(
-    body: Body, time: Array, angle: Array, measured: Wrench, limits: tuple[Array, Array], odd: float
+    body: Body, time: Array, angle: Array, measured: Wrench, limits: tuple[Array, Array], lacking: float
 ) -> tuple[str, str] | None:
     """Return the two joints whose exchange lets the plate follow from the encoders; None if no exchange does."""
-    step = round(RATE / _COARSE)
+    step, slow = round(RATE / _COARSE), LowPass(cutoff=0.2 * _COARSE)
+    measured = Wrench(measured.time, low_pass(measured.value, measured.rate, slow))
     coarse, few = time[::step], angle[::step]
     low, high = limits[0] - 0.35, limits[1] + 0.35
     inside = (few.min(axis=0)[:, None] >= low) & (few.max(axis=0)[:, None] <= high)
     moving = few.std(axis=0) > 0.01
-    best, pair = min(odd, _ODD / _BETTER) * _BETTER, None
+    best, pair = min(_BETTER * lacking, 2 * (1 - _FAITHFUL)), None
     for i, j in combinations(range(few.shape[1]), 2):
         if not (inside[i, j] and inside[j, i] and (moving[i] or moving[j])):
             continue
         other = few.copy()
         other[:, [i, j]] = few[:, [j, i]]
-        size = _quick_surprise(body, coarse, other, measured)
+        size = _lacking(body, coarse, other, measured)
         if size < best:
             best, pair = size, (body.joints[i].name, body.joints[j].name)
     return pair
 
 
-def _quick_surprise(body: Body, time: Array, angle: Array, measured: Wrench) -> float:
-    """Return the surprise at a coarse motion; infinite where nothing fits."""
+def _lacking(body: Body, time: Array, angle: Array, measured: Wrench) -> float:
+    """Return what the correlation at a coarse motion lacks to one; infinite where nothing fits."""
     try:
-        found = ground(body, time, angle, settings=LowPass(cutoff=0.3 * _COARSE))
-        fit = fit_plate(predict_wrench(body, found.motion), measured, found.use)
-        if fit.correlation < _SAME:
-            return np.inf
-        motion = robot_fit("", found, angle, on_motion_clock(measured, time, fit))
-        return surprise(body, motion) if motion.fit.use.any() else np.inf
+        found, fit = _stood(body, time, angle, measured, settings=LowPass(cutoff=0.2 * _COARSE))
+        legal = _SCALES[0] < fit.scale < _SCALES[1] and found.use.any()
+        return 1 - fit.correlation if legal else np.inf
     except BiodanceError:
         return np.inf
 
@@ -243,7 +255,9 @@ def _validated(
     """Return the identification beside what drawing and identified robot predict of every trial."""
     search = LoadSearch((), float("nan"), "the drawing", doubts=(_NO_SEARCH,))
     if done.status == "failed":
-        return SessionIdentification(name, done, (), (), {}, None, search, notes=done.notes, failures={"links": done.cause})
+        return SessionIdentification(
+            name, done, (), (), {}, None, search, notes=done.notes, failures={"links": done.cause}
+        )
     first, last = (tuple(_validation(done, one) for one in some) for some in (fitted, kept))
     notes, gain = list(done.notes), None
     try:
@@ -266,9 +280,7 @@ def _validation(done: Identification, one: MatchedTrial) -> TrialValidation:
     measured = on_motion_clock(one.measured, motion.time, still)
     point = Wrench(motion.time, measured).cop()[use]
     about = np.nanmean(point, axis=0)
-    truth, table, found = (
-        Wrench(motion.time, wrench_about_point(value, about)) for value in (measured, *predicted)
-    )
+    truth, table, found = (Wrench(motion.time, wrench_about_point(value, about)) for value in (measured, *predicted))
     return TrialValidation(
         one.recorded.name, about, truth, table, found, use, compare(truth, table, use), compare(truth, found, use)
     )

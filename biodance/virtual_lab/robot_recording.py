@@ -34,7 +34,15 @@ class RobotLab:
 
 
 def write_robot_trial(
-    folder: Path, name: str, joints: tuple[str, ...], time: Array, angle: Array, wrench: Array, *, lab: RobotLab, seed: int
+    folder: Path,
+    name: str,
+    joints: tuple[str, ...],
+    time: Array,
+    angle: Array,
+    wrench: Array,
+    *,
+    lab: RobotLab,
+    seed: int,
 ) -> None:
     """Write ``NAME_joints.csv`` and ``NAME_plate.c3d`` of one motion: joint ``angle`` (T, n) rad as the encoders see it
     and the ``wrench`` (T, 6) N, N·m of the ground on the robot at ``time`` (T,) s, about a point of the ground.

@@ -129,7 +129,7 @@ def for_joints(
         raise FileRefused(
             f"{where}: no encoder for the joint{'s' if len(missing) > 1 else ''} {', '.join(missing)}.{also} Name the "
             f"columns as the joints, or give recording.toml [joints] fixed = {{{missing[0]} = 0.0}} (rad) for a joint "
-            f"that did not move, rename = {{\"column\" = \"joint\"}} for another name."
+            f'that did not move, rename = {{"column" = "joint"}} for another name.'
         )
     angle = np.stack(
         [

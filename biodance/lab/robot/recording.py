@@ -91,7 +91,9 @@ def _told(folder: Path, trials: dict[str, Any]) -> dict[str, tuple[Role, tuple[P
     found: dict[str, tuple[Role, tuple[Path, Path]]] = {}
     for name, entry in trials.items():
         if not isinstance(entry, dict) or not {"encoders", "plate"} <= set(entry) <= {"encoders", "plate", "role"}:
-            raise SessionRefused(f"{folder / _FILE}: [trials.{name}] must say encoders and plate (files), and may role.")
+            raise SessionRefused(
+                f"{folder / _FILE}: [trials.{name}] must say encoders and plate (files), and may role."
+            )
         role = entry.get("role", _role(name))
         if role not in ROLES:
             raise UnknownName.of("trial role", role, ROLES)
