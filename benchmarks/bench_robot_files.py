@@ -121,8 +121,8 @@ def try_robot(name: str, folder: Path, out: Path) -> str:
     sd = float(np.sqrt(done.sip.covariance[10 * heavy, 10 * heavy]))
     rms = [" ".join(f"{x:.2f}" for x in one.rms) for one in (kept.table_agreement, kept.identified_agreement)]
     return (
-        f"| {name} | {len(body.segments)} links, {len(names)} joints | {body.sip.mass.sum():.1f}, {real.sip.mass.sum():.1f}, "
-        f"{done.sip.mass.sum():.2f} | {body.segments[heavy]} {mass[1]:.2f}, {mass[0]:.2f}, {mass[2]:.2f} ± {sd:.2f} | "
+        f"| {name} | {len(body.segments)} links, {len(names)} joints | "
+        f"{body.sip.mass.sum():.1f}, {real.sip.mass.sum():.1f}, {done.sip.mass.sum():.2f} | {body.segments[heavy]} {mass[1]:.2f}, {mass[0]:.2f}, {mass[2]:.2f} ± {sd:.2f} | "
         f"{rms[0]} | {rms[1]} | {made - start:.0f} + {clock.perf_counter() - made:.0f} s |"
     )
 

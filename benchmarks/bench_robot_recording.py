@@ -131,8 +131,8 @@ def judge(recording: str, done: str) -> None:
     table = np.array(errors)
     rms = np.sqrt(np.mean(table[:, :4] ** 2, axis=0))
     tell(
-        f"RMS error: mass {rms[0]:.0f} -> {rms[1]:.0f} g, CoM {rms[2]:.1f} -> {rms[3]:.1f} mm; {table[:, 4].sum():.0f} of "
-        f"{len(table)} masses within their 95 % intervals"
+        f"RMS error: mass {rms[0]:.0f} -> {rms[1]:.0f} g, CoM {rms[2]:.1f} -> {rms[3]:.1f} mm; "
+        f"{table[:, 4].sum():.0f} of {len(table)} masses within their 95 % intervals"
     )
     tell(f"base parameters: {found['base_parameters']}")
     for key in ("fitted", "validation"):

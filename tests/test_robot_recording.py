@@ -12,7 +12,7 @@ from biodance.body.robot.urdf import read_urdf
 from biodance.cli import run
 from biodance.errors import BiodanceError
 from biodance.lab.robot.recording import read_robot_recording
-from biodance.motion.clocks import PlateFit, fit_plate, onto_plate, placed
+from biodance.motion.clocks import PlateFit, fit_plate, onto_plate, from_plate
 from biodance.pipeline.robot import MatchedTrial, bring_together, identify_robot, told_of
 from biodance.records import Wrench
 from biodance.records.attention import Attention
@@ -69,7 +69,8 @@ def test_a_missing_cover_is_found_from_files_alone(
     assert (abs(mass - truth.mass) < 2 * sd).all()
     (one,) = found["validation"]
     assert one["identified"]["rms"][2] < 0.3 < 3 < one["table"]["rms"][2]
-    assert max(one["identified"]["rms"][:3]) < 2 and max(one["identified"]["rms"][3:]) < 1
+    assert max(one["identified"]["rms"][:3]) < 2
+    assert max(one["identified"]["rms"][3:]) < 1
     (match,) = found["matched"]
     assert match["delay_s"] == pytest.approx(RobotLab().ahead, abs=0.01)
     assert match["yaw_rad"] == pytest.approx(RobotLab().yaw, abs=0.02)
@@ -87,7 +88,7 @@ def test_time_and_place_of_a_plate_follow_from_the_path_alone() -> None:
     wrench[:, 3], wrench[:, 4] = 80 * path[1], -80 * path[0]
     truth = PlateFit(-2.5, (0.3, -0.1), 0.8, 1.0, 1.0)
     seen = Wrench(time + truth.delay, onto_plate(wrench, truth))
-    np.testing.assert_allclose(placed(seen.value, truth.place, truth.yaw), wrench, atol=1e-12)
+    np.testing.assert_allclose(from_plate(seen.value, truth.place, truth.yaw), wrench, atol=1e-12)
     some = np.ones(time.size, dtype=bool)
     some[300:420] = False
     found = fit_plate(Wrench(time, wrench), seen, some)

@@ -50,7 +50,7 @@ class RobotMotion:
 
 
 def robot_fit(name: str, found: Grounded, angle: Array, measured: Array) -> RobotMotion:
-    """Return a trial with its ``measured`` wrench (T, 6) in the frame of the first standing sole, NaN = not measured."""
+    """Return a trial with its ``measured`` wrench (T, 6) in the frame of the first standing sole, NaN unknown."""
     use = found.use & np.isfinite(measured).all(axis=1)
     wrench = Wrench(found.motion.time, measured)
     return RobotMotion(Fit(name, found.motion, wrench, use), angle, found)

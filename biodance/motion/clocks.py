@@ -8,6 +8,7 @@ doi:10.1109/TIP.2011.2181402).
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,10 +83,10 @@ def on_motion_clock(measured: Wrench, time: Array, fit: PlateFit) -> Array:
     """
     at = time + fit.delay
     seen = np.stack([np.interp(at, measured.time, one, left=np.nan, right=np.nan) for one in measured.value.T], axis=1)
-    return placed(seen, fit.place, fit.yaw)
+    return from_plate(seen, fit.place, fit.yaw)
 
 
-def placed(wrench: Array, place: tuple[float, float], yaw: float) -> Array:
+def from_plate(wrench: Array, place: tuple[float, float], yaw: float) -> Array:
     """Return a wrench (T, 6) about the lab origin in a frame at ``place`` m, turned by ``yaw`` rad about z."""
     near = wrench_about_point(wrench, np.array([*place, 0.0]))
     c, s = np.cos(yaw), np.sin(yaw)
@@ -114,7 +115,7 @@ def _correlated(
     size = 1 << int(np.ceil(np.log2(a.size + b.size)))
     lags = (np.arange(-(a.size - 1), b.size)) % size
 
-    def sums(one: Array | NDArray[np.complex128], other: Array | NDArray[np.complex128]) -> NDArray[np.complex128]:
+    def sums(one: NDArray[Any], other: NDArray[Any]) -> NDArray[np.complex128]:
         product = np.conj(np.fft.fft(one, size)) * np.fft.fft(other, size)
         return np.asarray(np.fft.ifft(product)[lags])
 
@@ -144,7 +145,7 @@ def _peak(values: Array, k: int) -> float:
 
 
 def onto_plate(wrench: Array, fit: PlateFit) -> Array:
-    """Return a wrench (T, 6) in the frame of the first standing sole in that of the plate; the inverse of `placed`."""
+    """Return a wrench (T, 6) in the frame of the first standing sole in that of the plate; the inverse of `from_plate`."""
     c, s = np.cos(fit.yaw), np.sin(fit.yaw)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     turned = np.concatenate([wrench[:, :3] @ turn.T, wrench[:, 3:] @ turn.T], axis=1)

@@ -7,6 +7,7 @@ first standing sole: origin in its middle, x forwards, y left, z up.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,9 +49,7 @@ class Grounded:
         """Side that the frame hangs on, from and to, s."""
         edges = [0, *(np.flatnonzero(np.diff(self.foot)) + 1).tolist(), self.foot.size]
         time = self.motion.time
-        return tuple(
-            (SIDES[self.foot[a]], float(time[a]), float(time[b - 1])) for a, b in zip(edges, edges[1:], strict=False)
-        )
+        return tuple((SIDES[self.foot[a]], float(time[a]), float(time[b - 1])) for a, b in pairwise(edges))
 
 
 def even_angles(encoders: Encoders, *, rate: float = RATE) -> tuple[Array, Array]:
@@ -138,7 +137,8 @@ def _standing(stands: NDArray[np.bool_], rate: float) -> tuple[NDArray[np.intp],
             now = 1 - now
         foot[t] = now
     _back_to_both(foot, stands)
-    use, wide = stands[foot, np.arange(foot.size)], round(_AROUND * rate)
+    use: NDArray[np.bool_] = np.array(stands[foot, np.arange(foot.size)])
+    wide = round(_AROUND * rate)
     for change in np.flatnonzero(np.diff(foot)):
         use[max(0, change - wide) : change + wide + 1] = False
     use[:wide] = use[-wide:] = False
@@ -163,7 +163,7 @@ def _chained(turn: Array, place: Array, foot: NDArray[np.intp]) -> tuple[Array, 
     rotation, position = np.empty(turn.shape[1:]), np.empty(place.shape[1:])
     yaw, at = np.eye(3), np.zeros(3)
     edges = [0, *(np.flatnonzero(np.diff(foot)) + 1).tolist(), foot.size]
-    for start, stop in zip(edges, edges[1:], strict=False):
+    for start, stop in pairwise(edges):
         side = foot[start]
         if start:  # the root as the foot before sees it, then the new sole from the root, laid flat
             before = 1 - side

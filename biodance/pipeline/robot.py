@@ -160,8 +160,8 @@ def _matched(body: Body, one: RobotTrial, fixed: dict[str, float]) -> MatchedTri
     weight = float(body.sip.mass.sum())
     if not _WEIGHTS[0] < carried / weight < _WEIGHTS[1]:
         raise TrialRefused(
-            f"{one.files[1]}: carries {carried:.2f} kg (median), {body.name} weighs {weight:.2f} kg. Is it the plate of "
-            f"this robot, in N, zeroed while empty?"
+            f"{one.files[1]}: carries {carried:.2f} kg (median), {body.name} weighs {weight:.2f} kg. Is it the plate "
+            f"of this robot, in N, zeroed while empty?"
         )
     grounded, fit = _stood(body, time, angle, measured)
     motion = robot_fit(one.name, grounded, angle, on_motion_clock(measured, time, fit))
@@ -178,8 +178,8 @@ def _matched(body: Body, one: RobotTrial, fixed: dict[str, float]) -> MatchedTri
         raise TrialRefused(
             f"{one.files[1]}: is not the plate of this motion ({where}): at no delay does its centre of pressure follow "
             f"what the encoders need (best correlation {fit.correlation:.2f}, least {_SAME:g}; size "
-            f"{fit.scale:.2f}, legal {_SCALES[0]:g} to {_SCALES[1]:g}). Pair the files of one run; else look for a wrong "
-            f"sign or zero of an encoder, or hands on the robot."
+            f"{fit.scale:.2f}, legal {_SCALES[0]:g} to {_SCALES[1]:g}). Pair the files of one run; else look for a "
+            f"wrong sign or zero of an encoder, or hands on the robot."
         )
     return MatchedTrial(replace(one, encoders=encoders), motion, fit, measured, odd)
 
@@ -302,8 +302,8 @@ def told_of(trials: list[MatchedTrial]) -> list[Attention]:
         out.append(Attention("warn" if abs(late) > _APART else "note", clocks, name, "time_delay"))
         if one.surprise > _ODD:
             words = (
-                f"The plate differs from the drawing by {one.surprise:.1f} times what its masses may be off by: look for "
-                f"a load, an encoder with another zero or sign, or hands on the robot."
+                f"The plate differs from the drawing by {one.surprise:.1f} times what its masses may be off by: look "
+                f"for a load, an encoder with another zero or sign, or hands on the robot."
             )
             out.append(Attention("warn", words, name, "drawing"))
         out += [Attention("warn", text, name, "plate") for text in one.recorded.warnings]
