@@ -122,7 +122,8 @@ def try_robot(name: str, folder: Path, out: Path) -> str:
     rms = [" ".join(f"{x:.2f}" for x in one.rms) for one in (kept.table_agreement, kept.identified_agreement)]
     return (
         f"| {name} | {len(body.segments)} links, {len(names)} joints | "
-        f"{body.sip.mass.sum():.1f}, {real.sip.mass.sum():.1f}, {done.sip.mass.sum():.2f} | {body.segments[heavy]} {mass[1]:.2f}, {mass[0]:.2f}, {mass[2]:.2f} ± {sd:.2f} | "
+        f"{body.sip.mass.sum():.1f}, {real.sip.mass.sum():.1f}, {done.sip.mass.sum():.2f}"
+        f" | {body.segments[heavy]} {mass[1]:.2f}, {mass[0]:.2f}, {mass[2]:.2f} ± {sd:.2f} | "
         f"{rms[0]} | {rms[1]} | {made - start:.0f} + {clock.perf_counter() - made:.0f} s |"
     )
 

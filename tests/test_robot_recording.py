@@ -12,7 +12,7 @@ from biodance.body.robot.urdf import read_urdf
 from biodance.cli import run
 from biodance.errors import BiodanceError
 from biodance.lab.robot.recording import read_robot_recording
-from biodance.motion.clocks import PlateFit, fit_plate, onto_plate, from_plate
+from biodance.motion.clocks import PlateFit, fit_plate, from_plate, onto_plate
 from biodance.pipeline.robot import MatchedTrial, bring_together, identify_robot, told_of
 from biodance.records import Wrench
 from biodance.records.attention import Attention

@@ -145,7 +145,7 @@ def _peak(values: Array, k: int) -> float:
 
 
 def onto_plate(wrench: Array, fit: PlateFit) -> Array:
-    """Return a wrench (T, 6) in the frame of the first standing sole in that of the plate; the inverse of `from_plate`."""
+    """Return a wrench (T, 6) in the first standing sole's frame in that of the plate; the inverse of `from_plate`."""
     c, s = np.cos(fit.yaw), np.sin(fit.yaw)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     turned = np.concatenate([wrench[:, :3] @ turn.T, wrench[:, 3:] @ turn.T], axis=1)

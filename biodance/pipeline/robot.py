@@ -176,8 +176,8 @@ def _matched(body: Body, one: RobotTrial, fixed: dict[str, float]) -> MatchedTri
             )
     if foreign:
         raise TrialRefused(
-            f"{one.files[1]}: is not the plate of this motion ({where}): at no delay does its centre of pressure follow "
-            f"what the encoders need (best correlation {fit.correlation:.2f}, least {_SAME:g}; size "
+            f"{one.files[1]}: is not the plate of this motion ({where}): at no delay does its centre of pressure "
+            f"follow what the encoders need (best correlation {fit.correlation:.2f}, least {_SAME:g}; size "
             f"{fit.scale:.2f}, legal {_SCALES[0]:g} to {_SCALES[1]:g}). Pair the files of one run; else look for a "
             f"wrong sign or zero of an encoder, or hands on the robot."
         )
@@ -330,7 +330,7 @@ def _weights(done: Identification) -> list[Attention]:
         if known.quantity == "mass" and known.verdict != "cannot be known" and abs(known.value - known.table) > reach:
             change = known.value - known.table
             out.append(
-                f"{known.segment} is {abs(change):.3f} ± {reach:.3f} kg {'lighter' if change < 0 else 'heavier'} than drawn"
-                f": covers or cables {'off' if change < 0 else 'on'}?"
+                f"{known.segment} is {abs(change):.3f} ± {reach:.3f} kg {'lighter' if change < 0 else 'heavier'} than "
+                f"drawn: covers or cables {'off' if change < 0 else 'on'}?"
             )
     return [Attention("note", text, "", "mass") for text in out]
