@@ -150,7 +150,7 @@ def _standing(stands: NDArray[np.bool_], rate: float) -> tuple[NDArray[np.intp],
 
 def _back_to_both(foot: NDArray[np.intp], stands: NDArray[np.bool_]) -> None:
     """Move every change of the standing foot back into the middle of the time before it in which both stand."""
-    both = stands.all(axis=0)
+    both = np.asarray(stands.all(axis=0))
     for change in np.flatnonzero(np.diff(foot)) + 1:
         start = change
         while start > 0 and both[start - 1] and foot[start - 1] != foot[change]:
