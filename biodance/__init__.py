@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from biodance.pipeline.plates import judge_plates as judge_plates
     from biodance.pipeline.registration import register as register
     from biodance.pipeline.results import SessionResult as SessionResult
+    from biodance.pipeline.robot import identify_robot as identify_robot
     from biodance.pipeline.session import examine as examine
     from biodance.records import Markers as Markers
     from biodance.records import Motion as Motion
@@ -92,6 +93,7 @@ HOMES = {
     "pipeline.plates": ("judge_plates",),
     "pipeline.registration": ("register",),
     "pipeline.results": ("SessionResult",),
+    "pipeline.robot": ("identify_robot",),
     "pipeline.session": ("examine",),
     "records": ("Markers", "Motion", "Plate", "Session", "Sip", "Subject", "Trial", "Wrench"),
     "registration.registration": ("Registration",),

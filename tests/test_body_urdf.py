@@ -151,9 +151,21 @@ def test_limits_are_needed(tmp_path: Path) -> None:
     without = ROBOT[:first] + ROBOT[ROBOT.index("/>", first) + 2 :]
     with pytest.raises(FileRefused, match="'waist' has no <limit>"):
         made(tmp_path, without)
-    mimic = ROBOT[:first] + '<mimic joint="r_knee"/>' + ROBOT[first:]
-    with pytest.raises(FileRefused, match="mimics another joint"):
-        made(tmp_path, mimic)
+
+
+def test_a_joint_that_mimics_another_is_held_and_said(tmp_path: Path) -> None:
+    first = ROBOT.index("<limit")
+    whole = made(tmp_path, ROBOT)
+    held = made(tmp_path, ROBOT[:first] + '<mimic joint="r_knee" offset="0.5"/>' + ROBOT[first:])
+    assert {j.name for j in whole.joints} - {j.name for j in held.joints} == {"waist"}
+    assert held.sip.mass.sum() == pytest.approx(whole.sip.mass.sum())
+    assert "Joints that mimic others are held where these are at zero: waist." in held.notes
+    q = np.zeros((2, whole.nq))
+    q[:, 6], q[1, whole.nq - len(whole.joints) + whole.joint_index("waist")] = 1.0, 0.5
+    at, chest, mass = poses(whole, q), whole.segments.index("chest"), whole.sip.mass
+    centre = at.position[1, chest] + at.rotation[1, chest] @ whole.sip.com[chest]
+    both = mass[0] * whole.sip.com[0] + mass[chest] * centre
+    np.testing.assert_allclose(held.sip.of(held.segments[0])[1:4], both, atol=1e-9)
 
 
 def test_feet_are_named_right_first(tmp_path: Path) -> None:

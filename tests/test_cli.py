@@ -164,14 +164,14 @@ def test_ctrl_c_while_identifying_keeps_all_trials(session, tmp_path, capsys, mo
 
 
 def test_a_full_disk_is_told_with_the_path(tmp_path, monkeypatch):
-    from biodance.report.write import _write
+    from biodance.report.write import write_files
 
     def full(*_, **__):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Path, "write_text", full)
     with pytest.raises(BiodanceError, match=r"results.json: cannot be written \(No space left on device\)"):
-        _write(tmp_path, {"results.json": "{}"})
+        write_files(tmp_path, {"results.json": "{}"})
 
 
 def test_ctrl_c_before_anything_was_done_writes_nothing(tmp_path, capsys, monkeypatch):

@@ -242,6 +242,10 @@ def identify_command(
     ] = None,
     body: BodyOption = None,
     lab: LabOption = None,
+    urdf: Annotated[
+        Path | None, Parameter(help="URDF file of the robot that was recorded instead of a person.")
+    ] = None,
+    feet: Annotated[str | None, Parameter(help="Links of the robot's right and left foot: RIGHT,LEFT.")] = None,
     subject: str | None = None,
     chosen: Set = (),
     tables: Tables = None,
@@ -254,10 +258,14 @@ def identify_command(
     Parameters
     ----------
     session
-        Folder with the static trial and the other trials.
+        Folder with the static trial and the other trials; of a robot (--urdf), with encoder tables (CSV or Parquet: s,
+        rad) and force plate files.
     subject
         The person to identify where C3D files hold several.
     """
+    if urdf is not None or feet is not None:
+        persons = {"--reference": reference, "--dance": dance, "--body": body, "--lab": lab, "--subject": subject}
+        return _identify_robot(session, out, urdf, feet, {**persons, "--tables": tables}, json=json, force=force)
     from biodance.dance.dance import Dance
     from biodance.pipeline import front
     from biodance.report.write import write_identification
@@ -273,6 +281,45 @@ def identify_command(
         tabled(result, place)
         document = write_identification(result, found, folder)
     return _told_identified(result, folder, document, json)
+
+
+def _identify_robot(
+    recording: Path,
+    out: Path,
+    urdf: Path | None,
+    feet: str | None,
+    others: "dict[str, Path | str | None]",
+    *,
+    json: bool,
+    force: bool,
+) -> int:
+    """Identify a robot instead of a person."""
+    from rich.console import Console
+
+    from biodance.errors import BiodanceError
+    from biodance.lab.session.results_folder import results_folder
+    from biodance.pipeline.dance import named_feet
+    from biodance.pipeline.robot import identify_robot
+    from biodance.report.robot_write import write_robot
+    from biodance.report.terminal import print_identification
+
+    if urdf is None or feet is None:
+        raise BiodanceError("A robot is told by both --urdf FILE and --feet RIGHT,LEFT; one of them is missing.")
+    given = [name for name, value in others.items() if value is not None]
+    if given:
+        raise BiodanceError(f"{', '.join(given)} cannot be used with --urdf: they are for sessions of people.")
+    with progress() as tell:
+        both = named_feet(feet)
+        folder = results_folder(out, recording, force=force)
+        result = identify_robot(recording, urdf=urdf, feet=both, tell=tell)
+        tell("writing the page")
+        found = write_robot(result, folder)
+    if json:
+        print_json(found)
+    else:
+        print_identification(found, Console())
+        sys.stdout.write(f"{folder / 'report.html'}\n")
+    return NEEDS_A_PERSON if result.needs_a_person else DONE
 
 
 @app.command

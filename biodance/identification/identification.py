@@ -249,6 +249,7 @@ def conclude(
     noise: Noise | None = None,
     found: Mismatch | None = None,
     prior: Sip | None = None,
+    machine: bool = False,
 ) -> Identification:
     """Return the identification from statistics that were gathered already, of several trials or of a stream of frames.
 
@@ -256,10 +257,11 @@ def conclude(
     noise alone, far too short, and the notes say so.
     """
     before = prior or widened(body.sip)
-    noise = noise or learn_noise(total, may_carry(body, before))[0]
+    room = before if machine else may_carry(body, before)
+    noise = noise or learn_noise(total, room)[0]
     data, sizes = total.information(noise), Sizes(0.0, 1.0)
     if found is not None:
-        sizes = evident_sizes(data, found, may_carry(body, before))
+        sizes = evident_sizes(data, found, room)
         data = temper(data, found, sizes)
     before, placed = more_probable_place(data, before, body) if prior is None else (before, "")
     belief = posterior(data, before)
@@ -268,8 +270,11 @@ def conclude(
     known: tuple[Known, ...] = ()
     words: tuple[str, ...] = (*(() if found else (NOISE_ALONE,)), *((placed,) if placed else ()))
     if fit.status == "solved":
-        fit = replace(fit, sip=about_true_centres(fit.sip, body.joint_errors))
-        known = knowledge(fit.sip, about_true_centres(before, body.joint_errors), belief)
+        first = before
+        if not machine:
+            fit = replace(fit, sip=about_true_centres(fit.sip, body.joint_errors))
+            first = about_true_centres(before, body.joint_errors)
+        known = knowledge(fit.sip, first, belief)
         words += _notes(known, fit)
     return Identification(body, belief, data, base, noise, sizes, fit, trials, data.frames, known, words)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from biodance.identification.posterior import Posterior, posterior
 from biodance.identification.statistics import Statistics
-from biodance.records import Sip
+from biodance.records import Array, Sip
 from biodance.uncertainty.learning import maximise, noise_of
 from biodance.uncertainty.noise import Noise
 
@@ -16,17 +16,19 @@ WORTH = 6.0
 """Coefficients' worth of the start that every band keeps."""
 
 
-def learn_noise(data: Statistics, prior: Sip, *, rounds: int = 12, tolerance: float = 1e-3) -> tuple[Noise, Posterior]:
+def learn_noise(
+    data: Statistics, prior: Sip, *, rounds: int = 12, tolerance: float = 1e-3, start: Array = START
+) -> tuple[Noise, Posterior]:
     """Return the noise of the session and the posterior under it, after at most ``rounds`` or once nothing changes
-    beyond ``tolerance``.
+    beyond ``tolerance``; ``start`` (6, 6) N², N·m, N²·m² as for people by default.
     """
 
     def improved(noise: Noise) -> Noise:
         belief = posterior(data.information(noise), prior)
         return replace(
-            noise, covariance=noise_of(data.moments(belief.mean, belief.covariance), start=START, worth=WORTH)
+            noise, covariance=noise_of(data.moments(belief.mean, belief.covariance), start=start, worth=WORTH)
         )
 
-    first = Noise(np.tile(START, (len(data.count), 1, 1)), data.layout.about, data.layout.bands)
+    first = Noise(np.tile(start, (len(data.count), 1, 1)), data.layout.about, data.layout.bands)
     noise = maximise(first, improved, lambda one: one.covariance, rounds=rounds, tolerance=tolerance)
     return noise, posterior(data.information(noise), prior)

@@ -219,10 +219,15 @@ def robot_dancer(path: Path, feet: str) -> Body:
     BiodanceError
         Not two feet are named, or the file cannot be used (`urdf.read_urdf`, `standing_frames`).
     """
+    return standing_frames(read_urdf(path, feet=named_feet(feet)))
+
+
+def named_feet(feet: str) -> tuple[str, str]:
+    """Return the links of the right and the left foot of "right,left"; BiodanceError if that is not two."""
     names = [name.strip() for name in feet.split(",")]
     if len(names) != 2 or names[0] == names[1] or not all(names):
         raise BiodanceError(f"--feet {feet}: expected the links of the right and the left foot, separated by a comma.")
-    return standing_frames(read_urdf(path, feet=(names[0], names[1])))
+    return names[0], names[1]
 
 
 def make_robot_dance(

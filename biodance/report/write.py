@@ -40,7 +40,7 @@ def write_report(
         "attention": attention_document(first),
         "judged": judged_document(judged),
     }
-    _write(folder, {_NUMBERS: to_text(found)} | ({PAGE: _page(result, made, diagnosis)} if drawn else {}))
+    write_files(folder, {_NUMBERS: to_text(found)} | ({PAGE: _page(result, made, diagnosis)} if drawn else {}))
     return dict(plain_values(found))
 
 
@@ -67,7 +67,7 @@ def write_identification(result: SessionResult, found: SessionIdentification, fo
     files = {_NUMBERS: to_text(numbers), PAGE: _page(result, made)}
     if found.identification.status == "solved":
         files[BODY] = body_text(*body_of_result(result))
-    _write(folder, files)
+    write_files(folder, files)
     return dict(plain_values(numbers))
 
 
@@ -96,7 +96,7 @@ def write_diagnosis(
     if accepted:
         numbers["accepted"], more = _accepted(result, found, folder, earlier)
         files |= more
-    _write(folder, {_NUMBERS: to_text(numbers), **files})
+    write_files(folder, {_NUMBERS: to_text(numbers), **files})
     return dict(plain_values(numbers))
 
 
@@ -132,7 +132,7 @@ def _page(result: SessionResult, made: Provenance, diagnosis: SessionDiagnosis |
     return page(result, made, attention=attention, stills=stills, diagnosis=told)
 
 
-def _write(folder: Path, files: dict[str, str]) -> None:
+def write_files(folder: Path, files: dict[str, str]) -> None:
     """Write every file under another name first and then rename it, so that a stopped run leaves no half file."""
     for name, text in files.items():
         part = folder / f".{name}.part"

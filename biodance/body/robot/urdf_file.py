@@ -15,6 +15,7 @@ from biodance.body.inertia import RigidInertia
 from biodance.body.robot.sole import mesh_file, mesh_hull
 from biodance.errors import FileRefused
 from biodance.records import Array
+from biodance.spatial import axis_rotation
 
 _KINDS = ("revolute", "continuous", "fixed")
 """Types of joints that a body can have."""
@@ -39,7 +40,8 @@ class Link:
 @dataclass(frozen=True, eq=False)
 class Connection:
     """One joint: ``rotation`` (3, 3) and ``translation`` (3,) m of the child's frame in the parent's; ``axis`` (3,)
-    unit vector in the child's; ``lower``, ``upper`` rad, ``velocity`` rad/s, ``effort`` N·m (all 0 for a fixed one).
+    unit vector in the child's; ``lower``, ``upper`` rad, ``velocity`` rad/s, ``effort`` N·m (all 0 for a fixed one);
+    ``frozen`` a joint that follows another one or slides, and is held where it is at zero.
     """
 
     name: str
@@ -53,6 +55,7 @@ class Connection:
     upper: float
     velocity: float
     effort: float
+    frozen: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,13 +200,13 @@ def mesh_hulls(path: Path, elements: list[Element], what: str, unread: list[str]
 def _connection(path: Path, element: Element, links: set[str]) -> Connection:
     name, kind = element.get("name") or "", element.get("type") or ""
     what = f"joint {name!r}"
-    if kind not in _KINDS:
+    mimic = element.find("mimic")
+    frozen = mimic is not None and kind in (*_KINDS, "prismatic")
+    if kind not in _KINDS and not frozen:
         raise FileRefused(
             f"{path}: {what} is of type {kind!r}; a body has revolute, continuous and fixed joints. Make it fixed, or "
             f"remove it."
         )
-    if element.find("mimic") is not None:
-        raise FileRefused(f"{path}: {what} mimics another joint, which a body cannot. Make it fixed.")
     ends = []
     for tag in ("parent", "child"):
         end = element.find(tag)
@@ -222,6 +225,12 @@ def _connection(path: Path, element: Element, links: set[str]) -> Connection:
     if length < 1e-6:
         raise FileRefused(f"{path}: the axis of {what} has no direction ({axis}). Give xyz of an axis.")
     axis = axis if abs(length - 1) < 1e-12 else axis / length
+    if mimic is not None:
+        offset = _number(path, mimic, "offset", what) if mimic.get("offset") else 0.0
+        slide, turn = (offset, 0.0) if kind == "prismatic" else (0.0, offset)
+        held = rotation @ axis_rotation(axis, np.array([turn]))[0]
+        place = translation + slide * rotation @ axis
+        return Connection(name, "fixed", ends[0], ends[1], held, place, axis, 0.0, 0.0, 0.0, 0.0, frozen=True)
     return Connection(name, kind, ends[0], ends[1], rotation, translation, axis, *_limits(path, element, kind, what))
 
 

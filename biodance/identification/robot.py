@@ -1,0 +1,157 @@
+"""What a robot weighs, link by link, from encoders and a force plate: the identification of people with the errors that
+a robot's laboratory makes.
+
+Encoders are exact but for their zeros, joints are where the drawing has them; where on the plate the robot stood is
+known to what the drawing's own errors allow. All of this enters as independent sources of error (`mismatch`), so that
+intervals hold with them.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.identification.base_parameters import BaseEstimate, BaseParameters, estimate_base
+from biodance.identification.identification import Identification, conclude, usable
+from biodance.identification.learning import START, learn_noise
+from biodance.identification.mismatch import SHORTEST, Mismatch
+from biodance.identification.statistics import Fit, empty, layout_for, statistics
+from biodance.motion.grounded import Grounded, ground
+from biodance.motion.regressor import predict_wrench, regressor
+from biodance.records import Array, Motion, Wrench
+from biodance.spatial import cross
+from biodance.threads import one_thread
+from biodance.uncertainty.bands import WHITE
+from biodance.uncertainty.noise import Noise
+from biodance.uncertainty.plates import plate_errors, plate_sources
+from biodance.uncertainty.tolerances import REFERENCE_PERSON
+
+_ZERO = 0.005
+"""rad: standard deviation of an encoder's zero about the drawing's (judgement: 0.3 degrees, set by hand at stops)."""
+_PLACE, _YAW = 0.02, 0.035
+"""m and rad: how well the place on the plate follows from the drawing's centre of pressure, before the data."""
+_THINNED = 4
+"""Every so many frames are enough to see what an encoder's zero does."""
+_ROOM = 3.0
+"""A difference between needed and measured wrench within so many standard deviations of what the drawing may be off
+by is no surprise.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class RobotMotion:
+    """One trial ready to identify from: ``fit`` in the frame of the first standing sole, and the ``angle`` (T, n) rad
+    that ``grounded`` follows from.
+    """
+
+    fit: Fit
+    angle: Array
+    grounded: Grounded
+
+
+def robot_fit(name: str, found: Grounded, angle: Array, measured: Array) -> RobotMotion:
+    """Return a trial with its ``measured`` wrench (T, 6) in the frame of the first standing sole, NaN unknown."""
+    use = found.use & np.isfinite(measured).all(axis=1)
+    wrench = Wrench(found.motion.time, measured)
+    return RobotMotion(Fit(name, found.motion, wrench, use), angle, found)
+
+
+def surprise(body: Body, one: RobotMotion) -> float:
+    """Return the RMS of what the drawing leaves of a trial's wrench, over what its own standard deviations allow.
+
+    Channels count in units of their allowance, to which the start of the noise is added; 1 is usual.
+    """
+    pick = np.flatnonzero(one.fit.use)[:: 4 * _THINNED]
+    motion = _picked(one.fit.motion, pick)
+    W = regressor(body, motion)
+    left = one.fit.wrench.value[pick] - W @ body.sip.phi
+    allowed = np.einsum("tci,ij,tcj->tc", W, body.sip.covariance, W, optimize=True) + np.diag(_start(body))
+    return float(np.sqrt(np.mean(left**2 / allowed)))
+
+
+@one_thread()
+def identify_links(body: Body, trials: tuple[RobotMotion, ...]) -> tuple[Identification, BaseEstimate]:
+    """Return the parameters of a robot from its ``trials``, with ``body.sip`` (the drawing) as prior; and the base
+    parameters as the paper counts them: every frame independent, noise alone.
+
+    Raises
+    ------
+    TrialRefused
+        No trial has a usable frame.
+    """
+    fits, about, notes = usable(body, tuple(one.fit for one in trials))
+    layout = layout_for(about)
+    total = empty(10 * len(body.segments), layout)
+    for fit in fits:
+        total = total + statistics(body, fit, layout)
+    noise, _ = learn_noise(total, body.sip, start=_start(body))
+    by_name = {fit.name: fit for fit in fits}
+    found = _errors(body, tuple((by_name[one.fit.name], one) for one in trials if one.fit.name in by_name), noise)
+    done = conclude(body, total, tuple(by_name), noise=noise, found=found, prior=body.sip, machine=True)
+    return replace(done, notes=(*notes, *done.notes)), _as_the_paper(body, fits, about, done.base.base)
+
+
+def _as_the_paper(body: Body, fits: tuple[Fit, ...], about: Array, base: BaseParameters) -> BaseEstimate:
+    """Return the base parameters by weighted least squares on frames that count as independent (paper eq. 7)."""
+    layout = layout_for(about, WHITE)
+    total = empty(10 * len(body.segments), layout)
+    for fit in fits:
+        total = total + statistics(body, fit, layout)
+    noise, _ = learn_noise(total, body.sip, start=_start(body))
+    return estimate_base(total.information(noise), base)
+
+
+def _start(body: Body) -> Array:
+    """Return the noise (6, 6) that learning starts with: that of a person, as much smaller as the robot is lighter."""
+    return np.asarray(START * (float(body.sip.mass.sum()) / REFERENCE_PERSON) ** 2)
+
+
+def _errors(body: Body, trials: tuple[tuple[Fit, RobotMotion], ...], noise: Noise) -> Mismatch:
+    """Return the scores of encoder zeros, plate faults (one plate for all trials) and places (one a trial)."""
+    size, plates = 10 * len(body.segments), plate_sources()
+    encoders, faults = np.zeros((size, len(body.joints))), np.zeros((size, len(plates.delay)))
+    places = np.zeros((len(trials), size, 3))
+    for k, (fit, one) in enumerate(trials):
+        changes = _zeros(body, one)
+        white = noise.at(fit.motion.rate)
+        for pick in noise.bands.runs(fit.use, fit.motion.rate):
+            if pick.size < SHORTEST:
+                continue
+            motion = _picked(fit.motion, pick)
+            W = regressor(body, motion)
+            weight, wrench = white.weighted(W), W @ body.sip.phi
+            encoders += np.tensordot(weight, changes[pick // _THINNED], axes=((0, 1), (0, 1)))
+            faults += np.tensordot(weight, plate_errors(wrench, motion.rate, noise, plates), axes=((0, 1), (0, 1)))
+            places[k] += np.tensordot(weight, _moved(wrench), axes=((0, 1), (0, 1)))
+    return Mismatch(encoders, np.concatenate([faults, *places], axis=1))
+
+
+def _zeros(body: Body, one: RobotMotion) -> Array:
+    """Return the change (T / `_THINNED`, 6, n) of the needed wrench by one standard deviation of every encoder's zero:
+    the robot is put on its foot anew with each.
+    """
+    motion = one.fit.motion
+    every = slice(None, None, _THINNED)
+    before = predict_wrench(body, _picked(motion, every)).value
+    out = np.empty((*before.shape, one.angle.shape[1]))
+    for j in range(one.angle.shape[1]):
+        moved = np.array(one.angle)
+        moved[:, j] += _ZERO
+        after = ground(body, motion.time, moved, lean=one.grounded.lean).motion
+        out[:, :, j] = predict_wrench(body, _picked(after, every)).value - before
+    return out
+
+
+def _moved(wrench: Array) -> Array:
+    """Return the changes (T, 6, 3) of a wrench by one standard deviation of the place along x, y and of the turn."""
+    force, moment = wrench[:, :3], wrench[:, 3:]
+    out = np.zeros((len(wrench), 6, 3))
+    for k in range(2):
+        out[:, 3:, k] = cross(_PLACE * np.eye(3)[k], force)
+    up = _YAW * np.eye(3)[2]
+    out[:, :3, 2], out[:, 3:, 2] = cross(up, force), cross(up, moment)
+    return out
+
+
+def _picked(motion: Motion, pick: "slice | np.ndarray") -> Motion:
+    return Motion(motion.time[pick], motion.q[pick], motion.v[pick], motion.a[pick])

@@ -1,0 +1,1 @@
+"""What a robot's laboratory recorded: joint encoders and a force plate, each with a clock of its own."""

@@ -1,0 +1,163 @@
+"""A robot's recording: a folder of encoder tables and force plate files, paired into trials.
+
+Which table goes with which plate: recording.toml says it, else the same stem (``walk_joints.csv`` and
+``walk_plate.c3d``), else there is one of each.
+"""
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from biodance.errors import BiodanceError, FileRefused, SessionRefused, UnknownName
+from biodance.lab.read import read_head, read_trial, sniffed
+from biodance.lab.robot.encoders import ENCODER_TABLES, column_names, heading, read_encoders
+from biodance.library import read_toml
+from biodance.records import ROLES, Role, Wrench
+from biodance.records.encoders import Encoders
+from biodance.spatial import wrench_about_point
+
+_FILE = "recording.toml"
+_ENDS = re.compile(r"[_.-]?(joints?|encoders?|angles?|plates?|forces?|grf)$", re.IGNORECASE)
+_KEPT = re.compile(r"valid|unseen|kept|squat", re.IGNORECASE)
+_KEYS = {"angle_unit": str, "joints": dict, "trials": dict}
+
+
+@dataclass(frozen=True, eq=False)
+class RobotTrial:
+    """One motion: ``encoders`` on the robot's clock, ``wrench`` of all plates on theirs, about the point
+    of their surface over the lab origin, ``role`` "fit" or "validate", ``history`` what the readers decided.
+    """
+
+    name: str
+    role: Role
+    encoders: Encoders
+    wrench: Wrench
+    files: tuple[Path, Path]
+    history: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class RobotRecording:
+    """The trials of a ``folder``; ``fixed`` joints without encoder and their angle, rad."""
+
+    folder: Path
+    trials: tuple[RobotTrial, ...]
+    fixed: dict[str, float] = field(default_factory=dict)
+
+
+def read_robot_recording(folder: str | Path, joints: tuple[str, ...]) -> RobotRecording:
+    """Return what a folder holds of a robot with these ``joints`` (names of the URDF).
+
+    Raises
+    ------
+    SessionRefused
+        There is no such folder, no table of encoders or no force plate file in it, or they do not pair.
+    FileRefused
+        A file cannot be trusted.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise SessionRefused(f"{folder}: is no folder. Give the folder with the encoders and the force plate files.")
+    said = _said(folder / _FILE)
+    rename: dict[str, str] = said["joints"].get("rename", {})
+    fixed = {name: float(angle) for name, angle in said["joints"].get("fixed", {}).items()}
+    for name in (*fixed, *rename.values()):
+        if name not in joints:
+            raise UnknownName.of("joint of the robot", name, joints)
+    pairs = _told(folder, said["trials"]) or _paired(folder, set(joints) | set(rename))
+    trials = tuple(
+        _trial(name, role, *files, said.get("angle_unit", ""), rename) for name, (role, files) in pairs.items()
+    )
+    return RobotRecording(folder, trials, fixed)
+
+
+def _said(path: Path) -> dict[str, Any]:
+    """Return the content of recording.toml, checked; empty without one."""
+    content = read_toml(path) if path.is_file() else {}
+    for key, value in content.items():
+        if key not in _KEYS or not isinstance(value, _KEYS[key]):
+            raise SessionRefused(f"{path}: {key} = {value!r} is not legal; legal are angle_unit, [joints], [trials.X].")
+    strange = sorted(set(content.get("joints", {})) - {"rename", "fixed"})
+    if strange:
+        raise SessionRefused(f"{path}: [joints] {strange[0]} is no key; legal are rename and fixed.")
+    return {"joints": {}, "trials": {}, **content}
+
+
+def _told(folder: Path, trials: dict[str, Any]) -> dict[str, tuple[Role, tuple[Path, Path]]]:
+    found: dict[str, tuple[Role, tuple[Path, Path]]] = {}
+    for name, entry in trials.items():
+        if not isinstance(entry, dict) or not {"encoders", "plate"} <= set(entry) <= {"encoders", "plate", "role"}:
+            raise SessionRefused(
+                f"{folder / _FILE}: [trials.{name}] must say encoders and plate (files), and may role."
+            )
+        role = entry.get("role", _role(name))
+        if role not in ROLES:
+            raise UnknownName.of("trial role", role, ROLES)
+        if role != "skip":
+            found[name] = (cast(Role, role), (folder / entry["encoders"], folder / entry["plate"]))
+    return found
+
+
+def _role(name: str) -> Role:
+    return "validate" if _KEPT.search(name) else "fit"
+
+
+def _paired(folder: Path, joints: set[str]) -> dict[str, tuple[Role, tuple[Path, Path]]]:
+    """Return the trials of a folder without a word about them."""
+    files = sorted(path for path in folder.iterdir() if path.is_file() and not path.name.startswith("."))
+    tables = [path for path in files if path.suffix.lower() in ENCODER_TABLES and _names_joints(path, joints)]
+    plates = [path for path in files if path not in tables and path.name != _FILE and _is_recording(path)]
+    if not tables or not plates:
+        lacks = "table with encoder columns named as the robot's joints" if not tables else "force plate file"
+        raise SessionRefused(
+            f"{folder}: holds no {lacks}; there are {', '.join(path.name for path in files[:8]) or 'no files'}. A "
+            f"recording is a CSV or Parquet file of encoders and a C3D, AMTI or CSV file of the plate."
+        )
+    if len(tables) == len(plates) == 1:
+        name = _stem(tables[0])
+        return {name: (_role(name), (tables[0], plates[0]))}
+    found: dict[str, tuple[Role, tuple[Path, Path]]] = {}
+    for table in tables:
+        same = [plate for plate in plates if _stem(plate) == _stem(table)]
+        if len(same) != 1:
+            raise SessionRefused(
+                f"{folder}: which plate file belongs to {table.name}? Give both the same stem, as walk_joints.csv and "
+                f"walk_plate.c3d, or say it in {_FILE}: [trials.{_stem(table)}] encoders, plate, role."
+            )
+        found[_stem(table)] = (_role(_stem(table)), (table, same[0]))
+    return found
+
+
+def _stem(path: Path) -> str:
+    return _ENDS.sub("", path.stem) or path.stem
+
+
+def _names_joints(path: Path, joints: set[str]) -> bool:
+    return bool(joints & {heading(name) for name in column_names(path)})
+
+
+def _is_recording(path: Path) -> bool:
+    try:
+        return sniffed(path, read_head(path)) is not None or path.suffix.lower() in (".c3d", ".bsf")
+    except BiodanceError:
+        return False
+
+
+def _trial(name: str, role: Role, table: Path, plate: Path, unit: str, rename: dict[str, str]) -> RobotTrial:
+    encoders = read_encoders(table, unit=unit)
+    joints = tuple(rename.get(joint, joint) for joint in encoders.joints)
+    recorded = read_trial(plate, role=role)
+    if not recorded.plates:
+        raise FileRefused(f"{plate}: holds no force plate that can be trusted. {' '.join(recorded.warnings)}")
+    first = recorded.plates[0].wrench
+    if any(one.wrench.time.size != first.time.size for one in recorded.plates):
+        raise FileRefused(f"{plate}: its plates have different lengths. Export them at one rate.")
+    surface = np.array([0.0, 0.0, np.mean([one.height for one in recorded.plates])])
+    total = np.sum([wrench_about_point(one.wrench.value, surface) for one in recorded.plates], axis=0)
+    said = (*(text for one in recorded.plates for text in one.decisions), *recorded.history)
+    found = Encoders(encoders.time, joints, encoders.angle, encoders.notes)
+    return RobotTrial(name, role, found, Wrench(first.time, total), (table, plate), said, recorded.warnings)

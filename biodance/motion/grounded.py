@@ -1,0 +1,187 @@
+"""Where a robot is, from its joint angles alone: the foot that stands is flat on the ground and does not move, and the
+rest follows through the chain.
+
+Which foot stands: one under whose plane no part of the other sole lies. It stands until the other one goes below it;
+where the standing foot changes, the new one stays where the chain has brought it, laid flat. The frame is that of the
+first standing sole: origin in its middle, x forwards, y left, z up.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.body.body import Body
+from biodance.body.robot.likeness import sole_normal
+from biodance.errors import TrialRefused
+from biodance.lab.filters import LowPass, low_pass
+from biodance.motion.kinematics import poses
+from biodance.motion.smoothing import smooth
+from biodance.records import SIDES, Array, Motion, runs
+from biodance.records.encoders import Encoders
+
+_UNDER = 0.02
+"""Of the leg's length: how far the other sole may lie under the ground of the standing one (encoders, soft soles)."""
+_AROUND = 0.25
+"""s around a change of the standing foot that do not count: what the soles are off shows as a jump there."""
+_SHORT = 0.5
+"""s: shorter stances are looked over."""
+RATE = 100.0
+"""Hz at which motion and wrench are compared."""
+
+
+@dataclass(frozen=True, eq=False)
+class Grounded:
+    """The ``motion`` of a robot in the frame of its first standing sole, ``foot`` (T,) which stands (0 right, 1 left),
+    ``use`` (T,) where one certainly does; ``unclear`` whether angles alone leave that open at times, and ``lean`` the
+    foot that was taken to stand then (None: the one that did before).
+    """
+
+    motion: Motion
+    foot: NDArray[np.intp]
+    use: NDArray[np.bool_]
+    unclear: bool = False
+    lean: int | None = None
+
+    @property
+    def supports(self) -> tuple[tuple[str, float, float], ...]:
+        """Side that the frame hangs on, from and to, s."""
+        edges = [0, *(np.flatnonzero(np.diff(self.foot)) + 1).tolist(), self.foot.size]
+        time = self.motion.time
+        return tuple((SIDES[self.foot[a]], float(time[a]), float(time[b - 1])) for a, b in pairwise(edges))
+
+
+def even_angles(encoders: Encoders, *, rate: float = RATE) -> tuple[Array, Array]:
+    """Return times (T,) s, evenly spaced from the encoders' first, and the joint angles (T, n) rad at them.
+
+    What is faster than 0.4 times ``rate`` is taken off before, so that it does not appear as something slow.
+    """
+    own, angle = encoders.rate, encoders.angle
+    count = int((encoders.time[-1] - encoders.time[0]) * own) + 1
+    even = encoders.time[0] + np.arange(count) / own
+    angle = np.stack([np.interp(even, encoders.time, one) for one in angle.T], axis=1)
+    if own > rate:
+        angle = low_pass(angle, own, LowPass(cutoff=0.4 * rate))
+    time = encoders.time[0] + np.arange(int((even[-1] - even[0]) * rate) + 1) / rate
+    return time, np.stack([np.interp(time, even, one) for one in angle.T], axis=1)
+
+
+def ground(
+    body: Body, time: Array, angle: Array, *, settings: LowPass | None = None, lean: int | None = None
+) -> Grounded:
+    """Return the motion of ``body`` with joint ``angle`` (T, n) rad at ``time`` (T,) s, evenly spaced.
+
+    ``settings`` of the low-pass, as for people by default; ``lean`` the foot (0 right, 1 left) that stands where a
+    lifted foot is so tilted that either could, None the one that stood before.
+
+    Raises
+    ------
+    TrialRefused
+        At no time does a foot stand flat.
+    """
+    if set(body.feet) != set(SIDES):
+        raise TrialRefused(f"{body.name}: has no right and left foot, so nothing tells where it is.")
+    turn, place, height = _soles(body, angle)
+    under = _UNDER * _leg(body)
+    stands = height > -under
+    unclear = stands.all(axis=0) & (height > under).any(axis=0)
+    if lean is not None:
+        stands[1 - lean] &= ~unclear
+    foot, use = _standing(stands, float(1.0 / (time[1] - time[0])))
+    rotation, position = _chained(turn, place, foot)
+    q = np.concatenate([position, _quaternions(rotation), angle], axis=1)
+    return Grounded(smooth(body, time, q, settings=settings), foot, use, bool(unclear.any()), lean)
+
+
+def _leg(body: Body) -> float:
+    """Return the length m from root to sole at zero angles."""
+    _, place, _ = _soles(body, np.zeros((1, len(body.joints))))
+    return float(np.linalg.norm(place[0, 0]))
+
+
+def _soles(body: Body, angle: Array) -> tuple[Array, Array, Array]:
+    """Return frames of both soles in the root's, turn (2, T, 3, 3) and place (2, T, 3) m, and the ``height`` (2, T) m
+    of the other sole's lowest corner over each one's plane.
+    """
+    root = np.array([0.0, 0, 0, 0, 0, 0, 1])
+    q = np.concatenate([np.tile(root, (len(angle) + 1, 1)), np.vstack([np.zeros(angle.shape[1]), angle])], axis=1)
+    pose = poses(body, q)
+    turn, place, corners = [], [], []
+    for side in SIDES:
+        foot = body.feet[side]
+        rotation, position = pose.rotation[:, foot.segment], pose.position[:, foot.segment]
+        up = sole_normal(foot)
+        ahead = rotation[0].T @ np.array([1.0, 0.0, 0.0])
+        ahead = ahead - (ahead @ up) * up
+        ahead /= np.linalg.norm(ahead)
+        turn.append(rotation[1:] @ np.stack([ahead, np.cross(up, ahead), up], axis=1))
+        place.append(position[1:] + rotation[1:] @ foot.outline.mean(axis=0))
+        corners.append(position[1:, None] + foot.outline @ np.swapaxes(rotation[1:], 1, 2))
+    height = [np.einsum("tkj,tj->tk", corners[1 - s] - place[s][:, None], turn[s][:, :, 2]).min(axis=1) for s in (0, 1)]
+    return np.array(turn), np.array(place), np.array(height)
+
+
+def _standing(stands: NDArray[np.bool_], rate: float) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Return which foot stands (T,) and where that is certain (T,); ``stands`` (2, T) which could."""
+    if not stands.any():
+        raise TrialRefused(
+            "At no time does a foot stand flat: each sole lies under the other's plane. Are columns swapped, or signs "
+            "turned?"
+        )
+    foot, now = np.zeros(stands.shape[1], dtype=np.intp), int(np.argmax(stands.sum(axis=1)))
+    starts = np.flatnonzero(stands.any(axis=0))
+    now = int(np.argmax(stands[:, starts[0]])) if not stands[:, starts[0]].all() else now
+    for t in range(foot.size):
+        if not stands[now, t] and stands[1 - now, t]:
+            now = 1 - now
+        foot[t] = now
+    _back_to_both(foot, stands)
+    use: NDArray[np.bool_] = np.array(stands[foot, np.arange(foot.size)])
+    wide = round(_AROUND * rate)
+    for change in np.flatnonzero(np.diff(foot)):
+        use[max(0, change - wide) : change + wide + 1] = False
+    use[:wide] = use[-wide:] = False
+    for start, stop in runs(use):
+        if stop - start < _SHORT * rate:
+            use[start:stop] = False
+    return foot, use
+
+
+def _back_to_both(foot: NDArray[np.intp], stands: NDArray[np.bool_]) -> None:
+    """Move every change of the standing foot back into the middle of the time before it in which both stand."""
+    both = np.asarray(stands.all(axis=0))
+    for change in np.flatnonzero(np.diff(foot)) + 1:
+        start = change
+        while start > 0 and both[start - 1] and foot[start - 1] != foot[change]:
+            start -= 1
+        foot[(start + change) // 2 : change] = foot[change]
+
+
+def _chained(turn: Array, place: Array, foot: NDArray[np.intp]) -> tuple[Array, Array]:
+    """Return turn (T, 3, 3) and place (T, 3) m of the root in the frame of the first standing sole."""
+    rotation, position = np.empty(turn.shape[1:]), np.empty(place.shape[1:])
+    yaw, at = np.eye(3), np.zeros(3)
+    edges = [0, *(np.flatnonzero(np.diff(foot)) + 1).tolist(), foot.size]
+    for start, stop in pairwise(edges):
+        side = foot[start]
+        if start:  # the root as the foot before sees it, then the new sole from the root, laid flat
+            before = 1 - side
+            root = yaw @ turn[before, start].T
+            origin = at - root @ place[before, start]
+            at, yaw = origin + root @ place[side, start], root @ turn[side, start]
+            at, yaw = at * np.array([1.0, 1.0, 0.0]), _about_z(float(np.arctan2(yaw[1, 0], yaw[0, 0])))
+        rotation[start:stop] = yaw @ np.swapaxes(turn[side, start:stop], 1, 2)
+        position[start:stop] = at - np.einsum("tij,tj->ti", rotation[start:stop], place[side, start:stop])
+    return rotation, position
+
+
+def _about_z(angle: float) -> Array:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _quaternions(rotation: Array) -> Array:
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_matrix(rotation).as_quat())

@@ -1,0 +1,81 @@
+"""What was found of a robot, as numbers and as a page."""
+
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from biodance.body.body_file import body_text
+from biodance.pipeline.export import BODY
+from biodance.pipeline.provenance import now
+from biodance.pipeline.robot import MatchedTrial, RobotResult
+from biodance.report.documents.diagnosis import attention_document, judged_document
+from biodance.report.documents.identification import identification_document
+from biodance.report.documents.session import plain_values, to_text
+from biodance.report.pages.identification import identification_section
+from biodance.report.write import PAGE, write_files
+from biodance.version import __version__
+
+
+def robot_document(result: RobotResult) -> dict[str, Any]:
+    """Return all that was found: as of a person (`identification_document`; "table" is the URDF), and how plate and
+    encoders were brought together.
+
+    CoM and inertia in the axes of the links of the URDF; of the root turned to x forwards, y up, z right.
+    ``well_known_every_frame_independent`` counts base parameters as the paper does.
+    """
+    found = identification_document(result.identified)
+    found["base_parameters"]["well_known_every_frame_independent"] = len(result.alone.well_known)
+    return {
+        "recording": result.recording.folder.name,
+        "robot": {"name": result.body.name, "urdf": result.urdf.name, "joints": len(result.body.joints)},
+        "attention": attention_document(result.attention),
+        "judged": judged_document(result.judged),
+        **found,
+        "matched": [_matched(one) for one in result.trials],
+        "provenance": {"created": now(), "versions": {"biodance": __version__}},
+    }
+
+
+def _matched(one: MatchedTrial) -> dict[str, Any]:
+    return {
+        "trial": one.recorded.name,
+        "role": one.recorded.role,
+        "encoders": one.recorded.files[0].name,
+        "plate": one.recorded.files[1].name,
+        "encoders_hz": one.recorded.encoders.rate,
+        "plate_hz": one.recorded.wrench.rate,
+        "delay_s": one.plate.delay,
+        "place_m": one.plate.place,
+        "yaw_rad": one.plate.yaw,
+        "correlation": one.plate.correlation,
+        "scale": one.plate.scale,
+        "surprise": one.surprise,
+        "standing": [{"foot": f, "start_s": a, "end_s": b} for f, a, b in one.motion.grounded.supports],
+        "history": one.recorded.history,
+    }
+
+
+def write_robot(result: RobotResult, folder: Path) -> dict[str, Any]:
+    """Write ``report.html``, ``results.json`` and, where a body was found, ``body.json``; return the numbers."""
+    numbers = robot_document(result)
+    content = {"results.json": to_text(numbers), PAGE: _page(result, numbers)}
+    done = result.identified.identification
+    if done.status == "solved":
+        content[BODY] = body_text(done.identified, f"Recording {result.recording.folder.name} of {result.body.name}.")
+    write_files(folder, content)
+    return dict(plain_values(numbers))
+
+
+def _page(result: RobotResult, numbers: dict[str, Any]) -> str:
+    from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
+
+    folder = files("biodance.report") / "templates"
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    return environment.from_string((folder / "robot.html.j2").read_text(encoding="utf-8")).render(
+        style=Markup((folder / "page.css").read_text(encoding="utf-8")),
+        name=result.body.name,
+        numbers=numbers,
+        version=__version__,
+        section=Markup(identification_section(result.identified)),
+    )

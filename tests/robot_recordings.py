@@ -1,0 +1,78 @@
+"""A robot on its left foot, moving every joint: angles made up, wrench by pinocchio's inverse dynamics of a robot whose
+masses are not those of the drawing.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from biodance.body.body import Body
+from biodance.body.export import write_model
+from biodance.body.robot.hoap3 import hoap3
+from biodance.records import Array, Sip
+from biodance.virtual_lab.robot_recording import RobotLab, write_robot_trial
+
+FEET = ("right_foot", "left_foot")
+RATE = 200.0
+SOLE_OVER_ANKLE = -0.040
+LIFTED = {"right_hip_pitch": -0.6, "right_knee_pitch": 1.2, "right_ankle_pitch": -0.6}
+COVER = 0.4
+"""kg taken off the trunk."""
+
+
+def drawing(folder: Path) -> Path:
+    """Write the drawing of HOAP-3 as URDF."""
+    folder.mkdir(parents=True, exist_ok=True)
+    write_model(hoap3(), folder / "hoap3.urdf", format="urdf")
+    return folder / "hoap3.urdf"
+
+
+def real_robot() -> Body:
+    """Return the robot without a cover: 0.4 kg less at the trunk's centre, its inertia in proportion."""
+    body = hoap3()
+    phi, i = np.array(body.sip.phi), body.segment_index("trunk_head")
+    phi[10 * i : 10 * i + 10] *= 1 - COVER / phi[10 * i]
+    return replace(body, sip=Sip(body.segments, phi, body.sip.covariance))
+
+
+def danced(body: Body, seed: int, seconds: float) -> tuple[Array, Array, Array]:
+    """Return times (T,) s, angles (T, n) rad and the ground's wrench (T, 6) about the middle of nothing but the origin
+    under the left ankle.
+    """
+    rng, time = np.random.default_rng(seed), np.arange(0, seconds, 1 / RATE)
+    names = [joint.name for joint in body.joints]
+    low, high = body.limits.lower, body.limits.upper
+    centre = np.clip([LIFTED.get(name, 0.0) for name in names], low + 0.25, high - 0.25)
+    size = np.minimum(0.22, np.minimum(centre - low, high - centre))
+    phase, rhythm = rng.uniform(0, 2 * np.pi, (2, 21)), rng.uniform(0.25, 0.7, (2, 21))
+    waves = 0.6 * np.sin(2 * np.pi * rhythm[0] * time[:, None] + phase[0])
+    angle = centre + size * (waves + 0.4 * np.sin(2 * np.pi * rhythm[1] * time[:, None] + phase[1]))
+    model, ankle = body.model, body.segment_joint[body.feet["left"].segment] + 2
+    data = model.createData()
+    planted = pin.SE3(np.array([[0.0, 0, 1], [0, -1, 0], [1, 0, 0]]), np.array([0.0, 0.0, -SOLE_OVER_ANKLE]))
+    q = np.empty((len(time), model.nq))
+    for t, one in enumerate(angle):
+        rest = np.concatenate([[0.0, 0, 0, 0, 0, 0, 1], one])
+        pin.forwardKinematics(model, data, rest)
+        root = planted * data.oMi[ankle].inverse()
+        q[t] = np.concatenate([pin.SE3ToXYZQUAT(root), one])
+    v = np.array([pin.difference(model, a, b) for a, b in zip(q[:-2], q[2:], strict=True)]) * RATE / 2
+    a = np.gradient(v, 1 / RATE, axis=0)
+    out = []
+    for now, rate, change in zip(q[1:-1], v, a, strict=True):
+        force = pin.Force(pin.rnea(model, data, now, rate, change)[:6])
+        out.append(pin.XYZQUATToSE3(now[:7]).act(force).vector)
+    return time[1:-1], angle[1:-1], np.array(out)
+
+
+def recorded(
+    folder: Path, *, seed: int = 0, seconds: float = 11.0, lab: RobotLab | None = None, name: str = "run"
+) -> Path:
+    """Write a recording and return its folder."""
+    body = real_robot()
+    time, angle, wrench = danced(body, seed, seconds)
+    names = tuple(joint.name for joint in body.joints)
+    write_robot_trial(folder, name, names, time, angle, wrench, lab=lab or RobotLab(), seed=seed)
+    return folder

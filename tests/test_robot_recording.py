@@ -1,0 +1,159 @@
+"""A robot's recording through the front door: masses of a truth made by pinocchio, and bad recordings in a sentence."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from robot_recordings import COVER, FEET, drawing, real_robot, recorded
+
+from biodance.body.robot.urdf import read_urdf
+from biodance.cli import run
+from biodance.errors import BiodanceError
+from biodance.lab.robot.recording import read_robot_recording
+from biodance.motion.clocks import PlateFit, fit_plate, from_plate, onto_plate
+from biodance.pipeline.robot import MatchedTrial, bring_together, identify_robot, told_of
+from biodance.records import Wrench
+from biodance.records.attention import Attention
+from biodance.virtual_lab.robot_recording import RobotLab
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("robot")
+    drawing(folder)
+    recorded(folder / "good")
+    return folder
+
+
+def table(source: Path, target: Path, change) -> Path:  # type: ignore[no-untyped-def]
+    """Copy a recording with another table of encoders."""
+    target.mkdir()
+    (target / "run_plate.c3d").write_bytes((source / "run_plate.c3d").read_bytes())
+    frame = change(pd.read_csv(source / "run_joints.csv"))
+    frame.to_csv(target / "run_joints.csv", index=False)
+    return target
+
+
+def refused(folder: Path, place: Path) -> str:
+    """Return the sentence with which a recording is refused."""
+    with pytest.raises(BiodanceError) as told:
+        identify_robot(folder, urdf=place / "hoap3.urdf", feet=FEET)
+    return str(told.value)
+
+
+def matched(folder: Path, place: Path) -> tuple[MatchedTrial, list[Attention]]:
+    """Return the one trial of a recording, brought together, and what is told of it."""
+    body = read_urdf(place / "hoap3.urdf", feet=FEET)
+    trials, lost = bring_together(body, read_robot_recording(folder, tuple(joint.name for joint in body.joints)))
+    assert not lost
+    return trials[0], told_of(trials)
+
+
+def test_a_missing_cover_is_found_from_files_alone(
+    place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked = ["identify", str(place / "good"), "--urdf", str(place / "hoap3.urdf"), "--feet", ",".join(FEET)]
+    assert run([*asked, "--out", str(tmp_path / "out"), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    truth = real_robot().sip
+    rows = found["segments"]
+    assert [row["name"] for row in rows] == list(truth.segments)
+    mass = np.array([row["mass_kg"] for row in rows])
+    sd = np.array([row["mass_sd_kg"] for row in rows])
+    drawn = np.array([row["mass_prior_kg"] for row in rows])
+    assert drawn.sum() - mass.sum() == pytest.approx(COVER, abs=0.1)
+    trunk = truth.segments.index("trunk_head")
+    assert abs(mass - truth.mass)[trunk] < 0.25 * COVER
+    assert (abs(mass - truth.mass) < 2 * sd).all()
+    (one,) = found["validation"]
+    assert one["identified"]["rms"][2] < 0.3 < 3 < one["table"]["rms"][2]
+    assert max(one["identified"]["rms"][:3]) < 2
+    assert max(one["identified"]["rms"][3:]) < 1
+    (match,) = found["matched"]
+    assert match["delay_s"] == pytest.approx(RobotLab().ahead, abs=0.01)
+    assert match["yaw_rad"] == pytest.approx(RobotLab().yaw, abs=0.02)
+    assert [stance["foot"] for stance in match["standing"]] == ["left"]
+    assert found["added_mass"] is None
+    assert any("less than drawn" in said["text"] for said in found["attention"])
+    assert "7.94 kg" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_time_and_place_of_a_plate_follow_from_the_path_alone() -> None:
+    rng, time = np.random.default_rng(3), np.arange(0, 12, 0.01)
+    path = np.cumsum(rng.normal(size=(2, time.size)), axis=1) * 0.002
+    wrench = np.zeros((time.size, 6))
+    wrench[:, 2] = 80.0
+    wrench[:, 3], wrench[:, 4] = 80 * path[1], -80 * path[0]
+    truth = PlateFit(-2.5, (0.3, -0.1), 0.8, 1.0, 1.0)
+    seen = Wrench(time + truth.delay, onto_plate(wrench, truth))
+    np.testing.assert_allclose(from_plate(seen.value, truth.place, truth.yaw), wrench, atol=1e-12)
+    some = np.ones(time.size, dtype=bool)
+    some[300:420] = False
+    found = fit_plate(Wrench(time, wrench), seen, some)
+    assert found.correlation == pytest.approx(1, abs=1e-9)
+    assert (found.delay, found.yaw, found.scale) == pytest.approx((truth.delay, truth.yaw, 1.0), abs=1e-4)
+    assert found.place == pytest.approx(truth.place, abs=1e-9)
+
+
+def test_clocks_apart_by_seconds_are_brought_together_and_said(place: Path, tmp_path: Path) -> None:
+    folder = table(
+        place / "good", tmp_path / "late", lambda frame: frame.assign(**{"time (s)": frame["time (s)"] + 7.25})
+    )
+    one, told = matched(folder, place)
+    assert one.plate.delay == pytest.approx(RobotLab().ahead - 7.25, abs=0.01)
+    (clocks,) = (said for said in told if said.about == "time_delay")
+    assert clocks.level == "warn"
+    assert "at t -6.88" in clocks.text
+
+
+def test_a_missing_encoder_is_named_and_a_still_joint_may_be_declared(place: Path, tmp_path: Path) -> None:
+    folder = table(place / "good", tmp_path / "lost", lambda frame: frame.drop(columns="left_elbow_pitch (rad)"))
+    assert "no encoder for the joint left_elbow_pitch" in refused(folder, place)
+    assert "fixed = {left_elbow_pitch" in refused(folder, place)
+    (folder / "recording.toml").write_text("[joints]\nfixed = {left_elbow_pitch = -0.3}\n")
+    _, told = matched(folder, place)
+    assert any("Taken as not moving: left_elbow_pitch" in said.text for said in told)
+
+
+def test_degrees_are_refused_unless_said(place: Path, tmp_path: Path) -> None:
+    def turned(frame: pd.DataFrame) -> pd.DataFrame:
+        angles = frame.columns[1:]
+        frame[angles] = np.degrees(frame[angles])
+        return frame.rename(columns=lambda name: name.replace(" (rad)", ""))
+
+    folder = table(place / "good", tmp_path / "degrees", turned)
+    assert "In degrees?" in refused(folder, place)
+    (folder / "recording.toml").write_text('angle_unit = "deg"\n')
+    _, told = matched(folder, place)
+    assert any("converted from degrees" in said.text for said in told)
+
+
+def test_exchanged_columns_are_named(place: Path, tmp_path: Path) -> None:
+    pair = ("right_hip_pitch", "left_hip_pitch")
+    one, other = (f"{name} (rad)" for name in pair)
+    folder = table(place / "good", tmp_path / "swapped", lambda frame: frame.rename(columns={one: other, other: one}))
+    said = refused(folder, place)
+    assert "exchanged" in said
+    assert pair[0] in said
+    assert pair[1] in said
+
+
+def test_a_plate_of_another_motion_is_refused(place: Path, tmp_path: Path) -> None:
+    other = recorded(tmp_path / "other", seed=8)
+    (other / "run_joints.csv").write_bytes((place / "good" / "run_joints.csv").read_bytes())
+    assert "is not the plate of this motion" in refused(other, place)
+
+
+def test_folders_that_are_no_recording_say_what_one_is(place: Path, tmp_path: Path) -> None:
+    assert "is no folder" in refused(tmp_path / "nowhere", place)
+    (tmp_path / "notes.txt").write_text("nothing")
+    assert "no table with encoder columns" in refused(tmp_path, place)
+    (tmp_path / "recording.toml").write_text("speed = 3\n")
+    assert "speed = 3 is not legal" in refused(tmp_path, place)
+
+
+def test_a_robot_needs_both_options(place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["identify", str(place / "good"), "--feet", "a,b", "--out", str(tmp_path / "out")]) == 2
+    assert "both --urdf FILE and --feet" in capsys.readouterr().err
