@@ -7,10 +7,10 @@ import time
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from biodance.batch.work import OUTCOME, Outcome, SessionStatus, Task, outcome_of, process_session
+from biodance.batch.work import OUTCOME, Outcome, SessionStatus, SessionTask, outcome_of, process_session
 
 
-def count(task: Task) -> Outcome:
+def count(task: SessionTask) -> Outcome:
     """Write down who worked on a session, and its outcome; nothing else."""
     if found := outcome_of(task):
         return found
@@ -22,14 +22,14 @@ def count(task: Task) -> Outcome:
     return outcome
 
 
-def die_in_s2(task: Task) -> Outcome:
+def die_in_s2(task: SessionTask) -> Outcome:
     """Be killed in session s2, each time."""
     if task.name == "s2":
         os.kill(os.getpid(), signal.SIGKILL)
     return count(task)
 
 
-def die_once(task: Task) -> Outcome:
+def die_once(task: SessionTask) -> Outcome:
     """Be killed in every session at the first try."""
     mark = Path(task.session) / "tried"
     if not mark.exists():
@@ -38,7 +38,7 @@ def die_once(task: Task) -> Outcome:
     return count(task)
 
 
-def slow(task: Task) -> Outcome:
+def slow(task: SessionTask) -> Outcome:
     """Go through a session that is refused, then wait to be killed with the one that asked."""
     if (found := outcome_of(task)) is None:
         found = process_session(replace(task, pages=False))

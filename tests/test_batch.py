@@ -15,10 +15,10 @@ import pytest
 
 import biodance
 from biodance.batch.ledger import LEDGER, Ledger
-from biodance.batch.rows import COLUMNS
+from biodance.batch.rows import ROW_TYPES
 from biodance.batch.run import run_batch
-from biodance.batch.summary import outliers, table_of
-from biodance.batch.work import Outcome, SessionStatus, Task, process_session
+from biodance.batch.summary import outliers, summary_table
+from biodance.batch.work import Outcome, SessionStatus, SessionTask, process_session
 from biodance.cli import run
 from biodance.errors import BiodanceError
 
@@ -38,7 +38,7 @@ def worked(archive: Path) -> dict[str, int]:
 
 def test_every_session_once_and_a_second_call_does_nothing(tmp_path: Path) -> None:
     archive = archive_of(tmp_path / "a", 6)
-    tasks = [Task(f"s{k}", str(archive / f"s{k}"), "", "f") for k in range(6)]
+    tasks = [SessionTask(f"s{k}", str(archive / f"s{k}"), "", "f") for k in range(6)]
     first = run_batch(archive, tmp_path / "out", workers=2, work=process_session, pages=False)
     assert (first.fresh, first.counts) == (6, {"refused": 6})
     assert len(tasks) == len(first.outcomes)
@@ -124,7 +124,7 @@ def test_a_folder_that_is_taken_is_refused(tmp_path: Path) -> None:
 def test_a_session_that_takes_too_long_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("biodance.batch.work._examined", lambda *_: time.sleep(20))
     session = archive_of(tmp_path / "a", 1) / "s0"
-    found = process_session(Task("s0", str(session), str(tmp_path / "out" / "s0"), "f", limit=0.2))
+    found = process_session(SessionTask("s0", str(session), str(tmp_path / "out" / "s0"), "f", limit=0.2))
     assert (found.status, found.reason) == ("failed", "Given up after 0 s; see --limit.")
     assert "Given up" in (tmp_path / "out" / "s0" / "log.txt").read_text()
 
@@ -139,7 +139,7 @@ def test_real_sessions_end_in_tables_and_on_a_page(tmp_path: Path, capsys: pytes
     assert (found["sessions"], found["fresh"]) == (2, 2)
     assert [one["session"] for one in found["not_done"]] == ["s0"]
     table = pd.read_parquet(out / "summary.parquet")
-    assert list(table.columns) == list(COLUMNS)
+    assert list(table.columns) == list(ROW_TYPES)
     good = table[table["session"] == "good"]
     assert good["declared_mass_kg"].to_numpy() == pytest.approx(61.0, abs=2.0)
     assert good["mass_difference_percent"].abs().max() < 2.0
@@ -158,9 +158,9 @@ def test_what_stands_out_is_measured_by_the_archive_itself() -> None:
         return Outcome(name, "f", SessionStatus.DONE, rows=(row,))
 
     usual = [session(f"s{k}", 0.1 * (-1) ** k) for k in range(9)]
-    (strange,) = outliers(table_of([*usual, session("odd", 2.4)]))
+    (strange,) = outliers(summary_table([*usual, session("odd", 2.4)]))
     assert (strange["session"], strange["value"]) == ("odd", "2.4 %")
-    assert outliers(table_of([*usual[:6], session("odd", 2.4)])) == []
+    assert outliers(summary_table([*usual[:6], session("odd", 2.4)])) == []
 
 
 def test_a_cluster_that_exists_is_used(tmp_path: Path) -> None:

@@ -163,13 +163,18 @@ def test_real_standing_is_not_accused_of_a_plate_fault(
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", ["HC030A", "HC032A"])
 @pytest.mark.parametrize("text", ["plate_gain:target=plate1:Fz,gain=0.08", "plate_offset:target=plate1:Fz,offset=30"])
-def test_a_fault_written_into_real_standing_alarms_and_gets_no_name(
+def test_a_fault_written_into_real_standing_is_told_as_what_weighing_can_see(
     name: str, text: str, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Standing shows nothing but weights: something is wrong, and no cause can be told."""
+    """Standing shows nothing but weights: a wrong mass, a gain or an offset, and which of them it cannot tell."""
     diagnosis = found(standing(data, tmp_path / "faulty", name, text), monkeypatch, without=("labels_swapped",))
-    assert diagnosis.verdict == "unexplained"
-    assert not diagnosis.findings
+    assert diagnosis.verdict == "named, incomplete"
+    (finding,) = diagnosis.findings
+    names = {one.effect for one in finding.set}
+    assert {"body_mass", "plate_gain"} <= names <= {"body_mass", "plate_gain", "plate_offset"}
+    static = read_session(data / "biomechzoo" / name)
+    weight = {"plate_gain": 0.08 * static.subject.mass, "plate_offset": 30 / 9.81}[text.partition(":")[0]]
+    assert finding.parameters[0].value == pytest.approx(weight, abs=2.5 * finding.parameters[0].sd)
     assert diagnosis.doubt == "standing alone tells no cause"
 
 

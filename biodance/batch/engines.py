@@ -8,17 +8,17 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 
-from biodance.batch.work import Outcome, SessionStatus, Task, untold
+from biodance.batch.work import Outcome, SessionStatus, SessionTask, untold
 from biodance.errors import BiodanceError
 
-Work = Callable[[Task], Outcome]
+Work = Callable[[SessionTask], Outcome]
 TRIES = 3
 """Times that a session may lose its process before it is given up."""
 _FRESH = 50
 """Sessions after which a process is replaced, so that memory stays flat."""
 
 
-def run_here(tasks: Iterable[Task], work: Work, *, workers: int) -> Iterator[tuple[Task, Outcome]]:
+def run_here(tasks: Iterable[SessionTask], work: Work, *, workers: int) -> Iterator[tuple[SessionTask, Outcome]]:
     """Yield every task with its outcome, worked on by processes of this machine, as they are finished.
 
     A process that dies (killed, out of memory) is replaced; the sessions that may have been its cause are tried again
@@ -26,7 +26,7 @@ def run_here(tasks: Iterable[Task], work: Work, *, workers: int) -> Iterator[tup
     """
     waiting, lost = deque(tasks), Counter[str]()
     while waiting:
-        pool, flying = _pool(workers), dict[Future[Outcome], Task]()
+        pool, flying = _pool(workers), dict[Future[Outcome], SessionTask]()
         try:
             yield from _until_broken(pool, work, workers, waiting, flying, lost)
         except BrokenProcessPool:
@@ -45,10 +45,10 @@ def _until_broken(
     pool: ProcessPoolExecutor,
     work: Work,
     workers: int,
-    waiting: deque[Task],
-    flying: dict[Future[Outcome], Task],
+    waiting: deque[SessionTask],
+    flying: dict[Future[Outcome], SessionTask],
     lost: Counter[str],
-) -> Iterator[tuple[Task, Outcome]]:
+) -> Iterator[tuple[SessionTask, Outcome]]:
     """Yield what is finished until all is, or until a process dies: then ``flying`` are the tasks that may be why.
 
     A task that lost a process before is worked on alone.
@@ -63,12 +63,12 @@ def _until_broken(
             yield flying.pop(future), outcome
 
 
-def _together(task: Task, flying: dict[Future[Outcome], Task], workers: int, lost: Counter[str]) -> bool:
+def _together(task: SessionTask, flying: dict[Future[Outcome], SessionTask], workers: int, lost: Counter[str]) -> bool:
     """Return whether a task may be worked on beside those that are."""
     return len(flying) < workers and not any(lost[one.name] for one in (task, *flying.values()))
 
 
-def _killed(task: Task) -> Outcome:
+def _killed(task: SessionTask) -> Outcome:
     """Return the outcome of a session that nobody survives."""
     why = f"Its process was ended from outside {TRIES} times (memory?). Report it alone to see why."
     return untold(task.name, task.fingerprint, SessionStatus.FAILED, why)
@@ -93,7 +93,7 @@ def end_with_parent() -> None:
         threading.Thread(target=watch, daemon=True).start()
 
 
-def run_on_dask(tasks: Iterable[Task], work: Work, *, scheduler: str) -> Iterator[tuple[Task, Outcome]]:
+def run_on_dask(tasks: Iterable[SessionTask], work: Work, *, scheduler: str) -> Iterator[tuple[SessionTask, Outcome]]:
     """Yield every task with its outcome, worked on by the Dask cluster at the address ``scheduler``.
 
     Recordings and results must lie where all workers see them under the same names. Dask replaces workers that die.

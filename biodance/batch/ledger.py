@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
 
-from biodance.batch.work import Outcome, SessionStatus, Task, untold
+from biodance.batch.work import Outcome, SessionStatus, SessionTask, untold
 from biodance.errors import BiodanceError
 
 LEDGER = "ledger.sqlite"
@@ -66,7 +66,7 @@ class Ledger:
             self.close()
             raise BiodanceError(f"{folder}: holds the results of another archive ({owner}). Choose another --out.")
 
-    def open_tasks(self, tasks: Iterable[Task]) -> list[Task]:
+    def open_tasks(self, tasks: Iterable[SessionTask]) -> list[SessionTask]:
         """Return the tasks that are not written down as done with the recordings as they are now."""
         known = dict(self._book.execute("SELECT name, fingerprint FROM sessions"))
         return [task for task in tasks if known.get(task.name) != task.fingerprint]
@@ -77,7 +77,7 @@ class Ledger:
         with self._book:
             self._book.execute(_WRITE, (one.name, one.fingerprint, one.status, one.reason, one.seconds, one.memory_mb))
 
-    def told(self, task: Task) -> Outcome | None:
+    def told(self, task: SessionTask) -> Outcome | None:
         """Return what is written down of a session that has no folder of its own (its process died each time)."""
         query = "SELECT fingerprint, status, reason FROM sessions WHERE name = ?"
         row = self._book.execute(query, (task.name,)).fetchone()

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-COLUMNS: dict[str, str] = {
+ROW_TYPES: dict[str, str] = {
     "session": "string",
     "trial": "string",
     "role": "string",

@@ -13,7 +13,7 @@ from biodance.batch.summary import write_summary
 from biodance.batch.work import (
     Outcome,
     SessionStatus,
-    Task,
+    SessionTask,
     fingerprint_of,
     outcome_of,
     process_session,
@@ -116,7 +116,7 @@ def run_batch(
     sessions, indices = archive_folders(archive)
     inside = folder.resolve()
     tasks = [
-        Task(name, str(path), str(folder / SESSIONS / name), fingerprint_of(path, chosen), chosen, pages, limit)
+        SessionTask(name, str(path), str(folder / SESSIONS / name), fingerprint_of(path, chosen), chosen, pages, limit)
         for path in sessions
         if inside not in (path.resolve(), *path.resolve().parents)
         for name in [_name(path, archive)]
@@ -134,7 +134,7 @@ def run_batch(
 
 
 def _work_off(
-    tasks: list[Task],
+    tasks: list[SessionTask],
     ledger: Ledger,
     workers: int | None,
     scheduler: str | None,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from biodance.batch.rows import COLUMNS
+from biodance.batch.rows import ROW_TYPES
 from biodance.batch.work import Outcome
 from biodance.display import BLUE, RED
 
@@ -25,7 +25,7 @@ _KEY = {
 }
 
 
-def table_of(outcomes: Sequence[Outcome]) -> "pd.DataFrame":
+def summary_table(outcomes: Sequence[Outcome]) -> "pd.DataFrame":
     """Return one row for each trial of every session; a session that was not read has one row with its reason."""
     import pandas as pd
 
@@ -41,14 +41,14 @@ def table_of(outcomes: Sequence[Outcome]) -> "pd.DataFrame":
         for one in outcomes
         for row in (one.rows or ({"trial": "", "status": one.status, "reason": one.reason},))
     ]
-    return pd.DataFrame(rows, columns=list(COLUMNS)).astype(COLUMNS)
+    return pd.DataFrame(rows, columns=list(ROW_TYPES)).astype(ROW_TYPES)
 
 
 def write_summary(folder: Path, name: str, outcomes: Sequence[Outcome], left_out: Sequence[str] = ()) -> None:
     """Write ``summary.parquet``, ``summary.csv`` and ``report.html`` of an archive into ``folder``; an earlier summary
     is replaced whole.
     """
-    table = table_of(outcomes)
+    table = summary_table(outcomes)
     parquet, text = folder / ".summary.parquet.part", folder / ".summary.csv.part"
     table.to_parquet(parquet, index=False)
     table.to_csv(text, index=False, lineterminator="\n")

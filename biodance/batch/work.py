@@ -36,7 +36,7 @@ class SessionStatus(StrEnum):
 
 
 @dataclass(frozen=True)
-class Task:
+class SessionTask:
     """One session to go through.
 
     Parameters
@@ -71,7 +71,7 @@ class Outcome:
     Parameters
     ----------
     name, fingerprint : str
-        Of its `Task`.
+        Of its `SessionTask`.
     status : SessionStatus
         What became of it.
     reason : str
@@ -111,7 +111,7 @@ def fingerprint_of(session: Path, chosen: tuple[str, ...]) -> str:
     return seen.hexdigest()[:24]
 
 
-def outcome_of(task: Task) -> Outcome | None:
+def outcome_of(task: SessionTask) -> Outcome | None:
     """Return what became of a session in this or an earlier run; None where it is not done as it is now."""
     try:
         found = json.loads((Path(task.out) / OUTCOME).read_text(encoding="utf-8"))
@@ -121,7 +121,7 @@ def outcome_of(task: Task) -> Outcome | None:
     return outcome if outcome.fingerprint == task.fingerprint else None
 
 
-def process_session(task: Task) -> Outcome:
+def process_session(task: SessionTask) -> Outcome:
     """Go through one session and return what became of it; nothing but a signal gets out of here.
 
     All is written beside and put in place at once, so that a killed process leaves nothing half done. A session that
@@ -149,7 +149,7 @@ def process_session(task: Task) -> Outcome:
     return outcome
 
 
-def _attempt(task: Task, folder: Path, tell: Callable[[str], None]) -> tuple[SessionStatus, str, Rows]:
+def _attempt(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> tuple[SessionStatus, str, Rows]:
     """Return status, reason and rows of a session; what is raised becomes a status."""
     try:
         with _limited(task.limit):
@@ -169,7 +169,7 @@ def _attempt(task: Task, folder: Path, tell: Callable[[str], None]) -> tuple[Ses
     return status, reason, ({"trial": "", "status": str(status), "reason": reason},)
 
 
-def _examined(task: Task, folder: Path, tell: Callable[[str], None]) -> tuple[SessionStatus, str, Rows]:
+def _examined(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> tuple[SessionStatus, str, Rows]:
     """Return status, reason and rows of a session that goes through."""
     from biodance.batch.rows import rows_of
     from biodance.lab.session.read import read_session

@@ -128,11 +128,11 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
         text = f"Nothing wrong in what could be judged ({rests_on}){beside}." if beside or one.doubt else (
             f"Nothing wrong was found in {rests_on}. Faults below the sizes that it could have seen stay unseen."
         )  # fmt: skip
-    elif not one.adequacy:
-        level, where = "warn", f" in {rests_on}: no movement could be compared with a body" if rests_on else ""
-        text = f"Cannot tell whether anything is wrong{where or ': nothing could be judged'}{beside}.{_heard(one)}"
     elif one.doubt.startswith(_FITS):
         level, text = "warn", f"Cannot tell whether anything is wrong in {rests_on}: {one.doubt}{beside}."
+    elif not (one.adequacy and rests_on):
+        level, where = "warn", f" in {rests_on}: no movement could be compared with a body" if rests_on else ""
+        text = f"Cannot tell whether anything is wrong{where or ': nothing could be judged'}{beside}.{_heard(one)}"
     elif one.doubt:
         level = "warn"
         text = f"Cannot tell whether anything is wrong in {rests_on}: {_where(one)}, but {one.doubt}{beside}."

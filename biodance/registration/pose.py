@@ -116,7 +116,7 @@ def forces_of(trial: Trial, settings: Settings) -> Forces:
     return Forces(trial.plates, time[::step], value, spline, trial.source.format not in _UNSIZED)
 
 
-def placed(trial: Trial, motion: Motion, forces: Forces, pose: FramePose) -> tuple[Trial, Motion]:
+def with_forces_at(trial: Trial, motion: Motion, forces: Forces, pose: FramePose) -> tuple[Trial, Motion]:
     """Return a prepared trial with the plates in the room at the times of ``motion``, and the motion, both cut to the
     time that the force file knows.
 

@@ -18,7 +18,7 @@ from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion, Trial, runs
 from biodance.registration.by_feet import feet_pull
 from biodance.registration.by_wrench import wrench_pull
-from biodance.registration.pose import Forces, FramePose, placed
+from biodance.registration.pose import Forces, FramePose, with_forces_at
 from biodance.registration.pull import PoseEvidence, together
 from biodance.registration.steps import plate_steps
 from biodance.spatial import quaternion_matrix, zero_moment_point
@@ -149,7 +149,7 @@ def _look(body: Body, trial: Trial, motion: Motion, forces: Forces, pose: FrameP
     """Return the trial under a pose with the frames that are fully measured, the soles, and the mean centre of
     pressure.
     """
-    there, cut = placed(trial, motion, forces, pose)
+    there, cut = with_forces_at(trial, motion, forces, pose)
     soles = soles_from_body(body, cut)
     look = Look(there, cut, np.zeros(cut.time.size, dtype=bool), 0.0, 1.0)
     measured = _contact(body, look, soles).measured if forces.sized else _carried(body, look)

@@ -109,7 +109,7 @@ def _step(
     away = place - at[0]
     phase = (time - time[0]) / (time[-1] - time[0])
     ahead, beside = (np.einsum("ti,ti->t", away, axis) for axis in (forwards, outwards))
-    onset = time[0] - heel_strike(frames, heel[:, 2], time[0], float(time.mean()))
+    onset = time[0] - _heel_strike(frames, heel[:, 2], time[0], float(time.mean()))
     known = np.isfinite(ahead)
     phase, place, forwards, outwards, ahead, beside = (
         x[known] for x in (phase, place, forwards, outwards, ahead, beside)
@@ -118,7 +118,7 @@ def _step(
     return PlateStep(number, SIDES[foot], phase, place, forwards, outwards, ahead, beside, length, onset)
 
 
-def heel_strike(time: Array, height: Array, near: float, middle: float) -> float:
+def _heel_strike(time: Array, height: Array, near: float, middle: float) -> float:
     """Return the time s at which a heel marker's upward acceleration peaks within 0.08 s of ``near``, close to the
     ground (its ``height`` at ``middle`` s + 20 mm); NaN where no peak shows it.
     """

@@ -46,7 +46,7 @@ def write_report(
 
 def write_subject_page(result: SessionResult, folder: Path, *, diagnosis: SessionDiagnosis | None = None) -> Path:
     """Write ``subject.html``, the page for the person who was measured, into ``folder`` and return its path."""
-    _write(folder, {SUBJECT_PAGE: subject_page(account_for(result, diagnosis))})
+    write_files(folder, {SUBJECT_PAGE: subject_page(account_for(result, diagnosis))})
     return folder / SUBJECT_PAGE
 
 

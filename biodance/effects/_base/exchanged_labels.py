@@ -25,6 +25,8 @@ _FAR_AWAY = 1.0
 """m between first and last frame that a person walks at least."""
 _MISFIT = 0.003
 """m: distances within a rigid group that differ so much (RMS) between static and trial are not those of one group."""
+_ARM = ("ELB", "FIN")
+"""Markers whose distance from those of the wrist changes least with the posture."""
 _BETTER = 0.4
 """Share of the misfit that the right names leave at most, and share of what the next best names leave."""
 
@@ -49,6 +51,7 @@ def exchanged_pairs(trial: Trial, static: Trial | None, known: frozenset[Pair]) 
         alone |= {*turned_wrists(markers, moves=trial.role != "static")}
     if static is None or static.markers is None or static is trial or not trial.marker_set:
         return frozenset(alone)
+    alone = {pair for pair in alone if pair in known or not _farther(markers, static.markers, pair)}
     marker_set = read_marker_set(trial.marker_set)
     for group in rigid_groups(markers, marker_set):
         swaps = other_names(markers, static.markers, group)
@@ -104,6 +107,20 @@ def turned_wrists(markers: Markers, *, moves: bool) -> tuple[Pair, ...]:
     if out["L"] @ out["R"] < _OPPOSITE and not wrong:
         wrong = {min(out, key=lambda side: float(out[side][:2].sum()))}
     return tuple((f"{side}WRA", f"{side}WRB") for side in sorted(wrong))
+
+
+def _farther(markers: Markers, static: Markers, pair: Pair) -> bool:
+    """Return whether exchanging the two markers of one wrist takes them away from where the static trial has them
+    beside elbow and finger: then the hand was turned, not the names.
+    """
+    side = pair[0][:1]
+    if pair[1][:1] != side:
+        return False
+    beside = [side + name for name in _ARM if side + name in markers.names and side + name in static.names]
+    if not beside or any(name not in static.names for name in pair):
+        return False
+    was, here = (_distances(one, (*pair, *beside))[:2, 2:] for one in (static, markers))
+    return bool(np.square(here[::-1] - was).sum() > np.square(here - was).sum())
 
 
 def rigid_groups(markers: Markers, marker_set: MarkerSet) -> Iterator[tuple[str, ...]]:
