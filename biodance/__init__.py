@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from biodance.identification.identification import Identification as Identification
     from biodance.lab.c3d.read import read_c3d as read_c3d
     from biodance.lab.read import read_trial as read_trial
-    from biodance.lab.session.init import init_session as init_session
     from biodance.lab.session.read import read_session as read_session
     from biodance.motion.regressor import predict_wrench as predict_wrench
     from biodance.motion.track import track as track
@@ -79,7 +78,6 @@ HOMES = {
     "identification.identification": ("Identification",),
     "lab.c3d.read": ("read_c3d",),
     "lab.read": ("read_trial",),
-    "lab.session.init": ("init_session",),
     "lab.session.read": ("read_session",),
     "motion.regressor": ("predict_wrench",),
     "motion.track": ("track",),

@@ -22,7 +22,7 @@ _HALF = 5
 """Tenths of a second."""
 SIGMAS_OF_A_JUMP = 6.0
 """Standard deviations: with a test every 0.1 s on six channels a false alarm must be rarer than one an hour."""
-_FLOOR = 0.01
+_SMALLEST_JUMP = 0.01
 """Share of body weight (and of body weight times 1 m): jumps this small are not worth an interruption."""
 MARKER_OFF = 0.05
 """m: least distance between marker and body that is a fault; soft tissue moves a skin marker by up to 40 mm (thigh)."""
@@ -119,7 +119,7 @@ class WrenchWatch:
         usual, latest = then - W0 @ belief.mean, late - W1 @ belief.mean
         jump = latest.mean(axis=0) - usual.mean(axis=0)
         _, unknown = belief.expected(W1.mean(axis=0) - W0.mean(axis=0))
-        sd = np.sqrt(_slow_variance(usual) + unknown + (_FLOOR * self.weight / SIGMAS_OF_A_JUMP) ** 2)
+        sd = np.sqrt(_slow_variance(usual) + unknown + (_SMALLEST_JUMP * self.weight / SIGMAS_OF_A_JUMP) ** 2)
         size = np.abs(jump) / sd
         self.wrong = bool((size > SIGMAS_OF_A_JUMP).any())
         return (jump, size) if self.wrong else None
@@ -129,7 +129,7 @@ class WrenchWatch:
         if len(self.before) < _LEAST:
             return np.full(6, (0.03 * self.weight) ** 2)
         W, wrench = (np.array(part) for part in zip(*self.before, strict=True))
-        return np.asarray((wrench - W @ belief.mean).var(axis=0)) + (_FLOOR * self.weight / 2) ** 2
+        return np.asarray((wrench - W @ belief.mean).var(axis=0)) + (_SMALLEST_JUMP * self.weight / 2) ** 2
 
 
 def said_of_jump(time: float, plates: Sequence[Plate], about: Array, jump: Array, size: Array) -> LiveWarning:
@@ -162,7 +162,7 @@ def silent_plates(
         value = plate.wrench.value
         unknown = bool(np.isnan(value).any())
         still = unknown or bool((value.max(axis=0) == value.min(axis=0)).all())
-        loaded = unknown or abs(value[-1, 2]) > _FLOOR * weight
+        loaded = unknown or abs(value[-1, 2]) > _SMALLEST_JUMP * weight
         if still and foot and (loaded or missing > _GONE * weight):
             text = f"{plate.name} says nothing any more while a foot is on it: check its cable and amplifier."
             found.append(LiveWarning(time, "plate_gone", plate.name, text))

@@ -12,7 +12,7 @@ import numpy as np
 from biodance.lab.c3d.write import PlateRecording, write_c3d
 from biodance.records import Array
 
-_SIDES = (0.50, 0.46)
+_PLATE_SIZE = (0.50, 0.46)
 """m along the plate's x and y (AMTI AccuGait)."""
 _ENCODER_RATE, _PLATE_RATE = 500.0, 1000.0
 """Hz, of Bonnet et al. 2016."""
@@ -74,6 +74,6 @@ def _plate(wrench: Array, lab: RobotLab, noise: Array) -> PlateRecording:
     moment = wrench[:, 3:] @ turn.T + np.cross([*lab.place, 0.0], force)
     down = np.array([1.0, -1.0, -1.0])
     channels = np.concatenate([-force * down, -moment * down], axis=1) + noise
-    (x, y), middle = np.array(_SIDES) / 2, np.array([0.25, 0.23, 0.0])
+    (x, y), middle = np.array(_PLATE_SIZE) / 2, np.array([0.25, 0.23, 0.0])
     corners = middle + np.array([[x, -y, 0.0], [-x, -y, 0.0], [-x, y, 0.0], [x, y, 0.0]])
     return PlateRecording(2, corners, np.zeros(3), channels)

@@ -38,7 +38,8 @@ def init_session(folder: str | Path, *, subject_name: str | None = None) -> dict
 
     Examples
     --------
-    >>> biodance.init_session("visit")
+    >>> from biodance.lab.session.init import init_session
+    >>> init_session("visit")
     Traceback (most recent call last):
     biodance.errors.SessionRefused: visit/session.toml is there already, and nothing of yours is overwritten. ...
     """
