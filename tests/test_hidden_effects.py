@@ -94,21 +94,6 @@ def test_a_reference_session_shows_a_load_below_the_limit_of_one_session(
     assert limits["added_mass", "left_forearm_hand"] < 0.5
 
 
-@pytest.mark.parametrize(
-    ("text", "effect", "target"),
-    [
-        ("plate_position:target=plate1:x,shift=0.05", "plate_position", "plate1:x"),
-        ("added_mass:target=left_forearm_hand,mass=2.4", "added_mass", "left_forearm_hand"),
-    ],
-)
-def test_a_hidden_cause_is_in_the_named_set(
-    text: str, effect: str, target: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    diagnosis = found(hidden(tmp_path / "s", text), monkeypatch)
-    assert diagnosis.verdict.startswith("named")
-    assert (effect, target) in {(alias.effect, alias.target) for alias in diagnosis.findings[0].set}
-
-
 def test_what_no_file_describes_is_unexplained(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     diagnosis = found(hidden(tmp_path / "s", "object_on_plate:weight=60"), monkeypatch)
     assert diagnosis.verdict == "unexplained"
