@@ -7,6 +7,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 
 import batch_work
@@ -55,7 +56,7 @@ def test_a_session_that_kills_its_process_takes_nobody_along(tmp_path: Path) -> 
     found = run_batch(archive, tmp_path / "out", workers=2, work=batch_work.die_in_s2)
     status = {one.name: one.status for one in found.outcomes}
     assert status["s2"] == "failed"
-    with sqlite3.connect(tmp_path / "out" / LEDGER) as book:
+    with closing(sqlite3.connect(tmp_path / "out" / LEDGER)) as book:
         known = dict(book.execute("SELECT name, status FROM sessions"))
     assert known == {"s0": "done", "s1": "done", "s2": "failed", "s3": "done", "s4": "done"}
     assert worked(archive) == {"s0": 1, "s1": 1, "s3": 1, "s4": 1}

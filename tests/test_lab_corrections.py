@@ -92,7 +92,7 @@ def test_a_lab_file_comes_back_and_adds_up(tmp_path: Path) -> None:
         ("plate_gain", "Fz", 0.04),
     ]
     assert again[0].source.startswith('session "A"')
-    assert read_lab(path).corrections == again
+    assert repr(read_lab(path).corrections) == repr(again)  # an unknown sd is nan, which equals nothing
     assert read_lab(None).corrections == ()
 
 

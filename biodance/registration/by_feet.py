@@ -1,8 +1,7 @@
 """The pose from the feet: where the pressure lies in the foot of an ordinary step, and when the heel strikes.
 
 What steps share (a person's foot, a laboratory's way to put its toe marker) is shared in their covariance: two steps of
-one foot do not halve it. Norms and standard deviations: 49 steps of 10 persons of 5 public laboratories, among them
-those of `BIODANCE_DATA`.
+one foot do not halve it. Norms and standard deviations are those of the witnesses.
 """
 
 from dataclasses import dataclass
@@ -12,19 +11,11 @@ import numpy as np
 from biodance.records import Array
 from biodance.registration.pull import PoseEvidence
 from biodance.registration.steps import PlateStep
+from biodance.witnesses.foot_across import ACROSS_PHASES
+from biodance.witnesses.foot_along import ALONG_PHASES
+from biodance.witnesses.force_onset import ONSET_AFTER_STRIKE
 
-_ACROSS = (
-    (0.04, 0.20, 0.000, 0.0030, 0.0025, 0.0020),
-    (0.20, 0.60, -0.001, 0.0040, 0.0045, 0.0025),
-    (0.60, 0.80, -0.006, 0.0055, 0.0070, 0.0040),
-)
-"""Phase of stance from, to; expected m outwards of the line from heel to toe marker; m sd of one step, of one foot of a
-person, of a laboratory's markers."""
-_ALONG = ((0.04, 0.10, 0.23, 0.030, 0.030, 0.02), (0.80, 0.92, 0.95, 0.030, 0.030, 0.05))
-"""The same ahead of the heel marker, in units of the distance between the two."""
-_ONSET = (-0.002, 0.0055, 0.003)
-"""s: force onset (20 N) after the peak of the heel marker's upward acceleration: expected, sd of one step, of a
-laboratory."""
+_ACROSS, _ALONG = tuple(ACROSS_PHASES.values()), tuple(ALONG_PHASES.values())
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +60,7 @@ def _rows(step: PlateStep, about: Array) -> list[_Row]:
         expected = share * step.length
         rows.append(_mean(step, step.ahead, step.forwards, (start, stop), expected, own, shared, about))
     if heel_first:
-        expected, own, laboratory = _ONSET
+        expected, own, laboratory = ONSET_AFTER_STRIKE
         rows.append(_Row(step.onset - expected, np.array([0.0, 0.0, 0.0, -1.0]), own, {"onset": laboratory}))
     return rows
 

@@ -7,7 +7,7 @@ from where the laboratory puts its toe marker. A turned plate shows as a slant o
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
 from biodance.witnesses._stance import step_course
 
-_PHASES = {
+ACROSS_PHASES = {
     "early": (0.04, 0.20, 0.000, 0.0030, 0.0025, 0.0020),
     "middle": (0.20, 0.60, -0.001, 0.0040, 0.0045, 0.0025),
     "late": (0.60, 0.80, -0.006, 0.0055, 0.0070, 0.0040),
@@ -35,7 +35,7 @@ class FootAcross(Witness):
         part, found = step_course(seen, step), []
         if part is None:
             return []
-        for phase, (start, stop, expected, sd, foot, laboratory) in _PHASES.items():
+        for phase, (start, stop, expected, sd, foot, laboratory) in ACROSS_PHASES.items():
             if phase == "early" and not step.heel_first:
                 continue
             norms = {f"person {step.side} foot across, {phase}": foot}

@@ -6,7 +6,7 @@ Coarser than across the foot, and it scales with the foot; steps in different di
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
 from biodance.witnesses._stance import step_course
 
-_PHASES = {
+ALONG_PHASES = {
     "early": (0.04, 0.10, 0.23, 0.030, 0.030, 0.02),
     "late": (0.80, 0.92, 0.95, 0.030, 0.030, 0.05),
 }
@@ -30,7 +30,7 @@ class FootAlong(Witness):
         part, found = step_course(seen, step), []
         if part is None:
             return []
-        for phase, (start, stop, share, sd, person, laboratory) in _PHASES.items():
+        for phase, (start, stop, share, sd, person, laboratory) in ALONG_PHASES.items():
             norms = {
                 f"person foot along, {phase}": person * part.length,
                 f"laboratory markers along, {phase}": laboratory * part.length,

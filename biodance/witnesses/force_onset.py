@@ -14,7 +14,7 @@ _AROUND = 0.08
 """s before and after the onset in which the heel strikes."""
 _NEAR = 0.02
 """m above its lowest place from which a heel strikes the ground."""
-_EXPECTED, _STEP, _LABORATORY = -0.002, 0.005, 0.003
+ONSET_AFTER_STRIKE = (-0.002, 0.005, 0.003)
 """s: onset less peak, its sd of one step and of one laboratory (filters of markers, thresholds of forces)."""
 
 
@@ -39,10 +39,11 @@ class ForceOnset(Witness):
         share = (ONSET - before) / (after - before) if after > before else 1.0
         onset = wrench.time[part.start - 1] + share * (wrench.time[part.start] - wrench.time[part.start - 1])
         struck = heel_strike(seen.foot(step.side), step.middle, onset)
-        own = float(np.hypot(_STEP, 0.25 / seen.foot(step.side).rate))
-        norms = {"laboratory onset": _LABORATORY}
+        expected, step_sd, laboratory = ONSET_AFTER_STRIKE
+        own = float(np.hypot(step_sd, 0.25 / seen.foot(step.side).rate))
+        norms = {"laboratory onset": laboratory}
         value = onset - struck
-        return [Observation(self.name, step.name, seen.trial.name, value, own, _EXPECTED, "s", step.plate, norms)]
+        return [Observation(self.name, step.name, seen.trial.name, value, own, expected, "s", step.plate, norms)]
 
 
 def heel_strike(foot: FootPath, middle: float, near: float) -> float:
