@@ -51,6 +51,16 @@ def test_every_session_once_and_a_second_call_does_nothing(tmp_path: Path) -> No
     assert run_batch(archive, tmp_path / "out", workers=1, pages=False).fresh == 1
 
 
+def test_a_session_inside_another_one_keeps_its_results(tmp_path: Path) -> None:
+    archive = archive_of(archive_of(tmp_path / "a", 1) / "s0", 1).parent
+    found = run_batch(archive, tmp_path / "out", workers=1, pages=False)
+    assert [one.name for one in found.outcomes] == ["s0", "s0/s0"]
+    (archive / "s0" / "walk.c3d").write_bytes(b"another recording")
+    assert [one.name for one in run_batch(archive, tmp_path / "out", workers=1).outcomes] == ["s0", "s0/s0"]
+    assert len([*(tmp_path / "out").rglob("outcome.json")]) == 2
+    assert 'href="sessions' not in (tmp_path / "out" / "report.html").read_text(), "no page was drawn"
+
+
 def test_a_session_that_kills_its_process_takes_nobody_along(tmp_path: Path) -> None:
     archive = archive_of(tmp_path / "a", 5)
     found = run_batch(archive, tmp_path / "out", workers=2, work=batch_work.die_in_s2)
@@ -171,8 +181,10 @@ def test_a_cluster_that_exists_is_used(tmp_path: Path) -> None:
         n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
     ) as cluster:
         found = run_batch(archive, tmp_path / "out", scheduler=cluster.scheduler_address, work=batch_work.count)
+        real = run_batch(archive, tmp_path / "real", scheduler=cluster.scheduler_address, pages=False)
     assert found.fresh == 3
     assert worked(archive) == {"s0": 1, "s1": 1, "s2": 1}
+    assert real.counts == {"refused": 3}, "the work itself runs in the threads of a cluster"
 
 
 def test_an_address_where_nobody_answers_is_one_sentence(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 from biodance.batch.engines import Work, run_here, run_on_dask
 from biodance.batch.ledger import Ledger
-from biodance.batch.summary import write_summary
+from biodance.batch.summary import SESSIONS, folder_name, write_summary
 from biodance.batch.work import (
     Outcome,
     SessionStatus,
@@ -21,9 +21,6 @@ from biodance.batch.work import (
 from biodance.errors import BiodanceError
 from biodance.lab.session.archive import archive_folders
 from biodance.settings import assignments
-
-SESSIONS = "sessions"
-"""Folder of the sessions' own results, in that of the archive's."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +113,15 @@ def run_batch(
     sessions, indices = archive_folders(archive)
     inside = folder.resolve()
     tasks = [
-        SessionTask(name, str(path), str(folder / SESSIONS / name), fingerprint_of(path, chosen), chosen, pages, limit)
+        SessionTask(
+            name,
+            str(path),
+            str(folder / SESSIONS / folder_name(name)),
+            fingerprint_of(path, chosen),
+            chosen,
+            pages,
+            limit,
+        )
         for path in sessions
         if inside not in (path.resolve(), *path.resolve().parents)
         for name in [_name(path, archive)]

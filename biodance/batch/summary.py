@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 import numpy as np
 
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _PAGE = "report.html"
+SESSIONS = "sessions"
+"""Folder of the sessions' own results, in that of the archive's."""
 _FAR = 3.0
 """Robust standard deviations from the archive's median at which a session stands out."""
 _KEY = {
@@ -23,6 +26,11 @@ _KEY = {
     "marker_rms_m": ("distance of markers", "mm", 1e3),
     "fz_rms_table_n": ("vertical force against the table's body", "N", 1.0),
 }
+
+
+def folder_name(session: str) -> str:
+    """Return the folder of a session's results: one level, so that a session inside another one keeps its own."""
+    return quote(session, safe=" ")
 
 
 def summary_table(outcomes: Sequence[Outcome]) -> "pd.DataFrame":
@@ -55,7 +63,7 @@ def write_summary(folder: Path, name: str, outcomes: Sequence[Outcome], left_out
     parquet.replace(folder / "summary.parquet")
     text.replace(folder / "summary.csv")
     page = folder / f".{_PAGE}.part"
-    page.write_text(_page(name, outcomes, table, left_out), encoding="utf-8")
+    page.write_text(_page(name, outcomes, table, left_out, _links(folder, outcomes)), encoding="utf-8")
     page.replace(folder / _PAGE)
 
 
@@ -86,6 +94,12 @@ def outliers(table: "pd.DataFrame") -> "list[dict[str, Any]]":
     return found
 
 
+def _links(folder: Path, outcomes: Sequence[Outcome]) -> dict[str, str]:
+    """Return the address of every session's own page, where one was drawn."""
+    pages = {one.name: Path(SESSIONS, folder_name(one.name), _PAGE) for one in outcomes}
+    return {name: quote(page.as_posix()) for name, page in pages.items() if (folder / page).is_file()}
+
+
 def _figure(table: "pd.DataFrame") -> "Figure | None":
     """Draw the key figures of all sessions as histograms; None where there is nothing to draw."""
     from biodance.report.figures.style import figure, look
@@ -104,7 +118,9 @@ def _figure(table: "pd.DataFrame") -> "Figure | None":
     return drawn
 
 
-def _page(name: str, outcomes: Sequence[Outcome], table: "pd.DataFrame", left_out: Sequence[str]) -> str:
+def _page(
+    name: str, outcomes: Sequence[Outcome], table: "pd.DataFrame", left_out: Sequence[str], links: dict[str, str]
+) -> str:
     """Return the page of an archive as HTML text."""
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
@@ -137,5 +153,5 @@ def _page(name: str, outcomes: Sequence[Outcome], table: "pd.DataFrame", left_ou
         trials=len(table),
         seconds=sum(one.seconds for one in outcomes),
         memory=max((one.memory_mb for one in outcomes), default=0.0),
-        sessions="sessions",
+        links=links,
     )

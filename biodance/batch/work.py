@@ -5,6 +5,7 @@ import json
 import resource
 import shutil
 import signal
+import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator
@@ -190,7 +191,12 @@ def _examined(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> t
 
 @contextmanager
 def _limited(seconds: float) -> Iterator[None]:
-    """Raise TimeoutError when what follows takes longer."""
+    """Raise TimeoutError when what follows takes longer; in a thread that is not the main one, as those of a Dask
+    worker, nothing can be interrupted and there is no limit.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
 
     def stop(*_: object) -> None:
         raise TimeoutError
