@@ -12,6 +12,7 @@ size by themselves). Causes that are found by a check instead of a fit (units, l
 ``DiscreteEffect``.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -169,7 +170,7 @@ class Effect:
         return case.plate(name) if name.startswith("plate") else case.trial.plates[0]
 
 
-class ChannelEffect(Effect):
+class ChannelEffect(Effect, ABC):
     """A cause in one channel of a plate: ``Fx`` ... for one plate, ``plate2:Fx`` ... for several."""
 
     @classmethod
@@ -184,9 +185,9 @@ class ChannelEffect(Effect):
         """Index 0..5 of the channel."""
         return CHANNELS.index(self.target.rpartition(":")[2])
 
+    @abstractmethod
     def in_channel(self, case: Case) -> Array:
         """Return (T,): what one unit adds to the channel, about the plate's centre."""
-        raise NotImplementedError
 
     def columns(self, case: Case) -> Array:
         """Return what one unit adds to the channel, moved to the lab origin."""
