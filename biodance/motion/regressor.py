@@ -29,9 +29,10 @@ def _inertia_columns(local: Array) -> Array:
     return out
 
 
-def regressor_of(segments: SegmentMotion, *, gravity: Array) -> Array:
+def regressor_of(segments: SegmentMotion, *, gravity: Array, sharing: Array | None = None) -> Array:
     """Return W (T, 6, 10N): wrench about the lab origin, force first, per unit of each parameter; ``gravity`` (3,)
-    m/s², lab frame.
+    m/s², lab frame; ``sharing`` (10 M, 10 N) what each of the M links that move has of the N segments
+    (``Body.sharing``; None: they are the segments).
     """
     rotation, position = segments.rotation, segments.position
     frames, count = position.shape[:2]
@@ -49,7 +50,8 @@ def regressor_of(segments: SegmentMotion, *, gravity: Array) -> Array:
     columns[..., 3:, 0] = np.einsum("...ij,...j->...i", arm, drive)
     columns[..., 3:, 1:4] = arm @ first - skew(drive) @ rotation
     columns[..., 3:, 4:] = second
-    return np.moveaxis(columns, 1, 2).reshape(frames, 6, 10 * count)
+    W = np.moveaxis(columns, 1, 2).reshape(frames, 6, 10 * count)
+    return W if sharing is None else W @ sharing
 
 
 def regressor(body: Body, motion: Motion) -> Array:
@@ -59,7 +61,7 @@ def regressor(body: Body, motion: Motion) -> Array:
     Parameters of segment i are columns 10i..10i+9 in Pinocchio's order [m, mc (3), Ixx, Ixy, Iyy, Ixz, Iyz, Izz] about
     the segment's joint frame. Gravity is the body's.
     """
-    return regressor_of(segment_motion(body, motion), gravity=body.gravity)
+    return regressor_of(segment_motion(body, motion), gravity=body.gravity, sharing=body.sharing)
 
 
 def predict_wrench(body: Body, motion: Motion, phi: Array | None = None) -> Wrench:

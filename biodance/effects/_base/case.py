@@ -51,7 +51,7 @@ class Case:
     @cached_property
     def regressor(self) -> Array:
         """(T, 6, 10N) root regressor about the lab origin."""
-        return regressor_of(self.segments, gravity=self.body.gravity)
+        return regressor_of(self.segments, gravity=self.body.gravity, sharing=self.body.sharing)
 
     @cached_property
     def segments(self) -> SegmentMotion:
