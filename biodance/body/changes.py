@@ -7,7 +7,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.inertia import RigidInertia, inertial_parameters, shift_matter
+from biodance.body.inertia import (
+    PSEUDO_INERTIA,
+    RigidInertia,
+    inertial_parameters,
+    pseudo_inertia,
+    shift_matter,
+    smallest_eigenvalues,
+)
 from biodance.body.parts import Joint, JointLimits, Part, SegmentMarkers
 from biodance.records import Array, Sip
 
@@ -74,6 +81,8 @@ vertebra up or down).
 """
 GRAM, GYRATION = 1e-3, 0.03
 """kg and m: mass and radius of gyration of a part to which nothing is assigned, so that it has a centre of mass."""
+_FLAT, _MOST = 1e-9, 0.95
+"""Share of a pseudo-inertia's largest eigenvalue that counts as none, and of a whole that a part may take."""
 _TRACE = 1e-4
 """Share of a segment's mass of a `Part` to which nothing is assigned (a collar bone): model formats refuse none."""
 
@@ -146,10 +155,13 @@ def with_axis(body: Body, after: str, name: str, axis: Array) -> Body:
 def parts_as_segments(body: Body) -> Body:
     """Return the same body whose parts are segments like the others, behind them, each with its own parameters; as it
     is without parts.
+
+    Where a whole is so unlike the table that no rest could be left of it, the part has less.
     """
     table, count = body.sharing, len(body.segments)
     if table is None:
         return body
+    phi = table @ body.sip.phi
     boxes, rooms = list(body.boxes), list(body.com_boxes)
     for k, part in enumerate(body.parts):
         _, origin = body.place_on_segment(body.segment_joint[count + k])
@@ -159,17 +171,36 @@ def parts_as_segments(body: Body) -> Body:
             own = own - origin
         boxes.append(own)
         rooms.append(own)
-    sips = [None if one is None else Sip(body.links, table @ one.phi, table @ one.covariance @ table.T)
-            for one in (body.sip, body.at_joint)]  # fmt: skip
+        _leave_possible(phi, part.segment, count + k, shift_matter(origin))
+    along = body.at_joint
     return replace(
         body,
         segments=body.links,
         parts=(),
-        sip=sips[0],
-        at_joint=sips[1],
+        sip=Sip(body.links, phi, table @ body.sip.covariance @ table.T),
+        at_joint=along and Sip(body.links, table @ along.phi, table @ along.covariance @ table.T),
         boxes=np.array(boxes),
         com_boxes=np.array(rooms),
     )
+
+
+def _leave_possible(phi: Array, rest: int, part: int, moved: Array) -> None:
+    """Take from the part what the rest of its segment lacks to be made of real mass.
+
+    ``phi`` (10 N,) is changed at both, ``moved`` (10, 10) takes the part into the segment's frame.
+    """
+    rows = [slice(10 * i, 10 * i + 10) for i in (rest, part)]
+    if smallest_eigenvalues(phi[rows[0]])[0] > 0:
+        return
+    own = moved @ phi[rows[1]]
+    value, vector = np.linalg.eigh(pseudo_inertia(phi[rows[0]] + own)[0])
+    root = np.sqrt(np.maximum(value, _FLAT * value[-1]))
+    share = (vector / root).T @ pseudo_inertia(own)[0] @ (vector / root)
+    level, axes = np.linalg.eigh(share)
+    less = (vector * root) @ (axes * np.minimum(level, _MOST)) @ axes.T @ (vector * root).T
+    left = np.linalg.lstsq(PSEUDO_INERTIA, less.ravel(), rcond=None)[0]
+    phi[rows[0]] += own - left
+    phi[rows[1]] = np.linalg.solve(moved, left)
 
 
 def _parted(box: Array, height: float, *, above: bool) -> tuple[Array, Array]:

@@ -161,7 +161,9 @@ def problem(
     shown = sizes_shown(cases, {**effects(), **effects(chosen)})
     sip = np.concatenate([W.reshape(-1, W.shape[2]), np.zeros((len(markers) + len(shown), W.shape[2]))])
     unit = next(one for some in errors for one in some)
-    groups = tuple(in_state(_of_whole(group, body), joint, body) for group, joint in zip(unit.groups, unit.joints, strict=True))
+    groups = tuple(
+        in_state(_of_whole(group, body), joint, body) for group, joint in zip(unit.groups, unit.joints, strict=True)
+    )
     measured = where.rows(tuple(case.residual[:, :, None] for case in cases))
     target = np.concatenate([measured.ravel(), _mean_markers(cases, where).ravel(), list(shown.values())])
     rows = np.concatenate([rows, markers, np.zeros((len(shown), rows.shape[1]))])

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.human.optional_joints import OPTIONAL, with_optional
+from biodance.body.human.optional_joints import OPTIONAL_JOINTS, with_optional
 from biodance.body.human.skeleton import kind_of
 from biodance.errors import TrialRefused
 from biodance.motion.ik.inverse_kinematics import solve_ik
@@ -86,7 +86,7 @@ def with_shown_joints(
 
     ``landmarks`` of the marker set: which labels mark the wrists.
     """
-    some, gains, left = _sample(body, recorded), list[JointGain](), list(OPTIONAL)
+    some, gains, left = _sample(body, recorded), list[JointGain](), list(OPTIONAL_JOINTS)
     while some is not None:
         before = _follow(body, some)
         wider = [(name, with_optional(body, name, landmarks)) for name in left]

@@ -25,19 +25,18 @@ virtual persons.
 """
 STERNOCLAVICULAR = np.array([0.2, 0.0, 0.12])
 """Forwards, upwards and sideways from the middle of the shoulders, in half shoulder widths."""
-OPTIONAL = ("neck", "forearms", "wrists", "clavicles")
-"""The joints that a body may have beyond its 23 axes, in the order in which they are tried: what the hand does is not laid
-on the shoulder."""
+OPTIONAL_JOINTS = ("neck", "forearms", "wrists", "clavicles")
+"""The joints that a body may have beyond its 23 axes."""
 _ACROMION = 0.5
-"""Half shoulder widths from the shoulder's centre: markers of the trunk so near ride on the end of the collar bone."""
+"""Half shoulder widths from the shoulder's centre: so near, markers of the trunk ride on the collar bone."""
 _BEYOND_WRIST = 0.03
 """m: markers of the forearm so far beyond the wrist are worn on the hand."""
 _HEAD_MARKERS = 3
 
 
 def with_optional(body: Body, name: str, landmarks: Mapping[str, tuple[tuple[str, ...], ...]]) -> Body:
-    """Return the body with one of the `OPTIONAL` joints, on every side whose markers can show it; as it is without
-    such markers.
+    """Return the body with one of the `OPTIONAL_JOINTS`, on every side whose markers can show it; as it is without such
+    markers.
 
     ``landmarks`` of its marker set: which labels mark the wrists.
     """
@@ -67,7 +66,9 @@ def sternoclavicular(body: Body, side: str) -> Array:
     middle = shoulders(body)
     assert middle is not None
     _, shoulder = body.place_on_segment(body.joint_index(f"{side}_shoulder_flexion"))
-    return np.asarray(middle + abs(float(shoulder[2])) * STERNOCLAVICULAR * [1.0, 1.0, 1.0 if side == "right" else -1.0])
+    return np.asarray(
+        middle + abs(float(shoulder[2])) * STERNOCLAVICULAR * [1.0, 1.0, 1.0 if side == "right" else -1.0]
+    )
 
 
 def shoulders(body: Body) -> Array | None:
@@ -114,7 +115,9 @@ def _with_clavicle(body: Body, side: str) -> Body:
         return body
     shoulder = body.joint_index(f"{side}_shoulder_flexion")
     _, centre = body.place_on_segment(shoulder)
-    seen = _worn(body, "trunk_head", np.linalg.norm(body.markers.position - centre, axis=1) < _ACROMION * abs(centre[2]))
+    seen = _worn(
+        body, "trunk_head", np.linalg.norm(body.markers.position - centre, axis=1) < _ACROMION * abs(centre[2])
+    )
     if not seen:
         return body
     place, axes = sternoclavicular(body, side), _axes("clavicle", side)
@@ -137,7 +140,9 @@ def _with_wrist(body: Body, side: str, landmarks: Mapping[str, tuple[tuple[str, 
     if not seen:
         return body
     table = read_segment_table("de_leva_1996")
-    long, short = (np.mean([table.value(part, "length", sex=sex) for sex in ("F", "M")]) for part in ("forearm", "hand"))
+    long, short = (
+        np.mean([table.value(part, "length", sex=sex) for sex in ("F", "M")]) for part in ("forearm", "hand")
+    )
     hand = share_of_body(body, "hand", top=wrist, bottom=wrist * (1 + short / long))
     return _ranged(with_part(body, Cut(segment, f"{side}_hand", _axes("wrist", side), wrist, hand, seen)))
 
