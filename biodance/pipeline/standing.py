@@ -38,9 +38,10 @@ def quiet_run(
 
 def centre_of_mass(body: Body, motion: Motion) -> Array:
     """Return the centre of mass (T, 3) m of ``body`` with its own parameters during ``motion``."""
-    mass = body.sip.mass
+    table = body.link_parameters().reshape(-1, 10)
+    mass = table[:, 0]
     carried = np.flatnonzero(mass > 0)
-    points = poses(body, motion.q).points(carried.tolist(), body.sip.com[carried])
+    points = poses(body, motion.q).points(carried.tolist(), table[carried, 1:4] / mass[carried, None])
     return np.einsum("k,tkj->tj", mass[carried], points) / mass[carried].sum()
 
 
