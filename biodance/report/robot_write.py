@@ -7,7 +7,8 @@ from typing import Any
 from biodance.body.body_file import body_text
 from biodance.pipeline.export import BODY
 from biodance.pipeline.provenance import now
-from biodance.pipeline.robot import MatchedTrial, RobotResult
+from biodance.pipeline.robot import RobotResult
+from biodance.pipeline.robot_trials import MatchedTrial
 from biodance.report.documents.diagnosis import attention_document, judged_document
 from biodance.report.documents.identification import identification_document
 from biodance.report.documents.session import plain_values, to_text
