@@ -10,6 +10,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.robot.urdf import read_urdf
+from biodance.diagnosis.robot import RobotFinding, robot_causes
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.added_mass import LoadSearch
 from biodance.identification.base_parameters import BaseEstimate
@@ -17,13 +18,13 @@ from biodance.identification.identification import Identification
 from biodance.identification.robot import identify_links
 from biodance.identification.validation import TrialValidation, residual_ratio
 from biodance.lab.robot.recording import RobotRecording, read_robot_recording
-from biodance.motion.clocks import fit_plate, on_motion_clock, onto_plate
+from biodance.motion.clocks import fit_plate, onto_plate
 from biodance.motion.comparison import compare
 from biodance.motion.grounded import RATE
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.robot_trials import MatchedTrial, bring_together
-from biodance.pipeline.robot_words import refusals, told_of, weights
+from biodance.pipeline.robot_words import cause_words, refusals, told_of, weights
 from biodance.records import Wrench
 from biodance.records.attention import Attention, Judged, strongest_first
 from biodance.spatial import wrench_about_point
@@ -36,7 +37,8 @@ _NO_SEARCH = "Of a robot, what differs from the drawing is told link by link ins
 @dataclass(frozen=True, eq=False)
 class RobotResult:
     """What a recording says about a robot: ``identified`` as of people, ``alone`` the base parameters as
-    the paper counts them (every frame independent), ``trials``, ``attention``, ``judged``, and the ``urdf``.
+    the paper counts them (every frame independent), ``causes`` of what is not as drawn (taken out before), ``trials``,
+    ``attention``, ``judged``, and the ``urdf``.
     """
 
     recording: RobotRecording
@@ -45,6 +47,7 @@ class RobotResult:
     trials: tuple[MatchedTrial, ...]
     identified: SessionIdentification
     alone: BaseEstimate
+    causes: tuple[RobotFinding, ...]
     attention: tuple[Attention, ...]
     judged: tuple[Judged, ...]
 
@@ -96,14 +99,16 @@ def identify_robot(
     if not fitted:
         reasons = " ".join(refused.values()) or "No trial has the role fit."
         raise TrialRefused(reasons)
+    tell("looking for what is not as drawn")
+    causes, fitted, kept = _without_causes(body, fitted, kept)
     tell("identifying")
     done, alone = identify_links(body, tuple(one.motion for one in fitted))
     tell("validating")
     identified = _validated(found.folder.name, done, fitted, kept)
-    said = strongest_first([*refusals(refused), *told_of(trials), *weights(done)])
+    said = strongest_first([*refusals(refused), *told_of(trials), *cause_words(causes), *weights(done)])
     judged = tuple(Judged(one.recorded.name, float(one.motion.fit.use.sum()) / RATE) for one in trials)
     lost = tuple(Judged(name, 0.0, why, missed=True) for name, why in refused.items())
-    return RobotResult(found, Path(urdf), body, tuple(trials), identified, alone, said, (*judged, *lost))
+    return RobotResult(found, Path(urdf), body, tuple(trials), identified, alone, causes, said, (*judged, *lost))
 
 
 def _parted(trials: list[MatchedTrial]) -> tuple[list[MatchedTrial], list[MatchedTrial]]:
@@ -120,6 +125,15 @@ def _parted(trials: list[MatchedTrial]) -> tuple[list[MatchedTrial], list[Matche
         first.append(_limited(one, one.motion.fit.use & early))
         last.append(_limited(one, one.motion.fit.use & ~early))
     return first, last
+
+
+def _without_causes(
+    body: Body, fitted: list[MatchedTrial], kept: list[MatchedTrial]
+) -> tuple[tuple[RobotFinding, ...], list[MatchedTrial], list[MatchedTrial]]:
+    """Return what is not as drawn, and the trials without it."""
+    causes, motions = robot_causes(body, tuple(one.motion for one in fitted), tuple(one.motion for one in kept))
+    trials = [replace(one, motion=motion) for one, motion in zip((*fitted, *kept), motions, strict=True)]
+    return causes, trials[: len(fitted)], trials[len(fitted) :]
 
 
 def _limited(one: MatchedTrial, use: "np.ndarray") -> MatchedTrial:
@@ -148,13 +162,12 @@ def _validated(
 def _validation(done: Identification, one: MatchedTrial) -> TrialValidation:
     """Return one trial in the plate's frame; drawing and identified robot stand each where it fits best."""
     motion, use = one.motion.fit.motion, one.motion.fit.use
+    measured = onto_plate(one.motion.fit.wrench.value, one.plate)
     predicted = []
     for body in (done.body, done.identified):
         needed = predict_wrench(body, motion)
-        fit = fit_plate(needed, one.measured, one.motion.grounded.use)
+        fit = fit_plate(needed, Wrench(motion.time, measured), one.motion.grounded.use)
         predicted.append(onto_plate(needed.value, fit))
-    still = replace(one.plate, place=(0.0, 0.0), yaw=0.0)
-    measured = on_motion_clock(one.measured, motion.time, still)
     point = Wrench(motion.time, measured).cop()[use]
     about = np.nanmean(point, axis=0)
     truth, table, found = (Wrench(motion.time, wrench_about_point(value, about)) for value in (measured, *predicted))

@@ -77,7 +77,7 @@ def _matched(body: Body, one: RobotTrial, fixed: dict[str, float]) -> MatchedTri
     odd = surprise(body, motion)
     foreign = fit.correlation < _SAME or not _SCALES[0] < fit.scale < _SCALES[1]
     if odd > ODD or fit.correlation < _FAITHFUL:
-        pair = _exchanged(body, time, angle, measured, limits, 1 - fit.correlation)
+        pair = _exchanged(body, time, angle, measured, limits)
         if pair:
             raise TrialRefused(
                 f"{where}: the columns of {pair[0]} and {pair[1]} are exchanged: exchanged back, the motion needs what "
@@ -107,7 +107,7 @@ def _stood(
 
 
 def _exchanged(
-    body: Body, time: Array, angle: Array, measured: Wrench, limits: tuple[Array, Array], lacking: float
+    body: Body, time: Array, angle: Array, measured: Wrench, limits: tuple[Array, Array]
 ) -> tuple[str, str] | None:
     """Return the two joints whose exchange lets the plate follow from the encoders; None if no exchange does."""
     step, slow = round(RATE / _COARSE), LowPass(cutoff=0.2 * _COARSE)
@@ -116,7 +116,7 @@ def _exchanged(
     low, high = limits[0] - 0.35, limits[1] + 0.35
     inside = (few.min(axis=0)[:, None] >= low) & (few.max(axis=0)[:, None] <= high)
     moving = few.std(axis=0) > 0.01
-    best, pair = min(_BETTER * lacking, 2 * (1 - _FAITHFUL)), None
+    best, pair = min(_BETTER * _lacking(body, coarse, few, measured), 2 * (1 - _FAITHFUL)), None
     for i, j in combinations(range(few.shape[1]), 2):
         if not (inside[i, j] and inside[j, i] and (moving[i] or moving[j])):
             continue

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from biodance.diagnosis.robot import RobotCause, RobotFinding
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import SIGMAS
 from biodance.pipeline.robot_trials import ODD, MatchedTrial
@@ -35,6 +36,44 @@ def told_of(trials: list[MatchedTrial]) -> list[Attention]:
         out += [Attention("warn", text, name, "plate") for text in one.recorded.warnings]
         out += [Attention("note", text, name, "encoders") for text in one.recorded.encoders.notes]
     return out
+
+
+def cause_words(causes: tuple[RobotFinding, ...]) -> list[Attention]:
+    """Return what is not as drawn."""
+    out = []
+    for one in causes:
+        others = " or ".join(_named(rival) for rival in one.rivals[:3])
+        more = f" The recording does not tell it from: {others}." if others else ""
+        text = f"{_told(one)} It was taken out before the masses were identified.{more}"
+        out.append(Attention("warn", text, "", one.cause.kind))
+    return out
+
+
+def _named(cause: RobotCause) -> str:
+    return f"{cause.kind.replace('_', ' ')} of {cause.where}"
+
+
+def _told(one: RobotFinding) -> str:
+    """Return a finding as a sentence, with its 95 % interval."""
+    where, value, reach = one.cause.where, one.value, SIGMAS * one.sd
+    angle = f"{np.degrees(value):.2f} ± {np.degrees(reach):.2f} degrees"
+    match one.cause.kind:
+        case "encoder_zero":
+            return f"The encoder of {where} reads {angle} too much: its zero is not the drawing's."
+        case "flexible_joint":
+            return f"{where} gives under load behind its encoder: {angle} per N·m."
+        case "backlash":
+            return f"{where} has play: {angle} between its two sides."
+        case "plate_gain":
+            return f"The plate reads {where} {100 * abs(value):.1f} ± {100 * reach:.1f} % too {_size(value)}."
+        case "plate_crosstalk":
+            return f"The plate's crosstalk from {where} is {100 * value:.1f} ± {100 * reach:.1f} %."
+        case _:
+            return f"The {_named(one.cause)} is {value:.3g} ± {reach:.2g} {one.cause.unit}."
+
+
+def _size(value: float) -> str:
+    return "large" if value > 0 else "small"
 
 
 def weights(done: Identification) -> list[Attention]:
