@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.lab.filters import LowPass
 from biodance.motion.dynamics import distribute, joint_torques
 from biodance.motion.grounded import Grounded, ground
 from biodance.motion.kinematics import poses
@@ -27,6 +28,8 @@ PLACE, YAW = 0.02, 0.035
 """m and rad: how well the place on the plate follows from the drawing's centre of pressure, before the data."""
 _NEAR = 0.02
 """Of the height of the root: soles so near the lower one bear too."""
+_SLOW = 0.3
+"""Cut-off over the thinned rate: changes are smooth."""
 THINNED = 4
 """Every so many frames are enough to see what an encoder's zero does."""
 
@@ -72,12 +75,13 @@ def angle_changes(body: Body, one: Grounded, angle: Array, shapes: Array) -> Arr
     """Return the change (T / `THINNED`, 6, k) of the needed wrench by changes ``shapes`` (T, n, k) rad of the joint
     ``angle`` (T, n) rad.
     """
-    every = slice(None, None, THINNED)
-    before = predict_wrench(body, thinned(one.motion, every)).value
+    time, few = one.motion.time[::THINNED], angle[::THINNED]
+    slow = LowPass(cutoff=_SLOW / float(time[1] - time[0]))
+    before = predict_wrench(body, ground(body, time, few, settings=slow, lean=one.lean).motion).value
     out = np.empty((*before.shape, shapes.shape[2]))
     for k in range(shapes.shape[2]):
-        after = ground(body, one.motion.time, angle + shapes[:, :, k], lean=one.lean).motion
-        out[:, :, k] = predict_wrench(body, thinned(after, every)).value - before
+        after = ground(body, time, few + shapes[::THINNED, :, k], settings=slow, lean=one.lean).motion
+        out[:, :, k] = predict_wrench(body, after).value - before
     return out
 
 
