@@ -8,7 +8,7 @@
 
 The robot plays its dance by its joints alone, free on a floor with friction, as its person-sized likeness (Froude),
 whose times and forces are scaled back. Covers and cables are taken off: the simulated robot is lighter than the URDF.
-Troubles (paper IV.C): `pid=1` every joint by PID alone (else spring, damper and the drawing's torque), `ankle=100` the
+Troubles (paper IV.C): `pid=3` every joint by PID alone, of so many times the usual stiffness (else spring, damper and the drawing's torque), `ankle=100` the
 pitch of the ankles gives behind the encoder (N·m/rad), `stiction=0.1` N·m in every joint, `friction=0.3` under the
 feet; hidden in the files: `zero.JOINT=0.04` rad, `play.JOINT=0.02` rad, `gain.Fz=0.95`.
 """
@@ -66,11 +66,12 @@ class Joints(_Driver):
 
     def __init__(self, body: Body, model: Any, troubles: dict[str, float], units: float) -> None:
         super().__init__(body, model)
+        self.past = np.zeros(len(body.joints)) if "pid" in troubles else None
+        self.stiffness = self.stiffness * troubles.get("pid", 1.0)
         self.soft = np.full(len(body.joints), np.inf)
         self.soft[ankles(body)] = units * troubles.get("ankle", np.inf)
         self.share = 1 / (1 + self.stiffness / self.soft)
-        self.past = np.zeros(len(body.joints)) if troubles.get("pid") else None
-        model.dof_damping[self.v_place] *= self.share
+        model.dof_damping[self.v_place] *= self.share * troubles.get("pid", 1.0)
         model.dof_frictionloss[self.v_place] = units * troubles.get("stiction", 0.0)
 
     def drive(self, data: Any, angle: Array, rate: Array, torque: Array) -> None:
