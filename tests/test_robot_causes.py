@@ -16,7 +16,7 @@ from biodance.motion.grounded import ground
 from biodance.pipeline.robot_words import cause_words
 from biodance.records import Array
 
-_SECONDS, _STEP = 22.0, 2
+_SECONDS, _STEP = 16.0, 2
 ANKLE, SOFT = "left_ankle_pitch", 60.0
 """The joint that gives, and its stiffness, N·m/rad."""
 

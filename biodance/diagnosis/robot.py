@@ -160,7 +160,7 @@ def _without(body: Body, one: RobotMotion, cause: RobotCause, column: int, amoun
         unit = {"encoder_zero": -ZERO * np.ones(len(shape)), "flexible_joint": cause.per * soft[:, j]}
         shape[:, j] = amount * unit.get(cause.kind, GIVE * play[:, j])
         angle = one.angle + shape
-        found = ground(body, fit.motion.time, angle, lean=one.grounded.lean)
+        found = ground(body, fit.motion.time, angle, lean=one.grounded.lean, base=one.grounded.base)
         return RobotMotion(replace(fit, motion=found.motion), angle, found)
     plates = plate_sources()
     k = column - n - 2 * len(leg_joints(body))
@@ -235,7 +235,7 @@ def _gathered(body: Body, one: RobotMotion, columns: _Columns, place: int, trial
         W = regressor(body, motion)
         seen = fit.wrench.value[pick]
         places = np.zeros((pick.size, 6, 3 * trials))
-        places[:, :, 3 * place : 3 * place + 3] = place_changes(seen)
+        places[:, :, 3 * place : 3 * place + 3] = place_changes(seen, one.grounded)
         near = np.minimum(pick // THINNED, len(changes) - 1)
         faults = plate_errors(seen, motion.rate, layout, plates)
         left = (seen - W @ body.sip.phi)[:, :, None]

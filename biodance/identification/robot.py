@@ -116,5 +116,5 @@ def _errors(body: Body, trials: tuple[tuple[Fit, RobotMotion], ...], noise: Nois
             weight, wrench = white.weighted(W), W @ body.sip.phi
             encoders += np.tensordot(weight, changes[pick // THINNED], axes=((0, 1), (0, 1)))
             faults += np.tensordot(weight, plate_errors(wrench, motion.rate, noise, plates), axes=((0, 1), (0, 1)))
-            places[k] += np.tensordot(weight, place_changes(wrench), axes=((0, 1), (0, 1)))
+            places[k] += np.tensordot(weight, place_changes(wrench, one.grounded), axes=((0, 1), (0, 1)))
     return Mismatch(encoders, np.concatenate([faults, *places], axis=1))

@@ -77,15 +77,16 @@ def angle_changes(body: Body, one: Grounded, angle: Array, shapes: Array) -> Arr
     """
     time, few = one.motion.time[::THINNED], angle[::THINNED]
     slow = LowPass(cutoff=_SLOW / float(time[1] - time[0]))
-    before = predict_wrench(body, ground(body, time, few, settings=slow, lean=one.lean).motion).value
+    base = one.base[::THINNED] if one.base else None
+    before = predict_wrench(body, ground(body, time, few, settings=slow, lean=one.lean, base=base).motion).value
     out = np.empty((*before.shape, shapes.shape[2]))
     for k in range(shapes.shape[2]):
-        after = ground(body, time, few + shapes[::THINNED, :, k], settings=slow, lean=one.lean).motion
+        after = ground(body, time, few + shapes[::THINNED, :, k], settings=slow, lean=one.lean, base=base).motion
         out[:, :, k] = predict_wrench(body, after).value - before
     return out
 
 
-def place_changes(wrench: Array) -> Array:
+def place_changes(wrench: Array, one: Grounded) -> Array:
     """Return the changes (T, 6, 3) of a wrench by one standard deviation of the place along x, y and of the turn."""
     force, moment = wrench[:, :3], wrench[:, 3:]
     out = np.zeros((len(wrench), 6, 3))
@@ -93,7 +94,7 @@ def place_changes(wrench: Array) -> Array:
         out[:, 3:, k] = cross(PLACE * np.eye(3)[k], force)
     up = YAW * np.eye(3)[2]
     out[:, :3, 2], out[:, 3:, 2] = cross(up, force), cross(up, moment)
-    return out
+    return out / 10 if one.base is not None and one.base.position is not None else out
 
 
 def _torques(body: Body, one: Grounded, measured: Array) -> Array:

@@ -7,11 +7,12 @@ from itertools import combinations
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.errors import BiodanceError, TrialRefused
+from biodance.errors import BiodanceError, FileRefused, TrialRefused
 from biodance.identification.robot import RobotMotion, robot_fit, surprise
 from biodance.lab.filters import LowPass, low_pass
 from biodance.lab.robot.encoders import for_joints
-from biodance.lab.robot.recording import RobotRecording, RobotTrial
+from biodance.lab.robot.recording import BaseSensors, RobotRecording, RobotTrial
+from biodance.motion.base_seen import BaseSeen, base_of_inclinations, base_of_markers
 from biodance.motion.clocks import PlateFit, fit_plate, on_motion_clock
 from biodance.motion.grounded import RATE, Grounded, even_angles, ground
 from biodance.motion.regressor import predict_wrench
@@ -52,17 +53,17 @@ def bring_together(
     for one in recording.trials:
         tell(f"{one.name}: bringing plate and encoders together")
         try:
-            trials.append(_matched(body, one, recording.fixed))
+            trials.append(_matched(body, one, recording))
         except BiodanceError as why:
             refused[one.name] = str(why)
     return trials, refused
 
 
-def _matched(body: Body, one: RobotTrial, fixed: dict[str, float]) -> MatchedTrial:
+def _matched(body: Body, one: RobotTrial, recording: RobotRecording) -> MatchedTrial:
     """Return one trial with plate and encoders brought together."""
     where = str(one.files[0])
     limits = (np.asarray(body.limits.lower), np.asarray(body.limits.upper))
-    encoders = for_joints(one.encoders, tuple(j.name for j in body.joints), limits, where=where, fixed=fixed)
+    encoders = for_joints(one.encoders, tuple(j.name for j in body.joints), limits, where=where, fixed=recording.fixed)
     time, angle = even_angles(encoders)
     measured = Wrench(one.wrench.time, low_pass(one.wrench.value, one.wrench.rate, LowPass()))
     carried = float(np.median(measured.value[:, 2])) / -float(body.gravity[2])
@@ -72,7 +73,10 @@ def _matched(body: Body, one: RobotTrial, fixed: dict[str, float]) -> MatchedTri
             f"{one.files[1]}: carries {carried:.2f} kg (median), {body.name} weighs {weight:.2f} kg. Is it the plate "
             f"of this robot, in N, zeroed while empty?"
         )
-    grounded, fit = _stood(body, time, angle, measured)
+    base = recording.base
+    grounded, fit = _stood(body, time, angle, measured, base=_inclined(one, base, time))
+    if base.markers:
+        grounded = _marked(body, one, base, grounded, angle, fit)
     motion = robot_fit(one.name, grounded, angle, on_motion_clock(measured, time, fit))
     odd = surprise(body, motion)
     foreign = fit.correlation < _SAME or not _SCALES[0] < fit.scale < _SCALES[1]
@@ -94,16 +98,55 @@ def _matched(body: Body, one: RobotTrial, fixed: dict[str, float]) -> MatchedTri
 
 
 def _stood(
-    body: Body, time: Array, angle: Array, measured: Wrench, *, settings: LowPass | None = None
+    body: Body,
+    time: Array,
+    angle: Array,
+    measured: Wrench,
+    *,
+    settings: LowPass | None = None,
+    base: BaseSeen | None = None,
 ) -> tuple[Grounded, PlateFit]:
     """Return the motion and its place on the plate; where the angles leave open which foot stands, the plate tells."""
     tried = []
     for lean in (None, 0, 1):
-        found = ground(body, time, angle, settings=settings, lean=lean)
+        found = ground(body, time, angle, settings=settings, lean=lean, base=base)
         tried.append((found, fit_plate(predict_wrench(body, found.motion), measured, found.use)))
         if not found.unclear:
             break
     return max(tried, key=lambda pair: pair[1].correlation)
+
+
+def _inclined(one: RobotTrial, base: BaseSensors, time: Array) -> BaseSeen | None:
+    """Return what the base's IMU shows at ``time`` (T,) s; None without one."""
+    if base.imu is None:
+        return None
+    lost = [name for name in base.imu if name not in one.encoders.joints]
+    if lost:
+        raise FileRefused(f"{one.files[0]}: has no column {lost[0]}, which recording.toml [base] imu names.")
+    columns = [one.encoders.joints.index(name) for name in base.imu]
+    _, angle = even_angles(replace(one.encoders, joints=base.imu, angle=one.encoders.angle[:, columns]))
+    return base_of_inclinations(*angle.T)
+
+
+def _marked(body: Body, one: RobotTrial, base: BaseSensors, found: Grounded, angle: Array, fit: PlateFit) -> Grounded:
+    """Return the motion with the base where its markers are, in the frame of the first standing sole; only frames with
+    all markers count.
+    """
+    if one.markers is None:
+        raise FileRefused(f"{one.files[1]}: holds no markers, which recording.toml [base] markers names.")
+    time, seen = found.motion.time, one.markers
+    rotation, position = base_of_markers(seen, dict(base.markers), str(one.files[1]))
+    whole = np.isfinite(position[:, 0])
+    rows = np.column_stack([position, rotation.reshape(-1, 9)])
+    at = time + fit.delay
+    rows = np.stack([np.interp(at, seen.time[whole], row[whole]) for row in rows.T], axis=1)
+    near = np.interp(at, seen.time, whole, left=0.0, right=0.0) > 1 - 1e-9
+    u, _, vt = np.linalg.svd(rows[:, 3:].reshape(-1, 3, 3))
+    c, s = np.cos(fit.yaw), np.sin(fit.yaw)
+    turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    pose = BaseSeen(turn @ (u @ vt), (rows[:, :3] - [*fit.place, 0.0]) @ turn.T)
+    out = ground(body, time, angle, lean=found.lean, base=pose)
+    return replace(out, use=out.use & near)
 
 
 def _exchanged(
