@@ -361,7 +361,7 @@ def export_command(
     Parameters
     ----------
     source
-        Session folder, or folder with the results of `biodance identify`.
+        Session folder, or folder with the results of `biodance identify`; or hoap3, the robot from our own tables.
     """
     from biodance.pipeline.export import export as write
     from biodance.pipeline.export import replaceable

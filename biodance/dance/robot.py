@@ -21,6 +21,7 @@ from biodance.dance.limits import Limit
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance
+from biodance.dance.reposition import reposition
 from biodance.dance.verify import Margin, verify
 from biodance.errors import BiodanceError
 from biodance.identification.information import Information, fold
@@ -104,7 +105,9 @@ def design_robot(
         limits=tuple(limit.resized(length) for limit in plan.limits),
     )
     large, _ = design(likeness(body, to), long, seed=seed, tell=tell, resume=resume)
-    dance = shrunk(large, body, to)
+    if tell is not None:
+        tell("the way from rest", 0, 0)
+    dance = shrunk(reposition(large, long), body, to)
     return dance, verify(body, dance, plan.limits)
 
 
