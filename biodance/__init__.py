@@ -52,6 +52,8 @@ if TYPE_CHECKING:
     from biodance.pipeline.front_dance import verify_dance as verify_dance
     from biodance.pipeline.identification import SessionIdentification as SessionIdentification
     from biodance.pipeline.learn import learn_laboratory as learn_laboratory
+    from biodance.pipeline.movement import SessionMovement as SessionMovement
+    from biodance.pipeline.movement import describe_movement as describe_movement
     from biodance.pipeline.plates import judge_plates as judge_plates
     from biodance.pipeline.registration import register as register
     from biodance.pipeline.results import SessionResult as SessionResult
@@ -88,6 +90,7 @@ HOMES = {
     "pipeline.front_dance": ("design_dance", "simulate", "verify_dance"),
     "pipeline.identification": ("SessionIdentification",),
     "pipeline.learn": ("learn_laboratory",),
+    "pipeline.movement": ("SessionMovement", "describe_movement"),
     "pipeline.plates": ("judge_plates",),
     "pipeline.registration": ("register",),
     "pipeline.results": ("SessionResult",),

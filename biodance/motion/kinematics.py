@@ -103,6 +103,14 @@ def segment_motion(body: Body, motion: Motion) -> SegmentMotion:
     )
 
 
+def centre_of_mass(body: Body, motion: Motion) -> Array:
+    """Return the centre of mass (T, 3) m of ``body`` with its own parameters during ``motion``."""
+    mass = body.sip.mass
+    carried = np.flatnonzero(mass > 0)
+    points = poses(body, motion.q).points(carried.tolist(), body.sip.com[carried])
+    return np.einsum("k,tkj->tj", mass[carried], points) / mass[carried].sum()
+
+
 def below(body: Body) -> Array:
     """Return (n, N) 1 where a segment hangs on a joint."""
     table = np.zeros((len(body.joints), len(body.segments)))

@@ -14,8 +14,8 @@ from biodance.motion.contact.contact import Contact, foot_wrenches, ground_conta
 from biodance.motion.contact.events import foot_events
 from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.dynamics import joint_torques
+from biodance.motion.kinematics import centre_of_mass
 from biodance.motion.regressor import predict_wrench
-from biodance.pipeline.standing import centre_of_mass
 from biodance.pipeline.trial_result import TrialResult
 from biodance.records import SIDES, Array, Wrench
 from biodance.version import __version__
