@@ -12,10 +12,12 @@ from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.export import BODY, body_of_result
 from biodance.pipeline.for_subject import account_for
 from biodance.pipeline.identification import SessionIdentification
+from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.provenance import Provenance, now, provenance
 from biodance.pipeline.results import SessionResult
 from biodance.report.documents.diagnosis import attention_document, diagnosis_document, judged_document
 from biodance.report.documents.identification import identification_document
+from biodance.report.documents.movement import movement_document
 from biodance.report.documents.session import plain_values, results_document, to_text
 from biodance.report.figures.solid import still_addresses
 from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
@@ -26,7 +28,12 @@ PAGE, SUBJECT_PAGE, _NUMBERS = "report.html", "subject.html", "results.json"
 
 
 def write_report(
-    result: SessionResult, folder: Path, *, diagnosis: SessionDiagnosis | None = None, drawn: bool = True
+    result: SessionResult,
+    folder: Path,
+    *,
+    diagnosis: SessionDiagnosis | None = None,
+    movement: SessionMovement | None = None,
+    drawn: bool = True,
 ) -> dict[str, Any]:
     """Write ``report.html`` (where ``drawn``) and ``results.json`` into ``folder`` (which exists) and return the
     content of the latter.
@@ -39,6 +46,7 @@ def write_report(
         "diagnosis": diagnosis_document(diagnosis) if diagnosis else None,
         "attention": attention_document(first),
         "judged": judged_document(judged),
+        "movement": movement_document(movement) if movement else None,
     }
     write_files(folder, {_NUMBERS: to_text(found)} | ({PAGE: _page(result, made, diagnosis)} if drawn else {}))
     return dict(plain_values(found))
@@ -50,7 +58,9 @@ def write_subject_page(result: SessionResult, folder: Path, *, diagnosis: Sessio
     return folder / SUBJECT_PAGE
 
 
-def write_identification(result: SessionResult, found: SessionIdentification, folder: Path) -> dict[str, Any]:
+def write_identification(
+    result: SessionResult, found: SessionIdentification, folder: Path, *, movement: SessionMovement | None = None
+) -> dict[str, Any]:
     """Write ``report.html``, ``results.json`` with the identification alone and ``body.json``, the identified body;
     return the numbers.
 
@@ -62,6 +72,7 @@ def write_identification(result: SessionResult, found: SessionIdentification, fo
         "attention": attention_document(session_attention(result)),
         "judged": judged_document(identified_trials(result)),
         **identification_document(found),
+        "movement": movement_document(movement) if movement else None,
         "provenance": made.as_dict(),
     }
     files = {_NUMBERS: to_text(numbers), PAGE: _page(result, made)}
