@@ -357,7 +357,9 @@ def settings(session: Path | None = None, *, chosen: Set = (), json: JsonOption 
 def export_command(
     source: Path,
     *,
-    format: Annotated[str, Parameter(help="osim, urdf, mjcf, biomod, glb, csv; or trc, mot, c3d of one trial.")],
+    format: Annotated[
+        str, Parameter(help="osim, urdf, mjcf, biomod, glb, csv; trc, mot, c3d of one trial; opensim: a whole folder.")
+    ],
     out: Annotated[Path, Parameter(help="The file to write.")],
     trial: Annotated[str | None, Parameter(help="Name of the trial for trc, mot and c3d.")] = None,
     subject: Annotated[str | None, Parameter(help="The person to export_command where C3D files hold several.")] = None,

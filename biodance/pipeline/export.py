@@ -5,28 +5,26 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-from scipy.spatial.transform import Rotation
-
 from biodance.body.body import Body
 from biodance.body.body_file import read_body
 from biodance.body.export import formats, write_model
-from biodance.body.export.osim import ROOT_ROTATIONS, ROOT_TRANSLATIONS
-from biodance.body.parts import UPRIGHT
 from biodance.body.solids import segment_solids
 from biodance.errors import SessionRefused, TrialRefused, UnknownName
-from biodance.lab.opensim.mot import TimeTable, write_mot
+from biodance.lab.opensim.mot import write_mot
 from biodance.lab.opensim.trc import write_trc
 from biodance.lab.session.read import read_session
+from biodance.pipeline.coordinates import opensim_coordinates
+from biodance.pipeline.opensim_folder import write_opensim_folder
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.results_c3d import results_into_c3d
 from biodance.pipeline.session import examine
 from biodance.pipeline.trial import prepare_trial
-from biodance.records import Motion, Session, Trial
+from biodance.records import Session, Trial
 
 BODY = "body.json"
 """File in which `biodance identify` keeps the identified body."""
-MOTION_FORMATS = ("trc", "mot", "c3d")
+MOTION_FORMATS = ("trc", "mot", "c3d", "opensim")
+"""Formats that need a recording beside the body."""
 
 
 def legal_formats() -> tuple[str, ...]:
@@ -57,9 +55,10 @@ def export(
         ``osim``, ``urdf``, ``mjcf``, ``biomod``, ``csv``: the body with the identified parameters, where there are
         trials to identify from, else with the table's. ``trc``: the prepared markers of a trial, ``mot``: its joint
         coordinates, of the model that ``osim`` writes; ``c3d``: a copy of its recording with angles, moments, wrenches,
-        centre of mass and events.
+        centre of mass and events. ``opensim``: a folder with all that OpenSim needs to run its inverse dynamics.
     trial : str, optional
-        Name of the trial for ``trc`` and ``mot``; by default the only one that moves.
+        Name of the trial for ``trc``, ``mot`` and ``c3d``, by default the only one that moves; for ``opensim`` by
+        default all.
     subject : str, optional
         The person where files hold several.
     meshes : pathlib.Path, optional
@@ -124,11 +123,25 @@ def _of_result(
     if format == "mot":
         return _motion(result, _chosen(result.session, trial).name, out)
     body, words = body_of_result(result)
+    if format == "opensim":
+        return _opensim(result, body, out, words, trial, meshes)
     if format == "c3d":
         name = _chosen(result.session, trial).name
         one = next(found for found in result.trials if found.trial.name == name)
         return results_into_c3d(one, body, out, source=words, subject=subject)
     return _model(body, out, format, words, meshes), words
+
+
+def _opensim(
+    result: SessionResult, body: Body, out: Path, source: str, trial: str | None, meshes: Path | None
+) -> tuple[Path, str]:
+    """Write the folder for OpenSim, of one trial or of all."""
+    chosen = result.trials if trial is None else (result[trial],)
+    solids = None if meshes is None else segment_solids(body, meshes)
+    written = write_opensim_folder(chosen, body, out, source=source, solids=solids)
+    ready = [one.trial for one in written if one.dynamics]
+    told = f"Inverse dynamics is set up for {', '.join(ready)}." if ready else "No plate measures all in any trial."
+    return out, f"Model, markers, motions and forces of {', '.join(one.trial for one in written)}. {told} {source}"
 
 
 def _model(body: Body, out: Path, format: str, source: str, meshes: Path | None) -> Path:
@@ -201,17 +214,3 @@ def _motion(result: SessionResult, name: str, out: Path) -> tuple[Path, str]:
     return write_mot(
         out, table
     ), f"Joint coordinates of trial {name}, rad and m, y up; the model is exported with --format osim."
-
-
-def opensim_coordinates(body: Body, motion: Motion) -> TimeTable:
-    """Return the coordinates of ``motion`` (T frames) by name: rad and m, root in OpenSim's ground (y up), joints as
-    in ``body``.
-    """
-    names = [joint.name for joint in body.joints]
-    angles = motion.q[:, body.nq - len(names) :]
-    if not body.n_root:
-        return TimeTable(body.name, tuple(names), motion.time, angles)
-    turned = UPRIGHT.T @ Rotation.from_quat(motion.q[:, 3:7]).as_matrix()
-    turns = np.unwrap(Rotation.from_matrix(turned).as_euler("ZXY"), axis=0)
-    root = [f"{body.segments[0]}_{word}" for word in (*ROOT_ROTATIONS, *ROOT_TRANSLATIONS)]
-    return TimeTable(body.name, (*root, *names), motion.time, np.hstack([turns, motion.q[:, :3] @ UPRIGHT, angles]))
