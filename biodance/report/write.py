@@ -19,7 +19,6 @@ from biodance.report.documents.diagnosis import attention_document, diagnosis_do
 from biodance.report.documents.identification import identification_document
 from biodance.report.documents.movement import movement_document
 from biodance.report.documents.session import plain_values, results_document, to_text
-from biodance.report.figures.solid import still_addresses
 from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
 from biodance.report.pages.session import page
 from biodance.report.pages.subject import subject_page
@@ -138,9 +137,8 @@ def _accepted(
 
 def _page(result: SessionResult, made: Provenance, diagnosis: SessionDiagnosis | None = None) -> str:
     told = diagnosis_section(diagnosis) if diagnosis else ""
-    stills = still_addresses((result.still, *result.more_stills)) if result.still else []
     attention = diagnosis.diagnosis.attention if diagnosis else None
-    return page(result, made, attention=attention, stills=stills, diagnosis=told)
+    return page(result, made, attention=attention, diagnosis=told)
 
 
 def write_files(folder: Path, files: dict[str, str]) -> None:

@@ -1,10 +1,10 @@
 """The analyst's page: one HTML file that holds all it shows and asks nothing of the network."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.resources import files
 
 from biodance.diagnosis.diagnosis import ABOUT
+from biodance.identification.validation import TrialValidation
 from biodance.lab.markers.gaps import MarkerGaps
 from biodance.pipeline.attention import session_attention
 from biodance.pipeline.provenance import Provenance
@@ -12,10 +12,17 @@ from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import Check, TrialResult
 from biodance.records import CHANNELS
 from biodance.records.attention import Attention
-from biodance.report.figures.session import marker_figure, standing_figure, wrench_figure
-from biodance.report.figures.style import svg_address
+from biodance.report.figures.session import (
+    marker_figure,
+    place_words,
+    standing_figure,
+    validation_figure,
+    wrench_figure,
+)
+from biodance.report.figures.still import still_figure
 from biodance.report.pages.identification import identification_section
-from biodance.report.wording import format_number, millimetres, trial_and_subject
+from biodance.report.pages.template import render, template_text
+from biodance.report.wording import trial_and_subject
 
 STATUS_WORDS = {"ok": "done", "warning": "look here", "refused": "refused"}
 
@@ -34,11 +41,12 @@ def check_table(result: SessionResult) -> tuple[list[tuple[str, str]], list[tupl
 
 @dataclass(frozen=True)
 class TrialPart:
-    """One trial with its drawn figures as image addresses; "" where there is nothing to draw."""
+    """One trial with its figures as HTML; "" where there is nothing to draw."""
 
     result: TrialResult
     markers: str
     wrench: str
+    validation: TrialValidation | None = None
 
     @property
     def gaps(self) -> list[MarkerGaps]:
@@ -67,12 +75,13 @@ class TrialPart:
         return list(zip(CHANNELS, units, comparison.rms.tolist(), comparison.correlation.tolist(), strict=True))
 
 
-def _trial_part(result: TrialResult) -> TrialPart:
-    return TrialPart(
-        result,
-        svg_address(marker_figure(result.fit)) if result.fit else "",
-        svg_address(wrench_figure(result.comparison)) if result.comparison else "",
-    )
+def _trial_part(result: TrialResult, validated: Mapping[str, TrialValidation]) -> TrialPart:
+    name = result.trial.name
+    if name in validated:
+        wrench = validation_figure(validated[name])
+    else:
+        wrench = wrench_figure(result.comparison, name) if result.comparison else ""
+    return TrialPart(result, marker_figure(result.fit) if result.fit else "", wrench, validated.get(name))
 
 
 def page(
@@ -80,33 +89,31 @@ def page(
     provenance: Provenance,
     *,
     attention: Sequence[Attention] | None = None,
-    stills: Sequence[str] = (),
     diagnosis: str = "",
 ) -> str:
     """Return the page of ``result`` as HTML text; ``attention`` what a person must see (by default
-    `session_attention`), ``stills`` the addresses of its 3-D images (`still`, then `more_stills`), ``diagnosis`` the
-    section on what the simulation gets wrong, "" for none.
+    `session_attention`), ``diagnosis`` the section on what the simulation gets wrong, "" for none.
 
     The same arguments give the same characters.
     """
-    from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
     said = session_attention(result) if attention is None else attention
     first = sorted(said, key=lambda one: one.about != ABOUT)
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters.update(number=format_number, mm=millimetres)
-    folder = files("biodance.report") / "templates"
-    return environment.from_string((folder / "page.html.j2").read_text(encoding="utf-8")).render(
-        style=Markup((folder / "page.css").read_text(encoding="utf-8")),
+    found = result.identification
+    validated = {one.name: one for one in (*found.validations, *found.fitted)} if found else {}
+    return render(
+        "page.html.j2",
+        filters={"place": place_words},
+        scripts=[template_text("curves.js")],
         attention=[(trial_and_subject(one), one.text) for one in first],
         check_table=check_table(result),
         result=result,
         provenance=provenance,
-        parts=[_trial_part(trial) for trial in result.trials],
-        standing=svg_address(standing_figure(result.standing)) if result.standing else "",
-        still=stills[0] if stills else "",
-        more_stills=list(zip(stills[1:], result.more_stills, strict=True)) if stills else [],
+        parts=[_trial_part(trial, validated) for trial in result.trials],
+        standing=Markup(standing_figure(result.standing)) if result.standing else "",
+        still=Markup(still_figure(result.still)) if result.still else "",
+        more_stills=[(Markup(still_figure(one)), one) for one in result.more_stills],
         diagnosis=Markup(diagnosis),
         identification=Markup(identification_section(result.identification)) if result.identification else "",
         words=STATUS_WORDS,

@@ -1,0 +1,38 @@
+"""How a template becomes a page: one environment, one style, and scripts that the page's own policy allows by their
+hash.
+"""
+
+from base64 import b64encode
+from collections.abc import Sequence
+from hashlib import sha256
+from importlib.resources import files
+from typing import Any
+
+from biodance.report.wording import format_number, millimetres
+
+
+def template_text(name: str) -> str:
+    """Return a file of the templates' folder."""
+    return (files("biodance.report") / "templates" / name).read_text(encoding="utf-8")
+
+
+def render(name: str, *, filters: dict[str, Any] | None = None, scripts: Sequence[str] = (), **values: Any) -> str:
+    """Return a template filled with ``values`` as HTML text; the same arguments give the same characters.
+
+    Every template knows ``style`` and ``policy`` (what its page may do: nothing of the network, and only ``scripts``),
+    ``scripts``, and the filters ``number`` and ``mm``.
+    """
+    from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
+
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters.update(number=format_number, mm=millimetres, **(filters or {}))
+    style = template_text("page.css") + template_text("curves.css")
+    given = {"style": Markup(style), "policy": _policy(scripts), "scripts": [Markup(text) for text in scripts]}
+    return environment.from_string(template_text(name)).render(**{**given, **values})
+
+
+def _policy(scripts: Sequence[str]) -> str:
+    hashes = " ".join(f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'" for text in scripts)
+    allowed = f"script-src {hashes}; " if scripts else ""
+    return f"default-src 'none'; {allowed}style-src 'unsafe-inline'; img-src data:"
