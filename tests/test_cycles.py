@@ -189,7 +189,7 @@ def test_repeats_have_mean_and_sd_and_gaps_stay_gaps():
     assert knee.sd[0] == pytest.approx(np.degrees(0.2) / np.sqrt(2))
     assert knee.mean[30] == pytest.approx(np.degrees(0.2))
     assert np.isnan(knee.sd[30])
-    assert {one.side for one in curves} == {"right", "middle"}
+    assert {one.side for one in curves} == {"right"}
 
 
 def test_moments_and_powers_are_those_of_recursive_newton_euler_per_kg():

@@ -11,7 +11,7 @@ from biodance.body.human.human import human
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
-from biodance.pipeline.movement import describe_movement
+from biodance.pipeline.front_movement import describe_movement
 from biodance.pipeline.session import examine
 from biodance.records import Markers, Motion, Plate, Session, Source, Subject, Trial, Wrench
 

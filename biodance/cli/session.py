@@ -75,7 +75,7 @@ def report_session(
     person who was measured; return the result and the content of results.json.
     """
     from biodance.pipeline.diagnosis import diagnosed
-    from biodance.pipeline.movement import describe_movement
+    from biodance.pipeline.front_movement import describe_movement
     from biodance.pipeline.session import stopped_before
     from biodance.report.write import write_report, write_subject_page
 
@@ -277,7 +277,7 @@ def identify_command(
         return _identify_robot(session, out, urdf, feet, {**persons, "--tables": tables}, json=json, force=force)
     from biodance.dance.dance import Dance
     from biodance.pipeline import front
-    from biodance.pipeline.movement import describe_movement
+    from biodance.pipeline.front_movement import describe_movement
     from biodance.report.write import write_identification
 
     with progress() as tell:

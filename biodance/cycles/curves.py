@@ -15,11 +15,11 @@ from biodance.records.arrays import assign
 
 _TRAVELS = 0.3
 """m that the pelvis goes in a cycle from which its way, not the way it faces, is the direction of walking."""
-PELVIS = ("pelvis_tilt", "pelvis_obliquity", "pelvis_rotation")
+_PELVIS = ("pelvis_tilt", "pelvis_obliquity", "pelvis_rotation")
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class CycleCurve:
     """One ``quantity`` over one ``cycle``: ``side`` "right", "left" or "middle" of the joint; ``value`` (101,) at
     `PERCENT` in ``unit``, NaN = not known; ``sd`` (101,) what the inertial parameters leave uncertain, NaN = not
     counted.
@@ -35,8 +35,8 @@ class Curve:
     def __post_init__(self) -> None:
         assign(
             self,
-            value=frozen_array(self.value, (PERCENT.size,), f"Curve {self.quantity}"),
-            sd=frozen_array(self.sd, (PERCENT.size,), f"Curve {self.quantity}, sd"),
+            value=frozen_array(self.value, (PERCENT.size,), f"CycleCurve {self.quantity}"),
+            sd=frozen_array(self.sd, (PERCENT.size,), f"CycleCurve {self.quantity}, sd"),
         )
 
 
@@ -57,16 +57,16 @@ class CurveGroup:
     parameters_sd: Array
 
 
-def curve(
+def over_cycle(
     cycle: Cycle, quantity: str, side: str, unit: str, time: Array, value: Array, sd: Array | None = None
-) -> Curve:
+) -> CycleCurve:
     """Return a quantity (T,) of a trial over one of its cycles; NaN beside frames in which it is NaN."""
     at = cycle.times()
     spread = np.full(at.size, np.nan) if sd is None else np.interp(at, time, sd)
-    return Curve(cycle, quantity, side, unit, np.interp(at, time, value), spread)
+    return CycleCurve(cycle, quantity, side, unit, np.interp(at, time, value), spread)
 
 
-def group_curves(curves: Sequence[Curve]) -> tuple[CurveGroup, ...]:
+def group_curves(curves: Sequence[CycleCurve]) -> tuple[CurveGroup, ...]:
     """Return the curves of the same kind, quantity and side together, in the order in which they come."""
     keys = dict.fromkeys((one.cycle.kind, one.quantity, one.side) for one in curves)
     found = []
@@ -88,18 +88,29 @@ def mean_and_sd(values: Array) -> tuple[Array, Array]:
     return mean, np.where(count > 1, np.sqrt(square / np.maximum(count - 1, 1)), np.nan)
 
 
-def angle_curves(cycle: Cycle, body: Body, motion: Motion) -> Iterator[Curve]:
+def angle_curves(cycle: Cycle, body: Body, motion: Motion) -> Iterator[CycleCurve]:
     """Yield the joint angles of a cycle in degrees: of its own side and of the trunk in a gait cycle, else of all.
 
     The axes are those of the ISB (Wu et al. 2002, doi:10.1016/S0021-9290(01)00222-6) in the order flexion about the
     z axis of the proximal segment, adduction about the floating axis, rotation about the y axis of the distal one;
-    docs/guide/movement.md says each sign.
+    docs/guide/movement.md says each sign. In a gait cycle bending and rotation of the trunk are seen from the cycle's
+    side, as those of the pelvis: its own side down, its own side forwards are positive.
     """
     angle = np.where(motion.determined[:, None], motion.angles, np.nan)
     for j, joint in enumerate(body.joints):
-        side, quantity = side_and_name(joint.name)
-        if cycle.side in ("both", side) or side == "middle":
-            yield curve(cycle, quantity, side, "deg", motion.time, angle[:, j])
+        if (seen := seen_from(cycle, joint.name)) is not None:
+            side, quantity, sign = seen
+            yield over_cycle(cycle, quantity, side, "deg", motion.time, sign * angle[:, j])
+
+
+def seen_from(cycle: Cycle, joint: str) -> tuple[str, str, float] | None:
+    """Return side, name without it and sign with which a joint belongs to a cycle; None where it does not."""
+    side, name = side_and_name(joint)
+    if cycle.side == "both":
+        return side, name, 1.0
+    if side == "middle":
+        return cycle.side, name, -1.0 if cycle.side == "left" and not name.endswith("flexion") else 1.0
+    return (side, name, 1.0) if side == cycle.side else None
 
 
 def side_and_name(joint: str) -> tuple[str, str]:
@@ -108,13 +119,13 @@ def side_and_name(joint: str) -> tuple[str, str]:
     return (side, name) if side in SIDES else ("middle", joint)
 
 
-def lab_curves(cycle: Cycle, body: Body, motion: Motion, soles: Soles) -> Iterator[Curve]:
+def lab_curves(cycle: Cycle, body: Body, motion: Motion, soles: Soles) -> Iterator[CycleCurve]:
     """Yield pelvis, foot progression (deg) and centre of mass (m) of a cycle.
 
     The pelvis in the frame of the way it goes (of the way it faces on average where it goes nowhere), in the order
     rotation, obliquity, tilt (Baker 2001, doi:10.1016/S0167-9457(00)00059-1): forward tilt, the cycle's own side up,
-    its own side forward are positive. Foot progression: toes inwards are positive. The centre of mass: m ahead of where
-    the cycle began, to the side of the foot, over the ground.
+    its own side forward are positive. Foot progression, while the foot stands: toes inwards are positive. The centre of
+    mass: m ahead of where the cycle began, to the side of the foot, over the ground.
     """
     pose, time = poses(body, motion.q), motion.time
     forward = _direction(cycle, pose, time)
@@ -122,20 +133,21 @@ def lab_curves(cycle: Cycle, body: Body, motion: Motion, soles: Soles) -> Iterat
     known = np.where(motion.determined, 1.0, np.nan)
     right = np.array([forward[1], -forward[0], 0.0])
     frame = np.stack([np.array([*forward, 0.0]), np.array([0.0, 0.0, 1.0]), right])
-    for name, angle in zip(PELVIS, _pelvis(frame @ pose.rotation[:, 0], mirror), strict=True):
-        yield curve(cycle, name, "middle" if cycle.side == "both" else cycle.side, "deg", time, known * angle)
+    for name, angle in zip(_PELVIS, _pelvis(frame @ pose.rotation[:, 0], mirror), strict=True):
+        yield over_cycle(cycle, name, "middle" if cycle.side == "both" else cycle.side, "deg", time, known * angle)
     heel, toe = heel_and_toe(body, soles.outline)
     for foot, side in enumerate(SIDES):
         if cycle.side in (side, "both"):
             ahead, aside = ((toe - heel)[:, foot] @ frame[k] for k in (0, 2))
             inwards = -np.degrees(np.arctan2(aside, ahead)) * (-1.0 if side == "left" else 1.0)
-            yield curve(cycle, "foot_progression", side, "deg", time, known * inwards)
+            stands = np.where((time > cycle.off) & (cycle.side == side), np.nan, known)
+            yield over_cycle(cycle, "foot_progression", side, "deg", time, stands * inwards)
     centre = centre_of_mass(body, motion)
     began = np.array([np.interp(cycle.start, time, column) for column in centre.T]) * np.array([1.0, 1.0, 0.0])
     ground = float(np.percentile(soles.outline[..., 2].min(axis=(1, 2)), 5))
     for name, axis, sign, zero in (("ahead", 0, 1.0, 0.0), ("aside", 2, mirror, 0.0), ("height", 1, 1.0, ground)):
         path = sign * ((centre - began) @ frame[axis]) - zero
-        yield curve(
+        yield over_cycle(
             cycle, f"centre_of_mass_{name}", "middle" if cycle.side == "both" else cycle.side, "m", time, known * path
         )
 

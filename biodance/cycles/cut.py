@@ -13,7 +13,7 @@ from biodance.motion.contact.soles import Soles
 from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.records import SIDES, Array, Motion, runs
 
-Kind = Literal["gait", "squat", "sit_to_stand"]
+CycleKind = Literal["gait", "squat", "sit_to_stand"]
 PERCENT = np.linspace(0.0, 100.0, 101)
 """% of a cycle at which its curves are given."""
 _SHORTEST_STRIDE, _LONGEST_STRIDE = 0.4, 2.5
@@ -38,7 +38,7 @@ class Cycle:
     """
 
     trial: str
-    kind: Kind
+    kind: CycleKind
     side: str
     start: float
     end: float

@@ -25,7 +25,7 @@ set by hand and force, are met to -4 and 0 ms in the mean (sd 15, 16 ms); with Z
 """
 _EVENT_CUTOFF = 8.0
 """Hz of the low-pass on the paths of the feet, of which only the extremes are looked for."""
-TOGETHER = 0.1
+_TOGETHER = 0.1
 """s: events of force and of markers that are nearer than this are one event."""
 
 
@@ -80,7 +80,7 @@ def agreement_of_events(force: tuple[FootEvent, ...], markers: tuple[FootEvent, 
     for event in force:
         same = [other.time - event.time for other in markers if (other.side, other.down) == (event.side, event.down)]
         nearest = min(same, key=abs, default=np.inf)
-        if abs(nearest) < TOGETHER:
+        if abs(nearest) < _TOGETHER:
             late[event.down].append(nearest)
     return np.array(late[True]), np.array(late[False])
 
@@ -91,7 +91,7 @@ def joined_events(force: tuple[FootEvent, ...], markers: tuple[FootEvent, ...]) 
         event
         for event in markers
         if not any(
-            (other.side, other.down) == (event.side, event.down) and abs(other.time - event.time) < TOGETHER
+            (other.side, other.down) == (event.side, event.down) and abs(other.time - event.time) < _TOGETHER
             for other in force
         )
     ]

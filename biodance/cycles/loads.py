@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.cycles.curves import Curve, curve, side_and_name
+from biodance.cycles.curves import CycleCurve, over_cycle, seen_from, side_and_name
 from biodance.cycles.cut import Cycle
 from biodance.identification.torques import ground_torques, torque_regressor
 from biodance.motion.kinematics import chains
@@ -19,7 +19,7 @@ _ENOUGH = 0.8
 
 def load_curves(
     cycle: Cycle, body: Body, sip: Sip, motion: Motion, feet: tuple[Wrench, Wrench], told: NDArray[np.bool_]
-) -> Iterator[Curve]:
+) -> Iterator[CycleCurve]:
     """Yield the moments (N·m/kg) and powers (W/kg) of a cycle, those of its own side and of the trunk in a gait cycle.
 
     ``feet`` the wrenches on the right and the left foot, ``told`` (T, 2) where they are known: elsewhere the leg's
@@ -47,11 +47,13 @@ def load_curves(
     variance = np.sum((rows @ sip.covariance) * rows, axis=-1)
     value, sd = (rows @ sip.phi - needed) / mass, np.sqrt(np.maximum(variance, 0.0)) / mass
     for k, (name, unit) in enumerate(zip(names, units, strict=True)):
-        side, quantity = side_and_name(name)
-        if cycle.side not in ("both", side) and side != "middle":
+        if (seen := seen_from(cycle, name.removesuffix("_moment").removesuffix("_power"))) is None:
             continue
+        side, _, sign = seen
+        sign = 1.0 if unit == "W/kg" else sign
         shown = np.where(_is_known(name, known, here), 1.0, np.nan)
-        one = curve(cycle, quantity, side, unit, here.time, shown * value[:, k], shown * sd[:, k])
+        quantity = side_and_name(name)[1]
+        one = over_cycle(cycle, quantity, side, unit, here.time, sign * shown * value[:, k], shown * sd[:, k])
         if np.isfinite(one.value).mean() > _ENOUGH:
             yield one
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from biodance import display
 from biodance.body.body import Body
-from biodance.cycles.curves import Curve, CurveGroup, angle_curves, group_curves, lab_curves
+from biodance.cycles.curves import CurveGroup, CycleCurve, angle_curves, group_curves, lab_curves
 from biodance.cycles.cut import PERCENT, Cycle, gait_cycles, repetitions
 from biodance.cycles.events import agreement_of_events, joined_events, kinematic_events
 from biodance.cycles.file_outputs import AngleComparison, EventComparison, compare_angles, compare_events
@@ -39,7 +39,7 @@ class TrialMovement:
         Strikes and leavings of both feet: of the plates where they saw one, else of the markers.
     cycles : tuple of Cycle
         Gait cycles of each foot, squats, rises from a chair.
-    curves : tuple of Curve
+    curves : tuple of CycleCurve
         Angles (deg), moments (N·m/kg) and powers (W/kg) of every cycle over 0 to 100 %, with what the parameters leave
         uncertain in them; pelvis, foot progression and centre of mass.
     strides : tuple of Stride
@@ -60,7 +60,7 @@ class TrialMovement:
     trial: str
     events: tuple[FootEvent, ...]
     cycles: tuple[Cycle, ...]
-    curves: tuple[Curve, ...]
+    curves: tuple[CycleCurve, ...]
     strides: tuple[Stride, ...]
     late: tuple[Array, Array]
     file_angles: tuple[AngleComparison, ...] = ()
@@ -152,7 +152,7 @@ class TrialMovement:
         Returns
         -------
         dict
-            Name -> (mean, sd, count) in the units of `cycles.steps.UNITS`; {} where nobody walks.
+            Name -> (mean, sd, count) in the units of `cycles.steps.STRIDE_UNITS`; {} where nobody walks.
 
         Examples
         --------
@@ -198,7 +198,7 @@ def trial_movement(
         force = foot_events(feet, contact)
     events = joined_events(force, markers) if markers else ()
     cycles = (*gait_cycles(trial.name, events), *repetitions(trial.name, body, motion, soles))
-    curves: list[Curve] = []
+    curves: list[CycleCurve] = []
     for cycle in cycles:
         curves += [*angle_curves(cycle, body, motion), *lab_curves(cycle, body, motion, soles)]
         if contact is not None and feet is not None:

@@ -16,7 +16,7 @@ _BELT = 0.15
 """m/s of a standing foot from which the ground is a belt."""
 _FLAT = (20.0, 40.0)
 """% of a cycle in which the foot stands flat and tells how fast the ground moves."""
-UNITS: Mapping[str, str] = {
+STRIDE_UNITS: Mapping[str, str] = {
     "cadence": "steps/min",
     "speed": "m/s",
     "stride_length": "m",
@@ -32,7 +32,7 @@ UNITS: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class Stride:
-    """The spatio-temporal values of one gait ``cycle`` by name (`UNITS`); a value that the trial does not tell is
+    """The spatio-temporal values of one gait ``cycle`` by name (`STRIDE_UNITS`); one that the trial does not tell is
     missing.
     """
 
@@ -55,7 +55,7 @@ def strides(cycles: Sequence[Cycle], events: Sequence[FootEvent], body: Body, so
 def mean_values(found: Sequence[Stride], side: str = "both") -> dict[str, tuple[float, float, int]]:
     """Return mean, standard deviation (NaN for one stride) and number of every value that the strides tell."""
     out = {}
-    for name in UNITS:
+    for name in STRIDE_UNITS:
         some = [s.values[name] for s in found if name in s.values and side in ("both", s.cycle.side)]
         if some:
             out[name] = (float(np.mean(some)), float(np.std(some, ddof=1)) if len(some) > 1 else np.nan, len(some))

@@ -2,14 +2,13 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from biodance import display
 from biodance.body.body import Body
 from biodance.cycles.movement import TrialMovement, trial_movement
-from biodance.cycles.steps import UNITS
-from biodance.errors import BiodanceError
+from biodance.cycles.steps import STRIDE_UNITS
+from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab.c3d.outputs import FileOutputs, read_outputs
 from biodance.motion.contact.contact import Contact, ground_contact
 from biodance.motion.contact.soles import soles_from_body
@@ -104,7 +103,7 @@ class SessionMovement:
         import pandas as pd
 
         rows = [
-            (one.trial, name, UNITS[name], side, *values)
+            (one.trial, name, STRIDE_UNITS[name], side, *values)
             for one in self.trials
             for side in ("both", "left", "right")
             for name, values in one.spatiotemporal(side).items()
@@ -113,49 +112,8 @@ class SessionMovement:
 
 
 @one_thread()
-def describe_movement(
-    session: "SessionResult | str | Path", *, tell: Callable[[str], None] = lambda _: None
-) -> SessionMovement:
-    """Return what moved in every trial of a visit: events, cycles, angles, moments, powers, spatio-temporal values.
-
-    Parameters
-    ----------
-    session : SessionResult, str or pathlib.Path
-        The visit as `examine` returns it, or its folder.
-    tell : callable, optional
-        Called with what is being done, in words.
-
-    Returns
-    -------
-    SessionMovement
-        ``moved["walk_1"].curve("knee_flexion", "left")`` holds all repetitions over 0 to 100 % with mean and sd, in
-        degrees; moments in N·m/kg and powers in W/kg with what the inertial parameters leave uncertain in them.
-
-    Raises
-    ------
-    SessionRefused
-        The folder holds no session.
-
-    See Also
-    --------
-    examine : All stages of a visit.
-
-    References
-    ----------
-    Joint axes: Wu et al. 2002, doi:10.1016/S0021-9290(01)00222-6. Events: Zeni et al. 2008,
-    doi:10.1016/j.gaitpost.2007.07.007. Pelvis: Baker 2001, doi:10.1016/S0167-9457(00)00059-1.
-
-    Examples
-    --------
-    >>> moved = biodance.describe_movement(result)
-    >>> bool(moved["squat_1"].curve("knee_flexion", "left").mean.max() > 60)
-    True
-    """
-    if not isinstance(session, SessionResult):
-        from biodance.lab.session.read import read_session
-        from biodance.pipeline.session import examine
-
-        session = examine(read_session(session, tell=tell), tell=tell)
+def session_movement(session: SessionResult, *, tell: Callable[[str], None] = lambda _: None) -> SessionMovement:
+    """Return what moved in an examined session; see `describe_movement`."""
     found = session.identification
     solved = found is not None and found.status == "solved"
     sip = found.identification.sip if found is not None and solved else None
@@ -179,8 +137,6 @@ def movement_of(one: TrialResult, body: Body | None, sip: Sip | None) -> TrialMo
     TrialRefused
         The trial gives no motion, or one too short.
     """
-    from biodance.errors import TrialRefused
-
     if body is None or one.motion is None:
         raise TrialRefused(f"Trial {one.name}: it gives no motion. {one.reason}".strip())
     contact = contact_of(one.trial, one, body)

@@ -6,7 +6,7 @@ import numpy as np
 
 from biodance.cycles.cut import PERCENT
 from biodance.cycles.movement import TrialMovement
-from biodance.cycles.steps import UNITS
+from biodance.cycles.steps import STRIDE_UNITS
 from biodance.pipeline.movement import SessionMovement
 
 if TYPE_CHECKING:
@@ -53,9 +53,9 @@ def _named(one: TrialMovement, number: int) -> tuple[Any, ...]:
 def _strides(moved: SessionMovement) -> "DataFrame":
     import pandas as pd
 
-    columns = [f"{name}_{unit.replace('/', '_per_').replace('%', 'percent')}" for name, unit in UNITS.items()]
+    columns = [f"{name}_{unit.replace('/', '_per_').replace('%', 'percent')}" for name, unit in STRIDE_UNITS.items()]
     rows = [
-        (one.trial, one.cycles.index(s.cycle) + 1, s.cycle.side, *(s.values.get(name, np.nan) for name in UNITS))
+        (one.trial, one.cycles.index(s.cycle) + 1, s.cycle.side, *(s.values.get(name, np.nan) for name in STRIDE_UNITS))
         for one in moved
         for s in one.strides
     ]

@@ -12,7 +12,7 @@ from biodance.body.body import Body
 from biodance.body.export import write_model
 from biodance.body.solids import SegmentSolids, segment_solids
 from biodance.errors import BiodanceError, SessionRefused, TrialRefused
-from biodance.lab.opensim.inverse_dynamics import external_loads, foot_forces, inverse_dynamics_setup
+from biodance.lab.opensim.inverse_dynamics import external_loads, ground_table, inverse_dynamics_setup
 from biodance.lab.opensim.mot import TimeTable, write_mot
 from biodance.lab.opensim.trc import write_trc
 from biodance.lab.plain_text import write_new
@@ -95,7 +95,7 @@ def _trial(one: TrialResult, body: Body, folder: Path) -> OpensimTrial:
         return OpensimTrial(name, tuple(files), None, "It has no force plate.")
     feet = foot_wrenches(one.trial, contact, soles_from_body(body, motion))
     ground = {f"{side}_foot": _finite(wrench) for side, wrench in zip(SIDES, feet, strict=True)}
-    files.append(write_mot(folder / f"{name}_forces.mot", foot_forces(ground, name=name)).name)
+    files.append(write_mot(folder / f"{name}_forces.mot", ground_table(ground, name=name)).name)
     loads = external_loads(tuple(ground), data_file=f"{name}_forces.mot")
     files.append(write_new(folder / f"{name}_ExternalLoads.xml", loads.encode()).name)
     span = _span(contact, motion)

@@ -20,6 +20,7 @@ from biodance.report.documents.identification import identification_document
 from biodance.report.documents.movement import movement_document
 from biodance.report.documents.session import plain_values, results_document, to_text
 from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
+from biodance.report.pages.movement import movement_section
 from biodance.report.pages.session import page
 from biodance.report.pages.subject import subject_page
 
@@ -47,7 +48,9 @@ def write_report(
         "judged": judged_document(judged),
         "movement": movement_document(movement) if movement else None,
     }
-    write_files(folder, {_NUMBERS: to_text(found)} | ({PAGE: _page(result, made, diagnosis)} if drawn else {}))
+    write_files(
+        folder, {_NUMBERS: to_text(found)} | ({PAGE: _page(result, made, diagnosis, movement)} if drawn else {})
+    )
     return dict(plain_values(found))
 
 
@@ -74,7 +77,7 @@ def write_identification(
         "movement": movement_document(movement) if movement else None,
         "provenance": made.as_dict(),
     }
-    files = {_NUMBERS: to_text(numbers), PAGE: _page(result, made)}
+    files = {_NUMBERS: to_text(numbers), PAGE: _page(result, made, movement=movement)}
     if found.identification.status == "solved":
         files[BODY] = body_text(*body_of_result(result))
     write_files(folder, files)
@@ -135,10 +138,16 @@ def _accepted(
     return told, files
 
 
-def _page(result: SessionResult, made: Provenance, diagnosis: SessionDiagnosis | None = None) -> str:
+def _page(
+    result: SessionResult,
+    made: Provenance,
+    diagnosis: SessionDiagnosis | None = None,
+    movement: SessionMovement | None = None,
+) -> str:
     told = diagnosis_section(diagnosis) if diagnosis else ""
+    moved = movement_section(movement) if movement else ""
     attention = diagnosis.diagnosis.attention if diagnosis else None
-    return page(result, made, attention=attention, diagnosis=told)
+    return page(result, made, attention=attention, diagnosis=told, movement=moved)
 
 
 def write_files(folder: Path, files: dict[str, str]) -> None:

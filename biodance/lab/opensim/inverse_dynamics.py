@@ -15,7 +15,7 @@ _AXES = "xyz"
 _VERSION = "40000"
 
 
-def foot_forces(feet: Mapping[str, Wrench], *, name: str) -> TimeTable:
+def ground_table(feet: Mapping[str, Wrench], *, name: str) -> TimeTable:
     """Return the ground's force on each segment as a table, y up: nine columns a segment, its name in front.
 
     ``feet`` segment -> wrench of the ground on it about the lab origin. Force and torque stand at one point of the
@@ -39,7 +39,7 @@ def _mean_place(wrench: Wrench) -> Array:
 
 
 def external_loads(segments: tuple[str, ...], *, data_file: str) -> str:
-    """Return ExternalLoads.xml: the columns of `foot_forces` in ``data_file`` on their segments, in the ground."""
+    """Return ExternalLoads.xml: the columns of `ground_table` in ``data_file`` on their segments, in the ground."""
     root = Element("OpenSimDocument", Version=_VERSION)
     loads = SubElement(root, "ExternalLoads", name="ground")
     objects = SubElement(loads, "objects")

@@ -7,7 +7,7 @@ import numpy as np
 from biodance.cycles.curves import CurveGroup
 from biodance.cycles.cut import PERCENT, Cycle
 from biodance.cycles.movement import TrialMovement
-from biodance.cycles.steps import UNITS
+from biodance.cycles.steps import STRIDE_UNITS
 from biodance.pipeline.movement import SessionMovement
 
 
@@ -54,7 +54,7 @@ def _cycle(one: Cycle) -> dict[str, Any]:
 def _spatiotemporal(one: TrialMovement) -> list[dict[str, Any]]:
     rows = [(side, *row) for side in ("both", "left", "right") for row in one.spatiotemporal(side).items()]
     return [
-        {"quantity": name, "unit": UNITS[name], "side": side, "mean": mean, "sd": sd, "count": count}
+        {"quantity": name, "unit": STRIDE_UNITS[name], "side": side, "mean": mean, "sd": sd, "count": count}
         for side, name, (mean, sd, count) in rows
     ]
 

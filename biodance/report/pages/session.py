@@ -90,9 +90,11 @@ def page(
     *,
     attention: Sequence[Attention] | None = None,
     diagnosis: str = "",
+    movement: str = "",
 ) -> str:
     """Return the page of ``result`` as HTML text; ``attention`` what a person must see (by default
-    `session_attention`), ``diagnosis`` the section on what the simulation gets wrong, "" for none.
+    `session_attention`); ``diagnosis`` and ``movement`` the sections on what the simulation gets wrong and on what
+    moved, "" for none.
 
     The same arguments give the same characters.
     """
@@ -115,6 +117,7 @@ def page(
         still=Markup(still_figure(result.still)) if result.still else "",
         more_stills=[(Markup(still_figure(one)), one) for one in result.more_stills],
         diagnosis=Markup(diagnosis),
+        movement=Markup(movement),
         identification=Markup(identification_section(result.identification)) if result.identification else "",
         words=STATUS_WORDS,
     )
