@@ -17,6 +17,7 @@ from biodance.pipeline.provenance import Provenance, now, provenance
 from biodance.pipeline.results import SessionResult
 from biodance.report.documents.diagnosis import attention_document, diagnosis_document, judged_document
 from biodance.report.documents.identification import identification_document
+from biodance.report.documents.methods import METHODS, methods_text
 from biodance.report.documents.movement import movement_document
 from biodance.report.documents.session import plain_values, results_document, to_text
 from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
@@ -35,8 +36,8 @@ def write_report(
     movement: SessionMovement | None = None,
     drawn: bool = True,
 ) -> dict[str, Any]:
-    """Write ``report.html`` (where ``drawn``) and ``results.json`` into ``folder`` (which exists) and return the
-    content of the latter.
+    """Write ``report.html`` (where ``drawn``), ``methods.md`` and ``results.json`` into ``folder`` (which exists) and
+    return the content of the latter.
     """
     made = provenance(result, created=now())
     first = diagnosis.diagnosis.attention if diagnosis else session_attention(result)
@@ -77,11 +78,13 @@ def write_identification(
         "movement": movement_document(movement) if movement else None,
         "provenance": made.as_dict(),
     }
-    files = {_NUMBERS: to_text(numbers), PAGE: _page(result, made, movement=movement)}
+    plain = dict(plain_values(numbers))
+    page = _page(result, made, movement=movement)
+    files = {_NUMBERS: to_text(numbers), METHODS: methods_text(plain), PAGE: page}
     if found.identification.status == "solved":
         files[BODY] = body_text(*body_of_result(result))
     write_files(folder, files)
-    return dict(plain_values(numbers))
+    return plain
 
 
 def write_diagnosis(
