@@ -23,9 +23,9 @@ from biodance.cli.app import (
     Tables,
     app,
     print_json,
-    progress,
     say,
 )
+from biodance.cli.progress import progress
 
 if TYPE_CHECKING:
     from collections.abc import Callable

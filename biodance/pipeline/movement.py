@@ -118,8 +118,8 @@ def session_movement(session: SessionResult, *, tell: Callable[[str], None] = la
     solved = found is not None and found.status == "solved"
     sip = found.identification.sip if found is not None and solved else None
     trials, left_out = [], {}
-    for one in session.trials:
-        tell(f"movement in {one.name}")
+    for k, one in enumerate(session.trials, 1):
+        tell(f"describing {one.name}, {k} of {len(session.trials)}")
         try:
             trials.append(movement_of(one, session.body, sip))
         except BiodanceError as why:

@@ -9,9 +9,10 @@ from biodance.lab.corrections import PlateCorrection
 from biodance.pipeline.attention import identified_trials, session_attention
 from biodance.pipeline.carry import CORRECTED, LAB, accepted_corrections, lab_text, write_corrected
 from biodance.pipeline.diagnosis import SessionDiagnosis
-from biodance.pipeline.export import BODY, body_of_result
+from biodance.pipeline.export import body_of_result
 from biodance.pipeline.for_subject import account_for
 from biodance.pipeline.identification import SessionIdentification
+from biodance.pipeline.kept import BODY, SCALED, keep_motions
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.provenance import Provenance, now, provenance
 from biodance.pipeline.results import SessionResult
@@ -49,10 +50,21 @@ def write_report(
         "judged": judged_document(judged),
         "movement": movement_document(movement) if movement else None,
     }
-    write_files(
-        folder, {_NUMBERS: to_text(found)} | ({PAGE: _page(result, made, diagnosis, movement)} if drawn else {})
-    )
-    return dict(plain_values(found))
+    plain = dict(plain_values(found))
+    files = {_NUMBERS: to_text(found), METHODS: methods_text(plain)}
+    if drawn:
+        files |= {PAGE: _page(result, made, diagnosis, movement)} | _kept(result, folder)
+    write_files(folder, files)
+    return plain
+
+
+def _kept(result: SessionResult, folder: Path) -> dict[str, str]:
+    """Write the motions; return the body that belongs to them, for `export`. After a failed fit there is none."""
+    fit = result.identification
+    if result.body is None or (fit is not None and fit.status != "solved"):
+        return {}
+    keep_motions(result, folder)
+    return {BODY if fit is not None else SCALED: body_text(*body_of_result(result))}
 
 
 def write_subject_page(result: SessionResult, folder: Path, *, diagnosis: SessionDiagnosis | None = None) -> Path:
@@ -81,9 +93,7 @@ def write_identification(
     plain = dict(plain_values(numbers))
     page = _page(result, made, movement=movement)
     files = {_NUMBERS: to_text(numbers), METHODS: methods_text(plain), PAGE: page}
-    if found.identification.status == "solved":
-        files[BODY] = body_text(*body_of_result(result))
-    write_files(folder, files)
+    write_files(folder, files | _kept(result, folder))
     return plain
 
 

@@ -29,7 +29,7 @@ REFERENCES: Mapping[str, str] = {
 @dataclass(frozen=True)
 class MethodClause:
     """One clause: ``keys`` of results.json whose values it says, as paths; ``say`` makes the sentence of them ("" =
-    there is nothing to say); ``cites`` short names of `REFERENCES` by a word that must be in the sentence ("" = always).
+    there is nothing to say); ``cites`` short names of `REFERENCES` by a word that must be in the sentence ("": always).
     """
 
     keys: tuple[_Path, ...]
