@@ -123,7 +123,7 @@ def lab_curves(cycle: Cycle, body: Body, motion: Motion, soles: Soles) -> Iterat
     """Yield pelvis, foot progression (deg) and centre of mass (m) of a cycle.
 
     The pelvis in the frame of the way it goes (of the way it faces on average where it goes nowhere), in the order
-    rotation, obliquity, tilt (Baker 2001, doi:10.1016/S0167-9457(00)00059-1): forward tilt, the cycle's own side up,
+    rotation, obliquity, tilt (Baker 2001, doi:10.1016/S0966-6362(00)00083-7): forward tilt, the cycle's own side up,
     its own side forward are positive. Foot progression, while the foot stands: toes inwards are positive. The centre of
     mass: m ahead of where the cycle began, to the side of the foot, over the ground.
     """

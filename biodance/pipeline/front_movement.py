@@ -40,7 +40,7 @@ def describe_movement(
     References
     ----------
     Joint axes: Wu et al. 2002, doi:10.1016/S0021-9290(01)00222-6. Events: Zeni et al. 2008,
-    doi:10.1016/j.gaitpost.2007.07.007. Pelvis: Baker 2001, doi:10.1016/S0167-9457(00)00059-1.
+    doi:10.1016/j.gaitpost.2007.07.007. Pelvis: Baker 2001, doi:10.1016/S0966-6362(00)00083-7.
 
     Examples
     --------

@@ -13,7 +13,7 @@ _Path = tuple[str, ...]
 
 REFERENCES: Mapping[str, str] = {
     "Bonnet": "Bonnet V. et al. (2016). IEEE Transactions on Robotics. doi:10.1109/TRO.2016.2583062",
-    "Baker": "Baker R. (2001). Human Movement Science 20:655. doi:10.1016/S0167-9457(00)00059-1",
+    "Baker": "Baker R. (2001). Gait & Posture 13:1. doi:10.1016/S0966-6362(00)00083-7",
     "Carpentier": "Carpentier J. et al. (2019). IEEE/SICE SII (Pinocchio). doi:10.1109/SII.2019.8700380",
     "Davis": "Davis R. et al. (1991). Human Movement Science 10:575. doi:10.1016/0167-9457(91)90046-Z",
     "de Leva": "de Leva P. (1996). Journal of Biomechanics 29:1223. doi:10.1016/0021-9290(95)00178-6",
