@@ -20,7 +20,7 @@ from biodance.pipeline.provenance import provenance
 from biodance.pipeline.results import SessionResult
 from biodance.report.figures.session import marker_figure, wrench_figure
 from biodance.report.figures.vector import STEPS, envelope, round_ticks
-from biodance.report.pages.session import check_table, page
+from biodance.report.pages.session import check_table, key_figures, page
 from biodance.report.wording import format_number, millimetres
 
 TIME = "2026-01-01T00:00:00Z"
@@ -67,7 +67,7 @@ def test_the_page_is_well_formed_and_labelled_for_a_screen_reader(full):
     assert len(drawn) == 2 + 2 + 1 + 12  # standing, two views, six channels with their differences
     assert all(attributes["aria-label"] for attributes in drawn)
     tables = sum(tag == "table" for tag, _ in elements)
-    assert tables == sum(tag == "caption" for tag, _ in elements) == 7
+    assert tables == sum(tag == "caption" for tag, _ in elements) == 6
     assert all(attributes.get("scope") in ("col", "row") for tag, attributes in elements if tag == "th")
 
 
@@ -75,8 +75,34 @@ def test_the_page_asks_nothing_of_the_network(full):
     elements = outline(full).elements
     policy = next(a["content"] for t, a in elements if a.get("http-equiv") == "Content-Security-Policy")
     assert policy.startswith("default-src 'none'")
-    assert not any(tag in ("link", "iframe", "object", "img") or "src" in a or "href" in a for tag, a in elements)
+    assert not any(tag in ("link", "iframe", "object", "img") or "src" in a for tag, a in elements)
+    assert all(a["href"].startswith("#") for _, a in elements if "href" in a)
     assert not re.search(r"url\(|@import", full.split("<body>")[0])
+
+
+def test_every_entry_of_the_contents_has_its_section(full):
+    elements = outline(full).elements
+    there = [a["id"] for _, a in elements if "id" in a]
+    assert len(there) == len(set(there))
+    entries = [a["href"].removeprefix("#") for tag, a in elements if tag == "a"]
+    assert entries == [where for tag, a in elements if tag == "section" and (where := a.get("id")) != "verdict"]
+
+
+def test_the_key_figures_say_the_worst_and_its_limit():
+    tiles = {tile.what: (tile.value, tile.inside) for tile in key_figures(full_session())}
+    assert tiles == {"Mass on the plates": ("65.20 kg", True), "Markers to the body": ("11.0 mm", True)}
+
+
+def test_a_printed_page_says_whose_it_is_and_when(tmp_path):
+    (tmp_path / "session.toml").write_text('[session]\ndate = 2026-03-05\nlab = "Gait </style> \\"lab\\""\n')
+    (tmp_path / "walk <1>.Trial.enf").write_text("[TRIAL_INFO]\nDESCRIPTION=barefoot\n")
+    result = full_session()
+    html = html_of(replace(result, session=replace(result.session, folder=tmp_path)))
+    style = re.search(r"<style>(.*?)</style>", html, re.DOTALL).group(1)
+    assert "date 2026-03-05 · lab Gait" in style
+    assert "condition barefoot" in style
+    assert "counter(page)" in style
+    assert "<dd>barefoot</dd>" in html
 
 
 def test_only_the_page_s_own_scripts_may_run(full):

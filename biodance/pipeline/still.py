@@ -153,7 +153,7 @@ def worst_still(body: Body, results: tuple[TrialResult, ...]) -> Still | None:
     if worst is None:
         return None
     size_n, one, frame, force = worst
-    x, y, z = (f"{value:+.0f}" for value in force)
+    x, y, z = (f"{round(value):+d}".replace("-", "−") for value in force)
     about = (
         f"The worst frame: the plates measured {size_n:.0f} N other than the body needs (x {x}, y {y}, z {z} N; "
         f"arrow: 1 m for 100 N)."

@@ -85,8 +85,8 @@ def torque_figure(bands: TorqueBands) -> str:
                 for column in (bands.torque, bands.half_width, bands.table)
             )
             look = _SIDES[side]
-            curves.append(Curve(f"{side or 'middle'} identified", torque, look, half))
-            curves.append(Curve(f"{side or 'middle'} with the table", table, Stroke(look.colour, "1 3", 0.9)))
+            curves.append(Curve(f"{side or 'trunk'} identified", torque, look, half))
+            curves.append(Curve(f"{side or 'trunk'} with the table", table, Stroke(look.colour, "1 3", 0.9)))
         cells.append([Strip(f"{title} (N·m)", curves, 4.0)])
     about = "Torques of the large joints; the largest values are in the table below"
     return CurveFigure(bands.time, cells, about, bands.use, bands.trial).html()

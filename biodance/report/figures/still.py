@@ -99,7 +99,8 @@ def still_figure(still: Still) -> str:
             for corners in still.plates
         ]
         parts += [*_body(still, screen), *_forces(still, screen)]
-        points = np.concatenate([still.bones.reshape(-1, 3), still.markers.reshape(-1, 3), still.plates.reshape(-1, 3)])
+        tips = [still.cop + FORCE_SCALE * still.force, still.com + RESIDUAL_SCALE * still.residual]
+        points = np.concatenate([still.bones.reshape(-1, 3), still.markers, still.plates.reshape(-1, 3), tips])
         shown = (points[np.isfinite(points).all(axis=1)] @ screen)[:, :2]
         body = (still.bones.reshape(-1, 3) @ screen)[:, :2]
         (left, top), (right, foot) = shown.min(axis=0) - 90, shown.max(axis=0) + 90

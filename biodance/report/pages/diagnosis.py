@@ -79,6 +79,13 @@ def answer(one: Diagnosis) -> str:
     return next((said.text for said in one.attention if said.about == ABOUT), f"{one.told[:1].upper()}{one.told[1:]}.")
 
 
+def _short_answer(one: Diagnosis) -> str:
+    """Return what the section begins with below the verdict, which stands at the top of the page."""
+    if one.findings:
+        return "What was found, its size, and what to do:"
+    return "No cause is named; the verdict stands at the top of this page."
+
+
 def odds(log_bayes_factor: float) -> str:
     """Return evidence against "nothing wrong" as odds in words."""
     if log_bayes_factor != log_bayes_factor or log_bayes_factor == float("inf"):
@@ -107,10 +114,10 @@ def diagnosis_section(found: SessionDiagnosis) -> str:
     )
     table = Markup("<table><tbody>{}</tbody></table>").format(rows) if one.findings else Markup("")
     return Markup(
-        "<section><h2>What the simulation gets wrong</h2><p class='look'><strong>{}</strong></p>{}{}"
+        '<section id="wrong"><h2>What the simulation gets wrong</h2><p>{}</p>{}{}'
         "<p class='small'>biodance diagnose says how we know, what else it could be and what accepting it "
         "changes.</p></section>"
-    ).format(answer(one), failures, table)
+    ).format(_short_answer(one), failures, table)
 
 
 def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: Provenance) -> str:

@@ -1,7 +1,13 @@
-"""The analyst's page: one HTML file that holds all it shows and asks nothing of the network."""
+"""The analyst's page: one HTML file that holds all it shows and asks nothing of the network.
 
+First what a person needs, on two printed pages: the verdict, what needs somebody, mass and key figures, the body; then,
+folded, everything by trial.
+"""
+
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from html import unescape
 
 from biodance.diagnosis.diagnosis import ABOUT
 from biodance.identification.validation import TrialValidation
@@ -21,22 +27,58 @@ from biodance.report.figures.session import (
 )
 from biodance.report.figures.still import still_figure
 from biodance.report.pages.identification import identification_section
-from biodance.report.pages.template import render, template_text
-from biodance.report.wording import trial_and_subject
+from biodance.report.pages.template import print_sheet, render, template_text
+from biodance.report.wording import format_number, millimetres, trial_and_subject
 
 STATUS_WORDS = {"ok": "done", "warning": "look here", "refused": "refused"}
 
 
-def check_table(result: SessionResult) -> tuple[list[tuple[str, str]], list[tuple[str, list[Check | None]]]]:
-    """Return the trials' checks as a table: its columns (what, limit), and per trial its name and one check or None
-    a column.
-    """
+def check_table(result: SessionResult) -> tuple[list[tuple[str, str]], list[tuple[TrialResult, list[Check | None]]]]:
+    """Return the trials' checks as a table: its columns (what, limit), and per trial one check or None a column."""
     columns = list(dict.fromkeys((check.what, check.limit) for trial in result.trials for check in trial.checks))
     rows = []
     for trial in result.trials:
         found = {(check.what, check.limit): check for check in trial.checks}
-        rows.append((trial.trial.name, [found.get(column) for column in columns]))
+        rows.append((trial, [found.get(column) for column in columns]))
     return columns, rows
+
+
+@dataclass(frozen=True)
+class Tile:
+    """One key figure: ``what``, its ``value``, what stands ``beside`` it, and whether it is inside its limit."""
+
+    what: str
+    value: str
+    beside: str
+    inside: bool = True
+
+
+def key_figures(result: SessionResult) -> list[Tile]:
+    """Return the mass and the key figures of a session: markers, forces, and what the movement told of the body."""
+    tiles, standing = [], result.standing
+    if standing:
+        declared = result.declared_mass
+        beside = (
+            f"declared {format_number(declared, 2)} kg ({format_number(result.mass_difference)} %)"
+            if declared == declared
+            else "none declared"
+        )
+        outside = any(check.what.startswith("mass on") and not check.inside for check in result.checks)
+        tiles.append(Tile("Mass on the plates", f"{format_number(standing.mass, 2)} kg", beside, not outside))
+    for start, what in (
+        ("marker distance, RMS", "Markers to the body"),
+        ("force difference", "Forces to the simulation"),
+    ):
+        if found := [check for check in result.all_checks if check.what.startswith(start)]:
+            worst = max(found, key=lambda check: float(check.value.split()[0]))
+            tiles.append(Tile(what, worst.value, f"worst trial {worst.where}, {worst.limit}", worst.inside))
+    one = result.identification
+    if one and one.identification.status == "solved":
+        masses = [known.verdict for known in one.identification.known if known.quantity == "mass"]
+        gain = f"{format_number(one.gain.force, 2)} times closer on kept trials" if one.gain else "gain not proven"
+        value = f"{masses.count('known')} known, {masses.count('partly known')} partly"
+        tiles.append(Tile(f"Masses of {len(masses)} segments", value, gain))
+    return tiles
 
 
 @dataclass(frozen=True)
@@ -84,6 +126,18 @@ def _trial_part(result: TrialResult, validated: Mapping[str, TrialValidation]) -
     return TrialPart(result, marker_figure(result.fit) if result.fit else "", wrench, validated.get(name))
 
 
+def _apart(value: float, above: str, below: str) -> str:
+    """Return a signed distance in m as words: ``15.1 mm behind``."""
+    return f"{millimetres(abs(value))} mm {above if value > 0 else below}"
+
+
+def _contents(inner: str) -> list[tuple[str, str]]:
+    """Return address and title of every section of the page, of which ``inner`` holds those in the middle."""
+    found = re.findall(r'<section id="([^"]+)">\s*<h2>([^<]+)</h2>', inner)
+    last = {"checks": "Quality checks", "standing": "Quiet standing", "trials": "Trials", "made": "How it was made"}
+    return [("body", "The body"), *((where, unescape(title)) for where, title in found), *last.items()]
+
+
 def page(
     result: SessionResult,
     provenance: Provenance,
@@ -101,23 +155,31 @@ def page(
     from markupsafe import Markup
 
     said = session_attention(result) if attention is None else attention
-    first = sorted(said, key=lambda one: one.about != ABOUT)
     found = result.identification
     validated = {one.name: one for one in (*found.validations, *found.fitted)} if found else {}
+    identified = identification_section(found) if found else ""
+    worst = result.more_stills[0] if result.more_stills else result.still
+    others = [still for still in (result.still, *result.more_stills) if still is not None and still is not worst]
+    name, made = result.session.folder.name, f"biodance {provenance.versions['biodance']}, {provenance.created}"
     return render(
         "page.html.j2",
-        filters={"place": place_words},
+        filters={"place": place_words, "apart": _apart},
         scripts=[template_text("curves.js")],
-        attention=[(trial_and_subject(one), one.text) for one in first],
+        sheet=Markup(print_sheet(f"Session {name}", provenance.visit, made)),
+        headline=next((one for one in said if one.about == ABOUT), None),
+        attention=[(trial_and_subject(one), one.text) for one in said if one.about != ABOUT],
+        tiles=key_figures(result),
+        contents=_contents(f"{diagnosis}{identified}{movement}"),
         check_table=check_table(result),
         result=result,
         provenance=provenance,
         parts=[_trial_part(trial, validated) for trial in result.trials],
         standing=Markup(standing_figure(result.standing)) if result.standing else "",
-        still=Markup(still_figure(result.still)) if result.still else "",
-        more_stills=[(Markup(still_figure(one)), one) for one in result.more_stills],
+        shown=Markup(still_figure(worst)) if worst else "",
+        shown_still=worst,
+        more_stills=[(Markup(still_figure(one)), one) for one in others],
         diagnosis=Markup(diagnosis),
         movement=Markup(movement),
-        identification=Markup(identification_section(result.identification)) if result.identification else "",
+        identification=Markup(identified),
         words=STATUS_WORDS,
     )

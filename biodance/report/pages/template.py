@@ -3,7 +3,7 @@ hash.
 """
 
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from hashlib import sha256
 from importlib.resources import files
 from typing import Any
@@ -30,6 +30,25 @@ def render(name: str, *, filters: dict[str, Any] | None = None, scripts: Sequenc
     style = template_text("page.css") + template_text("curves.css")
     given = {"style": Markup(style), "policy": _policy(scripts), "scripts": [Markup(text) for text in scripts]}
     return environment.from_string(template_text(name)).render(**{**given, **values})
+
+
+def print_sheet(title: str, visit: Mapping[str, str], made: str) -> str:
+    """Return the style of the printed page's margins: what it is above, when and by whom it was made and the page's
+    number below.
+    """
+    about = " · ".join(f"{what} {said}" for what, said in visit.items() if said)
+    boxes = {
+        "top-left": _css_text(title),
+        "top-right": _css_text(about),
+        "bottom-left": _css_text(f"{made} · for research use"),
+        "bottom-right": '"page " counter(page) " of " counter(pages)',
+    }
+    return f"@page {{ {' '.join(f'@{where} {{ content: {text}; }}' for where, text in boxes.items())} }}"
+
+
+def _css_text(text: str) -> str:
+    """Return text as a string of a style sheet; nothing in it can end the string or the sheet."""
+    return '"' + "".join(c if c.isalnum() or c in " .,:-·" else f"\\{ord(c):x} " for c in text) + '"'
 
 
 def _policy(scripts: Sequence[str]) -> str:
