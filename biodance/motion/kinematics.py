@@ -88,6 +88,15 @@ def segment_motion(body: Body, motion: Motion) -> SegmentMotion:
     )
 
 
+def centre_of_mass(body: Body, motion: Motion) -> Array:
+    """Return the centre of mass (T, 3) m of ``body`` with its own parameters during ``motion``."""
+    table = body.link_parameters().reshape(-1, 10)
+    mass = table[:, 0]
+    carried = np.flatnonzero(mass > 0)
+    points = poses(body, motion.q).points(carried.tolist(), table[carried, 1:4] / mass[carried, None])
+    return np.einsum("k,tkj->tj", mass[carried], points) / mass[carried].sum()
+
+
 def _tree(body: Body) -> tuple[Index, Array, Array, Array]:
     """Return the joint before each (n,), the parts (n, 3, 3, 3) of its rotation (see `place_joints`), its translation
     (n, 3) m and axis (n, 3).

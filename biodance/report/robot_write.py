@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from biodance.body.body_file import body_text
-from biodance.pipeline.export import BODY
+from biodance.pipeline.kept import BODY
 from biodance.pipeline.provenance import now
 from biodance.pipeline.robot import RobotResult
 from biodance.pipeline.robot_trials import MatchedTrial

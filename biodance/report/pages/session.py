@@ -144,9 +144,11 @@ def page(
     *,
     attention: Sequence[Attention] | None = None,
     diagnosis: str = "",
+    movement: str = "",
 ) -> str:
     """Return the page of ``result`` as HTML text; ``attention`` what a person must see (by default
-    `session_attention`), ``diagnosis`` the section on what the simulation gets wrong, "" for none.
+    `session_attention`); ``diagnosis`` and ``movement`` the sections on what the simulation gets wrong and on what
+    moved, "" for none.
 
     The same arguments give the same characters.
     """
@@ -167,7 +169,7 @@ def page(
         headline=next((one for one in said if one.about == ABOUT), None),
         attention=[(trial_and_subject(one), one.text) for one in said if one.about != ABOUT],
         tiles=key_figures(result),
-        contents=_contents(f"{diagnosis}{identified}"),
+        contents=_contents(f"{diagnosis}{identified}{movement}"),
         check_table=check_table(result),
         result=result,
         provenance=provenance,
@@ -177,6 +179,7 @@ def page(
         shown_still=worst,
         more_stills=[(Markup(still_figure(one)), one) for one in others],
         diagnosis=Markup(diagnosis),
+        movement=Markup(movement),
         identification=Markup(identified),
         words=STATUS_WORDS,
     )
