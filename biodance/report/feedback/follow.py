@@ -36,7 +36,7 @@ def follow_scene(dance: Dance) -> dict[str, Any] | None:
         "still": told.still.tolist(),
         "about": told.about.tolist(),
         "gravity": body.gravity.tolist(),
-        "segments": [name.replace("_", " ") for name in body.segments],
+        "segments": [_called(name) for name in body.segments],
         "carriers": list(body.segment_joint),
         "joints": [
             {
@@ -59,6 +59,10 @@ def follow_scene(dance: Dance) -> dict[str, Any] | None:
             for phase in dance.phases
         ],
     }
+
+
+def _called(segment: str) -> str:
+    return segment.replace("_head", " and head").replace("_hand", " and hand").replace("_", " ")
 
 
 def _packed(values: "np.ndarray[Any, Any]") -> str:

@@ -204,7 +204,7 @@ function show() {
 function tick(time) {
   if (!playing) return;
   const before = moment(second);
-  second += (Math.min(time - stamp, 250) / 1000) * Number(by("speed").value);
+  second += (Math.min(Math.max(time - stamp, 0), 1000) / 1000) * Number(by("speed").value);
   stamp = time;
   sound(before, moment(second));
   show();
