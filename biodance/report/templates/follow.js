@@ -56,6 +56,14 @@ function extent(points, more) {
   const left = Math.min(...xs) - margin, top = Math.min(...ys) - margin;
   return { x: left, y: top, w: Math.max(...xs) + margin - left, h: Math.max(...ys) + margin - top };
 }
+function around(points) { // the square about the hips that holds trunk and limbs (as in MoveNet's own demonstration)
+  const trunk = [5, 6, 11, 12].map((k) => points[k]);
+  if (trunk.some((one) => one.sure < 0.2)) return null;
+  const x = (trunk[2].x + trunk[3].x) / 2, y = (trunk[2].y + trunk[3].y) / 2;
+  const reach = (list) => Math.max(...list.map((one) => Math.max(Math.abs(one.x - x), Math.abs(one.y - y))));
+  const half = Math.max(1.9 * reach(trunk), 1.2 * reach(points.filter((one) => one.sure > 0.2)));
+  return { x: x - half, y: y - half, size: 2 * half };
+}
 function count(told) { // is there somebody else where the person is not?
   const sure = found(told).filter((one) => one.sure > SURE);
   others = sure.length >= 9 ? others + 1 : 0;
@@ -76,10 +84,7 @@ function take(told) {
   const sure = points.filter((one) => one.sure > SURE);
   document.body.dataset.looks = 1 + Number(document.body.dataset.looks ?? 0);
   document.body.dataset.ms = told.ms.toFixed(1);
-  if (sure.length >= 5) {
-    const e = extent(sure, 0.15), side = Math.max(e.w, e.h);
-    box = { x: e.x + e.w / 2 - side / 2, y: e.y + e.h / 2 - side / 2, size: side };
-  } else box = null;
+  box = around(points);
   unclear = { said: why, times: why === unclear.said ? unclear.times + 1 : 1 };
   if (unclear.times === 3 || (why && unclear.times > 3 && by("followed").textContent !== why)) report(why);
   last = sure.length >= 5 ? { frame: extent(sure, 0.12), p: last?.p } : null;
