@@ -7,7 +7,7 @@ The dance is made by hand of postures that people know, both feet planted (`know
 degrees off in trunk and arms and, by chance, dances with single limbs at a tenth to all of the planned amplitude. He is
 drawn as a dressed figure (pyvista) and stands before the camera of a headless Chromium as a film at 0.6 of his pace,
 since two shared cores without graphics look only a few times a second; the clock of the page is that of the film. The
-truth is what `score_performance` tells of the same motion. Takes 2 minutes a dancer; what is in FOLDER is not made anew.
+truth is what `score_performance` tells of the same motion. Takes 2 minutes a dancer; what is in FOLDER stays.
 """
 
 import io
@@ -41,8 +41,12 @@ from biodance.records import Array, Motion, Subject
 from biodance.report.feedback.write import write_feedback
 
 RATE, FILM, PACE, LEAD = 25.0, 30, 0.6, 5.0
-STAND = {"left_shoulder_adduction": -0.3, "right_shoulder_adduction": -0.3, "left_elbow_flexion": 0.2,
-         "right_elbow_flexion": 0.2}
+STAND = {
+    "left_shoulder_adduction": -0.3,
+    "right_shoulder_adduction": -0.3,
+    "left_elbow_flexion": 0.2,
+    "right_elbow_flexion": 0.2,
+}
 T = {"left_shoulder_adduction": -1.45, "right_shoulder_adduction": -1.45}
 AHEAD = {"left_shoulder_flexion": 1.4, "right_shoulder_flexion": 1.4}
 POSTURES: tuple[tuple[dict[str, float], tuple[float, float]], ...] = (
@@ -66,8 +70,15 @@ POSTURES: tuple[tuple[dict[str, float], tuple[float, float]], ...] = (
 LIMBS = (("left_shoulder", "left_elbow"), ("right_shoulder", "right_elbow"), ("trunk",), ())
 """What a dancer is lazy with: joints by the beginning of their names; the last is the pelvis."""
 SKIN, SHIRT, TROUSERS, SHOES = "#e0ac8c", "#b03a3a", "#2b3550", "#222222"
-CLOTHES = {"forearm_hand": SKIN, "upper_arm": SHIRT, "trunk_head": SHIRT, "pelvis": TROUSERS, "thigh": TROUSERS,
-           "shank": TROUSERS, "foot": SHOES}
+CLOTHES = {
+    "forearm_hand": SKIN,
+    "upper_arm": SHIRT,
+    "trunk_head": SHIRT,
+    "pelvis": TROUSERS,
+    "thigh": TROUSERS,
+    "shank": TROUSERS,
+    "foot": SHOES,
+}
 BITS, BLOCK = 10, 16
 """Every picture carries its number as black and white blocks along its upper edge: a film does not keep its pace."""
 FOLLOWS = """
@@ -101,8 +112,17 @@ def known_dance(body: Body) -> Dance:
         for name, angle in (STAND | angles).items():
             row[6 + body.joint_index(name)] = angle
     count = len(x)
-    dance = Dance("known", body, x, stances, np.ones(count), np.zeros((count - 1, 2, x.shape[1])),
-                  np.full(count - 1, 2.0), tuple(under(a, b) for a, b in pairwise(stances)), 0)
+    dance = Dance(
+        "known",
+        body,
+        x,
+        stances,
+        np.ones(count),
+        np.zeros((count - 1, 2, x.shape[1])),
+        np.full(count - 1, 2.0),
+        tuple(under(a, b) for a, b in pairwise(stances)),
+        0,
+    )
     return straight(dance, x)
 
 
@@ -142,10 +162,10 @@ def dressed(body: Body) -> list[tuple[int, Any, str]]:
 
 def _face(bounds: Array) -> list[tuple[Any, str]]:
     c, s = bounds.mean(axis=0), np.ptp(bounds, axis=0)
-    eyes = [(pv.Sphere(radius=0.012, center=c + [0.46 * s[0], 0.06 * s[1], z * s[2]]), "#101010") for z in (-0.2, 0.2)]
-    hair = pv.Sphere(radius=0.5).scale([1.06 * s[0], s[1], 1.08 * s[2]]).translate(c + [-0.02, 0.03, 0])
-    hair = hair.clip(normal=(1, -1.2, 0), origin=c + [0.02, 0.05, 0])
-    nose = pv.Sphere(radius=0.018, center=c + [0.52 * s[0], -0.06 * s[1], 0])
+    eyes = [(pv.Sphere(radius=0.012, center=c + s * (0.46, 0.06, z)), "#101010") for z in (-0.2, 0.2)]
+    hair = pv.Sphere(radius=0.5).scale([1.06 * s[0], s[1], 1.08 * s[2]]).translate(c + np.array((-0.02, 0.03, 0.0)))
+    hair = hair.clip(normal=(1, -1.2, 0), origin=c + np.array((0.02, 0.05, 0.0)))
+    nose = pv.Sphere(radius=0.018, center=c + s * (0.52, -0.06, 0.0))
     return [*eyes, (nose, "#d59a7c"), (hair, "#3a2616")]
 
 
@@ -156,8 +176,9 @@ def write_film(body: Body, motion: Motion, path: Path) -> None:
     wall = pv.Plane(center=(-2.5, 0, 2), direction=(1, 0, 0), i_size=8, j_size=8)
     pl.add_mesh(floor, color="#a08a70", lighting=False)
     pl.add_mesh(wall, color="#8f9b93", lighting=False)
-    actors = [(s, pl.add_mesh(mesh, color=colour, smooth_shading=True, ambient=0.25)) for s, mesh, colour in
-              dressed(body)]
+    actors = [
+        (s, pl.add_mesh(mesh, color=colour, smooth_shading=True, ambient=0.25)) for s, mesh, colour in dressed(body)
+    ]
     pl.camera_position = [(2.7, 0, 1.0), (0, 0, 1.0), (0, 0, 1)]
     pl.camera.view_angle = 2 * np.degrees(np.arctan(1 / 1.9))
     pl.camera.clipping_range = (0.1, 20)
@@ -214,8 +235,10 @@ def main(folder: str, dancers: str) -> None:
         rows.append((found["truth"], found["score"]))
         print(seed, int(found["looks"]), found["truth"].round(2), found["score"].round(2), flush=True)
         truth, score = (np.array(each) for each in zip(*rows, strict=True))
-        both = [np.corrcoef(a.ravel(), b.ravel())[0, 1] for a, b in
-                ((truth, score), (truth - truth.mean(axis=0), score - score.mean(axis=0)))]
+        both = [
+            np.corrcoef(a.ravel(), b.ravel())[0, 1]
+            for a, b in ((truth, score), (truth - truth.mean(axis=0), score - score.mean(axis=0)))
+        ]
         print(f"  all {both[0]:.2f}, among dancers alone {both[1]:.2f}", flush=True)
 
 

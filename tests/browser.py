@@ -60,7 +60,9 @@ class Page:
                 return answer["result"]
 
     def run(self, program: str) -> Any:
-        answer = self.send("Runtime.evaluate", expression=program, returnByValue=True, awaitPromise=True, userGesture=True)
+        answer = self.send(
+            "Runtime.evaluate", expression=program, returnByValue=True, awaitPromise=True, userGesture=True
+        )
         if "exceptionDetails" in answer:
             raise RuntimeError(answer["exceptionDetails"].get("exception", {}).get("description", "failed"))
         return answer["result"].get("value")
@@ -76,9 +78,7 @@ class Page:
         """Return errors and warnings of the console and the page."""
         self.run("0")
         logs = [e["params"]["entry"]["text"] for e in self.events if e.get("method") == "Log.entryAdded"]
-        errors = [
-            e["params"]["exceptionDetails"] for e in self.events if e.get("method") == "Runtime.exceptionThrown"
-        ]
+        errors = [e["params"]["exceptionDetails"] for e in self.events if e.get("method") == "Runtime.exceptionThrown"]
         return logs + [e.get("exception", {}).get("description", e["text"]) for e in errors]
 
     def asked(self) -> list[str]:

@@ -2,9 +2,9 @@
 somebody dances.
 
 A posture that is held tells by weight alone: the vertical force, and its moments about the horizontal axes. A move
-tells by its accelerations, too. Both are judged under the noise of typical sessions (`dance.expectation`). What disturbs
-a session beyond the noise (soft tissue, joint centres, plates) is left out; instead only the share `_TRUST` of the
-information counts, with which whole dances tell of every segment what is expected of them.
+tells by its accelerations, too. Both are judged under the noise of typical sessions (`dance.expectation`). What
+disturbs a session beyond the noise (soft tissue, joint centres, plates) is left out; instead only the share `_TRUST` of
+the information counts, with which whole dances tell of every segment what is expected of them.
 """
 
 from dataclasses import dataclass
@@ -36,8 +36,8 @@ class Telling:
     """By what a movement is judged that shall tell of the p = 10 N inertial parameters of a body.
 
     ``root`` (p, p): the table's covariance is ``root root'``. ``weights`` (B, 6): information of one coefficient of the
-    wrench (N, N·m about ``about`` (3,) m of the lab) in each of the bands between ``edges`` (B + 1,) Hz. ``still`` (3,):
-    information of one held posture on Fz, Mx and My.
+    wrench (N, N·m about ``about`` (3,) m of the lab) in each of the bands between ``edges`` (B + 1,) Hz. ``still``
+    (3,): information of one held posture on Fz, Mx and My.
     """
 
     root: Array

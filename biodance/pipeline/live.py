@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from biodance import display
 from biodance.body.body import Body
 from biodance.diagnosis.watch import LiveWarning
 from biodance.identification.identification import Identification
@@ -52,8 +53,22 @@ class LiveState:
 
 @dataclass(frozen=True, eq=False)
 class LiveResult:
-    """The end of a stream: ``fit`` all frames as they were used; ``identification`` from them, None with ``cause`` why;
-    ``warnings`` in time; ``frame_s`` (T,) s of processor time that each frame took, ``wall_s`` (T,) s by the clock.
+    """The end of a stream.
+
+    Parameters
+    ----------
+    fit : Fit or None
+        All frames as they were used; None where none came so far.
+    identification : Identification or None
+        From these frames; None with ``cause`` why.
+    cause : str
+        Why nothing was identified; empty otherwise.
+    warnings : tuple of LiveWarning
+        What was noticed on the way, in time.
+    frame_s, wall_s : array_like
+        (T,) s that each frame took: of processor time, and by the clock.
+    state : LiveState
+        What is known, suspect and to be done at the end.
     """
 
     fit: Fit | None
@@ -63,6 +78,14 @@ class LiveResult:
     frame_s: Array
     wall_s: Array
     state: LiveState
+
+    def __repr__(self) -> str:
+        used = int(self.fit.use.sum()) if self.fit else 0
+        return f"LiveResult({used} of {self.frame_s.size} frames used, {len(self.warnings)} warnings)"
+
+    def _repr_html_(self) -> str:
+        found = self.identification
+        return display.card(repr(self), found.table() if found else None, [one.text for one in self.warnings])
 
 
 class LiveSession:
@@ -227,9 +250,10 @@ class LiveSession:
             return "Mend what is suspect first: frames do not count until then."
         rows = np.diag(self.belief.covariance)[::10] / np.maximum(np.diag(self.belief.prior.covariance)[::10], 1e-12)
         names = self.belief.prior.segments
-        open_ = [i for i in np.argsort(-rows) if verdicts[names[i]] != "known"]
+        standing = {names[foot.segment] for foot in self.body.feet.values()}
+        open_ = [i for i in np.argsort(-rows) if verdicts[names[i]] != "known" and names[i] not in standing]
         if not open_:
-            return "All masses are known well enough: the session can end."
+            return "All masses but those of the feet are known well enough: the session can end."
         return f"Move the {names[open_[0]].replace('_', ' ')} further and faster, both feet on the plates."
 
     def _fit(self) -> Fit | None:

@@ -16,7 +16,6 @@ from biodance.diagnosis.watch import (
     silent_plates,
 )
 from biodance.identification.running import RunningBelief
-from biodance.motion.contact.contact import Contact
 from biodance.motion.ik.follow import Follower
 from biodance.records import Array, Plate, Trial, Wrench
 from biodance.spatial import wrench_about_point
@@ -58,7 +57,14 @@ class StreamWatch:
         self._warn("markers", said_of_markers(now, worst, self._follower.exchange(xyz, worst, self._sound)))
 
     def look_at_plates(
-        self, now: float, raw: Trial, plates: Sequence[Plate], on_plate: NDArray[np.bool_], missing: float, *, whole: bool
+        self,
+        now: float,
+        raw: Trial,
+        plates: Sequence[Plate],
+        on_plate: NDArray[np.bool_],
+        missing: float,
+        *,
+        whole: bool,
     ) -> None:
         """Look for a plate that fell silent, and for one that reads a load with nobody on it: channels ``raw`` and as
         filtered in ``plates``, feet ``on_plate`` (T, 2, P), ``missing`` N that the body needs beyond what was measured;
@@ -71,7 +77,8 @@ class StreamWatch:
         empty = {
             f"empty {plate.name}": said
             for index, plate in enumerate(plates)
-            if whole and not on_plate[:, :, index].any()
+            if whole
+            and not on_plate[:, :, index].any()
             and (said := loaded_while_empty(now, plate, plate.wrench.value))
         }
         for key in [key for key in self._suspect if key.startswith(("silent", "empty"))]:
@@ -80,9 +87,11 @@ class StreamWatch:
         for key, said in (silent | empty).items():
             self._warn(key, said)
 
-    def look_at_wrench(self, now: float, W: Array, wrench: Array, belief: RunningBelief, *, point: Array, step: int) -> None:
-        """Look for a jump of the measured ``wrench`` (T, 6) against what the ``belief`` expects from the regressor ``W``
-        (T, 6, p), ``step`` frames at once, about the first standing ``point`` (3,) m that was given.
+    def look_at_wrench(
+        self, now: float, W: Array, wrench: Array, belief: RunningBelief, *, point: Array, step: int
+    ) -> None:
+        """Look for a jump of the measured ``wrench`` (T, 6) against what the ``belief`` expects from the regressor
+        ``W`` (T, 6, p), ``step`` frames at once, about the first standing ``point`` (3,) m that was given.
         """
         if any(key != "wrench" for key in self._suspect):
             return

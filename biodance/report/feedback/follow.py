@@ -79,8 +79,9 @@ def _points(body: Body) -> list[dict[str, Any]]:
             if f"{side}_{part}" not in body.segments:
                 return []
             out.append((f"{side} {name}", body.segment_index(f"{side}_{part}"), np.zeros(3), name, second))
-        wrist = [body.markers.names.index(n) for one in _WRISTS if (n := one.format(side[0].upper())) in
-                 body.markers.names]
+        wrist = [
+            body.markers.names.index(n) for one in _WRISTS if (n := one.format(side[0].upper())) in body.markers.names
+        ]
         if not wrist:
             return []
         place = body.markers.position[wrist].mean(axis=0)
