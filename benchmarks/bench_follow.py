@@ -5,9 +5,10 @@ virtual dancers who are filmed.
 
 The dance is made by hand of postures that people know, both feet planted (`known_dance`). Every dancer is 3 to 10
 degrees off in trunk and arms and, by chance, dances with single limbs at a tenth to all of the planned amplitude. He is
-drawn as a dressed figure (pyvista) and stands before the camera of a headless Chromium as a film at 0.6 of his pace,
-since two shared cores without graphics look only a few times a second; the clock of the page is that of the film. The
-truth is what `score_performance` tells of the same motion. Takes 2 minutes a dancer; what is in FOLDER stays.
+drawn as a dressed figure (pyvista) and stands before the camera of a headless Chromium as a film; the clock of the page
+is that of the film, which runs at half its pace, since two shared cores without graphics look only a few times a
+second. The truth is what `score_performance` tells of the same motion. Takes 2 minutes a
+dancer; what is in FOLDER stays.
 """
 
 import io
@@ -40,7 +41,7 @@ from biodance.motion.smoothing import smooth
 from biodance.records import Array, Motion, Subject
 from biodance.report.feedback.write import write_feedback
 
-RATE, FILM, PACE, LEAD = 25.0, 30, 0.6, 5.0
+RATE, FILM, LEAD, SLOW = 25.0, 30, 3.0, 2
 STAND = {
     "left_shoulder_adduction": -0.3,
     "right_shoulder_adduction": -0.3,
@@ -94,7 +95,7 @@ document.getElementById("film").onclick().then(() => {
     for (let k = 0; k < BITS; k++) number = 2 * number + (row[4 * k] > 128 ? 1 : 0);
     if (number / PICTURES >= second || number < 5) second = number / PICTURES - (number ? 0 : LEAD);
     show();
-  }, 40);
+  }, 100);
 });
 """
 PICTURES = 10
@@ -196,19 +197,19 @@ def write_film(body: Body, motion: Motion, path: Path) -> None:
             seen[:BLOCK, : bits.size] = 255 * bits[None, :, None]
             picture = io.BytesIO()
             Image.fromarray(seen).save(picture, "JPEG", quality=80)
-            times = round(FILM / PICTURES / PACE) + (round(LEAD * FILM / PACE) if k == 0 else 0)
+            times = SLOW * FILM // PICTURES + (round(SLOW * LEAD * FILM) if k == 0 else 0)
             out.write(times * picture.getvalue())
     pl.close()
 
 
 def followed(page: Path, film: Path, seconds: float) -> tuple[Array, int]:
     """Return what the page thinks to be known of every segment after the dance, and how often it looked."""
-    with Page(page.resolve().as_uri(), film=film, size="800,600") as browser:
+    with Page(page.resolve().as_uri(), film=film, size="420,360") as browser:
         program = FOLLOWS
         for name in ("BITS", "BLOCK", "PICTURES", "LEAD"):
             program = program.replace(name, str(globals()[name]))
         browser.run(program)
-        browser.until(f"second >= {seconds - 0.2} || document.body.dataset.enough", (seconds + LEAD) / PACE + 60)
+        browser.until(f"second >= {seconds - 0.2} || document.body.dataset.enough", SLOW * (seconds + LEAD) + 90)
         known, looks = browser.run("[document.body.dataset.known, document.body.dataset.looks]")
     return np.array(known.split(), dtype=float), int(looks)
 

@@ -63,7 +63,6 @@ function stand(state, like, planted) { // the same posture with its planted feet
 // ---- the posture in the picture: most probable near the plan, by Gauss and Newton ----
 const FOCUS = 1.9, SPREAD = 0.045; // of usual webcams, and of the points found, both in halves of the picture's height
 const LOOSE = [1.2, 0.4, 0.4, 0.15, 0.1, 0.1, 0.1]; // sd: camera m, its tilt rad, turn of the pelvis rad
-const FREE = 0.4; // sd of a joint angle about the plan, rad
 function seen(x, [cx, cy, cz, tilt]) { // in halves of the picture's height, unmirrored, y up
   const r = minus(x, [cx, cy, cz]), c = Math.cos(tilt), s = Math.sin(tilt), deep = Math.max(0.2, -c * r[0] - s * r[2]);
   return [(FOCUS * r[1]) / deep, (FOCUS * (c * r[2] - s * r[0])) / deep];
@@ -75,7 +74,7 @@ function moved(plan, p) {
 function fit(points, plan, first, camera) { // points: {x, y, sure} or null, in the order of follow.points
   const N = 7 + SIZE, centre = [...camera.at, 0, 0, 0, ...new Array(SIZE).fill(0)];
   const loose = [...(camera.count > 20 ? [0.15, 0.15, 0.15, 0.03, 0.1, 0.1, 0.1] : LOOSE),
-    ...new Array(SIZE).fill(FREE)];
+    ...follow.joints.map((joint) => joint.free)];
   let p = first ? [...first] : [...centre];
   const rows = (q) => {
     const out = [];
