@@ -76,9 +76,13 @@ def design(
     work = DesignContext(
         chain, parts, plan, seed, Checkpoint(resume, body, plan, seed), workers, tell or (lambda what, done, of: None)
     )
-    dance = _followable(work) if np.isfinite(plan.instructions) else _joined(work, *replan(work, _postures(work)))
+    danced: tuple[Margin, ...] = ()
+    if np.isfinite(plan.instructions):
+        dance, danced = _followable(work)
+    else:
+        dance = _joined(work, *replan(work, _postures(work)))
     work.tell("checking every limit", 0, 0)
-    margins = verify_with(workers, body, dance, plan.limits)
+    margins = tuple(sorted((*verify_with(workers, body, dance, plan.limits), *danced), key=lambda m: m.limit))
     if wrong := broken(margins):
         told = "; ".join(
             f"{m.limit.replace('_', ' ')} by {-m.worst:.3g} {m.unit} at {m.where_s:.2f} s {m.what}" for m in wrong
@@ -90,8 +94,8 @@ def design(
     return dance, margins
 
 
-def _followable(work: DesignContext) -> Dance:
-    """Return a dance that people can follow, imprecise ones included: postures at which one of the performers has too
+def _followable(work: DesignContext) -> tuple[Dance, tuple[Margin, ...]]:
+    """Return a dance that people can follow, and what imprecise performers leave: postures at which one of them has too
     little room are not asked of anybody.
     """
     stances, walk = support_sequence(work.chain.body, work.plan), Walk(work)
@@ -105,7 +109,7 @@ def _followable(work: DesignContext) -> Dance:
         if found.safe or not bad - walk.banned:
             break
         walk.banned |= bad
-    return dance
+    return dance, found.margins(dance)
 
 
 def _walked(work: DesignContext, stances: tuple[Stance, ...], steps: list[Step], moves: list[Move]) -> Dance:

@@ -3,7 +3,8 @@ and early, swaying.
 
 A performer's joints err by smooth noise and the tempo wanders. Whoever stands corrects: the pelvis keeps the centre of
 mass where the dance has it, but for the sway; what hurried or crooked limbs do to the zero-moment point is not
-corrected. Planted feet stay where they are. The virtual laboratory performs dances by other code.
+corrected. Planted feet stay where they are, and a leg errs the more the farther it is lifted. A step by which a foot
+changes its place is everybody's own and not judged. The virtual laboratory performs dances by other code.
 """
 
 from concurrent.futures import Executor
@@ -21,12 +22,15 @@ from biodance.dance.dance import Dance, Phase
 from biodance.dance.limits.self_collision import surface_distances
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.stance import Stance
+from biodance.dance.verify import Margin
 from biodance.motion.kinematics import Poses, poses
 from biodance.records import Array
 from biodance.threads import one_thread
 
 APART = 0.02
 """m that segments of imprecise performers stay apart."""
+PERFORMERS = "of_performers"
+"""End of the names of their margins."""
 COUNT = 200
 """Performers that a dance is tried on."""
 _RATE, _PLAN_RATE = 5.0, 25.0
@@ -37,7 +41,7 @@ _STRAIGHT, _SOFT = float(np.radians(5.0)), 80.0
 """rad of a knee that counts as straight; 1/m of the soft minimum over the legs."""
 _PENDULUM = 0.1
 """s²: height of the centre of mass over gravity."""
-_LIFT = 0.4
+_LIFT = 1.0
 """Share of a move in which a foot leaves the ground, or comes back."""
 _ROUNDS = 2
 """Corrections of the pelvis; what is left is a tenth of a millimetre a degree."""
@@ -82,6 +86,15 @@ class Rehearsed:
     gap: Room
     bad: tuple[int, ...]
 
+    def margins(self, dance: Dance) -> tuple[Margin, ...]:
+        """Return what the performers leave as margins of a dance: inside the support, and beyond `APART`."""
+        starts = {phase.posture: phase.start for phase in reversed(dance.phases)}
+        rooms = (("balance", self.balance, 0.0), ("self_collision", self.gap, APART))
+        return tuple(
+            Margin(f"{name}_{PERFORMERS}", room.worst - need, starts[room.posture], "m", room.what)
+            for name, room, need in rooms
+        )
+
     @property
     def safe(self) -> bool:
         """True where nobody leaves the support or comes closer than `APART` to themselves."""
@@ -105,6 +118,7 @@ def perform(
         where = plan.names[rows[2 + int(inside.argmin())]]
         found["balance"].append(_Least.of(inside, posture[2:-2], postures, where))
         gap, pairs = surface_distances(dance.body, pose)
+        gap[plan.stepping[rows]] = np.inf
         pair = pairs[int(gap.min(axis=0).argmin())]
         found["gap"].append(_Least.of(gap.min(axis=1), posture, postures, pair))
     return _joined(count, found)
@@ -185,6 +199,7 @@ class _Planned:
         after = [dance.stances[phase.posture] for phase in phases]
         self.down = np.array([[_planted(s) for s in row] for row in zip(before, (p.stance for p in phases), after)])
         self.ankles = np.array([[s.ankle for s in row] for row in zip(before, after, strict=True)])
+        self.stepping = np.ptp(self.ankles, axis=1).any(axis=(1, 2))
         time = np.unique(np.concatenate([_instants(phase) for phase in phases]))
         rows, x = self.phase_at(time), np.empty((len(time), self.chain.size))
         for p, phase in enumerate(phases):
@@ -198,9 +213,9 @@ class _Planned:
         return np.asarray(np.clip(np.searchsorted(self.start, when + 1e-9, side="right") - 1, 0, None))
 
     def inside(self, rows: NDArray[np.intp], point: Array) -> Array:
-        """Return how far inside the whole support of its phase each point (T, 2) m is."""
-        out = np.empty(len(rows))
-        for p in np.unique(rows):
+        """Return how far inside the whole support of its phase each point (T, 2) m is; not asked during steps."""
+        out = np.full(len(rows), np.inf)
+        for p in np.unique(rows[~self.stepping[rows]]):
             normals, offsets = self.edges[p]
             out[rows == p] = (point[rows == p] @ normals.T + offsets).min(axis=1)
         return out

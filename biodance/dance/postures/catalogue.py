@@ -31,8 +31,6 @@ _SPARE = {"foot_placement": 0.05}
 """Share of the scale kept in reserve where it is another one than the limit's own: the moves are straight."""
 _BACK = 0.03
 """m behind the middle of the support where people stand: over the arch of the foot."""
-_SHY = 0.93
-"""Share of the way to the middle of what both feet and one alone can bear: stopping there pushes farther."""
 _LEAN, _TILT = ROOT - 2, ROOT - 1
 """Coordinates of the pelvis' lean to the right, and of its tilt backward."""
 
@@ -149,8 +147,7 @@ def settled(chain: Chain, stance: Stance, x: Array, knee: Array) -> Array:
 def _middle(stance: Stance) -> Array:
     """Return the point (2,) m over which people stand: behind the middle of the support, or of the foot that bears."""
     along = stance if stance.over is None else stance.on(stance.over)
-    aside = stance.centre[1] * (1.0 if stance.over is None else _SHY)
-    return np.array([along.centre[0] - _BACK, aside])
+    return np.array([along.centre[0] - _BACK, stance.centre[1]])
 
 
 def pelvis_height(chain: Chain, stance: Stance, x: Array, knee: Array) -> Array:

@@ -18,7 +18,7 @@ shipped ones are in ``protocols/dances``:
     free = false                 true: any posture, any number of instructions (the paper's); simplicity is 0 then
     gentle = false               true: only what people can do who tire or fear to fall
     deep = false                 true: deep squats and bows, one-leg squats, too
-    wide = 1.18                  distance between the feet, times the usual one (free: 1)
+    wide = 1.3                   distance between the feet, times the usual one (free: 1)
 
     [postures]                   how many postures on which feet, in the order of the dance
     parallel = 15                both feet side by side
@@ -170,7 +170,7 @@ _NUMBERS = {
 _SHORT = {"share_of_support": ("balance", "share")}
 """Key of the file: limit and its number."""
 _FLAGS = ("free", "gentle", "deep")
-_FOLLOWABLE = {"instructions": 4.0, "simplicity": 1.0, "wide": 1.18}
+_FOLLOWABLE = {"instructions": 4.0, "simplicity": 1.0, "wide": 1.3}
 """Of protocols that are not free, unless the file says otherwise."""
 _SUPPORT = {"share": 0.7}
 """Share of the support that a followable dance may use: what imprecise people need is judged by performers."""
