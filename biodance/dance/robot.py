@@ -9,6 +9,7 @@ is checked on the robot as it is.
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -64,7 +65,8 @@ def robot_plan(body: Body, plan: Plan) -> Plan:
         )
     usual = float(np.median(body.limits.velocity))
     ahead = float(np.clip(plan.forward * _FORWARD * leg_length(body), 0.05, 0.4))
-    return replace(plan, move=plan.move * max(1.0, UNHURRIED / usual), forward=ahead)
+    free: dict[str, Any] = {"instructions": float("inf"), "simplicity": 0.0, "wide": 1.0}
+    return replace(plan, move=plan.move * max(1.0, UNHURRIED / usual), forward=ahead, **free)
 
 
 def leg_length(body: Body) -> float:
