@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, STOPPED, ForceOption, JsonOption, OutOption, app, print_json, say
+from biodance.cli.app import DONE, NEEDS_A_PERSON, STOPPED, app, print_json, say
+from biodance.cli.options import ForceOption, JsonOption, OutOption
 from biodance.errors import BiodanceError
 
 if TYPE_CHECKING:
