@@ -29,6 +29,7 @@ ForceOption = Annotated[
 Tables = Annotated[
     Path | None, Parameter(name="--tables", help="Folder for the same numbers as tables, CSV and Parquet.")
 ]
+OpenOption = Annotated[bool, Parameter(name="--open", negative="", help="Show the page in the browser when done.")]
 OutOption = Annotated[Path, Parameter(name="--out", help="Folder for the results; it is made if it is missing.")]
 
 ReferenceOption = Annotated[
@@ -74,3 +75,17 @@ def print_json(document: object) -> None:
     from biodance.report.documents.session import to_text
 
     sys.stdout.write(to_text(document))
+
+
+def show_page(page: Path, *, wanted: bool) -> None:
+    """Show a page in the browser where that is ``wanted``; where there is none, say where the page lies."""
+    if not wanted:
+        return
+    import webbrowser
+
+    try:
+        opened = webbrowser.open(page.resolve().as_uri())
+    except webbrowser.Error:
+        opened = False
+    if not opened:
+        say(f"No browser was found here. Open {page} on a machine that has one.")

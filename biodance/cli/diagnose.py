@@ -14,12 +14,14 @@ from biodance.cli.app import (
     JsonOption,
     LabOption,
     MarkersFile,
+    OpenOption,
     OutOption,
     ReferenceOption,
     Set,
     Tables,
     app,
     print_json,
+    show_page,
 )
 from biodance.cli.progress import progress
 from biodance.cli.session import Reading, examine_with_reference, ready, tabled
@@ -72,6 +74,7 @@ def diagnose_command(
     chosen: Set = (),
     tables: Tables = None,
     markers: MarkersFile = None,
+    open_page: OpenOption = False,
     json: JsonOption = False,
     force: ForceOption = False,
 ) -> int:
@@ -105,6 +108,7 @@ def diagnose_command(
         tell("writing the page")
         tabled(result, place, found.diagnosis)
         document = write_diagnosis(result, found, folder, accepted=accept, earlier=carried.corrections)
+    show_page(folder / "report.html", wanted=open_page)
     if json:
         print_json(document)
     else:

@@ -17,6 +17,7 @@ from biodance.cli.app import (
     JsonOption,
     LabOption,
     MarkersFile,
+    OpenOption,
     OutOption,
     ReferenceOption,
     Set,
@@ -24,6 +25,7 @@ from biodance.cli.app import (
     app,
     print_json,
     say,
+    show_page,
 )
 from biodance.cli.progress import progress
 
@@ -215,6 +217,7 @@ def report_command(
         bool,
         Parameter(name="--subject-page", negative="", help="Also write subject.html, for the person who was measured."),
     ] = False,
+    open_page: OpenOption = False,
     json: JsonOption = False,
     force: ForceOption = False,
 ) -> int:
@@ -237,6 +240,7 @@ def report_command(
         result, found = report_session(
             result, folder, tell, tables=place, reference=before, tolerances=known, for_subject=subject_page
         )
+    show_page(folder / "report.html", wanted=open_page)
     return print_reported(result, folder, found, json)
 
 
@@ -259,6 +263,7 @@ def identify_command(
     chosen: Set = (),
     tables: Tables = None,
     markers: MarkersFile = None,
+    open_page: OpenOption = False,
     json: JsonOption = False,
     force: ForceOption = False,
 ) -> int:
@@ -291,6 +296,7 @@ def identify_command(
         tell("writing the page")
         tabled(result, place, movement=moved)
         document = write_identification(result, found, folder, movement=moved)
+    show_page(folder / "report.html", wanted=open_page)
     return _told_identified(result, folder, document, json)
 
 
