@@ -5,6 +5,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -106,8 +107,9 @@ def _load(trial: Trial) -> Array:
 
 
 def _motion(held: "np.lib.npyio.NpzFile", k: int) -> Motion:
-    arrays = {name: held[f"{k}.{name}"] for name in _ARRAYS}
-    return Motion(**arrays, **{name: tuple(str(one) for one in held[f"{k}.{name}"]) for name in _TEXTS})
+    arrays: dict[str, Any] = {name: held[f"{k}.{name}"] for name in _ARRAYS}
+    texts: dict[str, Any] = {name: tuple(str(one) for one in held[f"{k}.{name}"]) for name in _TEXTS}
+    return Motion(**arrays, **texts)
 
 
 def kept_trials(kept: KeptResults, names: tuple[str, ...], *, subject: str | None = None) -> tuple[TrialResult, ...]:
