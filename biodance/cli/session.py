@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from biodance.pipeline.movement import SessionMovement
     from biodance.pipeline.results import SessionResult
     from biodance.records import Session
-    from biodance.uncertainty.tolerances import Tolerances
 
 
 @dataclass(frozen=True)
@@ -70,21 +69,23 @@ def report_session(
     *,
     tables: Path | None = None,
     reference: "SessionIdentification | None" = None,
-    tolerances: "Tolerances | None" = None,
+    lab: Path | None = None,
     for_subject: bool = False,
 ) -> "tuple[SessionResult, dict[str, Any]]":
     """Report an examined session into ``folder``, as tables into ``tables``, ``for_subject`` with the page for the
     person who was measured; return the result and the content of results.json.
     """
+    from biodance.pipeline.carry import read_lab
     from biodance.pipeline.diagnosis import diagnosed
     from biodance.pipeline.front_movement import describe_movement
     from biodance.pipeline.session import stopped_before
     from biodance.report.write import write_report, write_subject_page
 
-    moved = describe_movement(result, tell=tell)
+    moved = describe_movement(result, lab=lab, tell=tell)
     try:
         stopped = result.stopped
-        found = None if stopped else diagnosed(result, reference=reference, tolerances=tolerances, tell=tell)
+        known = read_lab(lab).tolerances
+        found = None if stopped else diagnosed(result, reference=reference, tolerances=known, tell=tell)
     except KeyboardInterrupt:
         found, result = None, stopped_before(result, "the diagnosis")
     tell("writing the page")
@@ -231,14 +232,11 @@ def report_command(
         The person to report where C3D files hold several; without it a file with several persons is refused and names
         them.
     """
-    from biodance.pipeline.carry import read_lab
-
     with progress() as tell:
         options, place = Reading(subject, markers, chosen, reference, body, lab), ready(tables, session, force=force)
         result, before, folder = examine_with_reference(session, out, options, force=force, tell=tell)
-        known = read_lab(lab).tolerances
         result, found = report_session(
-            result, folder, tell, tables=place, reference=before, tolerances=known, for_subject=subject_page
+            result, folder, tell, tables=place, reference=before, lab=lab, for_subject=subject_page
         )
     show_page(folder / "report.html", wanted=open_page)
     return print_reported(result, folder, found, json)
@@ -292,7 +290,7 @@ def identify_command(
         result, _, folder = examine_with_reference(session, out, options, force=force, tell=tell)
         found = front.identify(result, dance=shown)
         result = replace(result, identification=found)
-        moved = describe_movement(result, tell=tell)
+        moved = describe_movement(result, lab=lab, tell=tell)
         tell("writing the page")
         tabled(result, place, movement=moved)
         document = write_identification(result, found, folder, movement=moved)
