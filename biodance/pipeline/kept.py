@@ -18,7 +18,7 @@ from biodance.motion.contact.soles import soles_from_body
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial import attempt, compare_wrenches, prepare_trial
 from biodance.pipeline.trial_result import Step, TrialResult
-from biodance.records import Array, Motion, Trial
+from biodance.records import Array, Motion, Session, Trial
 from biodance.settings import Value
 
 BODY = "body.json"
@@ -112,8 +112,11 @@ def _motion(held: "np.lib.npyio.NpzFile", k: int) -> Motion:
     return Motion(**arrays, **texts)
 
 
-def kept_trials(kept: KeptResults, names: tuple[str, ...], *, subject: str | None = None) -> tuple[TrialResult, ...]:
-    """Return trials of a results folder with their recordings prepared again; nothing is tracked or identified.
+def kept_trials(
+    kept: KeptResults, names: tuple[str, ...], *, subject: str | None = None
+) -> tuple[Session, tuple[TrialResult, ...]]:
+    """Return the session of a results folder as read, and trials with their recordings prepared again; nothing is
+    tracked or identified.
 
     Raises
     ------
@@ -128,7 +131,7 @@ def kept_trials(kept: KeptResults, names: tuple[str, ...], *, subject: str | Non
             f"session folder."
         )
     session = read_session(kept.session, subject_name=subject, settings=kept.settings)
-    return tuple(_again(session[name], kept, name) for name in names)
+    return session, tuple(_again(session[name], kept, name) for name in names)
 
 
 def _again(trial: Trial, kept: KeptResults, name: str) -> TrialResult:
