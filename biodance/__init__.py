@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from biodance.pipeline.movement import SessionMovement as SessionMovement
     from biodance.pipeline.plates import judge_plates as judge_plates
     from biodance.pipeline.registration import register as register
+    from biodance.pipeline.replay import stream_recording as stream_recording
     from biodance.pipeline.results import SessionResult as SessionResult
     from biodance.pipeline.robot import identify_robot as identify_robot
     from biodance.pipeline.session import examine as examine
@@ -94,6 +95,7 @@ HOMES = {
     "pipeline.movement": ("SessionMovement",),
     "pipeline.plates": ("judge_plates",),
     "pipeline.registration": ("register",),
+    "pipeline.replay": ("stream_recording",),
     "pipeline.results": ("SessionResult",),
     "pipeline.robot": ("identify_robot",),
     "pipeline.session": ("examine",),

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from biodance.cli import progress as told
-from biodance.cli.app import show_page
+from biodance.cli.options import Results
 
 
 class Clock:
@@ -54,8 +54,8 @@ def test_without_a_terminal_a_line_comes_every_few_seconds_and_a_short_run_is_si
 def test_the_page_is_opened_only_where_it_is_wanted_and_its_place_is_said_without_a_browser(capsys, monkeypatch):
     opened = []
     monkeypatch.setattr("webbrowser.open", lambda address: bool(opened.append(address)))
-    show_page(Path("out/report.html"), wanted=False)
+    Results(out=Path("out")).show_page(Path("out"))
     assert opened == []
-    show_page(Path("out/report.html"), wanted=True)
+    Results(out=Path("out"), open_page=True).show_page(Path("out"))
     assert opened[0].startswith("file://")
     assert "No browser was found here. Open out/report.html" in capsys.readouterr().err

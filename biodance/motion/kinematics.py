@@ -13,8 +13,8 @@ from biodance.spatial import cross, quaternion_matrix, skew
 @dataclass(frozen=True, eq=False)
 class Poses:
     """Poses in the lab frame: ``joint_rotation`` (T, n, 3, 3), ``joint_position`` (T, n, 3) m of the joint frames
-    (after their angle); ``rotation`` (T, N, 3, 3), ``position`` (T, N, 3) m of the segment frames; ``root_rotation``
-    (T, 3, 3), ``root_position`` (T, 3) m.
+    (after their angle); ``rotation`` (T, N, 3, 3), ``position`` (T, N, 3) m of the segment frames, with those of the
+    body's parts behind them (N + P); ``root_rotation`` (T, 3, 3), ``root_position`` (T, 3) m.
     """
 
     joint_rotation: Array
@@ -50,8 +50,8 @@ def poses(body: Body, q: Array) -> Poses:
 
 @dataclass(frozen=True, eq=False)
 class SegmentMotion:
-    """Segments in the lab frame: ``rotation`` (T, N, 3, 3), ``position`` (T, N, 3) m of the segment origin,
-    ``angular_velocity`` (T, N, 3) rad/s, ``angular_acceleration`` (T, N, 3) rad/s²,
+    """Segments in the lab frame, the body's parts behind them: ``rotation`` (T, N, 3, 3), ``position`` (T, N, 3) m of
+    the segment origin, ``angular_velocity`` (T, N, 3) rad/s, ``angular_acceleration`` (T, N, 3) rad/s²,
     ``acceleration`` (T, N, 3) m/s² of the segment origin (gravity not included).
     """
 
@@ -90,9 +90,10 @@ def segment_motion(body: Body, motion: Motion) -> SegmentMotion:
 
 def centre_of_mass(body: Body, motion: Motion) -> Array:
     """Return the centre of mass (T, 3) m of ``body`` with its own parameters during ``motion``."""
-    mass = body.sip.mass
+    table = body.link_parameters().reshape(-1, 10)
+    mass = table[:, 0]
     carried = np.flatnonzero(mass > 0)
-    points = poses(body, motion.q).points(carried.tolist(), body.sip.com[carried])
+    points = poses(body, motion.q).points(carried.tolist(), table[carried, 1:4] / mass[carried, None])
     return np.einsum("k,tkj->tj", mass[carried], points) / mass[carried].sum()
 
 
@@ -109,8 +110,8 @@ def _tree(body: Body) -> tuple[Index, Array, Array, Array]:
 
 
 def below(body: Body) -> Array:
-    """Return (n, N) 1 where a segment hangs on a joint."""
-    table = np.zeros((len(body.joints), len(body.segments)))
+    """Return (n, N + P) 1 where a segment, or a part of one, hangs on a joint."""
+    table = np.zeros((len(body.joints), len(body.segment_joint)))
     for s, j in enumerate(body.segment_joint):
         while j >= 0:
             table[j, s] = 1.0

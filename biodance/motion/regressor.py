@@ -18,15 +18,16 @@ from biodance.motion.kinematics import SegmentMotion, segment_motion
 from biodance.records import Array, Motion, Wrench
 
 
-def regressor_of(segments: SegmentMotion, *, gravity: Array) -> Array:
+def regressor_of(segments: SegmentMotion, *, gravity: Array, sharing: Array | None = None) -> Array:
     """Return W (T, 6, 10N): wrench about the lab origin, force first, per unit of each parameter; ``gravity`` (3,)
-    m/s², lab frame.
+    m/s², lab frame; ``sharing`` (10 M, 10 N) what each of the M links that move has of the N segments
+    (``Body.sharing``; None: they are the segments).
     """
     frames, count = segments.position.shape[:2]
     W = np.zeros((frames, 6, 10 * count))
     omega, alpha, drive = segments.angular_velocity, segments.angular_acceleration, segments.acceleration - gravity
     fill_regressor(segments.rotation, segments.position, omega, alpha, drive, W)
-    return W
+    return W if sharing is None else W @ sharing
 
 
 def regressor(body: Body, motion: Motion) -> Array:
@@ -36,7 +37,7 @@ def regressor(body: Body, motion: Motion) -> Array:
     Parameters of segment i are columns 10i..10i+9 in Pinocchio's order [m, mc (3), Ixx, Ixy, Iyy, Ixz, Iyz, Izz] about
     the segment's joint frame. Gravity is the body's.
     """
-    return regressor_of(segment_motion(body, motion), gravity=body.gravity)
+    return regressor_of(segment_motion(body, motion), gravity=body.gravity, sharing=body.sharing)
 
 
 def predict_wrench(body: Body, motion: Motion, phi: Array | None = None) -> Wrench:

@@ -8,6 +8,7 @@ from pathlib import Path
 from biodance.body.body import Body
 from biodance.body.body_file import read_body
 from biodance.body.export import formats, write_model
+from biodance.body.robot.hoap3 import hoap3
 from biodance.body.solids import segment_solids
 from biodance.errors import SessionRefused, TrialRefused, UnknownName
 from biodance.lab.opensim.mot import write_mot
@@ -24,6 +25,8 @@ from biodance.pipeline.trial import prepare_trial
 from biodance.pipeline.trial_result import TrialResult
 from biodance.records import Motion, Session, Trial
 
+_SHIPPED = {"hoap3": hoap3}
+"""Robots whose bodies are built from our own tables."""
 MOTION_FORMATS = ("trc", "mot", "c3d", "opensim", "bids")
 """Formats that need a recording beside the body."""
 
@@ -50,7 +53,7 @@ def export(
     ----------
     source : Session, SessionResult, str or pathlib.Path
         A visit, its folder, or the results folder (or its body.json) of ``biodance identify`` or ``report``, from which
-        nothing is computed again.
+        nothing is computed again; or ``"hoap3"``, the robot from our own tables.
     out : str or pathlib.Path
         The file to write; it must not exist.
     format : str
@@ -94,6 +97,8 @@ def export(
     if format not in legal_formats():
         raise UnknownName.of("format", format, legal_formats())
     out = Path(out)
+    if isinstance(source, str | Path) and str(source) in _SHIPPED and not Path(str(source)).exists():
+        return _robot(str(source), out, format, meshes)
     if isinstance(source, SessionResult):
         return _of_result(source, out, format, trial, meshes, subject=subject)
     session = source if isinstance(source, Session) else None
@@ -183,6 +188,14 @@ def _model(body: Body, out: Path, format: str, source: str, meshes: Path | None)
     """Write the body in a model format, with the solids of ``meshes`` where there are some."""
     solids = None if meshes is None else segment_solids(body, meshes)
     return write_model(body, out, format=format, source=source, solids=solids)
+
+
+def _robot(name: str, out: Path, format: str, meshes: Path | None) -> tuple[Path, str]:
+    if format in MOTION_FORMATS:
+        raise SessionRefused(f"{name}: is a robot and no trial. Give a session folder to export {format}.")
+    body = _SHIPPED[name]()
+    words = " ".join(body.notes)
+    return _model(body, out, format, words, meshes), words
 
 
 def body_of_result(result: SessionResult) -> tuple[Body, str]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from biodance import display
 from biodance.lab.markers.gaps import MarkerGaps
+from biodance.motion.optional_joints import JointGain
 from biodance.records import CHANNEL_TITLES, Array, Motion, Trial
 
 if TYPE_CHECKING:
@@ -138,6 +139,30 @@ class Check:
     advice: str = ""
 
 
+@dataclass(frozen=True)
+class ForceGain:
+    """RMS difference of measured and simulated force in a ``trial``, N along x, y, z, the body ``without`` the joints
+    that the markers show and ``with_them``; masses of the table, so that no force was used for either.
+    """
+
+    trial: str
+    without: tuple[float, ...]
+    with_them: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class ShownJoints:
+    """What each optional joint brings to the markers (``gains``), and all that were taken to the ``forces``."""
+
+    gains: tuple[JointGain, ...] = ()
+    forces: tuple[ForceGain, ...] = ()
+
+    @property
+    def taken(self) -> tuple[str, ...]:
+        """Names of the joints that the body has."""
+        return tuple(gain.name for gain in self.gains if gain.taken)
+
+
 @dataclass(frozen=True, eq=False)
 class TrialResult:
     """One trial after all steps: ``trial`` prepared (as read where preparing was refused); ``gaps`` as recorded, before
@@ -174,12 +199,12 @@ class TrialResult:
 
     @property
     def status(self) -> Status:
-        """State of the trial: "refused" where no step after preparing was done, "warning" where a person must look,
-        "ok" otherwise.
+        """State of the trial: "refused" where no step after preparing was done, "warning" where a person must look (a
+        refusal, a warning, a check outside its limit), "ok" otherwise.
         """
         if all(step.status != "done" or step.name == "prepare" for step in self.steps):
             return "refused"
-        return "warning" if self.reasons else "ok"
+        return "warning" if self.reasons or not all(check.inside for check in self.checks) else "ok"
 
     @property
     def reasons(self) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from the rate of momentum and angular momentum (docs/derivations.md, section 16)
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -20,7 +20,7 @@ from scipy.sparse import csr_array, diags_array, hstack, vstack
 
 from biodance.body.body import Body
 from biodance.body.inertia import TENSOR
-from biodance.motion.kinematics import Poses, jacobian, poses, segment_motion
+from biodance.motion.kinematics import Poses, SegmentMotion, jacobian, poses, segment_motion
 from biodance.records import Array, Index, Motion
 from biodance.spatial import skew
 
@@ -77,6 +77,11 @@ class Response:
         for s in every:
             tangent += place[:, s] @ moved[:, s] + turn[:, s] @ turned[:, s]
         return cls(body, motion, pose, place, turn, tangent, -tracking(body, J), J)
+
+    @cached_property
+    def segments(self) -> SegmentMotion:
+        """How the segments move."""
+        return segment_motion(self.body, self.motion)
 
     @property
     def angles(self) -> Array:

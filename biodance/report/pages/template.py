@@ -2,13 +2,17 @@
 hash.
 """
 
+import functools
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from hashlib import sha256
 from importlib.resources import files
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from biodance.report.wording import format_number, millimetres
+
+if TYPE_CHECKING:
+    from jinja2 import Template
 
 
 def template_text(name: str) -> str:
@@ -22,14 +26,20 @@ def render(name: str, *, filters: dict[str, Any] | None = None, scripts: Sequenc
     Every template knows ``style`` and ``policy`` (what its page may do: nothing of the network, and only ``scripts``),
     ``scripts``, and the filters ``number`` and ``mm``.
     """
-    from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters.update(number=format_number, mm=millimetres, **(filters or {}))
     style = template_text("page.css") + template_text("curves.css")
     given = {"style": Markup(style), "policy": _policy(scripts), "scripts": [Markup(text) for text in scripts]}
-    return environment.from_string(template_text(name)).render(**{**given, **values})
+    return _compiled(name, tuple((filters or {}).items())).render(**{**given, **values})
+
+
+@functools.cache
+def _compiled(name: str, filters: tuple[tuple[str, Any], ...]) -> "Template":
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters.update(number=format_number, mm=millimetres, **dict(filters))
+    return environment.from_string(template_text(name))
 
 
 def print_sheet(title: str, visit: Mapping[str, str], made: str) -> str:
