@@ -23,7 +23,7 @@ from biodance.pipeline.trial_result import TrialResult
 from biodance.records import CHANNELS, Markers, Motion, Plate, Session, Trial
 from biodance.version import __version__
 
-DERIVED = "derivatives/biodance"
+_DERIVED = "derivatives/biodance"
 _SYSTEM = "optical"
 
 
@@ -46,9 +46,9 @@ def write_bids_folder(session: Session, trials: Sequence[TrialResult], body: Bod
     if not raw:
         raise TrialRefused(f"{session.folder}: no trial has markers, so there is nothing to share as motion.")
     subject = bids_label(session.subject.name or session.folder.name)
-    place, derived = (made_folder(folder / part / f"sub-{subject}" / "motion") for part in (".", DERIVED))
+    place, derived = (made_folder(folder / part / f"sub-{subject}" / "motion") for part in (".", _DERIVED))
     write_description(folder, session.folder.name)
-    write_description(folder / DERIVED, "biodance", derived_by={"Name": "biodance", "Version": __version__})
+    write_description(folder / _DERIVED, "biodance", derived_by={"Name": "biodance", "Version": __version__})
     one = session.subject
     row = {
         "participant_id": f"sub-{subject}",
