@@ -101,7 +101,7 @@ USUAL_READING = Reading()
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class Results:
-    """Where results go: a folder, beside it tables where they are wanted; is JSON printed, is the page opened?"""
+    """Where results go: a folder, beside it tables where they are wanted; what is printed and opened."""
 
     out: OutOption
     tables: Tables = None

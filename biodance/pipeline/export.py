@@ -18,6 +18,7 @@ from biodance.pipeline.bids_folder import write_bids_folder
 from biodance.pipeline.coordinates import opensim_coordinates
 from biodance.pipeline.kept import kept_body, kept_trials, read_kept
 from biodance.pipeline.opensim_folder import write_opensim_folder
+from biodance.pipeline.rerun_recording import write_rerun
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.results_c3d import results_into_c3d
 from biodance.pipeline.session import examine
@@ -27,7 +28,7 @@ from biodance.records import Motion, Session, Trial
 
 _SHIPPED = {"hoap3": hoap3}
 """Robots whose bodies are built from our own tables."""
-MOTION_FORMATS = ("trc", "mot", "c3d", "opensim", "bids")
+MOTION_FORMATS = ("trc", "mot", "c3d", "opensim", "bids", "rerun")
 """Formats that need a recording beside the body."""
 
 
@@ -61,7 +62,8 @@ def export(
         trials to identify from, else with the table's. ``trc``: the prepared markers of a trial, ``mot``: its joint
         coordinates, of the model that ``osim`` writes; ``c3d``: a copy of its recording with angles, moments, wrenches,
         centre of mass and events. ``opensim``: a folder with all that OpenSim needs to run its inverse dynamics;
-        ``bids``: a BIDS motion dataset of the session, with its derivatives.
+        ``bids``: a BIDS motion dataset of the session, with its derivatives; ``rerun``: a trial with solids, forces and
+        residual for the viewer Rerun (needs rerun-sdk).
     trial : str, optional
         Name of the trial for ``trc``, ``mot`` and ``c3d``, by default the only one that moves; for ``opensim`` by
         default all.
@@ -137,6 +139,8 @@ def _of_kept(
     session, found = kept_trials(kept, chosen, subject=subject)
     if format == "bids":
         return _bids(session, found, kept.body, out)
+    if format == "rerun":
+        return _rerun(found[0], kept.body, out, meshes)
     if format == "trc":
         return _prepared_markers(found[0].trial, out)
     if format == "c3d":
@@ -158,6 +162,8 @@ def _of_result(
     body, words = body_of_result(result)
     if format == "bids":
         return _bids(result.session, result.trials, body, out)
+    if format == "rerun":
+        return _rerun(result[_chosen(result.session, trial).name], body, out, meshes)
     if format == "opensim":
         return _opensim(result.trials if trial is None else (result[trial],), body, out, words, meshes)
     if format == "c3d":
@@ -165,6 +171,11 @@ def _of_result(
         one = next(found for found in result.trials if found.trial.name == name)
         return results_into_c3d(one, body, out, source=words, subject=subject)
     return _model(body, out, format, words, meshes), words
+
+
+def _rerun(one: TrialResult, body: Body, out: Path, meshes: Path | None) -> tuple[Path, str]:
+    solids = None if meshes is None else segment_solids(body, meshes)
+    return write_rerun(one, body, out, solids=solids), f"Trial {one.name} for the viewer: rerun {out.name}"
 
 
 def _bids(session: Session, found: tuple[TrialResult, ...], body: Body, out: Path) -> tuple[Path, str]:
