@@ -70,9 +70,9 @@ def movement_figure(
         return ""
     loads = quantities == LOAD_PANELS
     about = f"{'Moments and powers' if loads else 'Angles'} of trial {one.trial}, left beside right"
-    band = "95 %, from the inertial parameters" if loads else "± 1 sd between repetitions"
+    band = "95 %, inertial parameters" if loads else "± 1 sd, repetitions"
     if any(n.kind == kind for n in normal):
-        band += "; grey ± 1 sd between people of this laboratory"
+        band += "; grey: ± 1 sd, people"
     return CurveFigure(PERCENT, cells, about, label=_AXES[kind], band=band).html()
 
 
