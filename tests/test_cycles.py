@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from squatting import BODY as SQUATTER
+from squatting import squat
 
 from biodance.body.human.human import human
 from biodance.cycles.curves import CycleCurve, angle_curves, group_curves, lab_curves
@@ -19,6 +21,7 @@ from biodance.motion.contact.events import FootEvent
 from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.dynamics import joint_torques
 from biodance.motion.kinematics import poses
+from biodance.pipeline.movement import movement_of
 from biodance.records import Motion, Subject, Wrench
 
 BODY = human(Subject(62.0, 1.70, "F", 30.0, "S01"))
@@ -262,3 +265,11 @@ def test_a_normal_band_counts_every_person_once_and_comes_back_from_the_file():
     np.testing.assert_allclose(back.sd, bands[0].sd, rtol=1e-3)
     with pytest.raises(ValueError, match="unpack"):
         normal_of({"knee": {"mean": [1], "sd": [1]}})
+
+
+def test_that_the_shares_of_two_feet_on_one_plate_are_an_estimate_is_said():
+    one = squat()
+    moved = movement_of(one, SQUATTER, None)
+    assert moved.told == "1 squat"
+    assert any("not measured" in note for note in moved.notes)
+    assert "no moments" in movement_of(replace(one, trial=replace(one.trial, plates=())), SQUATTER, None).notes[0]
