@@ -12,7 +12,21 @@ from pathlib import Path
 import numpy as np
 
 import biodance
+from biodance.lab.c3d.raw import read_raw, split_label
+from biodance.motion.contact.contact import foot_wrenches
+from biodance.motion.contact.soles import soles_from_body
+from biodance.motion.dynamics import joint_torques
+from biodance.pipeline.export import body_of_result
+from biodance.pipeline.movement import contact_of
+from biodance.records import SIDES
 
+MOMENTS = {
+    "hip_flexion": ("HipMoment", 0),
+    "hip_adduction": ("HipMoment", 1),
+    "knee_flexion": ("KneeMoment", 0),
+    "ankle_dorsiflexion": ("AnkleMoment", 0),
+}
+"""Plug-in gait's moments: N·mm per kg, positive against our angles (extensors, abductors, plantar flexors)."""
 SESSIONS = ("biomechzoo/HC0*", "c3d_parser_Sydney*", "c3d_parser_QCMAS*", "gaitalytics*")
 
 
@@ -21,23 +35,50 @@ def folders(data: Path, named: list[str]) -> list[Path]:
     return [data / name for name in named] or [one for some in SESSIONS for one in sorted(data.glob(some))]
 
 
-def moved_trials(folder: Path):
-    """Yield what moved in every moving trial of a session; say what gives nothing."""
+def examined(folder: Path):
+    """Return the examined session, or None; say why."""
     try:
-        result = biodance.examine(biodance.read_session(folder))
+        return biodance.examine(biodance.read_session(folder))
     except biodance.BiodanceError as why:
         print(f"{folder.name}: {str(why)[:150]}")
+        return None
+
+
+def moments_beside(result, one):
+    """Yield joint, RMS difference (N·m/kg) and correlation of the moments of a leg that stands, ours and the file's."""
+    body, _ = body_of_result(result)
+    contact = contact_of(one.trial, one, body)
+    if contact is None:
         return
-    for one in biodance.describe_movement(result):
-        if result[one.trial].trial.role != "static":
-            yield one
+    feet = foot_wrenches(one.trial, contact, soles_from_body(body, one.motion))
+    ground = {f"{side}_foot": wrench for side, wrench in zip(SIDES, feet, strict=True)}
+    torque = joint_torques(body, one.motion, ground).torque / body.sip.mass.sum()
+    raw = read_raw(one.trial.source.path)
+    labels = [split_label(label)[1] for label in raw.labels]
+    for foot, side in enumerate(SIDES):
+        stands = contact.told[:, foot] & (feet[foot].force[:, 2] > 50)
+        for joint, (name, axis) in MOMENTS.items():
+            if (label := f"{side[0].upper()}{name}") not in labels:
+                continue
+            theirs = -raw.points[:, labels.index(label), axis] / 1000
+            known = stands & np.isfinite(theirs) & (theirs != 0)
+            ours = torque[known, body.joint_index(f"{side}_{joint}")]
+            if known.sum() >= 20:
+                apart = ours - theirs[known]
+                yield joint, float(np.sqrt(np.mean(apart**2))), float(np.corrcoef(ours, theirs[known])[0, 1])
 
 
 def main() -> None:
     """Print the tables."""
-    angles, events, late = defaultdict(list), defaultdict(list), defaultdict(list)
+    angles, events, late, moments = (defaultdict(list) for _ in range(4))
     for folder in folders(Path(os.environ["BIODANCE_DATA"]), sys.argv[1:]):
-        for one in moved_trials(folder):
+        if (result := examined(folder)) is None:
+            continue
+        for one in biodance.describe_movement(result):
+            if result[one.trial].trial.role == "static":
+                continue
+            for joint, rms, cc in moments_beside(result, result[one.trial]):
+                moments[joint].append((rms, cc))
             print(f"{folder.name} {one.trial}: {one.told}", flush=True)
             for a in one.file_angles:
                 angles[a.joint.partition("_")[2]].append((a.offset, a.sd, a.correlation))
@@ -51,6 +92,10 @@ def main() -> None:
         offset, sd, cc = np.array(rows).T
         span = f"{offset.mean():+.1f} ({offset.min():+.1f} to {offset.max():+.1f})"
         print(f"| {name} | {len(rows)} | {span} | {np.median(sd):.1f} | {np.nanmedian(cc):.3f} ({np.nanmin(cc):.3f}) |")
+    print("| moment of a leg that stands | legs | RMS difference, median N·m/kg | correlation, median (least) |")
+    for name, rows in moments.items():
+        rms, cc = np.array(rows).T
+        print(f"| {name} | {len(rows)} | {np.median(rms):.2f} | {np.median(cc):.3f} ({cc.min():.3f}) |")
     for down, rows in events.items():
         mean, sd, count, missed = np.array(rows).T
         all_in = np.nansum(mean * count) / count.sum()

@@ -41,7 +41,8 @@ def test_identify_writes_page_numbers_and_body(lab, no_page, capsys):
     code = run(["identify", str(lab / "S01"), "--out", str(lab / "out"), "--json"])
     told = json.loads(capsys.readouterr().out)
     assert code == NEEDS_A_PERSON
-    assert sorted(path.name for path in (lab / "out").glob("[!.]*")) == ["body.json", "report.html", "results.json"]
+    files = ["body.json", "methods.md", "motions.npz", "report.html", "results.json"]
+    assert sorted(path.name for path in (lab / "out").glob("[!.]*")) == files
     assert told == json.loads((lab / "out" / "results.json").read_text())
     assert told["status"] == "solved"
     assert run(["identify", str(lab / "S01"), "--out", str(lab / "out")]) == NOT_DONE
@@ -96,12 +97,29 @@ def test_motion_is_exported_by_trial(lab, capsys):
     assert "no markers" in capsys.readouterr().err
 
 
+def test_a_results_folder_is_exported_without_computing_again(lab, no_page, monkeypatch, capsys):
+    results, session = str(lab / "kept"), str(lab / "S01")
+    assert run(["identify", session, "--out", results]) in (DONE, NEEDS_A_PERSON)
+    for name in ("a", "b"):
+        source = session if name == "a" else results
+        words = ["export", source, "--format", "mot", "--trial", "fit_0", "--out", str(lab / f"{name}.mot")]
+        assert run(words) == DONE
+        monkeypatch.setattr("biodance.pipeline.export.examine", None)
+    assert (lab / "a.mot").read_text() == (lab / "b.mot").read_text()
+    assert run(["export", results, "--format", "urdf", "--out", str(lab / "kept.urdf")]) == DONE
+    capsys.readouterr()
+    assert run(["export", results, "--format", "mot", "--trial", "x", "--out", str(lab / "x.mot")]) == NOT_DONE
+    assert "Legal: fit_0, validate_1" in capsys.readouterr().err
+    assert run(["export", results, "--format", "c3d", "--trial", "fit_0", "--out", str(lab / "x.c3d")]) == NOT_DONE
+    assert "are not there" in capsys.readouterr().err
+
+
 def test_an_existing_file_is_replaced_only_by_force_and_only_by_a_whole_one(lab, capsys):
     out = lab / "a.urdf"
     out.write_text("old")
     assert run(["export", str(lab / "S01"), "--format", "urdf", "--out", str(out)]) == NOT_DONE
     assert run(["export", str(lab / "S01"), "--format", "obj", "--out", str(out), "--force"]) == NOT_DONE
-    assert "Legal: biomod, c3d, csv, glb" in capsys.readouterr().err
+    assert "Legal: bids, biomod, c3d, csv, glb" in capsys.readouterr().err
     assert out.read_text() == "old"
     assert run(["export", str(lab / "S01"), "--format", "urdf", "--out", str(out), "--force"]) == DONE
     assert out.read_text().startswith("<?xml")

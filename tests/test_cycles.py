@@ -5,19 +5,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from squatting import BODY as SQUATTER
+from squatting import squat
 
 from biodance.body.human.human import human
-from biodance.cycles.curves import angle_curves, group_curves, lab_curves
+from biodance.cycles.curves import CycleCurve, angle_curves, group_curves, lab_curves
 from biodance.cycles.cut import Cycle, gait_cycles, repetitions
 from biodance.cycles.events import agreement_of_events, joined_events, kinematic_events
 from biodance.cycles.file_outputs import compare_angles, compare_events
 from biodance.cycles.loads import load_curves
+from biodance.cycles.normal import normal_curves, normal_of, normal_toml
 from biodance.cycles.steps import mean_values, strides
 from biodance.lab.c3d.outputs import FileEvent, FileOutputs
 from biodance.motion.contact.events import FootEvent
 from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.dynamics import joint_torques
 from biodance.motion.kinematics import poses
+from biodance.pipeline.movement import movement_of
 from biodance.records import Motion, Subject, Wrench
 
 BODY = human(Subject(62.0, 1.70, "F", 30.0, "S01"))
@@ -237,3 +241,35 @@ def test_another_program_s_angles_and_events_stand_beside_ours():
     (strikes,) = compare_events((FootEvent(1.01, "left", True),), outputs)
     assert (strikes.count, strikes.missed) == (1, 1)
     assert strikes.late == pytest.approx(0.01)
+
+
+def person_of(level, *, count=1):
+    cycle = Cycle("walk", "gait", "right", 0.0, 1.0, 0.6)
+    line = np.full(101, float(level))
+    one = [CycleCurve(cycle, "knee_flexion", side, "deg", line, line) for side in ("right", "left")] * count
+    broken = CycleCurve(cycle, "hip_power", "right", "W/kg", np.where(np.arange(101) < 50, np.nan, level), line)
+    return group_curves([*one, broken])
+
+
+def test_a_normal_band_counts_every_person_once_and_comes_back_from_the_file():
+    import tomllib
+
+    assert normal_curves({"a": person_of(10), "b": person_of(20)}) == ()
+    bands = normal_curves({"a": person_of(10, count=9), "b": person_of(20), "c": person_of(60)})
+    assert [one.quantity for one in bands] == ["knee_flexion"]  # a power that is known of half the cycle makes no band
+    assert (bands[0].people, bands[0].unit) == (3, "deg")
+    np.testing.assert_allclose(bands[0].mean, 30.0)
+    np.testing.assert_allclose(bands[0].sd, np.std([10, 20, 60], ddof=1))
+    (back,) = normal_of(tomllib.loads("\n".join(normal_toml(bands)))["normal"])
+    assert (back.kind, back.people) == ("gait", 3)
+    np.testing.assert_allclose(back.sd, bands[0].sd, rtol=1e-3)
+    with pytest.raises(ValueError, match="unpack"):
+        normal_of({"knee": {"mean": [1], "sd": [1]}})
+
+
+def test_that_the_shares_of_two_feet_on_one_plate_are_an_estimate_is_said():
+    one = squat()
+    moved = movement_of(one, SQUATTER, None)
+    assert moved.told == "1 squat"
+    assert any("not measured" in note for note in moved.notes)
+    assert "no moments" in movement_of(replace(one, trial=replace(one.trial, plates=())), SQUATTER, None).notes[0]

@@ -81,6 +81,7 @@ def diagnose_command(
         tell("writing the page")
         tabled(result, place, found.diagnosis)
         document = write_diagnosis(result, found, folder, accepted=accept, earlier=carried.corrections)
+    results.show_page(folder)
     if results.json:
         print_json(document)
     else:

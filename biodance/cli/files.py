@@ -62,7 +62,8 @@ def export_command(
     source: Path,
     *,
     format: Annotated[
-        str, Parameter(help="osim, urdf, mjcf, biomod, glb, csv; trc, mot, c3d of one trial; opensim: a whole folder.")
+        str,
+        Parameter(help="osim, urdf, mjcf, biomod, glb, csv; of one trial trc, mot, c3d, rerun; folders opensim, bids."),
     ],
     out: Annotated[Path, Parameter(help="The file to write.")],
     trial: Annotated[str | None, Parameter(help="Name of the trial for trc, mot and c3d.")] = None,

@@ -53,10 +53,11 @@ def identify_command(
         result, _, folder = examine_with_reference(session, reading, results, tell)
         found = front.identify(result, dance=shown)
         result = replace(result, identification=found)
-        moved = describe_movement(result, tell=tell)
+        moved = describe_movement(result, lab=reading.lab, tell=tell)
         tell("writing the page")
         tabled(result, place, movement=moved)
         document = write_identification(result, found, folder, movement=moved)
+    results.show_page(folder)
     return _told_identified(result, folder, document, results.json)
 
 
@@ -85,6 +86,7 @@ def _identify_robot(
         result = identify_robot(recording, urdf=urdf, feet=both, tell=tell)
         tell("writing the page")
         found = write_robot(result, folder)
+    results.show_page(folder)
     return _told_identified(result, folder, found, results.json)
 
 

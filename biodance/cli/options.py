@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from biodance.cli.app import say
+
 if TYPE_CHECKING:
     from biodance.records import Session
 
@@ -19,6 +21,7 @@ ForceOption = Annotated[
 Tables = Annotated[
     Path | None, Parameter(name="--tables", help="Folder for the same numbers as tables, CSV and Parquet.")
 ]
+OpenOption = Annotated[bool, Parameter(name="--open", negative="", help="Show the page in the browser when done.")]
 OutOption = Annotated[Path, Parameter(name="--out", help="Folder for the results; it is made if it is missing.")]
 
 ReferenceOption = Annotated[
@@ -98,10 +101,11 @@ USUAL_READING = Reading()
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class Results:
-    """Where results go: a folder, beside it tables where they are wanted; and whether JSON is printed."""
+    """Where results go: a folder, beside it tables where they are wanted; what is printed and opened."""
 
     out: OutOption
     tables: Tables = None
+    open_page: OpenOption = False
     json: JsonOption = False
     force: ForceOption = False
 
@@ -110,3 +114,17 @@ class Results:
         from biodance.report.tables import tables_folder
 
         return None if self.tables is None else tables_folder(self.tables, session, force=self.force)
+
+    def show_page(self, folder: Path) -> None:
+        """Show the page of a results folder in the browser, where that is wanted; say where it lies without one."""
+        if not self.open_page:
+            return
+        import webbrowser
+
+        page = folder / "report.html"
+        try:
+            opened = webbrowser.open(page.resolve().as_uri())
+        except webbrowser.Error:
+            opened = False
+        if not opened:
+            say(f"No browser was found here. Open {page} on a machine that has one.")

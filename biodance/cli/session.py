@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from biodance.pipeline.identification import SessionIdentification
     from biodance.pipeline.movement import SessionMovement
     from biodance.pipeline.results import SessionResult
-    from biodance.uncertainty.tolerances import Tolerances
 
 
 def report_session(
@@ -27,21 +26,23 @@ def report_session(
     *,
     tables: Path | None = None,
     reference: "SessionIdentification | None" = None,
-    tolerances: "Tolerances | None" = None,
+    lab: Path | None = None,
     for_subject: bool = False,
 ) -> "tuple[SessionResult, dict[str, Any]]":
     """Report an examined session into ``folder``, as tables into ``tables``, ``for_subject`` with the page for the
     person who was measured; return the result and the content of results.json.
     """
+    from biodance.pipeline.carry import read_lab
     from biodance.pipeline.diagnosis import diagnosed
     from biodance.pipeline.front_movement import describe_movement
     from biodance.pipeline.session import stopped_before
     from biodance.report.write import write_report, write_subject_page
 
-    moved = describe_movement(result, tell=tell)
+    moved = describe_movement(result, lab=lab, tell=tell)
     try:
         stopped = result.stopped
-        found = None if stopped else diagnosed(result, reference=reference, tolerances=tolerances, tell=tell)
+        known = read_lab(lab).tolerances
+        found = None if stopped else diagnosed(result, reference=reference, tolerances=known, tell=tell)
     except KeyboardInterrupt:
         found, result = None, stopped_before(result, "the diagnosis")
     tell("writing the page")
@@ -122,12 +123,11 @@ def report_command(
     session
         Folder with the static trial and the other trials.
     """
-    from biodance.pipeline.carry import read_lab
-
     with progress() as tell:
-        place, known = results.make_tables_folder(session), read_lab(reading.lab).tolerances
+        place = results.make_tables_folder(session)
         result, before, folder = examine_with_reference(session, reading, results, tell)
         result, found = report_session(
-            result, folder, tell, tables=place, reference=before, tolerances=known, for_subject=subject_page
+            result, folder, tell, tables=place, reference=before, lab=reading.lab, for_subject=subject_page
         )
+    results.show_page(folder)
     return print_reported(result, folder, found, results.json)

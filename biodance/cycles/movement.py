@@ -222,4 +222,10 @@ def _notes(cycles: Sequence[Cycle], contact: Contact | None) -> tuple[str, ...]:
         return ("No step, no squat and no rise from a chair was found, so there are no cycles.",)
     if contact is None:
         return ("No force plate tells what the ground does, so there are no moments and powers.",)
+    inside = np.any([(contact.time >= one.start) & (contact.time <= one.end) for one in cycles], axis=0)
+    if np.any(np.all(contact.on_plate[inside], axis=1)):
+        return (
+            "Both feet stood on one plate: what each of them carried is an estimate from the centre of pressure, so a "
+            "difference between left and right moments is not measured.",
+        )
     return ()

@@ -10,6 +10,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.body_file import read_body
+from biodance.cycles.normal import NormalCurve, normal_of
 from biodance.diagnosis.diagnosis import Finding
 from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.c3d.ezc3d_object import write_trial
@@ -33,10 +34,13 @@ LAB, CORRECTED = "lab.toml", "corrected"
 
 @dataclass(frozen=True, eq=False)
 class LabFile:
-    """What a lab.toml says: ``corrections`` of the plates, and ``tolerances`` of the laboratory's own or None."""
+    """What a lab.toml says: ``corrections`` of the plates, ``tolerances`` of the laboratory's own or None, and the
+    ``normal`` bands of its people.
+    """
 
     corrections: tuple[PlateCorrection, ...] = ()
     tolerances: Tolerances | None = None
+    normal: tuple[NormalCurve, ...] = ()
 
     def corrected(self, session: Session) -> Session:
         """Return a session as read, corrected."""
@@ -57,11 +61,13 @@ def read_lab(path: str | Path | None) -> LabFile:
     if path is None:
         return NO_LAB
     corrections = read_corrections(path)
-    raw = tomllib.loads(Path(path).read_text(encoding="utf-8")).get("tolerances")
+    whole = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    raw, where = whole.get("tolerances"), "tolerances"
     try:
-        return LabFile(corrections, tolerances_of(raw) if raw else None)
+        known, where = tolerances_of(raw) if raw else None, "normal"
+        return LabFile(corrections, known, normal_of(whole.get("normal", {})))
     except (KeyError, TypeError, ValueError, BiodanceError) as error:
-        raise FileRefused(f"{path}: [tolerances] is not what `biodance learn` writes ({error}).") from error
+        raise FileRefused(f"{path}: [{where}] is not what `biodance learn` writes ({error}).") from error
 
 
 def known_body(body: Body | str | Path | None) -> Body | None:

@@ -14,9 +14,11 @@ from biodance.errors import SessionRefused, TrialRefused, UnknownName
 from biodance.lab.opensim.mot import write_mot
 from biodance.lab.opensim.trc import write_trc
 from biodance.lab.session.read import read_session
+from biodance.pipeline.bids_folder import write_bids_folder
 from biodance.pipeline.coordinates import opensim_coordinates
 from biodance.pipeline.kept import kept_body, kept_trials, read_kept
 from biodance.pipeline.opensim_folder import write_opensim_folder
+from biodance.pipeline.rerun_recording import write_rerun
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.results_c3d import results_into_c3d
 from biodance.pipeline.session import examine
@@ -26,7 +28,7 @@ from biodance.records import Motion, Session, Trial
 
 _SHIPPED = {"hoap3": hoap3}
 """Robots whose bodies are built from our own tables."""
-MOTION_FORMATS = ("trc", "mot", "c3d", "opensim")
+MOTION_FORMATS = ("trc", "mot", "c3d", "opensim", "bids", "rerun")
 """Formats that need a recording beside the body."""
 
 
@@ -59,7 +61,9 @@ def export(
         ``osim``, ``urdf``, ``mjcf``, ``biomod``, ``csv``: the body with the identified parameters, where there are
         trials to identify from, else with the table's. ``trc``: the prepared markers of a trial, ``mot``: its joint
         coordinates, of the model that ``osim`` writes; ``c3d``: a copy of its recording with angles, moments, wrenches,
-        centre of mass and events. ``opensim``: a folder with all that OpenSim needs to run its inverse dynamics.
+        centre of mass and events. ``opensim``: a folder with all that OpenSim needs to run its inverse dynamics;
+        ``bids``: a BIDS motion dataset of the session, with its derivatives; ``rerun``: a trial with solids, forces and
+        residual for the viewer Rerun (needs rerun-sdk).
     trial : str, optional
         Name of the trial for ``trc``, ``mot`` and ``c3d``, by default the only one that moves; for ``opensim`` by
         default all.
@@ -128,11 +132,15 @@ def _of_kept(
     if trial is not None and trial not in names:
         raise UnknownName.of(f"trial in {folder}", trial, names)
     chosen = names if trial is None else (trial,)
-    if format != "opensim" and len(chosen) != 1:
+    if format not in ("opensim", "bids") and len(chosen) != 1:
         raise TrialRefused(f"{folder}: holds the trials {', '.join(names)}. Choose one with --trial.")
     if format == "mot":
         return _coordinates(kept.body, kept.motions[chosen[0]], chosen[0], out)
-    found = kept_trials(kept, chosen, subject=subject)
+    session, found = kept_trials(kept, chosen, subject=subject)
+    if format == "bids":
+        return _bids(session, found, kept.body, out)
+    if format == "rerun":
+        return _rerun(found[0], kept.body, out, meshes)
     if format == "trc":
         return _prepared_markers(found[0].trial, out)
     if format == "c3d":
@@ -152,6 +160,10 @@ def _of_result(
             raise TrialRefused(f"Trial {one.name}: it gives no motion. {one.reason or result.body_source}")
         return _coordinates(result.body, one.motion, one.name, out)
     body, words = body_of_result(result)
+    if format == "bids":
+        return _bids(result.session, result.trials, body, out)
+    if format == "rerun":
+        return _rerun(result[_chosen(result.session, trial).name], body, out, meshes)
     if format == "opensim":
         return _opensim(result.trials if trial is None else (result[trial],), body, out, words, meshes)
     if format == "c3d":
@@ -159,6 +171,17 @@ def _of_result(
         one = next(found for found in result.trials if found.trial.name == name)
         return results_into_c3d(one, body, out, source=words, subject=subject)
     return _model(body, out, format, words, meshes), words
+
+
+def _rerun(one: TrialResult, body: Body, out: Path, meshes: Path | None) -> tuple[Path, str]:
+    solids = None if meshes is None else segment_solids(body, meshes)
+    return write_rerun(one, body, out, solids=solids), f"Trial {one.name} for the viewer: rerun {out.name}"
+
+
+def _bids(session: Session, found: tuple[TrialResult, ...], body: Body, out: Path) -> tuple[Path, str]:
+    """Write the session as a BIDS dataset."""
+    moved = write_bids_folder(session, found, body, out)
+    return out, f"BIDS motion dataset of {session.folder.name}; angles and events of {', '.join(moved) or 'no trial'}."
 
 
 def _opensim(

@@ -1,9 +1,11 @@
 """What ``import biodance`` conducts about what moved; the commands call the same function."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from biodance.lab.session.read import read_session
+from biodance.pipeline.carry import read_lab
 from biodance.pipeline.movement import SessionMovement, session_movement
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine
@@ -11,7 +13,10 @@ from biodance.records import Session
 
 
 def describe_movement(
-    session: Session | SessionResult | str | Path, *, tell: Callable[[str], None] = lambda _: None
+    session: Session | SessionResult | str | Path,
+    *,
+    lab: str | Path | None = None,
+    tell: Callable[[str], None] = lambda _: None,
 ) -> SessionMovement:
     """Return what moved in every trial of a visit: events, cycles, angles, moments, powers, spatio-temporal values.
 
@@ -19,6 +24,8 @@ def describe_movement(
     ----------
     session : Session, SessionResult, str or pathlib.Path
         The visit: as `read_session` or `examine` return it, or its folder.
+    lab : str or pathlib.Path, optional
+        The laboratory's lab.toml, for the normal bands that it learned.
     tell : callable, optional
         Called with what is being done, in words.
 
@@ -51,4 +58,4 @@ def describe_movement(
     if not isinstance(session, SessionResult):
         read = session if isinstance(session, Session) else read_session(session, tell=tell)
         session = examine(read, tell=tell)
-    return session_movement(session, tell=tell)
+    return replace(session_movement(session, tell=tell), normal=read_lab(lab).normal)

@@ -5,6 +5,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from biodance.motion.contact.soles import soles_from_body
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial import attempt, compare_wrenches, prepare_trial
 from biodance.pipeline.trial_result import Step, TrialResult
-from biodance.records import Array, Motion, Trial
+from biodance.records import Array, Motion, Session, Trial
 from biodance.settings import Value
 
 BODY = "body.json"
@@ -106,12 +107,16 @@ def _load(trial: Trial) -> Array:
 
 
 def _motion(held: "np.lib.npyio.NpzFile", k: int) -> Motion:
-    arrays = {name: held[f"{k}.{name}"] for name in _ARRAYS}
-    return Motion(**arrays, **{name: tuple(str(one) for one in held[f"{k}.{name}"]) for name in _TEXTS})
+    arrays: dict[str, Any] = {name: held[f"{k}.{name}"] for name in _ARRAYS}
+    texts: dict[str, Any] = {name: tuple(str(one) for one in held[f"{k}.{name}"]) for name in _TEXTS}
+    return Motion(**arrays, **texts)
 
 
-def kept_trials(kept: KeptResults, names: tuple[str, ...], *, subject: str | None = None) -> tuple[TrialResult, ...]:
-    """Return trials of a results folder with their recordings prepared again; nothing is tracked or identified.
+def kept_trials(
+    kept: KeptResults, names: tuple[str, ...], *, subject: str | None = None
+) -> tuple[Session, tuple[TrialResult, ...]]:
+    """Return the session of a results folder as read, and trials with their recordings prepared again; nothing is
+    tracked or identified.
 
     Raises
     ------
@@ -126,7 +131,7 @@ def kept_trials(kept: KeptResults, names: tuple[str, ...], *, subject: str | Non
             f"session folder."
         )
     session = read_session(kept.session, subject_name=subject, settings=kept.settings)
-    return tuple(_again(session[name], kept, name) for name in names)
+    return session, tuple(_again(session[name], kept, name) for name in names)
 
 
 def _again(trial: Trial, kept: KeptResults, name: str) -> TrialResult:

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from biodance import display
+from biodance.cycles.curves import CurveGroup
+from biodance.cycles.normal import NormalCurve, normal_curves
 from biodance.diagnosis.archive.norms import (
     Norm,
     Seen,
@@ -22,6 +24,7 @@ from biodance.errors import SessionRefused
 from biodance.lab.session.archive import archive_folders
 from biodance.lab.session.read import read_session
 from biodance.pipeline.looked_at import cases_of, looked_at, soft_tissue
+from biodance.pipeline.movement import session_movement
 from biodance.pipeline.plates import told_failure
 from biodance.pipeline.provenance import now
 from biodance.pipeline.results import SessionResult
@@ -38,12 +41,14 @@ _Tell = Callable[[str], None]
 
 @dataclass(frozen=True, eq=False)
 class LearnedSession:
-    """What one session teaches: its ``null``, ``instruments``, and numbers ``seen``."""
+    """What one session teaches: its ``null``, ``instruments``, numbers ``seen``, and the ``curves`` of a ``person``."""
 
     name: str
     null: Null
     instruments: InstrumentNoise
     seen: tuple[Seen, ...]
+    person: str = ""
+    curves: tuple[CurveGroup, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +71,8 @@ class LearnedLaboratory:
         Key of a size -> how many coefficients the sessions show of it; 0 = as shipped.
     left_out : mapping
         Session -> why nothing was learned from it.
+    normal : tuple of NormalCurve
+        Bands of joint angles, moments and powers over its people; () for fewer than three.
     """
 
     archive: Path
@@ -75,6 +82,7 @@ class LearnedLaboratory:
     sessions: tuple[str, ...]
     shown: Mapping[str, float] = field(default_factory=dict)
     left_out: Mapping[str, str] = field(default_factory=dict)
+    normal: tuple[NormalCurve, ...] = ()
 
     def __repr__(self) -> str:
         return f"LearnedLaboratory({self.archive.name!r}, {len(self.sessions)} sessions, {self.created})"
@@ -159,7 +167,9 @@ def learned_session(result: SessionResult) -> LearnedSession:
     seen = [Seen("camera_noise", name, own.camera, "m"), Seen("plate_noise_fz", name, own.plate[2], "N/rtHz")]
     if result.standing is not None:
         seen += _standing(result, name)
-    return LearnedSession(name, null, own, (*seen, *seen_by_witnesses(session.trials, name, mass)))
+    curves = tuple(group for one in session_movement(result) for group in one.groups)
+    person = session.subject.name or name
+    return LearnedSession(name, null, own, (*seen, *seen_by_witnesses(session.trials, name, mass)), person, curves)
 
 
 def _standing(result: SessionResult, name: str) -> list[Seen]:
@@ -200,4 +210,13 @@ def learned_together(archive: Path, sessions: list[LearnedSession], left_out: Ma
         tuple(one.name for one in sessions),
         shown_by(nulls, tolerances),
         dict(left_out),
+        normal_curves(_by_person(sessions)),
     )
+
+
+def _by_person(sessions: list[LearnedSession]) -> dict[str, list[CurveGroup]]:
+    """Return the curves of every person over all their sessions."""
+    people: dict[str, list[CurveGroup]] = {}
+    for one in sessions:
+        people.setdefault(one.person or one.name, []).extend(one.curves)
+    return people

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from biodance import display
 from biodance.body.body import Body
 from biodance.cycles.movement import TrialMovement, trial_movement
+from biodance.cycles.normal import NormalCurve
 from biodance.cycles.steps import STRIDE_UNITS
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab.c3d.outputs import FileOutputs, read_outputs
@@ -37,6 +38,8 @@ class SessionMovement:
         kg that moments and powers are divided by: of that body.
     left_out : mapping
         Trial -> why nothing is told of its movement.
+    normal : tuple of NormalCurve
+        Bands of the laboratory's own people to be shown behind (`learn_laboratory`).
 
     Examples
     --------
@@ -49,6 +52,7 @@ class SessionMovement:
     parameters: str
     mass: float
     left_out: dict[str, str]
+    normal: tuple[NormalCurve, ...] = ()
 
     def __repr__(self) -> str:
         said = ", ".join(f"{one.trial} {one.told}" for one in self.trials if one.cycles)

@@ -1,7 +1,8 @@
 """``lab.toml``: what a laboratory learned, to be read by people and by ``--lab``.
 
 ``[laboratory]`` says when and from what; ``[tolerances]`` is what the diagnosis needs (`uncertainty.tolerances`),
-every size with what it rests on; ``[norms."..."]`` is what is usual of instruments, people and witnesses. Corrections
+every size with what it rests on; ``[norms."..."]`` is what is usual of instruments, people and witnesses;
+``[normal."..."]`` are bands of joint angles, moments and powers. Corrections
 that were accepted stand in ``[corrections]`` of the same file.
 """
 
@@ -10,6 +11,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+from biodance.cycles.normal import normal_toml
 from biodance.errors import SessionRefused
 from biodance.pipeline.learn import LearnedLaboratory
 from biodance.uncertainty.tolerances import shipped, to_toml
@@ -32,7 +34,7 @@ def lab_file_text(found: LearnedLaboratory) -> str:
         *[f"# left out: {name}: {_one_line(why)}" for name, why in found.left_out.items()],
         "",
     ]
-    return "\n".join([*head, *_tolerances(found), "", *_norms(found)]).rstrip() + "\n"
+    return "\n".join([*head, *_tolerances(found), "", *_norms(found), *normal_toml(found.normal)]).rstrip() + "\n"
 
 
 def _tolerances(found: LearnedLaboratory) -> list[str]:

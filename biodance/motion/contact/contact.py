@@ -110,11 +110,11 @@ def ground_contact(
 
 def _told(trial: Trial, place: Footing, touching: _Mask, rests: _Mask, load: _Mask) -> _Mask:
     """Return (T, 2) where a foot is off the ground, or stands wholly over plates that the other foot is not on."""
-    shared = place.on_plate.all(axis=1).any(axis=1)
-    silent = place.on_plate & rests[..., None] & ~load[:, None]
-    orphan = load & ~place.on_plate.any(axis=1)
-    known = np.isfinite(trial.wrench.value).all(axis=1) & ~shared & ~orphan.any(axis=1)
-    return np.asarray(known[:, None] & ~place.unseen & (~touching | place.covered) & ~silent.any(axis=2))
+    shared = np.any(np.all(place.on_plate, axis=1), axis=1)
+    silent = np.any(place.on_plate & rests[..., None] & ~load[:, None], axis=2)
+    orphan = np.any(load & ~np.any(place.on_plate, axis=1), axis=1)
+    known = np.all(np.isfinite(trial.wrench.value), axis=1) & ~shared & ~orphan
+    return np.asarray(known[:, None] & ~place.unseen & (~touching | place.covered) & ~silent)
 
 
 def _touching(soles: Soles, speed: Array, surfaces: Surfaces, rules: ContactRules) -> _Mask:

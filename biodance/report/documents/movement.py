@@ -61,7 +61,8 @@ def _spatiotemporal(one: TrialMovement) -> list[dict[str, Any]]:
 
 def _curve(group: CurveGroup) -> dict[str, Any]:
     known = np.isfinite(group.mean)
-    about = {"kind": group.kind, "quantity": group.quantity, "side": group.side, "unit": group.unit}
+    about: dict[str, Any] = {"kind": group.kind, "quantity": group.quantity}
+    about |= {"side": group.side, "unit": group.unit}
     about["count"] = len(group.values)
     if not known.any():
         return about

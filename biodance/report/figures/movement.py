@@ -7,11 +7,14 @@ import numpy as np
 from biodance.cycles.curves import CurveGroup
 from biodance.cycles.cut import PERCENT
 from biodance.cycles.movement import TrialMovement
+from biodance.cycles.normal import NormalCurve
+from biodance.display import GREY
 from biodance.identification.knowledge import SIGMAS
 from biodance.report.figures.curves import Curve, CurveFigure, Strip
 from biodance.report.figures.vector import LEFT_SIDE, MIDDLE_SIDE, RIGHT_SIDE, Stroke
 
 _LOOKS = {"left": LEFT_SIDE, "right": RIGHT_SIDE, "middle": MIDDLE_SIDE}
+_NORMAL = Stroke(GREY, "1 3", 0.8)
 _THIN = 0.4
 """px of one repetition."""
 _MOST = 12
@@ -46,8 +49,11 @@ _BOTH: Mapping[str, str] = {
 _AXES = {"gait": "% of the gait cycle", "squat": "% of the squat", "sit_to_stand": "% of the rise"}
 
 
-def movement_figure(one: TrialMovement, kind: str, quantities: Sequence[str]) -> str:
-    """Return one panel for each quantity of the cycles of a ``kind``; "" where none is known.
+def movement_figure(
+    one: TrialMovement, kind: str, quantities: Sequence[str], normal: Sequence[NormalCurve] = ()
+) -> str:
+    """Return one panel for each quantity of the cycles of a ``kind``, before the ``normal`` bands of the laboratory's
+    own people; "" where none is known.
 
     Bands of angles are one sd between repetitions; of moments and powers the 95 % that the inertial parameters leave
     uncertain in the mean.
@@ -57,13 +63,21 @@ def movement_figure(one: TrialMovement, kind: str, quantities: Sequence[str]) ->
     for quantity in quantities:
         same = [group for group in groups if group.quantity == quantity]
         if same:
-            cells.append([Strip(_title(same[0]), _curves(same), least=_LEAST.get(same[0].unit, 0.0))])
+            behind = [n for n in normal if (n.kind, n.quantity, n.unit) == (kind, quantity, same[0].unit)]
+            curves = [*_normal(behind), *_curves(same)]
+            cells.append([Strip(_title(same[0]), curves, least=_LEAST.get(same[0].unit, 0.0))])
     if not cells:
         return ""
     loads = quantities == LOAD_PANELS
     about = f"{'Moments and powers' if loads else 'Angles'} of trial {one.trial}, left beside right"
-    band = "95 %, from the inertial parameters" if loads else "± 1 sd between repetitions"
+    band = "95 %, inertial parameters" if loads else "± 1 sd, repetitions"
+    if any(n.kind == kind for n in normal):
+        band += "; grey: ± 1 sd, people"
     return CurveFigure(PERCENT, cells, about, label=_AXES[kind], band=band).html()
+
+
+def _normal(bands: Sequence[NormalCurve]) -> list[Curve]:
+    return [Curve(f"normal, {one.people} people", one.mean, _NORMAL, one.sd) for one in bands]
 
 
 def _title(group: CurveGroup) -> str:

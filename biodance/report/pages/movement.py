@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from biodance.cycles.movement import TrialMovement
+from biodance.cycles.normal import NormalCurve
 from biodance.cycles.steps import STRIDE_UNITS
 from biodance.pipeline.movement import SessionMovement
 from biodance.report.figures.movement import ANGLE_PANELS, LOAD_PANELS, movement_figure
@@ -25,17 +26,21 @@ class MovementPart:
 
 def movement_section(moved: SessionMovement) -> str:
     """Return the section as HTML text; "" where no trial holds a repetition and none has another program's angles."""
-    parts = [_part(one) for one in moved if one.cycles]
+    parts = [_part(one, moved.normal) for one in moved if one.cycles]
     compared = [one for one in moved if one.file_angles]
     if not parts and not compared:
         return ""
     return render("movement.html.j2", parts=parts, compared=compared, moved=moved, filters={"milli": _milli})
 
 
-def _part(one: TrialMovement) -> MovementPart:
+def _part(one: TrialMovement, normal: Sequence[NormalCurve]) -> MovementPart:
     kinds = [kind for kind in _KINDS if any(cycle.kind == kind for cycle in one.cycles)]
     figures = [
-        (_KINDS[kind], movement_figure(one, kind, ANGLE_PANELS), movement_figure(one, kind, LOAD_PANELS))
+        (
+            _KINDS[kind],
+            movement_figure(one, kind, ANGLE_PANELS, normal),
+            movement_figure(one, kind, LOAD_PANELS, normal),
+        )
         for kind in kinds
     ]
     both, left, right = (one.spatiotemporal(side) for side in ("both", "left", "right"))
