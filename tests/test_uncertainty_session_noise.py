@@ -47,7 +47,7 @@ def test_plate_noise_is_a_density_about_the_plates_centre() -> None:
 
 
 def test_camera_noise_reaches_the_forces_as_it_does_in_truth() -> None:
-    """Weighted least squares on noisy markers of a person at rest, differentiated twice: the spread of a coefficient of Fz."""
+    """Weighted least squares on noisy markers at rest, differentiated twice: the spread of a coefficient of Fz."""
     from biodance.motion.kinematics import jacobian, poses
 
     one, q, noise, rate = body(), motion(1).q[0], 3e-4, 100.0

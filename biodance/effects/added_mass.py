@@ -13,7 +13,6 @@ from biodance.effects._base.effect import Effect, Parameter
 from biodance.records import Array
 from biodance.spatial import point_mass
 
-
 _BESIDE = 0.2
 """m that a load may hang beside the segment that carries it."""
 

@@ -3,7 +3,7 @@
 import json
 import tomllib
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -57,11 +57,13 @@ def read_lab(path: str | Path | None) -> LabFile:
     if path is None:
         return NO_LAB
     corrections = read_corrections(path)
-    raw = tomllib.loads(Path(path).read_text(encoding="utf-8")).get("tolerances")
+    whole = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    raw = whole.get("tolerances")
     try:
-        return LabFile(corrections, tolerances_of(raw) if raw else None)
+        norms = {name: (float(one["value"]), float(one["sd"])) for name, one in whole.get("norms", {}).items()}
+        return LabFile(corrections, replace(tolerances_of(raw), norms=norms) if raw else None)
     except (KeyError, TypeError, ValueError, BiodanceError) as error:
-        raise FileRefused(f"{path}: [tolerances] is not what `biodance learn` writes ({error}).") from error
+        raise FileRefused(f"{path}: [tolerances] or [norms] are not what `biodance learn` writes ({error}).") from error
 
 
 def known_body(body: Body | str | Path | None) -> Body | None:
