@@ -236,7 +236,7 @@ def test_seconds_of_single_contact_count() -> None:
 
 def test_a_laboratory_s_own_norm_is_expected_and_a_fault_is_no_norm() -> None:
     """Its clock comes 4 ms later than elsewhere: expected then. 30 ms in all its sessions are a fault all the same."""
-    late = session(standing(), walk(Wrong(delay=0.004)), walk(Wrong(delay=0.004), name="again"))
+    late = session(standing(), walk(Wrong(late=0.004)), walk(Wrong(late=0.004), name="again"))
     before, own, fault = (
         [one for one in hear(late, None, norms).observations if one.witness == "force_onset"]
         for norms in ({}, {"force_onset": (0.004, 0.0001)}, {"force_onset": (0.03, 0.0001)})
