@@ -41,7 +41,12 @@ REAL = (
     *(f"biomechzoo/HC{number}A" for number in ("030", "031", "032", "038", "044", "050", "055")), "adl_gait", "pycgm",
     "c3d_parser_Sydney", "c3d_parser_QCMAS", "gaitalytics/test_small", "gaitalytics/treadmill_no_events",
 )  # fmt: skip
-TRULY = {"biomechzoo/HC030A": {"labels_swapped"}, "c3d_parser_QCMAS": {"time_delay"}}
+TRULY = {
+    "biomechzoo/HC030A": {"labels_swapped"},
+    "biomechzoo/HC050A": {"labels_swapped"},
+    "biomechzoo/HC055A": {"labels_swapped"},
+    "c3d_parser_QCMAS": {"time_delay"},
+}
 """What is wrong in a real session: names that are not false."""
 PEOPLE = (
     ("F", 1.68, 61), ("M", 1.81, 78), ("F", 1.59, 54), ("M", 1.74, 70), ("F", 1.75, 66), ("M", 1.90, 88),

@@ -7,7 +7,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.diagnosis.adequacy import STRAINED, STRETCHED, adequacy, alarming, strain, stretch, verdict
+from biodance.diagnosis.adequacy import (
+    LOUDER,
+    STRAINED,
+    STRETCHED,
+    adequacy,
+    alarming,
+    loudness,
+    strain,
+    stretch,
+    verdict,
+)
 from biodance.diagnosis.consequence import matters, unit_at
 from biodance.diagnosis.diagnosis import Diagnosis, Estimate, Finding, Unobservable
 from biodance.diagnosis.model import Model, NamedCause
@@ -35,6 +45,10 @@ UNASKED = (
 SEVERAL = (
     "Several channels would have to disturb each other at once. That is what a plate looks like that lies or is turned "
     "otherwise than the file says, or whose matrix is another one: none of these cross-talks is named."
+)
+LOUD = (
+    "What no cause explains is {:.1f} times as large as where tolerances were learned, in most bands and channels alike: "
+    "taken for how loud this laboratory is, so that a fault must be larger to be seen."
 )
 STANDING = (
     "Only quiet standing was judged: sway, soft tissue and a plate's zero look alike there, so no cause that has a "
@@ -86,10 +100,16 @@ def diagnose_trials(
     asked = family(effects)
     put = problem(body, looks, prior=prior, chosen=asked)
     quiet = not any(moves(case) for case, picks in zip(put.cases, put.spectrum.picks, strict=True) if picks)
-    if search and not quiet:
-        naming = with_passing(name_causes(put, known, asked), asked)
-    else:
-        naming = name_causes(put, known, asked, rounds=0)
+
+    def named(known: Tolerances) -> Naming:
+        if search and not quiet:
+            return with_passing(name_causes(put, known, asked), asked)
+        return name_causes(put, known, asked, rounds=0)
+
+    naming = named(known)
+    louder = 1.0 if quiet else loudness(naming.found)
+    if louder > LOUDER:
+        naming = named(replace(known, noise=louder**2 * known.noise))
     rows = detection_limits(visibility(naming.first, naming.first_causes), body, known.threshold)
     bare = Diagnosis(
         verdict="nothing wrong",
@@ -102,7 +122,11 @@ def diagnose_trials(
         candidates=tuple(one.alias for one in naming.screening.suspects),
     )
     found = judged(Examined(bare, naming))
-    notes = (*found.diagnosis.notes, *([STANDING] if quiet else []))
+    notes = (
+        *found.diagnosis.notes,
+        *([STANDING] if quiet else []),
+        *([LOUD.format(louder)] if louder > LOUDER else []),
+    )
     return replace(found, diagnosis=replace(found.diagnosis, notes=notes))
 
 
