@@ -2,6 +2,7 @@
 not be seen.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -47,8 +48,8 @@ SEVERAL = (
     "otherwise than the file says, or whose matrix is another one: none of these cross-talks is named."
 )
 LOUD = (
-    "What no cause explains is {:.1f} times as large as where tolerances were learned, in most bands and channels alike: "
-    "taken for how loud this laboratory is, so that a fault must be larger to be seen."
+    "What no cause explains is {:.1f} times as large as where tolerances were learned, in most bands and channels "
+    "alike: taken for how loud this laboratory is, so that a fault must be larger to be seen."
 )
 STANDING = (
     "Only quiet standing was judged: sway, soft tissue and a plate's zero look alike there, so no cause that has a "
@@ -100,16 +101,7 @@ def diagnose_trials(
     asked = family(effects)
     put = problem(body, looks, prior=prior, chosen=asked)
     quiet = not any(moves(case) for case, picks in zip(put.cases, put.spectrum.picks, strict=True) if picks)
-
-    def named(known: Tolerances) -> Naming:
-        if search and not quiet:
-            return with_passing(name_causes(put, known, asked), asked)
-        return name_causes(put, known, asked, rounds=0)
-
-    naming = named(known)
-    louder = 1.0 if quiet else loudness(naming.found)
-    if louder > LOUDER:
-        naming = named(replace(known, noise=louder**2 * known.noise))
+    naming, said = _as_loud(put, known, asked, search=search and not quiet, still=quiet)
     rows = detection_limits(visibility(naming.first, naming.first_causes), body, known.threshold)
     bare = Diagnosis(
         verdict="nothing wrong",
@@ -122,12 +114,27 @@ def diagnose_trials(
         candidates=tuple(one.alias for one in naming.screening.suspects),
     )
     found = judged(Examined(bare, naming))
-    notes = (
-        *found.diagnosis.notes,
-        *([STANDING] if quiet else []),
-        *([LOUD.format(louder)] if louder > LOUDER else []),
-    )
+    notes = (*found.diagnosis.notes, *([STANDING] if quiet else []), *said)
     return replace(found, diagnosis=replace(found.diagnosis, notes=notes))
+
+
+def _as_loud(
+    put: Problem, known: Tolerances, asked: Mapping[str, Effect], *, search: bool, still: bool
+) -> tuple[Naming, tuple[str, ...]]:
+    """Return the naming under tolerances as loud as this laboratory is (`loudness` of what is left once the causes of
+    the first try are named), and what is to be said of it. Standing still does not show how loud it is.
+    """
+
+    def named(under: Tolerances) -> Naming:
+        if not search:
+            return name_causes(put, under, asked, rounds=0)
+        return with_passing(name_causes(put, under, asked), asked)
+
+    naming = named(known)
+    louder = 1.0 if still else loudness(naming.found)
+    if louder <= LOUDER:
+        return naming, ()
+    return named(replace(known, noise=louder**2 * known.noise)), (LOUD.format(louder),)
 
 
 def judged(examined: Examined) -> Examined:
