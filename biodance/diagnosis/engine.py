@@ -25,11 +25,12 @@ from biodance.diagnosis.model import Model, NamedCause
 from biodance.diagnosis.naming import SURE, Naming, Round, less_one, name_causes, named_of, suspicious
 from biodance.diagnosis.observability import detection_limits, hidden, visibility
 from biodance.diagnosis.passing import with_passing
+from biodance.diagnosis.plate_axes import in_plate_axes
 from biodance.diagnosis.problem import Look, Problem, problem
 from biodance.discovery import Chosen
 from biodance.effects import Case, DiscreteEffect, Effect, Gate
 from biodance.effects import effects as family
-from biodance.records import Sip
+from biodance.records import Plate, Sip
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances, key_of, shipped
 
@@ -144,8 +145,9 @@ def judged(examined: Examined) -> Examined:
     naming, one = examined.naming, examined.diagnosis
     left, strained = adequacy(naming.found), bool(_strange(naming.found))
     put, known = naming.found.problem, naming.found.tolerances
+    plates = put.cases[0].trial.plates
     named = tuple(_measured(cause, put, known) for cause in naming.found.named)
-    every = [(cause, _finding(cause, r, known)) for cause, r in zip(named, naming.accepted, strict=True)]
+    every = [(cause, _finding(cause, r, known, plates)) for cause, r in zip(named, naming.accepted, strict=True)]
     large = [pair for pair in every if matters(pair[0].effect, pair[0].theta)]
     told = verdict(len(large), alarming(left), one.gates, strained=strained)
     doubted = [pair for pair in large if _one_of_several(pair[0], named) or not _shown(*pair)]
@@ -231,7 +233,7 @@ def _measured(one: NamedCause, put: Problem, known: Tolerances) -> NamedCause:
     return replace(one, theta=one.effect.measured(one.theta, *put.cases), covariance=covariance)
 
 
-def _finding(one: NamedCause, found: Round, known: Tolerances) -> Finding:
+def _finding(one: NamedCause, found: Round, known: Tolerances, plates: tuple[Plate, ...]) -> Finding:
     """Return a named cause as a finding; no size is surer than sessions without fault are alike, nor than faults are
     like their models.
     """
@@ -241,6 +243,5 @@ def _finding(one: NamedCause, found: Round, known: Tolerances) -> Finding:
     sd = np.hypot(np.maximum(np.sqrt(np.diag(one.covariance)), alike), known.unlike(one.effect.name) * length)
     reported = one.effect.reported(one.theta, sd)
     parameters = tuple(Estimate(name, size, own, unit_at(one.effect, unit)) for name, size, own, unit in reported)
-    return Finding(
-        one.effect.name, one.effect.target, parameters, found.set, found.suspects[0].visible, advice=one.effect.advice
-    )
+    advice = f"{one.effect.advice} {in_plate_axes(one.effect.target, plates)}".strip()
+    return Finding(one.effect.name, one.effect.target, parameters, found.set, found.suspects[0].visible, advice=advice)
