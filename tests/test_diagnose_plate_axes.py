@@ -12,7 +12,7 @@ def turned(degrees: float) -> Plate:
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     corners = np.array([[0.2, 0.3, 0], [-0.2, 0.3, 0], [-0.2, -0.3, 0], [0.2, -0.3, 0]])
     return Plate(
-        "plate1", 2, corners @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]), Wrench(np.zeros(2), np.zeros((2, 6)))
+        "plate1", 2, corners @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]), Wrench(np.arange(2.0), np.zeros((2, 6)))
     )
 
 

@@ -14,8 +14,6 @@ from biodance.records import Array
 
 REVERSAL = np.array([5.0, 5.0, 20.0, 5.0, 5.0, 2.0])
 """N, N·m by which a channel must turn back until the loop is crossed (to 63 %)."""
-_LOADED = 50.0
-"""N of vertical force that a plate must carry at some time."""
 
 
 class PlateHysteresis(ChannelEffect):
@@ -24,17 +22,12 @@ class PlateHysteresis(ChannelEffect):
     """
 
     name = "plate_hysteresis"
+    by_load = True
     parameters = (
         Parameter("width", "N or N·m", 3.0, "0.2-0.5 % of full scale in makers' sheets of strain-gauge plates"),
     )
     separated_by = "Weights put on and taken off one after the other, or slow squats with holds on the way down and up."
     advice = "Load and unload the plate with dead weights; look for a loose top plate, cable or screw."
-
-    @classmethod
-    def targets(cls, case: Case) -> tuple[str, ...]:
-        """Return every channel of every plate that carries somebody: an empty one has nothing to remember."""
-        empty = {plate.name for plate in case.trial.plates if plate.wrench.force[:, 2].max(initial=0.0) < _LOADED}
-        return tuple(name for name in super().targets(case) if name.partition(":")[0] not in empty)
 
     def in_channel(self, case: Case) -> Array:
         """Return minus the memory of the predicted channel."""
