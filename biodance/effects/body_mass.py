@@ -9,7 +9,6 @@ from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.records import Array
 
-
 _WRONG = 0.3
 """Share of the mass by which a declared one may be wrong: more is a unit, another person, or no mass at all."""
 
