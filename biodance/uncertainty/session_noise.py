@@ -30,8 +30,8 @@ _ENOUGH = 50
 """Samples below which no noise is estimated."""
 _COHERENT = 4.0
 """Times as large as independent noise counts what cameras add: the same noise is in the accelerations that loads and
-segments are seen by, so that it looks like lighter segments (errors in variables). Without it three of four clean
-sessions of an independent laboratory with cameras of 0.3 mm had a body unlike people; with it none.
+segments are seen by, so that it looks like lighter segments (errors in variables). Without it nine of ten clean
+sessions of an independent laboratory with cameras of 0.3 mm were unlike people; with it one of eight.
 """
 _LEVER = 0.03
 """m: a joint whose markers move less than this per rad is not carried by them alone; its neighbours in time hold it."""
