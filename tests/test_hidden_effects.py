@@ -164,13 +164,11 @@ def test_a_fault_written_into_real_standing_is_told_as_what_weighing_can_see(
 
 
 @pytest.mark.filterwarnings("ignore")
-def test_a_real_walk_gets_no_name_from_tolerances_that_do_not_hold_for_it(
-    data: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_real_walk_gets_no_name_that_feet_and_clocks_exclude(data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     diagnosis = found(data / "adl_gait", monkeypatch)
     assert diagnosis.verdict == "unexplained"
     assert not diagnosis.findings
-    assert any("not believed" in note for note in diagnosis.notes)
+    assert any("farther from the body" in note for note in diagnosis.notes)
 
 
 @pytest.mark.filterwarnings("ignore")

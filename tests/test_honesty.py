@@ -237,7 +237,7 @@ def test_a_poor_model_resembles_and_is_no_finding() -> None:
     [
         ("time_delay", "", [0.0029], [-0.0031]),
         ("plate_drift", "Fx", [1.9], [2.1]),
-        ("plate_drift", "Mx", [-0.49], [0.51]),
+        ("plate_drift", "Mx", [-0.99], [1.01]),
         ("plate_crosstalk", "Fz->My", [0.0009], [0.0011]),
         ("plate_crosstalk", "Fz->Fx", [0.0019], [0.0021]),
         ("external_contact", "left_foot", [1.1, 1.1, 1.1], [1.2, 1.2, 1.2]),

@@ -95,5 +95,8 @@ def test_soft_tissue_grows_with_the_markers_distance(factor: float, grows: bool)
         shipped().size("slide thigh") * (factor if grows else 1.0)
     )
     assert own.tolerances.size("plate_gain Fz") == shipped().size("plate_gain Fz")
-    assert own.believed != grows
+    more = factor if grows else 1.0
+    np.testing.assert_allclose(own.tolerances.noise[1:], more**2 * shipped().noise[1:])
+    np.testing.assert_allclose(own.tolerances.noise[0, :3, :3], shipped().noise[0, :3, :3])
+    assert own.believed, "widened, not refused"
     assert bool(own.notes) == grows

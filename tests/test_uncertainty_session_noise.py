@@ -47,7 +47,7 @@ def test_plate_noise_is_a_density_about_the_plates_centre() -> None:
 
 
 def test_camera_noise_reaches_the_forces_as_it_does_in_truth() -> None:
-    """Least squares on noisy markers of a person at rest, differentiated twice: the spread of a coefficient of Fz."""
+    """Weighted least squares on noisy markers at rest, differentiated twice: the spread of a coefficient of Fz."""
     from biodance.motion.kinematics import jacobian, poses
 
     one, q, noise, rate = body(), motion(1).q[0], 3e-4, 100.0
@@ -55,8 +55,9 @@ def test_camera_noise_reaches_the_forces_as_it_does_in_truth() -> None:
     rng, pose = np.random.default_rng(5), poses(one, q[None])
     places = pose.points(list(one.markers.segment), one.markers.position)
     J = jacobian(one, pose, list(one.markers.segment), places)[0][0]
+    root = np.repeat(np.sqrt(one.markers.weight), 3)
     com = jacobian(one, pose, list(range(len(one.segments))), pose.points(list(range(len(one.segments))), one.sip.com))
-    lift = (one.sip.mass @ com[0][0].reshape(-1, 3, one.nv)[:, 2]) @ np.linalg.pinv(J)
+    lift = (one.sip.mass @ com[0][0].reshape(-1, 3, one.nv)[:, 2]) @ np.linalg.pinv(root[:, None] * J) * root
     frames = 4096
     course = rng.normal(0, noise, (frames, J.shape[0])) @ lift
     spectrum = np.fft.rfft(course) * (2 * np.pi * np.fft.rfftfreq(frames, 1 / rate)) ** 2
@@ -79,7 +80,7 @@ def test_own_noise_is_added_beyond_what_was_learned_and_limits_follow() -> None:
     assert not added_noise(body(), recorded(0.9 * InstrumentNoise().camera), q, np.zeros(3)).any()
     more = added_noise(body(), recorded(3e-4), q, np.zeros(3))
     expected = of_cameras(body(), q, np.zeros(3), noise=np.sqrt(9 - 1) * 1e-4, rate=100.0)
-    np.testing.assert_allclose(more, expected, rtol=0.1)
+    np.testing.assert_allclose(more, 4 * expected, rtol=0.1, err_msg="columns have the same noise: four times")
     wider = with_own_noise(known(), more, 70.0)
     np.testing.assert_allclose(wider.noise - known().noise, more, atol=1e-12)
     seen = [

@@ -232,3 +232,17 @@ def test_objects_join_and_strangers_are_refused() -> None:
 
 def test_seconds_of_single_contact_count() -> None:
     assert hear(session(walk())).seconds["walk"] == pytest.approx(2 * STANCE, abs=0.02)
+
+
+def test_a_laboratory_s_own_norm_is_expected_and_a_fault_is_no_norm() -> None:
+    """Its clock comes 4 ms later than elsewhere: expected then. 30 ms in all its sessions are a fault all the same."""
+    late = session(standing(), walk(Wrong(late=0.004)), walk(Wrong(late=0.004), name="again"))
+    before, own, fault = (
+        [one for one in hear(late, None, norms).observations if one.witness == "force_onset"]
+        for norms in ({}, {"force_onset": (0.004, 0.0001)}, {"force_onset": (0.03, 0.0001)})
+    )
+    assert len(before) >= 2
+    for was, now, wrong in zip(before, own, fault, strict=True):
+        assert now.expected - was.expected == pytest.approx(0.004, rel=0.01)
+        assert now.norms["laboratory onset"] < 0.1 * was.norms["laboratory onset"]
+        assert wrong == was

@@ -17,6 +17,8 @@ from biodance.records import Array
 
 SCALE = 3.0
 """Standard deviation of a fault before the data, in typical sizes."""
+_EMPTY = 50.0
+"""N that a plate carries at most that is always empty."""
 _NOTHING = 1e-7
 """Share of the largest column below which a column is zero."""
 
@@ -54,11 +56,25 @@ def candidates(problem: Problem, chosen: Chosen[Effect] = None) -> tuple[Candida
     """Return all causes of the family (or those ``chosen``, see `effects`) at all their targets; those without any
     trace are left out.
     """
+    empty = empty_plates(problem.cases)
     every = [one for effect in effects(chosen).values() for one in effect.everywhere(problem.cases[0])]
+    every = [one for one in every if not (one.by_load and one.target.partition(":")[0] in empty)]
     if not every:
         return ()
     found = [candidate(problem, effect, columns) for effect, columns in zip(every, problem.columns(every), strict=True)]
     return tuple(one for one in found if one.basis.shape[1])
+
+
+def empty_plates(cases: tuple[Case, ...]) -> frozenset[str]:
+    """Return the plates on which nobody ever stands in any of the ``cases``."""
+    names = {plate.name for case in cases for plate in case.trial.plates}
+    trodden = {
+        plate.name
+        for case in cases
+        for plate in case.trial.plates
+        if plate.wrench.force[:, 2].max(initial=0.0) > _EMPTY
+    }
+    return frozenset(names - trodden)
 
 
 def candidate(problem: Problem, effect: Effect, unit: Array) -> Candidate:

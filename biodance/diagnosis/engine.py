@@ -2,23 +2,35 @@
 not be seen.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.diagnosis.adequacy import STRAINED, STRETCHED, adequacy, alarming, strain, stretch, verdict
+from biodance.diagnosis.adequacy import (
+    LOUDER,
+    STRAINED,
+    STRETCHED,
+    adequacy,
+    alarming,
+    loudness,
+    strain,
+    stretch,
+    verdict,
+)
 from biodance.diagnosis.consequence import matters, unit_at
 from biodance.diagnosis.diagnosis import Diagnosis, Estimate, Finding, Unobservable
 from biodance.diagnosis.model import Model, NamedCause
 from biodance.diagnosis.naming import SURE, Naming, Round, less_one, name_causes, named_of, suspicious
 from biodance.diagnosis.observability import detection_limits, hidden, visibility
 from biodance.diagnosis.passing import with_passing
+from biodance.diagnosis.plate_axes import in_plate_axes
 from biodance.diagnosis.problem import Look, Problem, problem
 from biodance.discovery import Chosen
 from biodance.effects import Case, DiscreteEffect, Effect, Gate
 from biodance.effects import effects as family
-from biodance.records import Sip
+from biodance.records import Plate, Sip
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances, key_of, shipped
 
@@ -35,6 +47,10 @@ UNASKED = (
 SEVERAL = (
     "Several channels would have to disturb each other at once. That is what a plate looks like that lies or is turned "
     "otherwise than the file says, or whose matrix is another one: none of these cross-talks is named."
+)
+LOUD = (
+    "What no cause explains is {:.1f} times as large as where tolerances were learned, in most bands and channels "
+    "alike: taken for how loud this laboratory is, so that a fault must be larger to be seen."
 )
 STANDING = (
     "Only quiet standing was judged: sway, soft tissue and a plate's zero look alike there, so no cause that has a "
@@ -86,10 +102,7 @@ def diagnose_trials(
     asked = family(effects)
     put = problem(body, looks, prior=prior, chosen=asked)
     quiet = not any(moves(case) for case, picks in zip(put.cases, put.spectrum.picks, strict=True) if picks)
-    if search and not quiet:
-        naming = with_passing(name_causes(put, known, asked), asked)
-    else:
-        naming = name_causes(put, known, asked, rounds=0)
+    naming, said = _as_loud(put, known, asked, search=search and not quiet, still=quiet)
     rows = detection_limits(visibility(naming.first, naming.first_causes), body, known.threshold)
     bare = Diagnosis(
         verdict="nothing wrong",
@@ -102,8 +115,27 @@ def diagnose_trials(
         candidates=tuple(one.alias for one in naming.screening.suspects),
     )
     found = judged(Examined(bare, naming))
-    notes = (*found.diagnosis.notes, *([STANDING] if quiet else []))
+    notes = (*found.diagnosis.notes, *([STANDING] if quiet else []), *said)
     return replace(found, diagnosis=replace(found.diagnosis, notes=notes))
+
+
+def _as_loud(
+    put: Problem, known: Tolerances, asked: Mapping[str, Effect], *, search: bool, still: bool
+) -> tuple[Naming, tuple[str, ...]]:
+    """Return the naming under tolerances as loud as this laboratory is (`loudness` of what is left once the causes of
+    the first try are named), and what is to be said of it. Standing still does not show how loud it is.
+    """
+
+    def named(under: Tolerances) -> Naming:
+        if not search:
+            return name_causes(put, under, asked, rounds=0)
+        return with_passing(name_causes(put, under, asked), asked)
+
+    naming = named(known)
+    louder = 1.0 if still else loudness(naming.found)
+    if louder <= LOUDER:
+        return naming, ()
+    return named(replace(known, noise=louder**2 * known.noise)), (LOUD.format(louder),)
 
 
 def judged(examined: Examined) -> Examined:
@@ -113,8 +145,9 @@ def judged(examined: Examined) -> Examined:
     naming, one = examined.naming, examined.diagnosis
     left, strained = adequacy(naming.found), bool(_strange(naming.found))
     put, known = naming.found.problem, naming.found.tolerances
+    plates = put.cases[0].trial.plates
     named = tuple(_measured(cause, put, known) for cause in naming.found.named)
-    every = [(cause, _finding(cause, r, known)) for cause, r in zip(named, naming.accepted, strict=True)]
+    every = [(cause, _finding(cause, r, known, plates)) for cause, r in zip(named, naming.accepted, strict=True)]
     large = [pair for pair in every if matters(pair[0].effect, pair[0].theta)]
     told = verdict(len(large), alarming(left), one.gates, strained=strained)
     doubted = [pair for pair in large if _one_of_several(pair[0], named) or not _shown(*pair)]
@@ -200,7 +233,7 @@ def _measured(one: NamedCause, put: Problem, known: Tolerances) -> NamedCause:
     return replace(one, theta=one.effect.measured(one.theta, *put.cases), covariance=covariance)
 
 
-def _finding(one: NamedCause, found: Round, known: Tolerances) -> Finding:
+def _finding(one: NamedCause, found: Round, known: Tolerances, plates: tuple[Plate, ...]) -> Finding:
     """Return a named cause as a finding; no size is surer than sessions without fault are alike, nor than faults are
     like their models.
     """
@@ -210,6 +243,5 @@ def _finding(one: NamedCause, found: Round, known: Tolerances) -> Finding:
     sd = np.hypot(np.maximum(np.sqrt(np.diag(one.covariance)), alike), known.unlike(one.effect.name) * length)
     reported = one.effect.reported(one.theta, sd)
     parameters = tuple(Estimate(name, size, own, unit_at(one.effect, unit)) for name, size, own, unit in reported)
-    return Finding(
-        one.effect.name, one.effect.target, parameters, found.set, found.suspects[0].visible, advice=one.effect.advice
-    )
+    advice = f"{one.effect.advice} {in_plate_axes(one.effect.target, plates)}".strip()
+    return Finding(one.effect.name, one.effect.target, parameters, found.set, found.suspects[0].visible, advice=advice)

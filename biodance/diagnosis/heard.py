@@ -1,7 +1,8 @@
 """What the witnesses of a session saw: their observations, and what every cause would add to each of them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -24,6 +25,8 @@ _FAULT = 4.0
 """A fault in steps of its cause: 16 mm, 16 ms, 8 %, 8 N, 0.08 rad, 2 kg."""
 _BLIND = 0.2
 """Standard deviations that a usual fault adds to an observation that is blind to it."""
+_HABIT = 3.0
+"""Standard deviations of laboratories beyond which a norm is no habit of one."""
 _ALIKE = 0.9
 """Correlation of what two causes add from which they cannot be told apart."""
 
@@ -117,22 +120,30 @@ def sights(heard: Testimony) -> tuple[Sight, ...]:
     return tuple(sorted(found, key=lambda one: not one.witnesses))
 
 
-def hear(session: Session, chosen: Chosen[Effect | DiscreteEffect] = None) -> Testimony:
-    """Return what the witnesses saw in all trials of a session but the skipped ones; ``chosen`` limits the causes."""
+def hear(
+    session: Session,
+    chosen: Chosen[Effect | DiscreteEffect] = None,
+    norms: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+) -> Testimony:
+    """Return what the witnesses saw in all trials of a session but the skipped ones; ``chosen`` limits the causes;
+    ``norms`` are those of the laboratory (`Tolerances.norms`).
+    """
     asked = causes(chosen)
     mass = float("nan") if "mass" in session.subject.guessed else session.subject.mass
     seen = [recording(trial, mass=mass) for trial in session.trials if trial.plates and trial.role != "skip"]
     found, single = [observe(one) for one in seen], all(len(one.trial.plates) == 1 for one in seen)
     known = {c.names: c for one in seen for c in possible_causes(one, single=single) if c.effect in asked}
     parts = {name: [np.zeros(len(some)) for some in found] for name in known}
+    plainly, found = found, [tuple(_by_norm(o, norms) for o in some) for some in found]
     turned: dict[tuple[str, str], list[Array]] = {}
     plain = [np.array([o.value - o.expected for o in some]) for some in found]
     for i, (one, some) in enumerate(zip(seen, found, strict=True)):
         for cause in possible_causes(one, single=single) if some else ():
             if cause.names in known:
                 parts[cause.names][i] = traces(one, some, cause)
+        shift = np.array([o.expected - p.expected for o, p in zip(some, plainly[i], strict=True)])
         for name, undo in turned_signs(one, single=single).items() if one.steps and "axis_error" in asked else ():
-            turned.setdefault(name, [value.copy() for value in plain])[i] = _again(undo(one), some)
+            turned.setdefault(name, [value.copy() for value in plain])[i] = _again(undo(one), some) - shift
     return Testimony(
         tuple(o for some in found for o in some),
         known,
@@ -140,6 +151,21 @@ def hear(session: Session, chosen: Chosen[Effect | DiscreteEffect] = None) -> Te
         {name: np.concatenate([*several, np.empty(0)]) for name, several in turned.items()},
         {one.trial.name: one.seconds for one in seen},
     )
+
+
+def _by_norm(one: Observation, norms: Mapping[str, tuple[float, float]]) -> Observation:
+    """Return an observation with what its laboratory is known to do: where markers are put, what filters do. The share
+    of a norm that the "laboratory" part of the expectation allows is expected, the rest stays uncertain; a norm that
+    lies beyond `_HABIT` standard deviations is no habit: it may be a plate that is wrong in all sessions.
+    """
+    own = [name for name in one.norms if name.startswith("laboratory")]
+    value, sd = norms.get(one.kind, (0.0, float("inf")))
+    usual = sum(one.norms[name] ** 2 for name in own)
+    if not usual or abs(value) > _HABIT * np.sqrt(usual + sd**2):
+        return one
+    share = usual / (usual + sd**2)
+    left = {name: size * (np.sqrt(1 - share) if name in own else 1.0) for name, size in one.norms.items()}
+    return replace(one, expected=one.expected + share * value, norms=left)
 
 
 def _again(altered: SeenTrial, before: tuple[Observation, ...]) -> Array:

@@ -13,6 +13,9 @@ from biodance.effects._base.effect import Effect, Parameter
 from biodance.records import Array
 from biodance.spatial import point_mass
 
+_BESIDE = 0.2
+"""m that a load may hang beside the segment that carries it."""
+
 
 class AddedMass(Effect):
     """A point ``mass`` (kg) at ``place`` (x, y, z: m from the CoM of the segment in the table, segment axes) on
@@ -46,6 +49,13 @@ class AddedMass(Effect):
     def possible(self, theta: Array) -> bool:
         """Return whether the size is positive: a load weighs something."""
         return bool(theta[0] > 0)
+
+    def possible_in(self, case: Case, theta: Array) -> bool:
+        """Return whether the load weighs something and lies at the segment, `_BESIDE` outside its box at most."""
+        index = case.body.segment_index(self.target)
+        place = case.phi[10 * index + 1 : 10 * index + 4] / case.phi[10 * index] + np.asarray(theta[1:4])
+        low, high = case.body.boxes[index]
+        return self.possible(theta) and bool(np.all((place > low - _BESIDE) & (place < high + _BESIDE)))
 
 
 EFFECT = AddedMass

@@ -9,6 +9,9 @@ from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.records import Array
 
+_WRONG = 0.3
+"""Share of the mass by which a declared one may be wrong: more is a unit, another person, or no mass at all."""
+
 
 class BodyMass(Effect):
     """An ``error`` (kg): the person weighs this much more than declared, in proportion everywhere."""
@@ -21,6 +24,10 @@ class BodyMass(Effect):
     def columns(self, case: Case) -> Array:
         """Return the predicted wrench per kilogram of body mass."""
         return (case.predicted / case.phi[::10].sum())[:, :, None]
+
+    def possible_in(self, case: Case, theta: Array) -> bool:
+        """Return whether a scale or a form can be so wrong: by at most `_WRONG` of the person's mass."""
+        return bool(abs(theta[0]) <= _WRONG * case.body.sip.mass.sum())
 
 
 EFFECT = BodyMass

@@ -19,6 +19,7 @@ class PlateCrosstalk(Effect):
     """
 
     name = "plate_crosstalk"
+    by_load = True
     parameters = (Parameter("ratio", "1 or m or 1/m", 0.01, "maker's limit of 2 % for classic strain-gauge plates"),)
     single = True
     separated_by = "Squats, which change Fz, at several places of the plate."

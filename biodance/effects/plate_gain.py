@@ -14,6 +14,7 @@ class PlateGain(ChannelEffect):
     """A relative ``gain`` (0.04: reads 4 % too much) of channel ``target`` about the plate's centre."""
 
     name = "plate_gain"
+    by_load = True
     parameters = (
         Parameter("gain", "1", 0.02, "3-5 N under dead loads of some hundred newtons (Cappello 2011, PMID 21392999)"),
     )

@@ -22,6 +22,7 @@ class PlateHysteresis(ChannelEffect):
     """
 
     name = "plate_hysteresis"
+    by_load = True
     parameters = (
         Parameter("width", "N or N·m", 3.0, "0.2-0.5 % of full scale in makers' sheets of strain-gauge plates"),
     )

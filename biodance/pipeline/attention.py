@@ -23,6 +23,7 @@ _KEPT = "kept to measure what a finding gains"
 _NEVER = "it holds no measured ground contact"
 _FITS = "the forces fit this body, but "
 """Beginning of the doubt about a body whose residual is as without fault."""
+_ONLY_STOOD = "none of the movement could be judged, and standing still tells little"
 EXPLAINS: dict[str, tuple[str, ...]] = {
     "mass on the plates": (
         "plate_gain", "plate_offset", "body_mass", "added_mass", "body_weight_support", "external_contact",
@@ -91,8 +92,17 @@ def told(one: Diagnosis, result: SessionResult, judged: tuple[Judged, ...]) -> D
         one = replace(one, verdict="named, incomplete")
     if one.verdict == "nothing wrong" and result.doubts:
         one = replace(one, verdict="unexplained", doubt=_FITS + _doubtful(result.doubts))
+    if one.verdict == "nothing wrong" and _stood_only(result, judged):
+        one = replace(one, verdict="unexplained", doubt=_FITS + _ONLY_STOOD)
     first = headline(one, amount(result, judged), judged, outside)
     return replace(one, judged=judged, attention=strongest_first([first, *session_attention(result, one.findings)]))
+
+
+def _stood_only(result: SessionResult, judged: tuple[Judged, ...]) -> bool:
+    """Return whether only standing was judged of a session that holds movement, not even by its steps."""
+    static = {one.trial.name for one in result.trials if one.trial.role == "static"}
+    moved = any(row.seconds > 0 for row in judged if row.trial not in static)
+    return not moved and any(row.missed and not row.seconds > 0 for row in judged)
 
 
 def is_well(one: Diagnosis) -> bool:

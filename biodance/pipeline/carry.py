@@ -3,7 +3,7 @@
 import json
 import tomllib
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -62,9 +62,11 @@ def read_lab(path: str | Path | None) -> LabFile:
         return NO_LAB
     corrections = read_corrections(path)
     whole = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    raw, where = whole.get("tolerances"), "tolerances"
+    raw, where = whole.get("tolerances"), "norms"
     try:
-        known, where = tolerances_of(raw) if raw else None, "normal"
+        norms = {name: (float(one["value"]), float(one["sd"])) for name, one in whole.get("norms", {}).items()}
+        where = "tolerances"
+        known, where = replace(tolerances_of(raw), norms=norms) if raw else None, "normal"
         return LabFile(corrections, known, normal_of(whole.get("normal", {})))
     except (KeyError, TypeError, ValueError, BiodanceError) as error:
         raise FileRefused(f"{path}: [{where}] is not what `biodance learn` writes ({error}).") from error

@@ -29,7 +29,7 @@ from biodance.pipeline.looked_at import all_looks, cases_of, left_out, looked_at
 from biodance.pipeline.results import SessionResult
 from biodance.records import Sip
 from biodance.threads import one_thread
-from biodance.uncertainty.tolerances import Tolerances
+from biodance.uncertainty.tolerances import Tolerances, shipped
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -129,7 +129,7 @@ def diagnose_session(
     """
     found = _diagnosed(result, reference=reference, tolerances=tolerances, effects=effects, tell=tell)
     tell("asking the witnesses: feet on plates, clocks, weights")
-    heard = hear(result.session, effects)
+    heard = hear(result.session, effects, (tolerances or shipped()).norms)
     whole = with_witnesses(found.diagnosis, weigh(heard), heard, judged=found.examined is not None)
     if mended:
         whole, found = _with_mended_labels(whole, mended), replace(found, mended=result)

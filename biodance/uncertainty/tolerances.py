@@ -70,7 +70,8 @@ class Tolerances:
     more than a few null sessions reach; ``origin`` in words; ``means`` what every null session shows of a nuisance,
     by `mean_key` or group, in the unit of its column (flesh sags downwards in everybody); ``accuracy`` by effect:
     share of its size by which a named cause errs beyond its own standard deviation, because no fault is quite like
-    its model.
+    its model; ``norms`` by kind of observation (`witnesses.Observation.kind`): what a laboratory's own sessions share
+    beyond what is expected everywhere, and its standard deviation.
     """
 
     sizes: Mapping[str, float]
@@ -82,12 +83,14 @@ class Tolerances:
     means: Mapping[str, float] = field(default_factory=dict)
     accuracy: Mapping[str, float] = field(default_factory=dict)
     instruments: "InstrumentNoise" = field(default_factory=InstrumentNoise)
+    norms: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         bands = len(self.noise)
         object.__setattr__(self, "sizes", MappingProxyType(dict(self.sizes)))
         object.__setattr__(self, "means", MappingProxyType(dict(self.means)))
         object.__setattr__(self, "accuracy", MappingProxyType(dict(self.accuracy)))
+        object.__setattr__(self, "norms", MappingProxyType(dict(self.norms)))
         object.__setattr__(self, "noise", frozen_array(self.noise, (bands, 6, 6), "Tolerances.noise"))
         for name in ("energy", "energy_sd"):
             object.__setattr__(self, name, frozen_array(getattr(self, name), (bands, 6), f"Tolerances.{name}"))

@@ -67,6 +67,12 @@ class Observation:
         return self.witness, self.trial, self.what
 
     @property
+    def kind(self) -> str:
+        """Witness and phase: what a laboratory learns a norm of."""
+        _, comma, phase = self.what.rpartition(", ")
+        return f"{self.witness} {phase}" if comma else self.witness
+
+    @property
     def expected_sd(self) -> float:
         """Standard deviation of what is expected of one such observation in a recording without fault."""
         return float(np.sqrt(self.sd**2 + sum(size**2 for size in self.norms.values())))

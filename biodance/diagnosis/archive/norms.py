@@ -70,9 +70,7 @@ def seen_by_witnesses(trials: Sequence[Trial], session: str, mass: float) -> lis
     found = []
     for trial in trials:
         for one in observe(recording(trial, mass=mass)) if trial.plates else ():
-            _, comma, phase = one.what.rpartition(", ")
-            name = f"{one.witness} {phase}" if comma else one.witness
-            found.append(Seen(name, session, one.value - one.expected, one.unit, one.sd))
+            found.append(Seen(one.kind, session, one.value - one.expected, one.unit, one.sd))
     return found
 
 

@@ -49,6 +49,8 @@ class Effect:
     """Whether joints that a movement placed (`motion.functional_joints`) have taken up a part of this cause before
     anybody looks.
     """
+    by_load: ClassVar[bool] = False
+    """Whether it is in proportion to what a plate carries: one that is always empty cannot show it."""
     single: ClassVar[bool] = False
     """Whether it is named only alone: several at once (cross-talks of a plate that lies elsewhere) are what a cause
     looks like that nobody described.

@@ -1,0 +1,40 @@
+"""A channel of the laboratory in a plate's own axes: what the amplifier and the maker's software call it."""
+
+import re
+
+import numpy as np
+
+from biodance.records import Plate
+
+_CHANNEL = re.compile(r"(?:(?P<plate>plate\w*):)?(?P<first>[FM][xyz])(?:->(?P<second>[FM][xyz]))?$")
+_ALONG = np.cos(np.radians(20.0))
+"""Cosine from which on an axis of the laboratory is one of the plate's."""
+
+
+def in_plate_axes(target: str, plates: tuple[Plate, ...]) -> str:
+    """Return in words what the channels of a ``target`` (``Fx``, ``plate2:Fz->My``) are in their plate's own axes; ""
+    where they have the same names there, or the target has no channel.
+
+    A plate's x axis points from its second corner to its first, y from the fourth to the first (C3D manual).
+    """
+    found = _CHANNEL.match(target)
+    plate = next((one for one in plates if found and found["plate"] in (None, one.name)), None)
+    if found is None or plate is None:
+        return ""
+    names = [name for name in (found["first"], found["second"]) if name]
+    own = [_own(name, plate) for name in names]
+    if own == names:
+        return ""
+    return f"In the axes of {plate.name} itself: {' into '.join(own)}."
+
+
+def _own(channel: str, plate: Plate) -> str:
+    """Return a channel of the laboratory by the plate's axes, with its sign; both where it lies between two."""
+    x, y = plate.corners[0] - plate.corners[1], plate.corners[0] - plate.corners[3]
+    axes = np.stack([x / np.linalg.norm(x), y / np.linalg.norm(y)])
+    axes = np.vstack([axes, np.cross(*axes)])
+    along = axes @ np.eye(3)["xyz".index(channel[1])]
+    order = np.argsort(-np.abs(along))
+    kept = order[:1] if abs(along[order[0]]) >= _ALONG else order[:2]
+    parts = [f"{'-' if along[k] < 0 else ''}{channel[0]}{'xyz'[k]}" for k in kept]
+    return " and ".join(parts)
