@@ -43,7 +43,7 @@ _TELLING = {
 class JointGain:
     """What one of the optional joints (``name``) brings: the ``markers`` that tell of it; ``fitted`` m, their RMS
     distance from the body without it; ``without``, ``with_it`` m, the RMS distance of each from where the others put
-    it, over the half of the trials that shows the joint best; whether it is ``taken``.
+    it; all over the half of the trials that shows the joint best; whether it is ``taken``.
     """
 
     name: str
@@ -118,8 +118,8 @@ def _tried(name: str, more: Body, some: _Sample, before: _Followed | None, need:
         return []
     _, with_it = after.distances(told, some.trial)
     best = np.argsort(with_it / without)[: (len(without) + 1) // 2]
-    mean = [float(np.sqrt(np.mean(value**2))) for value in (fitted, without[best], with_it[best])]
-    return [(more, JointGain(name, tuple(told), *mean))]
+    all_of, foretold, better = (float(np.sqrt(np.mean(x**2))) for x in (fitted[best], without[best], with_it[best]))
+    return [(more, JointGain(name, tuple(told), all_of, foretold, better))]
 
 
 def _follow(body: Body, some: _Sample) -> _Followed | None:
