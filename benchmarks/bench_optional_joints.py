@@ -55,7 +55,7 @@ def main() -> None:
             if one.trial.role != "static":
                 pairs = zip(made(body, one), made(wider, one), strict=True)
                 print(f"| {one.trial.name} |", " | ".join(f"{old} -> {new}" for old, new in pairs), "|")
-    print("| session | joint | markers | fitted mm | left out, without mm | with mm | taken |", "|---" * 7 + "|", sep="\n")
+    print("| session | joint | markers | fitted | left out: without | with | taken |", "|---" * 7 + "|", sep="\n")
     print(*told, sep="\n")
 
 
