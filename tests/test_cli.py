@@ -35,11 +35,6 @@ def reported(session):
     return biodance("report", session, "--out", out, "--json"), out
 
 
-@pytest.fixture
-def no_stills(monkeypatch):
-    monkeypatch.setattr("biodance.report.figures.solid.solid_pngs", lambda *_, **__: None)
-
-
 def test_help_names_every_command_and_imports_nothing_heavy():
     heavy = "{'numpy', 'scipy', 'ezc3d', 'matplotlib', 'pydantic'}"
     code = f"import sys; from biodance.cli import run; run(['--help']); print(sorted({heavy} & set(sys.modules)))"
@@ -101,7 +96,7 @@ def test_inspect_prints_one_json_document(session, capsys):
     assert run(["inspect", str(session / "static.c3d"), "--json"]) == DONE
 
 
-def test_nothing_is_overwritten_without_force(session, tmp_path, capsys, no_stills):
+def test_nothing_is_overwritten_without_force(session, tmp_path, capsys):
     small, out = tmp_path / "small", tmp_path / "out"
     small.mkdir()
     for name in ("static.c3d", "session.toml"):
@@ -116,7 +111,7 @@ def test_nothing_is_overwritten_without_force(session, tmp_path, capsys, no_stil
     assert (out / "results.json").stat().st_mtime_ns > before
 
 
-def test_a_session_without_static_is_reported_from_one_frame(session, tmp_path, capsys, no_stills):
+def test_a_session_without_static_is_reported_from_one_frame(session, tmp_path, capsys):
     folder = tmp_path / "session"
     folder.mkdir()
     shutil.copy(session / "walk.c3d", folder)
@@ -129,7 +124,7 @@ def test_a_session_without_static_is_reported_from_one_frame(session, tmp_path, 
     assert found["trials"][0]["wrench"]["frames_used"] == 100
 
 
-def test_ctrl_c_keeps_the_trials_that_are_done_and_says_so(session, tmp_path, capsys, monkeypatch, no_stills):
+def test_ctrl_c_keeps_the_trials_that_are_done_and_says_so(session, tmp_path, capsys, monkeypatch):
     import biodance.pipeline.session as room
 
     whole = room.examine_trial
@@ -150,7 +145,7 @@ def test_ctrl_c_keeps_the_trials_that_are_done_and_says_so(session, tmp_path, ca
     assert states["unknown_set"] == states["walk"] == "refused"
 
 
-def test_ctrl_c_while_identifying_keeps_all_trials(session, tmp_path, capsys, monkeypatch, no_stills):
+def test_ctrl_c_while_identifying_keeps_all_trials(session, tmp_path, capsys, monkeypatch):
     import biodance.pipeline.session as room
 
     def stopping(*_, **__):

@@ -1,6 +1,7 @@
 """What is drawn in 3-D: the frame with the largest residual, the load where it sits, postures; with GL and without."""
 
 import json
+import re
 from dataclasses import replace
 from io import BytesIO
 
@@ -15,8 +16,8 @@ from biodance.motion.kinematics import poses
 from biodance.pipeline.still import load_still, posture_still, worst_still
 from biodance.records import Markers
 from biodance.report.figures import solid
-from biodance.report.figures.solid import solid_pngs
-from biodance.report.figures.still import RESIDUAL_SCALE, still_figure
+from biodance.report.figures.solid import sheet_png
+from biodance.report.figures.still import RESIDUAL_SCALE, VIEWS, still_figure
 
 
 @pytest.fixture(scope="module")
@@ -42,9 +43,17 @@ def test_the_worst_frame_is_the_one_that_was_spoilt(result):
     assert (still.trial, still.time) == (first.trial.name, pytest.approx(first.motion.time[200]))
     np.testing.assert_allclose(still.residual, [300.0, -400.0, 1200.0], atol=60.0)
     assert "The worst frame" in still.about
-    drawn = still_figure(still).axes[0].lines
-    arrow = [np.ptp(line.get_data_3d(), axis=1) for line in drawn]
-    assert any(np.allclose(length, RESIDUAL_SCALE * np.abs(still.residual)) for length in arrow)
+    (first, _) = re.findall(r'd="M(\S+) (\S+) (\S+) (\S+)" fill="none" class="residual"', still_figure(still))
+    x, y, to_x, to_y = map(float, first)
+    elevation = np.radians(VIEWS[0][0])
+    assert (
+        abs(to_y - y)
+        == pytest.approx(  # mm down, of an arrow that leans towards the eye or away from it
+            1000 * RESIDUAL_SCALE * still.residual[2] * np.cos(elevation),
+            abs=1000 * RESIDUAL_SCALE * np.hypot(*still.residual[:2]) * np.sin(elevation) + 1,
+        )
+    )
+    assert abs(to_x - x) <= 1000 * RESIDUAL_SCALE * np.hypot(*still.residual[:2]) + 1
 
 
 def test_without_a_measured_frame_there_is_no_worst_one(result):
@@ -98,10 +107,10 @@ def test_pictures_are_drawn_where_the_machine_can(result):
     from PIL import Image
 
     stills = [posture_still(result.body, result.body.neutral, f"{k}") for k in range(2)]
-    pictures = solid_pngs(stills, sheet=True)
-    if pictures is None:
+    drawn = sheet_png(stills)
+    if drawn is None:
         pytest.skip("this machine draws no 3-D pictures; biodance doctor says how to mend it")
-    with Image.open(BytesIO(pictures[0])) as picture:
+    with Image.open(BytesIO(drawn)) as picture:
         assert picture.size == (600, 420)
         pixels = np.asarray(picture.convert("RGB")).reshape(-1, 3)
     assert 0.03 < np.mean(np.any(pixels < 240, axis=1)) < 0.6  # bodies on white ground
@@ -124,4 +133,4 @@ def test_a_child_without_gl_is_no_crash_and_no_hang(result, monkeypatch, code):
     run = solid.subprocess.run
     monkeypatch.setattr(solid, "_PATIENCE", 1.5)
     monkeypatch.setattr(solid.subprocess, "run", lambda words, **kind: run([words[0], "-c", code], **kind))
-    assert solid_pngs([posture_still(result.body, result.body.neutral, "one")]) is None
+    assert sheet_png([posture_still(result.body, result.body.neutral, "one")]) is None

@@ -3,6 +3,7 @@ session without results.
 """
 
 import base64
+import hashlib
 import re
 import shutil
 import subprocess
@@ -18,10 +19,8 @@ from biodance.pipeline.attention import without_path
 from biodance.pipeline.provenance import provenance
 from biodance.pipeline.results import SessionResult
 from biodance.report.figures.session import marker_figure, wrench_figure
-from biodance.report.figures.solid import still_addresses
-from biodance.report.figures.still import still_figure
-from biodance.report.figures.style import svg_address
-from biodance.report.pages.session import check_table, page
+from biodance.report.figures.vector import STEPS, envelope, round_ticks
+from biodance.report.pages.session import check_table, key_figures, page
 from biodance.report.wording import format_number, millimetres
 
 TIME = "2026-01-01T00:00:00Z"
@@ -53,8 +52,7 @@ def outline(html: str) -> Outline:
 
 
 def html_of(result: SessionResult, created: str = TIME) -> str:
-    still = svg_address(still_figure(result.still)) if result.still else ""
-    return page(result, provenance(result, created=created), stills=[still] if still else [])
+    return page(result, provenance(result, created=created))
 
 
 @pytest.fixture(scope="module")
@@ -65,11 +63,11 @@ def full() -> str:
 def test_the_page_is_well_formed_and_labelled_for_a_screen_reader(full):
     elements = outline(full).elements
     assert ("html", {"lang": "en"}) in elements
-    images = [attributes for tag, attributes in elements if tag == "img"]
-    assert len(images) == 4
-    assert all(len(image["alt"]) > 40 for image in images)
+    drawn = [attributes for tag, attributes in elements if attributes.get("role") in ("img", "group")]
+    assert len(drawn) == 2 + 2 + 1 + 12  # standing, two views, six channels with their differences
+    assert all(attributes["aria-label"] for attributes in drawn)
     tables = sum(tag == "table" for tag, _ in elements)
-    assert tables == sum(tag == "caption" for tag, _ in elements) == 7
+    assert tables == sum(tag == "caption" for tag, _ in elements) == 6
     assert all(attributes.get("scope") in ("col", "row") for tag, attributes in elements if tag == "th")
 
 
@@ -77,11 +75,42 @@ def test_the_page_asks_nothing_of_the_network(full):
     elements = outline(full).elements
     policy = next(a["content"] for t, a in elements if a.get("http-equiv") == "Content-Security-Policy")
     assert policy.startswith("default-src 'none'")
-    assert not any(tag in ("script", "link", "iframe", "object") for tag, _ in elements)
-    assert all(
-        attributes["src"].startswith("data:image/svg+xml;base64,") for tag, attributes in elements if tag == "img"
-    )
+    assert not any(tag in ("link", "iframe", "object", "img") or "src" in a for tag, a in elements)
+    assert all(a["href"].startswith("#") for _, a in elements if "href" in a)
     assert not re.search(r"url\(|@import", full.split("<body>")[0])
+
+
+def test_every_entry_of_the_contents_has_its_section(full):
+    elements = outline(full).elements
+    there = [a["id"] for _, a in elements if "id" in a]
+    assert len(there) == len(set(there))
+    entries = [a["href"].removeprefix("#") for tag, a in elements if tag == "a"]
+    assert entries == [where for tag, a in elements if tag == "section" and (where := a.get("id")) != "verdict"]
+
+
+def test_the_key_figures_say_the_worst_and_its_limit():
+    tiles = {tile.what: (tile.value, tile.inside) for tile in key_figures(full_session())}
+    assert tiles == {"Mass on the plates": ("65.20 kg", True), "Markers to the body": ("11.0 mm", True)}
+
+
+def test_a_printed_page_says_whose_it_is_and_when(tmp_path):
+    (tmp_path / "session.toml").write_text('[session]\ndate = 2026-03-05\nlab = "Gait </style> \\"lab\\""\n')
+    (tmp_path / "walk <1>.Trial.enf").write_text("[TRIAL_INFO]\nDESCRIPTION=barefoot\n")
+    result = full_session()
+    html = html_of(replace(result, session=replace(result.session, folder=tmp_path)))
+    style = re.search(r"<style>(.*?)</style>", html, re.DOTALL).group(1)
+    assert "date 2026-03-05 · lab Gait" in style
+    assert "condition barefoot" in style
+    assert "counter(page)" in style
+    assert "<dd>barefoot</dd>" in html
+
+
+def test_only_the_page_s_own_scripts_may_run(full):
+    policy = next(a["content"] for _, a in outline(full).elements if a.get("http-equiv") == "Content-Security-Policy")
+    scripts = re.findall(r"<script>(.*?)</script>", full, re.DOTALL)
+    hashes = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in scripts]
+    assert re.findall(r"sha256-([^']+)'", policy) == hashes
+    assert "unsafe" not in policy.split("script-src")[1].split(";")[0]
 
 
 def test_the_same_result_gives_the_same_characters(full):
@@ -121,48 +150,81 @@ def test_a_session_without_results_still_has_a_page_with_every_reason():
     ):
         assert sentence in html
     assert not re.search(r"\bnan\b", html, re.IGNORECASE)
-    assert "<img" not in html
+    assert "<svg" not in html
 
 
 def test_a_marker_never_seen_has_no_bar():
     fit = full_session().trials[0].fit
-    axes = marker_figure(fit).axes[0]
-    labels = [label.get_text() for label in axes.get_xticklabels()]
-    assert len(labels) == len(fit.names) - 1
-    assert "M06" not in labels
-    heights = [bar.get_height() for bar in axes.patches]
-    assert heights == sorted(heights, reverse=True)
-    assert heights[0] == pytest.approx(1000 * np.nanmax(fit.rms))
+    rows = re.findall(
+        r"<li><span>(.*?)</span><i style=\"--b:(.*?)%;--t:(.*?)%\"></i><b>(.*?) mm</b>", marker_figure(fit)
+    )
+    assert len(rows) == len(fit.names) - 1
+    assert "M06" not in [name for name, *_ in rows]
+    told = [float(text) for *_, text in rows]
+    assert told == sorted(told, reverse=True)
+    assert told[0] == pytest.approx(1000 * np.nanmax(fit.rms), abs=0.05)
+    name, bar, tick, _ = rows[3]
+    worst = fit.max[fit.names.index(name)] / np.nanmax(fit.max)
+    assert (float(bar), float(tick)) == pytest.approx((100 * worst / 2.2, 100 * worst), abs=0.1)
 
 
-def test_frames_left_out_have_no_residual_and_are_hatched():
+def read_back(svg: str, name: str) -> np.ndarray:
+    """Return the (time, value) pairs of the curve ``name`` in a panel, as the page's script reads them."""
+    x, y = (np.array(found.split(), dtype=float) for found in re.search(r'data-x="(.*?)" data-y="(.*?)"', svg).groups())
+    moves = re.search(rf'data-name="{name}"[^>]* d="(.*?)"', svg).group(1)
+    out = []
+    for start, steps in re.findall(r"M([^lh]*)(?:l([^M]*)|h0)", moves):
+        relative = np.array(re.findall(r"-?\d+", steps), dtype=float).reshape(-1, 2)
+        out.append(np.cumsum(np.vstack([np.array(start.split(), dtype=float), relative]), axis=0))
+    across, down = np.concatenate(out).T
+    return np.stack([x[0] + np.ptp(x) * across / STEPS, y[0] + np.ptp(y) * (1 - down / STEPS)], axis=1)
+
+
+def panels(html: str) -> list[str]:
+    return re.findall(r'<svg class="panel".*?</svg><g.*?</svg>', html, re.DOTALL)
+
+
+def test_frames_left_out_have_no_residual_and_are_grey():
     comparison = full_session().trials[0].comparison
-    residual = wrench_figure(comparison).axes[2]
-    drawn = residual.lines[-1].get_ydata()
-    assert np.array_equal(np.isfinite(drawn), comparison.used)
-    expected = (comparison.measured - comparison.simulated)[comparison.used, 0]
-    np.testing.assert_allclose(drawn[comparison.used], expected)
-    spans = [(p.get_x(), p.get_x() + p.get_width()) for p in residual.patches]
-    assert spans == [pytest.approx((0.0, 0.4)), pytest.approx((2.5, 2.99))]
+    curves, residual = panels(wrench_figure(comparison))[:2]
+    drawn = read_back(residual, "with the table")
+    used, low_high = comparison.used, re.search(r'data-y="(\S+) (\S+)"', residual).groups()
+    step = np.ptp(np.array(low_high, dtype=float)) / STEPS
+    np.testing.assert_allclose(drawn[:, 0], comparison.time[used], atol=0.001)
+    expected = (comparison.measured - comparison.simulated)[used, 0]
+    np.testing.assert_allclose(drawn[:, 1], expected, atol=step)
+    assert len(read_back(curves, "measured")) == comparison.time.size
+    spans = np.array(re.findall(r'class="out" x="(\d+)" y="0" width="(\d+)"', residual), dtype=float)
+    seconds = np.stack([spans[:, 0], spans.sum(axis=1)], axis=1) * 2.99 / STEPS
+    assert seconds == pytest.approx(np.array([[0.0, 0.4], [2.5, 2.99]]), abs=0.001)
 
 
 def test_a_comparison_without_a_used_frame_can_be_drawn():
     comparison = full_session().trials[0].comparison
     nothing = replace(comparison, used=np.zeros(comparison.time.size, dtype=bool), rms=np.full(6, np.nan))
-    svg = base64.b64decode(svg_address(wrench_figure(nothing)).split(",")[1])
-    assert svg.startswith(b"<?xml")
+    assert len(panels(wrench_figure(nothing))) == 12
 
 
-@pytest.mark.parametrize("child", ["false", "true", "no-such-program"])
-def test_a_child_that_dies_or_draws_nothing_leaves_the_drawing(monkeypatch, child):
-    monkeypatch.setattr("biodance.report.figures.solid.sys.executable", child)
-    still = full_session().still
-    assert still_addresses([still]) == [svg_address(still_figure(still))]
+def test_a_long_curve_keeps_its_highest_and_lowest_values():
+    values = np.sin(np.arange(90000) / 40)
+    values[41234], values[70000], values[50:900] = 7.0, -9.0, np.nan
+    chosen = envelope(values)
+    assert len(chosen) <= 1200
+    assert {41234, 70000} <= set(chosen.tolist())
+    assert np.all(np.diff(chosen) > 0)
 
 
-def test_figures_carry_no_date():
-    svg = base64.b64decode(svg_address(marker_figure(full_session().trials[0].fit)).split(",")[1]).decode()
-    assert "<dc:date>" not in svg
+@pytest.mark.parametrize(
+    ("low", "high", "words"),
+    [
+        (0.0, 1.0, ["0.0", "0.5", "1.0"]),
+        (-37.0, 61.0, ["0", "50"]),
+        (-0.04, 0.05, ["0.00", "0.05"]),
+        (99.0, 101.0, ["99", "100", "101"]),
+    ],
+)
+def test_ticks_are_round_numbers(low, high, words):
+    assert [text for _, text in round_ticks(low, high, 3)] == words
 
 
 @pytest.mark.parametrize(
@@ -202,5 +264,5 @@ def test_a_browser_shows_the_page_without_a_complaint(full, tmp_path):
         f"file://{tmp_path / 'page.html'}",
     ]
     shown = subprocess.run(words, capture_output=True, text=True, timeout=60, check=True)
-    assert shown.stdout.count("<img") == full.count("<img")
+    assert shown.stdout.count('class="cursor') == full.count('class="plot"') - 2  # all but the two of the standing
     assert "CONSOLE" not in shown.stderr

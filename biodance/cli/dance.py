@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, STOPPED, ForceOption, JsonOption, OutOption, app, print_json, say
+from biodance.cli.app import DONE, NEEDS_A_PERSON, STOPPED, app, print_json, say
+from biodance.cli.options import ForceOption, JsonOption, OutOption
 from biodance.errors import BiodanceError
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ def dance_command(
     limits: Annotated[Path | None, Parameter(help="TOML file with what this person can and may do.")] = None,
     urdf: Annotated[Path | None, Parameter(help="URDF file of a robot that dances instead of a person.")] = None,
     feet: Annotated[str | None, Parameter(help="Links of the robot's right and left foot: RIGHT,LEFT.")] = None,
-    seed: Annotated[int, Parameter(help="The same seed gives the same dance_command.")] = 0,
+    seed: Annotated[int, Parameter(help="The same seed gives the same dance.")] = 0,
     out: OutOption,
     json: JsonOption = False,
     force: ForceOption = False,
@@ -82,7 +83,8 @@ def feedback_command(dance: Path, *, out: FileOut, force: ForceOption = False) -
     """Write the page that leads a person through a dance: one file that opens in a browser without network.
 
     It shows the person's own body, the next posture as a light figure, what to move, the seconds left and when to move,
-    by sight and sound; over the mirrored picture of a camera where that is wanted.
+    by sight and sound; over the mirrored picture of a camera where that is wanted. With a camera it follows the person,
+    grades every posture by what it tells of each segment, and asks for what is missing.
 
     Parameters
     ----------
@@ -92,7 +94,8 @@ def feedback_command(dance: Path, *, out: FileOut, force: ForceOption = False) -
     from biodance.dance.dance import Dance
     from biodance.report.feedback.write import write_feedback
 
-    write_feedback(Dance.load(dance / "dance.npz" if dance.is_dir() else dance), out, force=force)
+    if not write_feedback(Dance.load(dance / "dance.npz" if dance.is_dir() else dance), out, force=force):
+        say("The page leads but does not follow: this takes the bundle that `make bundle` builds in a checkout (npm).")
     sys.stdout.write(f"{out}\n")
     return DONE
 

@@ -1,6 +1,8 @@
 """Commands about this machine: doctor."""
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, JsonOption, app, print_json, progress
+from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json
+from biodance.cli.options import JsonOption
+from biodance.cli.progress import progress
 
 
 @app.command(name="doctor")

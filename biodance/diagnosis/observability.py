@@ -14,7 +14,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.parts import JointError
 from biodance.diagnosis.candidates import SCALE, Candidate, changes
-from biodance.diagnosis.consequence import least
+from biodance.diagnosis.consequence import least, unit_at
 from biodance.diagnosis.diagnosis import Unobservable
 from biodance.diagnosis.evidence import Belief, smallest
 from biodance.diagnosis.model import Model
@@ -166,7 +166,7 @@ def detection_limits(seen: Visibility, body: Body, threshold: float) -> tuple[Un
         first = one.effect.parameters[one.silent.index(False)]
         limit = max(limit, least(one.effect).get(first.name, 0.0))
         sizes = [one.effect.size_told(size) for size in (limit, max(limit, here.told(i)), first.typical)]
-        rows.append(Unobservable(*one.names, sizes[0], first.unit, *sizes[1:]))
+        rows.append(Unobservable(*one.names, sizes[0], unit_at(one.effect, first.unit), *sizes[1:]))
     return tuple(rows)
 
 

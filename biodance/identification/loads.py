@@ -19,7 +19,7 @@ UNDECLARED = 0.25
 
 
 def compact_load(place: Array) -> Array:
-    """Return the ten parameters per kg of a compact load with CoM at ``place`` (3,) m."""
+    """Return the ten parameters (..., 10) per kg of compact loads with CoM at ``place`` (..., 3) m."""
     return point_mass(1.0, place, radius=_RADIUS)
 
 
@@ -45,7 +45,7 @@ def _unit_loads(body: Body, segment: int) -> Array:
     low, high = body.boxes[segment]
     margin = _NEAR * (high - low)
     place = np.random.default_rng(segment).uniform(low - margin, high + margin, (2000, 3))
-    return np.array([compact_load(one) for one in place])
+    return compact_load(place)
 
 
 def _factor(moment: Array) -> Array:

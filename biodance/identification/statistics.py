@@ -87,9 +87,9 @@ class Statistics:
         (expectation step).
         """
         z = np.append(-phi, 1.0)
-        square = np.einsum("i,bcidj,j->bcd", z, self.gram, z, optimize=True)
-        spread = np.einsum("bcidj,ij->bcd", self.gram[:, :, :-1, :, :-1], covariance, optimize=True)
-        return Moments(square + spread, self.count.astype(float))
+        second = np.outer(z, z)
+        second[:-1, :-1] += covariance
+        return Moments(np.einsum("bcidj,ij->bcd", self.gram, second), self.count.astype(float))
 
 
 def layout_for(about: Array, bands: Bands = BANDS) -> Noise:

@@ -13,20 +13,9 @@ and the wrench about the lab origin is [f; n + p x f]. Both are linear in [m, mc
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.inertia import TENSOR
+from biodance.motion.ik.compiled.tree import fill_regressor
 from biodance.motion.kinematics import SegmentMotion, segment_motion
 from biodance.records import Array, Motion, Wrench
-from biodance.spatial import skew
-
-
-def _inertia_columns(local: Array) -> Array:
-    """Return L (..., 3, 6) with ``L @ [Ixx Ixy Iyy Ixz Iyz Izz] = I @ local`` for vectors ``local`` (..., 3)."""
-    out = np.zeros((*local.shape, 6))
-    for column, (i, j) in enumerate(TENSOR):
-        out[..., i, column] += local[..., j]
-        if i != j:
-            out[..., j, column] += local[..., i]
-    return out
 
 
 def regressor_of(segments: SegmentMotion, *, gravity: Array, sharing: Array | None = None) -> Array:
@@ -34,23 +23,10 @@ def regressor_of(segments: SegmentMotion, *, gravity: Array, sharing: Array | No
     m/s², lab frame; ``sharing`` (10 M, 10 N) what each of the M links that move has of the N segments
     (``Body.sharing``; None: they are the segments).
     """
-    rotation, position = segments.rotation, segments.position
-    frames, count = position.shape[:2]
-    turned = np.swapaxes(rotation, -1, -2)
-    w = np.einsum("...ij,...j->...i", turned, segments.angular_velocity)
-    dw = np.einsum("...ij,...j->...i", turned, segments.angular_acceleration)
-    drive = segments.acceleration - gravity
-    skew_w = skew(w)
-    first = rotation @ (skew(dw) + skew_w @ skew_w)
-    second = rotation @ (_inertia_columns(dw) + skew_w @ _inertia_columns(w))
-    arm = skew(position)
-    columns = np.zeros((frames, count, 6, 10))
-    columns[..., :3, 0] = drive
-    columns[..., :3, 1:4] = first
-    columns[..., 3:, 0] = np.einsum("...ij,...j->...i", arm, drive)
-    columns[..., 3:, 1:4] = arm @ first - skew(drive) @ rotation
-    columns[..., 3:, 4:] = second
-    W = np.moveaxis(columns, 1, 2).reshape(frames, 6, 10 * count)
+    frames, count = segments.position.shape[:2]
+    W = np.zeros((frames, 6, 10 * count))
+    omega, alpha, drive = segments.angular_velocity, segments.angular_acceleration, segments.acceleration - gravity
+    fill_regressor(segments.rotation, segments.position, omega, alpha, drive, W)
     return W if sharing is None else W @ sharing
 
 

@@ -237,7 +237,11 @@ def _short(reason: str) -> str:
 def _heard(one: Diagnosis) -> str:
     """Return that the witnesses were asked, as a sentence; "" where they saw nothing."""
     trials = len({o.trial for o in one.witnesses.observations}) if one.witnesses else 0
-    return f" Plates and clocks show nothing wrong in {trials} trial{'s' * (trials > 1)}." if trials else ""
+    return (
+        f" Plates and clocks, judged alone, are as without fault in {trials} trial{'s' * (trials > 1)}."
+        if trials
+        else ""
+    )
 
 
 def stepped(rows: tuple[Judged, ...], heard: Testimony | None) -> tuple[Judged, ...]:

@@ -31,7 +31,9 @@ def load_doubts(checks: Iterable[Check], *, weighed: bool) -> tuple[str, ...]:
 
 
 def _upper(what: str, where: str, value: float, limit: float, unit: str, advice: str) -> Check:
-    return Check(what, where, f"{value:.1f} {unit}", f"at most {limit:g} {unit}", bool(value <= limit), advice)
+    inside = bool(value <= limit)
+    digits = next((k for k in (1, 2, 3) if (float(f"{value:.{k}f}") <= limit) is inside), 4)
+    return Check(what, where, f"{value:.{digits}f} {unit}", f"at most {limit:g} {unit}", inside, advice)
 
 
 def _group_check(by_group: Mapping[str, float], name: str, limits: CheckLimits, advice: str) -> list[Check]:

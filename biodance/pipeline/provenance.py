@@ -3,13 +3,14 @@
 import platform
 import subprocess
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from biodance.lab.session.visit import visit_words
 from biodance.library import PACKAGE
 from biodance.pipeline.results import SessionResult
 from biodance.settings import Value
@@ -37,7 +38,8 @@ class Provenance:
     """``created`` UTC time, ISO 8601: the only thing that differs when the same software runs again on the same files
     and machine; ``commit`` of biodance, "unknown" in an installed wheel, with "+changed" where files differ from it;
     ``versions`` library -> version; ``blas`` that numpy multiplies matrices with; ``inputs`` file name -> sha256;
-    ``settings`` dotted key -> value, all of them.
+    ``settings`` dotted key -> value, all of them; ``visit`` the ``date``, ``lab``, ``operator`` and ``condition`` of
+    the session, "" where nobody says.
     """
 
     created: str
@@ -46,6 +48,7 @@ class Provenance:
     blas: str
     inputs: Mapping[str, str]
     settings: Mapping[str, Value]
+    visit: Mapping[str, str] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
         """Return all fields as plain dictionaries."""
@@ -56,6 +59,7 @@ class Provenance:
             "blas": self.blas,
             "inputs_sha256": dict(self.inputs),
             "settings": dict(self.settings),
+            "visit": dict(self.visit),
         }
 
 
@@ -126,4 +130,5 @@ def provenance(result: SessionResult, *, created: str) -> Provenance:
     inputs = {
         _name(trial.trial.source.path, result.session.folder): trial.trial.source.sha256 for trial in result.trials
     }
-    return Provenance(created, commit(), versions, blas(), inputs, result.settings.as_dict())
+    visit = visit_words(result.session.folder, [trial.name for trial in result.trials])
+    return Provenance(created, commit(), versions, blas(), inputs, result.settings.as_dict(), visit)

@@ -71,6 +71,51 @@ def _scaled(subject: Subject, statics: tuple[Trial, ...], file: Path) -> Body:
     return body
 
 
+def stream_recording(
+    file: Path | str,
+    *,
+    static: Path | str | None = None,
+    subject: str | None = None,
+    markers: str | None = None,
+    tell: Callable[[LiveState], None] = lambda _: None,
+) -> LiveResult:
+    """Take a recording in frame by frame, as a laboratory would send it: track, watch for faults, identify.
+
+    Parameters
+    ----------
+    file : path
+        A recording with markers and force plates.
+    static : path, optional
+        The static trial; by default that of the folder in which the file lies.
+    subject : str, optional
+        The person, where C3D files hold several.
+    markers : str, optional
+        Marker set, where the file does not tell.
+    tell : callable, optional
+        Called with the `LiveState` after every second of the recording.
+
+    Returns
+    -------
+    LiveResult
+        What the stream told, and how long every frame took.
+
+    Raises
+    ------
+    SessionRefused
+        The recording is not there or was not read, or no static trial scales the body.
+    TrialRefused
+        The recording has no plates, or its first frame does not show the posture.
+
+    Examples
+    --------
+    >>> streamed = biodance.stream_recording("visit/squat_1.c3d")
+    >>> streamed.warnings
+    ()
+    """
+    body, trial = body_and_stream(Path(file), static=Path(static) if static else None, subject=subject, markers=markers)
+    return replay(body, trial, tell=tell)
+
+
 @one_thread()
 def replay(
     body: Body,

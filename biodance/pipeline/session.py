@@ -78,8 +78,8 @@ def examine(
     reference_person(session.settings.table, session.subject)
     steps: list[Step] = []
     read = []
-    for trial in sorted(session.trials, key=lambda trial: trial.role != "static"):
-        tell(f"preparing {trial.name}")
+    for k, trial in enumerate(sorted(session.trials, key=lambda trial: trial.role != "static"), 1):
+        tell(f"preparing {trial.name}, {k} of {len(session.trials)}")
         read.append(prepare_trial(trial))
     tell("scaling the body")
     body, source = body_of(session.subject, tuple(read), session.settings, steps)
@@ -91,8 +91,8 @@ def examine(
         body, shown = shown_joints(body, tuple(read), steps)
     results: list[TrialResult] = []
     try:
-        for one in read:
-            tell(f"tracking {one.trial.name}")
+        for k, one in enumerate(read, 1):
+            tell(f"tracking {one.trial.name}, {k} of {len(read)}")
             results.append(examine_trial(one, body, mass=session.subject.mass))
     except KeyboardInterrupt:
         results += [TrialResult(one.trial, (*one.steps, _stop("this trial")), one.gaps) for one in read[len(results) :]]

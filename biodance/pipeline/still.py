@@ -11,10 +11,10 @@ from biodance.body.changes import parts_as_segments
 from biodance.body.solids import shape_parts
 from biodance.errors import TrialRefused
 from biodance.identification.added_mass import LoadSearch
-from biodance.motion.kinematics import Poses, poses
+from biodance.motion.kinematics import Poses, centre_of_mass, poses
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.results import Still
-from biodance.pipeline.standing import centre_of_mass, facing
+from biodance.pipeline.standing import facing
 from biodance.pipeline.trial_result import TrialResult
 from biodance.records import Array, Motion
 
@@ -155,7 +155,7 @@ def worst_still(body: Body, results: tuple[TrialResult, ...]) -> Still | None:
     if worst is None:
         return None
     size_n, one, frame, force = worst
-    x, y, z = (f"{value:+.0f}" for value in force)
+    x, y, z = (f"{round(value):+d}".replace("-", "−") for value in force)
     about = (
         f"The worst frame: the plates measured {size_n:.0f} N other than the body needs (x {x}, y {y}, z {z} N; "
         f"arrow: 1 m for 100 N)."

@@ -201,12 +201,12 @@ class TrialResult:
 
     @property
     def status(self) -> Status:
-        """State of the trial: "refused" where no step after preparing was done, "warning" where a person must look,
-        "ok" otherwise.
+        """State of the trial: "refused" where no step after preparing was done, "warning" where a person must look (a
+        refusal, a warning, a check outside its limit), "ok" otherwise.
         """
         if all(step.status != "done" or step.name == "prepare" for step in self.steps):
             return "refused"
-        return "warning" if self.reasons else "ok"
+        return "warning" if self.reasons or not all(check.inside for check in self.checks) else "ok"
 
     @property
     def reasons(self) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ from biodance.pipeline.still import posture_still
 from biodance.records import SIDES, Array, Markers
 from biodance.report.documents.session import plain_values, to_text
 from biodance.report.figures.dance import criterion_figure, expectation_figure, postures_figure, zmp_figure
-from biodance.report.figures.solid import solid_pngs
+from biodance.report.figures.solid import sheet_png
 
 _RATE = 100.0
 """Hz of the preview's markers."""
@@ -55,7 +55,7 @@ def write_dance(result: DanceResult, folder: Path) -> dict[str, Any]:
         for name, figure in drawn.items():
             figure.savefig(folder / f"{name}.png", dpi=DOTS, metadata={"Software": None})
         stills = [posture_still(dance.body, q, title) for q, title in zip(still.q, titles, strict=True)]
-        for picture in solid_pngs(stills, sheet=True) or ():
+        if picture := sheet_png(stills):
             (folder / "postures_3d.png").write_bytes(picture)
     (folder / "results.json").write_text(to_text(found), encoding="utf-8", newline="\n")
     return found

@@ -4,7 +4,7 @@ The steps are sorted from the markers, not from the forces: a plate that lies el
 force comes late, must not hide the very steps that show it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -120,6 +120,7 @@ class SeenTrial:
     pelvis: Array | None
     velocity: Array | None
     still: bool
+    _stances: dict[FootStep, slice | None] = field(default_factory=dict, init=False, repr=False)
 
     def plate(self, name: str) -> Plate:
         """Return the plate of that name."""
@@ -131,6 +132,11 @@ class SeenTrial:
 
     def stance(self, step: FootStep) -> slice | None:
         """Return the samples of a step's plate while the foot stands on it; None where the force does not show it."""
+        if step not in self._stances:
+            self._stances[step] = self._stance(step)
+        return self._stances[step]
+
+    def _stance(self, step: FootStep) -> slice | None:
         wrench = self.plate(step.plate).wrench
         here = [run for run in runs(wrench.force[:, 2] > ONSET) if wrench.time[run[0]] <= step.middle]
         if not here or wrench.time[here[-1][1] - 1] < step.middle:

@@ -1,6 +1,7 @@
 """Means over a part of the stance of one step: the centre of pressure in the foot's own frame, the plate's force."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -32,8 +33,11 @@ class StepCourse:
         return float(here[known].mean()) if here.size and known.mean() >= _SEEN else float("nan")
 
 
+@lru_cache(maxsize=16)
 def step_course(seen: SeenTrial, step: FootStep) -> StepCourse | None:
-    """Return one step sample by sample; None where its plate's force does not show it."""
+    """Return one step sample by sample; None where its plate's force does not show it. Of the last steps it is kept:
+    several witnesses ask for it.
+    """
     part = seen.stance(step)
     if part is None:
         return None

@@ -130,13 +130,13 @@ def widen_limits(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:
     limits = replace(limits, lower=limits.lower - free, upper=limits.upper + free)
     lower, upper = np.minimum(limits.lower, angle - _SPARE), np.maximum(limits.upper, angle + _SPARE)
     notes = tuple(
-        f"Range of {joint.name} widened to {np.degrees(lower[i]):.0f} .. {np.degrees(upper[i]):.0f} deg: "
-        f"{np.degrees(angle[i]):.0f} deg when standing."
+        f"Range of {joint.name} widened to {round(np.degrees(lower[i]))} to {round(np.degrees(upper[i]))} degrees: "
+        f"{round(np.degrees(angle[i]))} degrees when standing."
         for i, joint in enumerate(body.joints)
         if lower[i] < limits.lower[i] or upper[i] > limits.upper[i]
     )
     tilted = (
-        f"Pelvis markers stand tilted {np.degrees(tilt):.0f} deg forwards: ranges of hip and trunk flexion are "
+        f"Pelvis markers stand tilted {round(np.degrees(tilt))} degrees forwards: ranges of hip and trunk flexion are "
         f"widened by as much."
     )
     return replace(limits, lower=lower, upper=upper), (tilted, *notes)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from biodance.body.human.fractions import MAN, WOMAN, published_fractions
+from biodance.body.human.fractions import MAN, WOMAN, published_fractions, published_people
 from biodance.body.human.girths import SegmentOpinion, girth_opinions
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of, side_of
 from biodance.body.inertia import TENSOR, RigidInertia, inertial_parameters, mirror_inertia, turn_inertia
@@ -44,9 +44,7 @@ def table_spread(kind: str) -> Spread:
     """Return the standard deviations of one kind of segment (pelvis, thigh, shank, foot, trunk_head, upper_arm,
     forearm_hand).
     """
-    tables = (*((name, who) for name in ("de_leva_1996", "dumas_2018") for who in (WOMAN, MAN)), ("winter_2009", MAN))
-    people = [reference(*table) for table in tables]
-    units = [_in_lengths(person, kind) for person in people]
+    units = [_in_lengths(person, kind) for who in (WOMAN, MAN) for person in published_people(who.sex)]
     masses = [fraction for who in (WOMAN, MAN) for fraction in published_fractions(kind, who)]
     inner = _within(kind)
     tensor = np.array([unit.inertia for unit in units])
@@ -173,8 +171,11 @@ def child_widening(subject: Subject) -> float:
     359-368) differ by one standard deviation in the root mean square over the segments: no
     table here holds centres of mass and inertias of children.
     """
-    if not is_child(subject):
-        return 1.0
+    return _boys_widening() if is_child(subject) else 1.0
+
+
+@functools.cache
+def _boys_widening() -> float:
     adult, boy = reference("de_leva_1996", MAN), study_masses("jensen_1986_12y", MAN)
     limbs = ("thigh", "shank", "foot", "upper_arm", "forearm_hand")
     apart = np.array([boy[kind] / adult.segments[kind].mass - 1.0 for kind in limbs])

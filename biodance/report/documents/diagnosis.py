@@ -104,6 +104,7 @@ def diagnosis_document(found: SessionDiagnosis) -> dict[str, Any]:
         "attention": attention_document(one.attention),
         "judged": judged_document(one.judged),
         "verdict": one.verdict,
+        "told": one.told,
         "findings": [_finding(finding) for finding in one.findings],
         "resembles": [_finding(finding) for finding in one.resembles],
         "within_tolerance": [_finding(finding) for finding in one.tolerated],

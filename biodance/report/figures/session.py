@@ -1,226 +1,160 @@
 """Figures of a session: markers to the model, quiet standing from above, measured beside simulated wrench."""
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from html import escape
 
 import numpy as np
 
-from biodance.display import BLACK, GREEN, GREY, RED, SKY
+from biodance.display import BLACK, GREEN, GREY
+from biodance.identification.validation import TrialValidation
 from biodance.pipeline.trial_result import MarkerFit, QuietStanding, WrenchComparison
-from biodance.records import CHANNELS, Array, runs
-from biodance.report.figures.style import SIDE_COLOURS, figure, look
+from biodance.records import CHANNEL_TITLES, Array
+from biodance.report.figures.curves import Curve, CurveFigure, Strip
+from biodance.report.figures.vector import (
+    IDENTIFIED,
+    LEFT_SIDE,
+    MEASURED,
+    RIGHT_SIDE,
+    TABLE,
+    Axis,
+    Frame,
+    Stroke,
+    panel,
+    points,
+    rule,
+    segments,
+)
+from biodance.report.wording import format_number, millimetres
 
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    _DrawChannel = Callable[[Axes, int], None]
+_LEAST = (10.0, 10.0, 10.0, 4.0, 4.0, 4.0)
+"""N, N·m: the least that an axis spans, so that the noise of quiet standing is not blown up."""
 
 
-def marker_figure(fit: MarkerFit) -> "Figure":
-    """Draw the RMS distance (bar) and the largest distance (short line) of every seen marker in mm, the worst first."""
+def bar_list(rows: Sequence[tuple[str, float, float, str]], about: str) -> str:
+    """Return bars as a list in columns: name, length of the bar and place of the tick in %, and the number as text."""
+    items = "".join(
+        f'<li><span>{escape(name)}</span><i style="--b:{bar:.1f}%;--t:{tick:.1f}%"></i><b>{escape(text)}</b></li>'
+        for name, bar, tick, text in rows
+    )
+    return f'<ol class="bars" aria-label="{escape(about)}">{items}</ol>'
+
+
+def marker_figure(fit: MarkerFit) -> str:
+    """Return the RMS distance (bar) and the largest distance (tick) of every seen marker in mm, the worst first."""
     seen = np.flatnonzero(np.isfinite(fit.rms))
     order = seen[np.argsort(-fit.rms[seen], kind="stable")]
-    with look():
-        drawn = figure(2.0)
-        axes = drawn.subplots()
-        place = np.arange(order.size)
-        axes.bar(
-            place,
-            1000 * fit.rms[order],
-            width=0.75,
-            color=SKY,
-            edgecolor=BLACK,
-            linewidth=0.5,
-            label="RMS over the trial",
-        )
-        axes.plot(place, 1000 * fit.max[order], linestyle="", marker="_", color=BLACK, markersize=7, label="largest")
-        axes.set_xticks(place, [fit.names[i] for i in order], rotation=90, fontsize=7)
-        axes.set_xlim(-0.6, max(order.size, 1) - 0.4)
-        axes.grid(visible=False, axis="x")
-        axes.set_ylim(0.0, max(1.0, 1050 * float(np.max(fit.max[order], initial=0.0))))
-        axes.set_ylabel("distance (mm)")
-        axes.legend(loc="upper right", ncols=2)
-    return drawn
+    full = float(np.max(fit.max[order], initial=1e-3))
+    rows = [
+        (fit.names[i], 100 * fit.rms[i] / full, 100 * fit.max[i] / full, f"{millimetres(fit.rms[i])} mm") for i in order
+    ]
+    return bar_list(rows, "Distance of every marker to the model, RMS, the worst first")
 
 
 _AROUND = 200.0
 """mm that the wide view shows around the feet."""
+_SQUARE = Frame(width=390.0, height=240.0, left=48.0)
 
 
-def _turned(points: Array, standing: QuietStanding) -> Array:
+def _turned(place: Array, standing: QuietStanding) -> Array:
     """Return lab points (..., 2) as millimetres to the subject's right and ahead, from the mean centre of pressure."""
     ahead = standing.forward
     right = np.array([ahead[1], -ahead[0]])
-    arm = points - np.nanmean(standing.cop, axis=0)
+    arm = place - np.nanmean(standing.cop, axis=0)
     return 1000 * np.stack([arm @ right, arm @ ahead], axis=-1)
 
 
-def _path(axes: "Axes", path: Array, *, colour: str, marker: str, label: str) -> None:
-    axes.plot(*path.T, color=colour, linewidth=0.6, alpha=0.6)
-    axes.plot(*np.nanmean(path, axis=0), color=colour, marker=marker, markersize=7, linestyle="", label=label)
+_COP, _COM = Stroke(BLACK, "", 0.8), Stroke(GREEN, "", 0.8)
 
 
-def _surroundings(axes: "Axes", standing: QuietStanding) -> None:
-    for i, corners in enumerate(standing.plates):
-        outline = _turned(corners[[0, 1, 2, 3, 0]], standing)
-        axes.plot(*outline.T, color=GREY, linewidth=0.8, linestyle="-", label="plates" if i == 0 else None)
-    for side, marker in (("left", "<"), ("right", ">")):
+def _paths(x: Axis, y: Axis, standing: QuietStanding) -> list[str]:
+    out = []
+    for path, look, inside in ((standing.cop, _COP, ""), (standing.com, _COM, "#fff")):
+        if path.size:
+            way = _turned(path, standing)
+            out += [segments(x, y, way, look), points(x, y, *np.nanmean(way, axis=0)[:, None], look, inside=inside)]
+    return out
+
+
+def _surroundings(x: Axis, y: Axis, standing: QuietStanding) -> list[str]:
+    out = [
+        segments(x, y, _turned(corners[[0, 1, 2, 3, 0]], standing), Stroke(GREY, "", 0.9))
+        for corners in standing.plates
+    ]
+    for side, look in (("left", LEFT_SIDE), ("right", RIGHT_SIDE)):
         chosen = [i for i, name in enumerate(standing.foot_names) if name.startswith(side)]
         if chosen:
-            feet = _turned(standing.feet[chosen], standing)
-            axes.plot(
-                *feet.T,
-                linestyle="",
-                marker=marker,
-                markersize=4,
-                color=SIDE_COLOURS[side][0],
-                label=f"{side} foot markers",
-            )
+            inside = "#fff" if side == "left" else ""
+            out.append(points(x, y, *_turned(standing.feet[chosen], standing).T, look, inside=inside))
+    return out
 
 
-def standing_figure(standing: QuietStanding) -> "Figure":
-    """Draw centre of pressure, centre of mass, feet and plates in the subject's own axes; on the right the middle,
+def _square(middle: Array, reach: float, labels: tuple[str, str]) -> tuple[Axis, Axis]:
+    """Return two axes of one scale about ``middle`` (2,) that reach at least ``reach`` to each side."""
+    aspect = (_SQUARE.width - _SQUARE.left - _SQUARE.right) / _SQUARE.height
+    wide, high = reach * max(aspect, 1.0), reach * max(1.0, 1 / aspect)
+    return (
+        Axis(middle[0] - wide, middle[0] + wide, labels[0]),
+        Axis(middle[1] - high, middle[1] + high, labels[1]),
+    )
+
+
+def standing_figure(standing: QuietStanding) -> str:
+    """Return centre of pressure, centre of mass, feet and plates in the subject's own axes, and beside it the middle,
     enlarged.
     """
-    with look():
-        drawn = figure(3.4)
-        wide, near = drawn.subplots(1, 2)
-        for axes in (wide, near):
-            _path(axes, _turned(standing.cop, standing), colour=BLACK, marker="o", label="centre of pressure (plates)")
-            if standing.com.size:
-                _path(axes, _turned(standing.com, standing), colour=GREEN, marker="D", label="centre of mass (table)")
-            axes.set_aspect("equal")
-            axes.set_xlabel("to the subject's right (mm)" if standing.com.size else "along lab −y (mm)")
-        _surroundings(wide, standing)
-        shown = _turned(np.concatenate([standing.feet, standing.cop]), standing)
-        (left, back), (right, front) = np.nanmin(shown, axis=0) - _AROUND, np.nanmax(shown, axis=0) + _AROUND
-        wide.set_xlim(left, right)
-        wide.set_ylim(back, front)
-        wide.set_ylabel("ahead (mm)" if standing.com.size else "along lab x (mm)")
-        reach = 1.4 * max(
-            20.0, *(np.nanmax(np.abs(_turned(p, standing))) for p in (standing.cop, standing.com) if p.size)
-        )
-        near.set_xlim(-reach, reach)
-        near.set_ylim(-reach, reach)
-        near.axhline(0.0, color=GREY, linewidth=0.6)
-        near.axvline(0.0, color=GREY, linewidth=0.6)
-        handles, labels = wide.get_legend_handles_labels()
-        drawn.legend(handles, labels, loc="outside lower center", ncols=3)
-    return drawn
+    tracked = bool(standing.com.size)
+    labels = ("to the subject's right (mm)", "ahead (mm)") if tracked else ("along lab −y (mm)", "along lab x (mm)")
+    shown = _turned(np.concatenate([standing.feet, standing.cop]), standing)
+    low, high = np.nanmin(shown, axis=0) - _AROUND, np.nanmax(shown, axis=0) + _AROUND
+    x, y = _square((low + high) / 2, float(np.max(high - low)) / 2, labels)
+    wide = panel(x, y, [*_surroundings(x, y, standing), *_paths(x, y, standing)], "feet and plates", frame=_SQUARE)
+    reach = 1.4 * max(20.0, *(np.nanmax(np.abs(_turned(p, standing))) for p in (standing.cop, standing.com) if p.size))
+    x, y = _square(np.zeros(2), float(reach), labels)
+    axes = [rule(x, 0.0, upright=True), rule(y, 0.0, upright=False)]
+    near = panel(x, y, [*axes, *_paths(x, y, standing)], "the middle, enlarged", frame=_SQUARE)
+    words = ["black point: centre of pressure (plates)"]
+    words += ["green ring: centre of mass (table)"] if tracked else []
+    words += ["blue points: right foot's markers", "red rings: left foot's"]
+    legend = "".join(f"<span>{word}</span>" for word in words)
+    return f'<div class="legend">{legend}</div><div class="cells">{wide}{near}</div>'
 
 
-TITLES = ("Fx (N)", "Fy (N)", "Fz (N)", "Mx (N·m)", "My (N·m)", "Mz (N·m)")
-
-LEAST = (10.0, 10.0, 10.0, 4.0, 4.0, 4.0)
-"""N, N·m: the least that an axis spans, so that the noise of quiet standing is not blown up."""
-
-
-def _shade(axes: "Axes", comparison: WrenchComparison) -> None:
-    """Hatch the frames that are left out of every number."""
-    for first, stop in runs(np.logical_not(comparison.used)):
-        axes.axvspan(
-            comparison.time[first],
-            comparison.time[stop - 1],
-            facecolor="#EDEDED",
-            edgecolor="#C4C4C4",
-            hatch="////",
-            linewidth=0,
-        )
-
-
-def _curves(axes: "Axes", comparison: WrenchComparison, channel: int) -> None:
-    time, used = comparison.time, comparison.used
-    _shade(axes, comparison)
-    axes.plot(time, comparison.measured[:, channel], color=BLACK, linestyle="-")
-    axes.plot(time, comparison.simulated[:, channel], color=RED, linestyle=(0, (4, 2)))
-    shown = np.concatenate(
-        [comparison.measured[:, channel], comparison.simulated[used, channel] if used.any() else np.empty(0)]
-    )
-    limit_channel(axes, channel, shown)
-
-
-def limit_channel(axes: "Axes", channel: int, shown: Array) -> None:
-    """Let the axes of a channel hold all values ``shown``, no closer than `LEAST`."""
-    low, high = np.nanmin(shown), np.nanmax(shown)
-    half = max(0.56 * (high - low), LEAST[channel] / 2)
-    axes.set_ylim((low + high) / 2 - half, (low + high) / 2 + half)
-    axes.set_ylabel(TITLES[channel])
-    axes.tick_params(labelbottom=False)
-
-
-def limit_difference(axes: "Axes", channel: int, largest: float) -> None:
-    """Let the axes of a channel's difference hold its ``largest`` size, zero in the middle."""
-    half = max(1.15 * largest, LEAST[channel] / 4)
-    axes.set_ylim(-half, half)
-    axes.set_ylabel("diff.", fontsize=7.5)
-
-
-def over_differences(
-    size: float,
-    time: Array,
-    curves: "_DrawChannel",
-    differences: "_DrawChannel",
-    *,
-    share: float,
-    lines: "list[Artist]",
-) -> "Figure":
-    """Draw six channels in two columns (forces left, moments right) over ``time`` (T,) s, each over its difference.
-
-    ``curves`` and ``differences`` draw one channel into the axes given; ``size`` inches is the height of the figure,
-    ``share`` that of a difference, ``lines`` the legend.
+def _channels(curves: list[tuple[str, Array, Stroke]], measured: Array, used: Array) -> list[list[Strip]]:
+    """Return for each channel its curves (measured first) over the differences measured minus curve; forces left,
+    moments right.
     """
-    drawn = figure(size)
-    grid = drawn.subplots(6, 2, sharex=True, height_ratios=[3, share] * 3)
-    for channel in range(len(CHANNELS)):
-        row, column = 2 * (channel % 3), channel // 3
-        curves(grid[row, column], channel)
-        differences(grid[row + 1, column], channel)
-    for axes in grid[-1]:
-        axes.set_xlabel("time (s)")
-        axes.set_xlim(time[0], time[-1])
-    drawn.legend(handles=lines, loc="outside upper center", ncols=3)
-    drawn.align_ylabels()
-    return drawn
-
-
-def _residual(axes: "Axes", comparison: WrenchComparison, channel: int) -> None:
-    difference = np.where(comparison.used, comparison.measured[:, channel] - comparison.simulated[:, channel], np.nan)
-    _shade(axes, comparison)
-    axes.axhline(0.0, color=GREY, linewidth=0.6)
-    axes.plot(comparison.time, difference, color=BLACK, linestyle="-", linewidth=0.9)
-    largest = np.nanmax(np.abs(difference)) if comparison.used.any() else 0.0
-    limit_difference(axes, channel, largest)
-
-
-def wrench_figure(comparison: WrenchComparison) -> "Figure":
-    """Draw six channels in two columns (forces left, moments right), each over its residual; hatched frames are left
-    out.
-    """
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
-    with look():
-        lines: list[Artist] = [
-            Line2D([], [], color=BLACK, linestyle="-", label="measured by the plates"),
-            Line2D([], [], color=RED, linestyle=(0, (4, 2)), label="simulated with the table"),
+    cells = []
+    for channel in (0, 3, 1, 4, 2, 5):
+        title, least = CHANNEL_TITLES[channel], _LEAST[channel]
+        drawn = [Curve("measured", measured[:, channel], MEASURED)]
+        drawn += [Curve(name, np.where(used, value[:, channel], np.nan), look) for name, value, look in curves]
+        left = [
+            Curve(name, np.where(used, measured[:, channel] - value[:, channel], np.nan), look)
+            for name, value, look in curves
         ]
-        if not comparison.used.all():
-            lines.append(
-                Patch(
-                    facecolor="#EDEDED",
-                    edgecolor="#C4C4C4",
-                    hatch="////",
-                    linewidth=0,
-                    label="left out: not fully measured",
-                )
-            )
-        return over_differences(
-            5.7,
-            comparison.time,
-            lambda axes, channel: _curves(axes, comparison, channel),
-            lambda axes, channel: _residual(axes, comparison, channel),
-            share=1,
-            lines=lines,
-        )
+        unit = title[title.index("(") :]
+        cells.append([Strip(title, drawn, least), Strip(f"measured − simulated {unit}", left, least / 2, even=True)])
+    return cells
+
+
+def wrench_figure(comparison: WrenchComparison, trial: str = "") -> str:
+    """Return six channels, measured and simulated with the table, each over its residual; grey frames are left out."""
+    curves = [("with the table", comparison.simulated, TABLE)]
+    cells = _channels(curves, comparison.measured, comparison.used)
+    about = "Measured and simulated ground wrench; the numbers are in the table below"
+    return CurveFigure(comparison.time, cells, about, comparison.used, trial).html()
+
+
+def validation_figure(one: TrialValidation) -> str:
+    """Return six channels, measured, with the table and with the identified parameters, each over its differences;
+    grey frames are left out.
+    """
+    curves = [("with the table", one.table.value, TABLE), ("identified", one.identified.value, IDENTIFIED)]
+    about = "Measured ground wrench beside the table's and the identified body's; the numbers are in the table below"
+    cells = _channels(curves, one.measured.value, one.use)
+    return CurveFigure(one.measured.time, cells, about, one.use, one.name).html()
+
+
+def place_words(about: Array) -> str:
+    """Return a point of the lab in words: x and y in m."""
+    return f"x {format_number(about[0], 2)} m, y {format_number(about[1], 2)} m"

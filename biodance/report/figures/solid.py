@@ -1,8 +1,8 @@
-"""3-D stills as shaded pictures by pyvista, drawn in a child process: without GL libraries VTK kills the process that
-draws.
+"""A sheet of postures as a shaded picture by pyvista, drawn in a child process: without GL libraries VTK kills the
+process that draws.
 
-The child reads stills as JSON from stdin and writes PNGs, as JSON, to stdout. Whatever goes wrong in it, the parent
-gets None and the page takes the drawings of ``still.py`` instead.
+The child reads stills as JSON from stdin and writes a PNG, as JSON, to stdout. Whatever goes wrong in it, the parent
+gets None.
 """
 
 import json
@@ -17,16 +17,13 @@ from typing import Any
 import numpy as np
 
 from biodance.body.solids import box_solid
-from biodance.display import BLACK, GREEN, GREY, YELLOW
+from biodance.display import BLACK, GREEN
 from biodance.pipeline.results import Still
-from biodance.records import Array
-from biodance.report.figures.still import FORCE_SCALE, RESIDUAL_SCALE, VIEWS, still_figure
-from biodance.report.figures.style import SIDE_COLOURS, svg_address
+from biodance.report.figures.style import SIDE_COLOURS
 
 _PATIENCE = 60.0
 """Seconds after which the child is given up."""
 
-PIXELS = (1500, 900)
 TILE, _COLUMNS = (300, 420), 6
 """Size of one posture in a sheet of postures, px, and how many stand beside each other."""
 PNG = b"\x89PNG"
@@ -34,14 +31,14 @@ SKIN = 0.3
 """Opacity of the segments, through which bones and markers are seen."""
 
 
-def solid_pngs(stills: Sequence[Still], *, sheet: bool = False) -> list[bytes] | None:
-    """Return the pictures of ``stills`` as PNG bytes, or one ``sheet`` of all of them, each titled by its ``trial``.
+def sheet_png(stills: Sequence[Still]) -> bytes | None:
+    """Return one picture of all ``stills``, each titled by its ``trial``, as PNG bytes.
 
     None where pyvista or GL is missing, or the child dies or is too slow.
     """
     if find_spec("pyvista") is None or not stills:
         return None
-    question = json.dumps({"sheet": sheet, "stills": [_plain(still) for still in stills]})
+    question = json.dumps([_plain(still) for still in stills])
     try:
         child = subprocess.run(
             [sys.executable, "-m", "biodance.report.figures.solid"],
@@ -50,19 +47,10 @@ def solid_pngs(stills: Sequence[Still], *, sheet: bool = False) -> list[bytes] |
             timeout=_PATIENCE,
             check=False,
         )
-        pictures = [b64decode(text) for text in json.loads(child.stdout)] if child.returncode == 0 else []
+        picture = b64decode(json.loads(child.stdout)) if child.returncode == 0 else b""
     except (subprocess.TimeoutExpired, OSError, ValueError, TypeError):
         return None
-    whole = len(pictures) == (1 if sheet else len(stills)) and all(picture.startswith(PNG) for picture in pictures)
-    return pictures if whole else None
-
-
-def still_addresses(stills: Sequence[Still]) -> list[str]:
-    """Return ``stills`` as addresses of images: shaded where this machine can, else as drawings."""
-    pngs = solid_pngs(stills)
-    if pngs is None:
-        return [svg_address(still_figure(still)) for still in stills]
-    return ["data:image/png;base64," + b64encode(png).decode("ascii") for png in pngs]
+    return picture if picture.startswith(PNG) else None
 
 
 def _plain(still: Still) -> dict[str, Any]:
@@ -114,62 +102,6 @@ def _body(plotter: Any, still: Still) -> None:
     plotter.add_mesh(pv.Sphere(0.03, still.com), color=GREEN)
 
 
-def _measured(plotter: Any, still: Still) -> None:
-    """Put markers, plates, forces and a load into the active view."""
-    import pyvista as pv
-
-    for marker in still.markers[np.isfinite(still.markers).all(axis=1)]:
-        plotter.add_mesh(pv.Sphere(0.011, marker), color=BLACK)
-    for corners in still.plates:
-        plotter.add_mesh(pv.PolyData(corners, faces=[4, 0, 1, 2, 3]), color=GREY, opacity=0.5)
-    _arrow(plotter, still.cop, FORCE_SCALE * still.force, GREEN, 0.010)
-    _arrow(plotter, still.com, RESIDUAL_SCALE * still.residual, BLACK, 0.014)
-    if np.isfinite(still.load).all():
-        plotter.add_mesh(pv.Sphere(0.06, still.load), color=YELLOW)
-
-
-def _arrow(plotter: Any, start: Array, along: Array, colour: str, radius: float) -> None:
-    """Draw an arrow with a head of the same size whatever its length; nothing where it is not known or shorter than
-    its head.
-    """
-    import pyvista as pv
-
-    length = float(np.linalg.norm(along))
-    if not (np.isfinite(start).all() and length > 6 * radius):
-        return
-    head = 6 * radius / length
-    arrow = pv.Arrow(
-        start,
-        along,
-        tip_length=head,
-        tip_radius=2.5 * radius / length,
-        shaft_radius=radius / length,
-        scale=length,
-        tip_resolution=40,
-    )
-    plotter.add_mesh(arrow, color=colour, smooth_shading=False)
-
-
-def _names(plotter: Any, still: Still) -> None:
-    """Write left and right beside the ends of the arms: seen from the front, the right arm is on the left of the
-    picture.
-    """
-    for side, justified in (("left", "left"), ("right", "right")):
-        ends = [end for (_, end), own in zip(still.bones, still.sides, strict=True) if own == side]
-        if ends:
-            word = f"   {side}   "
-            look = {
-                "font_size": 22,
-                "shape": None,
-                "show_points": False,
-                "always_visible": True,
-                "text_color": SIDE_COLOURS[side][0],
-            }
-            plotter.add_point_labels(
-                [ends[-1]], [word], justification_horizontal=justified, justification_vertical="center", **look
-            )
-
-
 def _camera(
     plotter: Any, still: Still, view: tuple[float, float], *, distance: float, height: float | None = None
 ) -> None:
@@ -196,21 +128,6 @@ def _png(plotter: Any) -> bytes:
     return picture.getvalue()
 
 
-def _draw(still: Still) -> bytes:
-    """Return the PNG of one still, both views beside each other."""
-    import pyvista as pv
-
-    plotter = pv.Plotter(off_screen=True, shape=(1, len(VIEWS)), window_size=list(PIXELS), border=False)
-    for column, (elevation, azimuth, _) in enumerate(VIEWS):
-        plotter.subplot(0, column)
-        _body(plotter, still)
-        _measured(plotter, still)
-        if column == 0:
-            _names(plotter, still)
-        _camera(plotter, still, (elevation, azimuth), distance=5.0)
-    return _png(plotter)
-
-
 def _draw_sheet(stills: Sequence[Still]) -> bytes:
     """Return the PNG of many postures, each from the front, right, with its title, all to one scale."""
     import pyvista as pv
@@ -229,11 +146,6 @@ def _draw_sheet(stills: Sequence[Still]) -> bytes:
     return _png(plotter)
 
 
-def _answer(question: dict[str, Any]) -> list[str]:
-    stills = [_record(one) for one in question["stills"]]
-    pictures = [_draw_sheet(stills)] if question["sheet"] else [_draw(still) for still in stills]
-    return [b64encode(picture).decode("ascii") for picture in pictures]
-
-
 if __name__ == "__main__":
-    sys.stdout.write(json.dumps(_answer(json.load(sys.stdin))))
+    given = [_record(one) for one in json.load(sys.stdin)]
+    sys.stdout.write(json.dumps(b64encode(_draw_sheet(given)).decode("ascii")))

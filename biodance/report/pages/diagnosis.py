@@ -4,7 +4,6 @@ what changes.
 
 import sys
 from dataclasses import dataclass
-from importlib.resources import files
 from typing import Any
 
 from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Estimate
@@ -14,8 +13,8 @@ from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.provenance import Provenance
 from biodance.pipeline.results import SessionResult
 from biodance.records import CHANNELS
-from biodance.report.figures.diagnosis import adequacy_figure, left_figure, limits_figure
-from biodance.report.figures.style import svg_address
+from biodance.report.figures.diagnosis import adequacy_table, left_figure, limits_figure
+from biodance.report.pages.template import render, template_text
 from biodance.report.wording import format_number, trial_and_subject
 
 _SHOWN = {"m": (1000.0, "mm", 0), "rad": (57.29578, "°", 1), "s": (1000.0, "ms", 1), "1": (100.0, "%", 1)}
@@ -80,6 +79,13 @@ def answer(one: Diagnosis) -> str:
     return next((said.text for said in one.attention if said.about == ABOUT), f"{one.told[:1].upper()}{one.told[1:]}.")
 
 
+def _short_answer(one: Diagnosis) -> str:
+    """Return what the section begins with below the verdict, which stands at the top of the page."""
+    if one.findings:
+        return "What was found, its size, and what to do:"
+    return "No cause is named; the verdict stands at the top of this page."
+
+
 def odds(log_bayes_factor: float) -> str:
     """Return evidence against "nothing wrong" as odds in words."""
     if log_bayes_factor != log_bayes_factor or log_bayes_factor == float("inf"):
@@ -108,32 +114,29 @@ def diagnosis_section(found: SessionDiagnosis) -> str:
     )
     table = Markup("<table><tbody>{}</tbody></table>").format(rows) if one.findings else Markup("")
     return Markup(
-        "<section><h2>What the simulation gets wrong</h2><p class='look'><strong>{}</strong></p>{}{}"
+        '<section id="wrong"><h2>What the simulation gets wrong</h2><p>{}</p>{}{}'
         "<p class='small'>biodance diagnose says how we know, what else it could be and what accepting it "
         "changes.</p></section>"
-    ).format(answer(one), failures, table)
+    ).format(_short_answer(one), failures, table)
 
 
 def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: Provenance) -> str:
     """Return the page as HTML text; the same arguments give the same characters."""
-    from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
     one = found.diagnosis
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters.update(
-        number=format_number, sized=sized, estimated=estimated, odds=odds, first_upper=first_upper
-    )
-    environment.globals.update(named=named, words_of=words_of)
-    folder = files("biodance.report") / "templates"
     masses = []
     if found.before and found.accepted:
         then, now = (
             dict(zip(one.sip.segments, one.sip.mass.tolist(), strict=True)) for one in (found.before, found.accepted)
         )
         masses = [(name.replace("_", " "), then.get(name, float("nan")), mass) for name, mass in now.items()]
-    return environment.from_string((folder / "diagnosis.html.j2").read_text(encoding="utf-8")).render(
-        style=Markup((folder / "page.css").read_text(encoding="utf-8")),
+    return render(
+        "diagnosis.html.j2",
+        filters={"sized": sized, "estimated": estimated, "odds": odds, "first_upper": first_upper},
+        scripts=[template_text("curves.js")],
+        named=named,
+        words_of=words_of,
         result=result,
         one=one,
         answer=answer(one),
@@ -142,9 +145,9 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
         provenance=provenance,
         channels=list(zip(CHANNELS, ("N",) * 3 + ("N·m",) * 3, strict=True)),
         masses=masses,
-        left=svg_address(left_figure(found.left)) if found.left else "",
-        adequacy=svg_address(adequacy_figure(one.adequacy)) if one.adequacy else "",
-        limits=svg_address(limits_figure(one.limits)) if one.limits else "",
+        left=Markup(left_figure(found.left)) if found.left else "",
+        adequacy=Markup(adequacy_table(one.adequacy)) if one.adequacy else "",
+        limits=Markup(limits_figure(one.limits)) if one.limits else "",
         gain=found.gain,
         witnesses=_witnesses(one.witnesses),
     )

@@ -1,17 +1,15 @@
 """The pages of the report on what the body weighs: figures, tables and sentences; computes nothing."""
 
-from importlib.resources import files
-
 from biodance.identification.knowledge import QUANTITIES
 from biodance.identification.load_words import say_load
 from biodance.identification.sessions import certain_changes
 from biodance.pipeline.identification import SessionIdentification
 from biodance.records import CHANNELS
 from biodance.report.documents.identification import information_share, segment_rows, torques_document
-from biodance.report.figures.identification import drawn_joints, forest_figure, torque_figure, validation_figure
+from biodance.report.figures.identification import drawn_joints, forest_figure, torque_figure
 from biodance.report.figures.sessions import changes_figure, excitation_figure
-from biodance.report.figures.style import svg_address
-from biodance.report.wording import format_number, millimetres
+from biodance.report.pages.template import render
+from biodance.report.wording import format_number
 
 MARKS = {"known": "●", "partly known": "◐", "cannot be known": "○"}
 LISTED = "Cannot be known"
@@ -31,36 +29,33 @@ def small(value: float) -> str:
 
 def identification_section(found: SessionIdentification) -> str:
     """Return the sections as HTML text; the same argument gives the same characters."""
-    from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
 
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters.update(number=format_number, mm=millimetres, spaced=spaced, small=small)
-    template = (files("biodance.report") / "templates" / "identification.html.j2").read_text(encoding="utf-8")
     one, sure = found.identification, certain_changes(found.changes)
     rows = [(name, segment_rows(one, name)) for name in one.sip.segments] if one.status == "solved" else []
-    shown = found.validations or found.fitted[:1]
-    return environment.from_string(template).render(
+    return render(
+        "identification.html.j2",
+        filters={"spaced": spaced, "small": small},
         one=one,
         notes=[note for note in found.notes if not note.startswith(LISTED)],
         failures=found.failures,
         girths="; ".join(f"{spaced(name)}: {spaced(', '.join(said))}" for name, said in one.body.girths.items()),
-        forest=svg_address(forest_figure(one)) if rows else "",
+        forest=Markup(forest_figure(one)) if rows else "",
         segments=[(name, known, information_share(known)) for name, known in rows],
         quantities=QUANTITIES,
         marks=MARKS,
         gain=found.gain,
         trials=[(trial, "kept") for trial in found.validations] + [(trial, "fitted") for trial in found.fitted],
         channels=list(zip(CHANNELS, _UNITS, strict=True)),
-        figures=[(trial, svg_address(validation_figure(trial))) for trial in shown],
         torques=found.torques,
         torque_rows=(torques_document(found.torques) or {}).get("joints", []),
-        torque_image=svg_address(torque_figure(found.torques)) if found.torques and drawn_joints(found.torques) else "",
+        torque_image=Markup(torque_figure(found.torques)) if found.torques and drawn_joints(found.torques) else "",
         search=found.search,
         load=say_load(found.search),
         changes=[row for row in found.changes if row.quantity == "mass"],
-        comparison=svg_address(changes_figure(found.changes, sure)) if found.changes else "",
+        comparison=Markup(changes_figure(found.changes, sure)) if found.changes else "",
         certain=sure,
         total=len(found.changes),
         performance=found.performance,
-        danced=svg_address(excitation_figure(found.performance)) if found.performance else "",
+        danced=Markup(excitation_figure(found.performance)) if found.performance else "",
     )

@@ -1,10 +1,16 @@
-"""The analyst's page: one HTML file that holds all it shows and asks nothing of the network."""
+"""The analyst's page: one HTML file that holds all it shows and asks nothing of the network.
 
-from collections.abc import Sequence
+First what a person needs, on two printed pages: the verdict, what needs somebody, mass and key figures, the body; then,
+folded, everything by trial.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.resources import files
+from html import unescape
 
 from biodance.diagnosis.diagnosis import ABOUT
+from biodance.identification.validation import TrialValidation
 from biodance.lab.markers.gaps import MarkerGaps
 from biodance.pipeline.attention import session_attention
 from biodance.pipeline.provenance import Provenance
@@ -12,33 +18,77 @@ from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import Check, TrialResult
 from biodance.records import CHANNELS
 from biodance.records.attention import Attention
-from biodance.report.figures.session import marker_figure, standing_figure, wrench_figure
-from biodance.report.figures.style import svg_address
+from biodance.report.figures.session import (
+    marker_figure,
+    place_words,
+    standing_figure,
+    validation_figure,
+    wrench_figure,
+)
+from biodance.report.figures.still import still_figure
 from biodance.report.pages.identification import identification_section
+from biodance.report.pages.template import print_sheet, render, template_text
 from biodance.report.wording import format_number, millimetres, trial_and_subject
 
 STATUS_WORDS = {"ok": "done", "warning": "look here", "refused": "refused"}
 
 
-def check_table(result: SessionResult) -> tuple[list[tuple[str, str]], list[tuple[str, list[Check | None]]]]:
-    """Return the trials' checks as a table: its columns (what, limit), and per trial its name and one check or None
-    a column.
-    """
+def check_table(result: SessionResult) -> tuple[list[tuple[str, str]], list[tuple[TrialResult, list[Check | None]]]]:
+    """Return the trials' checks as a table: its columns (what, limit), and per trial one check or None a column."""
     columns = list(dict.fromkeys((check.what, check.limit) for trial in result.trials for check in trial.checks))
     rows = []
     for trial in result.trials:
         found = {(check.what, check.limit): check for check in trial.checks}
-        rows.append((trial.trial.name, [found.get(column) for column in columns]))
+        rows.append((trial, [found.get(column) for column in columns]))
     return columns, rows
 
 
 @dataclass(frozen=True)
+class Tile:
+    """One key figure: ``what``, its ``value``, what stands ``beside`` it, and whether it is inside its limit."""
+
+    what: str
+    value: str
+    beside: str
+    inside: bool = True
+
+
+def key_figures(result: SessionResult) -> list[Tile]:
+    """Return the mass and the key figures of a session: markers, forces, and what the movement told of the body."""
+    tiles, standing = [], result.standing
+    if standing:
+        declared = result.declared_mass
+        beside = (
+            f"declared {format_number(declared, 2)} kg ({format_number(result.mass_difference)} %)"
+            if declared == declared
+            else "none declared"
+        )
+        outside = any(check.what.startswith("mass on") and not check.inside for check in result.checks)
+        tiles.append(Tile("Mass on the plates", f"{format_number(standing.mass, 2)} kg", beside, not outside))
+    for start, what in (
+        ("marker distance, RMS", "Markers to the body"),
+        ("force difference", "Forces to the simulation"),
+    ):
+        if found := [check for check in result.all_checks if check.what.startswith(start)]:
+            worst = max(found, key=lambda check: float(check.value.split()[0]))
+            tiles.append(Tile(what, worst.value, f"worst trial {worst.where}, {worst.limit}", worst.inside))
+    one = result.identification
+    if one and one.identification.status == "solved":
+        masses = [known.verdict for known in one.identification.known if known.quantity == "mass"]
+        gain = f"{format_number(one.gain.force, 2)} times closer on kept trials" if one.gain else "gain not proven"
+        value = f"{masses.count('known')} known, {masses.count('partly known')} partly"
+        tiles.append(Tile(f"Masses of {len(masses)} segments", value, gain))
+    return tiles
+
+
+@dataclass(frozen=True)
 class TrialPart:
-    """One trial with its drawn figures as image addresses; "" where there is nothing to draw."""
+    """One trial with its figures as HTML; "" where there is nothing to draw."""
 
     result: TrialResult
     markers: str
     wrench: str
+    validation: TrialValidation | None = None
 
     @property
     def gaps(self) -> list[MarkerGaps]:
@@ -67,12 +117,25 @@ class TrialPart:
         return list(zip(CHANNELS, units, comparison.rms.tolist(), comparison.correlation.tolist(), strict=True))
 
 
-def _trial_part(result: TrialResult) -> TrialPart:
-    return TrialPart(
-        result,
-        svg_address(marker_figure(result.fit)) if result.fit else "",
-        svg_address(wrench_figure(result.comparison)) if result.comparison else "",
-    )
+def _trial_part(result: TrialResult, validated: Mapping[str, TrialValidation]) -> TrialPart:
+    name = result.trial.name
+    if name in validated:
+        wrench = validation_figure(validated[name])
+    else:
+        wrench = wrench_figure(result.comparison, name) if result.comparison else ""
+    return TrialPart(result, marker_figure(result.fit) if result.fit else "", wrench, validated.get(name))
+
+
+def _apart(value: float, above: str, below: str) -> str:
+    """Return a signed distance in m as words: ``15.1 mm behind``."""
+    return f"{millimetres(abs(value))} mm {above if value > 0 else below}"
+
+
+def _contents(inner: str) -> list[tuple[str, str]]:
+    """Return address and title of every section of the page, of which ``inner`` holds those in the middle."""
+    found = re.findall(r'<section id="([^"]+)">\s*<h2>([^<]+)</h2>', inner)
+    last = {"checks": "Quality checks", "standing": "Quiet standing", "trials": "Trials", "made": "How it was made"}
+    return [("body", "The body"), *((where, unescape(title)) for where, title in found), *last.items()]
 
 
 def page(
@@ -80,34 +143,43 @@ def page(
     provenance: Provenance,
     *,
     attention: Sequence[Attention] | None = None,
-    stills: Sequence[str] = (),
     diagnosis: str = "",
+    movement: str = "",
 ) -> str:
     """Return the page of ``result`` as HTML text; ``attention`` what a person must see (by default
-    `session_attention`), ``stills`` the addresses of its 3-D images (`still`, then `more_stills`), ``diagnosis`` the
-    section on what the simulation gets wrong, "" for none.
+    `session_attention`); ``diagnosis`` and ``movement`` the sections on what the simulation gets wrong and on what
+    moved, "" for none.
 
     The same arguments give the same characters.
     """
-    from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
     said = session_attention(result) if attention is None else attention
-    first = sorted(said, key=lambda one: one.about != ABOUT)
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters.update(number=format_number, mm=millimetres)
-    folder = files("biodance.report") / "templates"
-    return environment.from_string((folder / "page.html.j2").read_text(encoding="utf-8")).render(
-        style=Markup((folder / "page.css").read_text(encoding="utf-8")),
-        attention=[(trial_and_subject(one), one.text) for one in first],
+    found = result.identification
+    validated = {one.name: one for one in (*found.validations, *found.fitted)} if found else {}
+    identified = identification_section(found) if found else ""
+    worst = result.more_stills[0] if result.more_stills else result.still
+    others = [still for still in (result.still, *result.more_stills) if still is not None and still is not worst]
+    name, made = result.session.folder.name, f"biodance {provenance.versions['biodance']}, {provenance.created}"
+    return render(
+        "page.html.j2",
+        filters={"place": place_words, "apart": _apart},
+        scripts=[template_text("curves.js")],
+        sheet=Markup(print_sheet(f"Session {name}", provenance.visit, made)),
+        headline=next((one for one in said if one.about == ABOUT), None),
+        attention=[(trial_and_subject(one), one.text) for one in said if one.about != ABOUT],
+        tiles=key_figures(result),
+        contents=_contents(f"{diagnosis}{identified}{movement}"),
         check_table=check_table(result),
         result=result,
         provenance=provenance,
-        parts=[_trial_part(trial) for trial in result.trials],
-        standing=svg_address(standing_figure(result.standing)) if result.standing else "",
-        still=stills[0] if stills else "",
-        more_stills=list(zip(stills[1:], result.more_stills, strict=True)) if stills else [],
+        parts=[_trial_part(trial, validated) for trial in result.trials],
+        standing=Markup(standing_figure(result.standing)) if result.standing else "",
+        shown=Markup(still_figure(worst)) if worst else "",
+        shown_still=worst,
+        more_stills=[(Markup(still_figure(one)), one) for one in others],
         diagnosis=Markup(diagnosis),
-        identification=Markup(identification_section(result.identification)) if result.identification else "",
+        movement=Markup(movement),
+        identification=Markup(identified),
         words=STATUS_WORDS,
     )

@@ -1,0 +1,222 @@
+"""Light figures as SVG text: axes, and marks in whole steps of them. No figure library is loaded.
+
+A panel is an SVG of its own with a plot of `STEPS` x `STEPS` steps that stretches to the panel's width; line widths
+and points keep their size. ``curves.js`` zooms by looking at a part of the steps, and reads values from the paths.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.display import BLACK, BLUE, GREEN, GREY, PINK, RED
+from biodance.records import Array, runs
+from biodance.report.wording import format_number
+
+STEPS = 4000
+"""Steps along each axis of a plot: a value is read to 1/4000 of what the axis spans."""
+_PLACES = 600
+"""Places along a curve that are told apart: of longer ones each place shows the lowest and the highest value."""
+_FAR = 8 * STEPS
+"""Steps beyond which a value outside the axes is cut."""
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """How a curve or a point looks: colour, dashes ("" = full line) and width in px. Never the colour alone."""
+
+    colour: str = BLACK
+    dash: str = ""
+    width: float = 1.3
+
+    @property
+    def attributes(self) -> str:
+        """As attributes of an SVG path."""
+        dash = f' stroke-dasharray="{self.dash}"' if self.dash else ""
+        return f'stroke="{self.colour}" stroke-width="{self.width:g}"{dash}'
+
+
+MEASURED, TABLE, IDENTIFIED = Stroke(BLACK), Stroke(BLUE, "6 3"), Stroke(RED, "2 2", 1.6)
+LEFT_SIDE, RIGHT_SIDE, MIDDLE_SIDE = Stroke(RED, "5 3"), Stroke(BLUE), Stroke(GREY)
+STROKES = (Stroke(BLUE), Stroke(RED, "5 3"), Stroke(GREEN, "2 2", 1.6), Stroke(BLACK, "7 2 2 2"), Stroke(PINK, "9 3"))
+"""Of curve after curve."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """From ``low`` to ``high``; ``label`` says what, with its unit; ``ticks`` (value, text) where they are not numbers;
+    ``log`` for a logarithmic one.
+    """
+
+    low: float
+    high: float
+    label: str = ""
+    ticks: tuple[tuple[float, str], ...] | None = None
+    log: bool = False
+
+    def steps(self, values: "NDArray[Any] | Sequence[float] | float") -> NDArray[np.int64]:
+        """Return where ``values`` (finite) lie, in whole steps from ``low``."""
+        given = np.asarray(values, dtype=float)
+        low, high = (np.log10([self.low, self.high])) if self.log else (self.low, self.high)
+        share = ((np.log10(given) if self.log else given) - low) / ((high - low) or 1.0)
+        return np.rint(np.clip(STEPS * share, -_FAR, _FAR + STEPS)).astype(np.int64)
+
+    def marked(self, count: int) -> list[tuple[int, str]]:
+        """Return step and text of its ticks: those given, else about ``count`` round numbers."""
+        if self.ticks is not None:
+            return [(int(self.steps(value)), text) for value, text in self.ticks]
+        return [(int(self.steps(value)), text) for value, text in round_ticks(self.low, self.high, count)]
+
+
+def around(values: NDArray[Any], *, least: float = 0.0, label: str = "", share: float = 0.06) -> Axis:
+    """Return an axis that holds all finite ``values`` with ``share`` of room on each side, no shorter than ``least``;
+    0 to 1 where there is none.
+    """
+    seen = values[np.isfinite(values)]
+    low, high = (float(seen.min()), float(seen.max())) if seen.size else (0.0, 1.0)
+    half = max((0.5 + share) * (high - low), least / 2) or 0.5
+    return Axis((low + high) / 2 - half, (low + high) / 2 + half, label)
+
+
+def round_ticks(low: float, high: float, count: int) -> list[tuple[float, str]]:
+    """Return about ``count`` round values between ``low`` and ``high`` with their text."""
+    rough = (high - low) / max(count, 1)
+    ten = 10.0 ** np.floor(np.log10(rough))
+    step = next(ten * k for k in (1, 2, 5, 10) if ten * k >= 0.999 * rough)
+    digits = max(0, -int(np.floor(np.log10(step) + 1e-9)))
+    first, last = int(np.ceil(low / step - 1e-9)), int(np.floor(high / step + 1e-9))
+    return [(k * step, format_number(k * step, digits)) for k in range(first, last + 1)]
+
+
+def envelope(values: Array) -> NDArray[np.int64]:
+    """Return the indices (n,) of ``values`` (T,) that a curve needs: all, or of every place along a long one the
+    lowest and the highest.
+    """
+    if values.size <= 2 * _PLACES:
+        return np.arange(values.size)
+    edges = np.linspace(0, values.size, _PLACES + 1).astype(int)
+    size = int(np.diff(edges).max())
+    index = np.minimum(edges[:-1, None] + np.arange(size), edges[1:, None] - 1)
+    held = values[index]
+    rows = np.arange(_PLACES)
+    lowest = index[rows, np.where(np.isfinite(held), held, np.inf).argmin(axis=1)]
+    highest = index[rows, np.where(np.isfinite(held), held, -np.inf).argmax(axis=1)]
+    return np.unique(np.concatenate([lowest, highest]))
+
+
+def path(across: NDArray[np.int64], down: NDArray[np.int64]) -> str:
+    """Return one line through points in steps, as an SVG path with steps from point to point."""
+    moved = np.stack([np.diff(across), np.diff(down)], axis=1).ravel().tolist()
+    start = f"M{across[0]} {down[0]}"
+    return f"{start}l{' '.join(map(str, moved))}".replace(" -", "-") if moved else f"{start}h0"
+
+
+def curve_line(x: Axis, y: Axis, at: Array, values: Array, look: Stroke, *, name: str = "", kind: str = "line") -> str:
+    """Return a curve of ``values`` (T,) over ``at`` (T,), broken where a value is not finite; ``name`` for the legend's
+    button, ``kind`` its class.
+    """
+    chosen = envelope(values)
+    across, held = x.steps(at[chosen]), values[chosen]
+    finite = np.isfinite(held)
+    down = STEPS - y.steps(np.where(finite, held, 0.0))
+    d = "".join(path(across[a:b], down[a:b]) for a, b in runs(finite))
+    return f'<path class="{kind}" {_named(name)}{look.attributes} d="{d}"/>' if d else ""
+
+
+def band(x: Axis, y: Axis, at: Array, low: Array, high: Array, colour: str, *, name: str = "") -> str:
+    """Return the area between ``low`` and ``high`` (T,), left out where either is not finite."""
+    chosen = np.union1d(envelope(low), envelope(high))
+    across, finite = x.steps(at[chosen]), np.isfinite(low[chosen] + high[chosen])
+    below, above = (STEPS - y.steps(np.where(finite, v[chosen], 0.0)) for v in (low, high))
+    d = "".join(
+        path(np.concatenate([across[a:b], across[a:b][::-1]]), np.concatenate([above[a:b], below[a:b][::-1]])) + "z"
+        for a, b in runs(finite)
+        if b - a > 1
+    )
+    return f'<path class="band" {_named(name)}fill="{colour}" d="{d}"/>' if d else ""
+
+
+def _named(name: str) -> str:
+    return f'data-name="{escape(name)}" ' if name else ""
+
+
+def shade(x: Axis, first: float, last: float, *, kind: str = "out") -> str:
+    """Return a strip over the whole height from ``first`` to ``last`` of the x axis; ``kind`` is its class."""
+    a, b = (int(v) for v in x.steps([first, last]))
+    return f'<rect class="{kind}" x="{a}" y="0" width="{max(b - a, 1)}" height="{STEPS}"/>'
+
+
+def rule(axis: Axis, value: float, *, upright: bool, look: Stroke = Stroke(GREY, "", 0.7)) -> str:
+    """Return a thin line through the whole plot at ``value``; ``upright`` where the axis is x."""
+    at = int(axis.steps(value))
+    d = f"M{at} 0v{STEPS}" if upright else f"M0 {STEPS - at}h{STEPS}"
+    return f'<path class="rule" {look.attributes} d="{d}"/>'
+
+
+def points(x: Axis, y: Axis, across: Array, up: Array, look: Stroke, *, size: float = 6.0, inside: str = "") -> str:
+    """Return round points of ``size`` px at (n,) places, filled with ``inside`` ("" = the look's colour)."""
+    finite = np.isfinite(across) & np.isfinite(up)
+    if not finite.any():
+        return ""
+    d = "".join(f"M{a} {STEPS - b}h0" for a, b in zip(x.steps(across[finite]), y.steps(up[finite]), strict=True))
+    dots = f'<path class="dot" stroke="{look.colour}" stroke-width="{size:g}" d="{d}"/>'
+    return dots + (f'<path class="dot" stroke="{inside}" stroke-width="{size - 2.4:g}" d="{d}"/>' if inside else "")
+
+
+def segments(x: Axis, y: Axis, way: Array, look: Stroke) -> str:
+    """Return a line through the places ``way`` (n, 2), broken where one is not finite."""
+    finite = np.isfinite(way).all(axis=1)
+    held = np.where(finite[:, None], way, 1.0)
+    across, down = x.steps(held[:, 0]), STEPS - y.steps(held[:, 1])
+    return f'<path {look.attributes} d="{"".join(path(across[a:b], down[a:b]) for a, b in runs(finite))}"/>'
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Size of a panel in px as drawn on a wide page: the plot's ``height`` and the whole ``width``, and the room for
+    the words ``left`` of the plot and ``below`` it.
+    """
+
+    width: float = 390.0
+    height: float = 110.0
+    left: float = 44.0
+    below: float = 16.0
+    above: float = 15.0
+    right: float = 8.0
+
+
+def panel(x: Axis, y: Axis, marks: Iterable[str], about: str, *, frame: Frame = Frame(), numbers: bool = True) -> str:
+    """Return one panel as an SVG element: ``marks`` in its plot, the y axis' label above it, the x axis' label below.
+
+    ``about`` is what a person who cannot see it is told; without ``numbers`` the x axis has no text.
+    """
+    f, wide = frame, frame.width - frame.left - frame.right
+    below = f.below + (13.0 if x.label else 0.0) if numbers else 5.0
+    up = y.marked(3 if f.height > 60 else 2)
+    grid = [f"M{at} 0v{STEPS}" for at, _ in x.marked(6)] + [f"M0 {STEPS - at}h{STEPS}" for at, _ in up]
+    words = [
+        f'<text x="{f.left - 4:g}" y="{f.above + f.height * (1 - at / STEPS) + 3:.1f}" text-anchor="end">{text}</text>'
+        for at, text in ((at, escape(text)) for at, text in up)
+    ]
+    if y.label:
+        words.append(f'<text class="title" x="{2 if y.ticks is None else f.left:g}" y="10">{escape(y.label)}</text>')
+    foot = f.above + f.height
+    if numbers:
+        words += [
+            f'<text class="x" x="{f.left + wide * at / STEPS:.1f}" y="{foot + 12:g}" text-anchor="middle">'
+            f"{escape(text)}</text>"
+            for at, text in x.marked(6)
+        ]
+    if numbers and x.label:
+        middle = f.left + wide / 2
+        words.append(f'<text x="{middle:g}" y="{foot + 26:g}" text-anchor="middle">{escape(x.label)}</text>')
+    return (
+        f'<svg class="panel" role="img" aria-label="{escape(about)}" viewBox="0 0 {f.width:g} {foot + below:g}"'
+        f' data-x="{x.low:.9g} {x.high:.9g}" data-y="{y.low:.9g} {y.high:.9g}" data-title="{escape(y.label)}">'
+        f'<svg class="plot" x="{f.left:g}" y="{f.above:g}" width="{wide:g}" height="{f.height:g}"'
+        f' viewBox="0 0 {STEPS} {STEPS}" preserveAspectRatio="none"><path class="grid" d="{"".join(grid)}"/>'
+        f'{"".join(marks)}</svg><g class="words">{"".join(words)}</g></svg>'
+    )

@@ -1,0 +1,67 @@
+"""How a template becomes a page: one environment, one style, and scripts that the page's own policy allows by their
+hash.
+"""
+
+import functools
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
+from hashlib import sha256
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any
+
+from biodance.report.wording import format_number, millimetres
+
+if TYPE_CHECKING:
+    from jinja2 import Template
+
+
+def template_text(name: str) -> str:
+    """Return a file of the templates' folder."""
+    return (files("biodance.report") / "templates" / name).read_text(encoding="utf-8")
+
+
+def render(name: str, *, filters: dict[str, Any] | None = None, scripts: Sequence[str] = (), **values: Any) -> str:
+    """Return a template filled with ``values`` as HTML text; the same arguments give the same characters.
+
+    Every template knows ``style`` and ``policy`` (what its page may do: nothing of the network, and only ``scripts``),
+    ``scripts``, and the filters ``number`` and ``mm``.
+    """
+    from markupsafe import Markup
+
+    style = template_text("page.css") + template_text("curves.css")
+    given = {"style": Markup(style), "policy": _policy(scripts), "scripts": [Markup(text) for text in scripts]}
+    return _compiled(name, tuple((filters or {}).items())).render(**{**given, **values})
+
+
+@functools.cache
+def _compiled(name: str, filters: tuple[tuple[str, Any], ...]) -> "Template":
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters.update(number=format_number, mm=millimetres, **dict(filters))
+    return environment.from_string(template_text(name))
+
+
+def print_sheet(title: str, visit: Mapping[str, str], made: str) -> str:
+    """Return the style of the printed page's margins: what it is above, when and by whom it was made and the page's
+    number below.
+    """
+    about = " · ".join(f"{what} {said}" for what, said in visit.items() if said)
+    boxes = {
+        "top-left": _css_text(title),
+        "top-right": _css_text(about),
+        "bottom-left": _css_text(f"{made} · for research use"),
+        "bottom-right": '"page " counter(page) " of " counter(pages)',
+    }
+    return f"@page {{ {' '.join(f'@{where} {{ content: {text}; }}' for where, text in boxes.items())} }}"
+
+
+def _css_text(text: str) -> str:
+    """Return text as a string of a style sheet; nothing in it can end the string or the sheet."""
+    return '"' + "".join(c if c.isalnum() or c in " .,:-·" else f"\\{ord(c):x} " for c in text) + '"'
+
+
+def _policy(scripts: Sequence[str]) -> str:
+    hashes = " ".join(f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'" for text in scripts)
+    allowed = f"script-src {hashes}; " if scripts else ""
+    return f"default-src 'none'; {allowed}style-src 'unsafe-inline'; img-src data:"

@@ -1,0 +1,108 @@
+"""Page, terminal and JSON over all verdicts, checks and unjudged trials: none of them says that all is well beside a
+check outside its limit or a trial that was not judged.
+"""
+
+import itertools
+import json
+import re
+from dataclasses import replace
+from io import StringIO
+
+import pytest
+from example_results import full_session
+from rich.console import Console
+
+from biodance.diagnosis.diagnosis import ABOUT, Adequacy, Alias, Diagnosis, Estimate, Finding
+from biodance.pipeline.attention import told
+from biodance.pipeline.diagnosis import SessionDiagnosis
+from biodance.pipeline.provenance import provenance
+from biodance.pipeline.trial_result import Check
+from biodance.records.attention import Judged
+from biodance.report.documents.diagnosis import attention_document, diagnosis_document
+from biodance.report.documents.session import results_document, to_text
+from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
+from biodance.report.pages.session import page
+from biodance.report.terminal import print_diagnosis, print_session
+
+WELL = re.compile(
+    r"nothing wrong(?! in what could be judged| \(in what could be judged)|named, complete|every check is inside|"
+    r"\bcomplete\b|\bnothing more is wrong",
+    re.IGNORECASE,
+)
+"""What may not stand beside a failed check: an unlimited "nothing wrong", "complete" and their like."""
+LEFT = (Adequacy("Fx", (0.3, 1.0), 12.0, "walk", 1.0, 5.0),)
+FOUND = Finding("plate_gain", "Fz", (Estimate("gain", 0.06, 0.002, "1"),), (Alias("plate_gain", "Fz", 80.0),), 0.9)
+WHOLE = Diagnosis("nothing wrong", ())
+VERDICTS = (
+    WHOLE,
+    replace(WHOLE, verdict="named, complete", findings=(FOUND,)),
+    replace(WHOLE, verdict="named, incomplete", findings=(FOUND,), adequacy=LEFT),
+    replace(WHOLE, verdict="unexplained", adequacy=LEFT),
+    replace(WHOLE, verdict="unexplained", adequacy=LEFT, resembles=(FOUND,)),
+    replace(WHOLE, verdict="unexplained", adequacy=LEFT, doubt="standing alone tells no cause"),
+    replace(WHOLE, verdict="unexplained"),
+)
+CHECKS = tuple(
+    Check(what, "walk <1>", "9 units", "at most 5 units", False, "Look.")
+    for what in (
+        "mass on the plates against declared",
+        "centre of mass off the centre of pressure, standing",
+        "marker distance, RMS",
+        "marker distance, largest",
+        "posture left open",
+        "markers not seen",
+        "fully measured",
+        "force difference, worst axis",
+    )
+)
+FULL = full_session()
+MADE = provenance(FULL, created="2026-01-01T00:00:00Z")
+STATIC, MISSED = Judged("static", 3.0), Judged("walk", 0.0, "no 1 s of contact.", missed=True)
+
+
+def surfaces(verdict: Diagnosis, check: Check, judged: tuple[Judged, ...]) -> dict[str, str]:
+    """Return what page, terminal and JSON say, as plain text, of a verdict beside a check of a trial."""
+    full = FULL
+    trial = replace(full.trials[0], fit=None, comparison=None, standing=None, checks=(check,))
+    result = replace(full, trials=(trial,), checks=(), standing=None, still=None)
+    found = SessionDiagnosis(told(verdict, result, judged))
+    made, first = MADE, found.diagnosis.attention
+    numbers = json.loads(to_text(diagnosis_document(found)))
+    screen = StringIO()
+    console = Console(file=screen, width=1000)
+    print_session(result, attention_document(first), console)
+    print_diagnosis(numbers, console)
+    pages = (
+        page(result, made, attention=first, diagnosis=diagnosis_section(found)),
+        diagnosis_page(result, found, made),
+    )
+    whole = to_text(results_document(result, made)) + to_text({**numbers, "verdict": ""})
+    plain = [re.sub(r"<style>.*?</style>|<script>.*?</script>|<[^>]+>", " ", text, flags=re.DOTALL) for text in pages]
+    return {"page": plain[0], "page of the diagnosis": plain[1], "terminal": screen.getvalue(), "JSON": whole}
+
+
+@pytest.mark.parametrize("verdict", VERDICTS, ids=lambda one: f"{one.verdict} {one.doubt[:8]}{len(one.resembles)}")
+def test_nothing_says_all_is_well_beside_a_failed_check_or_an_unjudged_trial(verdict: Diagnosis) -> None:
+    inside, rows = replace(CHECKS[2], inside=True), ((STATIC, MISSED), (MISSED,))
+    for check, judged in (*itertools.product(CHECKS, ((STATIC,),)), *itertools.product((inside, CHECKS[0]), rows)):
+        for where, text in surfaces(verdict, check, judged).items():
+            said = " ".join(text.split()).replace("as probable as nothing wrong", "").replace("named, incomplete", "")
+            assert not WELL.findall(said), f"{where} beside {check.what} ({check.inside}): {WELL.search(said)}"
+            if not check.inside:
+                assert check.what in said, where
+
+
+def test_a_session_without_fault_may_say_so() -> None:
+    check = replace(CHECKS[2], inside=True)
+    for where, text in surfaces(WHOLE, check, (STATIC,)).items():
+        assert "othing wrong" in text, where
+
+
+def test_a_trial_with_a_failed_check_is_not_ok() -> None:
+    trial = full_session().trials[0]
+    assert replace(trial, checks=()).status == "ok"
+    assert replace(trial, checks=(replace(CHECKS[0], inside=True),)).status == "ok"
+    for check in CHECKS:
+        one = replace(trial, checks=(check,))
+        assert one.status == "warning"
+        assert ABOUT not in one.reason
