@@ -43,7 +43,7 @@ def _group_check(by_group: Mapping[str, float], name: str, limits: CheckLimits, 
     if not worst:
         return []
     said = ", ".join(f"{group} {1000 * limit:g}" for group, limit in allowed.items())
-    value = f"{worst} {1000 * by_group[worst]:.1f} mm"
+    value = f"{1000 * by_group[worst]:.1f} mm, {worst}"
     return [Check(_GROUPS, name, value, f"at most {said} mm", by_group[worst] <= allowed[worst], advice)]
 
 
