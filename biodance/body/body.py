@@ -198,8 +198,22 @@ class Body:
         return tuple(carried.get(i, NO_JOINT) for i in range(len(self.segments) + len(self.parts)))
 
     def place_on_segment(self, joint: int) -> tuple[int, Array]:
-        """Return the segment that ``joint`` (an index) hangs on, parts passed over, and the joint's place (3,) m in its
-        frame in the neutral posture.
+        """Return which segment a joint hangs on, and where.
+
+        Parameters
+        ----------
+        joint : int
+            Index in ``joints``.
+
+        Returns
+        -------
+        tuple
+            Index of the segment, parts passed over, and the joint's place (3,) m in its frame in the neutral posture.
+
+        Examples
+        --------
+        >>> result.body.place_on_segment(result.body.joint_index("right_hip_flexion"))[0]
+        0
         """
         place, above = self.joints[joint].translation, self.joints[joint].parent
         while above >= 0 and not 0 <= self.joints[above].segment < len(self.segments):
@@ -279,7 +293,23 @@ class Body:
         return self.segments.index(name)
 
     def link_parameters(self, phi: Array | None = None) -> Array:
-        """Return the parameters (10 (N + P),) of the `links` from those of the segments ``phi`` (10 N,), the body's."""
+        """Return the inertial parameters of segments without their parts, and of the parts.
+
+        Parameters
+        ----------
+        phi : numpy.ndarray, optional
+            (10 N,) of the segments, each with its parts; by default the body's.
+
+        Returns
+        -------
+        numpy.ndarray
+            (10 (N + P),) of the `links`.
+
+        Examples
+        --------
+        >>> result.body.link_parameters().shape
+        (120,)
+        """
         whole = self.sip.phi if phi is None else phi
         return whole if self.sharing is None else self.sharing @ whole
 

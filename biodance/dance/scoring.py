@@ -198,8 +198,7 @@ def _in_joints_of(body: Body, dance: Dance, motion: Motion) -> Motion:
     new = np.flatnonzero([joint.name not in names for joint in body.joints])
     if not new.size:
         return motion
-    moved = [
-        np.insert(part, new - np.arange(new.size) + root, 0.0, axis=1)
-        for part, root in ((motion.q, body.nq - len(body.joints)), (motion.v, body.n_root), (motion.a, body.n_root))
-    ]
-    return Motion(motion.time, *moved, joint_names=tuple(joint.name for joint in body.joints))
+    before, root = new - np.arange(new.size), body.nq - len(body.joints)
+    q = np.insert(motion.q, before + root, 0.0, axis=1)
+    v, a = (np.insert(part, before + body.n_root, 0.0, axis=1) for part in (motion.v, motion.a))
+    return Motion(motion.time, q, v, a, joint_names=tuple(joint.name for joint in body.joints))

@@ -20,8 +20,10 @@ from biodance.motion.kinematics import jacobian, poses
 from biodance.motion.track import hold_open
 from biodance.records import Array, Index, Markers
 
-NEED = 0.015
-"""m: markers that lie within this of the body, RMS, ask for no further joint: skin alone slides by as much."""
+NEED = 0.020
+"""m: markers that lie within this of the body, RMS, in every trial ask for no further joint (OpenSim's user guide)."""
+_ONCE_WIDER = 0.015
+"""m: the same for a body that was found too stiff elsewhere."""
 GAIN = 0.9
 """A joint is taken if the markers left out lie nearer than this share of their distance without it."""
 _FRAMES, _TRIALS = 48, 6
@@ -41,7 +43,7 @@ _TELLING = {
 class JointGain:
     """What one of the optional joints (``name``) brings: the ``markers`` that tell of it; ``fitted`` m, their RMS
     distance from the body without it; ``without``, ``with_it`` m, the RMS distance of each from where the others put
-    it, over the half of the trials that shows the joint best; whether it is ``taken``.
+    it; all over the half of the trials that shows the joint best; whether it is ``taken``.
     """
 
     name: str
@@ -90,7 +92,12 @@ def with_shown_joints(
     while some is not None:
         before = _follow(body, some)
         wider = [(name, with_optional(body, name, landmarks)) for name in left]
-        tried = [pair for name, more in wider if more is not body for pair in _tried(name, more, some, before)]
+        tried = [
+            pair
+            for name, more in wider
+            if more is not body
+            for pair in _tried(name, more, some, before, _ONCE_WIDER if gains else NEED)
+        ]
         more, best = min(tried, key=lambda pair: pair[1].with_it / pair[1].without, default=(body, None))
         if best is None or best.with_it >= GAIN * best.without:
             return body, (*gains, *(gain for _, gain in tried))
@@ -99,20 +106,20 @@ def with_shown_joints(
     return body, ()
 
 
-def _tried(name: str, more: Body, some: _Sample, before: _Followed | None) -> list[tuple[Body, JointGain]]:
+def _tried(name: str, more: Body, some: _Sample, before: _Followed | None, need: float) -> list[tuple[Body, JointGain]]:
     """Return the body with one joint more and what it brings; nothing where no markers can show it, or none asks."""
     worn = zip(more.markers.names, more.markers.segment, strict=True)
     told = [one for one, s in worn if one in some.markers and kind_of(more.links[s]) in _TELLING[name]]
     if before is None or not told:
         return []
     fitted, without = before.distances(told, some.trial)
-    after = _follow(more, some) if fitted.max() > NEED else None
+    after = _follow(more, some) if fitted.max() > need else None
     if after is None:
         return []
     _, with_it = after.distances(told, some.trial)
     best = np.argsort(with_it / without)[: (len(without) + 1) // 2]
-    mean = [float(np.sqrt(np.mean(value**2))) for value in (fitted, without[best], with_it[best])]
-    return [(more, JointGain(name, tuple(told), *mean))]
+    all_of, foretold, better = (float(np.sqrt(np.mean(x**2))) for x in (fitted[best], without[best], with_it[best]))
+    return [(more, JointGain(name, tuple(told), all_of, foretold, better))]
 
 
 def _follow(body: Body, some: _Sample) -> _Followed | None:

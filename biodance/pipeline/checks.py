@@ -3,7 +3,7 @@
 The limits, and where they come from, are `biodance.settings.CheckLimits`.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from biodance.records import Subject
 from biodance.settings import CheckLimits
 
 _MASS = "mass on the plates against declared"
+_GROUPS = "marker distance, RMS by group"
 _MARKERS = ("marker distance, RMS", "marker distance, largest")
 
 
@@ -33,6 +34,17 @@ def _upper(what: str, where: str, value: float, limit: float, unit: str, advice:
     inside = bool(value <= limit)
     digits = next((k for k in (1, 2, 3) if (float(f"{value:.{k}f}") <= limit) is inside), 4)
     return Check(what, where, f"{value:.{digits}f} {unit}", f"at most {limit:g} {unit}", inside, advice)
+
+
+def _group_check(by_group: Mapping[str, float], name: str, limits: CheckLimits, advice: str) -> list[Check]:
+    """Hold the markers of legs, trunk, arms and head each against their own limit; the one nearest to it speaks."""
+    allowed = {group: getattr(limits, f"marker_{group}") for group in ("legs", "trunk", "arms", "head")}
+    worst = max(by_group, key=lambda group: by_group[group] / allowed[group], default="")
+    if not worst:
+        return []
+    said = ", ".join(f"{group} {1000 * limit:g}" for group, limit in allowed.items())
+    value = f"{1000 * by_group[worst]:.1f} mm, {worst}"
+    return [Check(_GROUPS, name, value, f"at most {said} mm", by_group[worst] <= allowed[worst], advice)]
 
 
 def mass_check(subject: Subject, standing: QuietStanding | None, limits: CheckLimits) -> list[Check]:
@@ -88,6 +100,7 @@ def trial_checks(result: TrialResult, mass: float) -> list[Check]:
                 advice,
             )
         )
+        found += _group_check(result.fit.by_group, name, limits, advice)
     if result.motion is not None:
         share = 100 * float(np.mean(~result.motion.determined))
         found.append(

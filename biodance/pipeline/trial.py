@@ -1,13 +1,14 @@
 """One trial through all its steps: gaps, motion, contact, simulated wrench beside the measured one, quiet standing."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.body.human.marker_groups import marker_groups
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab.markers.gaps import MarkerGaps, report_gaps
 from biodance.lab.markers.sets import canonical, read_marker_set
@@ -78,8 +79,10 @@ def prepare_trial(trial: Trial) -> Prepared:
     return Prepared(done or trial, tuple(steps), gaps_of(trial))
 
 
-def marker_fit(motion: Motion) -> MarkerFit:
-    """Return the distances (m) of a motion's markers to the model: RMS and largest per marker and of all together."""
+def marker_fit(motion: Motion, groups: Mapping[str, str] | None = None) -> MarkerFit:
+    """Return the distances (m) of a motion's markers to the model: RMS and largest per marker and of all together, and
+    the RMS of ``groups`` (marker -> group).
+    """
     squares = motion.residual**2
     seen = np.isfinite(squares)
     count = seen.sum(axis=0)
@@ -87,9 +90,11 @@ def marker_fit(motion: Motion) -> MarkerFit:
     rms = np.sqrt(np.divide(total.sum(axis=0), count, out=np.full(count.shape, np.nan), where=count > 0))
     largest = np.where(count > 0, np.where(seen, motion.residual, -np.inf).max(axis=0, initial=-np.inf), np.nan)
     overall = np.sqrt(total.sum() / count.sum()) if count.any() else np.nan
-    return MarkerFit(
-        motion.marker_names, rms, largest, float(overall), float(np.nanmax(largest)) if count.any() else np.nan
-    )
+    member = np.array([(groups or {}).get(name, "") for name in motion.marker_names])
+    named = [one for one in dict.fromkeys(member.tolist()) if one and count[member == one].any()]
+    by_group = {one: float(np.sqrt(total[:, member == one].sum() / count[member == one].sum())) for one in named}
+    most = float(np.nanmax(largest)) if count.any() else np.nan
+    return MarkerFit(motion.marker_names, rms, largest, float(overall), most, by_group)
 
 
 def feet(trial: Trial, body: Body | None, motion: Motion | None) -> Soles:
@@ -169,7 +174,8 @@ def examine_trial(read: Prepared, body: Body | None, *, mass: float) -> TrialRes
     if not read.usable:
         return TrialResult(trial, read.steps, read.gaps)
     motion = attempt(steps, "track", lambda: track_trial(trial, body))
-    fit = marker_fit(motion) if motion else None
+    groups = dict(zip(body.markers.names, marker_groups(body), strict=True)) if body else {}
+    fit = marker_fit(motion, groups) if motion else None
     if not trial.plates:
         steps.append(
             Step(

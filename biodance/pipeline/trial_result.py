@@ -4,7 +4,8 @@ All records are frozen; arrays are in SI units in the lab frame (z up); a wrench
 about the lab origin.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -37,7 +38,7 @@ class Step:
 @dataclass(frozen=True, eq=False)
 class MarkerFit:
     """Distance of the markers to the model: per marker ``names`` (K), ``rms`` and ``max`` (K,) m, NaN = never seen;
-    all together in m.
+    all together in m; ``by_group`` m, RMS of legs (with the pelvis), trunk, arms and head.
     """
 
     names: tuple[str, ...]
@@ -45,6 +46,7 @@ class MarkerFit:
     max: Array
     total_rms: float
     total_max: float
+    by_group: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

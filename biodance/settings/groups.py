@@ -140,6 +140,8 @@ class CheckLimits(Group):
         % between the mass on the plates and the declared mass.
     marker_rms, marker_largest : float
         m, distance of the markers to the model.
+    marker_legs, marker_trunk, marker_arms, marker_head : float
+        m, RMS distance of the markers of one part of the body; legs with the pelvis.
     gaps : float
         % of marker samples not seen.
     open : float
@@ -156,6 +158,10 @@ class CheckLimits(Group):
     mass: float = number_field(2.0, 0.1, 50.0, "%", "mass on the plates against the declared mass")
     marker_rms: float = number_field(0.020, 0.001, 0.2, "m", "distance of the markers to the model, RMS")
     marker_largest: float = number_field(0.080, 0.002, 1.0, "m", "distance of the markers to the model, largest")
+    marker_legs: float = number_field(0.015, 0.001, 0.2, "m", "distance of the markers of legs and pelvis, RMS")
+    marker_trunk: float = number_field(0.020, 0.001, 0.2, "m", "distance of the markers of the trunk, RMS")
+    marker_arms: float = number_field(0.020, 0.001, 0.2, "m", "distance of the markers of the arms, RMS")
+    marker_head: float = number_field(0.025, 0.001, 0.2, "m", "distance of the markers of the head, RMS")
     gaps: float = number_field(5.0, 0.0, 100.0, "%", "marker samples not seen")
     open: float = number_field(1.0, 0.0, 100.0, "%", "frames in which the markers seen do not fix the posture")
     seconds: float = number_field(

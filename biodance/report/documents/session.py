@@ -79,6 +79,7 @@ def _trial(result: TrialResult, identified: Agreement | None) -> dict[str, Any]:
             {"marker": g.label, "percent": g.percent, "longest_s": g.longest} for g in result.gaps if g.percent > 0
         ],
         "marker_rms_m": None if fit is None else fit.total_rms,
+        "marker_rms_by_group_m": None if fit is None else dict(fit.by_group),
         "marker_max_m": None if fit is None else fit.total_max,
         "markers": []
         if fit is None
