@@ -264,7 +264,8 @@ def conclude(
     noise = noise or learn_noise(total, room)[0]
     data, sizes = _discounted(total, noise, found, room)
     for _ in range(_ROUNDS if found is not None and not machine else 0):
-        real = undiluted(total, posterior(data, before).mean, body.segments)
+        table = more_probable_place(data, before, body)[0] if prior is None else before
+        real = undiluted(total, posterior(data, table).mean, body.segments)
         data, sizes = _discounted(real, noise, found, room)
     before, placed = more_probable_place(data, before, body) if prior is None else (before, "")
     belief = posterior(data, before)
