@@ -34,8 +34,9 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-_ROUNDS = 2
-"""How often the dilution is measured under the parameters of the fit before."""
+_ROUNDS, _AGAIN = 2, 4
+"""How often the dilution is measured under the parameters of the fit before; rounds of learning the noise anew after
+it."""
 NOISE_ALONE = (
     "The intervals count the noise alone, not soft tissue, joint centres and plates: they are several times too short."
 )
@@ -266,6 +267,7 @@ def conclude(
     for _ in range(_ROUNDS if found is not None and not machine else 0):
         table = more_probable_place(data, before, body)[0] if prior is None else before
         real = undiluted(total, posterior(data, table).mean, body.segments)
+        noise = learn_noise(real, room, rounds=_AGAIN)[0]
         data, sizes = _discounted(real, noise, found, room)
     before, placed = more_probable_place(data, before, body) if prior is None else (before, "")
     belief = posterior(data, before)
