@@ -15,6 +15,7 @@ from biodance import display
 from biodance.body.body import Body
 from biodance.errors import NotSolved, TrialRefused, UnknownName
 from biodance.identification.base_parameters import BaseEstimate, estimate_base, structural_base
+from biodance.identification.dilution import undiluted
 from biodance.identification.information import Information
 from biodance.identification.knowledge import QUANTITIES, Known, knowledge, known_together, mass_interval
 from biodance.identification.learning import learn_noise
@@ -33,6 +34,9 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+_ROUNDS, _AGAIN = 2, 4
+"""How often the dilution is measured under the parameters of the fit before; rounds of learning the noise anew after
+it."""
 NOISE_ALONE = (
     "The intervals count the noise alone, not soft tissue, joint centres and plates: they are several times too short."
 )
@@ -259,10 +263,12 @@ def conclude(
     before = prior or widened(body.sip)
     room = before if machine else may_carry(body, before)
     noise = noise or learn_noise(total, room)[0]
-    data, sizes = total.information(noise), Sizes(0.0, 1.0)
-    if found is not None:
-        sizes = evident_sizes(data, found, room)
-        data = temper(data, found, sizes)
+    data, sizes = _discounted(total, noise, found, room)
+    for _ in range(_ROUNDS if found is not None and not machine else 0):
+        table = more_probable_place(data, before, body)[0] if prior is None else before
+        real = undiluted(total, posterior(data, table).mean, body.segments)
+        noise = learn_noise(real, room, rounds=_AGAIN)[0]
+        data, sizes = _discounted(real, noise, found, room)
     before, placed = more_probable_place(data, before, body) if prior is None else (before, "")
     belief = posterior(data, before)
     fit = physical_fit(belief, body)
@@ -277,6 +283,15 @@ def conclude(
         known = knowledge(fit.sip, first, belief)
         words += _notes(known, fit)
     return Identification(body, belief, data, base, noise, sizes, fit, trials, data.frames, known, words)
+
+
+def _discounted(total: Statistics, noise: Noise, found: Mismatch | None, room: Sip) -> tuple[Information, Sizes]:
+    """Return the whitened data less what twins and plates disturb, and how large that is by evidence."""
+    data = total.information(noise)
+    if found is None:
+        return data, Sizes(0.0, 1.0)
+    sizes = evident_sizes(data, found, room)
+    return temper(data, found, sizes), sizes
 
 
 def standing_point(fits: tuple[Fit, ...]) -> Array:

@@ -4,7 +4,7 @@ large by evidence.
 The errors of independent sources, each of one standard deviation, enter the equations b = W' S^-1 y as scores W' S^-1
 e; with the scores as columns of F the covariance is F F', exact over all sources (`uncertainty/sources`). The model
 is b ~ N(H phi, noise H + kinematics² F_kinematics F_kinematics' + F_plates F_plates'),  and the two sizes are those
-under which the session's own b is most probable given the table (evidence), never smaller than drawn. What is left
+under which the session's own b is most probable given the table (evidence). What is left
 for the parameters is H (...)^-1 H in place of H.
 """
 
@@ -29,10 +29,10 @@ EVERY = 8
 """Frames: one of so many is enough to predict the size of the marker residuals from."""
 SHORTEST = 8
 """Frames: shorter runs have no accelerations worth the name."""
-KINEMATICS = (1.0, 1.4, 2.0, 2.8)
+KINEMATICS = (0.7, 1.0, 1.4, 2.0, 2.8)
 _NOISE = (1.7, 2.2, 3.0, 4.5, 7.0, 10.0, 15.0, 22.0)
-"""Sizes among which the evidence chooses: of the kinematic errors (never smaller than drawn), and variance factor of
-the noise (never below 1.7: the parameters absorb part of what is noise)."""
+"""Sizes among which the evidence chooses: of the kinematic errors, and variance factor of the noise (never below 1.7:
+the parameters absorb part of what is noise)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from biodance.body.tables.de_leva import PARTS
 from biodance.body.tables.de_leva import lengths as reference_lengths
 from biodance.body.tables.error_sizes import error_size
 from biodance.body.tables.published import regression, study_masses
-from biodance.body.tables.reference import Reference
+from biodance.body.tables.reference import Reference, proportion
 from biodance.records import Array, Sip, Subject
 
 _AXES = ("sagittal", "longitudinal", "transverse")
@@ -188,7 +188,8 @@ def scaled_lumps(reference: Reference, skeleton: Skeleton, subject: Subject) -> 
     frame.
 
     The pelvis of the table is upright; it is turned so that its long axis points from the mid hip to where the table
-    cuts the trunk. The trunk above the cut keeps its place in the person, also where the joint lies elsewhere.
+    cuts the trunk. The trunk above the cut keeps its place in the person, also where the joint lies elsewhere. The foot
+    lies between the person's heel and toe, wherever between them the ankle is.
     """
     lumps = []
     for segment in SEGMENTS:
@@ -200,6 +201,10 @@ def scaled_lumps(reference: Reference, skeleton: Skeleton, subject: Subject) -> 
             lump = turn_inertia(lump, _upright_to(skeleton.cut.get("pelvis", skeleton.origins["trunk"])))
         if segment == "trunk_head":
             lump = replace(lump, com=lump.com + skeleton.cut.get("trunk_head", np.zeros(3)))
+        if kind == "foot":
+            usual = proportion("heel_behind_ankle", subject.sex) * skeleton.lengths[segment]
+            ahead = usual - skeleton.heel_behind_ankle[segment.removesuffix("_foot")]
+            lump = replace(lump, com=lump.com + np.array([ahead, 0.0, 0.0]))
         lumps.append(lump if side_of(segment) > 0 else mirror_inertia(lump))
     return tuple(lumps)
 

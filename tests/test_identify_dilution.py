@@ -1,0 +1,84 @@
+"""Regression dilution: accelerations that nobody made shrink parameters; measured gains give that back."""
+
+import numpy as np
+import pytest
+from identify_trials import smooth_motion
+from scipy.signal import butter, sosfiltfilt
+
+from biodance.body.human.human import human
+from biodance.identification.dilution import undiluted
+from biodance.identification.posterior import posterior
+from biodance.identification.statistics import Fit, Statistics, layout_for, statistics
+from biodance.motion.regressor import predict_wrench
+from biodance.records import Array, Motion, Subject, Wrench
+from biodance.uncertainty.bands import BANDS
+from biodance.uncertainty.caution import widened
+from biodance.uncertainty.noise import Noise
+
+BODY = human(Subject(70.0, 1.75, "M"))
+ABOUT = np.zeros(3)
+FAST = np.array(BANDS.edges[:-1]) >= 1.0
+
+
+def recorded(shake: float) -> Statistics:
+    """Return the statistics of a trial whose trunk is seen to shake by ``shake`` rad/s² rms beyond 1 Hz, while the
+    plates feel the real movement.
+    """
+    rng = np.random.default_rng(7)
+    real = smooth_motion(BODY, rng, frames=3000, size=0.3)
+    wrench = predict_wrench(BODY, real).value + rng.normal(size=(3000, 6)) * [1, 1, 1, 0.3, 0.3, 0.3]
+    trunk = [6 + i for i, joint in enumerate(BODY.joints) if joint.name.startswith("trunk")]
+    noise = sosfiltfilt(butter(4, (1.2, 5.5), "band", fs=100, output="sos"), rng.normal(size=(3000, 3)), axis=0)
+    seen = real.a.copy()
+    seen[:, trunk] += shake * noise / noise.std()
+    motion = Motion(real.time, real.q, real.v, seen)
+    fit = Fit("t", motion, Wrench(real.time, wrench), np.ones(3000, dtype=bool))
+    return statistics(BODY, fit, layout_for(ABOUT))
+
+
+@pytest.fixture(scope="module")
+def shaken() -> Statistics:
+    return recorded(2.0)
+
+
+def slopes(total: Statistics, phi: Array) -> Array:
+    """Return (B, 6): how much of the predicted wrench the plates show."""
+    predicted, seen = np.append(phi, 0.0), np.eye(phi.size + 1)[-1]
+    products = [np.einsum("i,bcicj,j->bc", predicted, total.gram, other) for other in (seen, predicted)]
+    return products[0] / products[1]
+
+
+def test_a_movement_seen_as_it_was_keeps_its_regressor() -> None:
+    total = recorded(0.0)
+    same = undiluted(total, BODY.sip.phi, BODY.segments)
+    size = np.sqrt(np.einsum("bcici->bci", total.gram))
+    np.testing.assert_allclose(np.sqrt(np.einsum("bcici->bci", same.gram)), size, rtol=0.05, atol=1e-6)
+
+
+def test_what_the_plates_do_not_show_is_taken_off_the_regressor(shaken: Statistics) -> None:
+    phi = BODY.sip.phi
+    real = undiluted(shaken, phi, BODY.segments)
+    first, last = (slopes(total, phi)[FAST] for total in (shaken, real))
+    assert first[0].min() < 0.9
+    assert first[1].max() < 0.4
+    np.testing.assert_allclose(last[0], 1.0, atol=0.02)
+    np.testing.assert_allclose(last[1], 1.0, atol=0.3)
+    np.testing.assert_array_equal(real.gram[~FAST], shaken.gram[~FAST])
+    np.testing.assert_array_equal(real.gram[:, :, -1, :, -1], shaken.gram[:, :, -1, :, -1])
+    np.testing.assert_array_equal(real.count, shaken.count)
+
+
+def test_the_trunk_gets_its_inertia_back(shaken: Statistics) -> None:
+    table, trunk = widened(BODY.sip), 10 * BODY.segment_index("trunk_head")
+    noise = Noise(np.tile(np.diag([9.0] * 3 + [4.0] * 3), (len(BANDS), 1, 1)), ABOUT, BANDS)
+    before = posterior(shaken.information(noise), table).mean
+    after = posterior(undiluted(shaken, before, BODY.segments).information(noise), table).mean
+    moment, true = slice(trunk + 4, trunk + 10), BODY.sip.phi
+    off = [np.linalg.norm(phi[moment] - true[moment]) / np.linalg.norm(true[moment]) for phi in (before, after)]
+    assert off[0] > 0.1
+    assert off[1] < 0.5 * off[0]
+
+
+def test_segments_of_no_person_are_left_alone(shaken: Statistics) -> None:
+    names = tuple(f"link_{i}" for i in range(len(BODY.segments)))
+    np.testing.assert_array_equal(undiluted(shaken, BODY.sip.phi, names).gram, shaken.gram)
