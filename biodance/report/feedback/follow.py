@@ -7,7 +7,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
-from biodance.dance.telling import RATE, telling_of
+from biodance.dance.telling import telling_of
 from biodance.records import SIDES
 
 _POINTS = {"upper_arm": "shoulder", "forearm_hand": "elbow", "thigh": "hip", "shank": "knee", "foot": "ankle"}
@@ -30,8 +30,8 @@ def follow_scene(dance: Dance) -> dict[str, Any] | None:
         return None
     told = telling_of(dance)
     return {
-        "rate": RATE,
-        "plan": _packed(dance.motion(RATE).q),
+        "rate": told.rate,
+        "plan": _packed(dance.motion(told.rate).q),
         "root": _packed(told.root),
         "weights": told.weights.tolist(),
         "edges": list(told.edges),

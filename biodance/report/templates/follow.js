@@ -1,6 +1,7 @@
 // Follows the person before the camera, grades every posture by what it tells, and asks for what is missing. Pictures
 // go from the camera into a worker of this page and are forgotten there.
-const LOOKS = 192, SURE = 0.3, ENOUGH = 0.9, AGAIN = 12; // pixels; how sure; share of the plan; looks between two counts
+const LOOKS = 192, SURE = 0.3, ENOUGH = 0.9; // pixels; how sure a point; share of what the dance can tell
+const AGAIN = 12; // looks between two that look for somebody else
 const NAMED = [["nose", 0], ...follow.points.map((one) => [one.name, one.number])];
 let worker = null, busy = false, box = null, looks = 0, others = 0, unclear = { said: "", times: 0 };
 let camera = { at: [2.8, 0, 1.0, 0], count: 0 }, last = null, knots = {}, paused = false;
@@ -76,7 +77,8 @@ function unseen(points) { // why nobody can be followed now; "" when somebody ca
   if (all < 5) return "I see nobody. Step into the picture.";
   if (others > 0) return "I see two people. Only one may be in the picture.";
   if (sees("left shoulder", "right shoulder") < 2 && sees("nose") < 1) return "I do not see your head and shoulders.";
-  if (sees("left ankle", "right ankle", "left knee", "right knee") < 3) return "I do not see your legs and feet. Step back.";
+  const legs = sees("left ankle", "right ankle", "left knee", "right knee");
+  if (legs < 3) return "I do not see your legs and feet. Step back.";
   return all < 9 ? "I see only a part of you. Step back, into the light." : "";
 }
 function take(told) {
@@ -89,8 +91,10 @@ function take(told) {
   if (unclear.times === 3 || (why && unclear.times > 3 && by("followed").textContent !== why)) report(why);
   last = sure.length >= 5 ? { frame: extent(sure, 0.12), p: last?.p } : null;
   if (why || when < 0 || !playing) return;
-  const plan = planned(when), spots = follow.points.map(({ number }) => (points[number].sure > SURE ? {
-    x: (2 * points[number].x - width) / height, y: 1 - (2 * points[number].y) / height, sure: points[number].sure } : null));
+  const plan = planned(when), spots = follow.points.map(({ number }) => {
+    const { x, y, sure: s } = points[number];
+    return s > SURE ? { x: (2 * x - width) / height, y: 1 - (2 * y) / height, sure: s } : null;
+  });
   const one = fit(spots, plan, last.p, camera);
   if (!one.p.every(Number.isFinite)) return void (last.p = null);
   last.p = one.p;
@@ -177,7 +181,8 @@ function missing() { // at the end: the posture that adds most to what was dance
   if (open[least] >= ENOUGH) return "";
   const gain = (p) => shares(follow.phases.filter((one) => one.posture === p).map(intended).reduce(sum, H))[least];
   const best = [...graded].map((p) => [gain(p), p]).sort((a, b) => b[0] - a[0])[0];
-  return best ? `Least is known of your ${follow.segments[least]}: dance posture ${cues[best[1]].number} once more.` : "";
+  if (!best) return "";
+  return `Least is known of your ${follow.segments[least]}: dance posture ${cues[best[1]].number} once more.`;
 }
 
 // ---- what to correct now, in a posture that is held ----
@@ -197,8 +202,8 @@ function correct(when, plan, one) {
   }));
   asked_times = said === asked_for ? asked_times + 1 : 0;
   asked_for = said;
-  if (asked_times >= 1) by("ask").replaceChildren(...(said ? words(said[0].toUpperCase() + said.slice(1) + ".").childNodes
-    : [document.createTextNode("Good.")]));
+  const text = said ? said[0].toUpperCase() + said.slice(1) + "." : "Good.";
+  if (asked_times >= 1) by("ask").replaceChildren(...words(text).childNodes);
 }
 
 // ---- in step with the page ----
@@ -226,7 +231,8 @@ addEventListener("leapt", () => { // what is danced once more tells once more
   paused = false;
 });
 addEventListener("restarted", () => {
-  [H, known, graded, grades, knots, paused] = [new Float64Array(P * P), new Array(PARTS).fill(0), new Set(), {}, {}, false];
+  [H, known] = [new Float64Array(P * P), new Array(PARTS).fill(0)];
+  [graded, grades, knots, paused] = [new Set(), {}, {}, false];
   for (const id of ["ask", "grade"]) by(id).textContent = "";
   if (stream) draw_known();
 });
