@@ -1,6 +1,7 @@
 // Follows the person before the camera, grades every posture by what it tells, and asks for what is missing. Pictures
 // go from the camera into a worker of this page and are forgotten there.
 const LOOKS = 192, SURE = 0.3, ENOUGH = 0.9; // pixels; how sure a point; share of what the dance can tell
+const POOR = 0.06; // misfit of the points in halves of the picture's height: not believed
 const AGAIN = 12; // looks between two that look for somebody else
 const NAMED = [["nose", 0], ...follow.points.map((one) => [one.name, one.number])];
 let worker = null, busy = false, box = null, looks = 0, others = 0, unclear = { said: "", times: 0 };
@@ -91,17 +92,19 @@ function take(told) {
   if (unclear.times === 3 || (why && unclear.times > 3 && by("followed").textContent !== why)) report(why);
   last = sure.length >= 5 ? { frame: extent(sure, 0.12), p: last?.p } : null;
   if (why || when < 0 || !playing) return;
-  const plan = planned(when), spots = follow.points.map(({ number }) => {
-    const { x, y, sure: s } = points[number];
+  const plan = planned(when), spots = (order) => follow.points.map(({ number }) => {
+    const { x, y, sure: s } = points[order(number)];
     return s > SURE ? { x: (2 * x - width) / height, y: 1 - (2 * y) / height, sure: s } : null;
   });
-  const one = fit(spots, plan, last.p, camera);
-  if (!one.p.every(Number.isFinite)) return void (last.p = null);
-  last.p = one.p;
+  const one = fit(spots((k) => k), plan, last.p, camera); // or does the model confuse left and right?
+  const other = one.error < POOR ? one : fit(spots((k) => (k % 2 ? k + 1 : k - 1)), plan, null, camera);
+  const best = other.error < one.error ? other : one;
+  if (!best.p.every(Number.isFinite) || best.error > POOR) return void (last.p = null);
+  last.p = best.p;
   const share = 1 / Math.min(++camera.count, 50);
-  camera.at = camera.at.map((value, k) => value + share * (one.p[k] - value));
-  keep(when, one);
-  correct(when, plan, one);
+  camera.at = camera.at.map((value, k) => value + share * (best.p[k] - value));
+  keep(when, best);
+  correct(when, plan, best);
 }
 function report(text) {
   by("followed").textContent = text;
