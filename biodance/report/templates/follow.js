@@ -76,7 +76,7 @@ function unseen(points) { // why nobody can be followed now; "" when somebody ca
   const sees = (...names) => names.filter((name) => points[NAMED.find(([one]) => one === name)[1]].sure > SURE).length;
   const all = NAMED.filter(([name]) => sees(name)).length;
   if (all < 5) return "I see nobody. Step into the picture.";
-  if (others > 0) return "I see two people. Only one may be in the picture.";
+  if (others > 1) return "I see two people. Only one may be in the picture.";
   if (sees("left shoulder", "right shoulder") < 2 && sees("nose") < 1) return "I do not see your head and shoulders.";
   const legs = sees("left ankle", "right ankle", "left knee", "right knee");
   if (legs < 3) return "I do not see your legs and feet. Step back.";
