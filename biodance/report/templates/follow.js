@@ -1,7 +1,8 @@
 // Follows the person before the camera, grades every posture by what it tells, and asks for what is missing. Pictures
 // go from the camera into a worker of this page and are forgotten there.
 const LOOKS = 192, SURE = 0.3, ENOUGH = 0.9; // pixels; how sure a point; share of what the dance can tell
-const POOR = 0.06; // misfit of the points in halves of the picture's height: not believed
+// misfit of the points, in halves of the picture's height: below it a fit is taken, above it none is believed
+const GOOD = 0.035, POOR = 0.06;
 const AGAIN = 12; // looks between two that look for somebody else
 const NAMED = [["nose", 0], ...follow.points.map((one) => [one.name, one.number])];
 let worker = null, busy = false, box = null, looks = 0, others = 0, unclear = { said: "", times: 0 };
@@ -96,15 +97,24 @@ function take(told) {
     const { x, y, sure: s } = points[order(number)];
     return s > SURE ? { x: (2 * x - width) / height, y: 1 - (2 * y) / height, sure: s } : null;
   });
-  const one = fit(spots((k) => k), plan, last.p, camera); // or does the model confuse left and right?
-  const other = one.error < POOR ? one : fit(spots((k) => (k % 2 ? k + 1 : k - 1)), plan, null, camera);
-  const best = other.error < one.error ? other : one;
+  const best = nearest(spots, plan, last.p);
   if (!best.p.every(Number.isFinite) || best.error > POOR) return void (last.p = null);
   last.p = best.p;
   const share = 1 / Math.min(++camera.count, 50);
   camera.at = camera.at.map((value, k) => value + share * (best.p[k] - value));
   keep(when, best);
   correct(when, plan, best);
+}
+function nearest(spots, plan, before) { // of some descents: from the last look; else with sides confused, arms hanging
+  const first = planned(0).angles, hang = [...camera.at, 0, 0, 0, ...first.map((angle, j) => angle - plan.angles[j])];
+  let best = fit(spots((k) => k), plan, before, camera);
+  for (const [order, start] of [[(k) => k, hang], [(k) => (k % 2 ? k + 1 : k - 1), null],
+    [(k) => (k % 2 ? k + 1 : k - 1), hang]]) {
+    if (best.error < GOOD) break;
+    const other = fit(spots(order), plan, start, camera);
+    if (!(other.error >= best.error)) best = other;
+  }
+  return best;
 }
 function report(text) {
   by("followed").textContent = text;
