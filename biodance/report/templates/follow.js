@@ -149,9 +149,12 @@ function danced(phase) { // information of a phase as the camera saw it; null wh
   if (phase.kind === "hold") return after && information(states(phase, () => after), true);
   const before = middle("hold" + (phase.posture - 1)), between = middle("move" + phase.posture);
   if (!after || !before) return null;
-  const blend = (a, b, u) => a.map((value, j) => value + smooth(u) * (b[j] - value));
-  return information(states(phase, (part) => (!between ? blend(before, after, part) : part < 0.5
-    ? blend(before, between, 2 * part) : blend(between, after, 2 * part - 1))), false);
+  const way = (part) => before.map((from, j) => { // on the plan's own way, and off it in the middle if that is plain
+    const off = between ? between[j] - 0.5 * (from + after[j]) : 0; // rad
+    const plain = Math.sign(off) * Math.max(0, Math.abs(off) - 0.2);
+    return from + smooth(part) * (after[j] - from) + 16 * (part * (1 - part)) ** 2 * plain;
+  });
+  return information(states(phase, way), false);
 }
 const sum = (A, B) => A.map((value, i) => value + B[i]), mean = (list) => list.reduce((a, b) => a + b, 0) / list.length;
 const full = [], intended = (phase) => full[follow.phases.indexOf(phase)] ??= information(states(phase, () => null),
