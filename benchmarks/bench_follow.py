@@ -6,8 +6,8 @@ virtual dancers who are filmed.
 The dance is made by hand of postures that people know, both feet planted (`known_dance`). Every dancer is 3 to 10
 degrees off in trunk and arms and, by chance, dances with single limbs at a tenth to all of the planned amplitude. He is
 drawn as a dressed figure (pyvista) and stands before the camera of a headless Chromium as a film; the clock of the page
-is that of the film, and it does not stop when enough is known. The truth is what `score_performance` tells of the same motion. Takes 2 minutes a
-dancer; what is in FOLDER stays.
+is that of the film, and it does not stop when enough is known. The truth is what `score_performance` tells of the same
+motion. Takes 2 minutes a dancer; what is in FOLDER stays.
 """
 
 import io
