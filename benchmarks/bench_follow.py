@@ -93,6 +93,7 @@ document.getElementById("film").onclick().then(() => {
     let number = 0;
     for (let k = 0; k < BITS; k++) number = 2 * number + (row[4 * k] > 128 ? 1 : 0);
     if (number / PICTURES >= second || number < 5) second = number / PICTURES - (number ? 0 : LEAD);
+    if (second > data.duration_s - 0.15) second = data.duration_s;
     show();
   }, 100);
 });
@@ -208,7 +209,7 @@ def followed(page: Path, film: Path, seconds: float) -> tuple[Array, int]:
         for name in ("BITS", "BLOCK", "PICTURES", "LEAD"):
             program = program.replace(name, str(globals()[name]))
         browser.run(program)
-        browser.until(f"second >= {seconds - 0.2} ", SLOW * (seconds + LEAD) + 90)
+        browser.until("second >= data.duration_s", SLOW * (seconds + LEAD) + 90)
         known, looks = browser.run("[document.body.dataset.known, document.body.dataset.looks]")
     return np.array(known.split(), dtype=float), int(looks)
 
