@@ -2,6 +2,7 @@
 
 import json
 import os
+import select
 import shutil
 import subprocess
 import time
@@ -16,16 +17,21 @@ class Page:
 
     def __init__(self, url: str, *, film: Path | None = None, denied: bool = False, size: str = "1280,900") -> None:
         ours, theirs = os.pipe(), os.pipe()
-        os.set_inheritable(ours[0], True)
-        os.set_inheritable(theirs[1], True)
         flags = ["--headless", "--no-sandbox", "--disable-gpu", "--remote-debugging-pipe", f"--window-size={size}"]
         flags += ["--use-fake-device-for-media-stream", "--autoplay-policy=no-user-gesture-required"]
         flags += ["--mute-audio", "--disable-background-networking"]
         flags += ["--deny-permission-prompts"] if denied else ["--use-fake-ui-for-media-stream"]
         flags += [f"--use-file-for-fake-video-capture={film}"] if film else []
+
+        def plug() -> None:  # the browser reads from 3 and writes to 4
+            high = [os.dup(os.dup(os.dup(end))) for end in (ours[0], theirs[1])]
+            os.dup2(high[0], 3)
+            os.dup2(high[1], 4)
+
         self._process = subprocess.Popen(
-            ["sh", "-c", f'exec "$@" 3<&{ours[0]} 4>&{theirs[1]}', "sh", str(BROWSER), *flags, "about:blank"],
-            pass_fds=(ours[0], theirs[1]),
+            [str(BROWSER), *flags, "about:blank"],
+            preexec_fn=plug,  # noqa: PLW1509 - no threads here
+            pass_fds=(3, 4),
             stderr=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
         )
@@ -34,6 +40,13 @@ class Page:
         self._out, self._in, self._rest, self._number = ours[1], theirs[0], b"", 0
         self.events: list[dict[str, Any]] = []
         self._session: str | None = None
+        try:
+            self._open(url)
+        except BaseException:
+            self.__exit__()
+            raise
+
+    def _open(self, url: str) -> None:
         (target,) = [one for one in self.send("Target.getTargets")["targetInfos"] if one["type"] == "page"]
         attached = self.send("Target.attachToTarget", targetId=target["targetId"], flatten=True)
         self._session = attached["sessionId"]
@@ -49,7 +62,9 @@ class Page:
         os.write(self._out, json.dumps(message).encode() + b"\0")
         while True:
             while b"\0" not in self._rest:
-                self._rest += os.read(self._in, 1 << 20)
+                if not select.select([self._in], [], [], 60.0)[0] or not (more := os.read(self._in, 1 << 20)):
+                    raise TimeoutError(f"{method}: the browser does not answer")
+                self._rest += more
             one, self._rest = self._rest.split(b"\0", 1)
             answer = json.loads(one)
             if answer.get("id") != self._number:
@@ -67,12 +82,18 @@ class Page:
             raise RuntimeError(answer["exceptionDetails"].get("exception", {}).get("description", "failed"))
         return answer["result"].get("value")
 
-    def until(self, condition: str, seconds: float = 60.0) -> None:
+    def until(self, condition: str, seconds: float = 60.0) -> Any:
+        """Return what a condition has become as soon as it is no longer false."""
         end = time.monotonic() + seconds
-        while not self.run(condition):
+        while not (found := self.run(condition)):
             if time.monotonic() > end:
                 raise TimeoutError(condition)
             time.sleep(0.1)
+        return found
+
+    def key(self, name: str) -> None:
+        self.send("Input.dispatchKeyEvent", type="keyDown", key=name, text=name if len(name) == 1 else "")
+        self.send("Input.dispatchKeyEvent", type="keyUp", key=name)
 
     def said(self) -> list[str]:
         """Return errors and warnings of the console and the page."""

@@ -3,17 +3,22 @@
 import json
 import shutil
 from dataclasses import replace
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
 
 import numpy as np
 import pytest
 
 from biodance.cli import run
 from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE
+from biodance.diagnosis.watch import LiveWarning
+from biodance.errors import BiodanceError
 from biodance.identification.identification import identify_body
 from biodance.identification.running import belief_before
-from biodance.pipeline.live import LiveSession
+from biodance.pipeline.live import LiveSession, LiveState
 from biodance.pipeline.replay import body_and_stream, replay
 from biodance.records import Markers, Sip, Subject, Wrench
+from biodance.report.live_page import LivePage
 from biodance.virtual_lab.simulate import simulate_session
 
 FAULT = 6.0
@@ -96,6 +101,24 @@ def test_the_end_is_the_batch_of_the_same_frames_and_frames_are_quick(streamed):
     assert np.median(found.frame_s) < 0.005
 
 
+def test_the_page_shows_the_newest_state_to_this_machine_alone():
+    state = LiveState(3.0, {"left_thigh": "known"}, ("Plate 1 fell silent.",), "Mend it.")
+    with LivePage() as page:
+        page.show(state)
+        page.warn(LiveWarning(2.5, "plate_gone", "plate1", "Plate 1 fell silent."))
+        assert b"biodance live" in urlopen(page.address).read()
+        said = json.loads(urlopen(f"{page.address}state.json").read())
+        assert (said["time_s"], said["suspect"], said["next"]) == (3.0, ["Plate 1 fell silent."], "Mend it.")
+        assert said["warnings"] == [{"time_s": 2.5, "text": "Plate 1 fell silent."}]
+        assert said["known"] == {"left_thigh": "known"}
+        for wrong in (Request(page.address, headers={"Host": "elsewhere.example:80"}), f"{page.address}etc"):
+            with pytest.raises(HTTPError, match="404") as refused:
+                urlopen(wrong)
+            refused.value.close()
+        with pytest.raises(BiodanceError, match="Give another one"):
+            LivePage(int(page.address.rsplit(":", 1)[1].strip("/")))
+
+
 def test_the_running_belief_is_least_squares_with_the_prior():
     rng = np.random.default_rng(0)
     prior = Sip(("one",), rng.normal(size=10), np.diag(rng.uniform(0.5, 2, 10)))
@@ -127,6 +150,6 @@ def test_the_command(folder, tmp_path, capsys):
     assert run(["live", str(alone / squat.name)]) == NOT_DONE
     assert "--static FILE" in capsys.readouterr().err
     static = ["--static", str(folder / "static.c3d")]
-    assert run(["live", str(alone / squat.name), *static]) in (DONE, NEEDS_A_PERSON)
+    assert run(["live", str(alone / squat.name), *static, "--page", "0"]) in (DONE, NEEDS_A_PERSON)
     assert "next: " in capsys.readouterr().out
     assert run(["live", str(alone / "none.c3d")]) == NOT_DONE

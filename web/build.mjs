@@ -28,8 +28,10 @@ const notices = used.map((name) => {
     try { return readFileSync(join(modules, name, one)); } catch { return false; }
   });
   const text = file ? readFileSync(join(modules, name, file), "utf8").trim() : "";
-  const by = typeof author === "string" ? author : author?.name ?? (name.startsWith("@tensorflow/") ? "Google LLC" : "");
-  return `${name} ${version}, ${license}${by ? `, ${by}` : ""}\n${text && license !== "Apache-2.0" ? `\n${text}\n` : ""}`;
+  const known = name.startsWith("@tensorflow/") ? "Google LLC" : "";
+  const by = typeof author === "string" ? author : author?.name ?? known;
+  const said = text && license !== "Apache-2.0" ? `\n${text}\n` : "";
+  return `${name} ${version}, ${license}${by ? `, ${by}` : ""}\n${said}`;
 });
 const head = "What follows a person in the page that leads is made of these works of others.\n\n"
   + "MoveNet Lightning (weights; Google LLC, Apache-2.0), as the npm package @vladmandic/human carries them.\n";

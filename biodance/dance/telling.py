@@ -21,7 +21,7 @@ from biodance.uncertainty.bands import Bands
 from biodance.uncertainty.caution import widened
 from biodance.uncertainty.noise import Noise
 
-RATE = 12.5
+_RATE = 12.5
 """Hz at which a dance is judged, as in `dance.expectation`."""
 _STILL = 1.0
 """s: a hold says nothing more after this time."""
@@ -35,11 +35,12 @@ _AT_REST = slice(2, 5)
 class Telling:
     """By what a movement is judged that shall tell of the p = 10 N inertial parameters of a body.
 
-    ``root`` (p, p): the table's covariance is ``root root'``. ``weights`` (B, 6): information of one coefficient of the
-    wrench (N, N·m about ``about`` (3,) m of the lab) in each of the bands between ``edges`` (B + 1,) Hz. ``still``
-    (3,): information of one held posture on Fz, Mx and My.
+    ``rate`` Hz of the motions that are judged; ``root`` (p, p): the table's covariance is ``root root'``; ``weights``
+    (B, 6): information of one coefficient of the wrench (N, N·m about ``about`` (3,) m of the lab) in each of the bands
+    between ``edges`` (B + 1,) Hz; ``still`` (3,): information of one held posture on Fz, Mx and My.
     """
 
+    rate: float
     root: Array
     weights: Array
     edges: tuple[float, ...]
@@ -47,13 +48,13 @@ class Telling:
     about: Array
 
     def information(self, body: Body, motion: Motion, *, held: bool) -> Array:
-        """Return the information (p, p) of a ``motion`` at `RATE` or of the posture in which it ends."""
+        """Return the information (p, p) of a ``motion`` at ``rate`` or of the posture in which it ends."""
         W = regressor(body, motion)
         if held:
             rows = (wrench_shift(self.about) @ W[-1])[_AT_REST]
             return np.asarray(rows.T @ (self.still[:, None] * rows))
         covariance = np.array([np.diag(1.0 / row) for row in self.weights])
-        white = Noise(covariance, self.about, Bands(self.edges, RATE)).whiten(W).reshape(-1, W.shape[2])
+        white = Noise(covariance, self.about, Bands(self.edges, self.rate)).whiten(W).reshape(-1, W.shape[2])
         return np.asarray(white.T @ white)
 
     def shares(self, information: Array) -> Array:
@@ -69,19 +70,19 @@ class Telling:
 
 def telling_of(dance: Dance) -> Telling:
     """Return by what the parts of ``dance`` are judged."""
-    plan = dance.motion(RATE)
+    plan = dance.motion(_RATE)
     noise = typical_noise(np.asarray(predict_wrench(dance.body, plan).cop().mean(axis=0)))
     weights = _TRUST / np.diagonal(noise.covariance, axis1=1, axis2=2)
     value, vector = np.linalg.eigh(widened(dance.body.sip).covariance)
     root = vector * np.sqrt(np.maximum(value, 0.0))
-    return Telling(root, weights, noise.bands.edges, _STILL * RATE * weights[0, _AT_REST], noise.about)
+    return Telling(_RATE, root, weights, noise.bands.edges, _STILL * _RATE * weights[0, _AT_REST], noise.about)
 
 
 def planned_shares(dance: Dance, told: Telling) -> Array:
     """Return the share (N,) of the table's variance that the whole dance removes as planned."""
-    plan, total = dance.motion(RATE), np.zeros_like(told.root)
+    plan, total = dance.motion(_RATE), np.zeros_like(told.root)
     for phase in dance.phases:
         inside = (plan.time >= phase.start - 1e-9) & (plan.time <= phase.end + 1e-9)
-        part = Motion(*(each[inside] for each in (plan.time, plan.q, plan.v, plan.a)))
+        part = Motion(plan.time[inside], plan.q[inside], plan.v[inside], plan.a[inside])
         total += told.information(dance.body, part, held=phase.kind == "hold")
     return told.shares(total)

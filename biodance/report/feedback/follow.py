@@ -7,7 +7,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
-from biodance.dance.telling import RATE, telling_of
+from biodance.dance.telling import telling_of
 from biodance.records import SIDES
 
 _POINTS = {"upper_arm": "shoulder", "forearm_hand": "elbow", "thigh": "hip", "shank": "knee", "foot": "ankle"}
@@ -17,7 +17,7 @@ _NUMBERS = {"shoulder": 5, "elbow": 7, "wrist": 9, "hip": 11, "knee": 13, "ankle
 """Of the left point among the 17 of MoveNet (order of COCO); the right one comes next."""
 _ASKED = {"elbow": 1.0, "wrist": 1.0, "knee": 1.0, "shoulder": 0.8}
 """Points that a person is asked to correct, and how readily; the others follow them."""
-_ARMS, _TRUNK_AND_LEGS = 0.5, 0.25
+_ARMS, _TRUNK_AND_LEGS = 0.6, 0.25
 """rad, standard deviation of a joint angle about the plan: what the camera does not tell stays near it."""
 
 
@@ -30,8 +30,8 @@ def follow_scene(dance: Dance) -> dict[str, Any] | None:
         return None
     told = telling_of(dance)
     return {
-        "rate": RATE,
-        "plan": _packed(dance.motion(RATE).q),
+        "rate": told.rate,
+        "plan": _packed(dance.motion(told.rate).q),
         "root": _packed(told.root),
         "weights": told.weights.tolist(),
         "edges": list(told.edges),

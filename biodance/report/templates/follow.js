@@ -1,6 +1,9 @@
 // Follows the person before the camera, grades every posture by what it tells, and asks for what is missing. Pictures
 // go from the camera into a worker of this page and are forgotten there.
-const LOOKS = 192, SURE = 0.3, ENOUGH = 0.9, AGAIN = 12; // pixels; how sure; share of the plan; looks between two counts
+const LOOKS = 192, SURE = 0.3, ENOUGH = 0.9; // pixels; how sure a point; share of what the dance can tell
+// misfit of the points, in halves of the picture's height: below it a fit is taken, above it none is believed
+const GOOD = 0.035, POOR = 0.06;
+const AGAIN = 12; // looks between two that look for somebody else
 const NAMED = [["nose", 0], ...follow.points.map((one) => [one.name, one.number])];
 let worker = null, busy = false, box = null, looks = 0, others = 0, unclear = { said: "", times: 0 };
 let camera = { at: [2.8, 0, 1.0, 0], count: 0 }, last = null, knots = {}, paused = false;
@@ -74,9 +77,10 @@ function unseen(points) { // why nobody can be followed now; "" when somebody ca
   const sees = (...names) => names.filter((name) => points[NAMED.find(([one]) => one === name)[1]].sure > SURE).length;
   const all = NAMED.filter(([name]) => sees(name)).length;
   if (all < 5) return "I see nobody. Step into the picture.";
-  if (others > 0) return "I see two people. Only one may be in the picture.";
+  if (others > 1) return "I see two people. Only one may be in the picture.";
   if (sees("left shoulder", "right shoulder") < 2 && sees("nose") < 1) return "I do not see your head and shoulders.";
-  if (sees("left ankle", "right ankle", "left knee", "right knee") < 3) return "I do not see your legs and feet. Step back.";
+  const legs = sees("left ankle", "right ankle", "left knee", "right knee");
+  if (legs < 3) return "I do not see your legs and feet. Step back.";
   return all < 9 ? "I see only a part of you. Step back, into the light." : "";
 }
 function take(told) {
@@ -89,15 +93,28 @@ function take(told) {
   if (unclear.times === 3 || (why && unclear.times > 3 && by("followed").textContent !== why)) report(why);
   last = sure.length >= 5 ? { frame: extent(sure, 0.12), p: last?.p } : null;
   if (why || when < 0 || !playing) return;
-  const plan = planned(when), spots = follow.points.map(({ number }) => (points[number].sure > SURE ? {
-    x: (2 * points[number].x - width) / height, y: 1 - (2 * points[number].y) / height, sure: points[number].sure } : null));
-  const one = fit(spots, plan, last.p, camera);
-  if (!one.p.every(Number.isFinite)) return void (last.p = null);
-  last.p = one.p;
+  const plan = planned(when), spots = (order) => follow.points.map(({ number }) => {
+    const { x, y, sure: s } = points[order(number)];
+    return s > SURE ? { x: (2 * x - width) / height, y: 1 - (2 * y) / height, sure: s } : null;
+  });
+  const best = nearest(spots, plan, last.p);
+  if (!best.p.every(Number.isFinite) || best.error > POOR) return void (last.p = null);
+  last.p = best.p;
   const share = 1 / Math.min(++camera.count, 50);
-  camera.at = camera.at.map((value, k) => value + share * (one.p[k] - value));
-  keep(when, one);
-  correct(when, plan, one);
+  camera.at = camera.at.map((value, k) => value + share * (best.p[k] - value));
+  keep(when, best);
+  correct(when, plan, best);
+}
+function nearest(spots, plan, before) { // of some descents: from the last look; else with sides confused, arms hanging
+  const first = planned(0).angles, hang = [...camera.at, 0, 0, 0, ...first.map((angle, j) => angle - plan.angles[j])];
+  let best = fit(spots((k) => k), plan, before, camera);
+  for (const [order, start] of [[(k) => k, hang], [(k) => (k % 2 ? k + 1 : k - 1), null],
+    [(k) => (k % 2 ? k + 1 : k - 1), hang]]) {
+    if (best.error < GOOD) break;
+    const other = fit(spots(order), plan, start, camera);
+    if (!(other.error >= best.error)) best = other;
+  }
+  return best;
 }
 function report(text) {
   by("followed").textContent = text;
@@ -132,9 +149,12 @@ function danced(phase) { // information of a phase as the camera saw it; null wh
   if (phase.kind === "hold") return after && information(states(phase, () => after), true);
   const before = middle("hold" + (phase.posture - 1)), between = middle("move" + phase.posture);
   if (!after || !before) return null;
-  const blend = (a, b, u) => a.map((value, j) => value + smooth(u) * (b[j] - value));
-  return information(states(phase, (part) => (!between ? blend(before, after, part) : part < 0.5
-    ? blend(before, between, 2 * part) : blend(between, after, 2 * part - 1))), false);
+  const way = (part) => before.map((from, j) => { // on the plan's own way, and off it in the middle if that is plain
+    const off = between ? between[j] - 0.5 * (from + after[j]) : 0; // rad
+    const plain = Math.sign(off) * Math.max(0, Math.abs(off) - 0.2);
+    return from + smooth(part) * (after[j] - from) + 16 * (part * (1 - part)) ** 2 * plain;
+  });
+  return information(states(phase, way), false);
 }
 const sum = (A, B) => A.map((value, i) => value + B[i]), mean = (list) => list.reduce((a, b) => a + b, 0) / list.length;
 const full = [], intended = (phase) => full[follow.phases.indexOf(phase)] ??= information(states(phase, () => null),
@@ -177,7 +197,8 @@ function missing() { // at the end: the posture that adds most to what was dance
   if (open[least] >= ENOUGH) return "";
   const gain = (p) => shares(follow.phases.filter((one) => one.posture === p).map(intended).reduce(sum, H))[least];
   const best = [...graded].map((p) => [gain(p), p]).sort((a, b) => b[0] - a[0])[0];
-  return best ? `Least is known of your ${follow.segments[least]}: dance posture ${cues[best[1]].number} once more.` : "";
+  if (!best) return "";
+  return `Least is known of your ${follow.segments[least]}: dance posture ${cues[best[1]].number} once more.`;
 }
 
 // ---- what to correct now, in a posture that is held ----
@@ -197,8 +218,8 @@ function correct(when, plan, one) {
   }));
   asked_times = said === asked_for ? asked_times + 1 : 0;
   asked_for = said;
-  if (asked_times >= 1) by("ask").replaceChildren(...(said ? words(said[0].toUpperCase() + said.slice(1) + ".").childNodes
-    : [document.createTextNode("Good.")]));
+  const text = said ? said[0].toUpperCase() + said.slice(1) + "." : "Good.";
+  if (asked_times >= 1) by("ask").replaceChildren(...words(text).childNodes);
 }
 
 // ---- in step with the page ----
@@ -226,7 +247,8 @@ addEventListener("leapt", () => { // what is danced once more tells once more
   paused = false;
 });
 addEventListener("restarted", () => {
-  [H, known, graded, grades, knots, paused] = [new Float64Array(P * P), new Array(PARTS).fill(0), new Set(), {}, {}, false];
+  [H, known] = [new Float64Array(P * P), new Array(PARTS).fill(0)];
+  [graded, grades, knots, paused] = [new Set(), {}, {}, false];
   for (const id of ["ask", "grade"]) by(id).textContent = "";
   if (stream) draw_known();
 });

@@ -28,8 +28,9 @@ function spin(R) { // the vector of a small turn
 }
 function unit([x, y, z, w]) { // of a quaternion
   const s = 2 / (x * x + y * y + z * z + w * w);
-  return [1 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w), s * (x * y + z * w), 1 - s * (x * x + z * z),
-    s * (y * z - x * w), s * (x * z - y * w), s * (y * z + x * w), 1 - s * (x * x + y * y)];
+  return [1 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w),
+    s * (x * y + z * w), 1 - s * (x * x + z * z), s * (y * z - x * w),
+    s * (x * z - y * w), s * (y * z + x * w), 1 - s * (x * x + y * y)];
 }
 
 // ---- where the segments are ----
@@ -130,7 +131,8 @@ function segment(W, first, R, x, A, w, dw) { // Newton and Euler in m, m c, Ixx,
     put(3 + i, 0, X[3 * i] * A[0] + X[3 * i + 1] * A[1] + X[3 * i + 2] * A[2]);
     for (let k = 0; k < 3; k++) {
       put(i, 1 + k, swing[3 * i + k]);
-      put(3 + i, 1 + k, -fall[3 * i + k] + X[3 * i] * swing[k] + X[3 * i + 1] * swing[3 + k] + X[3 * i + 2] * swing[6 + k]);
+      const lever = X[3 * i] * swing[k] + X[3 * i + 1] * swing[3 + k] + X[3 * i + 2] * swing[6 + k];
+      put(3 + i, 1 + k, lever - fall[3 * i + k]);
     }
     for (let k = 0; k < 6; k++) {
       const own = [0, 1, 2].map((j) => L[j][k] + T[3 * j] * K[0][k] + T[3 * j + 1] * K[1][k] + T[3 * j + 2] * K[2][k]);

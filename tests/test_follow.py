@@ -1,0 +1,116 @@
+"""The page that follows: what a dance tells is the same in Python and in the browser; who is not seen is told so."""
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from browser import BROWSER, Page
+from PIL import Image
+from small_dances import small_dance
+
+from biodance.dance.dance import Dance
+from biodance.dance.expectation import expect
+from biodance.dance.telling import planned_shares, telling_of
+from biodance.records import Motion
+from biodance.report.feedback import write
+from biodance.report.feedback.follow import follow_scene
+
+BUILT = write.bundle() is not None
+SEEN = pytest.mark.skipif(not (BUILT and BROWSER), reason="no Chromium, or `make bundle` could not reach npm")
+SUMS = Path(__file__).parents[1] / "web" / "bundle.sha256"
+
+
+@pytest.fixture(scope="module")
+def dance() -> Dance:
+    return small_dance()
+
+
+def test_what_the_parts_tell_adds_up_to_what_is_expected_of_the_dance(dance: Dance) -> None:
+    planned, expected = planned_shares(dance, telling_of(dance)), expect(dance, steps=1).share[-1]
+    assert np.corrcoef(planned, expected)[0, 1] > 0.9
+    assert planned.mean() == pytest.approx(expected.mean(), abs=0.08)
+
+
+def test_more_movement_tells_more_and_no_movement_nothing_new(dance: Dance) -> None:
+    told, plan = telling_of(dance), dance.motion(12.5)
+    move = next(phase for phase in dance.phases if phase.kind == "move")
+    inside = (plan.time >= move.start) & (plan.time <= move.end)
+    motion = Motion(*(each[inside] for each in (plan.time, plan.q, plan.v, plan.a)))
+    H = told.information(dance.body, motion, held=False)
+    arm, other = (dance.body.segment_index(f"{side}_forearm_hand") for side in ("left", "right"))
+    assert told.shares(np.zeros_like(H)) == pytest.approx(0.0, abs=1e-9)
+    once, twice = told.shares(H), told.shares(4 * H)
+    assert np.all(twice >= once)
+    assert once[arm] > once[other], "the left arm moves, the right one hangs"
+    rest = Motion(motion.time, np.tile(motion.q[0], (len(motion.q), 1)), 0 * motion.v, 0 * motion.a)
+    gain = once - told.shares(told.information(dance.body, rest, held=False))
+    assert dance.body.segments[int(np.argmax(gain))] in ("left_upper_arm", "left_forearm_hand")
+
+
+def test_a_body_that_the_camera_does_not_know_is_not_followed(dance: Dance) -> None:
+    from dataclasses import replace
+
+    scene = follow_scene(dance)
+    assert scene is not None
+    assert {one["name"] for one in scene["points"]} >= {"left wrist", "right ankle"}
+    other = replace(
+        dance.body,
+        segments=tuple(f"link_{k}" for k in range(12)),
+        sip=replace(dance.body.sip, segments=tuple(f"link_{k}" for k in range(12))),
+    )
+    assert follow_scene(replace(dance, body=other)) is None
+
+
+@pytest.mark.skipif(not BUILT, reason="`make bundle` could not reach npm")
+def test_the_bundle_is_that_of_the_lock_file() -> None:
+    folder = Path(write.__file__).parent / "bundle"
+    for line in SUMS.read_text().splitlines():
+        digest, name = line.split()
+        assert hashlib.sha256((folder / name).read_bytes()).hexdigest() == digest, f"{name}: run make clean bundle"
+
+
+def test_without_the_bundle_the_page_leads_and_asks_for_nothing(
+    dance: Dance, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(write, "bundle", lambda: None)
+    assert write.write_feedback(dance, tmp_path / "page.html") is False
+    text = (tmp_path / "page.html").read_text()
+    assert "wasm" not in text.split("<style>")[0]
+    assert 'id="known"' not in text
+
+
+@SEEN
+def test_a_browser_follows_counts_and_says_whom_it_does_not_see(dance: Dance, tmp_path: Path) -> None:
+    page, film = tmp_path / "page.html", tmp_path / "empty.mjpeg"
+    assert write.write_feedback(dance, page)
+    Image.new("RGB", (320, 240), "#90a090").save(tmp_path / "one.jpg")
+    film.write_bytes((tmp_path / "one.jpg").read_bytes() * 60)
+    with Page(page.as_uri(), film=film, size="500,420") as browser:
+        browser.run("document.getElementById('film').click()")
+        goal = browser.until("document.body.dataset.goal")
+        assert np.array(goal.split(), dtype=float) == pytest.approx(planned_shares(dance, telling_of(dance)), abs=0.02)
+        assert "I see nobody" in browser.until(
+            "/nobody/.test(document.body.dataset.followed) && document.body.dataset.followed"
+        )
+        browser.key(" ")
+        browser.until("document.body.dataset.phase === 'hold'")
+        at = browser.run(
+            "[second, cues.map((cue) => cue.move_s), moment(cues[1].move_s - 1e-6).phase, moment(cues[1].move_s).phase]"
+        )
+        assert at[2:] == ["hold", "move"], "the cue changes at its instant"
+        browser.key("Escape")
+        assert browser.run("[document.body.dataset.phase, playing]") == ["ready", False]
+        assert browser.asked() == [page.as_uri()]
+        assert not [said for said in browser.said() if "WebGL" not in said]
+
+
+@SEEN
+def test_a_camera_that_is_denied_is_told_and_the_dance_goes_on(dance: Dance, tmp_path: Path) -> None:
+    write.write_feedback(dance, tmp_path / "page.html")
+    with Page((tmp_path / "page.html").as_uri(), denied=True, size="500,420") as browser:
+        browser.run("document.getElementById('film').click()")
+        said = browser.until("document.getElementById('said').textContent")
+        assert "was not allowed; the dance works without it" in said
+        browser.run("document.getElementById('play').click()")
+        browser.until("Number(document.body.dataset.frames) > 3")
