@@ -36,7 +36,7 @@ from biodance.errors import BiodanceError
 from biodance.threads import one_thread
 
 WORKERS = 2
-_ATTEMPTS = 4
+_ATTEMPTS = 8
 """Walks that are tried on performers."""
 _FEW = 24
 """Performers of a first look."""

@@ -25,7 +25,7 @@ from biodance.records import Array
 
 _ROUNDS = 5
 """Corrections of the pelvis; each leaves about a fifth of the error."""
-_DRAWN, _SIGMAS = 64, 3.7
+_DRAWN, _SIGMAS = 96, 4.2
 """Imprecise copies of a posture that are looked at, and standard deviations of a distance that it must bear."""
 _SPARE = {"foot_placement": 0.05}
 """Share of the scale kept in reserve where it is another one than the limit's own: the moves are straight."""
@@ -92,18 +92,18 @@ class Catalogue:
             spare = _SPARE.get(limit.name, limit.hold_reserve(self.stance)) * limit.scale
             if (limit.margins(state).value < spare).any():
                 return limit.name
-        return "" if self.apart(s) else "self_collision"
+        return "" if apart(self.chain, self.stance, self.x[s]) else "self_collision"
 
-    def apart(self, s: int) -> bool:
-        """Return whether segments stay `APART` when people copy posture ``s`` imprecisely."""
-        how, rng = Imprecision(), np.random.default_rng(0)
-        x = np.repeat(self.x[s : s + 1], _DRAWN, axis=0)
-        x[:, ROOT:] += how.tracking * rng.normal(size=(_DRAWN, self.chain.size - ROOT))
-        x[:, 3:ROOT] += how.pelvis * how.tracking * rng.normal(size=(_DRAWN, 3))
-        x = self.chain.plant(x, self.stance.planted, self.stance.ankle)
-        motion = self.chain.motion(np.arange(_DRAWN, dtype=float), x, *np.zeros((2, *x.shape)))
-        gap, _ = surface_distances(self.chain.body, poses(self.chain.body, motion.q), near=np.inf)
-        return bool((gap.mean(axis=0) - _SIGMAS * gap.std(axis=0) > APART).all())
+
+def apart(chain: Chain, stance: Stance, x: Array) -> bool:
+    """Return whether segments stay `APART` when people copy a posture ``x`` (n,) on the feet ``stance`` imprecisely."""
+    how, rng, copies = Imprecision(), np.random.default_rng(0), np.repeat(x[None], _DRAWN, axis=0)
+    copies[:, ROOT:] += how.tracking * rng.normal(size=(_DRAWN, chain.size - ROOT))
+    copies[:, 3:ROOT] += how.pelvis * how.tracking * rng.normal(size=(_DRAWN, 3))
+    copies = chain.plant(copies, stance.planted, stance.ankle)
+    motion = chain.motion(np.arange(_DRAWN, dtype=float), copies, *np.zeros((2, *copies.shape)))
+    gap, _ = surface_distances(chain.body, poses(chain.body, motion.q), near=np.inf)
+    return bool((gap.mean(axis=0) - _SIGMAS * gap.std(axis=0) > APART).all())
 
 
 def posed(chain: Chain, stance: Stance, words: Words, index: NDArray[np.intp]) -> Array:

@@ -6,12 +6,12 @@ What a posture must keep it keeps also for people who copy it imprecisely (`cata
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from biodance.dance.cues import instructions
-from biodance.dance.postures.catalogue import Catalogue
+from biodance.dance.postures.catalogue import Catalogue, apart
 from biodance.dance.postures.selection import learned
 from biodance.dance.postures.vocabulary import Word, read_vocabulary, words_for
 from biodance.dance.problem.splines import rest_to_rest
@@ -212,7 +212,9 @@ class Walk:
         if key not in self._moves:
             feet, plan = under(last.catalogue.stance, step.catalogue.stance), self.work.plan
             ends = np.array([last.x, step.x])
-            self._moves[key] = plain_move(Task(self.work.chain, self.work.blocks, feet, ends, plan.move, plan.limits))
+            move = plain_move(Task(self.work.chain, self.work.blocks, feet, ends, plan.move, plan.limits))
+            between = len(feet.planted) == 1 or apart(self.work.chain, feet, ends.mean(axis=0))
+            self._moves[key] = move if between or move.limit else replace(move, limit="self_collision")
         return self._moves[key]
 
     def _told(self, last: Step | None, step: Step) -> Array:
