@@ -22,7 +22,7 @@ from biodance.dance.postures.ordering import order_postures, support_sequence
 from biodance.dance.postures.posture import intermediate_posture
 from biodance.dance.postures.search import find_postures
 from biodance.dance.postures.selection import choose
-from biodance.dance.postures.walk import DanceStep, Walk, name_of
+from biodance.dance.followable.walk import DanceStep, Walk, name_of
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import excitation_blocks
 from biodance.dance.problem.plan import Plan

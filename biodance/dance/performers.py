@@ -200,7 +200,9 @@ class _Planned:
         self.edges = [replace(phase.stance, over=None).reduced(1.0) for phase in phases]
         before = [dance.stances[max(0, phase.posture - (phase.kind == "move"))] for phase in phases]
         after = [dance.stances[phase.posture] for phase in phases]
-        self.down = np.array([[_planted(s) for s in row] for row in zip(before, (p.stance for p in phases), after)])
+        self.down = np.array(
+            [[_planted(s) for s in row] for row in zip(before, (p.stance for p in phases), after, strict=True)]
+        )
         self.ankles = np.array([[s.ankle for s in row] for row in zip(before, after, strict=True)])
         self.stepping = np.ptp(self.ankles, axis=1).any(axis=(1, 2))
         time = np.unique(np.concatenate([_instants(phase) for phase in phases]))

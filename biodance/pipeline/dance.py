@@ -21,6 +21,7 @@ from biodance.dance.design import design
 from biodance.dance.expectation import Expectation, expect
 from biodance.dance.limits import Limit
 from biodance.dance.metrics import DanceMetrics, dance_metrics
+from biodance.dance.performers import OF_PERFORMERS, PERFORMER_COUNT, SEGMENT_GAP
 from biodance.dance.problem.person import PersonLimits, fit_to_person
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.shapes import unchecked_pairs
@@ -91,6 +92,7 @@ class DanceResult:
     reason: str
     notes: tuple[str, ...]
     seconds: float
+    reason_of_person: str = ""
 
     def __repr__(self) -> str:
         return f"DanceResult({self.dance!r})" if self.dance is not None else f"DanceResult(no dance: {self.reason})"
@@ -104,6 +106,46 @@ class DanceResult:
         return self.dance is not None
 
     @property
+    def performers(self) -> dict[str, float] | None:
+        """What imprecise performers leave, m: of the support, and between segments; None where none were asked."""
+        found = {m.limit.removesuffix(OF_PERFORMERS): m.worst for m in self.margins if m.limit.endswith(OF_PERFORMERS)}
+        if not found:
+            return None
+        gap = found["self_collision_"] + SEGMENT_GAP
+        return {"count": PERFORMER_COUNT, "balance_m": found["balance_"], "gap_m": gap}
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What this dance cannot tell, in plain sentences: where the criterion is far from its bound."""
+        if self.account is None or self.expectation is None or self.account.static <= _FAR * self.account.static_bound:
+            return ()
+        ratio, share = self.account.static / self.account.static_bound, self.expectation.share[-1]
+        poor = [
+            name.replace("_", " ") for name, part in zip(self.expectation.segments, share, strict=True) if part < _NEW
+        ]
+        what = f" Of {', '.join(poor)} it tells next to nothing beyond the table." if poor else ""
+        return (
+            f"The static criterion is {ratio:.0f} times its bound: segments that are hardly tilted cannot be learned"
+            f"{f' ({_names(self.account.hardly)})' if self.account.hardly else ''}.{what}",
+        )
+
+    @property
+    def about(self) -> tuple[str, ...]:
+        """What stands before the cues: for whom, the person's own limits and their reason, how safe, what is not told."""
+        out = [f"For {self.plan.whom}."] if self.plan.whom else []
+        if self.reason_of_person:
+            out.append(f"Made for one person's limits: {self.reason_of_person}.")
+        if found := self.performers:
+            out.append(
+                f"{found['count']:.0f} simulated people, seven degrees off in every joint, a fifth off in time and "
+                f"swaying, kept the weight {100 * found['balance_m']:.1f} cm inside the feet and arms and legs "
+                f"{100 * found['gap_m']:.1f} cm apart at the worst moment."
+            )
+        else:
+            out.append("Nobody imprecise was tried on this dance: it is for trained people only.")
+        return (*out, *self.notes, *self.warnings)
+
+    @property
     def complete(self) -> bool:
         """True where nothing of the protocol was left out: neither for the person nor because a move was impossible."""
         counted = self.dance.counted.sum() if self.dance else 0
@@ -113,6 +155,14 @@ class DanceResult:
 def designed_for(made: DanceResult, subject: Subject) -> DanceResult:
     """Return ``made`` with its dance knowing for whom it was designed."""
     return made if made.dance is None else replace(made, dance=replace(made.dance, subject=subject))
+
+
+_FAR, _NEW = 3.0, 0.05
+"""Times its bound at which the static criterion is warned of; share of the table's variance that is next to nothing."""
+
+
+def _names(segments: tuple[str, ...]) -> str:
+    return ", ".join(name.replace("_", " ") for name in segments)
 
 
 _LEGAL = {"mass": (30.0, 200.0, "kg"), "stature": (1.2, 2.2, "m")}
@@ -174,7 +224,8 @@ def make_dance(
         reason = " ".join(_told(margin) for margin in broken(margins))
     if reason:
         dance = counted = expected = None
-    return DanceResult(own, plan, dance, margins, counted, expected, reason, notes, time.perf_counter() - started)
+    spent = time.perf_counter() - started
+    return DanceResult(own, plan, dance, margins, counted, expected, reason, notes, spent, person.reason)
 
 
 def _told(m: Margin) -> str:

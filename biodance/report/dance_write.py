@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from biodance.dance.cues import cue_sheet
+from biodance.dance.cues import cue_sheet, dance_instructions
 from biodance.dance.dance import Dance
 from biodance.dance.problem.stance import Stance, stance_words
 from biodance.dance.rehearsal import Rehearsal
@@ -41,10 +41,10 @@ def write_dance(result: DanceResult, folder: Path) -> dict[str, Any]:
             write_preview(dance, folder / "dance.c3d")
         else:
             write_angles(dance, folder / "dance.csv")
-        (folder / "cues.md").write_text(cues(dance), encoding="utf-8", newline="\n")
+        (folder / "cues.md").write_text(cues(dance, result.about), encoding="utf-8", newline="\n")
         (folder / "margins.md").write_text(margin_table(result.margins), encoding="utf-8", newline="\n")
         counted = np.flatnonzero(dance.counted).tolist()
-        titles = tuple(f"{k} {_short(dance.stances[p])}" for k, p in enumerate(counted, start=1))
+        titles = tuple(f"{p + 1} {_short(dance.stances[p])}" for p in counted)
         still = dance.chain.motion(np.arange(len(counted), dtype=float), *(_held(dance, counted)))
         drawn = {
             "postures": postures_figure(dance.body, still.q, titles),
@@ -95,10 +95,22 @@ def dance_document(result: DanceResult) -> dict[str, Any]:
         "reason": result.reason,
         "expected_sd": rows,
         "expected_curve": _curve(result),
+        "for": result.plan.whom,
+        "instructions": _counted(dance),
+        "performers": result.performers,
+        "warnings": result.warnings,
         "notes": (*result.notes, *(dance.notes if dance else ())),
         "seed": dance.seed if dance else None,
         "compute_s": result.seconds,
     }
+
+
+def _counted(dance: Dance | None) -> dict[str, float] | None:
+    """Return how many things are called at once, on average and at most."""
+    if dance is None:
+        return None
+    counts = [len(said) for said in dance_instructions(dance)]
+    return {"mean": float(np.mean(counts)), "max": max(counts)}
 
 
 def playback_document(found: Rehearsal, film: Path) -> dict[str, Any]:
@@ -147,9 +159,9 @@ def _short(stance: Stance) -> str:
     )
 
 
-def cues(dance: Dance) -> str:
+def cues(dance: Dance, about: tuple[str, ...] = ()) -> str:
     """Return the cue sheet of all postures, those in between included: in words for a person, joint angles for a
-    robot without markers.
+    robot without markers; ``about`` sentences that stand before them.
     """
     if not dance.body.markers.names:
         return angle_sheet(dance, _held(dance, range(len(dance.stances)))[0][:, 6:])
@@ -157,7 +169,15 @@ def cues(dance: Dance) -> str:
     angles = _held(dance, range(len(dance.stances)))[0][:, 6:]
     planted = tuple(tuple(SIDES[side] for side in s.planted) for s in dance.stances)
     return cue_sheet(
-        dance.body, angles, words, planted, move=float(np.median(dance.move)), hold=float(np.max(dance.hold))
+        dance.body,
+        angles,
+        words,
+        planted,
+        move=float(np.median(dance.move)),
+        hold=float(np.max(dance.hold)),
+        said=dance_instructions(dance),
+        names=dance.names,
+        about=about,
     )
 
 
@@ -223,7 +243,7 @@ def print_dance(found: dict[str, Any]) -> None:
             console.print(table)
         if criterion["hardly_excited"]:
             console.print(f"hardly tilted: {', '.join(criterion['hardly_excited'])}", markup=False)
-    for note in found["notes"]:
+    for note in (*found["warnings"], *found["notes"]):
         console.print(f"look: {note}", markup=False)
 
 

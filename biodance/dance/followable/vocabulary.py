@@ -67,7 +67,8 @@ def read_vocabulary(name: str = "people") -> Vocabulary:
     Raises
     ------
     BiodanceError
-        A group is missing or unknown, a key is unknown, a group has not one word for rest, or a mirror image is missing.
+        A group is missing or unknown, a key is unknown, a group has not one word for rest, or a mirror image
+        is missing.
     """
     path = locate("protocols/vocabulary", name)
     raw = read_toml(path)

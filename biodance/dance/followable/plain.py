@@ -1,5 +1,5 @@
-"""Moves that people can follow: straight from one posture to the next, slower where the straight way breaks a limit, and
-at last with the pelvis and a lifted leg going round.
+"""Moves that people can follow: straight from one posture to the next, slower where the straight way breaks a limit,
+and at last with the pelvis and a lifted leg going round.
 """
 
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""A dance that people can follow: a walk from posture to posture in which one or two parts of the body change at a time.
+"""A dance that people can follow: a walk from posture to posture in which one or two parts of the body change.
 
 Every step takes, of all postures within reach of the last one - at most so many instructions away, or its mirror image
 - the one that tells most per second (`selection`), where an instruction costs time, too: the price of `simplicity`.
@@ -10,15 +10,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from biodance.dance.cues import instructions
-from biodance.dance.postures.catalogue import Catalogue, roomy
+from biodance.dance.cues import MIRRORED, instructions
+from biodance.dance.followable.catalogue import Catalogue, roomy
 from biodance.dance.postures.selection import learned
-from biodance.dance.postures.vocabulary import Word, read_vocabulary, words_for
+from biodance.dance.followable.vocabulary import Word, read_vocabulary, words_for
 from biodance.dance.problem.splines import rest_to_rest
 from biodance.dance.problem.stance import Stance, under
 from biodance.dance.transitions.context import DesignContext
 from biodance.dance.transitions.move import Move, Task
-from biodance.dance.transitions.plain import plain_move
+from biodance.dance.followable.plain import plain_move
 from biodance.errors import BiodanceError
 from biodance.identification.posterior import prior_factor
 from biodance.motion.regressor import regressor
@@ -58,7 +58,7 @@ class DanceStep:
 
 @dataclass(eq=False)
 class _Place:
-    """A place in the walk: the postures ``left`` to try after it, the ``belief`` there, and what was ``taken`` to it."""
+    """A place in the walk: the postures ``left`` to try after it, the ``belief`` there, what was ``taken`` to it."""
 
     left: Iterator[tuple[DanceStep, Move | None]] | None
     belief: Array
@@ -67,8 +67,8 @@ class _Place:
 
 @dataclass(eq=False)
 class Walk:
-    """The search for one dance: what was worked out is kept, so that another round with other ``banned`` postures (feet,
-    number) costs little.
+    """The search for one dance: what was worked out is kept, so that another round with other ``banned`` postures
+    (feet, number) costs little.
     """
 
     work: DesignContext
@@ -169,7 +169,7 @@ class Walk:
             before, feet = (zero, None) if last is None else (last.x, last.catalogue.stance)
             said = instructions(body, before[6:], catalogue.x[s, 6:], feet, catalogue.stance)
             if s == mirror:
-                yield DanceStep(catalogue, s, ("mirror: the same with right and left exchanged",), mirror=True)
+                yield DanceStep(catalogue, s, MIRRORED, mirror=True)
             elif len(said) <= most:
                 yield DanceStep(catalogue, s, said)
 

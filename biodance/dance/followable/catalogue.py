@@ -15,7 +15,7 @@ from biodance.dance.limits import Limit
 from biodance.dance.limits.self_collision import surface_distances
 from biodance.dance.performers import SEGMENT_GAP, Imprecision, mass_centre
 from biodance.dance.postures.exchange import counterpart
-from biodance.dance.postures.vocabulary import Vocabulary, Word, own_joint
+from biodance.dance.followable.vocabulary import Vocabulary, Word, own_joint
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State
@@ -96,7 +96,7 @@ class Catalogue:
 
 
 def roomy(chain: Chain, stance: Stance, x: Array) -> bool:
-    """Return whether segments stay `SEGMENT_GAP` when people copy a posture ``x`` (n,) on the feet ``stance`` imprecisely."""
+    """Return whether segments stay `SEGMENT_GAP` when people copy a posture ``x`` (n,) imprecisely."""
     how, rng, copies = Imprecision(), np.random.default_rng(0), np.repeat(x[None], _DRAWN, axis=0)
     copies[:, ROOT:] += how.tracking * rng.normal(size=(_DRAWN, chain.size - ROOT))
     copies[:, 3:ROOT] += how.pelvis * how.tracking * rng.normal(size=(_DRAWN, 3))
