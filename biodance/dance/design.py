@@ -16,13 +16,13 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
+from biodance.dance.followable.walk import DanceStep, Walk, name_of
 from biodance.dance.limits import Limit
 from biodance.dance.performers import PERFORMER_COUNT, perform_with
 from biodance.dance.postures.ordering import order_postures, support_sequence
 from biodance.dance.postures.posture import intermediate_posture
 from biodance.dance.postures.search import find_postures
 from biodance.dance.postures.selection import choose
-from biodance.dance.followable.walk import DanceStep, Walk, name_of
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import excitation_blocks
 from biodance.dance.problem.plan import Plan

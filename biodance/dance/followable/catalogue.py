@@ -11,11 +11,11 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from biodance.dance.followable.vocabulary import Vocabulary, Word, own_joint
 from biodance.dance.limits import Limit
 from biodance.dance.limits.self_collision import surface_distances
 from biodance.dance.performers import SEGMENT_GAP, Imprecision, mass_centre
 from biodance.dance.postures.exchange import counterpart
-from biodance.dance.followable.vocabulary import Vocabulary, Word, own_joint
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State

@@ -12,13 +12,13 @@ import numpy as np
 
 from biodance.dance.cues import MIRRORED, instructions
 from biodance.dance.followable.catalogue import Catalogue, roomy
-from biodance.dance.postures.selection import learned
+from biodance.dance.followable.plain import plain_move
 from biodance.dance.followable.vocabulary import Word, read_vocabulary, words_for
+from biodance.dance.postures.selection import learned
 from biodance.dance.problem.splines import rest_to_rest
 from biodance.dance.problem.stance import Stance, under
 from biodance.dance.transitions.context import DesignContext
 from biodance.dance.transitions.move import Move, Task
-from biodance.dance.followable.plain import plain_move
 from biodance.errors import BiodanceError
 from biodance.identification.posterior import prior_factor
 from biodance.motion.regressor import regressor

@@ -12,7 +12,7 @@ from biodance.dance.dance import Dance
 from biodance.dance.problem.stance import Stance, stance_words
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
-from biodance.records import SIDES, Array
+from biodance.records import SIDES
 
 _RATE = 15.0
 """Hz of the poses; the page turns and shifts evenly between two."""
