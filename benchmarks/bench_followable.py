@@ -69,7 +69,9 @@ def main() -> None:
     parser.add_argument("--free", action="store_true")
     chosen = parser.parse_args()
     chosen.folder.mkdir(parents=True, exist_ok=True)
-    print("| body | protocol | postures | s | instructions a cue: mean, most | limits that hold | 200 performers: inside")
+    print(
+        "| body | protocol | postures | s | instructions a cue: mean, most | limits that hold | 200 performers: inside"
+    )
     print("the support, mm | segments apart, mm | mass sd, kg | CoM sd, mm | design, CPU s |\n|" + "---|" * 11)
     for name in chosen.bodies.split(","):
         for protocol in chosen.protocols.split(","):

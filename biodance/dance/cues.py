@@ -47,7 +47,7 @@ _WORDS = {
 PLANTED = ("knee_flexion",)
 """What is called of a leg that stands: its other joints follow from the feet."""
 PLURAL = {"foot": "feet"}
-MIRRORED = ("mirror: the same with right and left exchanged",)
+MIRROR_CALL = ("mirror: the same with right and left exchanged",)
 """What is called for the image of the last posture: one known thing."""
 
 
@@ -148,7 +148,7 @@ def dance_instructions(dance: Dance) -> tuple[tuple[str, ...], ...]:
     out = []
     for p, (after, now) in enumerate(zip(angles, dance.stances, strict=True)):
         before, was = (angles[p - 1], dance.stances[p - 1]) if p else (np.zeros_like(after), None)
-        out.append(MIRRORED if p in dance.mirrored else instructions(dance.body, before, after, was, now))
+        out.append(MIRROR_CALL if p in dance.mirrored else instructions(dance.body, before, after, was, now))
     return tuple(out)
 
 

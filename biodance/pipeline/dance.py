@@ -36,7 +36,7 @@ _Tell = Callable[[str, int, int], None]
 UNFINISHED = "unfinished"
 """Folder with what is finished of a dance whose design was stopped."""
 _OURS = (
-    *("results.json", "dance.npz", "dance.c3d", "dance.csv", "cues.md", "margins.md"),
+    *("results.json", "dance.npz", "dance.c3d", "dance.csv", "cues.md", "cues.html", "margins.md"),
     *("postures.png", "postures_3d.png", "criterion.png", "zmp.png", "expectation.png"),
 )
 """Files that a dance consists of."""
@@ -131,7 +131,7 @@ class DanceResult:
 
     @property
     def about(self) -> tuple[str, ...]:
-        """What stands before the cues: for whom, the person's own limits and their reason, how safe, what is not told."""
+        """What stands before the cues: for whom, the person's own limits and their reason, how safe, what is untold."""
         out = [f"For {self.plan.whom}."] if self.plan.whom else []
         if self.reason_of_person:
             out.append(f"Made for one person's limits: {self.reason_of_person}.")

@@ -3,6 +3,7 @@ who calls it.
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from biodance.dance.dance import Dance
 from biodance.dance.problem.stance import Stance, stance_words
 from biodance.dance.rehearsal import Rehearsal
 from biodance.dance.verify import Margin
+from biodance.lab.c3d.parameters import FileValue
 from biodance.lab.c3d.write import write_c3d
 from biodance.motion.kinematics import poses
 from biodance.pipeline.dance import DanceResult
@@ -21,6 +23,7 @@ from biodance.records import SIDES, Array, Markers
 from biodance.report.documents.session import plain_values, to_text
 from biodance.report.figures.dance import criterion_figure, expectation_figure, postures_figure, zmp_figure
 from biodance.report.figures.solid import solid_pngs
+from biodance.report.pages.dance import cards_page
 
 _RATE = 100.0
 """Hz of the preview's markers."""
@@ -39,6 +42,7 @@ def write_dance(result: DanceResult, folder: Path) -> dict[str, Any]:
         dance.save(folder / "dance.npz")
         if dance.body.markers.names:
             write_preview(dance, folder / "dance.c3d")
+            (folder / "cues.html").write_text(cards_page(result), encoding="utf-8", newline="\n")
         else:
             write_angles(dance, folder / "dance.csv")
         (folder / "cues.md").write_text(cues(dance, result.about), encoding="utf-8", newline="\n")
@@ -190,8 +194,36 @@ def write_preview(dance: Dance, path: Path) -> None:
     write_c3d(
         path,
         markers=Markers(markers.names, motion.time, xyz),
-        parameters={"PROCESSING": {"Bodymass": weight}, "SUBJECTS": {"NAMES": ["designed dance"]}},
+        parameters={
+            "PROCESSING": {"Bodymass": weight},
+            "SUBJECTS": {"NAMES": ["designed dance"]},
+            "EVENT": _events(dance),
+            "DANCE": _phases(dance),
+        },
     )
+
+
+def _events(dance: Dance) -> dict[str, FileValue]:
+    """Return the events of a dance as C3D files hold them (times in minutes and seconds): postures by their number, and
+    feet that leave the ground or come back.
+    """
+    found = [(phase.start, "General", f"Posture {phase.posture + 1}") for phase in dance.phases if phase.kind == "hold"]
+    for before, after in pairwise(dance.phases):
+        for side, name in enumerate(SIDES):
+            down = [side in phase.stance.planted for phase in (before, after)]
+            if down[0] != down[1]:
+                found.append((after.start, name.capitalize(), "Foot Strike" if down[1] else "Foot Off"))
+    time = np.array([one[0] for one in sorted(found)])
+    contexts, labels = ([one[k] for one in sorted(found)] for k in (1, 2))
+    minutes = np.stack([time // 60, time % 60])
+    return {"USED": np.int16(len(found)), "CONTEXTS": contexts, "LABELS": labels, "TIMES": minutes}
+
+
+def _phases(dance: Dance) -> dict[str, FileValue]:
+    """Return the support phases: from when to when (s), on which feet."""
+    feet = [" and ".join(SIDES[side] for side in phase.stance.planted) or "seat" for phase in dance.phases]
+    times = np.array([[phase.start, phase.end] for phase in dance.phases]).T
+    return {"SUPPORT": feet, "SUPPORT_TIMES": times}
 
 
 def margin_table(margins: Sequence[Margin]) -> str:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from biodance.dance.cues import MIRRORED, instructions
+from biodance.dance.cues import MIRROR_CALL, instructions
 from biodance.dance.followable.catalogue import Catalogue, roomy
 from biodance.dance.followable.plain import plain_move
 from biodance.dance.followable.vocabulary import Word, read_vocabulary, words_for
@@ -169,7 +169,7 @@ class Walk:
             before, feet = (zero, None) if last is None else (last.x, last.catalogue.stance)
             said = instructions(body, before[6:], catalogue.x[s, 6:], feet, catalogue.stance)
             if s == mirror:
-                yield DanceStep(catalogue, s, MIRRORED, mirror=True)
+                yield DanceStep(catalogue, s, MIRROR_CALL, mirror=True)
             elif len(said) <= most:
                 yield DanceStep(catalogue, s, said)
 

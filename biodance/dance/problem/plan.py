@@ -182,9 +182,8 @@ _KEYS = ("name", "description", "postures", "limits", "weights", "ranges", "for"
 
 
 def read_plan(name_or_path: str | Path) -> Plan:
-    """Return a shipped protocol by name ("short", "easy", "patient", "chair", "full", "one_segment"), or one of the user's
-    by the path of
-    its TOML file.
+    """Return a shipped protocol by name ("short", "easy", "patient", "chair", "full", "one_segment"), or one of the
+    user's by the path of its TOML file.
 
     Raises
     ------
