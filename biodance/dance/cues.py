@@ -17,6 +17,8 @@ from biodance.records import SIDES, Array
 
 _SMALLEST = 12.0
 """degrees: a smaller change is not called."""
+_HANGING = float(np.radians(80.0))
+"""rad that knees are bent of somebody who has sat down."""
 _STEP = 15.0
 """degrees to which angles are rounded."""
 _MOST = 4
@@ -136,7 +138,7 @@ def instructions(body: Body, before: Array, after: Array, was: Stance | None, no
     if was is None and now.seat:  # whoever sits lets the legs hang
         legs = [j for j, joint in enumerate(body.joints) if _is_leg(_split(joint.name)[1])]
         before = before.copy()
-        before[legs] = after[legs]
+        before[legs] = [_HANGING if "knee" in body.joints[j].name else after[j] for j in legs]
     moved = calls(body, np.degrees(before), np.degrees(after), planted)
     return (*_feet_calls(was, now), *moved)
 

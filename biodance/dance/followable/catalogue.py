@@ -112,7 +112,7 @@ def posed(chain: Chain, stance: Stance, words: Vocabulary, index: NDArray[np.int
     for column, (part, group) in enumerate(words.items()):
         for k, word in enumerate(group):
             rows = index[:, column] == k
-            ahead, aside = word.pelvis
+            ahead, aside = (0.0, 0.0) if stance.seat else word.pelvis  # whoever sits keeps the pelvis on the seat
             x[rows, _TILT] -= ahead
             x[rows, _LEAN] += aside if part.startswith("left") else -aside
             for joint, angle in word.angles:

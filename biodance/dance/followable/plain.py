@@ -13,7 +13,7 @@ from biodance.records import Array
 _SLOWER = (1.0, 1.4, 1.8)
 """Factors on the duration of a straight move, one after the other."""
 _ITERATIONS = (12, 8)
-_STEP = (0.3, 0.0, 0.0, 0.6, 0.25, 0.0)
+_STEP = (0.5, 0.0, 0.0, 0.55, 0.0, 0.0)
 """rad by which hip, knee and ankle of a leg bend on the way, of a foot that is put somewhere else."""
 
 

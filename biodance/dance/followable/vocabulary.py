@@ -135,7 +135,7 @@ def free_words(rng: np.random.Generator) -> tuple[Word, ...]:
     for number, k in enumerate(chosen, start=1):
         angles = tuple((joint, float(np.radians(angle))) for joint, angle in zip(_FREE, grid[k], strict=True))
         key = f"free_{number}"
-        out.append(Word(key, f"{{}} arm free {number}", angles, key))
+        out.append(Word(key, "{} arms as in the picture", angles, key))
     return tuple(out)
 
 

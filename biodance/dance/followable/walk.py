@@ -258,7 +258,7 @@ def name_of(step: DanceStep) -> str:
     for kind in ("arm", "hanging"):
         pair = [words[f"{side}_{kind}"] for side in ("right", "left") if f"{side}_{kind}" in words]
         out += _pair_words(pair)
-    return ", ".join(out) or "stand"
+    return ", ".join(out) or ("sit" if "right_hanging" in words else "stand")
 
 
 def _pair_words(pair: list[Word]) -> list[str]:

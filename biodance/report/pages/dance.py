@@ -38,6 +38,6 @@ def cards_page(result: DanceResult) -> str:
         about=[sentence for sentence in result.about if sentence not in result.warnings],
         warnings=result.warnings,
         right="blue",
-        left="red",
+        left="orange",
         cues=cues,
     )
