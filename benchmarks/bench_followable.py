@@ -1,4 +1,4 @@
-"""Dances that people follow: how much is called at once, what imprecise people leave, what will be known, how long it takes.
+"""Dances that people follow: how much is called at once, what imprecise people leave, what will be known.
 
     OMP_NUM_THREADS=1 python benchmarks/bench_followable.py FOLDER [--protocols short,easy] [--bodies reference,careful]
 

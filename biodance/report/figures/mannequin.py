@@ -33,7 +33,7 @@ def mannequin_svg(body: Body, q: Array, title: str) -> str:
         across = np.array([-y, x, 0.0])
         flat = [(name, points @ across, points[:, 2], points @ np.array([x, y, 0.0])) for name, points in solids]
         low = min(float(u.min()) for _, u, _, _ in flat)
-        for name, u, z, depth in sorted(flat, key=lambda one: float(one[3].mean())):
+        for name, u, z, _ in sorted(flat, key=lambda one: float(one[3].mean())):
             corners = np.column_stack([left + scale * (u - low), _TALL - scale * z])
             hull = corners[ConvexHull(corners).vertices]
             path = " ".join(f"{a:.1f},{b:.1f}" for a, b in hull)
