@@ -36,9 +36,9 @@ from biodance.errors import BiodanceError
 from biodance.threads import one_thread
 
 WORKERS = 2
-_ATTEMPTS = 8
+_ATTEMPTS = 10
 """Walks that are tried on performers."""
-_FEW = 24
+_FEW = 40
 """Performers of a first look."""
 _SHORT = 1.0
 """s that postures in between are held."""

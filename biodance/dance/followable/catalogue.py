@@ -25,7 +25,7 @@ from biodance.records import Array
 
 _ROUNDS = 5
 """Corrections of the pelvis; each leaves about a fifth of the error."""
-_DRAWN, _SIGMAS = 96, 4.2
+_DRAWN, _SIGMAS = 96, 4.5
 """Imprecise copies of a posture that are looked at, and standard deviations of a distance that it must bear."""
 _SPARE = {"foot_placement": 0.05}
 """Share of the scale kept in reserve where it is another one than the limit's own: the moves are straight."""

@@ -32,6 +32,8 @@ _FORCE, _MOMENT, _RATE = 8.0, 4.0, 4.0
 """N, N·m, Hz: error of one independent sample of a person's wrench, and how many there are (`selection`)."""
 _TRIES = 200
 """Postures that are taken or given up before a walk is."""
+_BETWEEN = (0.5, 0.3, 0.7)
+"""Shares of a move at which imprecise people must have room, too."""
 _LOOKED_AT = 24
 """Postures that tell most standing still, whose ways are judged, too."""
 
@@ -213,7 +215,8 @@ class Walk:
             feet, plan = under(last.catalogue.stance, step.catalogue.stance), self.work.plan
             ends = np.array([last.x, step.x])
             move = plain_move(Task(self.work.chain, self.work.blocks, feet, ends, plan.move, plan.limits))
-            between = len(feet.planted) == 1 or roomy(self.work.chain, feet, ends.mean(axis=0))
+            way = [ends[0] + share * (ends[1] - ends[0]) for share in _BETWEEN]
+            between = len(feet.planted) == 1 or all(roomy(self.work.chain, feet, x) for x in way)
             self._moves[key] = move if between or move.limit else replace(move, limit="self_collision")
         return self._moves[key]
 

@@ -176,7 +176,7 @@ _SHORT = {"share_of_support": ("balance", "share")}
 _FLAGS = ("free", "gentle", "deep")
 _FOLLOWABLE = {"instructions": 4.0, "simplicity": 1.0, "wide": 1.3}
 """Of protocols that are not free, unless the file says otherwise."""
-_SUPPORT = {"share": 0.7}
+_SUPPORT = {"share": 0.8}
 """Share of the support that a followable dance may use: what imprecise people need is judged by performers."""
 _KEYS = ("name", "description", "postures", "limits", "weights", "ranges", "for", *_NUMBERS, *_SHORT, *_FLAGS)
 
