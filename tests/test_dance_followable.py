@@ -1,6 +1,7 @@
-"""A dance that people follow: few instructions, one or two parts at a time, room for imprecise people, cards to print."""
+"""A dance that people follow: few instructions, one or two parts at a time, room for imprecise people, pictures."""
 
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -39,7 +40,7 @@ def walked():
 
 def test_a_walk_asks_little_at_once_and_keeps_all_limits(walked) -> None:
     steps, dance = walked
-    for before, after in zip(steps, steps[1:], strict=False):
+    for before, after in pairwise(steps):
         changed = [part for part, word in after.words.items() if word.key != before.words[part].key]
         assert after.mirror or 1 <= len(changed) <= 2
     said = dance_instructions(dance)
@@ -52,7 +53,9 @@ def test_a_walk_asks_little_at_once_and_keeps_all_limits(walked) -> None:
 def test_a_catalogue_stands_balanced_on_its_feet() -> None:
     (stance, *_) = support_sequence(BODY, PLAN)
     words = words_for(BODY, PLAN, stance, read_vocabulary(), np.random.default_rng(0))
-    found = Catalogue.of(CHAIN, stance, {part: group if part == "trunk" else group[:2] for part, group in words.items()})
+    found = Catalogue.of(
+        CHAIN, stance, {part: group if part == "trunk" else group[:2] for part, group in words.items()}
+    )
     middle = mass_centre(CHAIN, found.x)[:, :2] - stance.centre
     np.testing.assert_allclose(middle[:, 1], 0.0, atol=2e-3)
     assert np.ptp(middle[:, 0]) < 4e-3

@@ -176,7 +176,7 @@ _SHORT = {"share_of_support": ("balance", "share")}
 _FLAGS = ("free", "gentle", "deep")
 _FOLLOWABLE = {"instructions": 4.0, "simplicity": 1.0, "wide": 1.3}
 """Of protocols that are not free, unless the file says otherwise."""
-_SUPPORT = {"share": 0.8}
+FOLLOWABLE_SHARE = 0.8
 """Share of the support that a followable dance may use: what imprecise people need is judged by performers."""
 _KEYS = ("name", "description", "postures", "limits", "weights", "ranges", "for", *_NUMBERS, *_SHORT, *_FLAGS)
 
@@ -221,7 +221,7 @@ def read_plan(name_or_path: str | Path) -> Plan:
         tuple(counts.items()),
         weights=tuple(weights.items()),
     )
-    return replace(plan, limits=_limits(path, raw, {} if free else {"balance": dict(_SUPPORT)}), **fields)
+    return replace(plan, limits=_limits(path, raw, {} if free else {"balance": {"share": FOLLOWABLE_SHARE}}), **fields)
 
 
 def _flag(path: Path, key: str, value: object) -> bool:
