@@ -38,9 +38,9 @@ def dance_command(
 ) -> int:
     """Design a dance for one person or robot: safe, balanced, and telling much about every segment.
 
-    Writes dance.npz, dance.c3d (a person's virtual markers) or dance.csv (a robot's joint angles), cues.md, cues.html,
-    margins.md, figures and results.json. Ctrl-C keeps what is finished, and the same command goes on from there. A dance that
-    cannot exist is refused with the constraint that forbids it (exit code 1).
+    Writes dance.npz, dance.c3d (a person's virtual markers) or dance.csv (a robot's joint angles), cues.md, cues.html
+    (cards to print), margins.md, figures and results.json. Ctrl-C keeps what is finished, and the same command goes on
+    from there. A dance that cannot exist is refused with the constraint that forbids it (exit code 1).
     """
     from biodance.dance.problem.person import HEALTHY, read_person
     from biodance.dance.problem.plan import read_plan
