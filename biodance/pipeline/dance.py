@@ -117,14 +117,22 @@ class DanceResult:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What this dance cannot tell, in plain sentences: where the criterion is far from its bound."""
+        unsafe = tuple(
+            f"NOT SAFE for imprecise people: {m.limit.removesuffix(OF_PERFORMERS).replace('_', ' ').strip()} fell short by "
+            f"{-1000 * m.worst:.0f} mm at {m.where_s:.0f} s ({m.what.replace('_', ' ')}) for the worst of "
+            f"{PERFORMER_COUNT}. Try another seed, an easier protocol, or dance it with somebody at hand."
+            for m in broken(self.margins)
+            if m.limit.endswith(OF_PERFORMERS)
+        )
         if self.account is None or self.expectation is None or self.account.static <= _FAR * self.account.static_bound:
-            return ()
+            return unsafe
         ratio, share = self.account.static / self.account.static_bound, self.expectation.share[-1]
         poor = [
             name.replace("_", " ") for name, part in zip(self.expectation.segments, share, strict=True) if part < _NEW
         ]
         what = f" Of {', '.join(poor)} it tells next to nothing beyond the table." if poor else ""
         return (
+            *unsafe,
             f"The static criterion is {ratio:.0f} times its bound: segments that are hardly tilted cannot be learned"
             f"{f' ({_names(self.account.hardly)})' if self.account.hardly else ''}.{what}",
         )
@@ -147,9 +155,15 @@ class DanceResult:
 
     @property
     def complete(self) -> bool:
-        """True where nothing of the protocol was left out: neither for the person nor because a move was impossible."""
+        """True where nothing of the protocol was left out, neither for the person nor because a move was impossible, and
+        imprecise people are safe.
+        """
         counted = self.dance.counted.sum() if self.dance else 0
-        return not self.notes and (np.isfinite(self.plan.budget) or counted == self.plan.count)
+        return (
+            not self.notes
+            and not broken(self.margins)
+            and (np.isfinite(self.plan.budget) or counted == self.plan.count)
+        )
 
 
 def designed_for(made: DanceResult, subject: Subject) -> DanceResult:
@@ -221,7 +235,7 @@ def make_dance(
         with ProcessPoolExecutor(1) as aside:
             numbers = aside.submit(dance_metrics, dance, plan)
             expected, counted = makers.expect(dance), numbers.result()
-        reason = " ".join(_told(margin) for margin in broken(margins))
+        reason = " ".join(_told(margin) for margin in broken(margins) if not margin.limit.endswith(OF_PERFORMERS))
     if reason:
         dance = counted = expected = None
     spent = time.perf_counter() - started
