@@ -118,8 +118,8 @@ class DanceResult:
     def warnings(self) -> tuple[str, ...]:
         """What this dance cannot tell, in plain sentences: where the criterion is far from its bound."""
         unsafe = tuple(
-            f"NOT SAFE for imprecise people: {m.limit.removesuffix(OF_PERFORMERS).replace('_', ' ').strip()} fell short by "
-            f"{-1000 * m.worst:.0f} mm at {m.where_s:.0f} s ({m.what.replace('_', ' ')}) for the worst of "
+            f"NOT SAFE for imprecise people: {m.limit.removesuffix(OF_PERFORMERS).replace('_', ' ').strip()} fell short "
+            f"by {-1000 * m.worst:.0f} mm at {m.where_s:.0f} s ({m.what.replace('_', ' ')}) for the worst of "
             f"{PERFORMER_COUNT}. Try another seed, an easier protocol, or dance it with somebody at hand."
             for m in broken(self.margins)
             if m.limit.endswith(OF_PERFORMERS)
@@ -155,8 +155,8 @@ class DanceResult:
 
     @property
     def complete(self) -> bool:
-        """True where nothing of the protocol was left out, neither for the person nor because a move was impossible, and
-        imprecise people are safe.
+        """True where nothing of the protocol was left out, neither for the person nor because a move was impossible,
+        and imprecise people are safe.
         """
         counted = self.dance.counted.sum() if self.dance else 0
         return (
