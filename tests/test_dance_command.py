@@ -21,7 +21,7 @@ from biodance.pipeline.dance import UNFINISHED, dance_folder, dancer
 from biodance.records import Subject
 
 WHO = ["--sex", "F", "--height", "1.75", "--mass", "65"]
-PROTOCOL = 'name = "tiny"\nmove_s = 2.0\nhold_s = 1.0\n[postures]\nparallel = 2\n'
+PROTOCOL = 'name = "tiny"\nmove_s = 2.0\nhold_s = 1.0\nfree = true\n[postures]\nparallel = 2\n'
 
 
 @pytest.fixture(scope="module")

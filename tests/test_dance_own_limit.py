@@ -62,7 +62,7 @@ class Ceiling(Limit):
 
 LIMIT = Ceiling
 '''
-PROTOCOL = 'name = "tiny"\nhold_s = 1.0\n[postures]\nparallel = 3\n[limits.friction]\nmu = 0.4\n'
+PROTOCOL = 'name = "tiny"\nhold_s = 1.0\nfree = true\n[postures]\nparallel = 3\n[limits.friction]\nmu = 0.4\n'
 
 
 @pytest.fixture

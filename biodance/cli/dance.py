@@ -26,7 +26,9 @@ def dance_command(
     height: Annotated[float | None, Parameter(help="Stature, m.")] = None,
     mass: Annotated[float | None, Parameter(help="Body mass, kg.")] = None,
     age: Annotated[float, Parameter(help="Age, years; strength falls with it.")] = float("nan"),
-    protocol: Annotated[str, Parameter(help="full, short, chair, one_segment, or a TOML file.")] = "full",
+    protocol: Annotated[
+        str, Parameter(help="easy, patient, chair, short, one_segment, full, or a TOML file.")
+    ] = "full",
     limits: Annotated[Path | None, Parameter(help="TOML file with what this person can and may do.")] = None,
     urdf: Annotated[Path | None, Parameter(help="URDF file of a robot that dances instead of a person.")] = None,
     feet: Annotated[str | None, Parameter(help="Links of the robot's right and left foot: RIGHT,LEFT.")] = None,
@@ -37,9 +39,9 @@ def dance_command(
 ) -> int:
     """Design a dance for one person or robot: safe, balanced, and telling much about every segment.
 
-    Writes dance.npz, dance.c3d (a person's virtual markers) or dance.csv (a robot's joint angles), cues.md, margins.md,
-    figures and results.json. Ctrl-C keeps what is finished, and the same command goes on from there. A dance that
-    cannot exist is refused with the constraint that forbids it (exit code 1).
+    Writes dance.npz, dance.c3d (a person's virtual markers) or dance.csv (a robot's joint angles), cues.md, cues.html
+    (cards to print), margins.md, figures and results.json. Ctrl-C keeps what is finished, and the same command goes on
+    from there. A dance that cannot exist is refused with the constraint that forbids it (exit code 1).
     """
     from biodance.dance.problem.person import HEALTHY, read_person
     from biodance.dance.problem.plan import read_plan

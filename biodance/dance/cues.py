@@ -10,12 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.dance.dance import Dance
 from biodance.dance.problem.stance import Stance
 from biodance.errors import BiodanceError
 from biodance.records import SIDES, Array
 
 _SMALLEST = 12.0
 """degrees: a smaller change is not called."""
+_HANGING = float(np.radians(80.0))
+"""rad that knees are bent of somebody who has sat down."""
 _STEP = 15.0
 """degrees to which angles are rounded."""
 _MOST = 4
@@ -46,6 +49,8 @@ _WORDS = {
 PLANTED = ("knee_flexion",)
 """What is called of a leg that stands: its other joints follow from the feet."""
 PLURAL = {"foot": "feet"}
+MIRROR_CALL = ("mirror: the same with right and left exchanged",)
+"""What is called for the image of the last posture: one known thing."""
 
 
 @dataclass(frozen=True)
@@ -62,8 +67,14 @@ def cue_sheet(
     *,
     move: float = 2.0,
     hold: float = 2.0,
+    said: tuple[tuple[str, ...], ...] | None = None,
+    names: tuple[str, ...] = (),
+    about: tuple[str, ...] = (),
 ) -> str:
     """Return the cue sheet (Markdown) of postures ``angles`` (P, n) rad of the joints of ``body``.
+
+    ``said`` (P) what is called for each, by default what moves; ``names`` (P) what they are called, if they are known
+    ones; ``about`` sentences that stand before them.
 
     ``stances`` (P,) say in words where the feet are; ``planted`` (P,) which feet SIDES stand. ``move`` and
     ``hold`` s.
@@ -86,12 +97,14 @@ def cue_sheet(
         f"what moves",
         "is said; everything else stays as it is. Stop whenever something hurts or you lose your balance; the posture "
         "can be repeated.",
+        *(line for sentence in about for line in ("", sentence)),
     ]
     for i, (stance, feet) in enumerate(zip(stances, planted, strict=True)):
         if i == 0 or stance != stances[i - 1]:
             lines += ["", f"## {stance[:1].upper()}{stance[1:]}"]
-        said = calls(body, degrees[i], degrees[i + 1], feet)
-        lines += ["", f"**{i + 1}.** {_sentence(said)}"]
+        called = said[i] if said is not None else calls(body, degrees[i], degrees[i + 1], feet)
+        name = f"*{names[i][:1].upper()}{names[i][1:]}.* " if names else ""
+        lines += ["", f"**{i + 1}.** {name}{_sentence(called)}"]
     return "\n".join(lines) + "\n"
 
 
@@ -122,8 +135,23 @@ def instructions(body: Body, before: Array, after: Array, was: Stance | None, no
     ``before``, ``after`` (n,) rad angles of the joints; ``was`` the feet before, None at the start, ``now`` after.
     """
     planted = tuple(SIDES[side] for side in now.planted)
+    if was is None and now.seat:  # whoever sits lets the legs hang
+        legs = [j for j, joint in enumerate(body.joints) if _is_leg(_split(joint.name)[1])]
+        before = before.copy()
+        before[legs] = [_HANGING if "knee" in body.joints[j].name else after[j] for j in legs]
     moved = calls(body, np.degrees(before), np.degrees(after), planted)
     return (*_feet_calls(was, now), *moved)
+
+
+def dance_instructions(dance: Dance) -> tuple[tuple[str, ...], ...]:
+    """Return what is called on the way to each posture of a dance, (P); postures are numbered from 1 everywhere."""
+    pairs = zip(dance.postures, dance.stances, strict=True)
+    angles = [dance.chain.plant(x[None], s.planted, s.ankle)[0, -len(dance.body.joints) :] for x, s in pairs]
+    out = []
+    for p, (after, now) in enumerate(zip(angles, dance.stances, strict=True)):
+        before, was = (angles[p - 1], dance.stances[p - 1]) if p else (np.zeros_like(after), None)
+        out.append(MIRROR_CALL if p in dance.mirrored else instructions(dance.body, before, after, was, now))
+    return tuple(out)
 
 
 def _feet_calls(was: Stance | None, now: Stance) -> tuple[str, ...]:

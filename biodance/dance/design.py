@@ -16,13 +16,13 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
+from biodance.dance.followable.walk import DanceStep, Walk, name_of
 from biodance.dance.limits import Limit
-from biodance.dance.performers import COUNT, perform_with
+from biodance.dance.performers import PERFORMER_COUNT, perform_with
 from biodance.dance.postures.ordering import order_postures, support_sequence
 from biodance.dance.postures.posture import intermediate_posture
 from biodance.dance.postures.search import find_postures
 from biodance.dance.postures.selection import choose
-from biodance.dance.postures.walk import Step, Walk, name_of
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import excitation_blocks
 from biodance.dance.problem.plan import Plan
@@ -36,9 +36,9 @@ from biodance.errors import BiodanceError
 from biodance.threads import one_thread
 
 WORKERS = 2
-_ATTEMPTS = 4
+_ATTEMPTS = 10
 """Walks that are tried on performers."""
-_FEW = 24
+_FEW = 40
 """Performers of a first look."""
 _SHORT = 1.0
 """s that postures in between are held."""
@@ -83,7 +83,7 @@ def design(
         dance = _joined(work, *replan(work, _postures(work)))
     work.tell("checking every limit", 0, 0)
     margins = tuple(sorted((*verify_with(workers, body, dance, plan.limits), *danced), key=lambda m: m.limit))
-    if wrong := broken(margins):
+    if wrong := broken(tuple(m for m in margins if m not in danced)):
         told = "; ".join(
             f"{m.limit.replace('_', ' ')} by {-m.worst:.3g} {m.unit} at {m.where_s:.2f} s {m.what}" for m in wrong
         )
@@ -103,7 +103,7 @@ def _followable(work: DesignContext) -> tuple[Dance, tuple[Margin, ...]]:
         steps, moves = walk.take(stances)
         dance = _walked(work, stances, steps, moves)
         work.tell("performers", attempt, 0)
-        found = perform_with(work.workers, dance, count=_FEW if attempt < _ATTEMPTS - 1 else COUNT)
+        found = perform_with(work.workers, dance, count=_FEW if attempt < _ATTEMPTS - 1 else PERFORMER_COUNT)
         found = perform_with(work.workers, dance) if found.safe else found
         bad = {walk.key(steps[p]) for p in found.bad}
         if found.safe or not bad - walk.banned:
@@ -112,7 +112,7 @@ def _followable(work: DesignContext) -> tuple[Dance, tuple[Margin, ...]]:
     return dance, found.margins(dance)
 
 
-def _walked(work: DesignContext, stances: tuple[Stance, ...], steps: list[Step], moves: list[Move]) -> Dance:
+def _walked(work: DesignContext, stances: tuple[Stance, ...], steps: list[DanceStep], moves: list[Move]) -> Dance:
     """Return the dance of a walk."""
     plan, x = work.plan, np.array([step.x for step in steps])
     hold = np.array([plan.hold if stance.over is None else min(_SHORT, plan.hold) for stance in stances])

@@ -27,11 +27,11 @@ from biodance.motion.kinematics import Poses, poses
 from biodance.records import Array
 from biodance.threads import one_thread
 
-APART = 0.02
+SEGMENT_GAP = 0.02
 """m that segments of imprecise performers stay apart."""
-PERFORMERS = "of_performers"
+OF_PERFORMERS = "of_performers"
 """End of the names of their margins."""
-COUNT = 200
+PERFORMER_COUNT = 200
 """Performers that a dance is tried on."""
 _RATE, _PLAN_RATE = 5.0, 25.0
 """Hz at which performances are judged, and the plan is laid out."""
@@ -87,23 +87,23 @@ class Rehearsed:
     bad: tuple[int, ...]
 
     def margins(self, dance: Dance) -> tuple[Margin, ...]:
-        """Return what the performers leave as margins of a dance: inside the support, and beyond `APART`."""
+        """Return what the performers leave as margins of a dance: inside the support, and beyond `SEGMENT_GAP`."""
         starts = {phase.posture: phase.start for phase in reversed(dance.phases)}
-        rooms = (("balance", self.balance, 0.0), ("self_collision", self.gap, APART))
+        rooms = (("balance", self.balance, 0.0), ("self_collision", self.gap, SEGMENT_GAP))
         return tuple(
-            Margin(f"{name}_{PERFORMERS}", room.worst - need, starts[room.posture], "m", room.what)
+            Margin(f"{name}_{OF_PERFORMERS}", room.worst - need, starts[room.posture], "m", room.what)
             for name, room, need in rooms
         )
 
     @property
     def safe(self) -> bool:
-        """True where nobody leaves the support or comes closer than `APART` to themselves."""
-        return self.balance.worst >= 0 and self.gap.worst >= APART
+        """True where nobody leaves the support or comes closer than `SEGMENT_GAP` to themselves."""
+        return self.balance.worst >= 0 and self.gap.worst >= SEGMENT_GAP
 
 
 @one_thread()
-def perform(
-    dance: Dance, *, count: int = COUNT, seed: int = 0, first: int = 0, how: Imprecision = Imprecision()
+def rehearse_imprecisely(
+    dance: Dance, *, count: int = PERFORMER_COUNT, seed: int = 0, first: int = 0, how: Imprecision = Imprecision()
 ) -> Rehearsed:
     """Return what ``count`` performers leave of the room in ``dance``; performer number k from ``first`` on is the same
     whoever else dances.
@@ -124,10 +124,13 @@ def perform(
     return _joined(count, found)
 
 
-def perform_with(workers: Executor, dance: Dance, *, count: int = COUNT, seed: int = 0) -> Rehearsed:
-    """Return what `perform` does, found by two ``workers`` side by side."""
+def perform_with(workers: Executor, dance: Dance, *, count: int = PERFORMER_COUNT, seed: int = 0) -> Rehearsed:
+    """Return what `rehearse_imprecisely` does, found by two ``workers`` side by side."""
     half = count // 2
-    tasks = [workers.submit(perform, dance, count=n, seed=seed, first=f) for n, f in ((half, 0), (count - half, half))]
+    tasks = [
+        workers.submit(rehearse_imprecisely, dance, count=n, seed=seed, first=f)
+        for n, f in ((half, 0), (count - half, half))
+    ]
     parts = [task.result() for task in tasks]
     count = sum(part.count for part in parts)
     rooms = []
@@ -141,7 +144,7 @@ def perform_with(workers: Executor, dance: Dance, *, count: int = COUNT, seed: i
 def _joined(count: int, parts: dict[str, list["_Least"]]) -> Rehearsed:
     """Return the worst of all performers, for the zero-moment point and for the segments."""
     rooms, bad = [], set[int]()
-    for need, found in zip((0.0, APART), parts.values(), strict=True):
+    for need, found in zip((0.0, SEGMENT_GAP), parts.values(), strict=True):
         worst = min(found, key=lambda one: one.room)
         rooms.append(Room(worst.room, worst.posture, worst.what, float(np.mean([one.room < need for one in found]))))
         bad |= {int(p) for one in found for p in np.flatnonzero(one.each < need)}
@@ -197,7 +200,9 @@ class _Planned:
         self.edges = [replace(phase.stance, over=None).reduced(1.0) for phase in phases]
         before = [dance.stances[max(0, phase.posture - (phase.kind == "move"))] for phase in phases]
         after = [dance.stances[phase.posture] for phase in phases]
-        self.down = np.array([[_planted(s) for s in row] for row in zip(before, (p.stance for p in phases), after)])
+        self.down = np.array(
+            [[_planted(s) for s in row] for row in zip(before, (p.stance for p in phases), after, strict=True)]
+        )
         self.ankles = np.array([[s.ankle for s in row] for row in zip(before, after, strict=True)])
         self.stepping = np.ptp(self.ankles, axis=1).any(axis=(1, 2))
         time = np.unique(np.concatenate([_instants(phase) for phase in phases]))
@@ -206,7 +211,7 @@ class _Planned:
             x[rows == p] = dance.state(phase, time[rows == p]).x
         up, ankle = self._feet(rows, time)
         over = x[:, 2] - self._tops(x, up, ankle)
-        self.spline = CubicSpline(time, np.column_stack([x, centre_of_mass(self.chain, x)[:, :2], over]))
+        self.spline = CubicSpline(time, np.column_stack([x, mass_centre(self.chain, x)[:, :2], over]))
 
     def phase_at(self, when: Array) -> NDArray[np.intp]:
         """Return the phase (T,) at instants of the plan."""
@@ -260,7 +265,7 @@ class _Planned:
             x[:, 2] = self._tops(x, up, ankle) + over
             x = self._standing(x, wanted, up, ankle)
             if k < _ROUNDS:
-                x[:, :2] += (com - centre_of_mass(chain, x)[:, :2]) / _CARRIED
+                x[:, :2] += (com - mass_centre(chain, x)[:, :2]) / _CARRIED
         return x, rows
 
     def _standing(self, x: Array, wanted: Array, up: Array, ankle: Array) -> Array:
@@ -287,7 +292,7 @@ def _instants(phase: Phase) -> Array:
     return np.round(np.linspace(phase.start, phase.end, count, endpoint=False), 9)
 
 
-def centre_of_mass(chain: Chain, x: Array) -> Array:
+def mass_centre(chain: Chain, x: Array) -> Array:
     """Return the centre of mass (S, 3) m of coordinates (S, n), lab frame."""
     pin = load_pinocchio()
     return np.array([pin.centerOfMass(chain.model, chain.data, row) for row in x]).reshape(-1, 3)

@@ -19,8 +19,9 @@ from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.expectation import Expectation, parameter_deviations
 from biodance.dance.limits import Limit
+from biodance.dance.limits.balance import Balance
 from biodance.dance.problem.chain import Chain
-from biodance.dance.problem.plan import Plan
+from biodance.dance.problem.plan import FOLLOWABLE_SHARE, Plan
 from biodance.dance.problem.stance import Stance
 from biodance.dance.reposition import reposition
 from biodance.dance.verify import Margin, verify
@@ -66,6 +67,8 @@ def robot_plan(body: Body, plan: Plan) -> Plan:
     usual = float(np.median(body.limits.velocity))
     ahead = float(np.clip(plan.forward * _FORWARD * leg_length(body), 0.05, 0.4))
     free: dict[str, Any] = {"instructions": float("inf"), "simplicity": 0.0, "wide": 1.0}
+    if any(isinstance(limit, Balance) and limit.share == FOLLOWABLE_SHARE for limit in plan.limits):
+        plan = plan.with_limits([Balance()])  # people have performers instead
     return replace(plan, move=plan.move * max(1.0, UNHURRIED / usual), forward=ahead, **free)
 
 

@@ -34,7 +34,7 @@ def design_dance(
     subject : Subject
         Mass kg, stature m, sex, age years (strength falls with it).
     protocol : str or pathlib.Path
-        "full", "short", "chair", "one_segment", or a TOML file.
+        "short", "easy", "patient", "chair", "one_segment", "full", or a TOML file.
     limits : str or pathlib.Path, optional
         TOML file with what this person can and may do.
     own_limits : iterable of Limit, optional

@@ -3,16 +3,18 @@ who calls it.
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from biodance.dance.cues import cue_sheet
+from biodance.dance.cues import cue_sheet, dance_instructions
 from biodance.dance.dance import Dance
 from biodance.dance.problem.stance import Stance, stance_words
 from biodance.dance.rehearsal import Rehearsal
 from biodance.dance.verify import Margin
+from biodance.lab.c3d.parameters import FileValue
 from biodance.lab.c3d.write import write_c3d
 from biodance.motion.kinematics import poses
 from biodance.pipeline.dance import DanceResult
@@ -21,6 +23,7 @@ from biodance.records import SIDES, Array, Markers
 from biodance.report.documents.session import plain_values, to_text
 from biodance.report.figures.dance import criterion_figure, expectation_figure, postures_figure, zmp_figure
 from biodance.report.figures.solid import sheet_png
+from biodance.report.pages.dance import cards_page
 
 _RATE = 100.0
 """Hz of the preview's markers."""
@@ -39,12 +42,13 @@ def write_dance(result: DanceResult, folder: Path) -> dict[str, Any]:
         dance.save(folder / "dance.npz")
         if dance.body.markers.names:
             write_preview(dance, folder / "dance.c3d")
+            (folder / "cues.html").write_text(cards_page(result), encoding="utf-8", newline="\n")
         else:
             write_angles(dance, folder / "dance.csv")
-        (folder / "cues.md").write_text(cues(dance), encoding="utf-8", newline="\n")
+        (folder / "cues.md").write_text(cues(dance, result.about), encoding="utf-8", newline="\n")
         (folder / "margins.md").write_text(margin_table(result.margins), encoding="utf-8", newline="\n")
         counted = np.flatnonzero(dance.counted).tolist()
-        titles = tuple(f"{k} {_short(dance.stances[p])}" for k, p in enumerate(counted, start=1))
+        titles = tuple(f"{p + 1} {_short(dance.stances[p])}" for p in counted)
         still = dance.chain.motion(np.arange(len(counted), dtype=float), *(_held(dance, counted)))
         drawn = {
             "postures": postures_figure(dance.body, still.q, titles),
@@ -95,10 +99,22 @@ def dance_document(result: DanceResult) -> dict[str, Any]:
         "reason": result.reason,
         "expected_sd": rows,
         "expected_curve": _curve(result),
+        "for": result.plan.whom,
+        "instructions": _counted(dance),
+        "performers": result.performers,
+        "warnings": result.warnings,
         "notes": (*result.notes, *(dance.notes if dance else ())),
         "seed": dance.seed if dance else None,
         "compute_s": result.seconds,
     }
+
+
+def _counted(dance: Dance | None) -> dict[str, float] | None:
+    """Return how many things are called at once, on average and at most."""
+    if dance is None:
+        return None
+    counts = [len(said) for said in dance_instructions(dance)]
+    return {"mean": float(np.mean(counts)), "max": max(counts)}
 
 
 def playback_document(found: Rehearsal, film: Path) -> dict[str, Any]:
@@ -147,9 +163,9 @@ def _short(stance: Stance) -> str:
     )
 
 
-def cues(dance: Dance) -> str:
+def cues(dance: Dance, about: tuple[str, ...] = ()) -> str:
     """Return the cue sheet of all postures, those in between included: in words for a person, joint angles for a
-    robot without markers.
+    robot without markers; ``about`` sentences that stand before them.
     """
     if not dance.body.markers.names:
         return angle_sheet(dance, _held(dance, range(len(dance.stances)))[0][:, 6:])
@@ -157,7 +173,15 @@ def cues(dance: Dance) -> str:
     angles = _held(dance, range(len(dance.stances)))[0][:, 6:]
     planted = tuple(tuple(SIDES[side] for side in s.planted) for s in dance.stances)
     return cue_sheet(
-        dance.body, angles, words, planted, move=float(np.median(dance.move)), hold=float(np.max(dance.hold))
+        dance.body,
+        angles,
+        words,
+        planted,
+        move=float(np.median(dance.move)),
+        hold=float(np.max(dance.hold)),
+        said=dance_instructions(dance),
+        names=dance.names,
+        about=about,
     )
 
 
@@ -170,8 +194,36 @@ def write_preview(dance: Dance, path: Path) -> None:
     write_c3d(
         path,
         markers=Markers(markers.names, motion.time, xyz),
-        parameters={"PROCESSING": {"Bodymass": weight}, "SUBJECTS": {"NAMES": ["designed dance"]}},
+        parameters={
+            "PROCESSING": {"Bodymass": weight},
+            "SUBJECTS": {"NAMES": ["designed dance"]},
+            "EVENT": _events(dance),
+            "DANCE": _phases(dance),
+        },
     )
+
+
+def _events(dance: Dance) -> dict[str, FileValue]:
+    """Return the events of a dance as C3D files hold them (times in minutes and seconds): postures by their number, and
+    feet that leave the ground or come back.
+    """
+    found = [(phase.start, "General", f"Posture {phase.posture + 1}") for phase in dance.phases if phase.kind == "hold"]
+    for before, after in pairwise(dance.phases):
+        for side, name in enumerate(SIDES):
+            down = [side in phase.stance.planted for phase in (before, after)]
+            if down[0] != down[1]:
+                found.append((after.start, name.capitalize(), "Foot Strike" if down[1] else "Foot Off"))
+    time = np.array([one[0] for one in sorted(found)])
+    contexts, labels = ([one[k] for one in sorted(found)] for k in (1, 2))
+    minutes = np.stack([time // 60, time % 60])
+    return {"USED": np.int16(len(found)), "CONTEXTS": contexts, "LABELS": labels, "TIMES": minutes}
+
+
+def _phases(dance: Dance) -> dict[str, FileValue]:
+    """Return the support phases: from when to when (s), on which feet."""
+    feet = [" and ".join(SIDES[side] for side in phase.stance.planted) or "seat" for phase in dance.phases]
+    times = np.array([[phase.start, phase.end] for phase in dance.phases]).T
+    return {"SUPPORT": feet, "SUPPORT_TIMES": times}
 
 
 def margin_table(margins: Sequence[Margin]) -> str:
@@ -223,7 +275,7 @@ def print_dance(found: dict[str, Any]) -> None:
             console.print(table)
         if criterion["hardly_excited"]:
             console.print(f"hardly tilted: {', '.join(criterion['hardly_excited'])}", markup=False)
-    for note in found["notes"]:
+    for note in (*found["warnings"], *found["notes"]):
         console.print(f"look: {note}", markup=False)
 
 

@@ -5,20 +5,24 @@ A person's reduced range, strength or speed go into ``body.limits`` and a person
 blocks out of the plan (`person.fitted`), so that whoever designs needs the two records only. The file is TOML; the
 shipped ones are in ``protocols/dances``:
 
-    name = "short" description = "what it is for, one sentence" move_s = 2.0                 seconds from posture to
-    posture hold_s = 1.5                 seconds of standing still in each forward_m = 0.2              how far the
-    right foot stands in front in "right_forward" share_of_support = 0.6       short for the share under
-    [limits.balance] budget_s = 115               of free ones: those that inform most per second are danced until the time is
-    used up; without it: all simplicity = 1.0             the performer's term: 0 = excitation only; 1 = an instruction
-    costs half a second (free: a simple dance is worth as much as an exciting one) other_weight = 1.0           emphasis of the segments that [weights] does not
-    name ranges = "comfortable"       what joints may use: what is reached without effort, or "anatomical": all that a
-    healthy joint allows
-
+    name = "short"
+    description = "what it is for, one sentence"
+    for = "for whom, in words"
+    move_s = 2.0                 seconds from posture to posture
+    hold_s = 1.5                 seconds of standing still in each
+    forward_m = 0.2              how far the right foot stands in front in "right_forward"
+    share_of_support = 0.6       short for the share under [limits.balance]
     instructions = 4             most that is called at once; known postures and a few free ones (protocols/vocabulary)
     free = false                 true: any posture, any number of instructions (the paper's); simplicity is 0 then
+    simplicity = 1.0             the performer's term: 0 = excitation only; 1 = an instruction costs half a second
+                                 (free: a simple dance is worth as much as an exciting one)
+    budget_s = 115               of free ones: those that inform most per second are danced until the time is used up
     gentle = false               true: only what people can do who tire or fear to fall
     deep = false                 true: deep squats and bows, one-leg squats, too
     wide = 1.3                   distance between the feet, times the usual one (free: 1)
+    other_weight = 1.0           emphasis of the segments that [weights] does not name
+    ranges = "comfortable"       what joints may use: what is reached without effort, or "anatomical": all that a
+                                 healthy joint allows
 
     [postures]                   how many postures on which feet, in the order of the dance
     parallel = 15                both feet side by side
@@ -68,8 +72,8 @@ class Plan:
     performer's term beside the excitation; ``alone`` the legs on which the person may stand alone, be it for a step;
     ``instructions`` most that is called at once (inf: free postures, no vocabulary); ``gentle`` only postures that
     people can take who tire or fear to fall; ``deep`` deep ones, too; ``wide`` times the usual distance between the
-    feet; ``whom`` for whom it is, in words; ``holds`` the hands that stay on the grips of a frame; ``ranges`` what joints may use: what is reached without
-    effort, or all that a healthy joint allows (the paper).
+    feet; ``whom`` for whom it is, in words; ``holds`` the hands that stay on the grips of a frame; ``ranges`` what
+    joints may use: what is reached without effort, or all that a healthy joint allows (the paper).
     """
 
     name: str
@@ -172,14 +176,14 @@ _SHORT = {"share_of_support": ("balance", "share")}
 _FLAGS = ("free", "gentle", "deep")
 _FOLLOWABLE = {"instructions": 4.0, "simplicity": 1.0, "wide": 1.3}
 """Of protocols that are not free, unless the file says otherwise."""
-_SUPPORT = {"share": 0.7}
+FOLLOWABLE_SHARE = 0.8
 """Share of the support that a followable dance may use: what imprecise people need is judged by performers."""
 _KEYS = ("name", "description", "postures", "limits", "weights", "ranges", "for", *_NUMBERS, *_SHORT, *_FLAGS)
 
 
 def read_plan(name_or_path: str | Path) -> Plan:
-    """Return a shipped protocol by name ("short", "easy", "patient", "chair", "full", "one_segment"), or one of the user's by the path of
-    its TOML file.
+    """Return a shipped protocol by name ("short", "easy", "patient", "chair", "full", "one_segment"), or one of the
+    user's by the path of its TOML file.
 
     Raises
     ------
@@ -217,7 +221,7 @@ def read_plan(name_or_path: str | Path) -> Plan:
         tuple(counts.items()),
         weights=tuple(weights.items()),
     )
-    return replace(plan, limits=_limits(path, raw, {} if free else {"balance": dict(_SUPPORT)}), **fields)
+    return replace(plan, limits=_limits(path, raw, {} if free else {"balance": {"share": FOLLOWABLE_SHARE}}), **fields)
 
 
 def _flag(path: Path, key: str, value: object) -> bool:

@@ -7,12 +7,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from biodance.body.solids import segment_solids
-from biodance.dance.cues import calls
+from biodance.dance.cues import dance_instructions
 from biodance.dance.dance import Dance
 from biodance.dance.problem.stance import Stance, stance_words
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
-from biodance.records import SIDES, Array
+from biodance.records import SIDES
 
 _RATE = 15.0
 """Hz of the poses; the page turns and shifts evenly between two."""
@@ -72,11 +72,10 @@ def _text(values: "np.ndarray[Any, Any]") -> str:
 
 def _cues(dance: Dance) -> list[dict[str, Any]]:
     """Return of every posture: ``number`` as on the cue sheet, ``move_s`` when to begin to move, ``hold_s`` from when
-    and ``end_s`` until when to stand still, ``calls`` what to do, largest change first, ``stance`` in words, ``feet``
+    and ``end_s`` until when to stand still, ``calls`` what to do, ``stance`` in words, ``feet``
     the outlines of the planted soles (P, 2) m.
     """
-    angles = np.degrees(_angles(dance))
-    before = np.concatenate([np.zeros((1, angles.shape[1])), angles[:-1]])
+    said = dance_instructions(dance)
     holds = {phase.posture: phase for phase in dance.phases if phase.kind == "hold"}
     moves = {phase.posture: phase for phase in dance.phases if phase.kind == "move"}
     out = []
@@ -89,19 +88,12 @@ def _cues(dance: Dance) -> list[dict[str, Any]]:
                 "move_s": start,
                 "hold_s": held,
                 "end_s": holds[p].end if p in holds else held,
-                "calls": list(calls(dance.body, before[p], angles[p], tuple(SIDES[side] for side in stance.planted))),
+                "calls": list(said[p]),
                 "stance": stance_words(stance),
                 "feet": [_outline(stance, side) for side in stance.planted],
             }
         )
     return out
-
-
-def _angles(dance: Dance) -> Array:
-    """Return the joint angles of all postures, (P, n) rad."""
-    chain = dance.chain
-    found = [chain.plant(q[None], s.planted, s.ankle)[0] for q, s in zip(dance.postures, dance.stances, strict=True)]
-    return np.array(found)[:, 6:]
 
 
 def _outline(stance: Stance, side: int) -> list[list[float]]:

@@ -1,4 +1,4 @@
-"""A dance that people can follow: a walk from posture to posture in which one or two parts of the body change at a time.
+"""A dance that people can follow: a walk from posture to posture in which one or two parts of the body change.
 
 Every step takes, of all postures within reach of the last one - at most so many instructions away, or its mirror image
 - the one that tells most per second (`selection`), where an instruction costs time, too: the price of `simplicity`.
@@ -6,19 +6,19 @@ What a posture must keep it keeps also for people who copy it imprecisely (`cata
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from biodance.dance.cues import instructions
-from biodance.dance.postures.catalogue import Catalogue
+from biodance.dance.cues import MIRROR_CALL, instructions
+from biodance.dance.followable.catalogue import Catalogue, roomy
+from biodance.dance.followable.plain import plain_move
+from biodance.dance.followable.vocabulary import Word, read_vocabulary, words_for
 from biodance.dance.postures.selection import learned
-from biodance.dance.postures.vocabulary import Word, read_vocabulary, words_for
 from biodance.dance.problem.splines import rest_to_rest
 from biodance.dance.problem.stance import Stance, under
 from biodance.dance.transitions.context import DesignContext
 from biodance.dance.transitions.move import Move, Task
-from biodance.dance.transitions.plain import plain_move
 from biodance.errors import BiodanceError
 from biodance.identification.posterior import prior_factor
 from biodance.motion.regressor import regressor
@@ -32,12 +32,14 @@ _FORCE, _MOMENT, _RATE = 8.0, 4.0, 4.0
 """N, N·m, Hz: error of one independent sample of a person's wrench, and how many there are (`selection`)."""
 _TRIES = 200
 """Postures that are taken or given up before a walk is."""
+_BETWEEN = (0.5, 0.3, 0.7)
+"""Shares of a move at which imprecise people must have room, too."""
 _LOOKED_AT = 24
 """Postures that tell most standing still, whose ways are judged, too."""
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class DanceStep:
     """Posture ``s`` of a ``catalogue``, what is ``said`` on the way to it; ``mirror`` True for the last one's image."""
 
     catalogue: Catalogue
@@ -58,17 +60,17 @@ class Step:
 
 @dataclass(eq=False)
 class _Place:
-    """A place in the walk: the postures ``left`` to try after it, the ``belief`` there, and what was ``taken`` to it."""
+    """A place in the walk: the postures ``left`` to try after it, the ``belief`` there, what was ``taken`` to it."""
 
-    left: Iterator[tuple[Step, Move | None]] | None
+    left: Iterator[tuple[DanceStep, Move | None]] | None
     belief: Array
-    taken: tuple[Step, Move | None] = None  # type: ignore[assignment]
+    taken: tuple[DanceStep, Move | None] = None  # type: ignore[assignment]
 
 
 @dataclass(eq=False)
 class Walk:
-    """The search for one dance: what was worked out is kept, so that another round with other ``banned`` postures (feet,
-    number) costs little.
+    """The search for one dance: what was worked out is kept, so that another round with other ``banned`` postures
+    (feet, number) costs little.
     """
 
     work: DesignContext
@@ -85,7 +87,7 @@ class Walk:
         self.scale = self.factor * np.sqrt(weight / np.where(before > 0, before, 1.0))[:, None]
         self.samples = rest_to_rest(plan.move, via=0, rate=_RATE)
 
-    def take(self, stances: tuple[Stance, ...]) -> tuple[list[Step], list[Move]]:
+    def take(self, stances: tuple[Stance, ...]) -> tuple[list[DanceStep], list[Move]]:
         """Return one step for each of ``stances`` and the moves between them.
 
         Raises
@@ -113,8 +115,8 @@ class Walk:
         raise BiodanceError(self._stuck(stances[max(0, len(path) - 1)], len(path) - 1, why))
 
     def _possible(
-        self, steps: list[Step], stance: Stance, belief: Array, why: dict[str, int]
-    ) -> Iterator[tuple[Step, Move | None]]:
+        self, steps: list[DanceStep], stance: Stance, belief: Array, why: dict[str, int]
+    ) -> Iterator[tuple[DanceStep, Move | None]]:
         """Yield the postures that follow on these feet with the move to them, the best first; ``why`` counts the limits
         that others break.
         """
@@ -135,7 +137,7 @@ class Walk:
             f"instructions, or leave this stance out of the protocol."
         )
 
-    def _ranked(self, steps: list[Step], stance: Stance, belief: Array) -> Iterator[Step]:
+    def _ranked(self, steps: list[DanceStep], stance: Stance, belief: Array) -> Iterator[DanceStep]:
         """Yield the postures within reach on these feet, the best first."""
         catalogue = self._catalogue(stance)
         last = steps[-1] if steps else None
@@ -155,12 +157,12 @@ class Walk:
         yield from (first[k] for k in np.argsort(-np.array(worth), kind="stable"))
         yield from (found[k] for k in order[_LOOKED_AT:])
 
-    def _seconds(self, steps: list[Step]) -> Array:
+    def _seconds(self, steps: list[DanceStep]) -> Array:
         """Return what each step costs, s."""
         plan = self.work.plan
         return np.array([plan.move + plan.hold + _INSTRUCTION * plan.simplicity * len(step.said) for step in steps])
 
-    def _reach(self, last: Step | None, catalogue: Catalogue) -> Iterator[Step]:
+    def _reach(self, last: DanceStep | None, catalogue: Catalogue) -> Iterator[DanceStep]:
         """Yield all postures of a catalogue that can be reached from the last one within the instructions."""
         body, most = self.work.chain.body, self.work.plan.instructions
         zero = np.zeros(self.work.chain.size)
@@ -169,11 +171,11 @@ class Walk:
             before, feet = (zero, None) if last is None else (last.x, last.catalogue.stance)
             said = instructions(body, before[6:], catalogue.x[s, 6:], feet, catalogue.stance)
             if s == mirror:
-                yield Step(catalogue, s, ("mirror: the same with right and left exchanged",), mirror=True)
+                yield DanceStep(catalogue, s, MIRROR_CALL, mirror=True)
             elif len(said) <= most:
-                yield Step(catalogue, s, said)
+                yield DanceStep(catalogue, s, said)
 
-    def _near(self, last: Step | None, catalogue: Catalogue) -> list[int]:
+    def _near(self, last: DanceStep | None, catalogue: Catalogue) -> list[int]:
         """Return the postures that differ in few parts of the body from the last one, and its mirror image."""
         if np.isinf(self.work.plan.instructions):
             return list(range(len(catalogue.index)))
@@ -195,11 +197,11 @@ class Walk:
             self._catalogues[key] = Catalogue.of(chain, stance, words_for(chain.body, plan, stance, self.words, rng))
         return self._catalogues[key]
 
-    def key(self, step: Step) -> tuple[str, int]:
+    def key(self, step: DanceStep) -> tuple[str, int]:
         """Return what a posture is known by in ``banned``."""
         return _feet(step.catalogue.stance), step.s
 
-    def _wrong(self, step: Step) -> str:
+    def _wrong(self, step: DanceStep) -> str:
         key = self.key(step)
         if key in self.banned:
             return "self_collision"
@@ -207,15 +209,18 @@ class Walk:
             self._broken[key] = step.catalogue.keeps(step.s, self.work.plan.limits)
         return self._broken[key]
 
-    def _move(self, last: Step, step: Step) -> Move:
+    def _move(self, last: DanceStep, step: DanceStep) -> Move:
         key = (last.x.tobytes(), step.x.tobytes())
         if key not in self._moves:
             feet, plan = under(last.catalogue.stance, step.catalogue.stance), self.work.plan
             ends = np.array([last.x, step.x])
-            self._moves[key] = plain_move(Task(self.work.chain, self.work.blocks, feet, ends, plan.move, plan.limits))
+            move = plain_move(Task(self.work.chain, self.work.blocks, feet, ends, plan.move, plan.limits))
+            way = [ends[0] + share * (ends[1] - ends[0]) for share in _BETWEEN]
+            between = len(feet.planted) == 1 or all(roomy(self.work.chain, feet, x) for x in way)
+            self._moves[key] = move if between or move.limit else replace(move, limit="self_collision")
         return self._moves[key]
 
-    def _told(self, last: Step | None, step: Step) -> Array:
+    def _told(self, last: DanceStep | None, step: DanceStep) -> Array:
         """Return the whitened rows (m, k) of standing in a posture and of the straight way to it."""
         still = self._white(step.catalogue.standing[step.s : step.s + 1])[0]
         if last is None:
@@ -244,7 +249,7 @@ def _feet(stance: Stance) -> str:
     return f"{stance.name} {stance.planted} {stance.over} {stance.ankle.tobytes().hex()}"
 
 
-def name_of(step: Step) -> str:
+def name_of(step: DanceStep) -> str:
     """Return what a posture is called: the words of all parts that do not rest; of arms that do the same, once."""
     words = step.words
     out = []
@@ -256,7 +261,7 @@ def name_of(step: Step) -> str:
     for kind in ("arm", "hanging"):
         pair = [words[f"{side}_{kind}"] for side in ("right", "left") if f"{side}_{kind}" in words]
         out += _pair_words(pair)
-    return ", ".join(out) or "stand"
+    return ", ".join(out) or ("sit" if "right_hanging" in words else "stand")
 
 
 def _pair_words(pair: list[Word]) -> list[str]:

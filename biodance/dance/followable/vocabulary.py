@@ -18,7 +18,7 @@ from biodance.records import SIDES
 
 _KEYS = ("name", "angles", "mirror", "rest", "gentle", "deep", "double")
 _GROUPS = ("arm", "trunk", "legs", "lifted", "hanging")
-TILT, LEAN = "pelvis_tilt", "pelvis_lean"
+PELVIS_TILT, PELVIS_LEAN = "pelvis_tilt", "pelvis_lean"
 """Angles of a word that are no joint's: how far the pelvis leans forward, and towards the leg that stands."""
 _FREE = {
     "shoulder_flexion": (0, 30, 60, 90, 120),
@@ -54,20 +54,21 @@ class Word:
     def pelvis(self) -> tuple[float, float]:
         """How far the pelvis leans forward, and towards the leg that stands, rad."""
         angles = dict(self.angles)
-        return angles.get(TILT, 0.0), angles.get(LEAN, 0.0)
+        return angles.get(PELVIS_TILT, 0.0), angles.get(PELVIS_LEAN, 0.0)
 
 
-Words = dict[str, tuple[Word, ...]]
+Vocabulary = dict[str, tuple[Word, ...]]
 """Group: its words, the one for rest first."""
 
 
-def read_vocabulary(name: str = "people") -> Words:
+def read_vocabulary(name: str = "people") -> Vocabulary:
     """Return the words of a file in ``protocols/vocabulary``.
 
     Raises
     ------
     BiodanceError
-        A group is missing or unknown, a key is unknown, a group has not one word for rest, or a mirror image is missing.
+        A group is missing or unknown, a key is unknown, a group has not one word for rest, or a mirror image
+        is missing.
     """
     path = locate("protocols/vocabulary", name)
     raw = read_toml(path)
@@ -108,12 +109,12 @@ def groups_of(stance: Stance) -> dict[str, str]:
     return parts | {"legs": "legs"} | {f"{side}_lifted": "lifted" for side in up}
 
 
-def words_for(body: Body, plan: Plan, stance: Stance, words: Words, rng: np.random.Generator) -> Words:
+def words_for(body: Body, plan: Plan, stance: Stance, words: Vocabulary, rng: np.random.Generator) -> Vocabulary:
     """Return for every part of `groups_of` what this person may be asked on these feet, rest first; ``rng`` draws the
     free postures of the arms.
     """
     alone = len(stance.planted) == 1
-    out: Words = {}
+    out: Vocabulary = {}
     free = () if plan.gentle else free_words(rng)
     for part, group in groups_of(stance).items():
         kept = [
@@ -134,11 +135,11 @@ def free_words(rng: np.random.Generator) -> tuple[Word, ...]:
     for number, k in enumerate(chosen, start=1):
         angles = tuple((joint, float(np.radians(angle))) for joint, angle in zip(_FREE, grid[k], strict=True))
         key = f"free_{number}"
-        out.append(Word(key, f"{{}} arm free {number}", angles, key))
+        out.append(Word(key, "{} arms as in the picture", angles, key))
     return tuple(out)
 
 
-def joint_of(part: str, joint: str) -> str:
+def own_joint(part: str, joint: str) -> str:
     """Return the name of the body's joint of a word's angle: ``right_arm``, ``shoulder_flexion`` ->
     ``right_shoulder_flexion``.
     """
@@ -152,10 +153,10 @@ def _fitted(body: Body, part: str, word: Word) -> Word | None:
         return word
     names, angles = [joint.name for joint in body.joints], []
     for joint, angle in word.angles:
-        if joint in (TILT, LEAN):
+        if joint in (PELVIS_TILT, PELVIS_LEAN):
             angles.append((joint, angle))
             continue
-        j = names.index(joint_of(part, joint))
+        j = names.index(own_joint(part, joint))
         low, high = body.limits.lower[j] + _STOP, body.limits.upper[j] - _STOP
         near = float(np.clip(angle, min(low, high), max(low, high)))
         if abs(near - angle) > _FITS and not word.rest:

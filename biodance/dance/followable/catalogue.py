@@ -11,11 +11,11 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from biodance.dance.followable.vocabulary import Vocabulary, Word, own_joint
 from biodance.dance.limits import Limit
 from biodance.dance.limits.self_collision import surface_distances
-from biodance.dance.performers import APART, Imprecision, centre_of_mass
+from biodance.dance.performers import SEGMENT_GAP, Imprecision, mass_centre
 from biodance.dance.postures.exchange import counterpart
-from biodance.dance.postures.vocabulary import Word, Words, joint_of
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State
@@ -25,7 +25,7 @@ from biodance.records import Array
 
 _ROUNDS = 5
 """Corrections of the pelvis; each leaves about a fifth of the error."""
-_DRAWN, _SIGMAS = 64, 3.7
+_DRAWN, _SIGMAS = 96, 4.5
 """Imprecise copies of a posture that are looked at, and standard deviations of a distance that it must bear."""
 _SPARE = {"foot_placement": 0.05}
 """Share of the scale kept in reserve where it is another one than the limit's own: the moves are straight."""
@@ -43,12 +43,12 @@ class Catalogue:
 
     chain: Chain
     stance: Stance
-    words: Words
+    words: Vocabulary
     index: NDArray[np.intp]
     x: Array
 
     @classmethod
-    def of(cls, chain: Chain, stance: Stance, words: Words) -> "Catalogue":
+    def of(cls, chain: Chain, stance: Stance, words: Vocabulary) -> "Catalogue":
         """Return all combinations of ``words`` on the feet ``stance``."""
         index = np.array(list(product(*(range(len(group)) for group in words.values()))), dtype=np.intp)
         return cls(chain, stance, words, index, posed(chain, stance, words, index))
@@ -92,33 +92,33 @@ class Catalogue:
             spare = _SPARE.get(limit.name, limit.hold_reserve(self.stance)) * limit.scale
             if (limit.margins(state).value < spare).any():
                 return limit.name
-        return "" if self.apart(s) else "self_collision"
-
-    def apart(self, s: int) -> bool:
-        """Return whether segments stay `APART` when people copy posture ``s`` imprecisely."""
-        how, rng = Imprecision(), np.random.default_rng(0)
-        x = np.repeat(self.x[s : s + 1], _DRAWN, axis=0)
-        x[:, ROOT:] += how.tracking * rng.normal(size=(_DRAWN, self.chain.size - ROOT))
-        x[:, 3:ROOT] += how.pelvis * how.tracking * rng.normal(size=(_DRAWN, 3))
-        x = self.chain.plant(x, self.stance.planted, self.stance.ankle)
-        motion = self.chain.motion(np.arange(_DRAWN, dtype=float), x, *np.zeros((2, *x.shape)))
-        gap, _ = surface_distances(self.chain.body, poses(self.chain.body, motion.q), near=np.inf)
-        return bool((gap.mean(axis=0) - _SIGMAS * gap.std(axis=0) > APART).all())
+        return "" if roomy(self.chain, self.stance, self.x[s]) else "self_collision"
 
 
-def posed(chain: Chain, stance: Stance, words: Words, index: NDArray[np.intp]) -> Array:
+def roomy(chain: Chain, stance: Stance, x: Array) -> bool:
+    """Return whether segments stay `SEGMENT_GAP` when people copy a posture ``x`` (n,) imprecisely."""
+    how, rng, copies = Imprecision(), np.random.default_rng(0), np.repeat(x[None], _DRAWN, axis=0)
+    copies[:, ROOT:] += how.tracking * rng.normal(size=(_DRAWN, chain.size - ROOT))
+    copies[:, 3:ROOT] += how.pelvis * how.tracking * rng.normal(size=(_DRAWN, 3))
+    copies = chain.plant(copies, stance.planted, stance.ankle)
+    motion = chain.motion(np.arange(_DRAWN, dtype=float), copies, *np.zeros((2, *copies.shape)))
+    gap, _ = surface_distances(chain.body, poses(chain.body, motion.q), near=np.inf)
+    return bool((gap.mean(axis=0) - _SIGMAS * gap.std(axis=0) > SEGMENT_GAP).all())
+
+
+def posed(chain: Chain, stance: Stance, words: Vocabulary, index: NDArray[np.intp]) -> Array:
     """Return the coordinates (S, n) of the postures with the words ``index`` (S, parts)."""
     x, knee, names = np.zeros((len(index), chain.size)), np.zeros(len(index)), _columns(chain)
     for column, (part, group) in enumerate(words.items()):
         for k, word in enumerate(group):
             rows = index[:, column] == k
-            ahead, aside = word.pelvis
+            ahead, aside = (0.0, 0.0) if stance.seat else word.pelvis  # whoever sits keeps the pelvis on the seat
             x[rows, _TILT] -= ahead
             x[rows, _LEAN] += aside if part.startswith("left") else -aside
             for joint, angle in word.angles:
                 if part == "legs" and joint == "knee_flexion":
                     knee[rows] = angle
-                elif (name := joint_of(part, joint)) in names:
+                elif (name := own_joint(part, joint)) in names:
                     x[rows, names[name]] = angle
     return settled(chain, stance, x, knee)
 
@@ -137,10 +137,10 @@ def settled(chain: Chain, stance: Stance, x: Array, knee: Array) -> Array:
         return x
     x[:, :2] = middle = _middle(stance)
     for _ in range(_ROUNDS):
-        x[:, 2] = pelvis_height(chain, stance, x, knee)
+        x[:, 2] = _pelvis_height(chain, stance, x, knee)
         x = chain.plant(x, stance.planted, stance.ankle)
-        x[:, :2] += middle - centre_of_mass(chain, x)[:, :2]
-    x[:, 2] = pelvis_height(chain, stance, x, knee)
+        x[:, :2] += middle - mass_centre(chain, x)[:, :2]
+    x[:, 2] = _pelvis_height(chain, stance, x, knee)
     return chain.plant(x, stance.planted, stance.ankle)
 
 
@@ -150,7 +150,7 @@ def _middle(stance: Stance) -> Array:
     return np.array([along.centre[0] - _BACK, stance.centre[1]])
 
 
-def pelvis_height(chain: Chain, stance: Stance, x: Array, knee: Array) -> Array:
+def _pelvis_height(chain: Chain, stance: Stance, x: Array, knee: Array) -> Array:
     """Return the height (S,) m of the pelvis at which no planted knee is bent by less than ``knee`` (S,) rad."""
     turn, tops = chain.root_rotation(x), []
     for side in stance.planted:

@@ -1,5 +1,5 @@
-"""Moves that people can follow: straight from one posture to the next, slower where the straight way breaks a limit, and
-at last with the pelvis and a lifted leg going round.
+"""Moves that people can follow: straight from one posture to the next, slower where the straight way breaks a limit,
+and at last with the pelvis and a lifted leg going round.
 """
 
 from dataclasses import replace
@@ -8,10 +8,13 @@ import numpy as np
 
 from biodance.dance.problem.chain import ROOT
 from biodance.dance.transitions.move import GRID, RESERVE, Move, MoveObjective, Task, evaluate_move, improved_way
+from biodance.records import Array
 
 _SLOWER = (1.0, 1.4, 1.8)
 """Factors on the duration of a straight move, one after the other."""
 _ITERATIONS = (12, 8)
+_STEP = (0.5, 0.0, 0.0, 0.55, 0.0, 0.0)
+"""rad by which hip, knee and ankle of a leg bend on the way, of a foot that is put somewhere else."""
 
 
 def plain_move(task: Task) -> Move:
@@ -22,17 +25,27 @@ def plain_move(task: Task) -> Move:
     for factor in _SLOWER:
         slow = replace(task, duration=factor * task.duration)
         tried.append(evaluate_move(slow, slow.straight())[0])
+        if len(task.stance.planted) == 1:
+            tried.append(min(tried.pop(), evaluate_move(slow, _stepping(slow))[0], key=lambda move: move.violation))
         if tried[-1].violation == 0 or tried[-1].limit not in ("balance", "friction", "joint_speed", "joint_torque"):
             break
     best = min(tried, key=lambda move: move.violation)
     return best if best.violation == 0 or task.stance.seat else _round(replace(task, duration=best.duration), best)
 
 
+def _stepping(task: Task) -> Array:
+    """Return the via points (2, n) of a straight move on which the free leg is lifted."""
+    via = task.straight()
+    for side in {0, 1} - set(task.stance.planted):
+        via[:, task.chain.leg_columns[side]] += _STEP
+    return via
+
+
 def _round(task: Task, best: Move) -> Move:
     """Return a move in which the pelvis and a lifted leg avoid what the straight one breaks."""
     up = [c for side in (0, 1) if side not in task.stance.planted for c in task.chain.leg_columns[side]]
     objective = MoveObjective(task, np.zeros((len(task.chain.body.segments), 6, 6)), 0.0)
-    via, time = task.straight(), task.grid(GRID)
+    via, time = best.via, task.grid(GRID)
     for k, iterations in enumerate(_ITERATIONS):
         via, _ = improved_way(task, via, time, objective, iterations, RESERVE * (1 + k / 4), free=[*range(ROOT), *up])
         found, worst = evaluate_move(task, via)
