@@ -231,10 +231,9 @@ def _connection(path: Path, element: Element, links: set[str]) -> Connection:
         held = rotation @ axis_rotation(axis, np.array([turn]))[0]
         place = translation + slide * rotation @ axis
         return Connection(name, "fixed", ends[0], ends[1], held, place, axis, 0.0, 0.0, 0.0, 0.0, frozen="mimic")
-    if _is_idle(path, element, what):
-        return Connection(
-            name, "fixed", ends[0], ends[1], rotation, translation, axis, 0.0, 0.0, 0.0, 0.0, frozen="idle"
-        )
+    limits = _limits(path, element, kind, what)
+    if not limits:
+        return Connection(name, "fixed", ends[0], ends[1], rotation, translation, axis, 0.0, 0.0, 0.0, 0.0, "idle")
     return Connection(name, kind, ends[0], ends[1], rotation, translation, axis, *limits)
 
 
