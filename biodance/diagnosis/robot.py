@@ -24,14 +24,14 @@ from biodance.identification.robot_errors import (
     leg_joints,
     load_angles,
     place_changes,
-    thinned,
+    some_frames,
 )
 from biodance.identification.statistics import Statistics, empty, layout_for
 from biodance.motion.grounded import ground
 from biodance.motion.regressor import regressor
 from biodance.records import CHANNELS, Array, Wrench
 from biodance.threads import one_thread
-from biodance.uncertainty.learning import maximise, noise_of
+from biodance.uncertainty.learning import Moments, maximise, noise_of
 from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.plates import Plates, plate_errors, plate_sources
 from biodance.uncertainty.tolerances import REFERENCE_PERSON
@@ -85,6 +85,34 @@ class _Columns:
     layout: Noise
 
 
+@dataclass(frozen=True, eq=False)
+class _Products:
+    """Second moments as `Statistics`, in the order in which they are summed: ``gram`` (B 36, (c + 1)²)."""
+
+    gram: Array
+    count: Array
+
+    @classmethod
+    def of(cls, parts: list[Statistics]) -> "_Products":
+        """Return the sum of some trials."""
+        gram = np.sum([part.gram for part in parts], axis=0)
+        flat = gram.transpose(0, 1, 3, 2, 4).reshape(36 * len(gram), -1)
+        return cls(flat, np.sum([part.count for part in parts], axis=0, dtype=float))
+
+    def equations(self, noise: Noise) -> tuple[Array, Array]:
+        """Return X' S^-1 X (c, c) and X' S^-1 y (c,)."""
+        flat = np.linalg.inv(noise.covariance).ravel() @ self.gram
+        H = flat.reshape(2 * (round(np.sqrt(flat.size)),))
+        return H[:-1, :-1], H[:-1, -1]
+
+    def moments(self, mean: Array, covariance: Array) -> Moments:
+        """Return what unknowns of this ``mean`` (c,) and ``covariance`` (c, c) leave."""
+        z = np.append(-mean, 1.0)
+        square = np.outer(z, z)
+        square[:-1, :-1] += covariance
+        return Moments((self.gram @ square.ravel()).reshape(-1, 6, 6), self.count)
+
+
 @one_thread()
 def robot_causes(
     body: Body, fitted: tuple[RobotMotion, ...], kept: tuple[RobotMotion, ...] = ()
@@ -97,12 +125,12 @@ def robot_causes(
     trials, found = (*fitted, *kept), list[RobotFinding]()
     columns = _columns(body, fitted, len(trials))
     size, here = prior_factor(body.sip).shape[1], np.array(columns.usual)
+    noise = replace(columns.layout, covariance=np.tile(_start(body), (len(columns.layout.bands), 1, 1)))
     while True:
-        parts = [_gathered(body, one, columns, k, len(trials)) for k, one in enumerate(trials)]
-        first, rest = _sum(parts[: len(fitted)]), _sum(parts[len(fitted) :])
-        noise = _learned(first, np.append(np.ones(size), np.maximum(columns.wide, here)), _start(body))
-        fit = _equations(first, noise)
-        every = tuple(a + b for a, b in zip(fit, _equations(rest, noise), strict=True)) if kept else fit
+        first, *rest = _gathered(body, trials, len(fitted), columns)
+        noise = _learned(first, noise, np.append(np.ones(size), np.maximum(columns.wide, here)), _start(body))
+        fit = first.equations(noise)
+        every = tuple(a + b for a, b in zip(fit, rest[0].equations(noise), strict=True)) if rest else fit
         found, trials = _refined(body, found, trials, columns, every, here)
         gain, both = (_gains(*some, here, columns.wide)[size:] for some in (fit, every))
         best, rivals = _chosen(columns, both, both - gain, [one.cause for one in found])
@@ -213,7 +241,13 @@ def _plate_causes() -> list[RobotCause]:
     return [*out, RobotCause("time_delay", "plate", float(plates.delay[48]), "s")]
 
 
-def _gathered(body: Body, one: RobotMotion, columns: _Columns, place: int, trials: int) -> Statistics:
+def _gathered(body: Body, trials: tuple[RobotMotion, ...], fitted: int, columns: _Columns) -> list[_Products]:
+    """Return the products of the ``fitted`` first trials, and of the others where there are some."""
+    parts = [_products(body, one, columns, k, len(trials)) for k, one in enumerate(trials)]
+    return [_Products.of(some) for some in (parts[:fitted], parts[fitted:]) if some]
+
+
+def _products(body: Body, one: RobotMotion, columns: _Columns, place: int, trials: int) -> Statistics:
     """Return the second moments of [W S, causes, what the drawing leaves] of one trial."""
     S, layout, legs, n = prior_factor(body.sip), columns.layout, list(leg_joints(body)), len(body.joints)
     soft, play, _ = load_angles(body, one.grounded, one.fit.wrench.value)
@@ -231,7 +265,7 @@ def _gathered(body: Body, one: RobotMotion, columns: _Columns, place: int, trial
     for pick in layout.bands.runs(fit.use, fit.motion.rate):
         if pick.size < SHORTEST:
             continue
-        motion = thinned(fit.motion, pick)
+        motion = some_frames(fit.motion, pick)
         W = regressor(body, motion)
         seen = fit.wrench.value[pick]
         places = np.zeros((pick.size, 6, 3 * trials))
@@ -249,38 +283,20 @@ def _gathered(body: Body, one: RobotMotion, columns: _Columns, place: int, trial
     return Statistics(gram, frames, layout)
 
 
-def _sum(parts: list[Statistics]) -> Statistics | None:
-    total = parts[0] if parts else None
-    for part in parts[1:]:
-        assert total is not None
-        total = total + part
-    return total
-
-
 def _start(body: Body) -> Array:
     return np.asarray(START * (float(body.sip.mass.sum()) / REFERENCE_PERSON) ** 2)
 
 
-def _learned(total: Statistics | None, sd: Array, start: Array) -> Noise:
-    """Return the noise that is left where every cause may be there."""
-    assert total is not None
+def _learned(total: _Products, noise: Noise, sd: Array, start: Array) -> Noise:
+    """Return the noise that is left where every cause may be there, from ``noise`` on."""
 
-    def improved(noise: Noise) -> Noise:
-        A, b = _equations(total, noise)
+    def improved(before: Noise) -> Noise:
+        A, b = total.equations(before)
         covariance = _posterior(A, sd)
         left = noise_of(total.moments(covariance @ b, covariance), start=start, worth=WORTH)
-        return replace(noise, covariance=left)
+        return replace(before, covariance=left)
 
-    first = Noise(np.tile(start, (len(total.count), 1, 1)), total.layout.about, total.layout.bands)
-    return maximise(first, improved, lambda one: one.covariance, rounds=_ROUNDS, tolerance=1e-2)
-
-
-def _equations(total: Statistics | None, noise: Noise) -> tuple[Array, Array]:
-    """Return X' S^-1 X (c, c) and X' S^-1 y (c,)."""
-    assert total is not None
-    weight = np.linalg.inv(noise.covariance)
-    H = np.einsum("bcd,bcidj->ij", weight, total.gram, optimize=True)
-    return H[:-1, :-1], H[:-1, -1]
+    return maximise(noise, improved, lambda one: one.covariance, rounds=_ROUNDS, tolerance=1e-2)
 
 
 def _posterior(A: Array, sd: Array) -> Array:
