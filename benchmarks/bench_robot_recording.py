@@ -186,6 +186,10 @@ def judge(recording: str, done: str) -> None:
     )
     tell(f"base parameters: {found['base_parameters']}")
     tell(*(f"{k}: {v}" for k, v in found["diagnosis"].items()))
+    for trial, both in found["in_root_frame"].items():
+        for who, one in both.items():
+            rms, cc = (" ".join(f"{x:.3f}" for x in one[key]) for key in ("rms", "cc"))
+            tell(f"root frame {trial} {who}: rms {rms}; cc {cc}")
     for key in ("fitted", "validation"):
         for trial in found[key]:
             for who in ("table", "identified"):
