@@ -24,10 +24,11 @@ from biodance.identification.robot_errors import (
     leg_joints,
     load_angles,
     place_changes,
+    slow_wrench,
     some_frames,
 )
 from biodance.identification.statistics import Statistics, empty, layout_for
-from biodance.motion.grounded import ground
+from biodance.motion.grounded import ground_again
 from biodance.motion.regressor import regressor
 from biodance.records import CHANNELS, Array, Wrench
 from biodance.threads import one_thread
@@ -42,6 +43,8 @@ _LOADED = 2.0
 """The same of joints that give or have play, in units of `GIVE`; usual is none."""
 _CLEAR, _LIKE = 8.0, 3.0
 """Nats: least evidence of a cause; causes within so many of the best are not told apart from it."""
+_WORST = 4.0
+"""Standard deviations of a cause that is there, beyond which none is believed: it would be seen without us."""
 _MOST = 4
 """Causes that are looked for, one after the other."""
 _ROUNDS = 12
@@ -172,7 +175,8 @@ def _refined(
     for one in found:
         k = columns.causes.index(one.cause)
         more, sd = float((covariance @ b)[size + k]), float(np.sqrt(covariance[size + k, size + k]))
-        per = one.cause.per
+        per, most = one.cause.per, _WORST * columns.wide[k]
+        more = float(np.clip(one.value / per + more, -most, most) - one.value / per)
         out.append(replace(one, value=one.value + more * per, sd=sd * per))
         trials = tuple(_without(body, trial, one.cause, k, more) for trial in trials)
     return out, trials
@@ -188,13 +192,13 @@ def _without(body: Body, one: RobotMotion, cause: RobotCause, column: int, amoun
         unit = {"encoder_zero": -ZERO * np.ones(len(shape)), "flexible_joint": cause.per * soft[:, j]}
         shape[:, j] = amount * unit.get(cause.kind, GIVE * play[:, j])
         angle = one.angle + shape
-        found = ground(body, fit.motion.time, angle, lean=one.grounded.lean, base=one.grounded.base)
+        found = ground_again(body, one.grounded, angle)
         return RobotMotion(replace(fit, motion=found.motion), angle, found)
     plates = plate_sources()
     k = column - n - 2 * len(leg_joints(body))
     one_fault = Plates(plates.mixing[k : k + 1], plates.offset[k : k + 1], plates.delay[k : k + 1])
     about = layout_for(standing_point((fit,)))
-    error = plate_errors(fit.wrench.value, fit.motion.rate, about, one_fault)[:, :, 0]
+    error = plate_errors(slow_wrench(body, one.grounded, one.angle), fit.motion.rate, about, one_fault)[:, :, 0]
     return replace(one, fit=replace(fit, wrench=Wrench(fit.wrench.time, fit.wrench.value - amount * error)))
 
 
@@ -258,7 +262,7 @@ def _products(body: Body, one: RobotMotion, columns: _Columns, place: int, trial
     shapes[:, legs, range(n + len(legs), n + 2 * len(legs))] = GIVE * play[:, legs]
     shapes[:, :, :n] *= -1
     changes = angle_changes(body, one.grounded, one.angle, shapes)
-    plates, fit = plate_sources(), one.fit
+    plates, fit, slow = plate_sources(), one.fit, slow_wrench(body, one.grounded, one.angle)
     count = S.shape[1] + changes.shape[2] + len(plates.delay) + 3 * trials
     total = empty(count, layout)
     gram, frames = total.gram.copy(), total.count.copy()
@@ -267,12 +271,11 @@ def _products(body: Body, one: RobotMotion, columns: _Columns, place: int, trial
             continue
         motion = some_frames(fit.motion, pick)
         W = regressor(body, motion)
-        seen = fit.wrench.value[pick]
         places = np.zeros((pick.size, 6, 3 * trials))
-        places[:, :, 3 * place : 3 * place + 3] = place_changes(seen, one.grounded)
+        places[:, :, 3 * place : 3 * place + 3] = place_changes(slow[pick], one.grounded)
         near = np.minimum(pick // THINNED, len(changes) - 1)
-        faults = plate_errors(seen, motion.rate, layout, plates)
-        left = (seen - W @ body.sip.phi)[:, :, None]
+        faults = plate_errors(slow[pick], motion.rate, layout, plates)
+        left = (fit.wrench.value[pick] - W @ body.sip.phi)[:, :, None]
         rows = np.concatenate([W @ S, changes[near], faults, places, left], axis=2)
         X = layout.bands.coefficients(layout.shift @ rows)
         band = layout.bands.at(fit.motion.rate).of(len(X))
