@@ -133,9 +133,10 @@ def robot_causes(
         first, *rest = _gathered(body, trials, len(fitted), columns)
         noise = _learned(first, noise, np.append(np.ones(size), np.maximum(columns.wide, here)), _start(body))
         fit = first.equations(noise)
-        every = tuple(a + b for a, b in zip(fit, rest[0].equations(noise), strict=True)) if rest else fit
+        more = rest[0].equations(noise) if rest else (0.0, 0.0)
+        every = fit[0] + more[0], fit[1] + more[1]
         found, trials = _refined(body, found, trials, columns, every, here)
-        gain, both = (_gains(*some, here, columns.wide)[size:] for some in (fit, every))
+        gain, both = (_gains(A, b, here, columns.wide)[size:] for A, b in (fit, every))
         best, rivals = _chosen(columns, both, both - gain, [one.cause for one in found])
         if best < 0 or len(found) == _MOST:
             return tuple(found), trials

@@ -139,6 +139,6 @@ def _torques(body: Body, one: Grounded, measured: Array) -> Array:
     needed = predict_wrench(body, still).value
     measured = np.where(np.isfinite(measured), measured, needed)
     wrench = Wrench(still.time, low_pass(measured, still.rate, LowPass(cutoff=_QUIET)))
-    parts = distribute(wrench, *soles, down)
+    parts = distribute(wrench, soles[0], soles[1], down)
     names = [body.segments[body.feet[side].segment] for side in SIDES]
     return joint_torques(body, still, dict(zip(names, parts, strict=True))).torque
