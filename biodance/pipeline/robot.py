@@ -39,7 +39,7 @@ class RobotResult:
     """What a recording says about a robot: ``identified`` as of people, ``alone`` the base parameters as
     the paper counts them (every frame independent), ``causes`` of what is not as drawn (taken out before), ``in_root``
     agreements of drawing and identified robot by trial in the root's frame (paper Table II), ``trials``,
-    ``attention``, ``judged``, and the ``urdf``.
+    ``attention``, ``judged``, the ``urdf``, and the ``verdict``: clean, named or unexplained.
     """
 
     recording: RobotRecording
@@ -52,6 +52,7 @@ class RobotResult:
     in_root: dict[str, tuple[Agreement, Agreement]]
     attention: tuple[Attention, ...]
     judged: tuple[Judged, ...]
+    verdict: str = "clean"
 
     @property
     def needs_a_person(self) -> bool:
@@ -101,20 +102,50 @@ def identify_robot(
     if not fitted:
         reasons = " ".join(refused.values()) or "No trial has the role fit."
         raise TrialRefused(reasons)
-    tell("looking for what is not as drawn")
-    causes, fitted, kept = _without_causes(body, fitted, kept)
     tell("identifying")
-    done, alone = identify_links(body, tuple(one.motion for one in fitted))
-    tell("validating")
-    identified = _validated(found.folder.name, done, fitted, kept)
-    seen = (*identified.fitted, *identified.validations)
-    rooted = {v.name: _in_root(one, v) for one, v in zip((*fitted, *kept)[: len(seen)], seen, strict=True)}
-    said = strongest_first([*refusals(refused), *told_of(trials), *cause_words(causes), *weights(done)])
+    plain = _identified(body, found.folder.name, fitted, kept)
+    tell("looking for what is not as drawn")
+    causes, *without = _without_causes(body, fitted, kept)
+    best = _identified(body, found.folder.name, *without) if causes else plain
+    doubtful = bool(causes) and not _predicts_better(best.identified, plain.identified)
+    best = plain if doubtful else best
+    words = cause_words(causes, doubtful=doubtful)
+    said = strongest_first([*refusals(refused), *told_of(trials), *words, *weights(best.identified.identification)])
     judged = tuple(Judged(one.recorded.name, float(one.motion.fit.use.sum()) / RATE) for one in trials)
     lost = tuple(Judged(name, 0.0, why, missed=True) for name, why in refused.items())
+    named = () if doubtful else causes
     return RobotResult(
-        found, Path(urdf), body, tuple(trials), identified, alone, causes, rooted, said, (*judged, *lost)
+        *(found, Path(urdf), body, tuple(trials), best.identified, best.alone, named, best.in_root),
+        *(said, (*judged, *lost), "unexplained" if doubtful else "named" if causes else "clean"),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Identified:
+    """What some trials give: see `RobotResult`."""
+
+    identified: SessionIdentification
+    alone: BaseEstimate
+    in_root: dict[str, tuple[Agreement, Agreement]]
+
+
+def _identified(body: Body, name: str, fitted: list[MatchedTrial], kept: list[MatchedTrial]) -> _Identified:
+    """Identify from the ``fitted`` trials, validate on all."""
+    done, alone = identify_links(body, tuple(one.motion for one in fitted))
+    identified = _validated(name, done, fitted, kept)
+    seen = (*identified.fitted, *identified.validations)
+    rooted = {v.name: _in_root(one, v) for one, v in zip((*fitted, *kept)[: len(seen)], seen, strict=True)}
+    return _Identified(identified, alone, rooted)
+
+
+def _predicts_better(one: SessionIdentification, other: SessionIdentification) -> bool:
+    """Whether ``one`` leaves less of the kept motions than ``other``: mean logarithm of the RMS over all channels."""
+    return bool(_left(one) < _left(other))
+
+
+def _left(one: SessionIdentification) -> float:
+    rms = [trial.identified_agreement.rms for trial in (one.validations or one.fitted)]
+    return float(np.mean(np.log(rms))) if rms else float("inf")
 
 
 def _parted(trials: list[MatchedTrial]) -> tuple[list[MatchedTrial], list[MatchedTrial]]:

@@ -43,7 +43,7 @@ def robot_document(result: RobotResult) -> dict[str, Any]:
 
 
 def _diagnosis(result: RobotResult) -> dict[str, Any]:
-    """Return what is not as drawn: verdict "clean" or "named", and the findings."""
+    """Return what is not as drawn: the verdict, and the findings."""
     findings = [
         {
             "cause": one.cause.kind,
@@ -57,7 +57,7 @@ def _diagnosis(result: RobotResult) -> dict[str, Any]:
         }
         for one in result.causes
     ]
-    return {"verdict": "named" if findings else "clean", "findings": findings}
+    return {"verdict": result.verdict, "findings": findings}
 
 
 def _matched(one: MatchedTrial) -> dict[str, Any]:
