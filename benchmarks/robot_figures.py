@@ -74,7 +74,9 @@ def main(recording: str, done: str, urdf: str, out: str) -> None:
     rows = {"measured": measured}
     for who, robot in (("drawn", body), ("identified", identified)):
         needed = predict_wrench(robot, one.motion.fit.motion)
-        rows[who] = onto_plate(needed.value, fit_plate(needed, Wrench(time, measured), one.motion.grounded.use))
+        rows[who] = onto_plate(
+            needed.value, fit_plate(needed, Wrench(time, measured), one.motion.grounded.use, within=0.3)
+        )
     draw_wrench(time, rows, one.motion.fit.use, folder / "robot_wrench.png")
 
 

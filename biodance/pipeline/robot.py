@@ -31,6 +31,8 @@ from biodance.spatial import cross, quaternion_matrix, wrench_about_point
 
 _KEPT = 0.2
 """Share of every trial, at its end, that is kept where no trial is."""
+_NEAR = 0.3
+"""s: clocks that were brought together are not moved further for validation."""
 _NO_SEARCH = "Of a robot, what differs from the drawing is told link by link instead."
 
 
@@ -203,7 +205,7 @@ def _validation(done: Identification, one: MatchedTrial) -> TrialValidation:
     predicted = []
     for body in (done.body, done.identified):
         needed = predict_wrench(body, motion)
-        fit = fit_plate(needed, Wrench(motion.time, measured), one.motion.grounded.use)
+        fit = fit_plate(needed, Wrench(motion.time, measured), one.motion.grounded.use, within=_NEAR)
         predicted.append(onto_plate(needed.value, fit))
     point = Wrench(motion.time, measured).cop()[use]
     about = np.nanmean(point, axis=0)
