@@ -8,9 +8,10 @@
 
 The robot plays its dance by its joints alone, free on a floor with friction, as its person-sized likeness (Froude),
 whose times and forces are scaled back. Covers and cables are taken off: the simulated robot is lighter than the URDF.
-Troubles (paper IV.C): `pid=3` every joint by PID alone, of so many times the usual stiffness (else spring, damper and the drawing's torque), `ankle=100` the
-pitch of the ankles gives behind the encoder (N·m/rad), `stiction=0.1` N·m in every joint, `friction=0.3` under the
-feet; hidden in the files: `zero.JOINT=0.04` rad, `play.JOINT=0.02` rad, `gain.Fz=0.95`.
+Troubles (paper IV.C): `pid=3` every joint by PID alone, of so many times the usual stiffness (else spring, damper and
+the drawing's torque), `ankle=200` the pitch of the ankles gives behind the encoder (N·m/rad), `stiction=0.1` N·m in
+every joint, `friction=0.3` under the feet; hidden in the files: `zero.JOINT=0.04` rad, `play.JOINT=0.02` rad,
+`gain.Fz=0.95`.
 """
 
 import json
@@ -185,6 +186,10 @@ def judge(recording: str, done: str) -> None:
     )
     tell(f"base parameters: {found['base_parameters']}")
     tell(*(f"{k}: {v}" for k, v in found["diagnosis"].items()))
+    for trial, both in found["in_root_frame"].items():
+        for who, one in both.items():
+            rms, cc = (" ".join(f"{x:.3f}" for x in one[key]) for key in ("rms", "cc"))
+            tell(f"root frame {trial} {who}: rms {rms}; cc {cc}")
     for key in ("fitted", "validation"):
         for trial in found[key]:
             for who in ("table", "identified"):

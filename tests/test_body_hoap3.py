@@ -1,11 +1,14 @@
 """HOAP-3: the maker's mass, lengths and origins come out of the Denavit-Hartenberg rows."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from biodance.body.inertia import smallest_eigenvalues
 from biodance.body.robot.hoap3 import _SEGMENTS, hoap3
 from biodance.body.tables.anthropometry import read_table, row_numbers
+from biodance.cli import run
 from biodance.identification.base_parameters import structural_base
 from biodance.motion.kinematics import poses
 
@@ -74,3 +77,11 @@ def test_its_base_parameters_are_counted_by_theory() -> None:
     # 7 - 1 joints of two or three axes lose one parameter each (hips, ankles, shoulders), 5 hinges three each (knees,
     # elbows, waist)
     assert structural_base(BODY).count == 120 - 6 - 15
+
+
+@pytest.mark.parametrize("form", ["urdf", "mjcf"])
+def test_it_is_written_from_our_tables_by_export(form: str, tmp_path: Path) -> None:
+    asked = ["export", "hoap3", "--format", form, "--out", str(tmp_path / f"hoap3.{form}")]
+    assert run(asked) == 0
+    assert (tmp_path / f"hoap3.{form}").read_text().count("trunk_head") > 0
+    assert run([*asked[:3], "trc", "--out", str(tmp_path / "hoap3.trc")]) == 2

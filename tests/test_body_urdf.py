@@ -153,6 +153,14 @@ def test_limits_are_needed(tmp_path: Path) -> None:
         made(tmp_path, without)
 
 
+def test_a_joint_without_speed_and_torque_is_held_and_said(tmp_path: Path) -> None:
+    first = ROBOT.index("<limit")
+    end = ROBOT.index("/>", first)
+    held = made(tmp_path, ROBOT[:first] + '<limit lower="-1" upper="1" velocity="0" effort="0"' + ROBOT[end:])
+    assert "waist" not in {joint.name for joint in held.joints}
+    assert "Joints without speed and torque are held at zero: waist." in held.notes
+
+
 def test_a_joint_that_mimics_another_is_held_and_said(tmp_path: Path) -> None:
     first = ROBOT.index("<limit")
     whole = made(tmp_path, ROBOT)

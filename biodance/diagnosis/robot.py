@@ -24,14 +24,15 @@ from biodance.identification.robot_errors import (
     leg_joints,
     load_angles,
     place_changes,
-    thinned,
+    slow_wrench,
+    some_frames,
 )
 from biodance.identification.statistics import Statistics, empty, layout_for
-from biodance.motion.grounded import ground
+from biodance.motion.grounded import ground_again
 from biodance.motion.regressor import regressor
 from biodance.records import CHANNELS, Array, Wrench
 from biodance.threads import one_thread
-from biodance.uncertainty.learning import maximise, noise_of
+from biodance.uncertainty.learning import Moments, maximise, noise_of
 from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.plates import Plates, plate_errors, plate_sources
 from biodance.uncertainty.tolerances import REFERENCE_PERSON
@@ -42,6 +43,8 @@ _LOADED = 2.0
 """The same of joints that give or have play, in units of `GIVE`; usual is none."""
 _CLEAR, _LIKE = 8.0, 3.0
 """Nats: least evidence of a cause; causes within so many of the best are not told apart from it."""
+_WORST = 4.0
+"""Standard deviations of a cause that is there, beyond which none is believed: it would be seen without us."""
 _MOST = 4
 """Causes that are looked for, one after the other."""
 _ROUNDS = 12
@@ -85,6 +88,34 @@ class _Columns:
     layout: Noise
 
 
+@dataclass(frozen=True, eq=False)
+class _Products:
+    """Second moments as `Statistics`, in the order in which they are summed: ``gram`` (B 36, (c + 1)²)."""
+
+    gram: Array
+    count: Array
+
+    @classmethod
+    def of(cls, parts: list[Statistics]) -> "_Products":
+        """Return the sum of some trials."""
+        gram = np.sum([part.gram for part in parts], axis=0)
+        flat = gram.transpose(0, 1, 3, 2, 4).reshape(36 * len(gram), -1)
+        return cls(flat, np.sum([part.count for part in parts], axis=0, dtype=float))
+
+    def equations(self, noise: Noise) -> tuple[Array, Array]:
+        """Return X' S^-1 X (c, c) and X' S^-1 y (c,)."""
+        flat = np.linalg.inv(noise.covariance).ravel() @ self.gram
+        H = flat.reshape(2 * (round(np.sqrt(flat.size)),))
+        return H[:-1, :-1], H[:-1, -1]
+
+    def moments(self, mean: Array, covariance: Array) -> Moments:
+        """Return what unknowns of this ``mean`` (c,) and ``covariance`` (c, c) leave."""
+        z = np.append(-mean, 1.0)
+        square = np.outer(z, z)
+        square[:-1, :-1] += covariance
+        return Moments((self.gram @ square.ravel()).reshape(-1, 6, 6), self.count)
+
+
 @one_thread()
 def robot_causes(
     body: Body, fitted: tuple[RobotMotion, ...], kept: tuple[RobotMotion, ...] = ()
@@ -97,14 +128,15 @@ def robot_causes(
     trials, found = (*fitted, *kept), list[RobotFinding]()
     columns = _columns(body, fitted, len(trials))
     size, here = prior_factor(body.sip).shape[1], np.array(columns.usual)
+    noise = replace(columns.layout, covariance=np.tile(_start(body), (len(columns.layout.bands), 1, 1)))
     while True:
-        parts = [_gathered(body, one, columns, k, len(trials)) for k, one in enumerate(trials)]
-        first, rest = _sum(parts[: len(fitted)]), _sum(parts[len(fitted) :])
-        noise = _learned(first, np.append(np.ones(size), np.maximum(columns.wide, here)), _start(body))
-        fit = _equations(first, noise)
-        every = tuple(a + b for a, b in zip(fit, _equations(rest, noise), strict=True)) if kept else fit
+        first, *rest = _gathered(body, trials, len(fitted), columns)
+        noise = _learned(first, noise, np.append(np.ones(size), np.maximum(columns.wide, here)), _start(body))
+        fit = first.equations(noise)
+        more = rest[0].equations(noise) if rest else (0.0, 0.0)
+        every = fit[0] + more[0], fit[1] + more[1]
         found, trials = _refined(body, found, trials, columns, every, here)
-        gain, both = (_gains(*some, here, columns.wide)[size:] for some in (fit, every))
+        gain, both = (_gains(A, b, here, columns.wide)[size:] for A, b in (fit, every))
         best, rivals = _chosen(columns, both, both - gain, [one.cause for one in found])
         if best < 0 or len(found) == _MOST:
             return tuple(found), trials
@@ -144,7 +176,8 @@ def _refined(
     for one in found:
         k = columns.causes.index(one.cause)
         more, sd = float((covariance @ b)[size + k]), float(np.sqrt(covariance[size + k, size + k]))
-        per = one.cause.per
+        per, most = one.cause.per, _WORST * columns.wide[k]
+        more = float(np.clip(one.value / per + more, -most, most) - one.value / per)
         out.append(replace(one, value=one.value + more * per, sd=sd * per))
         trials = tuple(_without(body, trial, one.cause, k, more) for trial in trials)
     return out, trials
@@ -160,13 +193,13 @@ def _without(body: Body, one: RobotMotion, cause: RobotCause, column: int, amoun
         unit = {"encoder_zero": -ZERO * np.ones(len(shape)), "flexible_joint": cause.per * soft[:, j]}
         shape[:, j] = amount * unit.get(cause.kind, GIVE * play[:, j])
         angle = one.angle + shape
-        found = ground(body, fit.motion.time, angle, lean=one.grounded.lean, base=one.grounded.base)
+        found = ground_again(body, one.grounded, angle)
         return RobotMotion(replace(fit, motion=found.motion), angle, found)
     plates = plate_sources()
     k = column - n - 2 * len(leg_joints(body))
     one_fault = Plates(plates.mixing[k : k + 1], plates.offset[k : k + 1], plates.delay[k : k + 1])
     about = layout_for(standing_point((fit,)))
-    error = plate_errors(fit.wrench.value, fit.motion.rate, about, one_fault)[:, :, 0]
+    error = plate_errors(slow_wrench(body, one.grounded, one.angle), fit.motion.rate, about, one_fault)[:, :, 0]
     return replace(one, fit=replace(fit, wrench=Wrench(fit.wrench.time, fit.wrench.value - amount * error)))
 
 
@@ -213,7 +246,13 @@ def _plate_causes() -> list[RobotCause]:
     return [*out, RobotCause("time_delay", "plate", float(plates.delay[48]), "s")]
 
 
-def _gathered(body: Body, one: RobotMotion, columns: _Columns, place: int, trials: int) -> Statistics:
+def _gathered(body: Body, trials: tuple[RobotMotion, ...], fitted: int, columns: _Columns) -> list[_Products]:
+    """Return the products of the ``fitted`` first trials, and of the others where there are some."""
+    parts = [_products(body, one, columns, k, len(trials)) for k, one in enumerate(trials)]
+    return [_Products.of(some) for some in (parts[:fitted], parts[fitted:]) if some]
+
+
+def _products(body: Body, one: RobotMotion, columns: _Columns, place: int, trials: int) -> Statistics:
     """Return the second moments of [W S, causes, what the drawing leaves] of one trial."""
     S, layout, legs, n = prior_factor(body.sip), columns.layout, list(leg_joints(body)), len(body.joints)
     soft, play, _ = load_angles(body, one.grounded, one.fit.wrench.value)
@@ -224,21 +263,20 @@ def _gathered(body: Body, one: RobotMotion, columns: _Columns, place: int, trial
     shapes[:, legs, range(n + len(legs), n + 2 * len(legs))] = GIVE * play[:, legs]
     shapes[:, :, :n] *= -1
     changes = angle_changes(body, one.grounded, one.angle, shapes)
-    plates, fit = plate_sources(), one.fit
+    plates, fit, slow = plate_sources(), one.fit, slow_wrench(body, one.grounded, one.angle)
     count = S.shape[1] + changes.shape[2] + len(plates.delay) + 3 * trials
     total = empty(count, layout)
     gram, frames = total.gram.copy(), total.count.copy()
     for pick in layout.bands.runs(fit.use, fit.motion.rate):
         if pick.size < SHORTEST:
             continue
-        motion = thinned(fit.motion, pick)
+        motion = some_frames(fit.motion, pick)
         W = regressor(body, motion)
-        seen = fit.wrench.value[pick]
         places = np.zeros((pick.size, 6, 3 * trials))
-        places[:, :, 3 * place : 3 * place + 3] = place_changes(seen, one.grounded)
+        places[:, :, 3 * place : 3 * place + 3] = place_changes(slow[pick], one.grounded)
         near = np.minimum(pick // THINNED, len(changes) - 1)
-        faults = plate_errors(seen, motion.rate, layout, plates)
-        left = (seen - W @ body.sip.phi)[:, :, None]
+        faults = plate_errors(slow[pick], motion.rate, layout, plates)
+        left = (fit.wrench.value[pick] - W @ body.sip.phi)[:, :, None]
         rows = np.concatenate([W @ S, changes[near], faults, places, left], axis=2)
         X = layout.bands.coefficients(layout.shift @ rows)
         band = layout.bands.at(fit.motion.rate).of(len(X))
@@ -249,38 +287,20 @@ def _gathered(body: Body, one: RobotMotion, columns: _Columns, place: int, trial
     return Statistics(gram, frames, layout)
 
 
-def _sum(parts: list[Statistics]) -> Statistics | None:
-    total = parts[0] if parts else None
-    for part in parts[1:]:
-        assert total is not None
-        total = total + part
-    return total
-
-
 def _start(body: Body) -> Array:
     return np.asarray(START * (float(body.sip.mass.sum()) / REFERENCE_PERSON) ** 2)
 
 
-def _learned(total: Statistics | None, sd: Array, start: Array) -> Noise:
-    """Return the noise that is left where every cause may be there."""
-    assert total is not None
+def _learned(total: _Products, noise: Noise, sd: Array, start: Array) -> Noise:
+    """Return the noise that is left where every cause may be there, from ``noise`` on."""
 
-    def improved(noise: Noise) -> Noise:
-        A, b = _equations(total, noise)
+    def improved(before: Noise) -> Noise:
+        A, b = total.equations(before)
         covariance = _posterior(A, sd)
         left = noise_of(total.moments(covariance @ b, covariance), start=start, worth=WORTH)
-        return replace(noise, covariance=left)
+        return replace(before, covariance=left)
 
-    first = Noise(np.tile(start, (len(total.count), 1, 1)), total.layout.about, total.layout.bands)
-    return maximise(first, improved, lambda one: one.covariance, rounds=_ROUNDS, tolerance=1e-2)
-
-
-def _equations(total: Statistics | None, noise: Noise) -> tuple[Array, Array]:
-    """Return X' S^-1 X (c, c) and X' S^-1 y (c,)."""
-    assert total is not None
-    weight = np.linalg.inv(noise.covariance)
-    H = np.einsum("bcd,bcidj->ij", weight, total.gram, optimize=True)
-    return H[:-1, :-1], H[:-1, -1]
+    return maximise(noise, improved, lambda one: one.covariance, rounds=_ROUNDS, tolerance=1e-2)
 
 
 def _posterior(A: Array, sd: Array) -> Array:

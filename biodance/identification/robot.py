@@ -15,7 +15,7 @@ from biodance.identification.base_parameters import BaseEstimate, BaseParameters
 from biodance.identification.identification import Identification, conclude, usable
 from biodance.identification.learning import START, learn_noise
 from biodance.identification.mismatch import SHORTEST, Mismatch
-from biodance.identification.robot_errors import THINNED, place_changes, thinned, zero_changes
+from biodance.identification.robot_errors import THINNED, place_changes, some_frames, zero_changes
 from biodance.identification.statistics import Fit, empty, layout_for, statistics
 from biodance.motion.grounded import Grounded
 from biodance.motion.regressor import regressor
@@ -56,7 +56,7 @@ def surprise(body: Body, one: RobotMotion) -> float:
     Channels count in units of their allowance, to which the start of the noise is added; 1 is usual.
     """
     pick = np.flatnonzero(one.fit.use)[:: 4 * THINNED]
-    motion = thinned(one.fit.motion, pick)
+    motion = some_frames(one.fit.motion, pick)
     W = regressor(body, motion)
     left = one.fit.wrench.value[pick] - W @ body.sip.phi
     allowed = np.einsum("tci,ij,tcj->tc", W, body.sip.covariance, W, optimize=True) + np.diag(_start(body))
@@ -111,7 +111,7 @@ def _errors(body: Body, trials: tuple[tuple[Fit, RobotMotion], ...], noise: Nois
         for pick in noise.bands.runs(fit.use, fit.motion.rate):
             if pick.size < SHORTEST:
                 continue
-            motion = thinned(fit.motion, pick)
+            motion = some_frames(fit.motion, pick)
             W = regressor(body, motion)
             weight, wrench = white.weighted(W), W @ body.sip.phi
             encoders += np.tensordot(weight, changes[pick // THINNED], axes=((0, 1), (0, 1)))

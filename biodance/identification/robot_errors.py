@@ -10,13 +10,14 @@ from dataclasses import replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.lab.filters import LowPass
+from biodance.body.pinocchio_model import load_pinocchio
+from biodance.lab.filters import LowPass, low_pass
 from biodance.motion.dynamics import distribute, joint_torques
-from biodance.motion.grounded import Grounded, ground
+from biodance.motion.grounded import Grounded, ground_again
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
 from biodance.records import SIDES, Array, Motion, Wrench
-from biodance.spatial import cross
+from biodance.spatial import cross, quaternion_matrix
 
 ZERO = 0.005
 """rad: standard deviation of an encoder's zero about the drawing's (judgement: 0.3 degrees, set by hand at stops)."""
@@ -28,13 +29,17 @@ PLACE, YAW = 0.02, 0.035
 """m and rad: how well the place on the plate follows from the drawing's centre of pressure, before the data."""
 _NEAR = 0.02
 """Of the height of the root: soles so near the lower one bear too."""
+_QUIET = 1.5
+"""Hz: accelerations below it are the robot's, above it the encoders' noise and vibrations, which would be taken for
+causes.
+"""
 _SLOW = 0.3
 """Cut-off over the thinned rate: changes are smooth."""
 THINNED = 4
 """Every so many frames are enough to see what an encoder's zero does."""
 
 
-def thinned(motion: Motion, pick: "slice | np.ndarray") -> Motion:
+def some_frames(motion: Motion, pick: "slice | np.ndarray") -> Motion:
     """Return the chosen frames of a motion."""
     return Motion(motion.time[pick], motion.q[pick], motion.v[pick], motion.a[pick])
 
@@ -75,15 +80,35 @@ def angle_changes(body: Body, one: Grounded, angle: Array, shapes: Array) -> Arr
     """Return the change (T / `THINNED`, 6, k) of the needed wrench by changes ``shapes`` (T, n, k) rad of the joint
     ``angle`` (T, n) rad.
     """
-    time, few = one.motion.time[::THINNED], angle[::THINNED]
-    slow = LowPass(cutoff=_SLOW / float(time[1] - time[0]))
-    base = one.base[::THINNED] if one.base else None
-    before = predict_wrench(body, ground(body, time, few, settings=slow, lean=one.lean, base=base).motion).value
+    few, time = angle[::THINNED], one.motion.time
+    slow = LowPass(cutoff=_SLOW / float(time[THINNED] - time[0]))
+    before = _needed(body, ground_again(body, one, few, every=THINNED, settings=slow).motion)
     out = np.empty((*before.shape, shapes.shape[2]))
     for k in range(shapes.shape[2]):
-        after = ground(body, time, few + shapes[::THINNED, :, k], settings=slow, lean=one.lean, base=base).motion
-        out[:, :, k] = predict_wrench(body, after).value - before
+        after = ground_again(body, one, few + shapes[::THINNED, :, k], every=THINNED, settings=slow)
+        out[:, :, k] = _needed(body, after.motion) - before
     return out
+
+
+def slow_wrench(body: Body, one: Grounded, angle: Array) -> Array:
+    """Return the wrench (T, 6) that a motion needs, without what is faster than `_QUIET`: faults of a plate are made
+    from it, since neither the encoders' noise nor forces that no motion explains are in it.
+    """
+    return _needed(body, ground_again(body, one, angle, settings=LowPass(cutoff=_QUIET)).motion)
+
+
+def _needed(body: Body, motion: Motion) -> Array:
+    """Return the wrench (T, 6) that a motion needs, about the origin; one vector at a time, ten times faster than by
+    the regressor.
+    """
+    pin = load_pinocchio()
+    model, rows = body.model, np.empty((motion.time.size, 6))
+    data = model.createData()
+    for row, q, v, a in zip(rows, motion.q, motion.v, motion.a, strict=True):
+        row[:] = pin.rnea(model, data, q, v, a)[:6]
+    turn = quaternion_matrix(motion.q[:, 3:7])
+    force, moment = (np.einsum("tij,tj->ti", turn, part) for part in (rows[:, :3], rows[:, 3:]))
+    return np.concatenate([force, moment + cross(motion.q[:, :3], force)], axis=1)
 
 
 def place_changes(wrench: Array, one: Grounded) -> Array:
@@ -112,7 +137,8 @@ def _torques(body: Body, one: Grounded, measured: Array) -> Array:
     down[np.arange(len(down)), one.foot] = True
     still = replace(one.motion, v=np.zeros_like(one.motion.v), a=np.zeros_like(one.motion.a))
     needed = predict_wrench(body, still).value
-    wrench = Wrench(still.time, np.where(np.isfinite(measured), measured, needed))
-    parts = distribute(wrench, *soles, down)
+    measured = np.where(np.isfinite(measured), measured, needed)
+    wrench = Wrench(still.time, low_pass(measured, still.rate, LowPass(cutoff=_QUIET)))
+    parts = distribute(wrench, soles[0], soles[1], down)
     names = [body.segments[body.feet[side].segment] for side in SIDES]
     return joint_torques(body, still, dict(zip(names, parts, strict=True))).torque

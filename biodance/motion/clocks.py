@@ -37,9 +37,10 @@ class PlateFit:
     scale: float
 
 
-def fit_plate(needed: Wrench, measured: Wrench, use: NDArray[np.bool_]) -> PlateFit:
+def fit_plate(needed: Wrench, measured: Wrench, use: NDArray[np.bool_], *, within: float = float("inf")) -> PlateFit:
     """Return when and where the plate saw what a motion needs: ``needed`` (T, 6) in the frame of the first standing
-    sole, of which ``use`` (T,) counts, and ``measured`` (S, 6) about the lab origin, both evenly sampled.
+    sole, of which ``use`` (T,) counts, and ``measured`` (S, 6) about the lab origin, both evenly sampled; delays are
+    tried ``within`` so many s.
 
     Raises
     ------
@@ -57,7 +58,8 @@ def fit_plate(needed: Wrench, measured: Wrench, use: NDArray[np.bool_]) -> Plate
             "that shifts the weight."
         )
     correlation, slope, first, second = _correlated(path, mask, other, np.isfinite(other))
-    size = np.abs(correlation)
+    late = clock[0] - needed.time[0] + (np.arange(correlation.size) - (path.size - 1)) / rate
+    size = np.where(np.abs(late) <= within, np.abs(correlation), 0.0)
     k = int(np.argmax(size))
     if size[k] == 0:
         raise TrialRefused(

@@ -22,8 +22,10 @@ from biodance.motion.smoothing import smooth
 from biodance.records import SIDES, Array, Motion, runs
 from biodance.records.encoders import Encoders
 
-_UNDER = 0.02
-"""Of the leg's length: how far the other sole may lie under the ground of the standing one (encoders, soft soles)."""
+UNDER = (0.02, 0.008)
+"""Of the leg's length: how far the other sole may lie under the ground of the standing one (encoders, soft soles);
+the second where a step is so low that the first does not see it.
+"""
 _AROUND = 0.25
 """s around a change of the standing foot that do not count: what the soles are off shows as a jump there."""
 _SHORT = 0.5
@@ -36,7 +38,8 @@ RATE = 100.0
 class Grounded:
     """The ``motion`` of a robot in the frame of its first standing sole, ``foot`` (T,) which stands (0 right, 1 left),
     ``use`` (T,) where one certainly does; ``unclear`` whether angles alone leave that open at times, and ``lean`` the
-    foot that was taken to stand then (None: the one that did before); ``base`` what was seen of it beside the joints.
+    foot that was taken to stand then (None: the one that did before); ``base`` what was seen of it beside the joints,
+    and ``under`` as in `ground`.
     """
 
     motion: Motion
@@ -45,6 +48,7 @@ class Grounded:
     unclear: bool = False
     lean: int | None = None
     base: BaseSeen | None = None
+    under: float = UNDER[0]
 
     @property
     def supports(self) -> tuple[tuple[str, float, float], ...]:
@@ -77,11 +81,13 @@ def ground(
     settings: LowPass | None = None,
     lean: int | None = None,
     base: BaseSeen | None = None,
+    under: float = UNDER[0],
 ) -> Grounded:
     """Return the motion of ``body`` with joint ``angle`` (T, n) rad at ``time`` (T,) s, evenly spaced.
 
     ``settings`` of the low-pass, as for people by default; ``lean`` the foot (0 right, 1 left) that stands where a
-    lifted foot is so tilted that either could, None the one that stood before; ``base`` where it was seen.
+    lifted foot is so tilted that either could, None the one that stood before; ``base`` where it was seen;
+    ``under`` of `UNDER`.
 
     Raises
     ------
@@ -91,9 +97,9 @@ def ground(
     if set(body.feet) != set(SIDES):
         raise TrialRefused(f"{body.name}: has no right and left foot, so nothing tells where it is.")
     turn, place, height = _soles(body, angle)
-    under = _UNDER * _leg(body)
-    stands = height > -under
-    unclear = stands.all(axis=0) & (height > under).any(axis=0)
+    depth = under * _leg(body)
+    stands = height > -depth
+    unclear = stands.all(axis=0) & (height > depth).any(axis=0)
     if lean is not None:
         stands[1 - lean] &= ~unclear
     foot, use = _standing(stands, float(1.0 / (time[1] - time[0])))
@@ -103,7 +109,17 @@ def ground(
         middle = position + np.einsum("tij,tj->ti", rotation, place[foot, every])
         rotation, position = base.corrected(rotation, position, middle)
     q = np.concatenate([position, _quaternions(rotation), angle], axis=1)
-    return Grounded(smooth(body, time, q, settings=settings), foot, use, bool(unclear.any()), lean, base)
+    return Grounded(smooth(body, time, q, settings=settings), foot, use, bool(unclear.any()), lean, base, under)
+
+
+def ground_again(
+    body: Body, one: Grounded, angle: Array, *, every: int = 1, settings: LowPass | None = None
+) -> Grounded:
+    """Return the motion with other joint ``angle`` (T / ``every``, n) rad, standing as ``one`` does, of every so many
+    of its instants.
+    """
+    base = one.base[::every] if one.base else None
+    return ground(body, one.motion.time[::every], angle, settings=settings, lean=one.lean, base=base, under=one.under)
 
 
 def _leg(body: Body) -> float:

@@ -19,7 +19,7 @@ from biodance.identification.robot import identify_links
 from biodance.identification.validation import TrialValidation, residual_ratio
 from biodance.lab.robot.recording import RobotRecording, read_robot_recording
 from biodance.motion.clocks import fit_plate, onto_plate
-from biodance.motion.comparison import compare
+from biodance.motion.comparison import Agreement, compare
 from biodance.motion.grounded import RATE
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.identification import SessionIdentification
@@ -27,18 +27,21 @@ from biodance.pipeline.robot_trials import MatchedTrial, bring_together
 from biodance.pipeline.robot_words import cause_words, refusals, told_of, weights
 from biodance.records import Wrench
 from biodance.records.attention import Attention, Judged, strongest_first
-from biodance.spatial import wrench_about_point
+from biodance.spatial import cross, quaternion_matrix, wrench_about_point
 
 _KEPT = 0.2
 """Share of every trial, at its end, that is kept where no trial is."""
+_NEAR = 0.3
+"""s: clocks that were brought together are not moved further for validation."""
 _NO_SEARCH = "Of a robot, what differs from the drawing is told link by link instead."
 
 
 @dataclass(frozen=True, eq=False)
 class RobotResult:
     """What a recording says about a robot: ``identified`` as of people, ``alone`` the base parameters as
-    the paper counts them (every frame independent), ``causes`` of what is not as drawn (taken out before), ``trials``,
-    ``attention``, ``judged``, and the ``urdf``.
+    the paper counts them (every frame independent), ``causes`` of what is not as drawn (taken out before), ``in_root``
+    agreements of drawing and identified robot by trial in the root's frame (paper Table II), ``trials``,
+    ``attention``, ``judged``, the ``urdf``, and the ``verdict``: clean, named or unexplained.
     """
 
     recording: RobotRecording
@@ -48,8 +51,10 @@ class RobotResult:
     identified: SessionIdentification
     alone: BaseEstimate
     causes: tuple[RobotFinding, ...]
+    in_root: dict[str, tuple[Agreement, Agreement]]
     attention: tuple[Attention, ...]
     judged: tuple[Judged, ...]
+    verdict: str = "clean"
 
     @property
     def needs_a_person(self) -> bool:
@@ -99,16 +104,50 @@ def identify_robot(
     if not fitted:
         reasons = " ".join(refused.values()) or "No trial has the role fit."
         raise TrialRefused(reasons)
-    tell("looking for what is not as drawn")
-    causes, fitted, kept = _without_causes(body, fitted, kept)
     tell("identifying")
-    done, alone = identify_links(body, tuple(one.motion for one in fitted))
-    tell("validating")
-    identified = _validated(found.folder.name, done, fitted, kept)
-    said = strongest_first([*refusals(refused), *told_of(trials), *cause_words(causes), *weights(done)])
+    plain = _identified(body, found.folder.name, fitted, kept)
+    tell("looking for what is not as drawn")
+    causes, *without = _without_causes(body, fitted, kept)
+    best = _identified(body, found.folder.name, *without) if causes else plain
+    doubtful = bool(causes) and not _predicts_better(best.identified, plain.identified)
+    best = plain if doubtful else best
+    words = cause_words(causes, doubtful=doubtful)
+    said = strongest_first([*refusals(refused), *told_of(trials), *words, *weights(best.identified.identification)])
     judged = tuple(Judged(one.recorded.name, float(one.motion.fit.use.sum()) / RATE) for one in trials)
     lost = tuple(Judged(name, 0.0, why, missed=True) for name, why in refused.items())
-    return RobotResult(found, Path(urdf), body, tuple(trials), identified, alone, causes, said, (*judged, *lost))
+    named = () if doubtful else causes
+    return RobotResult(
+        *(found, Path(urdf), body, tuple(trials), best.identified, best.alone, named, best.in_root),
+        *(said, (*judged, *lost), "unexplained" if doubtful else "named" if causes else "clean"),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Identified:
+    """What some trials give: see `RobotResult`."""
+
+    identified: SessionIdentification
+    alone: BaseEstimate
+    in_root: dict[str, tuple[Agreement, Agreement]]
+
+
+def _identified(body: Body, name: str, fitted: list[MatchedTrial], kept: list[MatchedTrial]) -> _Identified:
+    """Identify from the ``fitted`` trials, validate on all."""
+    done, alone = identify_links(body, tuple(one.motion for one in fitted))
+    identified = _validated(name, done, fitted, kept)
+    seen = (*identified.fitted, *identified.validations)
+    rooted = {v.name: _in_root(one, v) for one, v in zip((*fitted, *kept)[: len(seen)], seen, strict=True)}
+    return _Identified(identified, alone, rooted)
+
+
+def _predicts_better(one: SessionIdentification, other: SessionIdentification) -> bool:
+    """Whether ``one`` leaves less of the kept motions than ``other``: mean logarithm of the RMS over all channels."""
+    return bool(_left(one) < _left(other))
+
+
+def _left(one: SessionIdentification) -> float:
+    rms = [trial.identified_agreement.rms for trial in (one.validations or one.fitted)]
+    return float(np.mean(np.log(rms))) if rms else float("inf")
 
 
 def _parted(trials: list[MatchedTrial]) -> tuple[list[MatchedTrial], list[MatchedTrial]]:
@@ -166,7 +205,7 @@ def _validation(done: Identification, one: MatchedTrial) -> TrialValidation:
     predicted = []
     for body in (done.body, done.identified):
         needed = predict_wrench(body, motion)
-        fit = fit_plate(needed, Wrench(motion.time, measured), one.motion.grounded.use)
+        fit = fit_plate(needed, Wrench(motion.time, measured), one.motion.grounded.use, within=_NEAR)
         predicted.append(onto_plate(needed.value, fit))
     point = Wrench(motion.time, measured).cop()[use]
     about = np.nanmean(point, axis=0)
@@ -174,3 +213,23 @@ def _validation(done: Identification, one: MatchedTrial) -> TrialValidation:
     return TrialValidation(
         one.recorded.name, about, truth, table, found, use, compare(truth, table, use), compare(truth, found, use)
     )
+
+
+def _in_root(one: MatchedTrial, seen: TrialValidation) -> tuple[Agreement, Agreement]:
+    """Return how well drawing and identified robot agree with a trial's wrench in the axes and about the origin of the
+    robot's root, as the paper compares: there gravity turns with the robot, and all channels move.
+    """
+    q = one.motion.fit.motion.q
+    c, s = np.cos(one.plate.yaw), np.sin(one.plate.yaw)
+    on_plate = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    turn = on_plate @ quaternion_matrix(q[:, 3:7])
+    arm = seen.about - [*one.plate.place, 0.0] - q[:, :3] @ on_plate.T
+
+    def turned(wrench: Wrench) -> Wrench:
+        force, moment = wrench.value[:, :3], wrench.value[:, 3:]
+        moment = moment + cross(arm, force)
+        both = [np.einsum("tji,tj->ti", turn, part) for part in (force, moment)]
+        return Wrench(wrench.time, np.concatenate(both, axis=1))
+
+    truth, table, found = (turned(one) for one in (seen.measured, seen.table, seen.identified))
+    return compare(truth, table, seen.use), compare(truth, found, seen.use)

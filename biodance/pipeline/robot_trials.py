@@ -14,7 +14,7 @@ from biodance.lab.robot.encoders import for_joints
 from biodance.lab.robot.recording import BaseSensors, RobotRecording, RobotTrial
 from biodance.motion.base_seen import BaseSeen, base_of_inclinations, base_of_markers
 from biodance.motion.clocks import PlateFit, fit_plate, on_motion_clock
-from biodance.motion.grounded import RATE, Grounded, even_angles, ground
+from biodance.motion.grounded import RATE, UNDER, Grounded, even_angles, ground
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Wrench
 
@@ -108,8 +108,8 @@ def _stood(
 ) -> tuple[Grounded, PlateFit]:
     """Return the motion and its place on the plate; where the angles leave open which foot stands, the plate tells."""
     tried = []
-    for lean in (None, 0, 1):
-        found = ground(body, time, angle, settings=settings, lean=lean, base=base)
+    for under, lean in ((UNDER[0], None), (UNDER[1], None), (UNDER[0], 0), (UNDER[0], 1)):
+        found = ground(body, time, angle, settings=settings, lean=lean, base=base, under=under)
         tried.append((found, fit_plate(predict_wrench(body, found.motion), measured, found.use)))
         if not found.unclear:
             break
@@ -145,7 +145,7 @@ def _marked(body: Body, one: RobotTrial, base: BaseSensors, found: Grounded, ang
     c, s = np.cos(fit.yaw), np.sin(fit.yaw)
     turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
     pose = BaseSeen(turn @ (u @ vt), (rows[:, :3] - [*fit.place, 0.0]) @ turn.T)
-    out = ground(body, time, angle, lean=found.lean, base=pose)
+    out = ground(body, time, angle, lean=found.lean, base=pose, under=found.under)
     return replace(out, use=out.use & near)
 
 

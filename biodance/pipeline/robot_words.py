@@ -38,8 +38,15 @@ def told_of(trials: list[MatchedTrial]) -> list[Attention]:
     return out
 
 
-def cause_words(causes: tuple[RobotFinding, ...]) -> list[Attention]:
-    """Return what is not as drawn."""
+def cause_words(causes: tuple[RobotFinding, ...], *, doubtful: bool = False) -> list[Attention]:
+    """Return what is not as drawn; ``doubtful`` where the motion kept is not predicted better without the causes."""
+    if doubtful:
+        names = ", ".join(_named(one.cause) for one in causes)
+        text = (
+            f"Something is not as drawn that resembles {names}; without it the motion kept is not predicted better, so "
+            f"nothing is named and nothing was taken out."
+        )
+        return [Attention("warn", text, "", "drawing")]
     out = []
     for one in causes:
         others = " or ".join(_named(rival) for rival in one.rivals[:3])

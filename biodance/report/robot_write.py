@@ -10,7 +10,7 @@ from biodance.pipeline.provenance import now
 from biodance.pipeline.robot import RobotResult
 from biodance.pipeline.robot_trials import MatchedTrial
 from biodance.report.documents.diagnosis import attention_document, judged_document
-from biodance.report.documents.identification import identification_document
+from biodance.report.documents.identification import agreement, identification_document
 from biodance.report.documents.session import plain_values, to_text
 from biodance.report.pages.identification import identification_section
 from biodance.report.write import PAGE, write_files
@@ -33,13 +33,17 @@ def robot_document(result: RobotResult) -> dict[str, Any]:
         "judged": judged_document(result.judged),
         **found,
         "diagnosis": _diagnosis(result),
+        "in_root_frame": {
+            name: {"table": agreement(table), "identified": agreement(found)}
+            for name, (table, found) in result.in_root.items()
+        },
         "matched": [_matched(one) for one in result.trials],
         "provenance": {"created": now(), "versions": {"biodance": __version__}},
     }
 
 
 def _diagnosis(result: RobotResult) -> dict[str, Any]:
-    """Return what is not as drawn: verdict "clean" or "named", and the findings."""
+    """Return what is not as drawn: the verdict, and the findings."""
     findings = [
         {
             "cause": one.cause.kind,
@@ -53,7 +57,7 @@ def _diagnosis(result: RobotResult) -> dict[str, Any]:
         }
         for one in result.causes
     ]
-    return {"verdict": "named" if findings else "clean", "findings": findings}
+    return {"verdict": result.verdict, "findings": findings}
 
 
 def _matched(one: MatchedTrial) -> dict[str, Any]:

@@ -179,8 +179,9 @@ def _notes(file: UrdfFile, heavy: list[_Carrier], points: list[str]) -> tuple[st
     turning = [c.name for c in file.connections if c.kind == "continuous"]
     notes = [f"No boxes in the file, taken from the inertia instead: {', '.join(guessed)}."] if guessed else []
     notes += [f"Continuous joints are used within half a turn to either side: {', '.join(turning)}."] if turning else []
-    frozen = [c.name for c in file.connections if c.frozen]
-    notes += [f"Joints that mimic others are held where these are at zero: {', '.join(frozen)}."] if frozen else []
+    held = {why: ", ".join(c.name for c in file.connections if c.frozen == why) for why in ("mimic", "idle")}
+    notes += [f"Joints that mimic others are held where these are at zero: {held['mimic']}."] if held["mimic"] else []
+    notes += [f"Joints without speed and torque are held at zero: {held['idle']}."] if held["idle"] else []
     notes += (
         [f"Point masses in the file, of which the boxes say how sure they are: {', '.join(points)}."] if points else []
     )

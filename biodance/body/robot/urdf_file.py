@@ -41,7 +41,7 @@ class Link:
 class Connection:
     """One joint: ``rotation`` (3, 3) and ``translation`` (3,) m of the child's frame in the parent's; ``axis`` (3,)
     unit vector in the child's; ``lower``, ``upper`` rad, ``velocity`` rad/s, ``effort`` N·m (all 0 for a fixed one);
-    ``frozen`` a joint that follows another one or slides, and is held where it is at zero.
+    ``frozen`` why it is held where it is at zero: "mimic" follows another joint, "idle" has neither speed nor torque.
     """
 
     name: str
@@ -55,7 +55,7 @@ class Connection:
     upper: float
     velocity: float
     effort: float
-    frozen: bool = False
+    frozen: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,12 +230,17 @@ def _connection(path: Path, element: Element, links: set[str]) -> Connection:
         slide, turn = (offset, 0.0) if kind == "prismatic" else (0.0, offset)
         held = rotation @ axis_rotation(axis, np.array([turn]))[0]
         place = translation + slide * rotation @ axis
-        return Connection(name, "fixed", ends[0], ends[1], held, place, axis, 0.0, 0.0, 0.0, 0.0, frozen=True)
-    return Connection(name, kind, ends[0], ends[1], rotation, translation, axis, *_limits(path, element, kind, what))
+        return Connection(name, "fixed", ends[0], ends[1], held, place, axis, 0.0, 0.0, 0.0, 0.0, frozen="mimic")
+    limits = _limits(path, element, kind, what)
+    if not limits:
+        return Connection(name, "fixed", ends[0], ends[1], rotation, translation, axis, 0.0, 0.0, 0.0, 0.0, "idle")
+    return Connection(name, kind, ends[0], ends[1], rotation, translation, axis, *limits)
 
 
-def _limits(path: Path, element: Element, kind: str, what: str) -> tuple[float, float, float, float]:
-    """Return lower, upper, velocity and effort of a joint that moves."""
+def _limits(path: Path, element: Element, kind: str, what: str) -> tuple[float, float, float, float] | None:
+    """Return lower, upper, velocity and effort of a joint; None if it has neither of the last two and zero is in its
+    range: a finger that is drawn and never moves.
+    """
     limit = element.find("limit")
     if limit is None:
         raise FileRefused(
@@ -247,6 +252,8 @@ def _limits(path: Path, element: Element, kind: str, what: str) -> tuple[float, 
     velocity, effort = (_number(path, limit, key, what) for key in ("velocity", "effort"))
     if not lower <= upper:
         raise FileRefused(f"{path}: the range of {what} is {lower:g} to {upper:g} rad; lower must not exceed upper.")
+    if velocity == effort == 0 and lower <= 0 <= upper:
+        return None
     for key, value, unit in (("velocity", velocity, "rad/s"), ("effort", effort, "N·m")):
         if not value > 0:
             raise FileRefused(
