@@ -13,6 +13,7 @@ from biodance.pipeline.export import BODY, body_of_result
 from biodance.pipeline.for_subject import account_for
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.provenance import Provenance, now, provenance
+from biodance.pipeline.replay import replay_of
 from biodance.pipeline.results import SessionResult
 from biodance.report.documents.diagnosis import attention_document, diagnosis_document, judged_document
 from biodance.report.documents.identification import identification_document
@@ -127,7 +128,7 @@ def _accepted(
 def _page(result: SessionResult, made: Provenance, diagnosis: SessionDiagnosis | None = None) -> str:
     told = diagnosis_section(diagnosis) if diagnosis else ""
     attention = diagnosis.diagnosis.attention if diagnosis else None
-    return page(result, made, attention=attention, diagnosis=told)
+    return page(result, made, attention=attention, diagnosis=told, replay=replay_of(result))
 
 
 def write_files(folder: Path, files: dict[str, str]) -> None:

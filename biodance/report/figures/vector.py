@@ -184,7 +184,7 @@ class Frame:
     height: float = 110.0
     left: float = 44.0
     below: float = 16.0
-    above: float = 15.0
+    above: float = 18.0
     right: float = 8.0
 
 
