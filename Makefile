@@ -3,12 +3,13 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
+BUNDLE := biodance/report/feedback/bundle
 
-.PHONY: demo test hidden lint docs tutorials clean
-demo: $(STAMP)
+.PHONY: demo test hidden lint docs tutorials bundle bundle-if-possible clean
+demo: $(STAMP) bundle-if-possible
 	$(BIN)/biodance demo --out demo --force || [ $$? -eq 1 ] # 1: done, and something needs a person
 
-test: $(STAMP)
+test: $(STAMP) bundle-if-possible
 	$(BIN)/python -m pytest -n 2
 
 PART ?= 1/1
@@ -29,6 +30,13 @@ tutorials: $(STAMP) # runs every example, and keeps what it prints and draws for
 	$(BIN)/python docs/hooks/tutorials.py
 	$(BIN)/python docs/figures/measured_and_simulated.py docs/figures/measured_and_simulated.png
 
+bundle: $(BUNDLE)/NOTICES.txt # what lets the page that leads follow the person: from npm, as its lock file says
+$(BUNDLE)/NOTICES.txt: web/package-lock.json web/pose.js web/build.mjs | $(STAMP)
+	PYTHON=$(abspath $(BIN)/python) sh web/build.sh $(abspath $(BUNDLE))
+
+bundle-if-possible: $(STAMP)
+	@$(MAKE) --no-print-directory bundle || echo "Without npm the page that leads does not follow the person; all else works."
+
 $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
@@ -36,4 +44,4 @@ $(STAMP): pyproject.toml constraints.txt
 	touch $(STAMP)
 
 clean:
-	rm -rf $(VENV) demo build/site
+	rm -rf $(VENV) demo build/site web/node_modules $(BUNDLE)

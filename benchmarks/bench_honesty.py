@@ -2,7 +2,7 @@
 verdict may say.
 
     BIODANCE_DATA=folder BIODANCE_FOREIGN_LAB=folder python benchmarks/bench_honesty.py --run NAME [--only real foreign
-        own] [--foreign 8] [--out docs/benchmarks/diagnosis.md]
+        own] [--foreign 24] [--out docs/benchmarks/diagnosis.md]
 
 Sessions are tracked once and kept (`hidden_sessions.CACHE`), answers are kept per ``--run``: a run that was stopped
 goes on. ``--out`` writes the columns real, foreign and own of the runs ``before`` and NAME into that page.
@@ -12,36 +12,56 @@ import argparse
 import json
 import os
 import pickle
+import random
+import shutil
 import subprocess
 import sys
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from hidden_causes import SINGLE, nulls, singles, truth
 from hidden_sessions import CACHE, examined, store
 
+from biodance.diagnosis.diagnosis import Finding
 from biodance.errors import BiodanceError
 from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine
+from biodance.virtual_lab.faults.causes import hide, parse_cause
+from biodance.virtual_lab.movement.protocol import read_protocol
+from biodance.virtual_lab.recording.family import draw_laboratory, draw_visitor
+from biodance.virtual_lab.recording.laboratory import LabVisit
+from biodance.virtual_lab.simulate import simulate_session
 
 REAL = (
     *(f"biomechzoo/HC{number}A" for number in ("030", "031", "032", "038", "044", "050", "055")), "adl_gait", "pycgm",
+    "c3d_parser_Sydney", "c3d_parser_QCMAS", "gaitalytics/test_small", "gaitalytics/treadmill_no_events",
 )  # fmt: skip
-TRULY = {"biomechzoo/HC030A": {"labels_swapped"}}
+TRULY = {"biomechzoo/HC030A": {"labels_swapped"}, "c3d_parser_QCMAS": {"time_delay"}}
 """What is wrong in a real session: names that are not false."""
 PEOPLE = (
     ("F", 1.68, 61), ("M", 1.81, 78), ("F", 1.59, 54), ("M", 1.74, 70), ("F", 1.75, 66), ("M", 1.90, 88),
     ("F", 1.63, 72), ("M", 1.69, 60),
 )  # fmt: skip
 ROOM = ("--noise", "0.6", "--camera", "0.3")
+ROOMS = {
+    "real rooms": (ROOM, 24), "as quiet as here": (("--noise", "0.22", "--camera", "1.5"), 12), "as it comes": ((), 12),
+}  # fmt: skip
+"""Noise of the foreign laboratory, and the people recorded with it: 401, 402, ..."""
 NAMED = (
     "plate_offset:target=Fx", "plate_gain:target=Fz", "plate_crosstalk:target=Fz->My", "plate_drift:target=Mx",
     "plate_position:target=plate1:x", "plate_rotation:target=plate1:z", "time_delay",
     "added_mass:target=left_forearm_hand",
 )  # fmt: skip
+IN_FAMILY = (
+    "plate_position:target=plate1:x,shift=0.02", "time_delay:delay=0.02", "plate_offset:target={}Fx,offset=15",
+    "plate_rotation:target=plate1:z,angle=0.0698", "added_mass:target=left_forearm_hand,mass=2.4",
+    "plate_gain:target={}Fz,gain=0.05",
+)  # fmt: skip
+"""Hidden in laboratories 1, 2, ... of the family; ``{}`` is the plate where there are several."""
 START, END = "<!-- honesty: begin -->", "<!-- honesty: end -->"
 
 
@@ -63,6 +83,8 @@ class Answer:
     z: float
     hidden: str = ""
     seconds: float = 0.0
+    said: tuple[str, ...] = ()
+    covers: bool | None = None
 
     @property
     def alarm(self) -> bool:
@@ -85,23 +107,60 @@ class Answer:
 
 def real_session(name: str) -> SessionResult:
     """Return a real session, tracked once."""
-    return _kept(f"real-{name.replace('/', '-')}", lambda: Path(os.environ["BIODANCE_DATA"]) / name)
+    place = Path(os.environ["BIODANCE_DATA"]) / name
+
+    def folder() -> Path:
+        if place.is_dir():
+            return place
+        alone = CACHE / "real" / name
+        alone.mkdir(parents=True, exist_ok=True)
+        shutil.copy(place.with_suffix(".c3d"), alone)
+        return alone
+
+    return _kept(f"real-{name.replace('/', '-')}", folder)
 
 
-def foreign_session(index: int) -> SessionResult:
-    """Return a clean session of the foreign laboratory with the noise of real rooms, tracked once."""
+def foreign_session(seed: int, room: str) -> SessionResult:
+    """Return a clean session of the foreign laboratory with the noise of a room, tracked once."""
+    folder = CACHE / "foreign" / room.replace(" ", "_") / f"P{seed}"
 
     def written() -> Path:
-        sex, height, mass = PEOPLE[index]
-        folder = CACHE / "foreign" / f"clean-{index}"
         if not folder.is_dir():
             folder.parent.mkdir(parents=True, exist_ok=True)
             script = Path(os.environ["BIODANCE_FOREIGN_LAB"]) / "foreign_lab.py"
-            who = ["--seed", str(101 + index), "--sex", sex, "--height", str(height), "--mass", str(mass)]
-            subprocess.run([sys.executable, str(script), *who, *ROOM, "--out", str(folder)], check=True)
+            told = [*person_of(seed), *ROOMS[room][0], "--out", str(folder)]
+            subprocess.run([sys.executable, str(script), *told], check=True, stdout=subprocess.DEVNULL)
         return folder
 
-    return _kept(f"foreign-{index}", written)
+    return _kept(f"foreign-{room.replace(' ', '_')}-{seed}", written)
+
+
+def family_session(number: int, hidden: str = "") -> SessionResult:
+    """Return a session of one laboratory of the family, of a visitor of its own, with or without a cause; tracked
+    once.
+    """
+    name = f"{number}-{hidden.replace(':', '_').replace(',', '_').replace('>', '') or 'clean'}"
+
+    def written() -> Path:
+        folder = CACHE / "family" / name
+        if not folder.is_dir():
+            laboratory = draw_laboratory(number)
+            who, plan = draw_visitor(laboratory, number), read_protocol("diagnosis")
+            plan = replace(plan, trials=tuple(one for one in plan.trials if one.role != "validate"))
+            causes = (parse_cause(hidden),) if hidden else ()
+            visit, loads = hide(causes, who, plan, seed=number, visit=LabVisit(laboratory=laboratory))
+            simulate_session(who, plan, folder, seed=number, visit=visit, loads=loads)
+        return folder
+
+    return _kept(f"family-{name}", written)
+
+
+def person_of(seed: int) -> list[str]:
+    """Return seed, sex, stature and mass of a person of the foreign laboratory as it takes them."""
+    draw, sex = random.Random(seed), "FM"[seed % 2]
+    height = round(draw.uniform(1.52, 1.75) if sex == "F" else draw.uniform(1.64, 1.95), 2)
+    mass = round(draw.uniform(19.5, 28.5) * height * height, 1)
+    return ["--seed", str(seed), "--sex", sex, "--height", str(height), "--mass", str(mass)]
 
 
 def _kept(key: str, folder) -> SessionResult:  # type: ignore[no-untyped-def]
@@ -135,15 +194,52 @@ def answered(key: str, column: str, result: SessionResult, true: set[str], hidde
     where = f"{worst.channel} {worst.band_hz[0]:g}-{worst.band_hz[1]:g} Hz" if worst else ""
     seconds = time.process_time() - start
     z = worst.z if worst else 0.0
-    return Answer(key, column, one.verdict, names, false, head, failed, missed, where, z, hidden, seconds)
+    said = (*map(repr, one.findings), *(f"resembles {other!r}" for other in one.resembles), *one.notes)
+    return Answer(
+        key,
+        column,
+        one.verdict,
+        names,
+        false,
+        head,
+        failed,
+        missed,
+        where,
+        z,
+        hidden,
+        seconds,
+        said,
+        _covers(hidden, one.findings),
+    )
 
 
-def jobs(foreign: int, own: int) -> list[tuple[str, str, object, set[str], str]]:
+def _covers(hidden: str, findings: tuple[Finding, ...]) -> bool | None:
+    """Return whether the 95 % interval of the first size holds what was hidden; None where it was not named."""
+    effect, _, rest = hidden.partition(":")
+    target = rest.partition("target=")[2].partition(",")[0]
+    found = [one for one in findings if (one.effect, one.target) == (effect, target) and one.parameters]
+    if not found:
+        return None
+    low, high = found[0].parameters[0].interval
+    return bool(low <= float(rest.rpartition("=")[2]) <= high)
+
+
+def jobs(foreign: int, own: int, family: int) -> list[tuple[str, str, object, set[str], str]]:
     """Return key, column, how to get the session, true names and hidden cause of every session."""
     out: list[tuple[str, str, object, set[str], str]] = [
         (f"real {name}", "real", lambda name=name: real_session(name), TRULY.get(name, set()), "") for name in REAL
     ]
-    out += [(f"foreign {k}", "foreign", lambda k=k: foreign_session(k), set(), "") for k in range(foreign)]
+    for room, (_, people) in ROOMS.items():
+        for seed in range(401, 401 + min(foreign, people)):
+            get = partial(foreign_session, seed, room)
+            out.append((f"foreign, {room}, P{seed}", f"foreign, {room}", get, set(), ""))
+    for number in range(1, 1 + family):
+        out.append((f"family {number}", "family", partial(family_session, number), set(), ""))
+        text = IN_FAMILY[(number - 1) % len(IN_FAMILY)].format("plate1:" if draw_laboratory(number).plates > 1 else "")
+        effect, _, rest = text.partition(":target=")
+        true = {f"{effect.partition(':')[0]} {rest.partition(',')[0]}".strip()}
+        get = partial(family_session, number, text)
+        out.append((f"family {number}, {text}", "family, one fault", get, true, text))
     for one in nulls(range(own), range(1)):
         out.append((f"own {one.key}", "own", lambda one=one: examined(one), set(), ""))
     causes = {one.words.partition(",")[0]: one for one in SINGLE}
@@ -156,12 +252,12 @@ def jobs(foreign: int, own: int) -> list[tuple[str, str, object, set[str], str]]
     return out
 
 
-def run(name: str, only: list[str], foreign: int, own: int) -> list[Answer]:
+def run(name: str, only: list[str], *, foreign: int, own: int, family: int) -> list[Answer]:
     """Return the answers of a run; those that are there are not made again."""
     path = CACHE / "honesty" / f"answers-{name}.json"
     known = {row["key"]: row for row in json.loads(path.read_text())} if path.is_file() else {}
-    for key, column, get, true, hidden in jobs(foreign, own):
-        if key not in known and (not only or column in only):
+    for key, column, get, true, hidden in jobs(foreign, own, family):
+        if key not in known and (not only or any(column.startswith(one) for one in only)):
             known[key] = asdict(answered(key, column, get(), true, hidden))  # type: ignore[operator]
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(json.dumps(list(known.values()), indent=1))
@@ -228,11 +324,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--run", default="now")
     parser.add_argument("--only", nargs="*", default=[])
-    parser.add_argument("--foreign", type=int, default=len(PEOPLE))
-    parser.add_argument("--own", type=int, default=8)
+    parser.add_argument("--foreign", type=int, default=24)
+    parser.add_argument("--own", type=int, default=12)
+    parser.add_argument("--family", type=int, default=12)
     parser.add_argument("--out", type=Path)
     chosen = parser.parse_args()
-    answers = run(chosen.run, chosen.only, chosen.foreign, chosen.own)
+    answers = run(chosen.run, chosen.only, foreign=chosen.foreign, own=chosen.own, family=chosen.family)
     if chosen.out:
         path = CACHE / "honesty" / "answers-before.json"
         rows = json.loads(path.read_text()) if path.is_file() else []

@@ -2,14 +2,15 @@
 
     biodance dance --urdf hoap3.urdf --feet right_foot,left_foot --protocol fit.toml --out FIT
     biodance dance --urdf hoap3.urdf --feet right_foot,left_foot --protocol other.toml --seed 5 --out UNSEEN
-    python benchmarks/bench_robot_recording.py record FIT UNSEEN hoap3.urdf RECORDING [ankle N·m/rad]
+    python benchmarks/bench_robot_recording.py record FIT UNSEEN hoap3.urdf RECORDING [trouble=number ...]
     biodance identify RECORDING --urdf hoap3.urdf --feet right_foot,left_foot --out DONE
     python benchmarks/bench_robot_recording.py judge RECORDING DONE
 
-The robot plays its dance by its joints alone (spring, damper and the drawing's torque), free on a floor with friction,
-as its person-sized likeness (Froude), whose times and forces are scaled back. Covers and cables are taken off: the
-simulated robot is lighter than the URDF. With a stiffness given, the pitch of the ankles gives under load behind the
-encoder.
+The robot plays its dance by its joints alone, free on a floor with friction, as its person-sized likeness (Froude),
+whose times and forces are scaled back. Covers and cables are taken off: the simulated robot is lighter than the URDF.
+Troubles (paper IV.C): `pid=3` every joint by PID alone, of so many times the usual stiffness (else spring, damper and the drawing's torque), `ankle=100` the
+pitch of the ankles gives behind the encoder (N·m/rad), `stiction=0.1` N·m in every joint, `friction=0.3` under the
+feet; hidden in the files: `zero.JOINT=0.04` rad, `play.JOINT=0.02` rad, `gain.Fz=0.95`.
 """
 
 import json
@@ -28,7 +29,7 @@ from biodance.dance.dance import Dance
 from biodance.dance.rehearsal import _STEP, SETTLE, _Driver, _floor_wrench, bearing, floor_model, planned_torques
 from biodance.dance.robot import person_sized, shrunk
 from biodance.motion.regressor import predict_wrench
-from biodance.records import Array, Sip
+from biodance.records import CHANNELS, Array, Sip
 from biodance.spatial import point_mass
 from biodance.virtual_lab.robot_recording import RobotLab, write_robot_trial
 
@@ -42,6 +43,9 @@ COVERS = {
     "left_shank": (0.05, (0.5, 0.5, 0.7)),
 }
 """kg taken off a link, and where in its box (shares of its sides)."""
+PHYSICAL = ("pid", "ankle", "stiction", "friction")
+INTEGRAL = 0.3
+"""s: integral time of the motors, in the likeness."""
 EVERY = 8
 """Steps of the simulation between samples."""
 
@@ -57,9 +61,37 @@ def bare(body: Body) -> Body:
     return replace(body, sip=Sip(body.segments, phi, body.sip.covariance))
 
 
-def simulate(dance: Dance, truth: Body, hold: float) -> tuple[Array, Array, Array, Array]:
-    """Return times (T,) s, joint angles (T, n), torques (T, n) and the floor's wrench (T, 6) of the played dance, in
-    the robot's own size.
+class Joints(_Driver):
+    """Motors of a robot in its person-sized likeness, with troubles; ``units`` N·m of the likeness per N·m."""
+
+    def __init__(self, body: Body, model: Any, troubles: dict[str, float], units: float) -> None:
+        super().__init__(body, model)
+        self.past = np.zeros(len(body.joints)) if "pid" in troubles else None
+        self.stiffness = self.stiffness * troubles.get("pid", 1.0)
+        self.soft = np.full(len(body.joints), np.inf)
+        self.soft[ankles(body)] = units * troubles.get("ankle", np.inf)
+        self.share = 1 / (1 + self.stiffness / self.soft)
+        model.dof_damping[self.v_place] *= self.share * troubles.get("pid", 1.0)
+        model.dof_frictionloss[self.v_place] = units * troubles.get("stiction", 0.0)
+
+    def drive(self, data: Any, angle: Array, rate: Array, torque: Array) -> None:
+        """Set the motors' torques; behind a joint that gives, motor and spring are in series."""
+        if self.past is not None:
+            encoder = data.qpos[self.q_place] + data.qfrc_applied[self.v_place] / self.soft
+            self.past += _STEP / INTEGRAL * (angle - encoder)
+            torque = self.stiffness * self.past
+        super().drive(data, angle, rate, torque)
+        data.qfrc_applied[self.v_place] *= self.share
+
+
+def ankles(body: Body) -> list[int]:
+    """Return the joints that bend the ankles forwards."""
+    return [i for i, joint in enumerate(body.joints) if "ankle_pitch" in joint.name]
+
+
+def simulate(dance: Dance, truth: Body, hold: float, troubles: dict[str, float]) -> tuple[Array, Array, Array, Array]:
+    """Return times (T,) s, joint angles (T, n) behind the motors, torques (T, n) and the floor's wrench (T, 6) of the
+    played dance, in the robot's own size.
     """
     import mujoco
 
@@ -68,8 +100,8 @@ def simulate(dance: Dance, truth: Body, hold: float) -> tuple[Array, Array, Arra
     big = shrunk(plan, likeness(dance.body, to), Likeness(1 / to.length, 1 / to.mass))
     motion = big.motion(100.0)
     torque = planned_torques(big.body, motion, predict_wrench(big.body, motion), bearing(big, motion.time))
-    model = floor_model(likeness(truth, to))
-    data, driver = mujoco.MjData(model), _Driver(big.body, model)
+    model = floor_model(likeness(truth, to), friction=troubles.get("friction", 0.5))
+    data, driver = mujoco.MjData(model), Joints(big.body, model, troubles, to.mass * to.length)
     driver.place(data, motion.q[0], motion.v[0])
     for _ in range(round(SETTLE / _STEP)):
         driver.drive(data, motion.q[0, 7:], np.zeros(torque.shape[1]), torque[0])
@@ -87,31 +119,48 @@ def simulate(dance: Dance, truth: Body, hold: float) -> tuple[Array, Array, Arra
             applied = data.qfrc_applied[driver.v_place] + data.qfrc_passive[driver.v_place]
             rows.append((k * _STEP, data.qpos[driver.q_place].copy(), applied, _floor_wrench(mujoco, model, data)))
             if data.qpos[2] < 0.5 * motion.q[0, 2]:
+                tell(f"worst joint: {np.abs(now[:n] - data.qpos[driver.q_place]).max():.2f} rad from the plan")
                 raise SystemExit(f"fell at {k * _STEP / to.time:.1f} s")
     time, q, applied, wrench = (np.array(column) for column in zip(*rows, strict=True))
     units = to.mass * np.array([1.0] * 3 + [to.length] * 3)
     return time / to.time, q, applied / (to.mass * to.length), wrench / units
 
 
-def record(fit: str, unseen: str, urdf: str, out: str, ankle: str = "") -> None:
+def hidden(body: Body, troubles: dict[str, float], angle: Array, torque: Array, wrench: Array) -> tuple[Array, Array]:
+    """Return what encoders (T, n) and plate (T, 6) show of true angles, torques and wrench."""
+    names = [joint.name for joint in body.joints]
+    angle, wrench = np.array(angle), np.array(wrench)
+    angle[:, ankles(body)] += torque[:, ankles(body)] / troubles.get("ankle", np.inf)
+    for key, value in troubles.items():
+        kind, _, where = key.partition(".")
+        if kind == "zero":
+            angle[:, names.index(where)] += value
+        if kind == "play":
+            angle[:, names.index(where)] += value / 2 * np.sign(torque[:, names.index(where)])
+        if kind == "gain":
+            wrench[:, CHANNELS.index(where)] *= value
+    return angle, wrench
+
+
+def record(fit: str, unseen: str, urdf: str, out: str, *words: str) -> None:
     """Write the recording of both dances, and the truth beside its folder."""
     folder, drawn = Path(out), read_urdf(urdf, feet=FEET)
+    troubles = {key: float(value) for key, value in (word.split("=") for word in words)}
     truth = bare(drawn)
-    pitch = [i for i, joint in enumerate(drawn.joints) if "ankle_pitch" in joint.name]
+    physical = "_".join(f"{key}{value:g}" for key, value in sorted(troubles.items()) if key in PHYSICAL)
     for k, (name, source) in enumerate((("dance", fit), ("unseen", unseen))):
         dance = Dance.load(Path(source) / "dance.npz")
-        cache = Path(source) / "played.npz"
+        cache = Path(source) / f"played_{physical}.npz"
         if not cache.exists():
-            played = simulate(dance, replace(dance.body, sip=standing_frames(truth).sip), 1.0)
+            played = simulate(dance, replace(dance.body, sip=standing_frames(truth).sip), 1.0, troubles)
             np.savez(cache, *played)
-        time, angle, torque, wrench = np.load(cache).values()
-        if ankle:
-            angle[:, pitch] -= torque[:, pitch] / float(ankle)
+        time, *true = np.load(cache).values()
+        angle, wrench = hidden(drawn, troubles, *true)
         lab = RobotLab(ahead=0.37 + k, place=(0.03 - 0.05 * k, -0.02), yaw=0.1 - 0.3 * k)
         write_robot_trial(folder, name, tuple(j.name for j in drawn.joints), time, angle, wrench, lab=lab, seed=k)
         tell(f"{name}: {time[-1]:.1f} s, stayed up")
     truth_file = folder.with_name(folder.name + ".truth.json")
-    truth_file.write_text(json.dumps({"links": truth.segments, "phi": truth.sip.phi.tolist()}))
+    truth_file.write_text(json.dumps({"links": truth.segments, "phi": truth.sip.phi.tolist(), "troubles": troubles}))
 
 
 def judge(recording: str, done: str) -> None:
@@ -135,6 +184,7 @@ def judge(recording: str, done: str) -> None:
         f"{table[:, 4].sum():.0f} of {len(table)} masses within their 95 % intervals"
     )
     tell(f"base parameters: {found['base_parameters']}")
+    tell(*(f"{k}: {v}" for k, v in found["diagnosis"].items()))
     for key in ("fitted", "validation"):
         for trial in found[key]:
             for who in ("table", "identified"):

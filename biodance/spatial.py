@@ -130,10 +130,10 @@ def zero_moment_point(wrench: _Array, *, height: ArrayLike = 0.0, threshold: flo
 
 
 def point_mass(mass: float, place: _Array, *, radius: float = 0.0) -> _Array:
-    """Return the ten parameters (..., 10) [m, mc, Ixx, Ixy, Iyy, Ixz, Iyz, Izz] of a compact ``mass`` kg at ``place``
-    (..., 3) m with the radius of gyration ``radius`` m about its own centre.
+    """Return the ten parameters (..., 10) [m, mc, Ixx, Ixy, Iyy, Ixz, Iyz, Izz] of compact loads of ``mass`` kg at
+    ``place`` (..., 3) m with the radius of gyration ``radius`` m about their own centre.
     """
-    x, y, z = np.moveaxis(np.asarray(place, dtype=float), -1, 0)
+    x, y, z = np.moveaxis(np.asarray(place), -1, 0)
     own = radius**2
     about = [y * y + z * z + own, -x * y, x * x + z * z + own, -x * z, -y * z, x * x + y * y + own]
     return mass * np.stack([np.ones_like(x), x, y, z, *about], axis=-1)

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from human_cases import human_case
 
-from biodance.body.changes import move_joint, move_marker, recentre_joint, shift_matter
+from biodance.body.changes import move_joint, move_marker, recentre_joint
 from biodance.body.human.human import human
+from biodance.body.inertia import shift_matter
 from biodance.effects import effect
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench

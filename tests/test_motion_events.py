@@ -18,7 +18,8 @@ def walked(*, measured=True, shared=False):
     on = np.zeros((200, 2, 2), dtype=bool)
     on[:, 0, 0] = force > 0
     on[:, 1, 0] = shared
-    contact = Contact(TIME, on.any(axis=2), on, np.full(200, measured), np.zeros((200, 2)), ())
+    sure = np.full(200, measured)
+    contact = Contact(TIME, on.any(axis=2), on, sure, np.zeros((200, 2)), (), np.stack([sure, sure], axis=1))
     return (Wrench(TIME, value), Wrench(TIME, np.zeros((200, 6)))), contact
 
 

@@ -11,9 +11,9 @@ from random_bodies import random_body, random_motion
 from biodance.body.human.human import human
 from biodance.errors import TrialRefused
 from biodance.lab.markers.gaps import MarkerGaps
-from biodance.motion.kinematics import poses
+from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.pipeline.checks import mass_check, standing_check, trial_checks
-from biodance.pipeline.standing import centre_of_mass, facing, quiet_run, quiet_standing
+from biodance.pipeline.standing import facing, quiet_run, quiet_standing
 from biodance.pipeline.still import bone_lines
 from biodance.pipeline.trial import attempt, marker_fit
 from biodance.pipeline.trial_result import MarkerFit, QuietStanding, Step, TrialResult

@@ -11,6 +11,7 @@ from biodance.body.human.human import human
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
+from biodance.pipeline.front_movement import describe_movement
 from biodance.pipeline.session import examine
 from biodance.records import Markers, Motion, Plate, Session, Source, Subject, Trial, Wrench
 
@@ -118,6 +119,19 @@ def test_the_weight_of_real_statics_is_the_declared_one(name, declared):
     assert static.fit.total_rms < 0.002
     assert 0.3 < walk.comparison.used.sum() / RATE < 1.5
     assert walk.comparison.correlation[3] > 0.5
+    near_what_vicon_says(describe_movement(result)[walk.name])
+
+
+def near_what_vicon_says(moved):
+    """Events and joint angles of a real walk lie where the software of its laboratory puts them."""
+    for one in moved.file_events:
+        assert one.missed <= 1
+        assert abs(one.late) < 0.025
+    limits = {"hip_flexion": (8.0, 0.95), "knee_flexion": (6.0, 0.97), "ankle_dorsiflexion": (5.0, 0.95)}
+    found = {one.joint.partition("_")[2]: one for one in moved.file_angles}
+    for joint, (offset, correlation) in limits.items():
+        assert abs(found[joint].offset) < offset, joint
+        assert found[joint].correlation > correlation, joint
 
 
 def test_a_static_off_the_plates_is_refused_and_the_stairs_are_compared():

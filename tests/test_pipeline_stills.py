@@ -16,7 +16,7 @@ from biodance.identification.added_mass import added_mass
 from biodance.identification.load_posterior import MASSES, LoadPosterior
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
-from biodance.pipeline.replay import replay_of
+from biodance.pipeline.session_frames import frames_of
 from biodance.pipeline.still import load_still, posture_still, worst_still
 from biodance.records import Markers
 from biodance.report.figures import solid
@@ -148,7 +148,7 @@ def unpacked(text: str, *shape: int) -> np.ndarray:
 
 
 def test_a_replay_holds_every_body_marker_and_force_where_they_were(result):
-    replay = replay_of(result)
+    replay = frames_of(result)
     data = json.loads(replay_data(replay))
     one, found = data["trials"][0], result.trials[0]
     frames, segments, markers = one["frames"], one["segments"], one["markers"]
@@ -174,12 +174,12 @@ def test_a_replay_holds_every_body_marker_and_force_where_they_were(result):
 
 
 def test_a_replay_shows_the_load_that_was_found_and_stays_small(result, monkeypatch):
-    monkeypatch.setattr("biodance.pipeline.replay._FRAMES", 40)
+    monkeypatch.setattr("biodance.pipeline.session_frames._FRAMES", 40)
     search, place = result.identification.search, np.array([0.0, -0.2, 0.02])
     best = replace(search.best, segment="left_forearm_hand", place=place)
     found = replace(result.identification, search=replace(search, suspects=(best, *search.suspects[1:])))
-    replay = replay_of(replace(result, identification=found))
+    replay = frames_of(replace(result, identification=found))
     data = json.loads(replay_data(replay))
     assert data["load"] == {"on": result.body.segment_index("left_forearm_hand"), "place": place.tolist()}
     assert sum(one["frames"] for one in data["trials"]) <= 44
-    assert replay_of(replace(result, body=None)) is None
+    assert frames_of(replace(result, body=None)) is None

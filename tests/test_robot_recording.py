@@ -13,7 +13,9 @@ from biodance.cli import run
 from biodance.errors import BiodanceError
 from biodance.lab.robot.recording import read_robot_recording
 from biodance.motion.clocks import PlateFit, fit_plate, from_plate, onto_plate
-from biodance.pipeline.robot import MatchedTrial, bring_together, identify_robot, told_of
+from biodance.pipeline.robot import identify_robot
+from biodance.pipeline.robot_trials import MatchedTrial, bring_together
+from biodance.pipeline.robot_words import told_of
 from biodance.records import Wrench
 from biodance.records.attention import Attention
 from biodance.virtual_lab.robot_recording import RobotLab

@@ -15,7 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance import display
-from biodance.body.parts import GRAVITY, NO_JOINT, NO_SEGMENT, Foot, Joint, JointError, JointLimits, SegmentMarkers
+from biodance.body.inertia import shift_matter
+from biodance.body.parts import (
+    GRAVITY,
+    NO_JOINT,
+    NO_SEGMENT,
+    Foot,
+    Joint,
+    JointError,
+    JointLimits,
+    Part,
+    SegmentMarkers,
+)
 from biodance.body.pinocchio_model import build
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import Array, Sip, frozen_array
@@ -62,6 +73,8 @@ class Body:
         cuts the trunk from the pelvis; None where both are one.
     girths : mapping
         By segment, the girths of the person that its mass in ``sip`` takes in beside the table.
+    parts : tuple
+        Pieces of segments that move on joints of their own (``Part``): the head, hands, collar bones.
 
     Examples
     --------
@@ -84,6 +97,7 @@ class Body:
     gravity: Array = field(default_factory=GRAVITY.copy)
     at_joint: Sip | None = None
     girths: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    parts: tuple[Part, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(self.segments)
@@ -172,11 +186,42 @@ class Body:
         lower, upper = (np.where(held, angle, limit) for limit in (self.limits.lower, self.limits.upper))
         return replace(self, limits=replace(self.limits, lower=lower, upper=upper))
 
+    @property
+    def links(self) -> tuple[str, ...]:
+        """Names of the N segments and, behind them, of the P parts."""
+        return (*self.segments, *(part.name for part in self.parts))
+
     @cached_property
     def segment_joint(self) -> tuple[int, ...]:
-        """Index in `joints` of the joint that carries each segment, (N); -1 for the root's segment."""
+        """Index in `joints` of the joint that carries each of the `links`, (N + P); -1 for the root's segment."""
         carried = {joint.segment: i for i, joint in enumerate(self.joints) if joint.segment != NO_SEGMENT}
-        return tuple(carried.get(i, NO_JOINT) for i in range(len(self.segments)))
+        return tuple(carried.get(i, NO_JOINT) for i in range(len(self.segments) + len(self.parts)))
+
+    def place_on_segment(self, joint: int) -> tuple[int, Array]:
+        """Return the segment that ``joint`` (an index) hangs on, parts passed over, and the joint's place (3,) m in its
+        frame in the neutral posture.
+        """
+        place, above = self.joints[joint].translation, self.joints[joint].parent
+        while above >= 0 and not 0 <= self.joints[above].segment < len(self.segments):
+            place = self.joints[above].translation + self.joints[above].rotation @ place
+            above = self.joints[above].parent
+        return (self.joints[above].segment if above >= 0 else 0), place
+
+    @cached_property
+    def sharing(self) -> Array | None:
+        """(10 (N + P), 10 N): the parameters of the `links` from those of the segments, each of which means the whole;
+        None without parts.
+        """
+        if not self.parts:
+            return None
+        count = 10 * len(self.segments)
+        table = np.eye(count + 10 * len(self.parts), count)
+        for k, part in enumerate(self.parts):
+            mass, rest = 10 * part.segment, slice(10 * part.segment, 10 * part.segment + 10)
+            table[count + 10 * k : count + 10 * k + 10, mass] = part.share
+            _, origin = self.place_on_segment(self.segment_joint[len(self.segments) + k])
+            table[rest, mass] -= shift_matter(origin) @ part.share
+        return table
 
     def joint_index(self, name: str) -> int:
         """Return the index of a joint in ``joints``.
@@ -233,6 +278,11 @@ class Body:
             raise UnknownName.of("segment", name, self.segments)
         return self.segments.index(name)
 
+    def link_parameters(self, phi: Array | None = None) -> Array:
+        """Return the parameters (10 (N + P),) of the `links` from those of the segments ``phi`` (10 N,), the body's."""
+        whole = self.sip.phi if phi is None else phi
+        return whole if self.sharing is None else self.sharing @ whole
+
     @property
     def neutral(self) -> Array:
         """Upright posture, (nq,): zero joint angles, root at the lab origin, facing lab x."""
@@ -248,7 +298,7 @@ class Body:
             self.name,
             self.joints,
             self.limits,
-            inertias=tuple(zip(self.segment_joint, self.sip.phi.reshape(-1, 10), strict=True)),
+            inertias=tuple(zip(self.segment_joint, self.link_parameters().reshape(-1, 10), strict=True)),
             gravity=self.gravity,
             free=bool(self.n_root),
         )

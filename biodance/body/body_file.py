@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.parts import Foot, Joint, JointError, JointLimits, SegmentMarkers
+from biodance.body.parts import Foot, Joint, JointError, JointLimits, Part, SegmentMarkers
 from biodance.errors import BiodanceError, FileRefused
 from biodance.records import Sip
 
@@ -73,6 +73,7 @@ def _body(found: dict[str, Any]) -> Body:
         **({"gravity": found["gravity"]} if "gravity" in found else {}),
         at_joint=_sip(found["at_joint"]) if found.get("at_joint") else None,
         girths={segment: tuple(said) for segment, said in found.get("girths", {}).items()},
+        parts=tuple(Part(**part) for part in found.get("parts", ())),
     )
 
 

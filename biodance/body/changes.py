@@ -1,12 +1,21 @@
-"""The same body with one thing elsewhere: a joint, a length, a marker, or a segment cut in two by another joint."""
+"""The same body with one thing elsewhere: a joint, a length, a marker, or a segment cut in two by another joint, the
+piece a segment of its own or a part of the whole.
+"""
 
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.inertia import PSEUDO_INERTIA, RigidInertia, inertial_parameters
-from biodance.body.parts import Joint, JointLimits, SegmentMarkers
+from biodance.body.inertia import (
+    PSEUDO_INERTIA,
+    RigidInertia,
+    inertial_parameters,
+    pseudo_inertia,
+    shift_matter,
+    smallest_eigenvalues,
+)
+from biodance.body.parts import Joint, JointLimits, Part, SegmentMarkers
 from biodance.records import Array, Sip
 
 
@@ -64,15 +73,6 @@ def neutral_turn(body: Body, joint: int) -> Array:
     return np.asarray(turn.T)
 
 
-def shift_matter(shift: Array) -> Array:
-    """Return the map (10, 10) of the ten parameters when all matter moves by ``shift`` (3,) m in the segment's
-    frame.
-    """
-    move = np.eye(4)
-    move[:3, 3] = shift
-    return np.asarray(np.linalg.lstsq(PSEUDO_INERTIA, np.kron(move, move) @ PSEUDO_INERTIA, rcond=None)[0])
-
-
 _RANGE, _SPEED, TORQUE = 1.2, 10.0, 100.0
 """rad either way, rad/s, N·m: wide enough for any joint that is put in to follow markers."""
 SPLIT = 0.2
@@ -81,6 +81,10 @@ vertebra up or down).
 """
 GRAM, GYRATION = 1e-3, 0.03
 """kg and m: mass and radius of gyration of a part to which nothing is assigned, so that it has a centre of mass."""
+_FLAT, _MOST = 1e-9, 0.95
+"""Share of a pseudo-inertia's largest eigenvalue that counts as none, and of a whole that a part may take."""
+_TRACE = 1e-4
+"""Share of a segment's mass of a `Part` to which nothing is assigned (a collar bone): model formats refuse none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,38 +114,145 @@ def branch_off(body: Body, cut: Cut) -> Body:
     """
     if not cut.phi.any():
         cut = replace(cut, phi=GRAM * inertial_parameters(RigidInertia(1.0, cut.place, GYRATION**2 * np.eye(3))))
-    old = body.segment_index(cut.segment)
-    first, count = body.segment_joint[old] + 1, len(cut.axes)
-    new = []
-    for k, (name, axis) in enumerate(cut.axes.items()):
-        place = cut.place if k == 0 else np.zeros(3)
-        new.append(Joint(name, first - 1 + k, axis, np.eye(3), place, len(body.segments) if k == count - 1 else -1))
-    shifted = [j if j.parent < first else replace(j, parent=j.parent + count) for j in body.joints]
-    for index in cut.joints:
-        moved = body.joints[index]
-        shifted[index] = replace(moved, parent=first + count - 1, translation=moved.translation - cut.place)
-    names, limits = (*body.segments, cut.name), body.limits
-    extended = replace(
-        body,
+    old, new = body.segment_index(cut.segment), len(body.segments)
+    names = (*body.segments, cut.name)
+    return replace(
+        _jointed(_room_for(body, cut), cut, old, new),
         segments=names,
-        joints=(*shifted[:first], *new, *shifted[first:]),
         sip=_sip(body, cut, names),
-        limits=JointLimits(
-            **{
-                key: np.insert(getattr(limits, key), first, np.full(count, value))
-                for key, value in (
-                    ("lower", -_RANGE), ("upper", _RANGE), ("velocity", _SPEED), ("torque_lower", -TORQUE),
-                    ("torque_upper", TORQUE)
-                )
-            }
-        ),
-        markers=_markers(body, cut),
         boxes=np.concatenate([body.boxes, body.boxes[[old]] - cut.place]),
         com_boxes=_com_boxes(body, cut),
         notes=(*body.notes, f"{cut.name} moves on {cut.segment}."),
         at_joint=None,
-    )  # fmt: skip
-    return extended
+    )
+
+
+def with_part(body: Body, cut: Cut) -> Body:
+    """Return the body with the cut's joint, at zero angle the same as before; what is cut off is a `Part` of its
+    segment, the last one. A part that takes no matter takes a ten-thousandth.
+    """
+    segment, phi = body.segment_index(cut.segment), cut.phi
+    share = shift_matter(-cut.place) @ phi / body.sip.phi[10 * segment]
+    if not phi.any():
+        share = _TRACE * inertial_parameters(RigidInertia(1.0, np.zeros(3), GYRATION**2 * np.eye(3)))
+    jointed = _jointed(body, cut, segment, len(body.links))
+    return replace(jointed, parts=(*body.parts, Part(cut.name, segment, share)))
+
+
+def with_axis(body: Body, after: str, name: str, axis: Array) -> Body:
+    """Return the body whose segment on the joint ``after`` turns, behind it, about ``axis`` (3,) through its origin,
+    too: the joint ``name``, at zero angle the same as before.
+    """
+    k = body.joint_index(after)
+    old = body.joints[k]
+    jointed = _jointed(body, Cut("", "", {name: axis}, np.zeros(3), np.zeros(10), ()), old.segment, old.segment)
+    joints = list(jointed.joints)
+    joints[k] = replace(joints[k], segment=-1)
+    hung = [j if j.parent != k or i == k + 1 else replace(j, parent=k + 1) for i, j in enumerate(joints)]
+    return replace(jointed, joints=tuple(hung))
+
+
+def parts_as_segments(body: Body) -> Body:
+    """Return the same body whose parts are segments like the others, behind them, each with its own parameters; as it
+    is without parts.
+
+    Where a whole is so unlike the table that no rest could be left of it, the part has less.
+    """
+    table, count = body.sharing, len(body.segments)
+    if table is None:
+        return body
+    phi = table @ body.sip.phi
+    boxes, rooms = list(body.boxes), list(body.com_boxes)
+    for k, part in enumerate(body.parts):
+        _, origin = body.place_on_segment(body.segment_joint[count + k])
+        whole, own = boxes[part.segment], np.zeros((2, 3))
+        if part.share[0] > _TRACE:
+            own, boxes[part.segment] = _parted(whole, origin[1], above=bool(part.share[2] > 0))
+            own = own - origin
+        boxes.append(own)
+        rooms.append(own)
+        _leave_possible(phi, part.segment, count + k, shift_matter(origin))
+    along = body.at_joint
+    return replace(
+        body,
+        segments=body.links,
+        parts=(),
+        sip=Sip(body.links, phi, table @ body.sip.covariance @ table.T),
+        at_joint=along and Sip(body.links, table @ along.phi, table @ along.covariance @ table.T),
+        boxes=np.array(boxes),
+        com_boxes=np.array(rooms),
+    )
+
+
+def _leave_possible(phi: Array, rest: int, part: int, moved: Array) -> None:
+    """Take from the part what the rest of its segment lacks to be made of real mass.
+
+    ``phi`` (10 N,) is changed at both, ``moved`` (10, 10) takes the part into the segment's frame.
+    """
+    rows = [slice(10 * i, 10 * i + 10) for i in (rest, part)]
+    if smallest_eigenvalues(phi[rows[0]])[0] > 0:
+        return
+    own = moved @ phi[rows[1]]
+    value, vector = np.linalg.eigh(pseudo_inertia(phi[rows[0]] + own)[0])
+    root = np.sqrt(np.maximum(value, _FLAT * value[-1]))
+    share = (vector / root).T @ pseudo_inertia(own)[0] @ (vector / root)
+    level, axes = np.linalg.eigh(share)
+    less = (vector * root) @ (axes * np.minimum(level, _MOST)) @ axes.T @ (vector * root).T
+    left = np.linalg.lstsq(PSEUDO_INERTIA, less.ravel(), rcond=None)[0]
+    phi[rows[0]] += own - left
+    phi[rows[1]] = np.linalg.solve(moved, left)
+
+
+def _parted(box: Array, height: float, *, above: bool) -> tuple[Array, Array]:
+    """Return the two pieces (2, 3) m of a ``box`` cut at ``height`` along y, the one ``above`` (or below) first."""
+    low, high = np.array(box), np.array(box)
+    low[1, 1] = high[0, 1] = np.clip(height, *box[:, 1])
+    return (high, low) if above else (low, high)
+
+
+def _room_for(body: Body, cut: Cut) -> Body:
+    """Return the body whose parts stand one further in ``links``, so that one more segment finds its place before them;
+    parts whose joints go with the cut are pieces of the new segment.
+    """
+    count, gone = len(body.segments), float(cut.phi[0] / body.sip.phi[10 * body.segment_index(cut.segment)])
+    parts = []
+    for k, part in enumerate(body.parts):
+        first = _first_joint(body, body.segment_joint[count + k])
+        moved = Part(part.name, count, part.share / gone)
+        stays = Part(part.name, part.segment, part.share / (1 - gone))
+        cut_here = body.segments[part.segment] == cut.segment
+        parts.append(moved if first in cut.joints else stays if cut_here else part)
+    joints = tuple(replace(j, segment=j.segment + (j.segment >= count)) for j in body.joints)
+    worn = tuple(s + (s >= count) for s in body.markers.segment)
+    return replace(body, parts=tuple(parts), joints=joints, markers=replace(body.markers, segment=worn))
+
+
+def _first_joint(body: Body, joint: int) -> int:
+    """Return the first joint of the chain from the segment that ``joint`` (an index) hangs on."""
+    above = body.joints[joint].parent
+    while above >= 0 and not 0 <= body.joints[above].segment < len(body.segments):
+        joint, above = above, body.joints[above].parent
+    return joint
+
+
+def _jointed(body: Body, cut: Cut, old: int, new: int) -> Body:
+    """Return the body with the cut's joints and limits, and its markers on the link ``new`` instead of ``old``."""
+    first, count = body.segment_joint[old] + 1, len(cut.axes)
+    added = []
+    for k, (name, axis) in enumerate(cut.axes.items()):
+        place = cut.place if k == 0 else np.zeros(3)
+        added.append(Joint(name, first - 1 + k, axis, np.eye(3), place, new if k == count - 1 else -1))
+    shifted = [j if j.parent < first else replace(j, parent=j.parent + count) for j in body.joints]
+    for index in cut.joints:
+        moved = body.joints[index]
+        shifted[index] = replace(moved, parent=first + count - 1, translation=moved.translation - cut.place)
+    wide = {"lower": -_RANGE, "upper": _RANGE, "velocity": _SPEED, "torque_lower": -TORQUE, "torque_upper": TORQUE}
+    limits = {
+        key: np.insert(getattr(body.limits, key), first, np.full(count, value, dtype=float))
+        for key, value in wide.items()
+    }
+    joints = (*shifted[:first], *added, *shifted[first:])
+    return replace(body, joints=joints, limits=JointLimits(**limits), markers=_markers(body, cut, new))
 
 
 def _sip(body: Body, cut: Cut, names: tuple[str, ...]) -> Sip:
@@ -176,9 +287,9 @@ def _com_boxes(body: Body, cut: Cut) -> Array:
     return boxes
 
 
-def _markers(body: Body, cut: Cut):  # type: ignore[no-untyped-def]
+def _markers(body: Body, cut: Cut, new: int) -> SegmentMarkers:
     on = np.array([name in cut.markers for name in body.markers.names])
-    segment = tuple(len(body.segments) if moved else s for moved, s in zip(on, body.markers.segment, strict=True))
+    segment = tuple(new if moved else s for moved, s in zip(on, body.markers.segment, strict=True))
     return replace(
         body.markers, segment=segment, position=body.markers.position - np.where(on[:, None], cut.place, 0.0)
     )

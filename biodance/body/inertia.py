@@ -72,6 +72,15 @@ PSEUDO_INERTIA = _pseudo_inertia_map()
 """(16, 10): the pseudo-inertia is linear in the ten parameters."""
 
 
+def shift_matter(shift: Array) -> Array:
+    """Return the map (10, 10) of the ten parameters when all matter moves by ``shift`` (3,) m in the segment's
+    frame.
+    """
+    move = np.eye(4)
+    move[:3, 3] = shift
+    return np.asarray(np.linalg.lstsq(PSEUDO_INERTIA, np.kron(move, move) @ PSEUDO_INERTIA, rcond=None)[0])
+
+
 def pseudo_inertia(phi: Array) -> Array:
     """Return the pseudo-inertia matrices (N, 4, 4) of ``phi`` (10N,): second moments kg·m², first moments kg·m, mass
     kg.

@@ -23,8 +23,8 @@ class Joint:
 
     ``parent`` index of the parent joint in ``Body.joints`` (-1: the root); ``axis`` (3,) unit vector in the joint's
     frame, signed so that the positive angle is the anatomical direction in ``positive``; ``rotation`` (3, 3) and
-    ``translation`` (3,) m place the joint frame in the parent joint's frame at zero angle; ``segment`` index of the
-    segment that turns with this joint, -1 for an intermediate link.
+    ``translation`` (3,) m place the joint frame in the parent joint's frame at zero angle; ``segment`` index in
+    ``Body.links`` of the segment or part that turns with this joint, -1 for an intermediate link.
     """
 
     name: str
@@ -43,9 +43,27 @@ class Joint:
 
 
 @dataclass(frozen=True, eq=False)
+class Part:
+    """A piece of a segment that moves on joints of its own: a head on the trunk, a hand on the forearm.
+
+    ``segment`` index of the segment that it is a piece of, whose inertial parameters go on meaning the whole, in the
+    neutral posture; ``share`` (10,) the ten parameters of the piece, in its own frame (axes of the segment, origin at
+    its joint), for one kilogram of the whole: of what the whole weighs the piece has its share, whatever else the whole
+    has otherwise than the table is in the rest.
+    """
+
+    name: str
+    segment: int
+    share: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "share", frozen_array(self.share, (10,), f"part {self.name}.share"))
+
+
+@dataclass(frozen=True, eq=False)
 class SegmentMarkers:
-    """Where each marker sits: ``names`` (K), ``segment`` (K,) index, ``position`` (K, 3) m in the segment frame,
-    ``weight`` (K,) >= 0.
+    """Where each marker sits: ``names`` (K), ``segment`` (K,) index in ``Body.links``, ``position`` (K, 3) m in the
+    frame of that segment or part, ``weight`` (K,) >= 0.
     """
 
     names: tuple[str, ...]

@@ -53,17 +53,27 @@ def shape_parts(body: Body) -> list[tuple[int, Array]]:
         if not np.all(box[1] > box[0]):
             continue
         arms = [joint.translation[1] for joint in body.joints if joint.parent == body.segment_joint[index]]
-        if body.segments[index] == "trunk_head" and arms and box[0, 1] < np.mean(arms) < box[1, 1]:
-            low, high = np.array(box), np.array(box)
+        if body.segments[index] == "head":
+            parts.append((index, _head_in(box, box[1, 1] - box[0, 1])))
+        elif _has_head(body, index) and arms and box[0, 1] < np.mean(arms) < box[1, 1]:
+            low = np.array(box)
             low[1, 1] = np.mean(arms) + _SHOULDER * (box[1, 1] - np.mean(arms))
-            height = _HEAD * (box[1, 1] - np.mean(arms))
-            middle, half = (box[0] + box[1]) / 2, height * np.array([HEAD_DEPTH, 1.0, HEAD_BREADTH]) / 2
-            high = np.stack([middle - half, middle + half])
-            high[:, 1] = box[1, 1] - height, box[1, 1]
-            parts += [(index, low), (index, high)]
+            parts += [(index, low), (index, _head_in(box, _HEAD * (box[1, 1] - np.mean(arms))))]
         else:
             parts.append((index, box))
     return parts
+
+
+def _has_head(body: Body, index: int) -> bool:
+    return body.segments[index] == "trunk_head" and "head" not in body.segments
+
+
+def _head_in(box: Array, height: float) -> Array:
+    """Return the box (2, 3) m of a head of some ``height`` (m) at the top of a ``box``."""
+    middle, half = (box[0] + box[1]) / 2, height * np.array([HEAD_DEPTH, 1.0, HEAD_BREADTH]) / 2
+    head = np.stack([middle - half, middle + half])
+    head[:, 1] = box[1, 1] - height, box[1, 1]
+    return head
 
 
 def marker_hull(body: Body, segment: str) -> "Trimesh":

@@ -3,17 +3,12 @@ the terminal.
 """
 
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import App, Parameter
 
 from biodance.version import __version__
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED = 0, 1, 2, 130
 
@@ -79,13 +74,3 @@ def print_json(document: object) -> None:
     from biodance.report.documents.session import to_text
 
     sys.stdout.write(to_text(document))
-
-
-@contextmanager
-def progress() -> "Iterator[Callable[[str], None]]":
-    """Yield a function that shows on stderr what is being done: one changing line on a terminal, nothing elsewhere."""
-    from rich.console import Console
-    from rich.markup import escape
-
-    with Console(stderr=True).status("") as status:
-        yield lambda text: status.update(escape(text))

@@ -6,7 +6,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, ForceOption, JsonOption, OutOption, app, print_json, progress
+from biodance.cli.app import DONE, NEEDS_A_PERSON, ForceOption, JsonOption, OutOption, app, print_json
+from biodance.cli.progress import progress
 
 
 @app.command(name="plates")

@@ -5,7 +5,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, JsonOption, OutOption, Set, app, print_json, progress, say
+from biodance.cli.app import DONE, NEEDS_A_PERSON, JsonOption, OutOption, Set, app, print_json, say
+from biodance.cli.progress import progress
 
 
 @app.command(name="batch")

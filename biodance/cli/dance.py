@@ -82,7 +82,8 @@ def feedback_command(dance: Path, *, out: FileOut, force: ForceOption = False) -
     """Write the page that leads a person through a dance: one file that opens in a browser without network.
 
     It shows the person's own body, the next posture as a light figure, what to move, the seconds left and when to move,
-    by sight and sound; over the mirrored picture of a camera where that is wanted.
+    by sight and sound; over the mirrored picture of a camera where that is wanted. With a camera it follows the person,
+    grades every posture by what it tells of each segment, and asks for what is missing.
 
     Parameters
     ----------
@@ -92,7 +93,8 @@ def feedback_command(dance: Path, *, out: FileOut, force: ForceOption = False) -
     from biodance.dance.dance import Dance
     from biodance.report.feedback.write import write_feedback
 
-    write_feedback(Dance.load(dance / "dance.npz" if dance.is_dir() else dance), out, force=force)
+    if not write_feedback(Dance.load(dance / "dance.npz" if dance.is_dir() else dance), out, force=force):
+        say("The page leads but does not follow: this takes the bundle that `make bundle` builds in a checkout (npm).")
     sys.stdout.write(f"{out}\n")
     return DONE
 

@@ -20,8 +20,8 @@ from biodance.cli.app import (
     Tables,
     app,
     print_json,
-    progress,
 )
+from biodance.cli.progress import progress
 from biodance.cli.session import Reading, examine_with_reference, ready, tabled
 
 

@@ -1,11 +1,17 @@
 """The command that takes a recording in frame by frame, as a laboratory would send it."""
 
+from contextlib import nullcontext
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, JsonOption, MarkersFile, Set, app, print_json, progress, say
+from biodance.cli.app import DONE, NEEDS_A_PERSON, JsonOption, MarkersFile, Set, app, print_json, say
+from biodance.cli.progress import progress
+
+if TYPE_CHECKING:
+    from biodance.diagnosis.watch import LiveWarning
+    from biodance.pipeline.live import LiveState
 
 
 @app.command(name="live")
@@ -21,6 +27,9 @@ def live_command(
     subject: str | None = None,
     markers: MarkersFile = None,
     chosen: Set = (),
+    page: Annotated[
+        int | None, Parameter(help="Port of this machine's loopback at which a page shows the same; 0: a free one.")
+    ] = None,
     json: JsonOption = False,
 ) -> int:
     """Replay a recording as a stream: track, watch for faults and identify while it runs.
@@ -36,20 +45,30 @@ def live_command(
 
     from biodance.pipeline.replay import body_and_stream, replay
     from biodance.report.documents.live import live_document
+    from biodance.report.live_page import LivePage
     from biodance.report.terminal_live import print_live, state_line, warning_line
     from biodance.settings import assignments
 
-    with progress() as tell:
+    with progress() as tell, LivePage(page) if page is not None else nullcontext() as shown:
+        if shown:
+            say(f"Open {shown.address} on this machine.")
+
+        def tell_state(state: "LiveState") -> None:
+            tell(state_line(state))
+            if shown:
+                shown.show(state)
+
+        def tell_warning(said: "LiveWarning") -> None:
+            say(warning_line(said))
+            if shown:
+                shown.warn(said)
+
         body, trial = body_and_stream(
             file, static=static, subject=subject, markers=markers, settings=assignments(chosen), tell=tell
         )
-        found = replay(
-            body,
-            trial,
-            real_time=real_time,
-            tell=lambda state: tell(state_line(state)),
-            warn=lambda said: say(warning_line(said)),
-        )
+        found = replay(body, trial, real_time=real_time, tell=tell_state, warn=tell_warning)
+        if shown:
+            shown.end(found.state, found.cause)
     document = live_document(found)
     if json:
         print_json(document)

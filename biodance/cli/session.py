@@ -23,15 +23,16 @@ from biodance.cli.app import (
     Tables,
     app,
     print_json,
-    progress,
     say,
 )
+from biodance.cli.progress import progress
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from biodance.diagnosis.diagnosis import Diagnosis
     from biodance.pipeline.identification import SessionIdentification
+    from biodance.pipeline.movement import SessionMovement
     from biodance.pipeline.results import SessionResult
     from biodance.records import Session
     from biodance.uncertainty.tolerances import Tolerances
@@ -74,28 +75,36 @@ def report_session(
     person who was measured; return the result and the content of results.json.
     """
     from biodance.pipeline.diagnosis import diagnosed
+    from biodance.pipeline.front_movement import describe_movement
     from biodance.pipeline.session import stopped_before
     from biodance.report.write import write_report, write_subject_page
 
+    moved = describe_movement(result, tell=tell)
     try:
         stopped = result.stopped
         found = None if stopped else diagnosed(result, reference=reference, tolerances=tolerances, tell=tell)
     except KeyboardInterrupt:
         found, result = None, stopped_before(result, "the diagnosis")
     tell("writing the page")
-    tabled(result, tables, found.diagnosis if found else None)
+    tabled(result, tables, found.diagnosis if found else None, movement=moved)
     if for_subject:
         write_subject_page(result, folder, diagnosis=found)
-    return result, write_report(result, folder, diagnosis=found)
+    return result, write_report(result, folder, diagnosis=found, movement=moved)
 
 
-def tabled(result: "SessionResult", folder: Path | None, diagnosis: "Diagnosis | None" = None) -> None:
+def tabled(
+    result: "SessionResult",
+    folder: Path | None,
+    diagnosis: "Diagnosis | None" = None,
+    *,
+    movement: "SessionMovement | None" = None,
+) -> None:
     """Write the tables of a result into a folder that is ready for them; nothing without one."""
     from biodance.pipeline.tables import session_tables
     from biodance.report.tables import write_tables
 
     if folder is not None:
-        write_tables(session_tables(result, diagnosis), folder)
+        write_tables(session_tables(result, diagnosis, movement), folder)
 
 
 def ready(tables: Path | None, session: Path, *, force: bool) -> Path | None:
@@ -268,6 +277,7 @@ def identify_command(
         return _identify_robot(session, out, urdf, feet, {**persons, "--tables": tables}, json=json, force=force)
     from biodance.dance.dance import Dance
     from biodance.pipeline import front
+    from biodance.pipeline.front_movement import describe_movement
     from biodance.report.write import write_identification
 
     with progress() as tell:
@@ -277,9 +287,10 @@ def identify_command(
         result, _, folder = examine_with_reference(session, out, options, force=force, tell=tell)
         found = front.identify(result, dance=shown)
         result = replace(result, identification=found)
+        moved = describe_movement(result, tell=tell)
         tell("writing the page")
-        tabled(result, place)
-        document = write_identification(result, found, folder)
+        tabled(result, place, movement=moved)
+        document = write_identification(result, found, folder, movement=moved)
     return _told_identified(result, folder, document, json)
 
 
@@ -346,7 +357,9 @@ def settings(session: Path | None = None, *, chosen: Set = (), json: JsonOption 
 def export_command(
     source: Path,
     *,
-    format: Annotated[str, Parameter(help="osim, urdf, mjcf, biomod, glb, csv; or trc, mot, c3d of one trial.")],
+    format: Annotated[
+        str, Parameter(help="osim, urdf, mjcf, biomod, glb, csv; trc, mot, c3d of one trial; opensim: a whole folder.")
+    ],
     out: Annotated[Path, Parameter(help="The file to write.")],
     trial: Annotated[str | None, Parameter(help="Name of the trial for trc, mot and c3d.")] = None,
     subject: Annotated[str | None, Parameter(help="The person to export_command where C3D files hold several.")] = None,
@@ -361,7 +374,7 @@ def export_command(
     Parameters
     ----------
     source
-        Session folder, or folder with the results of `biodance identify`.
+        Session folder, or folder with the results of `biodance identify`; or hoap3, the robot from our own tables.
     """
     from biodance.pipeline.export import export as write
     from biodance.pipeline.export import replaceable

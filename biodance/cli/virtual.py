@@ -6,7 +6,8 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, ForceOption, OutOption, app, progress
+from biodance.cli.app import DONE, ForceOption, OutOption, app
+from biodance.cli.progress import progress
 from biodance.cli.session import print_reported, report_session
 
 
@@ -31,6 +32,10 @@ def simulate_command(
     effect: Annotated[
         tuple[str, ...], Parameter(negative=(), help="Hide a cause: plate_gain:target=Fz,gain=0.04; may be repeated.")
     ] = (),
+    lab_seed: Annotated[
+        int | None,
+        Parameter(help="Number of a laboratory of the family: other plates, cameras, soft tissue, tolerances."),
+    ] = None,
     out: OutOption,
     force: ForceOption = False,
 ) -> int:
@@ -50,7 +55,9 @@ def simulate_command(
         _forget_simulated(out)
     with progress() as tell:
         tell(f"simulating {protocol or dance}")
-        folder = front_dance.simulate(who, protocol, out, seed=seed, effects=effect, dance=shown, performer=performer)
+        folder = front_dance.simulate(
+            who, protocol, out, seed=seed, effects=effect, dance=shown, performer=performer, lab_seed=lab_seed
+        )
     sys.stdout.write(f"{folder}\n")
     return DONE
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.dance.problem.stance import Stance
 from biodance.errors import BiodanceError
 from biodance.records import SIDES, Array
 
@@ -113,6 +114,33 @@ def calls(body: Body, before: Array, after: Array, planted: tuple[str, ...] = ()
             start, end = (start + partner[0]) / 2, (end + partner[1]) / 2
         found.append(_Call(abs(end - start), _call(movement, "both" if pair else side, end)))
     return tuple(call.text for call in sorted(found, key=lambda call: -call.size))
+
+
+def instructions(
+    body: Body, before: Array, after: Array, was: Stance | None, now: Stance
+) -> tuple[str, ...]:
+    """Return everything that is called on the way between two postures: what the feet do, then what moves.
+
+    ``before``, ``after`` (n,) rad angles of the joints; ``was`` the feet before, None at the start, ``now`` after.
+    """
+    planted = tuple(SIDES[side] for side in now.planted)
+    moved = calls(body, np.degrees(before), np.degrees(after), planted)
+    return (*_feet_calls(was, now), *moved)
+
+
+def _feet_calls(was: Stance | None, now: Stance) -> tuple[str, ...]:
+    """Return what the feet do between two stances; a leg that is lifted is told by its joints."""
+    if was is None:
+        return ()
+    if not np.array_equal(was.ankle, now.ankle):
+        ahead = now.ankle[0, 0] > was.ankle[0, 0] + 1e-6
+        return ("step forward with the right foot" if ahead else "set the right foot back beside the left one",)
+    down = [SIDES[side] for side in now.planted if side not in was.planted]
+    if down:
+        return (f"set the {down[0]} foot down",)
+    if now.over is not None and now.over != was.over:
+        return (f"shift your weight onto the {SIDES[now.over]} leg",)
+    return ()
 
 
 def _split(name: str) -> tuple[str, str]:

@@ -72,6 +72,10 @@ class Dance:
         What differs from the plan because a move was impossible.
     subject : Subject or None
         For whom it was designed; None for a robot.
+    names : tuple of str
+        (P) what each posture is called, where it is made of known ones; else empty.
+    mirrored : tuple of int
+        Postures that are the one before them with right and left exchanged.
 
     Examples
     --------
@@ -91,6 +95,8 @@ class Dance:
     seed: int
     notes: tuple[str, ...] = ()
     subject: Subject | None = None
+    names: tuple[str, ...] = ()
+    mirrored: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         count, size = np.shape(self.postures)
@@ -248,6 +254,7 @@ class Dance:
         if self.subject is not None:
             who = {name: getattr(self.subject, name) for name in _PERSON}
             words["subject"] = {name: value for name, value in who.items() if value == value}
+        words |= {"names": self.names, "mirrored": self.mirrored}
         words |= {"stances": [_told(s) for s in self.stances], "under": [_told(s) for s in self.under]}
         arrays = {name: getattr(self, name) for name in ("postures", "hold", "via", "move")}
         np.savez_compressed(
@@ -287,8 +294,8 @@ class Dance:
                 body, _ = parse_body(str(found["body"]), str(path))
             feet: dict[str, Any] = {name: tuple(Stance(**s) for s in words[name]) for name in ("stances", "under")}
             who = Subject(**words["subject"]) if "subject" in words else None
-            notes = tuple(words.get("notes", ()))
-            return cls(words["protocol"], body, seed=words["seed"], notes=notes, subject=who, **feet, **arrays)
+            more: dict[str, Any] = {name: tuple(words.get(name, ())) for name in ("notes", "names", "mirrored")}
+            return cls(words["protocol"], body, seed=words["seed"], subject=who, **more, **feet, **arrays)
         except OSError as error:
             raise FileRefused(f"{path}: cannot be read ({error.strerror or error}).") from error
         except FileRefused:

@@ -9,6 +9,7 @@ faster or how often it was interrupted.
 from collections.abc import Iterable
 from concurrent.futures import Executor, ProcessPoolExecutor
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -16,15 +17,18 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
 from biodance.dance.limits import Limit
+from biodance.dance.performers import COUNT, perform_with
 from biodance.dance.postures.ordering import order_postures, support_sequence
 from biodance.dance.postures.posture import intermediate_posture
 from biodance.dance.postures.search import find_postures
 from biodance.dance.postures.selection import choose
+from biodance.dance.postures.walk import Step, Walk, name_of
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import excitation_blocks
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance, under
 from biodance.dance.transitions.context import Checkpoint, Course, DesignContext, Tell
+from biodance.dance.transitions.move import Move
 from biodance.dance.transitions.planner import Way
 from biodance.dance.transitions.schedule import replan
 from biodance.dance.verify import Margin, broken, verify_with
@@ -32,6 +36,10 @@ from biodance.errors import BiodanceError
 from biodance.threads import one_thread
 
 WORKERS = 2
+_ATTEMPTS = 4
+"""Walks that are tried on performers."""
+_FEW = 24
+"""Performers of a first look."""
 _SHORT = 1.0
 """s that postures in between are held."""
 
@@ -68,9 +76,13 @@ def design(
     work = DesignContext(
         chain, parts, plan, seed, Checkpoint(resume, body, plan, seed), workers, tell or (lambda what, done, of: None)
     )
-    dance = _joined(work, *replan(work, _postures(work)))
+    danced: tuple[Margin, ...] = ()
+    if np.isfinite(plan.instructions):
+        dance, danced = _followable(work)
+    else:
+        dance = _joined(work, *replan(work, _postures(work)))
     work.tell("checking every limit", 0, 0)
-    margins = verify_with(workers, body, dance, plan.limits)
+    margins = tuple(sorted((*verify_with(workers, body, dance, plan.limits), *danced), key=lambda m: m.limit))
     if wrong := broken(margins):
         told = "; ".join(
             f"{m.limit.replace('_', ' ')} by {-m.worst:.3g} {m.unit} at {m.where_s:.2f} s {m.what}" for m in wrong
@@ -80,6 +92,35 @@ def design(
             f"protocol."
         )
     return dance, margins
+
+
+def _followable(work: DesignContext) -> tuple[Dance, tuple[Margin, ...]]:
+    """Return a dance that people can follow, and what imprecise performers leave: postures at which one of them has too
+    little room are not asked of anybody.
+    """
+    stances, walk = support_sequence(work.chain.body, work.plan), Walk(work)
+    for attempt in range(_ATTEMPTS):
+        steps, moves = walk.take(stances)
+        dance = _walked(work, stances, steps, moves)
+        work.tell("performers", attempt, 0)
+        found = perform_with(work.workers, dance, count=_FEW if attempt < _ATTEMPTS - 1 else COUNT)
+        found = perform_with(work.workers, dance) if found.safe else found
+        bad = {walk.key(steps[p]) for p in found.bad}
+        if found.safe or not bad - walk.banned:
+            break
+        walk.banned |= bad
+    return dance, found.margins(dance)
+
+
+def _walked(work: DesignContext, stances: tuple[Stance, ...], steps: list[Step], moves: list[Move]) -> Dance:
+    """Return the dance of a walk."""
+    plan, x = work.plan, np.array([step.x for step in steps])
+    hold = np.array([plan.hold if stance.over is None else min(_SHORT, plan.hold) for stance in stances])
+    feet = tuple(under(*pair) for pair in pairwise(stances))
+    via = np.array([move.via for move in moves]).reshape(-1, 2, x.shape[1])
+    duration, names = np.array([move.duration for move in moves]), tuple(name_of(step) for step in steps)
+    dance = Dance(plan.name, work.chain.body, x, stances, hold, via, duration, feet, work.seed)
+    return replace(dance, names=names, mirrored=tuple(p for p, step in enumerate(steps) if step.mirror))
 
 
 def _postures(work: DesignContext) -> Course:

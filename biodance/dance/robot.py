@@ -9,6 +9,7 @@ is checked on the robot as it is.
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from biodance.dance.limits import Limit
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance
+from biodance.dance.reposition import reposition
 from biodance.dance.verify import Margin, verify
 from biodance.errors import BiodanceError
 from biodance.identification.information import Information, fold
@@ -63,7 +65,8 @@ def robot_plan(body: Body, plan: Plan) -> Plan:
         )
     usual = float(np.median(body.limits.velocity))
     ahead = float(np.clip(plan.forward * _FORWARD * leg_length(body), 0.05, 0.4))
-    return replace(plan, move=plan.move * max(1.0, UNHURRIED / usual), forward=ahead)
+    free: dict[str, Any] = {"instructions": float("inf"), "simplicity": 0.0, "wide": 1.0}
+    return replace(plan, move=plan.move * max(1.0, UNHURRIED / usual), forward=ahead, **free)
 
 
 def leg_length(body: Body) -> float:
@@ -104,7 +107,9 @@ def design_robot(
         limits=tuple(limit.resized(length) for limit in plan.limits),
     )
     large, _ = design(likeness(body, to), long, seed=seed, tell=tell, resume=resume)
-    dance = shrunk(large, body, to)
+    if tell is not None:
+        tell("the way from rest", 0, 0)
+    dance = shrunk(reposition(large, long), body, to)
     return dance, verify(body, dance, plan.limits)
 
 

@@ -129,13 +129,13 @@ def score_performance(
     Raises
     ------
     BiodanceError
-        Body and dance have other joints, or nothing was recorded.
+        The dance has joints that the body has not, or nothing was recorded.
     """
     _same_joints(dance, body)
     if not any(use.any() for _, use in recorded):
         raise BiodanceError("No trial with role fit has motion and plates, so nobody knows how the dance was danced.")
     brief = replace(dance, hold=np.minimum(dance.hold, _STILL))
-    plan = brief.motion(_RATE)
+    plan = _in_joints_of(body, dance, brief.motion(_RATE))
     noise = typical_noise(np.asarray(predict_wrench(body, plan).cop().mean(axis=0)))
     planned = _shares(body, worth_of(body, plan, noise=noise))
     parts = [worth_of(body, motion, use, noise=noise) for motion, use in recorded if use.any()]
@@ -150,7 +150,7 @@ def score_performance(
 
 def _same_joints(dance: Dance, body: Body) -> None:
     names, own = ([joint.name for joint in one.joints] for one in (dance.body, body))
-    if names != own or dance.body.segments != body.segments:
+    if [name for name in own if name in names] != names or dance.body.segments != body.segments:
         other = sorted(set(names) ^ set(own)) or ["the order"]
         raise BiodanceError(
             f"Dance {dance.protocol}: was designed for a body with other joints than that of this session "
@@ -188,4 +188,18 @@ def _once(dance: Dance, body: Body, start: float, end: float, noise: Noise) -> W
     time = np.arange(max(2, round((end - start) * _RATE)) + 1) / _RATE
     phase = next(phase for phase in dance.phases if phase.start == start)
     state = dance.state(phase, np.minimum(start + time, end))
-    return worth_of(body, dance.chain.motion(time, state.x, state.v, state.a), noise=noise)
+    motion = dance.chain.motion(time, state.x, state.v, state.a)
+    return worth_of(body, _in_joints_of(body, dance, motion), noise=noise)
+
+
+def _in_joints_of(body: Body, dance: Dance, motion: Motion) -> Motion:
+    """Return a planned motion in the coordinates of a body that may have joints which the dance leaves at zero."""
+    names = [joint.name for joint in dance.body.joints]
+    new = np.flatnonzero([joint.name not in names for joint in body.joints])
+    if not new.size:
+        return motion
+    moved = [
+        np.insert(part, new - np.arange(new.size) + root, 0.0, axis=1)
+        for part, root in ((motion.q, body.nq - len(body.joints)), (motion.v, body.n_root), (motion.a, body.n_root))
+    ]
+    return Motion(motion.time, *moved, joint_names=tuple(joint.name for joint in body.joints))

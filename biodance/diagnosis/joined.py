@@ -15,6 +15,8 @@ from biodance.diagnosis.testimony import Verdicts, size_by
 
 _FAR = 3.0
 """Standard deviations between two sizes of one cause from which they contradict each other."""
+_EXCLUDED = "what the simulation would explain by a {} is none, as feet, clocks and weights show"
+"""Why nothing can be told where the only cause of the simulation is excluded by the witnesses."""
 _RAW = ("clipping", "axis_error", "unit_error", "frame_rate")
 """Causes that a check finds in the raw channels: what witnesses measure in such recordings has no size."""
 
@@ -100,7 +102,15 @@ def _checked(one: Diagnosis, heard: Testimony) -> Diagnosis:
     said = "{} {} was taken back: feet and weight on the plates exclude its size."
     notes = tuple(said.format(finding.effect.replace("_", " "), finding.target) for finding in gone)
     told: Verdict = "named, incomplete" if left else "unexplained"
-    return replace(one, verdict=told, findings=left, resembles=(*gone, *one.resembles), notes=(*one.notes, *notes))
+    doubt = one.doubt or ("" if left or one.verdict != "named, complete" else _EXCLUDED.format(gone[0].effect))
+    return replace(
+        one,
+        verdict=told,
+        findings=left,
+        resembles=(*gone, *one.resembles),
+        notes=(*one.notes, *notes),
+        doubt=doubt.replace("_", " "),
+    )
 
 
 def _excluded(finding: Finding, heard: Testimony) -> bool:

@@ -77,7 +77,8 @@ def white(problem: Problem, tolerances: Tolerances, rows: Array) -> Array:
 def marker_keys(problem: Problem) -> tuple[str, ...]:
     """Return the keys of the rows that follow those of the plates."""
     body = problem.cases[0].body
-    keys = tuple(f"marker {kind_of(body.segments[s])}" for s in body.markers.segment for _ in range(3))
+    wholes = (*range(len(body.segments)), *(part.segment for part in body.parts))
+    keys = tuple(f"marker {kind_of(body.segments[wholes[s]])}" for s in body.markers.segment for _ in range(3))
     return keys + tuple(f"shown {name}" for name, _ in problem.shown)
 
 

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
+from biodance.body.changes import parts_as_segments
+from biodance.body.human.skeleton import kind_of
 from biodance.diagnosis.spectrum import SHORTEST_RUN, Spectrum, spectrum, thinned
 from biodance.discovery import Chosen
 from biodance.effects import Case, Effect, effects
@@ -159,7 +161,9 @@ def problem(
     shown = sizes_shown(cases, {**effects(), **effects(chosen)})
     sip = np.concatenate([W.reshape(-1, W.shape[2]), np.zeros((len(markers) + len(shown), W.shape[2]))])
     unit = next(one for some in errors for one in some)
-    groups = tuple(in_state(group, joint, body) for group, joint in zip(unit.groups, unit.joints, strict=True))
+    groups = tuple(
+        in_state(_of_whole(group, body), joint, body) for group, joint in zip(unit.groups, unit.joints, strict=True)
+    )
     measured = where.rows(tuple(case.residual[:, :, None] for case in cases))
     target = np.concatenate([measured.ravel(), _mean_markers(cases, where).ravel(), list(shown.values())])
     rows = np.concatenate([rows, markers, np.zeros((len(shown), rows.shape[1]))])
@@ -178,10 +182,19 @@ def sizes_shown(cases: tuple[Case, ...], causes: Mapping[str, Effect]) -> dict[t
     return found
 
 
+def _of_whole(group: str, body: Body) -> str:
+    """Return a group of errors as that of the segment where it is one of a part: ``slide head`` -> ``slide
+    trunk_head``.
+    """
+    wholes = {kind_of(part.name): kind_of(body.segments[part.segment]) for part in body.parts}
+    quantity, _, target = group.partition(" ")
+    return f"{quantity} {wholes.get(target, target)}"
+
+
 def _errors(body: Body, cases: tuple[Case, ...], where: Spectrum) -> list[list[Errors]]:
     """Return the elementary errors of every run of every trial."""
     return [
-        [forward(of_clusters(body), _part(case.motion, pick)) for pick in picks]
+        [forward(of_clusters(parts_as_segments(body)), _part(case.motion, pick)) for pick in picks]
         for case, picks in zip(cases, where.picks, strict=True)
     ]
 

@@ -31,9 +31,9 @@ class ExternalContact(Effect):
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:
         """Return the segments that can touch something: those without a further segment, and the pelvis."""
-        carried = {case.body.joints[j].segment for j in case.body.segment_joint if j >= 0}
-        inner = {_parent_segment(case, j) for j in case.body.segment_joint if j >= 0}
-        return tuple(name for i, name in enumerate(case.body.segments) if (i in carried and i not in inner) or i == 0)
+        body = case.body
+        inner = {body.place_on_segment(j)[0] for j in body.segment_joint[: len(body.segments)] if j >= 0}
+        return tuple(name for i, name in enumerate(body.segments) if i not in inner or i == 0)
 
     def columns(self, case: Case) -> Array:
         """Return minus the wrench of a unit force at the contact point: what another support carries, the plates
@@ -56,14 +56,6 @@ class ExternalContact(Effect):
         knots = time[0] + _STEP * np.arange(int((time[-1] - time[0]) / _STEP) + 2)
         hats = np.maximum(0.0, 1.0 - np.abs(time[:, None] - knots) / _STEP)
         return (self.columns(case)[:, :, None, :] * hats[:, None, :, None]).reshape(time.size, 6, -1)
-
-
-def _parent_segment(case: Case, joint: int) -> int:
-    """Return the segment that carries the chain of ``joint``; 0 for the root."""
-    parent = case.body.joints[joint].parent
-    while parent >= 0 and case.body.joints[parent].segment < 0:
-        parent = case.body.joints[parent].parent
-    return 0 if parent < 0 else case.body.joints[parent].segment
 
 
 EFFECT = ExternalContact

@@ -9,15 +9,11 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.changes import Cut, branch_off
+from biodance.body.human.optional_joints import neck_and_vertex, share_of_body
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Parameter
-from biodance.effects._base.missing_joint import MissingJoint, share_of_body, shoulders
+from biodance.effects._base.missing_joint import MissingJoint
 
-NECK = 0.41
-"""Height, between shoulders and vertex, about which the head turns: the angle of the jaw (de Leva 1996: 0.39 men, 0.45
-women). Nodding is shared by all of the neck; about its base the head's weight would move twice as far as it does in
-virtual persons.
-"""
 _AXES = {"neck_flexion": -np.eye(3)[2], "neck_bending": np.eye(3)[0], "neck_rotation": np.eye(3)[1]}
 _MARKERS = 3
 
@@ -44,13 +40,12 @@ class HeadJoint(MissingJoint):
 
 
 def with_neck(case: Case) -> Body | None:
-    """Return the body with three joints in the neck; None where the markers do not show the head."""
-    body, middle = case.body, shoulders(case.body)
+    """Return the body with three joints in the neck; None where the markers do not show the head, or it has them."""
+    body, places = case.body, neck_and_vertex(case.body)
     seen = tuple(body.markers.names[c] for c in case.marker_columns if body.markers.names[c].endswith("HD"))
-    if middle is None or len(seen) < _MARKERS:
+    if places is None or len(seen) < _MARKERS or "head" in body.links:
         return None
-    vertex = np.array([middle[0], body.boxes[body.segment_index("trunk_head"), 1, 1], 0.0])
-    neck = middle + NECK * (vertex - middle)
+    neck, vertex = places
     head = share_of_body(body, "head", top=vertex, bottom=neck)
     return branch_off(body, Cut("trunk_head", "head", _AXES, neck, head, seen))
 

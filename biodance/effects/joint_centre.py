@@ -37,9 +37,12 @@ class JointCentre(Effect):
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:
-        """Return every anatomical joint that is followed; none without markers."""
-        followed = [name for name, chain in joint_chains(case.body).items() if case.body.free[list(chain)].any()]
-        return tuple(followed) if case.marker_columns else ()
+        """Return every anatomical joint of a segment that is followed; none without markers."""
+        body, count = case.body, len(case.body.segments)
+        chains = joint_chains(body).items() if case.marker_columns else ()
+        return tuple(
+            name for name, chain in chains if body.free[list(chain)].any() and body.joints[chain[-1]].segment < count
+        )
 
     def columns(self, case: Case) -> Array:
         """Return the change of the wrench with the posture that the markers give the true body, per metre."""

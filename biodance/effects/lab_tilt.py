@@ -30,7 +30,7 @@ class LabTilt(Effect):
         with it.
         """
         turned = np.cross(axis_vector(self.target), case.body.gravity)
-        table = case.phi.reshape(-1, 10)
+        table = case.body.link_parameters(case.phi).reshape(-1, 10)
         move = case.segments
         first = np.einsum("tnij,nj->ti", move.rotation, table[:, 1:4]) + np.einsum(
             "tni,n->ti", move.position, table[:, 0]

@@ -37,9 +37,11 @@ class SegmentLength(Effect):
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:
         """Return the segments between two joints; none without markers."""
-        inner = {case.body.joints[chain[0]].parent for chain in joint_chains(case.body).values()} - {-1}
-        carried = [case.body.joints[j].segment for j in sorted(inner)]
-        return tuple(case.body.segments[s] for s in carried) if case.marker_columns else ()
+        body, count = case.body, len(case.body.segments)
+        chains = [chain for chain in joint_chains(body).values() if body.joints[chain[-1]].segment < count]
+        inner = {body.place_on_segment(chain[0])[0] for chain in chains if body.joints[chain[0]].parent >= 0}
+        carried = sorted(inner, key=body.segment_joint.__getitem__)
+        return tuple(body.segments[s] for s in carried) if case.marker_columns else ()
 
     def columns(self, case: Case) -> Array:
         """Return the change of the wrench with the posture that the markers give the true body, per metre."""

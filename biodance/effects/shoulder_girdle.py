@@ -9,12 +9,10 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.changes import Cut, branch_off
+from biodance.body.human.optional_joints import shoulders, sternoclavicular
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Parameter
-from biodance.effects._base.missing_joint import MissingJoint, doubting, shoulders
-
-STERNOCLAVICULAR = np.array([0.2, 0.0, 0.12])
-"""Forwards, upwards and sideways from the middle of the shoulders, in half shoulder widths."""
+from biodance.effects._base.missing_joint import MissingJoint, doubting
 
 SHOULDERS = ("RSHO", "LSHO")
 """Skin over the acromion follows the collar bone in part only, and how far is what is asked: the arm's markers show
@@ -47,16 +45,15 @@ class ShoulderGirdle(MissingJoint):
 
 def with_clavicles(case: Case) -> Body | None:
     """Return the body with two joints at the inner end of each collar bone; None where the markers do not show both
-    shoulders.
+    shoulders, or it has them.
     """
-    body, middle = case.body, shoulders(case.body)
+    body = case.body
     seen = {body.markers.names[c] for c in case.marker_columns}
-    if middle is None or not seen.issuperset(SHOULDERS):
+    if shoulders(body) is None or not seen.issuperset(SHOULDERS) or "right_clavicle" in body.links:
         return None
     for side, sign in (("right", 1.0), ("left", -1.0)):
         shoulder = body.joint_index(f"{side}_shoulder_flexion")
-        width = abs(float(body.joints[shoulder].translation[2]))
-        place = middle + width * STERNOCLAVICULAR * [1.0, 1.0, sign]
+        place = sternoclavicular(body, side)
         axes = {f"{side}_clavicle_elevation": -sign * np.eye(3)[0], f"{side}_clavicle_protraction": sign * np.eye(3)[1]}
         body = branch_off(body, Cut("trunk_head", f"{side}_clavicle", axes, place, np.zeros(10), (), (shoulder,)))
     return doubting(body, SHOULDERS)

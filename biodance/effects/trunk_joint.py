@@ -10,9 +10,10 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.changes import Cut, branch_off
+from biodance.body.human.optional_joints import share_of_body, shoulders
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Parameter
-from biodance.effects._base.missing_joint import MissingJoint, doubting, share_of_body, shoulders
+from biodance.effects._base.missing_joint import MissingJoint, doubting
 
 XIPHION = 0.61
 """Height of the xiphion between the trunk's joint and the shoulders (de Leva 1996, from the omphalion: 0.58 men,

@@ -115,7 +115,7 @@ def structural_base(body: Body, *, gravity: Array = GRAVITY, seed: int = 0) -> B
     motion = Motion(
         np.arange(frames, dtype=float), q, rng.normal(0, 2, (frames, body.nv)), rng.normal(0, 4, (frames, body.nv))
     )
-    W = regressor_of(segment_motion(body, motion), gravity=gravity)
+    W = regressor_of(segment_motion(body, motion), gravity=gravity, sharing=body.sharing)
     return base_parameters(fold(W.reshape(-1, W.shape[2])), parameter_names(body))
 
 

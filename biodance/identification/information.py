@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.motion.kinematics import segment_motion
-from biodance.motion.regressor import regressor_of
+from biodance.motion.regressor import regressor
 from biodance.records import Array, Motion, Wrench
 from biodance.uncertainty.noise import Noise
 
@@ -95,7 +94,7 @@ def whitened_rows(body: Body, motion: Motion, wrench: Wrench, noise: Noise, used
     """Yield whitened rows (m, 6, 10N + 1) of [W y], block by block."""
     for pick in noise.bands.runs(used, motion.rate):
         part = Motion(motion.time[pick], motion.q[pick], motion.v[pick], motion.a[pick])
-        W = regressor_of(segment_motion(body, part), gravity=body.gravity)
+        W = regressor(body, part)
         yield noise.at(motion.rate).whiten(np.concatenate([W, wrench.value[pick][:, :, None]], axis=2))
 
 

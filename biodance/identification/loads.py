@@ -19,7 +19,7 @@ UNDECLARED = 0.25
 
 
 def compact_load(place: Array) -> Array:
-    """Return the ten parameters (..., 10) per kg of a compact load with CoM at ``place`` (..., 3) m."""
+    """Return the ten parameters (..., 10) per kg of compact loads with CoM at ``place`` (..., 3) m."""
     return point_mass(1.0, place, radius=_RADIUS)
 
 

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.body.changes import parts_as_segments
 from biodance.identification.information import Information
 from biodance.identification.statistics import Fit
-from biodance.motion.kinematics import segment_motion
-from biodance.motion.regressor import regressor_of
+from biodance.motion.regressor import regressor
 from biodance.records import Array, Motion, Sip
 from biodance.uncertainty.deviations import deviations
 from biodance.uncertainty.noise import Noise
@@ -58,8 +58,8 @@ def mismatch(body: Body, fits: tuple[Fit, ...], noise: Noise) -> Mismatch:
 
     Skin and flesh slide as much as the table says, or more where the markers' residuals are larger than that predicts.
     """
-    found, sources, plates = nothing(body), of_markers(body), plate_sources()
-    sd, scores, plate_scores = deviations(body, sources), np.array(found.kinematics), np.array(found.plates)
+    found, sources, plates = nothing(body), of_markers(parts_as_segments(body)), plate_sources()
+    sd, scores, plate_scores = deviations(sources[0].body, sources), np.array(found.kinematics), np.array(found.plates)
     predicted, observed = 0.0, 0.0
     for fit in fits:
         white = noise.at(fit.motion.rate)
@@ -67,13 +67,13 @@ def mismatch(body: Body, fits: tuple[Fit, ...], noise: Noise) -> Mismatch:
             if pick.size < SHORTEST:
                 continue
             motion = Motion(fit.motion.time[pick], fit.motion.q[pick], fit.motion.v[pick], fit.motion.a[pick])
-            W = regressor_of(segment_motion(body, motion), gravity=body.gravity)
+            W = regressor(body, motion)
             weight = white.weighted(W)
-            scores += transpose(sources, Response.of(body, motion), weight).T
+            scores += transpose(sources, Response.of(sources[0].body, motion), weight).T
             wrong = plate_errors(W @ body.sip.phi, motion.rate, noise, plates)
             plate_scores += np.tensordot(weight, wrong, axes=((0, 1), (0, 1)))
             if fit.motion.residual.shape[1] and np.isfinite(fit.motion.residual[pick]).any():
-                predicted += float(sd**2 @ _marker_squares(body, motion, sources)) * pick.size
+                predicted += float(sd**2 @ _marker_squares(motion, sources)) * pick.size
                 observed += float(np.nanmean(fit.motion.residual[pick] ** 2)) * pick.size
     soft = np.array([not joint for source in sources for joint in source.joints])
     more = np.sqrt(max(1.0, observed / predicted)) if predicted > 0 else 1.0
@@ -82,16 +82,16 @@ def mismatch(body: Body, fits: tuple[Fit, ...], noise: Noise) -> Mismatch:
 
 def nothing(body: Body) -> Mismatch:
     """Return the scores of no frames."""
-    size, sources = 10 * len(body.segments), sum(len(source.groups) for source in of_markers(body))
+    size, sources = 10 * len(body.segments), sum(len(source.groups) for source in of_markers(parts_as_segments(body)))
     return Mismatch(np.zeros((size, sources)), np.zeros((size, PLATE_SOURCES)))
 
 
-def _marker_squares(body: Body, motion: Motion, sources: tuple[ErrorSource, ...]) -> Array:
+def _marker_squares(motion: Motion, sources: tuple[ErrorSource, ...]) -> Array:
     """Return (K,) mean square distance (m²) between markers and model that every error of unit size leaves, over one
     of `EVERY` frames (two at least).
     """
     some = slice(None, None, min(EVERY, max(1, motion.time.size // 2)))
-    few = Response.of(body, Motion(motion.time[some], motion.q[some], motion.v[some], motion.a[some]))
+    few = Response.of(sources[0].body, Motion(motion.time[some], motion.q[some], motion.v[some], motion.a[some]))
     return np.concatenate([source.squares(few) for source in sources])
 
 

@@ -15,23 +15,17 @@ from biodance.identification.base_parameters import BaseEstimate, BaseParameters
 from biodance.identification.identification import Identification, conclude, usable
 from biodance.identification.learning import START, learn_noise
 from biodance.identification.mismatch import SHORTEST, Mismatch
+from biodance.identification.robot_errors import THINNED, place_changes, thinned, zero_changes
 from biodance.identification.statistics import Fit, empty, layout_for, statistics
-from biodance.motion.grounded import Grounded, ground
-from biodance.motion.regressor import predict_wrench, regressor
-from biodance.records import Array, Motion, Wrench
-from biodance.spatial import cross
+from biodance.motion.grounded import Grounded
+from biodance.motion.regressor import regressor
+from biodance.records import Array, Wrench
 from biodance.threads import one_thread
 from biodance.uncertainty.bands import WHITE
 from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.plates import plate_errors, plate_sources
 from biodance.uncertainty.tolerances import REFERENCE_PERSON
 
-_ZERO = 0.005
-"""rad: standard deviation of an encoder's zero about the drawing's (judgement: 0.3 degrees, set by hand at stops)."""
-_PLACE, _YAW = 0.02, 0.035
-"""m and rad: how well the place on the plate follows from the drawing's centre of pressure, before the data."""
-_THINNED = 4
-"""Every so many frames are enough to see what an encoder's zero does."""
 _ROOM = 3.0
 """A difference between needed and measured wrench within so many standard deviations of what the drawing may be off
 by is no surprise.
@@ -61,8 +55,8 @@ def surprise(body: Body, one: RobotMotion) -> float:
 
     Channels count in units of their allowance, to which the start of the noise is added; 1 is usual.
     """
-    pick = np.flatnonzero(one.fit.use)[:: 4 * _THINNED]
-    motion = _picked(one.fit.motion, pick)
+    pick = np.flatnonzero(one.fit.use)[:: 4 * THINNED]
+    motion = thinned(one.fit.motion, pick)
     W = regressor(body, motion)
     left = one.fit.wrench.value[pick] - W @ body.sip.phi
     allowed = np.einsum("tci,ij,tcj->tc", W, body.sip.covariance, W, optimize=True) + np.diag(_start(body))
@@ -112,46 +106,15 @@ def _errors(body: Body, trials: tuple[tuple[Fit, RobotMotion], ...], noise: Nois
     encoders, faults = np.zeros((size, len(body.joints))), np.zeros((size, len(plates.delay)))
     places = np.zeros((len(trials), size, 3))
     for k, (fit, one) in enumerate(trials):
-        changes = _zeros(body, one)
+        changes = zero_changes(body, one.grounded, one.angle)
         white = noise.at(fit.motion.rate)
         for pick in noise.bands.runs(fit.use, fit.motion.rate):
             if pick.size < SHORTEST:
                 continue
-            motion = _picked(fit.motion, pick)
+            motion = thinned(fit.motion, pick)
             W = regressor(body, motion)
             weight, wrench = white.weighted(W), W @ body.sip.phi
-            encoders += np.tensordot(weight, changes[pick // _THINNED], axes=((0, 1), (0, 1)))
+            encoders += np.tensordot(weight, changes[pick // THINNED], axes=((0, 1), (0, 1)))
             faults += np.tensordot(weight, plate_errors(wrench, motion.rate, noise, plates), axes=((0, 1), (0, 1)))
-            places[k] += np.tensordot(weight, _moved(wrench), axes=((0, 1), (0, 1)))
+            places[k] += np.tensordot(weight, place_changes(wrench, one.grounded), axes=((0, 1), (0, 1)))
     return Mismatch(encoders, np.concatenate([faults, *places], axis=1))
-
-
-def _zeros(body: Body, one: RobotMotion) -> Array:
-    """Return the change (T / `_THINNED`, 6, n) of the needed wrench by one standard deviation of every encoder's zero:
-    the robot is put on its foot anew with each.
-    """
-    motion = one.fit.motion
-    every = slice(None, None, _THINNED)
-    before = predict_wrench(body, _picked(motion, every)).value
-    out = np.empty((*before.shape, one.angle.shape[1]))
-    for j in range(one.angle.shape[1]):
-        moved = np.array(one.angle)
-        moved[:, j] += _ZERO
-        after = ground(body, motion.time, moved, lean=one.grounded.lean).motion
-        out[:, :, j] = predict_wrench(body, _picked(after, every)).value - before
-    return out
-
-
-def _moved(wrench: Array) -> Array:
-    """Return the changes (T, 6, 3) of a wrench by one standard deviation of the place along x, y and of the turn."""
-    force, moment = wrench[:, :3], wrench[:, 3:]
-    out = np.zeros((len(wrench), 6, 3))
-    for k in range(2):
-        out[:, 3:, k] = cross(_PLACE * np.eye(3)[k], force)
-    up = _YAW * np.eye(3)[2]
-    out[:, :3, 2], out[:, 3:, 2] = cross(up, force), cross(up, moment)
-    return out
-
-
-def _picked(motion: Motion, pick: "slice | np.ndarray") -> Motion:
-    return Motion(motion.time[pick], motion.q[pick], motion.v[pick], motion.a[pick])

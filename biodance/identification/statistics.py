@@ -87,9 +87,9 @@ class Statistics:
         (expectation step).
         """
         z = np.append(-phi, 1.0)
-        square = np.einsum("i,bcidj,j->bcd", z, self.gram, z, optimize=True)
-        spread = np.einsum("bcidj,ij->bcd", self.gram[:, :, :-1, :, :-1], covariance, optimize=True)
-        return Moments(square + spread, self.count.astype(float))
+        second = np.outer(z, z)
+        second[:-1, :-1] += covariance
+        return Moments(np.einsum("bcidj,ij->bcd", self.gram, second), self.count.astype(float))
 
 
 def layout_for(about: Array, bands: Bands = BANDS) -> Noise:
@@ -122,7 +122,7 @@ def statistics(body: Body, fit: Fit, layout: Noise) -> Statistics:
     for pick in layout.bands.runs(fit.use, fit.motion.rate):
         part = Motion(fit.motion.time[pick], fit.motion.q[pick], fit.motion.v[pick], fit.motion.a[pick])
         moved = segment_motion(body, part)
-        W = regressor_of(moved, gravity=body.gravity)
+        W = regressor_of(moved, gravity=body.gravity, sharing=body.sharing)
         rows = np.concatenate([W, fit.wrench.value[pick][:, :, None]], axis=2)
         X = layout.bands.coefficients(layout.shift @ rows)
         band = layout.bands.at(fit.motion.rate).of(len(X))

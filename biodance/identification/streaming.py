@@ -78,7 +78,7 @@ class Stream:
         rows = np.column_stack([motion.time, motion.q, motion.v, motion.a, wrench.value, _marker_rms(motion)])
         steps = np.diff(motion.time, prepend=self.last)
         broken = np.abs(steps * self.rate - 1) > 0.5
-        stream = replace(self, pressure=self.pressure + _pressure(fit), last=float(motion.time[-1]))
+        stream = replace(self, pressure=self.pressure + summed_pressure(fit), last=float(motion.time[-1]))
         starts = np.flatnonzero(broken | ~use | np.append(True, ~use[:-1]))
         for first, stop in zip(starts, [*starts[1:], use.size], strict=True):
             if broken[first] or not use[first] or stream.run == 0:
@@ -166,7 +166,7 @@ def about(found: Statistics, point: Array) -> Statistics:
     return Statistics(np.einsum("ab,nbicj,dc->naidj", move, found.gram, move, optimize=True), found.count, layout)
 
 
-def _pressure(fit: Fit) -> Array:
+def summed_pressure(fit: Fit) -> Array:
     """Return the summed centre of pressure (3,) m of the loaded used frames and their number."""
     points = fit.wrench.cop()[fit.use]
     loaded = points[np.isfinite(points).all(axis=1)]

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import SIGMAS
-from biodance.motion.kinematics import below, poses
-from biodance.motion.regressor import regressor
+from biodance.motion.kinematics import below, poses, segment_motion
+from biodance.motion.regressor import regressor_of
 from biodance.records import Array, Motion, Wrench
 
 
@@ -67,9 +67,9 @@ def torque_bands(
 
 def torque_regressor(body: Body, motion: Motion) -> Array:
     """Return Y (T, n, 10N): what each parameter needs about each joint's axis, N·m per unit."""
-    W = regressor(body, motion)
-    beyond = np.repeat(below(body), 10, axis=1)
-    return np.asarray(_about_axes(body, motion, W) * beyond)
+    W = regressor_of(segment_motion(body, motion), gravity=body.gravity)
+    Y = _about_axes(body, motion, W) * np.repeat(below(body), 10, axis=1)
+    return np.asarray(Y if body.sharing is None else Y @ body.sharing)
 
 
 def ground_torques(body: Body, motion: Motion, ground: Mapping[str, Wrench]) -> Array:

@@ -16,6 +16,7 @@ from biodance.body.body import Body
 from biodance.body.robot.likeness import sole_normal
 from biodance.errors import TrialRefused
 from biodance.lab.filters import LowPass, low_pass
+from biodance.motion.base_seen import BaseSeen
 from biodance.motion.kinematics import poses
 from biodance.motion.smoothing import smooth
 from biodance.records import SIDES, Array, Motion, runs
@@ -35,7 +36,7 @@ RATE = 100.0
 class Grounded:
     """The ``motion`` of a robot in the frame of its first standing sole, ``foot`` (T,) which stands (0 right, 1 left),
     ``use`` (T,) where one certainly does; ``unclear`` whether angles alone leave that open at times, and ``lean`` the
-    foot that was taken to stand then (None: the one that did before).
+    foot that was taken to stand then (None: the one that did before); ``base`` what was seen of it beside the joints.
     """
 
     motion: Motion
@@ -43,6 +44,7 @@ class Grounded:
     use: NDArray[np.bool_]
     unclear: bool = False
     lean: int | None = None
+    base: BaseSeen | None = None
 
     @property
     def supports(self) -> tuple[tuple[str, float, float], ...]:
@@ -68,12 +70,18 @@ def even_angles(encoders: Encoders, *, rate: float = RATE) -> tuple[Array, Array
 
 
 def ground(
-    body: Body, time: Array, angle: Array, *, settings: LowPass | None = None, lean: int | None = None
+    body: Body,
+    time: Array,
+    angle: Array,
+    *,
+    settings: LowPass | None = None,
+    lean: int | None = None,
+    base: BaseSeen | None = None,
 ) -> Grounded:
     """Return the motion of ``body`` with joint ``angle`` (T, n) rad at ``time`` (T,) s, evenly spaced.
 
     ``settings`` of the low-pass, as for people by default; ``lean`` the foot (0 right, 1 left) that stands where a
-    lifted foot is so tilted that either could, None the one that stood before.
+    lifted foot is so tilted that either could, None the one that stood before; ``base`` where it was seen.
 
     Raises
     ------
@@ -90,8 +98,12 @@ def ground(
         stands[1 - lean] &= ~unclear
     foot, use = _standing(stands, float(1.0 / (time[1] - time[0])))
     rotation, position = _chained(turn, place, foot)
+    if base is not None:
+        every = np.arange(foot.size)
+        middle = position + np.einsum("tij,tj->ti", rotation, place[foot, every])
+        rotation, position = base.corrected(rotation, position, middle)
     q = np.concatenate([position, _quaternions(rotation), angle], axis=1)
-    return Grounded(smooth(body, time, q, settings=settings), foot, use, bool(unclear.any()), lean)
+    return Grounded(smooth(body, time, q, settings=settings), foot, use, bool(unclear.any()), lean, base)
 
 
 def _leg(body: Body) -> float:

@@ -5,15 +5,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.records import Array, Motion
-from biodance.spatial import axis_rotation, cross, quaternion_matrix, skew
+from biodance.motion.ik.compiled.tree import move_joints, place_joints
+from biodance.records import Array, Index, Motion
+from biodance.spatial import cross, quaternion_matrix, skew
 
 
 @dataclass(frozen=True, eq=False)
 class Poses:
     """Poses in the lab frame: ``joint_rotation`` (T, n, 3, 3), ``joint_position`` (T, n, 3) m of the joint frames
-    (after their angle); ``rotation`` (T, N, 3, 3), ``position`` (T, N, 3) m of the segment frames; ``root_rotation``
-    (T, 3, 3), ``root_position`` (T, 3) m.
+    (after their angle); ``rotation`` (T, N, 3, 3), ``position`` (T, N, 3) m of the segment frames, with those of the
+    body's parts behind them (N + P); ``root_rotation`` (T, 3, 3), ``root_position`` (T, 3) m.
     """
 
     joint_rotation: Array
@@ -34,19 +35,13 @@ def poses(body: Body, q: Array) -> Poses:
     q = np.atleast_2d(q)
     frames, n = q.shape[0], len(body.joints)
     if body.n_root:
-        root_rotation, root_position = quaternion_matrix(q[:, 3:7]), q[:, :3]
+        root_rotation, root_position = quaternion_matrix(q[:, 3:7]), np.array(q[:, :3])
     else:
-        root_rotation, root_position = np.broadcast_to(np.eye(3), (frames, 3, 3)), np.zeros((frames, 3))
+        root_rotation, root_position = np.tile(np.eye(3), (frames, 1, 1)), np.zeros((frames, 3))
     rotation, position = np.empty((frames, n, 3, 3)), np.empty((frames, n, 3))
-    angles = q[:, body.nq - n :]
-    for i, joint in enumerate(body.joints):
-        parent_r, parent_p = (
-            (root_rotation, root_position)
-            if joint.parent < 0
-            else (rotation[:, joint.parent], position[:, joint.parent])
-        )
-        rotation[:, i] = parent_r @ (joint.rotation @ axis_rotation(joint.axis, angles[:, i]))
-        position[:, i] = parent_p + parent_r @ joint.translation
+    parent, turn, translation, _ = _tree(body)
+    angles = np.array(q[:, body.nq - n :])
+    place_joints(parent, turn, translation, root_rotation, root_position, angles, rotation, position)
     carrier = body.segment_joint
     seg_r = np.stack([root_rotation if j < 0 else rotation[:, j] for j in carrier], axis=1)
     seg_p = np.stack([root_position if j < 0 else position[:, j] for j in carrier], axis=1)
@@ -55,8 +50,8 @@ def poses(body: Body, q: Array) -> Poses:
 
 @dataclass(frozen=True, eq=False)
 class SegmentMotion:
-    """Segments in the lab frame: ``rotation`` (T, N, 3, 3), ``position`` (T, N, 3) m of the segment origin,
-    ``angular_velocity`` (T, N, 3) rad/s, ``angular_acceleration`` (T, N, 3) rad/s²,
+    """Segments in the lab frame, the body's parts behind them: ``rotation`` (T, N, 3, 3), ``position`` (T, N, 3) m of
+    the segment origin, ``angular_velocity`` (T, N, 3) rad/s, ``angular_acceleration`` (T, N, 3) rad/s²,
     ``acceleration`` (T, N, 3) m/s² of the segment origin (gravity not included).
     """
 
@@ -78,21 +73,11 @@ def segment_motion(body: Body, motion: Motion) -> SegmentMotion:
         w_root = np.einsum("tij,tj->ti", turn, angular)
         dw_root = np.einsum("tij,tj->ti", turn, motion.a[:, 3:6])
         acc_root = np.einsum("tij,tj->ti", turn, motion.a[:, :3] + cross(angular, linear))
-    omega, alpha, acc = (np.empty((frames, n, 3)) for _ in range(3))
-    rate, rate2 = motion.v[:, body.n_root :], motion.a[:, body.n_root :]
-    for i, joint in enumerate(body.joints):
-        p = joint.parent
-        w, dw, a0, x0 = (
-            (w_root, dw_root, acc_root, pose.root_position)
-            if p < 0
-            else (omega[:, p], alpha[:, p], acc[:, p], pose.joint_position[:, p])
-        )
-        arm = pose.joint_position[:, i] - x0
-        axis = pose.joint_rotation[:, i] @ joint.axis
-        acc[:, i] = a0 + cross(dw, arm) + cross(w, cross(w, arm))
-        spin = axis * rate[:, i, None]
-        omega[:, i] = w + spin
-        alpha[:, i] = dw + axis * rate2[:, i, None] + cross(w, spin)
+    rate, rate2 = np.array(motion.v[:, body.n_root :]), np.array(motion.a[:, body.n_root :])
+    root = np.stack([w_root, dw_root, acc_root, pose.root_position])
+    parent, _, _, axis = _tree(body)
+    omega, alpha, acc = moved = np.empty((3, frames, n, 3))
+    move_joints(parent, axis, pose.joint_rotation, pose.joint_position, root, rate, rate2, moved)
     pick = body.segment_joint
 
     def gather(root: Array, joints: Array) -> Array:
@@ -103,9 +88,30 @@ def segment_motion(body: Body, motion: Motion) -> SegmentMotion:
     )
 
 
+def centre_of_mass(body: Body, motion: Motion) -> Array:
+    """Return the centre of mass (T, 3) m of ``body`` with its own parameters during ``motion``."""
+    table = body.link_parameters().reshape(-1, 10)
+    mass = table[:, 0]
+    carried = np.flatnonzero(mass > 0)
+    points = poses(body, motion.q).points(carried.tolist(), table[carried, 1:4] / mass[carried, None])
+    return np.einsum("k,tkj->tj", mass[carried], points) / mass[carried].sum()
+
+
+def _tree(body: Body) -> tuple[Index, Array, Array, Array]:
+    """Return the joint before each (n,), the parts (n, 3, 3, 3) of its rotation (see `place_joints`), its translation
+    (n, 3) m and axis (n, 3).
+    """
+    axis = np.array([joint.axis for joint in body.joints], dtype=float).reshape(-1, 3)
+    fixed = np.array([joint.rotation for joint in body.joints], dtype=float).reshape(-1, 3, 3)
+    sine = fixed @ skew(axis)
+    turn = np.stack([fixed, sine, sine @ skew(axis)], axis=1)
+    translation = np.array([joint.translation for joint in body.joints], dtype=float).reshape(-1, 3)
+    return np.array([joint.parent for joint in body.joints], dtype=np.intp), turn, translation, axis
+
+
 def below(body: Body) -> Array:
-    """Return (n, N) 1 where a segment hangs on a joint."""
-    table = np.zeros((len(body.joints), len(body.segments)))
+    """Return (n, N + P) 1 where a segment, or a part of one, hangs on a joint."""
+    table = np.zeros((len(body.joints), len(body.segment_joint)))
     for s, j in enumerate(body.segment_joint):
         while j >= 0:
             table[j, s] = 1.0

@@ -5,28 +5,29 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-from scipy.spatial.transform import Rotation
-
 from biodance.body.body import Body
 from biodance.body.body_file import read_body
 from biodance.body.export import formats, write_model
-from biodance.body.export.osim import ROOT_ROTATIONS, ROOT_TRANSLATIONS
-from biodance.body.parts import UPRIGHT
+from biodance.body.robot.hoap3 import hoap3
 from biodance.body.solids import segment_solids
 from biodance.errors import SessionRefused, TrialRefused, UnknownName
-from biodance.lab.opensim.mot import TimeTable, write_mot
+from biodance.lab.opensim.mot import write_mot
 from biodance.lab.opensim.trc import write_trc
 from biodance.lab.session.read import read_session
+from biodance.pipeline.coordinates import opensim_coordinates
+from biodance.pipeline.kept import kept_body, kept_trials, read_kept
+from biodance.pipeline.opensim_folder import write_opensim_folder
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.results_c3d import results_into_c3d
 from biodance.pipeline.session import examine
 from biodance.pipeline.trial import prepare_trial
+from biodance.pipeline.trial_result import TrialResult
 from biodance.records import Motion, Session, Trial
 
-BODY = "body.json"
-"""File in which `biodance identify` keeps the identified body."""
-MOTION_FORMATS = ("trc", "mot", "c3d")
+_SHIPPED = {"hoap3": hoap3}
+"""Robots whose bodies are built from our own tables."""
+MOTION_FORMATS = ("trc", "mot", "c3d", "opensim")
+"""Formats that need a recording beside the body."""
 
 
 def legal_formats() -> tuple[str, ...]:
@@ -50,16 +51,18 @@ def export(
     Parameters
     ----------
     source : Session, SessionResult, str or pathlib.Path
-        A visit, its folder, or the results folder (or its body.json) of ``biodance identify``.
+        A visit, its folder, or the results folder (or its body.json) of ``biodance identify`` or ``report``, from which
+        nothing is computed again; or ``"hoap3"``, the robot from our own tables.
     out : str or pathlib.Path
         The file to write; it must not exist.
     format : str
         ``osim``, ``urdf``, ``mjcf``, ``biomod``, ``csv``: the body with the identified parameters, where there are
         trials to identify from, else with the table's. ``trc``: the prepared markers of a trial, ``mot``: its joint
         coordinates, of the model that ``osim`` writes; ``c3d``: a copy of its recording with angles, moments, wrenches,
-        centre of mass and events.
+        centre of mass and events. ``opensim``: a folder with all that OpenSim needs to run its inverse dynamics.
     trial : str, optional
-        Name of the trial for ``trc`` and ``mot``; by default the only one that moves.
+        Name of the trial for ``trc``, ``mot`` and ``c3d``, by default the only one that moves; for ``opensim`` by
+        default all.
     subject : str, optional
         The person where files hold several.
     meshes : pathlib.Path, optional
@@ -92,27 +95,49 @@ def export(
     if format not in legal_formats():
         raise UnknownName.of("format", format, legal_formats())
     out = Path(out)
+    if isinstance(source, str | Path) and str(source) in _SHIPPED and not Path(str(source)).exists():
+        return _robot(str(source), out, format, meshes)
     if isinstance(source, SessionResult):
         return _of_result(source, out, format, trial, meshes, subject=subject)
     session = source if isinstance(source, Session) else None
     if session is None:
         folder = Path(source) if isinstance(source, str | Path) else Path()
-        kept = folder if folder.is_file() else folder / BODY
-        if kept.is_file():
-            if format in MOTION_FORMATS:
-                raise SessionRefused(
-                    f"{folder}: holds a body and no trial. Give the session folder to export {format}."
-                )
-            body, words = read_body(kept)
-            return _model(body, out, format, words, meshes), words
+        if kept_body(folder).is_file():
+            return _of_kept(folder, out, format, trial, meshes, subject=subject)
         session = read_session(folder, subject_name=subject, markers=markers, tell=tell)
     if format == "trc":
         return _markers(_chosen(session, trial), out)
     if format == "mot":
         one = _chosen(session, trial)
         session = replace(session, trials=tuple(t for t in session.trials if t.role == "static" or t is one))
-        return _motion(examine(session, tell=tell), one.name, out)
+        trial = one.name
     return _of_result(examine(session, tell=tell), out, format, trial, meshes, subject=subject)
+
+
+def _of_kept(
+    folder: Path, out: Path, format: str, trial: str | None, meshes: Path | None, *, subject: str | None
+) -> tuple[Path, str]:
+    """Write what a results folder keeps; nothing is tracked or identified again."""
+    if format not in MOTION_FORMATS:
+        body, words = read_body(kept_body(folder))
+        return _model(body, out, format, words, meshes), words
+    if folder.is_file():
+        raise SessionRefused(f"{folder}: holds a body and no trial. Give the session folder to export {format}.")
+    kept = read_kept(folder)
+    names = tuple(kept.motions)
+    if trial is not None and trial not in names:
+        raise UnknownName.of(f"trial in {folder}", trial, names)
+    chosen = names if trial is None else (trial,)
+    if format != "opensim" and len(chosen) != 1:
+        raise TrialRefused(f"{folder}: holds the trials {', '.join(names)}. Choose one with --trial.")
+    if format == "mot":
+        return _coordinates(kept.body, kept.motions[chosen[0]], chosen[0], out)
+    found = kept_trials(kept, chosen, subject=subject)
+    if format == "trc":
+        return _prepared_markers(found[0].trial, out)
+    if format == "c3d":
+        return results_into_c3d(found[0], kept.body, out, source=kept.source, subject=subject)
+    return _opensim(found, kept.body, out, kept.source, meshes)
 
 
 def _of_result(
@@ -122,8 +147,13 @@ def _of_result(
     if format == "trc":
         return _markers(_chosen(result.session, trial), out)
     if format == "mot":
-        return _motion(result, _chosen(result.session, trial).name, out)
+        one = result[_chosen(result.session, trial).name]
+        if result.body is None or one.motion is None:
+            raise TrialRefused(f"Trial {one.name}: it gives no motion. {one.reason or result.body_source}")
+        return _coordinates(result.body, one.motion, one.name, out)
     body, words = body_of_result(result)
+    if format == "opensim":
+        return _opensim(result.trials if trial is None else (result[trial],), body, out, words, meshes)
     if format == "c3d":
         name = _chosen(result.session, trial).name
         one = next(found for found in result.trials if found.trial.name == name)
@@ -131,10 +161,29 @@ def _of_result(
     return _model(body, out, format, words, meshes), words
 
 
+def _opensim(
+    chosen: tuple[TrialResult, ...], body: Body, out: Path, source: str, meshes: Path | None
+) -> tuple[Path, str]:
+    """Write the folder for OpenSim, of some trials."""
+    solids = None if meshes is None else segment_solids(body, meshes)
+    written = write_opensim_folder(chosen, body, out, source=source, solids=solids)
+    ready = [one.trial for one in written if one.dynamics]
+    told = f"Inverse dynamics is set up for {', '.join(ready)}." if ready else "No plate measures all in any trial."
+    return out, f"Model, markers, motions and forces of {', '.join(one.trial for one in written)}. {told} {source}"
+
+
 def _model(body: Body, out: Path, format: str, source: str, meshes: Path | None) -> Path:
     """Write the body in a model format, with the solids of ``meshes`` where there are some."""
     solids = None if meshes is None else segment_solids(body, meshes)
     return write_model(body, out, format=format, source=source, solids=solids)
+
+
+def _robot(name: str, out: Path, format: str, meshes: Path | None) -> tuple[Path, str]:
+    if format in MOTION_FORMATS:
+        raise SessionRefused(f"{name}: is a robot and no trial. Give a session folder to export {format}.")
+    body = _SHIPPED[name]()
+    words = " ".join(body.notes)
+    return _model(body, out, format, words, meshes), words
 
 
 def body_of_result(result: SessionResult) -> tuple[Body, str]:
@@ -187,31 +236,15 @@ def _chosen(session: Session, name: str | None) -> Trial:
 
 
 def _markers(trial: Trial, out: Path) -> tuple[Path, str]:
-    markers = prepare_trial(trial).trial.markers
-    if markers is None:
+    return _prepared_markers(prepare_trial(trial).trial, out)
+
+
+def _prepared_markers(trial: Trial, out: Path) -> tuple[Path, str]:
+    if trial.markers is None:
         raise TrialRefused(f"Trial {trial.name}: it has no markers to write.")
-    return write_trc(out, markers), f"Markers of trial {trial.name}, gaps filled where they were short; mm, y up."
+    return write_trc(out, trial.markers), f"Markers of trial {trial.name}, gaps filled where they were short; mm, y up."
 
 
-def _motion(result: SessionResult, name: str, out: Path) -> tuple[Path, str]:
-    one = result[name]
-    if result.body is None or one.motion is None:
-        raise TrialRefused(f"Trial {name}: it gives no motion. {one.reason or result.body_source}")
-    table = opensim_coordinates(result.body, one.motion)
-    return write_mot(
-        out, table
-    ), f"Joint coordinates of trial {name}, rad and m, y up; the model is exported with --format osim."
-
-
-def opensim_coordinates(body: Body, motion: Motion) -> TimeTable:
-    """Return the coordinates of ``motion`` (T frames) by name: rad and m, root in OpenSim's ground (y up), joints as
-    in ``body``.
-    """
-    names = [joint.name for joint in body.joints]
-    angles = motion.q[:, body.nq - len(names) :]
-    if not body.n_root:
-        return TimeTable(body.name, tuple(names), motion.time, angles)
-    turned = UPRIGHT.T @ Rotation.from_quat(motion.q[:, 3:7]).as_matrix()
-    turns = np.unwrap(Rotation.from_matrix(turned).as_euler("ZXY"), axis=0)
-    root = [f"{body.segments[0]}_{word}" for word in (*ROOT_ROTATIONS, *ROOT_TRANSLATIONS)]
-    return TimeTable(body.name, (*root, *names), motion.time, np.hstack([turns, motion.q[:, :3] @ UPRIGHT, angles]))
+def _coordinates(body: Body, motion: Motion, name: str, out: Path) -> tuple[Path, str]:
+    written = write_mot(out, opensim_coordinates(body, motion))
+    return written, f"Joint coordinates of trial {name}, rad and m, y up; the model is exported with --format osim."

@@ -147,6 +147,7 @@ def simulate(
     effects: Iterable[str] = (),
     dance: "Dance | str | Path | None" = None,
     performer: str = "normal",
+    lab_seed: int | None = None,
 ) -> Path:
     """Write a simulated visit as a laboratory would have: C3D files and session.toml, the truth apart in
     ``truth/truth.json``.
@@ -170,6 +171,9 @@ def simulate(
         How well it is copied: "steady" 2 degrees off in every joint (root mean square), "normal" 5, "restless" 7; the
         tempo wanders by 5, 10, 20 %, about a duration 1.1, 1.2, 1.2 times the planned one; sway 0.7, 1 and 1.5 times
         the usual.
+    lab_seed : int, optional
+        Number of a laboratory of the family (`virtual_lab.recording.family`): other plates, cameras, soft tissue,
+        tolerances. None = the usual one.
 
     Returns
     -------
@@ -193,15 +197,21 @@ def simulate(
     """
     from biodance.virtual_lab.faults.causes import hide, parse_cause
     from biodance.virtual_lab.movement.protocol import read_protocol
+    from biodance.virtual_lab.recording.family import draw_laboratory
+    from biodance.virtual_lab.recording.laboratory import FIRST_VISIT, LabVisit
     from biodance.virtual_lab.simulate import simulate_session as write_session
 
     hidden = tuple(parse_cause(text) for text in effects)
     if (protocol is None) == (dance is None):
         raise BiodanceError("Simulating needs either a protocol or a dance. Give one of the two.")
     if dance is not None or protocol is None:
+        if lab_seed is not None:
+            raise BiodanceError("A laboratory of the family is for protocols. Give --protocol with --lab-seed.")
         return _danced(subject, dance, Path(out), seed=seed, performer=performer, hidden=hidden)
-    plan = read_protocol(protocol)
-    visit, loads = hide(hidden, subject, plan, seed=seed)
+    plan, visit = read_protocol(protocol), FIRST_VISIT
+    if lab_seed is not None:
+        visit = LabVisit(laboratory=draw_laboratory(lab_seed))
+    visit, loads = hide(hidden, subject, plan, seed=seed, visit=visit)
     return write_session(subject, plan, Path(out), seed=seed, loads=loads, visit=visit)
 
 

@@ -124,8 +124,8 @@ def learn_laboratory(archive: str | Path, *, tell: _Tell = lambda _: None) -> Le
     if len(sessions) < FEWEST:
         held = f"{len(sessions)} session{'s' * (len(sessions) != 1)}"
         raise SessionRefused(f"{folder}: holds {held}, at least {FEWEST} are needed to learn from.")
-    for path in sessions:
-        tell(f"examining {path.name}")
+    for k, path in enumerate(sessions, 1):
+        tell(f"examining {path.name}, {k} of {len(sessions)}")
         try:
             found.append(learned_session(examine(read_session(path))))
         except Exception as why:

@@ -6,26 +6,19 @@ cut into steps that different frames do, so that no frame waits for all of it.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from biodance import display
 from biodance.body.body import Body
-from biodance.diagnosis.watch import (
-    LiveWarning,
-    MarkerWatch,
-    WrenchWatch,
-    loaded_while_empty,
-    said_of_jump,
-    said_of_markers,
-    silent_plates,
-)
+from biodance.diagnosis.watch import LiveWarning
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import Knowability
 from biodance.identification.running import RunningBelief, belief_before
 from biodance.identification.statistics import Fit, believable
-from biodance.identification.streaming import Stream, begin
+from biodance.identification.streaming import begin, summed_pressure
 from biodance.lab.filters import force_filter, motion_filter
 from biodance.lab.prepare import at_marker_times
 from biodance.motion.contact.contact import Contact, ground_contact
@@ -34,14 +27,14 @@ from biodance.motion.ik.follow import Follower
 from biodance.motion.regressor import regressor
 from biodance.motion.smoothing import smooth
 from biodance.motion.upright import upright_trunk
-from biodance.records import Array, Markers, Motion, Plate, Trial, Wrench
-from biodance.spatial import wrench_about_point
+from biodance.pipeline.live_watch import StreamWatch
+from biodance.records import Array, Markers, Motion, Trial, Wrench
 from biodance.uncertainty.caution import widened
 
 _WINDOW, _DELAY, _HOP = 1.0, 0.3, 0.1
 """s: what the filter sees, how long it waits for what follows, how often."""
-_SILENT = 0.2
-"""s without any change of a raw channel: no amplifier is so quiet."""
+_RECENT = 0.25
+"""s of markers that are judged at once."""
 _SLOW = 10.0
 """Samples of the running belief count as if only so many-th of them were independent: errors last about a second."""
 
@@ -60,8 +53,22 @@ class LiveState:
 
 @dataclass(frozen=True, eq=False)
 class LiveResult:
-    """The end of a stream: ``fit`` all frames as they were used; ``identification`` from them, None with ``cause`` why;
-    ``warnings`` in time; ``frame_s`` (T,) s of processor time that each frame took, ``wall_s`` (T,) s by the clock.
+    """The end of a stream.
+
+    Parameters
+    ----------
+    fit : Fit or None
+        All frames as they were used; None where none came so far.
+    identification : Identification or None
+        From these frames; None with ``cause`` why.
+    cause : str
+        Why nothing was identified; empty otherwise.
+    warnings : tuple of LiveWarning
+        What was noticed on the way, in time.
+    frame_s, wall_s : array_like
+        (T,) s that each frame took: of processor time, and by the clock.
+    state : LiveState
+        What is known, suspect and to be done at the end.
     """
 
     fit: Fit | None
@@ -72,12 +79,13 @@ class LiveResult:
     wall_s: Array
     state: LiveState
 
+    def __repr__(self) -> str:
+        used = int(self.fit.use.sum()) if self.fit else 0
+        return f"LiveResult({used} of {self.frame_s.size} frames used, {len(self.warnings)} warnings)"
 
-@dataclass
-class _Emitted:
-    motions: list[Motion] = field(default_factory=list)
-    wrenches: list[Wrench] = field(default_factory=list)
-    uses: list[NDArray[np.bool_]] = field(default_factory=list)
+    def _repr_html_(self) -> str:
+        found = self.identification
+        return display.card(repr(self), found.table() if found else None, [one.text for one in self.warnings])
 
 
 class LiveSession:
@@ -99,16 +107,24 @@ class LiveSession:
         self._distance: list[Array] = []
         self._determined: list[bool] = []
         self._work: Iterator[None] | None = None
-        self._done, self._out = 0, _Emitted()
-        self.stream: Stream = begin(body, rate=rate, verdicts=False)
+        self._done = 0
+        self._taken: list[Fit] = []
+        self._pressure = np.zeros(4)
         self.belief: RunningBelief = belief_before(widened(body.sip))
         self._weight = -float(body.gravity[2] * body.sip.mass.sum())
-        self._marker_watch = MarkerWatch(np.zeros(len(self._follower.names)))
-        self._wrench_watch = WrenchWatch(self._weight)
-        self._sound = self._follower.q
-        self._point: Array | None = None
-        self._suspect: dict[str, LiveWarning] = {}
-        self.warnings: list[LiveWarning] = []
+        self._watch = StreamWatch(trial, self._follower, weight=self._weight)
+
+    @property
+    def warnings(self) -> tuple[LiveWarning, ...]:
+        """All that was noticed, in time."""
+        return tuple(self._watch.warnings)
+
+    @property
+    def _standing_point(self) -> Array:
+        """(3,) m, mean centre of pressure of the loaded frames so far; before them the middle of all plates."""
+        if self._pressure[3]:
+            return np.asarray(self._pressure[:3] / self._pressure[3])
+        return np.asarray(np.mean([plate.centre for plate in self.trial.plates], axis=0))
 
     @property
     def _now(self) -> float:
@@ -123,7 +139,8 @@ class LiveSession:
         self._distance.append(distance)
         self._determined.append(determined)
         if (frame + 1) % self._hop == 0:
-            self._watch_markers(frame)
+            recent = np.array(self._distance[-max(3, round(_RECENT * self.markers.rate)) :])
+            self._watch.look_at_markers(self._now, self._xyz[frame], recent)
         if self._work is None and frame + 1 >= self._window and (frame + 1 - self._window) % self._hop == 0:
             self._work = self._take(frame + 1, frame + 1 - self._delay)
         if self._work is not None:
@@ -133,7 +150,7 @@ class LiveSession:
     def state(self) -> LiveState:
         """Return what is known, suspect and to be done now."""
         verdicts = dict(self.belief.verdicts())
-        return LiveState(self._now, verdicts, tuple(w.text for w in self._suspect.values()), self._advice(verdicts))
+        return LiveState(self._now, verdicts, self._watch.suspect, self._advice(verdicts))
 
     def finish(self, frame_s: Array, wall_s: Array) -> LiveResult:
         """Take in what the filter still held back, and return all that was found."""
@@ -145,25 +162,12 @@ class LiveSession:
                 pass
         fit = self._fit()
         if fit is not None and fit.use.any():
-            found = self.stream.identification((fit,))
+            stream = begin(self.body, rate=self.markers.rate, verdicts=False).feed(fit.motion, fit.wrench, fit.use)
+            found = stream.identification((fit,))
             cause = found.cause
         else:
             cause = "No frame had all its ground contact measured by the plates: nothing can be identified."
-        return LiveResult(fit, found, cause, tuple(self.warnings), frame_s, wall_s, self.state())
-
-    def _watch_markers(self, frame: int) -> None:
-        """Look at the markers of the last quarter of a second."""
-        off = self._marker_watch.look(np.array(self._distance[-max(3, round(0.25 * self.markers.rate)) :]))
-        if not off.any():
-            self._sound = self._follower.q
-            self._suspect.pop("markers", None)
-            return
-        if "markers" in self._suspect or np.isnan(self._sound).any():
-            return
-        now = np.nan_to_num(self._distance[-1])
-        worst = [self._follower.names[i] for i in np.argsort(-now)[:5] if now[i] > 0]
-        pair = self._follower.exchange(self._xyz[frame], worst, self._sound)
-        self._warn("markers", said_of_markers(self._now, worst, pair))
+        return LiveResult(fit, found, cause, self.warnings, frame_s, wall_s, self.state())
 
     def _take(self, stop: int, until: int) -> Iterator[None]:
         """Do the work of the window that ends before frame ``stop`` for the frames not yet done before ``until``."""
@@ -176,9 +180,9 @@ class LiveSession:
         low_pass = force_filter(self.trial.settings)
         filtered = replace(raw, plates=tuple(at_marker_times(plate, raw.markers, low_pass) for plate in raw.plates))
         yield
-        contact = ground_contact(
-            filtered, soles_from_body(self.body, motion), mass=self._weight / -self.body.gravity[2]
-        )
+        soles = soles_from_body(self.body, motion)
+        yield
+        contact = ground_contact(filtered, soles, mass=self._weight / -self.body.gravity[2])
         yield
         new = slice(self._done - start, until - start)
         self._done = until
@@ -213,105 +217,53 @@ class LiveSession:
         wrench = Wrench(part.time, filtered.wrench.value[new])
         W = regressor(self.body, part)
         measured = contact.measured[new] & np.array(self._determined[cut]) & np.isfinite(wrench.value).all(axis=1)
-        self._watch_plates(raw, filtered, contact, W, wrench)
+        missing = float((W[-1] @ self.belief.mean)[2] - np.nan_to_num(wrench.value[-1])[2])
+        whole = len(contact.time) >= self._window
+        self._watch.look_at_plates(self._now, raw, filtered.plates, contact.on_plate, missing, whole=whole)
         yield
         use = self._believed(part, wrench, measured)
         if use.any():
-            self._watch_wrench(W[use], wrench.value[use])
+            point, seen = self._standing_point, (W[use], wrench.value[use])
+            self._watch.look_at_wrench(self._now, *seen, self.belief, point=point, step=self._hop)
         yield
-        if self._suspect:
-            use = np.zeros_like(use)
-        if use.any():
-            last = int(np.flatnonzero(use)[-1])
-            variance = _SLOW * self._wrench_watch.noise(self.belief)
-            self.belief = self.belief.updated(W[last], wrench.value[last], variance)
-        self.stream = self.stream.feed(part, wrench, use)
-        self._out.motions.append(part)
-        self._out.wrenches.append(wrench)
-        self._out.uses.append(use)
+        self._learn(Fit("stream", part, wrench, use & (not self._watch.suspect), self.trial.settings.outlier), W)
+
+    def _learn(self, fit: Fit, W: Array) -> None:
+        """Let the used frames of a window tell of the body; ``W`` (T, 6, p) is their regressor."""
+        if fit.use.any():
+            last = int(np.flatnonzero(fit.use)[-1])
+            variance = _SLOW * self._watch.noise(self.belief)
+            self.belief = self.belief.updated(W[last], fit.wrench.value[last], variance)
+        self._pressure = self._pressure + summed_pressure(fit)
+        self._taken.append(fit)
 
     def _believed(self, part: Motion, wrench: Wrench, measured: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return the measured frames without those that table and plates contradict, as the batch leaves them out."""
         if not measured.any():
             return measured
         fit = Fit("stream", part, wrench, measured, self.trial.settings.outlier)
-        return believable(self.body, fit, self.stream.standing_point)[0].use
-
-    def _watch_plates(self, raw: Trial, filtered: Trial, contact: Contact, W: Array, wrench: Wrench) -> None:
-        """Look for a plate that fell silent, and for one that reads a load with nobody on it."""
-        now, on = self._now, contact.on_plate
-        missing = float((W[-1] @ self.belief.mean)[2] - np.nan_to_num(wrench.value[-1])[2])
-        silent = {
-            f"silent {said.target}": said
-            for said in silent_plates(now, self._last(raw), on[-1].any(axis=0), missing, self._weight)
-        }
-        empty = {
-            f"empty {plate.name}": said
-            for index, plate in enumerate(filtered.plates)
-            if len(on) >= self._window
-            and not on[:, :, index].any()
-            and (said := loaded_while_empty(now, plate, plate.wrench.value))
-        }
-        for key in [key for key in self._suspect if key.startswith(("silent", "empty"))]:
-            if key not in silent | empty:
-                del self._suspect[key]
-        for key, said in (silent | empty).items():
-            self._warn(key, said)
-
-    def _last(self, raw: Trial) -> list[Plate]:
-        """Return the plates over the last `_SILENT` s of a window, as they came."""
-        cut = []
-        for plate in raw.plates:
-            count = max(3, round(_SILENT * plate.wrench.rate))
-            cut.append(replace(plate, wrench=Wrench(plate.wrench.time[-count:], plate.wrench.value[-count:])))
-        return cut
-
-    def _watch_wrench(self, W: Array, wrench: Array) -> None:
-        """Look for a jump of measured against expected wrench, about the first standing point."""
-        if any(key != "wrench" for key in self._suspect):
-            return
-        if self._point is None:
-            self._point = self.stream.standing_point if self.stream.pressure[3] else _middle(self.trial)
-        about = self._point
-        turned = np.swapaxes(wrench_about_point(np.swapaxes(W, 1, 2), about), 1, 2)
-        moved, found = wrench_about_point(wrench, about), None
-        for first in range(0, len(W), self._hop):
-            cut = slice(first, first + self._hop)
-            found = self._wrench_watch.look(turned[cut], moved[cut], self.belief)
-        if found is None:
-            self._suspect.pop("wrench", None)
-        elif "wrench" not in self._suspect:
-            self._warn("wrench", said_of_jump(self._now, self.trial.plates, about, *found))
-
-    def _warn(self, key: str, said: LiveWarning) -> None:
-        known = {(w.effect, w.target) for w in self.warnings}
-        self._suspect[key] = said
-        if (said.effect, said.target) not in known:
-            self.warnings.append(said)
+        about = self._standing_point if self._pressure[3] else np.zeros(3)
+        return believable(self.body, fit, about)[0].use
 
     def _advice(self, verdicts: Mapping[str, Knowability]) -> str:
-        if self._suspect:
+        if self._watch.suspect:
             return "Mend what is suspect first: frames do not count until then."
         rows = np.diag(self.belief.covariance)[::10] / np.maximum(np.diag(self.belief.prior.covariance)[::10], 1e-12)
         names = self.belief.prior.segments
-        open_ = [i for i in np.argsort(-rows) if verdicts[names[i]] != "known"]
+        standing = {names[foot.segment] for foot in self.body.feet.values()}
+        open_ = [i for i in np.argsort(-rows) if verdicts[names[i]] != "known" and names[i] not in standing]
         if not open_:
-            return "All masses are known well enough: the session can end."
+            return "All masses but those of the feet are known well enough: the session can end."
         return f"Move the {names[open_[0]].replace('_', ' ')} further and faster, both feet on the plates."
 
     def _fit(self) -> Fit | None:
         """Return all frames that were taken in as one trial."""
-        if not self._out.motions:
+        if not self._taken:
             return None
-        parts = self._out.motions
+        parts = [fit.motion for fit in self._taken]
         time, q, v, a, residual = (
             np.concatenate([getattr(part, name) for part in parts]) for name in ("time", "q", "v", "a", "residual")
         )
         motion = Motion(time, q, v, a, residual, self._follower.names, joint_names=parts[0].joint_names)
-        wrench = Wrench(time, np.concatenate([one.value for one in self._out.wrenches]))
-        return Fit("stream", motion, wrench, np.concatenate(self._out.uses), self.trial.settings.outlier)
-
-
-def _middle(trial: Trial) -> Array:
-    """Return the middle (3,) m of all plates."""
-    return np.asarray(np.mean([plate.centre for plate in trial.plates], axis=0))
+        wrench = Wrench(time, np.concatenate([fit.wrench.value for fit in self._taken]))
+        return Fit("stream", motion, wrench, np.concatenate([fit.use for fit in self._taken]), self._taken[0].outlier)

@@ -38,6 +38,10 @@ MORE = 1.6
 """So many times as large it must be before soft tissue is believed to be larger than theirs (five real walks: 2.4 to
 4.8 times).
 """
+_TOO_FAR = 4.0
+"""So many times as far from the body, markers are no longer those of the segments that they are named after: nothing is
+named. (Soft tissue made 2 to 3 times as large in an independent laboratory: 1.6 to 2.6.)
+"""
 _SOFT = (
     "flesh ",
     "sag ",
@@ -47,6 +51,7 @@ _SOFT = (
     "joint_centre ",
     "segment_length ",
     "marker_misplaced ",
+    "wobbling_mass ",
     "shown ",
 )
 """Keys of the tolerances that grow with it."""
@@ -144,14 +149,12 @@ def own_tolerances(
         found = with_own_noise(found, added, float(body.sip.mass.sum()))
     factor = soft_tissue(chosen) / found.instruments.distance
     if factor > MORE:
-        sizes = {key: size * (factor if key.startswith(_SOFT) else 1.0) for key, size in found.sizes.items()}
-        found = replace(found, sizes=sizes)
+        found = widened_by(found, factor)
         notes.append(
             f"Markers are farther from the body than where tolerances were learned ({factor:.1f} times in the first "
-            f"quartile): soft "
-            "tissue and joints may err as much more, and no cause is named from such movement. Tolerances learned on "
-            "sessions of your own "
-            "laboratory without fault (biodance learn) hold for it."
+            f"quartile): soft tissue and joints, and what they leave in the forces, were taken for so many times as "
+            f"large, and a fault must be larger to be seen. Tolerances learned on sessions of your own laboratory "
+            f"without fault (biodance learn) hold for it."
         )
     standing = tuple(look for look in chosen if look.trial.role == "static" and seconds_of(look) > 0)
     if standing:
@@ -164,7 +167,17 @@ def own_tolerances(
             f"{SWAYING:g} Hz (heart, breath, muscles; root mean square), which no marker shows: a fault must be "
             f"larger to be seen."
         )
-    return Own(found, tuple(notes), believed=factor <= MORE)
+    return Own(found, tuple(notes), believed=factor <= _TOO_FAR)
+
+
+def widened_by(known: Tolerances, factor: float) -> Tolerances:
+    """Return tolerances for soft tissue and joints ``factor`` times as large: their sizes, and what they leave in the
+    wrench beyond them; the mean force is weight, whatever the skin does.
+    """
+    sizes = {key: size * (factor if key.startswith(_SOFT) else 1.0) for key, size in known.sizes.items()}
+    more = np.full((len(known.noise), 6), factor)
+    more[0, :3] = 1.0
+    return replace(known, sizes=sizes, noise=known.noise * more[:, :, None] * more[:, None, :])
 
 
 def soft_tissue(chosen: tuple[Look, ...]) -> float:

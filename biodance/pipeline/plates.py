@@ -112,8 +112,8 @@ def judge_plates(archive: str | Path, *, tell: _Tell = lambda _: None) -> Plates
     sessions, indices = archive_folders(folder)
     refused: dict[str, str] = {}
     observations: list[PlateEvidence] = []
-    for path in sessions:
-        tell(f"reading {path.name}")
+    for k, path in enumerate(sessions, 1):
+        tell(f"reading {path.name}, {k} of {len(sessions)}")
         observations += _of_session(path, folder, refused)
     for path in indices:
         tell(f"reading what {path.name} names")

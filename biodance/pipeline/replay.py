@@ -1,130 +1,153 @@
-"""What a replay of a session shows, frame by frame: body, markers, plates, measured and simulated force, what is
-left.
-"""
+"""A file as a stream: which body moves in it, and every frame in turn."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import time as clock
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.solids import shape_parts
-from biodance.identification.validation import TrialValidation
-from biodance.motion.kinematics import poses
-from biodance.pipeline.results import SessionResult
-from biodance.pipeline.standing import centre_of_mass
-from biodance.pipeline.trial_result import TrialResult
-from biodance.records import SIDES, Array, Motion
-from biodance.spatial import zero_moment_point
+from biodance.diagnosis.watch import LiveWarning
+from biodance.errors import SessionRefused, TrialRefused
+from biodance.lab.markers.sets import canonical, read_marker_set
+from biodance.lab.read import read_trial
+from biodance.lab.session.read import read_session
+from biodance.pipeline.body import body_of
+from biodance.pipeline.live import LiveResult, LiveSession, LiveState
+from biodance.pipeline.trial import prepare_trial
+from biodance.pipeline.trial_result import Step
+from biodance.records import Subject, Trial
+from biodance.threads import one_thread
 
-_FASTEST, _FRAMES = 25.0, 3000
-"""Hz of a replay at most, and its frames in all trials together: a page stays small however long the session."""
 
+@one_thread()
+def body_and_stream(
+    file: Path,
+    *,
+    static: Path | None = None,
+    subject: str | None = None,
+    markers: str | None = None,
+    settings: Mapping[str, object] | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+) -> tuple[Body, Trial]:
+    """Return the body that moves in a recording, scaled on its ``static`` (by default that of its folder), and the
+    recording with the markers of its set alone.
 
-@dataclass(frozen=True, eq=False)
-class TrialReplay:
-    """One trial at the frames (F) shown, m and N in the lab frame, NaN = not known.
-
-    ``time`` (F,) s; ``positions`` (F, N, 3) and ``rotations`` (F, N, 4), quaternions x y z w, of the segments;
-    ``markers`` (F, K, 3); ``com`` (F, 3); ``measured`` and ``simulated`` (F, 2, 3) force and centre of pressure, with
-    ``parameters`` "identified" or "table"; ``residual`` (F, 3) N measured less simulated, of fully measured frames;
-    ``plates`` (P, 4, 3) corners; ``worst`` s at which the residual is largest (NaN: nowhere measured).
+    Raises
+    ------
+    SessionRefused
+        The recording is not there or was not read, or no static trial scales the body; the message says why.
     """
+    if not file.is_file():
+        raise SessionRefused(f"{file}: there is no such file. Give one recording of a session's folder.")
+    session = read_session(file.parent, subject_name=subject, markers=markers, settings=settings, tell=tell)
+    trial = next((one for one in session.trials if one.source.path.resolve() == file.resolve()), None)
+    if trial is None:
+        why = session.refused.get(file.name, "session.toml says skip, or it is no recording.")
+        raise SessionRefused(f"{file}: cannot be streamed. {why}")
+    worn = read_marker_set(markers or trial.marker_set) if markers or trial.marker_set else None
+    statics = session.of_role("static")
+    if static is not None:
+        statics = (
+            replace(read_trial(static, role="static", subject=subject, markers=worn), settings=session.settings),
+        )
+    if worn is None or trial.markers is None:
+        raise SessionRefused(f"{file}: has no markers of a known set, so no body can follow it. Say --markers.")
+    return _scaled(session.subject, statics, file), replace(trial, markers=canonical(trial.markers, worn))
 
-    name: str
-    time: Array
-    positions: Array
-    rotations: Array
-    markers: Array
-    com: Array
-    measured: Array
-    simulated: Array
-    parameters: str
-    residual: Array
-    plates: Array
-    worst: float
+
+def _scaled(subject: Subject, statics: tuple[Trial, ...], file: Path) -> Body:
+    """Return the body scaled on a static trial, or refuse: a stream has no later to look at for a better body."""
+    if not statics:
+        raise SessionRefused(
+            f"{file}: its folder has no static trial, so nobody knows who moves. Give one with --static FILE."
+        )
+    steps: list[Step] = []
+    body, _ = body_of(subject, tuple(map(prepare_trial, statics)), statics[0].settings, steps)
+    if body is None or not any(step.name == "scale" and step.status == "done" for step in steps):
+        why = " ".join(step.text for step in steps if step.status != "done" and step.name in ("subject", "scale"))
+        raise SessionRefused(f"{file}: no body can be scaled for it. {why}")
+    return body
 
 
-@dataclass(frozen=True, eq=False)
-class SessionReplay:
-    """The ``trials`` that can be replayed; ``boxes`` (B, 2, 3) m that the body is drawn as, each on the segment
-    ``on`` (B) with its ``sides``; a load that was found: its segment's index and place (3,) m there, else None.
+def stream_recording(
+    file: Path | str,
+    *,
+    static: Path | str | None = None,
+    subject: str | None = None,
+    markers: str | None = None,
+    tell: Callable[[LiveState], None] = lambda _: None,
+) -> LiveResult:
+    """Take a recording in frame by frame, as a laboratory would send it: track, watch for faults, identify.
+
+    Parameters
+    ----------
+    file : path
+        A recording with markers and force plates.
+    static : path, optional
+        The static trial; by default that of the folder in which the file lies.
+    subject : str, optional
+        The person, where C3D files hold several.
+    markers : str, optional
+        Marker set, where the file does not tell.
+    tell : callable, optional
+        Called with the `LiveState` after every second of the recording.
+
+    Returns
+    -------
+    LiveResult
+        What the stream told, and how long every frame took.
+
+    Raises
+    ------
+    SessionRefused
+        The recording is not there or was not read, or no static trial scales the body.
+    TrialRefused
+        The recording has no plates, or its first frame does not show the posture.
+
+    Examples
+    --------
+    >>> streamed = biodance.stream_recording("visit/squat_1.c3d")
+    >>> streamed.warnings
+    ()
     """
-
-    trials: tuple[TrialReplay, ...]
-    boxes: Array
-    on: tuple[int, ...]
-    sides: tuple[str, ...]
-    load: tuple[int, Array] | None = None
+    body, trial = body_and_stream(Path(file), static=Path(static) if static else None, subject=subject, markers=markers)
+    return replay(body, trial, tell=tell)
 
 
-def replay_of(result: SessionResult) -> SessionReplay | None:
-    """Return the replay of a session; None where no trial has a motion."""
-    body, found = result.body, result.identification
-    moving = [one for one in result.trials if one.motion is not None and one.trial.markers is not None]
-    if body is None or not moving:
-        return None
-    validated = {one.name: one for one in (*found.validations, *found.fitted)} if found else {}
-    frames = sum(one.motion.time.size / one.motion.rate for one in moving if one.motion)
-    rate = min(_FASTEST, _FRAMES / max(frames, 1e-9))
-    parts = shape_parts(body)
-    best = found.search.best if found and found.search.found else None
-    placed = best is not None and bool(np.isfinite(best.place).all())
-    return SessionReplay(
-        tuple(_trial(body, one, rate, validated) for one in moving),
-        np.reshape([box for _, box in parts], (-1, 2, 3)),
-        tuple(segment for segment, _ in parts),
-        tuple(next((side for side in SIDES if body.segments[k].startswith(side)), "middle") for k, _ in parts),
-        (body.segment_index(best.segment), best.place) if best is not None and placed else None,
-    )
+@one_thread()
+def replay(
+    body: Body,
+    trial: Trial,
+    *,
+    real_time: bool = False,
+    tell: Callable[[LiveState], None] = lambda _: None,
+    warn: Callable[[LiveWarning], None] = lambda _: None,
+) -> LiveResult:
+    """Return what a stream of the frames of ``trial`` (of which only its own set's markers are kept) tells of ``body``.
 
+    ``real_time`` waits for the rate of the recording; ``tell`` is called once a second of the recording, ``warn`` as
+    soon as something is noticed.
 
-def _trial(body: Body, one: TrialResult, rate: float, validated: Mapping[str, TrialValidation]) -> TrialReplay:
-    from scipy.spatial.transform import Rotation
-
-    trial, motion = one.trial, one.motion
-    assert motion is not None
-    assert trial.markers is not None
-    height = float(np.mean([p.height for p in trial.plates])) if trial.plates else 0.0
-    simulated, parameters, residual = _simulated(one, validated.get(one.name), height)
-    size = np.linalg.norm(residual, axis=1)
-    worst, step = int(np.nanargmax(size)) if np.isfinite(size).any() else None, max(1, round(motion.rate / rate))
-    chosen = np.arange((worst or 0) % step, motion.time.size, step)
-    shown = Motion(motion.time[chosen], motion.q[chosen], motion.v[chosen], motion.a[chosen])
-    pose = poses(body, shown.q)
-    measured = np.full((motion.time.size, 2, 3), np.nan)
-    if trial.plates:
-        measured = np.stack([trial.wrench.force, trial.wrench.cop(height=height)], axis=1)
-    turn = Rotation.from_matrix(pose.rotation.reshape(-1, 3, 3)).as_quat().reshape(*pose.rotation.shape[:2], 4)
-    return TrialReplay(
-        one.name,
-        shown.time,
-        pose.position,
-        turn,
-        trial.markers.xyz[chosen],
-        centre_of_mass(body, shown),
-        measured[chosen],
-        simulated[chosen],
-        parameters,
-        residual[chosen],
-        np.reshape([plate.corners for plate in trial.plates], (-1, 4, 3)),
-        float("nan") if worst is None else float(motion.time[worst]),
-    )
-
-
-def _simulated(one: TrialResult, found: TrialValidation | None, height: float) -> tuple[Array, str, Array]:
-    """Return force and centre of pressure (T, 2, 3) of the simulation, whose parameters it has, and the residual force
-    (T, 3) of the fully measured frames.
+    Raises
+    ------
+    TrialRefused
+        The trial has no plates, or its first frame does not show the posture.
     """
-    assert one.motion is not None
-    if found is not None:
-        wrench, about, use, parameters = found.identified.value, found.about, found.use, "identified"
-        left = found.measured.value - wrench
-    elif one.comparison is not None:
-        wrench, about, use, parameters = one.comparison.simulated, np.zeros(3), one.comparison.used, "table"
-        left = one.comparison.measured - wrench
-    else:
-        nothing = np.full((one.motion.time.size, 2, 3), np.nan)
-        return nothing, "table", nothing[:, 0]
-    cop = zero_moment_point(wrench, height=height - about[2], threshold=20.0) + about
-    return np.stack([wrench[:, :3], cop], axis=1), parameters, np.where(use[:, None], left[:, :3], np.nan)
+    if trial.markers is None or not trial.plates:
+        raise TrialRefused(f"Trial {trial.name}: a stream needs markers and force plates, and one of them is missing.")
+    session, count = LiveSession(body, trial), trial.markers.time.size
+    spent, wall = np.zeros(count), np.zeros(count)
+    started, second = clock.perf_counter(), max(1, round(trial.markers.rate))
+    for frame in range(count):
+        if real_time:
+            clock.sleep(max(0.0, started + frame / trial.markers.rate - clock.perf_counter()))
+        began, mine = clock.perf_counter(), clock.thread_time()
+        found = session.push()
+        spent[frame], wall[frame] = clock.thread_time() - mine, clock.perf_counter() - began
+        for said in found:
+            warn(said)
+        if frame % second == second - 1:
+            tell(session.state())
+    return session.finish(spent, wall)

@@ -14,7 +14,7 @@ import numpy as np
 from biodance import display
 from biodance.body.body import Body
 from biodance.pipeline.identification import SessionIdentification
-from biodance.pipeline.trial_result import Check, QuietStanding, Step, TrialResult
+from biodance.pipeline.trial_result import Check, QuietStanding, ShownJoints, Step, TrialResult
 from biodance.records import Array, Session, Sip, Subject, by_name
 from biodance.settings import Settings
 
@@ -83,6 +83,8 @@ class SessionResult:
         The frame with the largest residual force, and a load that was found.
     prior : Sip or None
         What an earlier session lets expect of the body; None where that is the table.
+    shown_joints : ShownJoints
+        The joints beyond its 23 axes that the body has because its markers show them, and what each brings.
 
     Examples
     --------
@@ -104,6 +106,7 @@ class SessionResult:
     identification: SessionIdentification | None = None
     more_stills: tuple[Still, ...] = ()
     prior: Sip | None = None
+    shown_joints: ShownJoints = field(default_factory=ShownJoints)
 
     def __repr__(self) -> str:
         return (

@@ -5,17 +5,18 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.errors import BiodanceError, TrialRefused
+from biodance.errors import TrialRefused
 from biodance.lab.c3d.parameters import FileValue
 from biodance.lab.c3d.results import Event, Output, write_results_c3d
-from biodance.motion.contact.contact import Contact, foot_wrenches, ground_contact
-from biodance.motion.contact.events import foot_events
+from biodance.motion.contact.contact import Contact, foot_wrenches
 from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.dynamics import joint_torques
+from biodance.motion.kinematics import centre_of_mass
 from biodance.motion.regressor import predict_wrench
-from biodance.pipeline.standing import centre_of_mass
+from biodance.pipeline.movement import contact_of, movement_of
 from biodance.pipeline.trial_result import TrialResult
 from biodance.records import SIDES, Array, Wrench
 from biodance.version import __version__
@@ -31,10 +32,11 @@ def results_into_c3d(
     ``body`` that moved, with the parameters to predict with, and ``source`` in words where they come from; ``subject``
     the person where the file holds several.
 
-    Joint angles (deg) and joint moments (N·m, what the muscles do), positive as the joints of the body; measured and
-    predicted wrench about the lab origin (of the prepared, filtered trial); the centre of mass; foot strikes and offs
-    on the plates; in the group BIODANCE the masses of all segments. Moments and wrenches only where the plates measure
-    all that the ground does.
+    Joint angles (deg), moments (N·m, what the muscles do) and powers (W), positive as the joints of the body; measured
+    and predicted wrench about the lab origin (of the prepared, filtered trial); the centre of mass; foot strikes and
+    offs, of the plates where they saw one, else of the markers; in the group BIODANCE the masses of all segments.
+    Wrenches only where the plates measure all that the ground does, a leg's moments and powers where they measure what
+    it does to its foot.
 
     Raises
     ------
@@ -51,15 +53,16 @@ def results_into_c3d(
             f"Trial {trial}: comes from a file of the format {one.trial.source.format}. Only a C3D file is copied as "
             f"one."
         )
-    outputs, events = [*_angles(body, one)], tuple[Event, ...]()
+    outputs = [*_angles(body, one)]
     outputs.append(Output("BodyCentreOfMass", "MODELED_MARKERS", centre_of_mass(body, one.motion), "x, y, z"))
-    contact = _contact(body, one)
+    contact = contact_of(one.trial, one, body)
+    if one.comparison is not None:
+        outputs += _wrenches(body, one)
     if contact is not None:
-        outputs += [*_wrenches(body, one), *_moments(body, one, contact)]
-        feet = foot_wrenches(one.trial, contact, soles_from_body(body, one.motion))
-        events = tuple(
-            Event(event.time, event.side.title(), _NAMES[event.down]) for event in foot_events(feet, contact)
-        )
+        outputs += _loads(body, one, contact)
+    events = tuple(
+        Event(event.time, event.side.title(), _NAMES[event.down]) for event in movement_of(one, body, None).events
+    )
     said: dict[str, FileValue] = {
         "VERSION": [__version__],
         "SOURCE": [source[:255]],
@@ -68,16 +71,6 @@ def results_into_c3d(
     }
     write_results_c3d(path, one.trial.source.path, outputs=outputs, events=events, parameters=said, subject=subject)
     return path, f"The recording of trial {trial} with {len(outputs)} results and {len(events)} events. {source}"
-
-
-def _contact(body: Body, one: TrialResult) -> Contact | None:
-    """Return the ground contact; None where measured and simulated wrench could not be compared."""
-    if one.comparison is None or one.motion is None:
-        return None
-    try:
-        return ground_contact(one.trial, soles_from_body(body, one.motion), mass=float(body.sip.mass.sum()))
-    except BiodanceError:
-        return None
 
 
 def _groups(body: Body) -> Iterator[tuple[str, list[int], str]]:
@@ -97,9 +90,9 @@ def _groups(body: Body) -> Iterator[tuple[str, list[int], str]]:
         chain = []
 
 
-def _three(values: Array, columns: list[int]) -> Array:
+def _three(values: Array) -> Array:
     """Return (T, 3): up to three columns, the rest zero."""
-    some = values[:, columns[:3]]
+    some = values[:, :3]
     return np.pad(some, ((0, 0), (0, 3 - some.shape[1])))
 
 
@@ -107,17 +100,29 @@ def _angles(body: Body, one: TrialResult) -> Iterator[Output]:
     assert one.motion is not None
     angle = np.where(one.motion.determined[:, None], one.motion.q[:, -len(body.joints) :], np.nan)
     for name, columns, axes in _groups(body):
-        yield Output(f"{name}Angles", "ANGLES", _three(angle, columns), axes, turns=False)
+        yield Output(f"{name}Angles", "ANGLES", _three(angle[:, columns]), axes, turns=False)
 
 
-def _moments(body: Body, one: TrialResult, contact: Contact) -> Iterator[Output]:
+def _loads(body: Body, one: TrialResult, contact: Contact) -> Iterator[Output]:
+    """Yield moments and powers; NaN where nobody knows what the ground does to the leg's foot."""
     assert one.motion is not None
-    assert one.comparison is not None
-    feet = foot_wrenches(one.trial, contact, soles_from_body(body, one.motion))
+    motion = one.motion
+    feet = foot_wrenches(one.trial, contact, soles_from_body(body, motion))
     ground = {f"{side}_foot": wrench for side, wrench in zip(SIDES, feet, strict=True)}
-    torque = np.where(one.comparison.used[:, None], joint_torques(body, one.motion, ground).torque, np.nan)
+    torque, rate = joint_torques(body, motion, ground).torque, motion.v[:, body.n_root :]
     for name, columns, axes in _groups(body):
-        yield Output(f"{name}Moments", "MOMENTS", _three(torque, columns), f"{axes}: what the muscles do", turns=False)
+        told = motion.determined & _told(name, contact)
+        value = np.where(told[:, None], torque[:, columns], np.nan)
+        power = np.sum(value * rate[:, columns], axis=1, keepdims=True)
+        yield Output(f"{name}Moments", "MOMENTS", _three(value), f"{axes}: what the muscles do", turns=False)
+        yield Output(f"{name}Power", "POWERS", _three(power), "all axes of the joint", turns=False)
+
+
+def _told(name: str, contact: Contact) -> NDArray[np.bool_]:
+    """Return (T,) where the ground's share in a joint is known: of legs, where their foot's is; of all others."""
+    leg = any(word in name for word in ("Hip", "Knee", "Ankle"))
+    side = next((k for k, word in enumerate(SIDES) if name.startswith(word.title())), None)
+    return contact.told[:, side] if leg and side is not None else np.ones(len(contact.told), dtype=bool)
 
 
 def _wrenches(body: Body, one: TrialResult) -> Iterator[Output]:

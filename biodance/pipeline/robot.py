@@ -4,68 +4,41 @@ sentence.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.robot.urdf import read_urdf
+from biodance.diagnosis.robot import RobotFinding, robot_causes
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.added_mass import LoadSearch
 from biodance.identification.base_parameters import BaseEstimate
 from biodance.identification.identification import Identification
-from biodance.identification.knowledge import SIGMAS
-from biodance.identification.robot import RobotMotion, identify_links, robot_fit, surprise
+from biodance.identification.robot import identify_links
 from biodance.identification.validation import TrialValidation, residual_ratio
-from biodance.lab.filters import LowPass, low_pass
-from biodance.lab.robot.encoders import for_joints
-from biodance.lab.robot.recording import RobotRecording, RobotTrial, read_robot_recording
-from biodance.motion.clocks import PlateFit, fit_plate, on_motion_clock, onto_plate
+from biodance.lab.robot.recording import RobotRecording, read_robot_recording
+from biodance.motion.clocks import fit_plate, onto_plate
 from biodance.motion.comparison import compare
-from biodance.motion.grounded import RATE, Grounded, even_angles, ground
+from biodance.motion.grounded import RATE
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.identification import SessionIdentification
-from biodance.records import Array, Wrench
+from biodance.pipeline.robot_trials import MatchedTrial, bring_together
+from biodance.pipeline.robot_words import cause_words, refusals, told_of, weights
+from biodance.records import Wrench
 from biodance.records.attention import Attention, Judged, strongest_first
 from biodance.spatial import wrench_about_point
 
-_SAME = 0.9
-"""Least correlation of the paths of the centre of pressure, needed and measured, of one motion."""
-_SCALES = (0.7, 1.4)
-"""Legal sizes of the measured path over the needed one."""
-_WEIGHTS = (0.5, 2.0)
-"""Legal weight on the plate over that of the drawing."""
-_ODD, _FAITHFUL = 1.6, 0.99
-"""Beyond this surprise, or below this correlation, exchanged columns are looked for."""
-_BETTER = 0.25
-"""They are named if, exchanged back, they leave so much of what the correlation lacks to one."""
-_APART = 1.0
-"""s: clocks further apart are said first."""
 _KEPT = 0.2
 """Share of every trial, at its end, that is kept where no trial is."""
-_COARSE = 20.0
-"""Hz at which exchanged columns are looked for."""
 _NO_SEARCH = "Of a robot, what differs from the drawing is told link by link instead."
-
-
-@dataclass(frozen=True, eq=False)
-class MatchedTrial:
-    """One trial with plate and encoders brought together: ``motion`` to identify from, ``plate`` when and where,
-    ``measured`` wrench, filtered, on the plate's clock, ``surprise`` of the drawing at it.
-    """
-
-    recorded: RobotTrial
-    motion: RobotMotion
-    plate: PlateFit
-    measured: Wrench
-    surprise: float
 
 
 @dataclass(frozen=True, eq=False)
 class RobotResult:
     """What a recording says about a robot: ``identified`` as of people, ``alone`` the base parameters as
-    the paper counts them (every frame independent), ``trials``, ``attention``, ``judged``, and the ``urdf``.
+    the paper counts them (every frame independent), ``causes`` of what is not as drawn (taken out before), ``trials``,
+    ``attention``, ``judged``, and the ``urdf``.
     """
 
     recording: RobotRecording
@@ -74,6 +47,7 @@ class RobotResult:
     trials: tuple[MatchedTrial, ...]
     identified: SessionIdentification
     alone: BaseEstimate
+    causes: tuple[RobotFinding, ...]
     attention: tuple[Attention, ...]
     judged: tuple[Judged, ...]
 
@@ -125,108 +99,16 @@ def identify_robot(
     if not fitted:
         reasons = " ".join(refused.values()) or "No trial has the role fit."
         raise TrialRefused(reasons)
+    tell("looking for what is not as drawn")
+    causes, fitted, kept = _without_causes(body, fitted, kept)
     tell("identifying")
     done, alone = identify_links(body, tuple(one.motion for one in fitted))
     tell("validating")
     identified = _validated(found.folder.name, done, fitted, kept)
-    said = strongest_first([*_refusals(refused), *told_of(trials), *_weights(done)])
+    said = strongest_first([*refusals(refused), *told_of(trials), *cause_words(causes), *weights(done)])
     judged = tuple(Judged(one.recorded.name, float(one.motion.fit.use.sum()) / RATE) for one in trials)
     lost = tuple(Judged(name, 0.0, why, missed=True) for name, why in refused.items())
-    return RobotResult(found, Path(urdf), body, tuple(trials), identified, alone, said, (*judged, *lost))
-
-
-def bring_together(
-    body: Body, recording: RobotRecording, *, tell: Callable[[str], None] = lambda _: None
-) -> tuple[list[MatchedTrial], dict[str, str]]:
-    """Return the trials in which plate and encoders are of one motion, and why others are not, by name."""
-    trials, refused = list[MatchedTrial](), dict[str, str]()
-    for one in recording.trials:
-        tell(f"{one.name}: bringing plate and encoders together")
-        try:
-            trials.append(_matched(body, one, recording.fixed))
-        except BiodanceError as why:
-            refused[one.name] = str(why)
-    return trials, refused
-
-
-def _matched(body: Body, one: RobotTrial, fixed: dict[str, float]) -> MatchedTrial:
-    """Return one trial with plate and encoders brought together."""
-    where = str(one.files[0])
-    limits = (np.asarray(body.limits.lower), np.asarray(body.limits.upper))
-    encoders = for_joints(one.encoders, tuple(j.name for j in body.joints), limits, where=where, fixed=fixed)
-    time, angle = even_angles(encoders)
-    measured = Wrench(one.wrench.time, low_pass(one.wrench.value, one.wrench.rate, LowPass()))
-    carried = float(np.median(measured.value[:, 2])) / -float(body.gravity[2])
-    weight = float(body.sip.mass.sum())
-    if not _WEIGHTS[0] < carried / weight < _WEIGHTS[1]:
-        raise TrialRefused(
-            f"{one.files[1]}: carries {carried:.2f} kg (median), {body.name} weighs {weight:.2f} kg. Is it the plate "
-            f"of this robot, in N, zeroed while empty?"
-        )
-    grounded, fit = _stood(body, time, angle, measured)
-    motion = robot_fit(one.name, grounded, angle, on_motion_clock(measured, time, fit))
-    odd = surprise(body, motion)
-    foreign = fit.correlation < _SAME or not _SCALES[0] < fit.scale < _SCALES[1]
-    if odd > _ODD or fit.correlation < _FAITHFUL:
-        pair = _exchanged(body, time, angle, measured, limits, 1 - fit.correlation)
-        if pair:
-            raise TrialRefused(
-                f"{where}: the columns of {pair[0]} and {pair[1]} are exchanged: exchanged back, the motion needs what "
-                f"the plate shows. Correct the headings."
-            )
-    if foreign:
-        raise TrialRefused(
-            f"{one.files[1]}: is not the plate of this motion ({where}): at no delay does its centre of pressure "
-            f"follow what the encoders need (best correlation {fit.correlation:.2f}, least {_SAME:g}; size "
-            f"{fit.scale:.2f}, legal {_SCALES[0]:g} to {_SCALES[1]:g}). Pair the files of one run; else look for a "
-            f"wrong sign or zero of an encoder, or hands on the robot."
-        )
-    return MatchedTrial(replace(one, encoders=encoders), motion, fit, measured, odd)
-
-
-def _stood(
-    body: Body, time: Array, angle: Array, measured: Wrench, *, settings: LowPass | None = None
-) -> tuple[Grounded, PlateFit]:
-    """Return the motion and its place on the plate; where the angles leave open which foot stands, the plate tells."""
-    tried = []
-    for lean in (None, 0, 1):
-        found = ground(body, time, angle, settings=settings, lean=lean)
-        tried.append((found, fit_plate(predict_wrench(body, found.motion), measured, found.use)))
-        if not found.unclear:
-            break
-    return max(tried, key=lambda pair: pair[1].correlation)
-
-
-def _exchanged(
-    body: Body, time: Array, angle: Array, measured: Wrench, limits: tuple[Array, Array], lacking: float
-) -> tuple[str, str] | None:
-    """Return the two joints whose exchange lets the plate follow from the encoders; None if no exchange does."""
-    step, slow = round(RATE / _COARSE), LowPass(cutoff=0.2 * _COARSE)
-    measured = Wrench(measured.time, low_pass(measured.value, measured.rate, slow))
-    coarse, few = time[::step], angle[::step]
-    low, high = limits[0] - 0.35, limits[1] + 0.35
-    inside = (few.min(axis=0)[:, None] >= low) & (few.max(axis=0)[:, None] <= high)
-    moving = few.std(axis=0) > 0.01
-    best, pair = min(_BETTER * lacking, 2 * (1 - _FAITHFUL)), None
-    for i, j in combinations(range(few.shape[1]), 2):
-        if not (inside[i, j] and inside[j, i] and (moving[i] or moving[j])):
-            continue
-        other = few.copy()
-        other[:, [i, j]] = few[:, [j, i]]
-        size = _lacking(body, coarse, other, measured)
-        if size < best:
-            best, pair = size, (body.joints[i].name, body.joints[j].name)
-    return pair
-
-
-def _lacking(body: Body, time: Array, angle: Array, measured: Wrench) -> float:
-    """Return what the correlation at a coarse motion lacks to one; infinite where nothing fits."""
-    try:
-        found, fit = _stood(body, time, angle, measured, settings=LowPass(cutoff=0.2 * _COARSE))
-        legal = _SCALES[0] < fit.scale < _SCALES[1] and found.use.any()
-        return 1 - fit.correlation if legal else np.inf
-    except BiodanceError:
-        return np.inf
+    return RobotResult(found, Path(urdf), body, tuple(trials), identified, alone, causes, said, (*judged, *lost))
 
 
 def _parted(trials: list[MatchedTrial]) -> tuple[list[MatchedTrial], list[MatchedTrial]]:
@@ -243,6 +125,15 @@ def _parted(trials: list[MatchedTrial]) -> tuple[list[MatchedTrial], list[Matche
         first.append(_limited(one, one.motion.fit.use & early))
         last.append(_limited(one, one.motion.fit.use & ~early))
     return first, last
+
+
+def _without_causes(
+    body: Body, fitted: list[MatchedTrial], kept: list[MatchedTrial]
+) -> tuple[tuple[RobotFinding, ...], list[MatchedTrial], list[MatchedTrial]]:
+    """Return what is not as drawn, and the trials without it."""
+    causes, motions = robot_causes(body, tuple(one.motion for one in fitted), tuple(one.motion for one in kept))
+    trials = [replace(one, motion=motion) for one, motion in zip((*fitted, *kept), motions, strict=True)]
+    return causes, trials[: len(fitted)], trials[len(fitted) :]
 
 
 def _limited(one: MatchedTrial, use: "np.ndarray") -> MatchedTrial:
@@ -271,66 +162,15 @@ def _validated(
 def _validation(done: Identification, one: MatchedTrial) -> TrialValidation:
     """Return one trial in the plate's frame; drawing and identified robot stand each where it fits best."""
     motion, use = one.motion.fit.motion, one.motion.fit.use
+    measured = onto_plate(one.motion.fit.wrench.value, one.plate)
     predicted = []
     for body in (done.body, done.identified):
         needed = predict_wrench(body, motion)
-        fit = fit_plate(needed, one.measured, one.motion.grounded.use)
+        fit = fit_plate(needed, Wrench(motion.time, measured), one.motion.grounded.use)
         predicted.append(onto_plate(needed.value, fit))
-    still = replace(one.plate, place=(0.0, 0.0), yaw=0.0)
-    measured = on_motion_clock(one.measured, motion.time, still)
     point = Wrench(motion.time, measured).cop()[use]
     about = np.nanmean(point, axis=0)
     truth, table, found = (Wrench(motion.time, wrench_about_point(value, about)) for value in (measured, *predicted))
     return TrialValidation(
         one.recorded.name, about, truth, table, found, use, compare(truth, table, use), compare(truth, found, use)
     )
-
-
-def _refusals(refused: dict[str, str]) -> list[Attention]:
-    return [Attention("warn", why, name, "trial") for name, why in refused.items()]
-
-
-def told_of(trials: list[MatchedTrial]) -> list[Attention]:
-    """Return what a person should know of the recordings: clocks, plates, encoders, what contradicts the drawing."""
-    out = []
-    for one in trials:
-        name, late = one.recorded.name, one.plate.delay
-        clocks = (
-            f"What the encoders show at t the plate shows at t {late:+.3f} s; brought together by the motion "
-            f"(correlation {one.plate.correlation:.3f})."
-        )
-        out.append(Attention("warn" if abs(late) > _APART else "note", clocks, name, "time_delay"))
-        if one.surprise > _ODD:
-            words = (
-                f"The plate differs from the drawing by {one.surprise:.1f} times what its masses may be off by: look "
-                f"for a load, an encoder with another zero or sign, or hands on the robot."
-            )
-            out.append(Attention("warn", words, name, "drawing"))
-        out += [Attention("warn", text, name, "plate") for text in one.recorded.warnings]
-        out += [Attention("note", text, name, "encoders") for text in one.recorded.encoders.notes]
-    return out
-
-
-def _weights(done: Identification) -> list[Attention]:
-    """Return what weighs more or less than drawn, beyond doubt."""
-    if done.status == "failed":
-        return [Attention("fail", done.cause, "", "identification")]
-    total = np.zeros(done.sip.phi.size)
-    total[::10] = 1.0
-    drawn, mass = float(done.body.sip.mass.sum()), float(done.sip.mass.sum())
-    reach = SIGMAS * float(np.sqrt(total @ done.sip.covariance @ total))
-    out = []
-    if abs(mass - drawn) > reach:
-        out.append(
-            f"The robot weighs {mass:.2f} ± {reach:.2f} kg, {abs(mass - drawn):.2f} kg "
-            f"{'less' if mass < drawn else 'more'} than drawn ({drawn:.2f} kg)."
-        )
-    for known in done.known:
-        reach = SIGMAS * known.sd
-        if known.quantity == "mass" and known.verdict != "cannot be known" and abs(known.value - known.table) > reach:
-            change = known.value - known.table
-            out.append(
-                f"{known.segment} is {abs(change):.3f} ± {reach:.3f} kg {'lighter' if change < 0 else 'heavier'} than "
-                f"drawn: covers or cables {'off' if change < 0 else 'on'}?"
-            )
-    return [Attention("note", text, "", "mass") for text in out]

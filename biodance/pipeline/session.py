@@ -11,9 +11,10 @@ from biodance.pipeline.body import body_of, starting_from
 from biodance.pipeline.checks import mass_check, standing_check, trial_checks
 from biodance.pipeline.identification import SessionIdentification, can_identify, identify_trials
 from biodance.pipeline.results import SessionResult, Still
+from biodance.pipeline.shown_joints import shown_joints, with_forces
 from biodance.pipeline.still import load_still, still_of, worst_still
 from biodance.pipeline.trial import attempt, examine_trial, prepare_trial
-from biodance.pipeline.trial_result import QuietStanding, Step, TrialResult
+from biodance.pipeline.trial_result import QuietStanding, ShownJoints, Step, TrialResult
 from biodance.records import Session
 from biodance.settings import StandingRules
 from biodance.threads import one_thread
@@ -77,22 +78,27 @@ def examine(
     reference_person(session.settings.table, session.subject)
     steps: list[Step] = []
     read = []
-    for trial in sorted(session.trials, key=lambda trial: trial.role != "static"):
-        tell(f"preparing {trial.name}")
+    for k, trial in enumerate(sorted(session.trials, key=lambda trial: trial.role != "static"), 1):
+        tell(f"preparing {trial.name}, {k} of {len(session.trials)}")
         read.append(prepare_trial(trial))
     tell("scaling the body")
     body, source = body_of(session.subject, tuple(read), session.settings, steps)
     prior = None
     if body is not None and known is not None:
         body, prior, source = starting_from(known, body, session.subject.mass, source)
+    plain, shown = body, ShownJoints()
+    if body is not None:
+        body, shown = shown_joints(body, tuple(read), steps)
     results: list[TrialResult] = []
     try:
-        for one in read:
-            tell(f"tracking {one.trial.name}")
+        for k, one in enumerate(read, 1):
+            tell(f"tracking {one.trial.name}, {k} of {len(read)}")
             results.append(examine_trial(one, body, mass=session.subject.mass))
     except KeyboardInterrupt:
         results += [TrialResult(one.trial, (*one.steps, _stop("this trial")), one.gaps) for one in read[len(results) :]]
     done = tuple(replace(result, checks=tuple(trial_checks(result, session.subject.mass))) for result in results)
+    if body is not None and plain is not None:
+        body, shown = with_forces(shown, plain, body, done)
     standing = attempt(steps, "standing", lambda: best_standing(done))
     identification, limits = None, session.settings.checks
     checks = (*mass_check(session.subject, standing, limits), *standing_check(standing, limits))
@@ -118,6 +124,7 @@ def examine(
         identification=identification,
         more_stills=_stills(body, done, identification) if body else (),
         prior=prior,
+        shown_joints=shown,
     )
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.lab.markers.sets import landmark, read_marker_set
 from biodance.lab.weight import movement
-from biodance.motion.kinematics import poses
+from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.pipeline.trial_result import QuietStanding
 from biodance.records import Array, Markers, Motion, Trial, runs
 from biodance.settings import StandingRules
@@ -34,14 +34,6 @@ def quiet_run(
     steady = runs((np.abs(vertical - middle) <= rules.sway * middle) & used)
     first, stop = max(steady, key=lambda run: run[1] - run[0], default=(0, 0))
     return slice(first, stop) if stop - first >= rules.shortest * rate else None
-
-
-def centre_of_mass(body: Body, motion: Motion) -> Array:
-    """Return the centre of mass (T, 3) m of ``body`` with its own parameters during ``motion``."""
-    mass = body.sip.mass
-    carried = np.flatnonzero(mass > 0)
-    points = poses(body, motion.q).points(carried.tolist(), body.sip.com[carried])
-    return np.einsum("k,tkj->tj", mass[carried], points) / mass[carried].sum()
 
 
 def facing(body: Body, motion: Motion) -> Array:

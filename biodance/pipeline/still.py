@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.body.changes import parts_as_segments
 from biodance.body.solids import shape_parts
 from biodance.errors import TrialRefused
 from biodance.identification.added_mass import LoadSearch
-from biodance.motion.kinematics import Poses, poses
+from biodance.motion.kinematics import Poses, centre_of_mass, poses
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.results import Still
-from biodance.pipeline.standing import centre_of_mass, facing
+from biodance.pipeline.standing import facing
 from biodance.pipeline.trial_result import TrialResult
 from biodance.records import Array, Motion
 
@@ -115,6 +116,7 @@ def still_at(body: Body, one: TrialResult, frame: int) -> Still:
 def posture_still(body: Body, q: Array, title: str) -> Still:
     """Return a posture ``q`` (nq,) alone: bones, boxes and centre of mass, without markers, plates or forces."""
     motion = Motion(np.zeros(1), q[None], np.zeros((1, body.nv)), np.zeros((1, body.nv)))
+    com, body = centre_of_mass(body, motion)[0], parts_as_segments(body)
     pose, nothing, parts = poses(body, q), np.full(3, np.nan), shape_parts(body)
     on = [segment for segment, _ in parts]
     lines, sides = bone_lines(body, pose)
@@ -125,7 +127,7 @@ def posture_still(body: Body, q: Array, title: str) -> Still:
         sides=sides,
         markers=np.empty((0, 3)),
         plates=np.empty((0, 4, 3)),
-        com=centre_of_mass(body, motion)[0],
+        com=com,
         force=nothing,
         cop=nothing,
         forward=facing(body, motion),

@@ -12,6 +12,8 @@ import numpy as np
 from biodance.diagnosis.diagnosis import Diagnosis
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.identification import SessionIdentification
+from biodance.pipeline.movement import SessionMovement
+from biodance.pipeline.movement_tables import movement_tables
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import TrialResult
 from biodance.records import CHANNELS, Array
@@ -43,14 +45,16 @@ UNSEEN = ("effect", "target", "limit", "unit", "told_from", "typical")
 ADEQUACY = ("channel", "band_low_hz", "band_high_hz", "z", "trial", "second_s")
 
 
-def session_tables(result: SessionResult, diagnosis: Diagnosis | None = None) -> dict[str, "DataFrame"]:
+def session_tables(
+    result: SessionResult, diagnosis: Diagnosis | None = None, movement: SessionMovement | None = None
+) -> dict[str, "DataFrame"]:
     """Return all tables of a session by name.
 
     Always ``trials``, ``checks``, ``markers`` (distance to the model), ``marker_residuals`` (m by frame), ``angles``
     (deg by frame), ``wrench`` (N, N·m by frame: measured, of the table's body, of the identified one, about the lab
     origin); with an identification ``segments``, ``moments`` (N·m by frame, of the trial whose feet are known) and
-    ``validation``; with a diagnosis ``findings``, ``unobservable`` and ``adequacy``. A table without rows has its
-    columns all the same.
+    ``validation``; with a diagnosis ``findings``, ``unobservable`` and ``adequacy``; with a
+    movement those of `movement_tables`. A table without rows has its columns all the same.
     """
     found = result.identification
     tables = {
@@ -65,6 +69,8 @@ def session_tables(result: SessionResult, diagnosis: Diagnosis | None = None) ->
         tables |= {"segments": _segments(found), "moments": _moments(found), "validation": _validation(found)}
     if diagnosis is not None:
         tables |= _diagnosed(diagnosis)
+    if movement is not None:
+        tables |= movement_tables(movement)
     return tables
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from biodance import display
 from biodance.lab.markers.gaps import MarkerGaps
+from biodance.motion.optional_joints import JointGain
 from biodance.records import CHANNEL_TITLES, Array, Motion, Trial
 
 if TYPE_CHECKING:
@@ -136,6 +137,30 @@ class Check:
     limit: str
     inside: bool
     advice: str = ""
+
+
+@dataclass(frozen=True)
+class ForceGain:
+    """RMS difference of measured and simulated force in a ``trial``, N along x, y, z, the body ``without`` the joints
+    that the markers show and ``with_them``; masses of the table, so that no force was used for either.
+    """
+
+    trial: str
+    without: tuple[float, ...]
+    with_them: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class ShownJoints:
+    """What each optional joint brings to the markers (``gains``), and all that were taken to the ``forces``."""
+
+    gains: tuple[JointGain, ...] = ()
+    forces: tuple[ForceGain, ...] = ()
+
+    @property
+    def taken(self) -> tuple[str, ...]:
+        """Names of the joints that the body has."""
+        return tuple(gain.name for gain in self.gains if gain.taken)
 
 
 @dataclass(frozen=True, eq=False)

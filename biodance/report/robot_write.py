@@ -5,9 +5,10 @@ from pathlib import Path
 from typing import Any
 
 from biodance.body.body_file import body_text
-from biodance.pipeline.export import BODY
+from biodance.pipeline.kept import BODY
 from biodance.pipeline.provenance import now
-from biodance.pipeline.robot import MatchedTrial, RobotResult
+from biodance.pipeline.robot import RobotResult
+from biodance.pipeline.robot_trials import MatchedTrial
 from biodance.report.documents.diagnosis import attention_document, judged_document
 from biodance.report.documents.identification import identification_document
 from biodance.report.documents.session import plain_values, to_text
@@ -31,9 +32,28 @@ def robot_document(result: RobotResult) -> dict[str, Any]:
         "attention": attention_document(result.attention),
         "judged": judged_document(result.judged),
         **found,
+        "diagnosis": _diagnosis(result),
         "matched": [_matched(one) for one in result.trials],
         "provenance": {"created": now(), "versions": {"biodance": __version__}},
     }
+
+
+def _diagnosis(result: RobotResult) -> dict[str, Any]:
+    """Return what is not as drawn: verdict "clean" or "named", and the findings."""
+    findings = [
+        {
+            "cause": one.cause.kind,
+            "where": one.cause.where,
+            "value": one.value,
+            "sd": one.sd,
+            "unit": one.cause.unit,
+            "evidence_nats": one.gain,
+            "evidence_on_kept_nats": one.kept_gain,
+            "not_told_from": [f"{rival.kind} {rival.where}" for rival in one.rivals],
+        }
+        for one in result.causes
+    ]
+    return {"verdict": "named" if findings else "clean", "findings": findings}
 
 
 def _matched(one: MatchedTrial) -> dict[str, Any]:

@@ -9,16 +9,21 @@ from biodance.lab.corrections import PlateCorrection
 from biodance.pipeline.attention import identified_trials, session_attention
 from biodance.pipeline.carry import CORRECTED, LAB, accepted_corrections, lab_text, write_corrected
 from biodance.pipeline.diagnosis import SessionDiagnosis
-from biodance.pipeline.export import BODY, body_of_result
+from biodance.pipeline.export import body_of_result
 from biodance.pipeline.for_subject import account_for
 from biodance.pipeline.identification import SessionIdentification
+from biodance.pipeline.kept import BODY, SCALED, keep_motions
+from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.provenance import Provenance, now, provenance
-from biodance.pipeline.replay import replay_of
 from biodance.pipeline.results import SessionResult
+from biodance.pipeline.session_frames import frames_of
 from biodance.report.documents.diagnosis import attention_document, diagnosis_document, judged_document
 from biodance.report.documents.identification import identification_document
+from biodance.report.documents.methods import METHODS, methods_text
+from biodance.report.documents.movement import movement_document
 from biodance.report.documents.session import plain_values, results_document, to_text
 from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
+from biodance.report.pages.movement import movement_section
 from biodance.report.pages.session import page
 from biodance.report.pages.subject import subject_page
 
@@ -26,10 +31,15 @@ PAGE, SUBJECT_PAGE, _NUMBERS = "report.html", "subject.html", "results.json"
 
 
 def write_report(
-    result: SessionResult, folder: Path, *, diagnosis: SessionDiagnosis | None = None, drawn: bool = True
+    result: SessionResult,
+    folder: Path,
+    *,
+    diagnosis: SessionDiagnosis | None = None,
+    movement: SessionMovement | None = None,
+    drawn: bool = True,
 ) -> dict[str, Any]:
-    """Write ``report.html`` (where ``drawn``) and ``results.json`` into ``folder`` (which exists) and return the
-    content of the latter.
+    """Write ``report.html`` (where ``drawn``), ``methods.md`` and ``results.json`` into ``folder`` (which exists) and
+    return the content of the latter.
     """
     made = provenance(result, created=now())
     first = diagnosis.diagnosis.attention if diagnosis else session_attention(result)
@@ -39,9 +49,23 @@ def write_report(
         "diagnosis": diagnosis_document(diagnosis) if diagnosis else None,
         "attention": attention_document(first),
         "judged": judged_document(judged),
+        "movement": movement_document(movement) if movement else None,
     }
-    write_files(folder, {_NUMBERS: to_text(found)} | ({PAGE: _page(result, made, diagnosis)} if drawn else {}))
-    return dict(plain_values(found))
+    plain = dict(plain_values(found))
+    files = {_NUMBERS: to_text(found), METHODS: methods_text(plain)}
+    if drawn:
+        files |= {PAGE: _page(result, made, diagnosis, movement)} | _kept(result, folder)
+    write_files(folder, files)
+    return plain
+
+
+def _kept(result: SessionResult, folder: Path) -> dict[str, str]:
+    """Write the motions; return the body that belongs to them, for `export`. After a failed fit there is none."""
+    fit = result.identification
+    if result.body is None or (fit is not None and fit.status != "solved"):
+        return {}
+    keep_motions(result, folder)
+    return {BODY if fit is not None else SCALED: body_text(*body_of_result(result))}
 
 
 def write_subject_page(result: SessionResult, folder: Path, *, diagnosis: SessionDiagnosis | None = None) -> Path:
@@ -50,7 +74,9 @@ def write_subject_page(result: SessionResult, folder: Path, *, diagnosis: Sessio
     return folder / SUBJECT_PAGE
 
 
-def write_identification(result: SessionResult, found: SessionIdentification, folder: Path) -> dict[str, Any]:
+def write_identification(
+    result: SessionResult, found: SessionIdentification, folder: Path, *, movement: SessionMovement | None = None
+) -> dict[str, Any]:
     """Write ``report.html``, ``results.json`` with the identification alone and ``body.json``, the identified body;
     return the numbers.
 
@@ -62,13 +88,14 @@ def write_identification(result: SessionResult, found: SessionIdentification, fo
         "attention": attention_document(session_attention(result)),
         "judged": judged_document(identified_trials(result)),
         **identification_document(found),
+        "movement": movement_document(movement) if movement else None,
         "provenance": made.as_dict(),
     }
-    files = {_NUMBERS: to_text(numbers), PAGE: _page(result, made)}
-    if found.identification.status == "solved":
-        files[BODY] = body_text(*body_of_result(result))
-    write_files(folder, files)
-    return dict(plain_values(numbers))
+    plain = dict(plain_values(numbers))
+    page = _page(result, made, movement=movement)
+    files = {_NUMBERS: to_text(numbers), METHODS: methods_text(plain), PAGE: page}
+    write_files(folder, files | _kept(result, folder))
+    return plain
 
 
 def write_diagnosis(
@@ -125,10 +152,17 @@ def _accepted(
     return told, files
 
 
-def _page(result: SessionResult, made: Provenance, diagnosis: SessionDiagnosis | None = None) -> str:
+def _page(
+    result: SessionResult,
+    made: Provenance,
+    diagnosis: SessionDiagnosis | None = None,
+    movement: SessionMovement | None = None,
+) -> str:
     told = diagnosis_section(diagnosis) if diagnosis else ""
+    moved = movement_section(movement) if movement else ""
     attention = diagnosis.diagnosis.attention if diagnosis else None
-    return page(result, made, attention=attention, diagnosis=told, replay=replay_of(result))
+    frames = frames_of(result)
+    return page(result, made, attention=attention, diagnosis=told, movement=moved, replay=frames)
 
 
 def write_files(folder: Path, files: dict[str, str]) -> None:

@@ -12,20 +12,25 @@ from the rate of momentum and angular momentum (docs/derivations.md, section 16)
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
+from scipy.sparse import csr_array, diags_array, hstack, vstack
 
 from biodance.body.body import Body
 from biodance.body.inertia import TENSOR
-from biodance.motion.kinematics import Poses, jacobian, poses, segment_motion
+from biodance.motion.kinematics import Poses, SegmentMotion, jacobian, poses, segment_motion
 from biodance.records import Array, Index, Motion
 from biodance.spatial import skew
 
 TRACKING_RIDGE = 1e-6
 """Share of the mean curvature of the tracking that is added to it, so that coordinates without markers stay where
 they are."""
+_REACH = 100
+"""Samples from an end beyond which a spline does not feel it: 2.3^-100 is 1e-36."""
+_NOTHING = 1e-17
+"""Share of the largest coefficient below which a double cannot show what is left out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +78,11 @@ class Response:
             tangent += place[:, s] @ moved[:, s] + turn[:, s] @ turned[:, s]
         return cls(body, motion, pose, place, turn, tangent, -tracking(body, J), J)
 
+    @cached_property
+    def segments(self) -> SegmentMotion:
+        """How the segments move."""
+        return segment_motion(self.body, self.motion)
+
     @property
     def angles(self) -> Array:
         """(F, n) rad, of the joints."""
@@ -109,13 +119,30 @@ class Response:
 
 
 @lru_cache(maxsize=8)
-def derivatives(count: int) -> tuple[Array, Array]:
-    """Return (n, n) twice: second and first derivative, at ``count`` samples one unit apart, of the quintic spline
-    through them.
+def derivatives(count: int) -> tuple[csr_array, csr_array]:
+    """Return (n, n) twice, sparse: second and first derivative, at ``count`` samples one unit apart, of the quintic
+    spline through them.
+
+    A sample's influence on the spline falls by a factor of 2.3 per sample: rows farther than `_REACH` from both ends
+    are one row, moved along.
     """
-    time = np.arange(count, dtype=float)
-    spline = make_interp_spline(time, np.eye(count), k=min(5, count - 1))
-    return spline.derivative(2)(time), spline.derivative(1)(time)
+    some = min(count, 2 * _REACH + 1)
+    time = np.arange(some, dtype=float)
+    spline = make_interp_spline(time, np.eye(some), k=min(5, some - 1))
+    return _lengthened(spline.derivative(2)(time), count), _lengthened(spline.derivative(1)(time), count)
+
+
+def _lengthened(rows: Array, count: int) -> csr_array:
+    """Return the rows (m, m) of a short series for ``count`` samples: the middle one moves along."""
+    rows = np.where(np.abs(rows) > _NOTHING * np.abs(rows).max(), rows, 0.0)
+    more = count - len(rows)
+    if not more:
+        return csr_array(rows)
+    first, last = csr_array(rows[:_REACH]), csr_array(rows[_REACH + 1 :])
+    middle = diags_array(list(rows[_REACH]), offsets=range(len(rows)), shape=(more + 1, count))
+    first.resize((_REACH, count))
+    last = hstack([csr_array((_REACH, more)), last])
+    return csr_array(vstack([first, middle, last]))
 
 
 def centres_of_mass(body: Body, pose: Poses) -> Array:

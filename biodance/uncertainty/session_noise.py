@@ -80,7 +80,9 @@ def carried(body: Body, q: Array, about: Array) -> Array:
     segment = list(body.markers.segment)
     points = pose.points(segment, body.markers.position)
     place, _ = jacobian(body, pose, segment, points)
-    spread = np.linalg.inv(place[0].T @ place[0] + _LEVER**2 * np.eye(body.nv))
+    weighted = np.repeat(np.asarray(body.markers.weight), 3)[:, None] * place[0]
+    inverse = np.linalg.inv(place[0].T @ weighted + _LEVER**2 * np.eye(body.nv))
+    spread = inverse @ weighted.T @ weighted @ inverse
     turn = np.eye(body.nv)
     if body.n_root:
         to_root = quaternion_matrix(q[None, 3:7])[0].T

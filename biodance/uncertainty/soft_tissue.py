@@ -7,7 +7,6 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.human.skeleton import kind_of
-from biodance.motion.kinematics import segment_motion
 from biodance.records import Array, Index
 from biodance.spatial import cross
 from biodance.uncertainty.response import Pull, Response
@@ -116,7 +115,7 @@ class Sag(ErrorSource):
     def _moved(self, trial: Response, s: int) -> tuple[Index, Array]:
         """Return the markers of a segment and the acceleration (F, 3) of their middle less gravity, lab."""
         on = np.flatnonzero(np.array(self.body.markers.segment) == s)
-        move = segment_motion(self.body, trial.motion)
+        move = trial.segments
         arm = move.rotation[:, s] @ self.body.markers.position[on].mean(axis=0)
         w = move.angular_velocity[:, s]
         acceleration = move.acceleration[:, s] + cross(move.angular_acceleration[:, s], arm) + cross(w, cross(w, arm))

@@ -27,6 +27,8 @@ REFERENCE_PERSON = 70.0
 """kg: the noise is stated for a person of this mass and grows in proportion to it."""
 BEFORE = " before"
 """End of the key of what belongs to a joint where no functional calibration was made."""
+OTHER = "other"
+"""Target of the size of all targets that have none of their own."""
 HABIT = "habit "
 """Beginning of the key of what persons do by habit and `Effect.shown` takes off: spread of all other rows only."""
 CALIBRATED = ("joint_centre", "tilt")
@@ -92,9 +94,11 @@ class Tolerances:
 
     def size(self, key: str) -> float:
         """Return the standard deviation of ``key``; 0 for one that was never learned: it is then no nuisance. A joint
-        before functional calibration has the size of one after it where nothing is known of the difference.
+        before functional calibration has the size of one after it where nothing is known of the difference, and a
+        target that nobody knows (a marker of another set) that of `OTHER` ones.
         """
-        return self.sizes.get(key, self.sizes.get(key.removesuffix(BEFORE), 0.0))
+        known = self.sizes.get(key, self.sizes.get(key.removesuffix(BEFORE), 0.0))
+        return known or self.sizes.get(f"{key.partition(' ')[0]} {OTHER}", 0.0)
 
     def mean(self, key: str) -> float:
         """Return what is expected of ``key`` in a session without fault; 0 where nothing was learned."""
@@ -155,7 +159,7 @@ def table_sizes() -> dict[str, float]:
     """
     sizes = {}
     for row in error_rows():
-        if row["learned_on"] == "null_sessions" or row["quantity"] in CALIBRATED:
+        if row["learned_on"] in ("null_sessions", "family") or row["quantity"] in CALIBRATED:
             key = " ".join((row["quantity"], row["target"])).removesuffix(" session")
             sizes[key + (BEFORE if row["state"] == "before" else "")] = float(row["sd"])
     return sizes

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from biodance.lab.c3d.write import PlateRecording, write_c3d
-from biodance.records import Array
+from biodance.records import Array, Markers
 
 _PLATE_SIZE = (0.50, 0.46)
 """m along the plate's x and y (AMTI AccuGait)."""
-_ENCODER_RATE, _PLATE_RATE = 500.0, 1000.0
+_ENCODER_RATE, _PLATE_RATE, _CAMERA_RATE = 500.0, 1000.0, 100.0
 """Hz, of Bonnet et al. 2016."""
 
 
@@ -22,7 +22,7 @@ _ENCODER_RATE, _PLATE_RATE = 500.0, 1000.0
 class RobotLab:
     """Where and when: the plate starts ``ahead`` s before the encoders; the frame in which motion and wrench are given
     lies at ``place`` (x, y) m from the plate's centre, turned by ``yaw`` rad; standard deviations of one sample:
-    ``encoder`` rad, ``force`` N, ``moment`` N·m.
+    ``encoder`` rad, ``force`` N, ``moment`` N·m, ``camera`` m.
     """
 
     ahead: float = 0.37
@@ -31,6 +31,7 @@ class RobotLab:
     encoder: float = 0.0005
     force: float = 0.3
     moment: float = 0.02
+    camera: float = 0.0001
 
 
 def write_robot_trial(
@@ -43,9 +44,11 @@ def write_robot_trial(
     *,
     lab: RobotLab,
     seed: int,
+    markers: tuple[tuple[str, ...], Array] | None = None,
 ) -> None:
     """Write ``NAME_joints.csv`` and ``NAME_plate.c3d`` of one motion: joint ``angle`` (T, n) rad as the encoders see it
-    and the ``wrench`` (T, 6) N, N·m of the ground on the robot at ``time`` (T,) s, about a point of the ground.
+    and the ``wrench`` (T, 6) N, N·m of the ground on the robot at ``time`` (T,) s, about a point of the ground;
+    ``markers`` names (K) and places (T, K, 3) m in the same frame.
     """
     rng, length = np.random.default_rng(seed), float(time[-1] - time[0])
     clock = np.arange(0.0, length, 1 / _ENCODER_RATE)
@@ -55,15 +58,31 @@ def write_robot_trial(
     folder.mkdir(parents=True, exist_ok=True)
     heading = ",".join(["time (s)", *(f"{joint} (rad)" for joint in joints)])
     np.savetxt(folder / f"{name}_joints.csv", table, fmt="%.6f", delimiter=",", header=heading, comments="")
-    ticks = np.arange(0.0, length + lab.ahead, 1 / _PLATE_RATE) - lab.ahead + time[0]
+    per = round(_PLATE_RATE / _CAMERA_RATE)
+    ticks = np.arange(int((length + lab.ahead) * _CAMERA_RATE) * per) / _PLATE_RATE - lab.ahead + time[0]
     pressed = np.stack([np.interp(ticks, time, one) for one in wrench.T], axis=1)
     size = np.array([lab.force] * 3 + [lab.moment] * 3)
     write_c3d(
         folder / f"{name}_plate.c3d",
-        markers=None,
+        markers=_seen(markers, time, ticks[::per], lab, rng),
         plates=[_plate(pressed, lab, size * rng.normal(size=pressed.shape))],
         analog_rate=_PLATE_RATE,
     )
+
+
+def _seen(
+    markers: tuple[tuple[str, ...], Array] | None, time: Array, ticks: Array, lab: RobotLab, rng: np.random.Generator
+) -> Markers | None:
+    """Return what cameras see of the markers, on the plate's clock, in its lab."""
+    if markers is None:
+        return None
+    names, xyz = markers
+    flat = np.stack([np.interp(ticks, time, one) for one in xyz.reshape(len(time), -1).T], axis=1)
+    c, s = np.cos(lab.yaw), np.sin(lab.yaw)
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    middle = np.array([*(np.array(_PLATE_SIZE) / 2 + lab.place), 0.0])
+    place = flat.reshape(len(ticks), -1, 3) @ turn.T + middle
+    return Markers(names, ticks - ticks[0], place + lab.camera * rng.normal(size=place.shape))
 
 
 def _plate(wrench: Array, lab: RobotLab, noise: Array) -> PlateRecording:

@@ -7,6 +7,7 @@ OUT/truth/truth.json                   what only the simulation knows; no other 
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,12 +15,16 @@ import numpy as np
 from biodance.errors import BiodanceError
 from biodance.records import Subject
 from biodance.threads import one_thread
-from biodance.virtual_lab.movement.performance import Performance
+from biodance.virtual_lab.faults.forces import wobbling_mass
+from biodance.virtual_lab.movement.performance import AppliedForce, Performance
 from biodance.virtual_lab.movement.protocol import Protocol, TrialPlan, read_protocol
 from biodance.virtual_lab.person.person import AddedLoad, Person, make_person
+from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS
+from biodance.virtual_lab.recording.family import SWINGING, soft_parts
 from biodance.virtual_lab.recording.laboratory import (
     FIRST_VISIT,
     Instruments,
+    Laboratory,
     LabVisit,
     perform_in,
     record,
@@ -27,6 +32,7 @@ from biodance.virtual_lab.recording.laboratory import (
     set_up,
     write,
 )
+from biodance.virtual_lab.recording.merge import CARRIERS
 from biodance.virtual_lab.truth import truth
 
 TRUTH = "truth"
@@ -80,9 +86,15 @@ def write_visit(
     """
     _check(subject, out)
     person = make_person(
-        subject, seed, tolerances=visit.tolerances, loads=loads, session=visit.number, joint_shifts=visit.joint_shifts
+        subject,
+        seed,
+        tolerances=visit.tolerances,
+        loads=loads,
+        session=visit.number,
+        joint_shifts=visit.joint_shifts,
+        population=visit.laboratory.population,
     )
-    instruments = set_up(person, visit)
+    instruments = set_up(person, replace(visit, forces=(*visit.forces, *_swinging_flesh(person, visit.laboratory))))
     out.mkdir(parents=True, exist_ok=True)
     performances = []
     declared = scale_reading(person, visit.number, visit.tolerances)
@@ -94,11 +106,18 @@ def write_visit(
         declared = float(recording.parameters["PROCESSING"]["Bodymass"])  # type: ignore[arg-type]
         write(recording, out)
         performances.append(performance)
-    (out / "session.toml").write_text(session_toml(person, plan, declared))
+    (out / "session.toml").write_text(session_toml(person, plan, declared, joints=visit.laboratory.joints))
     (out / TRUTH).mkdir()
     document = truth(person, plan.name, instruments, performances)
     (out / TRUTH / "truth.json").write_text(json.dumps(document, indent=1) + "\n")
     return out
+
+
+def _swinging_flesh(person: Person, laboratory: Laboratory) -> tuple[AppliedForce, ...]:
+    """Return what the flesh that swings by itself adds to the forces, in a laboratory of more than 16 segments."""
+    parts = ((name, CARRIERS.get(name, name)) for name in soft_parts(laboratory))
+    mass = person.body.sip.mass
+    return tuple(wobbling_mass(person, name, SWINGING * mass[TRUE_SEGMENTS.index(on)]) for name, on in parts)
 
 
 def _check(subject: Subject, out: Path) -> None:
@@ -116,8 +135,8 @@ def _check(subject: Subject, out: Path) -> None:
         raise BiodanceError(f"{out}: exists and is not an empty folder; nothing was written. Choose another --out.")
 
 
-def session_toml(person: Person, protocol: Protocol, mass: float) -> str:
-    """Return what an analyst would have written down about the session."""
+def session_toml(person: Person, protocol: Protocol, mass: float, *, joints: str = "functional") -> str:
+    """Return what an analyst would have written down about the session; ``joints`` as the setting says."""
     lines = [
         "[subject]",
         f"mass_kg = {float(mass)}",
@@ -126,6 +145,8 @@ def session_toml(person: Person, protocol: Protocol, mass: float) -> str:
     ]
     if np.isfinite(person.subject.age):
         lines.append(f"age = {float(person.subject.age)}")
+    if joints != "functional":
+        lines += ["", "[settings]", f'joints = "{joints}"']
     for trial in protocol.trials:
         lines += ["", f'[trials."{trial.name}"]', f'role = "{trial.role}"']
     return "\n".join(lines) + "\n"

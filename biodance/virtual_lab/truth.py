@@ -64,6 +64,7 @@ def truth(person: Person, protocol: str, instruments: Instruments, performances:
         },
         "habits": asdict(person.habits),
         "tolerances": asdict(instruments.visit.tolerances),
+        "laboratory": {k: v for k, v in asdict(instruments.visit.laboratory).items() if k != "tolerances"},
         "instruments": {
             "tilt": instruments.tilt.tolist(),
             "plates": [_plate(p.corners, p) for p in instruments.plates],

@@ -13,12 +13,15 @@ from typing import Protocol
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.body.changes import parts_as_segments
 from biodance.body.inertia import pseudo_inertia
 from biodance.body.solids import SegmentSolids
 from biodance.discovery import Chosen, Family, missing_of
 from biodance.errors import BiodanceError
 from biodance.lab.plain_text import write_new
 
+_OF_SEGMENTS = ("csv",)
+"""Formats that say what is known of the segments as wholes; all others show the parts as bodies of their own."""
 _ROUNDING = 1e-9
 """Share of a pseudo-inertia's largest eigenvalue by which its smallest may be negative from rounding alone."""
 
@@ -97,6 +100,9 @@ def write_model(
     path = Path(path)
     (kind,) = (FAMILY.choose([format]) if isinstance(format, str) else FAMILY.judged([format])).values()
     refuse_impossible(body)
+    if kind.FORMAT not in _OF_SEGMENTS:
+        body = parts_as_segments(body)
+        refuse_impossible(body)
     write_new(path, _content(kind, body, source, solids))
     for name, content in _beside(kind, body, solids).items():
         file = path.parent / name

@@ -43,14 +43,15 @@ class Branch:
 
 
 def segment_tree(body: Body) -> tuple[Branch, ...]:
-    """Return the branches of all segments, in the order of ``body.segments``.
+    """Return the branches of all segments, every one behind that on which it hangs.
 
     Raises
     ------
     BiodanceError
         A link without segment carries more than one joint: such a tree has no compound joints.
     """
-    branches = tuple(_branch(body, i) for i in range(len(body.segments)))
+    outwards = sorted(range(len(body.segments)), key=lambda i: body.segment_joint[i])
+    branches = tuple(_branch(body, i) for i in outwards)
     used = [hinge.joint for branch in branches for hinge in branch.hinges]
     twice = {body.joints[j].name for j in used if used.count(j) > 1}
     if twice:

@@ -135,6 +135,50 @@ def deepest(ends: Array, half: Array) -> Array:
     return start + width / 2
 
 
+_CLOSE = 0.25
+"""m between the axes of two segments whose distance is worked out; others' is a lower bound."""
+
+
+def surface_distances(body: Body, pose: Poses, *, near: float = _CLOSE) -> tuple[Array, tuple[str, ...]]:
+    """Return the distances (T, pairs) m between the surfaces of the segments that must not touch, and the pairs.
+
+    In closed form, many frames at once; of axes farther apart than ``near`` m a lower bound.
+    """
+    solids = Solids.of(body)
+    ends = np.stack([pose.points(list(range(len(body.segments))), solids.axis[:, k]) for k in (0, 1)], axis=2)
+    limbs, boxes = zip(solids.first, solids.second, strict=True), zip(solids.limb, solids.box, strict=True)
+    out, names = [], []
+    for i, j in limbs:
+        out.append(_limbs_apart(ends[:, i], ends[:, j], near) - solids.radius[i] - solids.radius[j])
+        names.append(f"{body.segments[i]} - {body.segments[j]}")
+    for i, j in boxes:
+        low, high = body.boxes[j]
+        local = (ends[:, i] - pose.position[:, j, None]) @ pose.rotation[:, j] - (low + high) / 2
+        out.append(_box_apart(local, (high - low) / 2, near) - solids.radius[i])
+        names.append(f"{body.segments[i]} - {body.segments[j]}")
+    return np.stack(out, axis=1), tuple(names)
+
+
+def _limbs_apart(a: Array, b: Array, enough: float) -> Array:
+    """Return the distances (T,) of lines ``a`` from lines ``b`` (T, 2, 3)."""
+    reach = sum(np.linalg.norm(line[:, 1] - line[:, 0], axis=1) / 2 for line in (a, b))
+    out = np.asarray(np.linalg.norm(a.mean(axis=1) - b.mean(axis=1), axis=1) - reach)
+    near = out < enough
+    s, t = nearest(a[near], b[near])
+    out[near] = np.linalg.norm(_on(a[near], s) - _on(b[near], t), axis=1)
+    return out
+
+
+def _box_apart(line: Array, half: Array, enough: float) -> Array:
+    """Return the signed distances (T,) of lines (T, 2, 3) from a box about the origin with half sides ``half`` (3,)."""
+    reach = np.linalg.norm(line[:, 1] - line[:, 0], axis=1) / 2
+    out = np.asarray(_depth(np.abs(line.mean(axis=1)) - half) - reach)
+    near = out < enough
+    share = deepest(line[near][:, None], half[None])
+    out[near] = _depth(np.abs(_on(line[near][:, None], share)) - half)[:, 0]
+    return out
+
+
 def solid_distances(body: Body, pose: Poses) -> tuple[Array, list[str]]:
     """Return the distances (T, pairs) m between surfaces, negative where they overlap, and the names of the pairs.
 

@@ -106,7 +106,7 @@ def support_sequence(body: Body, plan: Plan) -> tuple[Stance, ...]:
 
 
 def _double(body: Body, plan: Plan, name: str) -> Stance:
-    feet = stance(body, name, right=plan.forward if name == "right_forward" else 0.0, share=plan.share)
+    feet = stance(body, name, right=plan.forward if name == "right_forward" else 0.0, share=plan.share, wide=plan.wide)
     return holding(feet, body, plan.holds)
 
 

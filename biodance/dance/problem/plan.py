@@ -8,11 +8,17 @@ shipped ones are in ``protocols/dances``:
     name = "short" description = "what it is for, one sentence" move_s = 2.0                 seconds from posture to
     posture hold_s = 1.5                 seconds of standing still in each forward_m = 0.2              how far the
     right foot stands in front in "right_forward" share_of_support = 0.6       short for the share under
-    [limits.balance] budget_s = 115               the postures that inform most per second are danced until the time is
-    used up; without it: all simplicity = 0.0             the performer's term: 0 = excitation only; 1 = a simple dance
-    is worth as much as an exciting one other_weight = 1.0           emphasis of the segments that [weights] does not
+    [limits.balance] budget_s = 115               of free ones: those that inform most per second are danced until the time is
+    used up; without it: all simplicity = 1.0             the performer's term: 0 = excitation only; 1 = an instruction
+    costs half a second (free: a simple dance is worth as much as an exciting one) other_weight = 1.0           emphasis of the segments that [weights] does not
     name ranges = "comfortable"       what joints may use: what is reached without effort, or "anatomical": all that a
     healthy joint allows
+
+    instructions = 4             most that is called at once; known postures and a few free ones (protocols/vocabulary)
+    free = false                 true: any posture, any number of instructions (the paper's); simplicity is 0 then
+    gentle = false               true: only what people can do who tire or fear to fall
+    deep = false                 true: deep squats and bows, one-leg squats, too
+    wide = 1.3                   distance between the feet, times the usual one (free: 1)
 
     [postures]                   how many postures on which feet, in the order of the dance
     parallel = 15                both feet side by side
@@ -60,7 +66,9 @@ class Plan:
     those that inform most per second are danced until the time is used up (inf: all); ``weights`` (segment, factor) in
     eq. 12 on top of the masses, ``other_weight`` the factor of all segments not named; ``simplicity`` >= 0 of the
     performer's term beside the excitation; ``alone`` the legs on which the person may stand alone, be it for a step;
-    ``holds`` the hands that stay on the grips of a frame; ``ranges`` what joints may use: what is reached without
+    ``instructions`` most that is called at once (inf: free postures, no vocabulary); ``gentle`` only postures that
+    people can take who tire or fear to fall; ``deep`` deep ones, too; ``wide`` times the usual distance between the
+    feet; ``whom`` for whom it is, in words; ``holds`` the hands that stay on the grips of a frame; ``ranges`` what joints may use: what is reached without
     effort, or all that a healthy joint allows (the paper).
     """
 
@@ -74,9 +82,14 @@ class Plan:
     weights: tuple[tuple[str, float], ...] = ()
     other_weight: float = 1.0
     simplicity: float = 0.0
+    instructions: float = float("inf")
+    wide: float = 1.0
+    gentle: bool = False
+    deep: bool = False
     alone: tuple[str, ...] = SIDES
     holds: tuple[str, ...] = ()
     ranges: Range = "comfortable"
+    whom: str = ""
     limits: tuple[Limit, ...] = field(default_factory=family)
 
     def __post_init__(self) -> None:
@@ -99,6 +112,8 @@ class Plan:
             ("hold", 0.0, 60.0, "s"),
             ("forward", 0.05, 0.4, "m"),
             ("simplicity", 0.0, 100.0, ""),
+            ("instructions", 2.0, float("inf"), ""),
+            ("wide", 0.8, 1.5, "times the usual distance"),
         ):
             value = getattr(self, name)
             if not low <= value <= high:
@@ -147,16 +162,23 @@ _NUMBERS = {
     "forward_m": "forward",
     "budget_s": "budget",
     "simplicity": "simplicity",
+    "instructions": "instructions",
+    "wide": "wide",
     "other_weight": "other_weight",
 }
 """Key of the file: field of the Plan."""
 _SHORT = {"share_of_support": ("balance", "share")}
 """Key of the file: limit and its number."""
-_KEYS = ("name", "description", "postures", "limits", "weights", "ranges", *_NUMBERS, *_SHORT)
+_FLAGS = ("free", "gentle", "deep")
+_FOLLOWABLE = {"instructions": 4.0, "simplicity": 1.0, "wide": 1.3}
+"""Of protocols that are not free, unless the file says otherwise."""
+_SUPPORT = {"share": 0.7}
+"""Share of the support that a followable dance may use: what imprecise people need is judged by performers."""
+_KEYS = ("name", "description", "postures", "limits", "weights", "ranges", "for", *_NUMBERS, *_SHORT, *_FLAGS)
 
 
 def read_plan(name_or_path: str | Path) -> Plan:
-    """Return a shipped protocol by name ("full", "short", "chair", "one_segment"), or one of the user's by the path of
+    """Return a shipped protocol by name ("short", "easy", "patient", "chair", "full", "one_segment"), or one of the user's by the path of
     its TOML file.
 
     Raises
@@ -173,8 +195,10 @@ def read_plan(name_or_path: str | Path) -> Plan:
     for key in raw:
         if key not in _KEYS:
             raise UnknownName.of(f"key of {path}", key, _KEYS)
-    words = {"ranges": str(raw["ranges"])} if "ranges" in raw else {}
-    fields: dict[str, Any] = words | {
+    words = {key: str(raw[name]) for key, name in (("ranges", "ranges"), ("whom", "for")) if name in raw}
+    flags = {name: _flag(path, name, raw[name]) for name in _FLAGS if name in raw}
+    free = flags.pop("free", False)
+    fields: dict[str, Any] = ({} if free else dict(_FOLLOWABLE)) | flags | words | {
         field: finite_number(path, key, raw[key]) for key, field in _NUMBERS.items() if key in raw
     }
     counts = table(path, raw, "postures")
@@ -190,13 +214,19 @@ def read_plan(name_or_path: str | Path) -> Plan:
         tuple(counts.items()),
         weights=tuple(weights.items()),
     )
-    return replace(plan, limits=_limits(path, raw), **fields)
+    return replace(plan, limits=_limits(path, raw, {} if free else {"balance": dict(_SUPPORT)}), **fields)
 
 
-def _limits(path: Path, raw: dict[str, Any]) -> tuple[Limit, ...]:
-    """Return all limits with the numbers that the file gives them."""
+def _flag(path: Path, key: str, value: object) -> bool:
+    if not isinstance(value, bool):
+        raise BiodanceError(f"{path}: {key} = {value!r}; expected true or false.")
+    return value
+
+
+def _limits(path: Path, raw: dict[str, Any], usual: dict[str, dict[str, float]]) -> tuple[Limit, ...]:
+    """Return all limits with the numbers that the file gives them, else the ``usual`` ones of its kind of dance."""
     given = table(path, raw, "limits")
-    found = {
+    found = usual | {
         name: {
             key: finite_number(path, f"limits.{name}.{key}", value)
             for key, value in table(path, given, name, of="limits.").items()
@@ -204,7 +234,7 @@ def _limits(path: Path, raw: dict[str, Any]) -> tuple[Limit, ...]:
         for name in given
     }
     for short, (name, key) in _SHORT.items():
-        if short in raw and key in found.get(name, {}):
+        if short in raw and key in given.get(name, {}):
             raise BiodanceError(f"{path}: {short} and limits.{name}.{key} say the same; keep one of them.")
         if short in raw:
             found.setdefault(name, {})[key] = finite_number(path, short, raw[short])

@@ -127,12 +127,13 @@ def stance(
     right: float = 0.0,
     planted: tuple[int, ...] = (0, 1),
     share: float = 1.0,
+    wide: float = 1.0,
 ) -> Stance:
     """Return a stance with the ankles ``left`` and ``right`` m ahead of the lab origin, side by side at the person's
-    width.
+    width, or ``wide`` times as far apart.
     """
     height = -float(body.feet["right"].outline[:, 1].min())
-    half = apart(body, share) / 2
+    half = apart(body, share, wide=wide) / 2
     ankle = np.array([[right, -half, height], [left, half, -float(body.feet["left"].outline[:, 1].min())]])
     soles = [
         ankle[k] + np.stack([o[:, 0], -o[:, 2], o[:, 1]], axis=1)
@@ -157,7 +158,7 @@ def seat(body: Body, *, share: float = 1.0) -> Stance:
     return replace(feet, props=STOOL, seat=float(max(legs) + feet.ankle[:, 2].max()) + HANGING)
 
 
-def apart(body: Body, share: float) -> float:
+def apart(body: Body, share: float, *, wide: float = 1.0) -> float:
     """Return the distance (m) between the ankles: of a person about 1.3 times the width of the hips; of a robot at
     least that of its hips.
 
@@ -166,7 +167,7 @@ def apart(body: Body, share: float) -> float:
     """
     sideways = body.feet["right"].outline[:, 2]
     outer, inner = float(sideways.max()), -float(sideways.min())
-    usual = max(_WIDTH * stature_of(body), hip_width(body))
+    usual = wide * max(_WIDTH * stature_of(body), hip_width(body))
     if share >= 1.0:
         return usual
     middle, wide = (outer - inner) / 2, outer + inner

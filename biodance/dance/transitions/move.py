@@ -181,7 +181,7 @@ def find_move(task: Task, history: Array, *, rng: np.random.Generator) -> Move:
         via[:, task.excited] += rng.normal(0, spread, (2, len(task.excited)))
         for k, iterations in enumerate(rounds):
             reserve = RESERVE * (1 + k / 4)
-            via, violation = _improved(task, via, time, objective, iterations, reserve)
+            via, violation = improved_way(task, via, time, objective, iterations, reserve)
             found, instants = evaluate_move(task, via)
             if best is None or found.violation < best.violation:
                 best = found
@@ -194,13 +194,20 @@ def find_move(task: Task, history: Array, *, rng: np.random.Generator) -> Move:
     return best
 
 
-def _improved(
-    task: Task, via: Array, time: Array, objective: MoveObjective, iterations: int, reserve: float
+def improved_way(
+    task: Task,
+    via: Array,
+    time: Array,
+    objective: MoveObjective,
+    iterations: int,
+    reserve: float,
+    *,
+    free: list[int] | None = None,
 ) -> tuple[Array, float]:
     """Return the via points found from ``via`` (2, n), and by how much they violate the limits with their ``reserve``
-    at ``time`` s.
+    at ``time`` s; only the coordinates ``free`` move, by default all that can.
     """
-    free = free_coordinates(task.chain, task.stance)
+    free = free_coordinates(task.chain, task.stance) if free is None else free
     problem = task.problem(via, free, time, reserve=reserve, objective=objective)
     found, out = minimise(problem.evaluate, via[:, free].ravel(), iterations=iterations), via.copy()
     out[:, free] = found.y.reshape(2, -1)

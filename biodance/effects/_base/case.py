@@ -51,7 +51,7 @@ class Case:
     @cached_property
     def regressor(self) -> Array:
         """(T, 6, 10N) root regressor about the lab origin."""
-        return regressor_of(self.segments, gravity=self.body.gravity)
+        return regressor_of(self.segments, gravity=self.body.gravity, sharing=self.body.sharing)
 
     @cached_property
     def segments(self) -> SegmentMotion:
@@ -151,7 +151,8 @@ class Case:
         masses are `ALIKE`.
         """
         known = self.__dict__.get("geometry")
-        before, now = (np.asarray(p)[::10] for p in (self.phi if known is None else known.phi, phi))
+        used = self.body.link_parameters(self.phi) if known is None else known.phi
+        before, now = (np.asarray(p)[::10] for p in (used, self.body.link_parameters(phi)))
         same = bool(np.all(np.abs(now - before) <= _ALIKE * np.abs(before)))
         return self._known(replace(self, phi=phi), *OF_MOTION, *(("geometry",) if same else ()))
 

@@ -141,9 +141,10 @@ def geometry(
     weight = seen * body.markers.weight[list(columns)]
     apart = weight[..., None] * np.where(seen[..., None] > 0, markers - measured, 0.0)
     answer = PostureAnswer(body, pose, motion.q[every, body.nq - len(body.joints) :], segment, markers, apart, weight)
-    com = pose.points(list(range(len(body.segments))), centres_of(phi))
-    place, turn = jacobian(body, pose, list(range(len(body.segments))), com)
-    shape = (len(com), len(body.segments), 3, body.nv)
+    phi, links = body.link_parameters(phi), list(range(len(body.links)))
+    com = pose.points(links, centres_of(phi))
+    place, turn = jacobian(body, pose, links, com)
+    shape = (len(com), len(links), 3, body.nv)
     speed = (place @ _tangent_speed(body, motion, pose, every)[..., None]).reshape(shape[:3])
     parts = moved_matter(_move(segments, every), phi, speed)
     return Geometry(

@@ -14,8 +14,6 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from biodance.body.body import Body
-from biodance.body.inertia import RigidInertia, inertial_parameters
-from biodance.body.tables.segment_data import read_segment_table
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect
 from biodance.errors import TrialRefused
@@ -186,31 +184,6 @@ def _parameters(case: Case, body: Body) -> Array:
     phi = np.array(body.sip.phi)
     phi[: case.phi.size] += case.phi - case.body.sip.phi
     return phi
-
-
-def share_of_body(body: Body, segment: str, *, top: Array, bottom: Array) -> Array:
-    """Return the ten parameters (10,) of a part of the trunk between ``bottom`` and ``top`` (3,) m, by its name in de
-    Leva's table (mean of women and men), in the frame of the two points; masses in proportion to the body's.
-    """
-    table = read_segment_table("de_leva_1996")
-    rows = [
-        (
-            table.value(segment, "mass", sex=sex),
-            table.value(segment, "com", "longitudinal", sex=sex),
-            *table.values(segment, "gyration", "sagittal transverse longitudinal", sex=sex),
-        )
-        for sex in ("F", "M")
-    ]
-    fraction, place, sagittal, transverse, along = np.mean(rows, axis=0)
-    mass, length = fraction * float(body.sip.mass.sum()), float(np.linalg.norm(top - bottom))
-    inertia = mass * length**2 * np.diag([sagittal**2, along**2, transverse**2])
-    return inertial_parameters(RigidInertia(mass, top + place * (bottom - top), inertia))
-
-
-def shoulders(body: Body) -> Array | None:
-    """Return the middle (3,) m between the shoulder joints in the trunk's frame; None for a body without them."""
-    places = [joint.translation for joint in body.joints if joint.name.endswith("shoulder_flexion")]
-    return np.mean(places, axis=0) if len(places) == 2 and "trunk_head" in body.segments else None
 
 
 def doubting(body: Body, names: Iterable[str]) -> Body:

@@ -29,9 +29,14 @@ _PATIENCE = 300.0
 """s after which the child is given up."""
 _NEAR = 0.1
 """s: an event that the file has already within this time is not written again."""
-Kind = Literal["ANGLES", "FORCES", "MOMENTS", "MODELED_MARKERS"]
-_UNITS = {"ANGLES": ("ANGLE_UNITS", "deg"), "FORCES": ("FORCE_UNITS", "N"), "MOMENTS": ("MOMENT_UNITS", "Nm")}
-PER_SI = {"deg": 180 / np.pi, "rad": 1.0, "N": 1.0, "Nm": 1.0, "Nmm": 1000.0}
+Kind = Literal["ANGLES", "FORCES", "MOMENTS", "POWERS", "MODELED_MARKERS"]
+_UNITS = {
+    "ANGLES": ("ANGLE_UNITS", "deg"),
+    "FORCES": ("FORCE_UNITS", "N"),
+    "MOMENTS": ("MOMENT_UNITS", "Nm"),
+    "POWERS": ("POWER_UNITS", "W"),
+}
+PER_SI = {"deg": 180 / np.pi, "rad": 1.0, "N": 1.0, "Nm": 1.0, "Nmm": 1000.0, "W": 1.0}
 """How many of a file's unit one SI unit is."""
 
 
@@ -39,7 +44,7 @@ PER_SI = {"deg": 180 / np.pi, "rad": 1.0, "N": 1.0, "Nm": 1.0, "Nmm": 1000.0}
 class Output:
     """One result over the frames of the trial, as C3D stores it: a point with three components.
 
-    ``label`` of the point; ``kind`` the parameter of POINT that lists it; ``value`` (T, 3) rad, N, N·m or m, NaN =
+    ``label`` of the point; ``kind`` the parameter of POINT that lists it; ``value`` (T, 3) rad, N, N·m, W or m, NaN =
     none; ``about`` what the three components are. ``turns`` True for vectors of the lab frame, which are written in the
     file's axes.
     """

@@ -5,7 +5,8 @@ Which table goes with which plate: recording.toml says it, else the same stem (`
 """
 
 import re
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -15,20 +16,21 @@ from biodance.errors import BiodanceError, FileRefused, SessionRefused, UnknownN
 from biodance.lab.read import read_head, read_trial, sniffed
 from biodance.lab.robot.encoders import ENCODER_TABLES, column_names, heading, read_encoders
 from biodance.library import read_toml
-from biodance.records import ROLES, Role, Wrench
+from biodance.records import ROLES, Markers, Role, Wrench
 from biodance.records.encoders import Encoders
 from biodance.spatial import wrench_about_point
 
 _FILE = "recording.toml"
 _ENDS = re.compile(r"[_.-]?(joints?|encoders?|angles?|plates?|forces?|grf)$", re.IGNORECASE)
 _KEPT = re.compile(r"valid|unseen|kept|squat", re.IGNORECASE)
-_KEYS = {"angle_unit": str, "joints": dict, "trials": dict}
+_KEYS = {"angle_unit": str, "joints": dict, "trials": dict, "base": dict}
 
 
 @dataclass(frozen=True, eq=False)
 class RobotTrial:
     """One motion: ``encoders`` on the robot's clock, ``wrench`` of all plates on theirs, about the point
-    of their surface over the lab origin, ``role`` "fit" or "validate", ``history`` what the readers decided.
+    of their surface over the lab origin, ``role`` "fit" or "validate", ``history`` what the readers decided,
+    ``markers`` on the plates' clock over the same point.
     """
 
     name: str
@@ -38,15 +40,27 @@ class RobotTrial:
     files: tuple[Path, Path]
     history: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    markers: Markers | None = None
+
+
+@dataclass(frozen=True)
+class BaseSensors:
+    """What sees the base: ``markers`` m from the root link's origin (forwards, left, up) by name, in the files of the
+    plate; or the ``imu``'s columns of roll and pitch among the encoders; neither by default.
+    """
+
+    markers: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    imu: tuple[str, str] | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class RobotRecording:
-    """The trials of a ``folder``; ``fixed`` joints without encoder and their angle, rad."""
+    """The trials of a ``folder``; ``fixed`` joints without encoder and their angle, rad; ``base`` what sees it."""
 
     folder: Path
     trials: tuple[RobotTrial, ...]
     fixed: dict[str, float] = field(default_factory=dict)
+    base: BaseSensors = BaseSensors()
 
 
 def read_robot_recording(folder: str | Path, joints: tuple[str, ...]) -> RobotRecording:
@@ -72,7 +86,7 @@ def read_robot_recording(folder: str | Path, joints: tuple[str, ...]) -> RobotRe
     trials = tuple(
         _trial(name, role, *files, said.get("angle_unit", ""), rename) for name, (role, files) in pairs.items()
     )
-    return RobotRecording(folder, trials, fixed)
+    return RobotRecording(folder, trials, fixed, _base(folder / _FILE, said.get("base", {})))
 
 
 def _said(path: Path) -> dict[str, Any]:
@@ -80,11 +94,31 @@ def _said(path: Path) -> dict[str, Any]:
     content = read_toml(path) if path.is_file() else {}
     for key, value in content.items():
         if key not in _KEYS or not isinstance(value, _KEYS[key]):
-            raise SessionRefused(f"{path}: {key} = {value!r} is not legal; legal are angle_unit, [joints], [trials.X].")
+            raise SessionRefused(
+                f"{path}: {key} = {value!r} is not legal; legal are angle_unit, [joints], [trials.X], [base]."
+            )
     strange = sorted(set(content.get("joints", {})) - {"rename", "fixed"})
     if strange:
         raise SessionRefused(f"{path}: [joints] {strange[0]} is no key; legal are rename and fixed.")
     return {"joints": {}, "trials": {}, **content}
+
+
+def _base(path: Path, said: dict[str, Any]) -> BaseSensors:
+    """Return what sees the base, as recording.toml says."""
+    markers, imu = said.get("markers", {}), said.get("imu", {})
+    numbers = isinstance(markers, dict) and all(
+        isinstance(xyz, list) and len(xyz) == 3 and all(isinstance(x, int | float) for x in xyz)
+        for xyz in markers.values()
+    )
+    named = isinstance(imu, dict) and set(imu) in (set(), {"roll", "pitch"})
+    if not (numbers and named and set(said) <= {"markers", "imu"}) or (markers and imu):
+        raise SessionRefused(
+            f"{path}: [base] is not legal. Give markers = {{NAME = [forwards, left, up]}} in m from the root link's "
+            f'origin, or imu = {{roll = "column", pitch = "column"}} of the encoders\' table.'
+        )
+    return BaseSensors(
+        {name: tuple(xyz) for name, xyz in markers.items()}, (imu["roll"], imu["pitch"]) if imu else None
+    )
 
 
 def _told(folder: Path, trials: dict[str, Any]) -> dict[str, tuple[Role, tuple[Path, Path]]]:
@@ -160,4 +194,6 @@ def _trial(name: str, role: Role, table: Path, plate: Path, unit: str, rename: d
     total = np.sum([wrench_about_point(one.wrench.value, surface) for one in recorded.plates], axis=0)
     said = (*(text for one in recorded.plates for text in one.decisions), *recorded.history)
     found = Encoders(encoders.time, joints, encoders.angle, encoders.notes)
-    return RobotTrial(name, role, found, Wrench(first.time, total), (table, plate), said, recorded.warnings)
+    seen = recorded.markers
+    markers = replace(seen, xyz=seen.xyz - surface) if seen is not None and seen.names else None
+    return RobotTrial(name, role, found, Wrench(first.time, total), (table, plate), said, recorded.warnings, markers)

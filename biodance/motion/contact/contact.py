@@ -40,7 +40,8 @@ class Contact:
     ``time`` (T,) s; ``touching`` (T, 2) True where a foot may touch anything; ``on_plate`` (T, 2, P) True where a part
     of a touching foot is over a plate; ``measured`` (T,) True where the plates measure all that the ground does;
     ``cop_outside`` (T, P) m, distance of a plate's centre of pressure from the soles on it (0 = inside), NaN = hardly
-    loaded; ``notes`` how many frames remain, and why no others.
+    loaded; ``notes`` how many frames remain, and why no others; ``told`` (T, 2) True where the plates tell what the
+    ground does to this foot, whatever the other one stands on.
     """
 
     time: Array
@@ -49,6 +50,7 @@ class Contact:
     measured: _Mask
     cop_outside: Array
     notes: tuple[str, ...]
+    told: _Mask
 
 
 def ground_contact(
@@ -102,7 +104,17 @@ def ground_contact(
         + surfaces.notes
         + _cop_notes(trial, outside, measured, rules)
     )
-    return Contact(soles.time, touching, place.on_plate, measured, outside, notes)
+    told = measured[:, None] | _told(trial, place, touching, rests, load)
+    return Contact(soles.time, touching, place.on_plate, measured, outside, notes, told)
+
+
+def _told(trial: Trial, place: Footing, touching: _Mask, rests: _Mask, load: _Mask) -> _Mask:
+    """Return (T, 2) where a foot is off the ground, or stands wholly over plates that the other foot is not on."""
+    shared = place.on_plate.all(axis=1).any(axis=1)
+    silent = place.on_plate & rests[..., None] & ~load[:, None]
+    orphan = load & ~place.on_plate.any(axis=1)
+    known = np.isfinite(trial.wrench.value).all(axis=1) & ~shared & ~orphan.any(axis=1)
+    return np.asarray(known[:, None] & ~place.unseen & (~touching | place.covered) & ~silent.any(axis=2))
 
 
 def _touching(soles: Soles, speed: Array, surfaces: Surfaces, rules: ContactRules) -> _Mask:

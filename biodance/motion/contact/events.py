@@ -1,6 +1,7 @@
 """When a foot comes down on the plates and when it leaves them."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -18,25 +19,26 @@ _SHORTEST = 0.05
 @dataclass(frozen=True)
 class FootEvent:
     """``time`` s on the clock of the trial; ``side`` "right" or "left"; ``down`` True where the foot comes down,
-    False where it leaves.
+    False where it leaves; ``source`` "force" where a plate saw it, "markers" where the movement of the feet tells it.
     """
 
     time: float
     side: str
     down: bool
+    source: Literal["force", "markers"] = "force"
 
 
 def foot_events(feet: tuple[Wrench, Wrench], contact: Contact) -> tuple[FootEvent, ...]:
     """Return when each foot came down on a plate or left it, in the order of time.
 
     ``feet`` the wrenches on the right and the left foot. An event is where the vertical force passes `THRESHOLD`,
-    between two frames that are fully measured and in which the other foot is not over the same plate: a force that two
-    feet share tells nothing of one.
+    between two frames in which the plates tell what the ground does to this foot and the other one is not over the same
+    plate: a force that two feet share tells nothing of one.
     """
     found = []
     for foot, wrench in enumerate(feet):
         shared = (contact.on_plate[:, foot] & contact.on_plate[:, 1 - foot]).any(axis=1)
-        sure, force = contact.measured & ~shared, wrench.force[:, 2]
+        sure, force = contact.told[:, foot] & ~shared, wrench.force[:, 2]
         shortest = _SHORTEST * wrench.rate
         loaded = _without_short(np.nan_to_num(force) > _THRESHOLD, shortest)
         for i in np.flatnonzero(loaded[1:] != loaded[:-1]) if loaded.size > 1 else ():

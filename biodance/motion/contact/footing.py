@@ -48,13 +48,10 @@ def inside(plate: Plate, points: Array) -> Array:
     outside.
     """
     corners = plate.corners[:, :2]
-    edges = np.roll(corners, -1, axis=0) - corners
-    turn = np.sign(np.sum(corners[:, 0] * np.roll(corners[:, 1], -1) - corners[:, 1] * np.roll(corners[:, 0], -1)))
-    distance = np.full(points.shape[:-1], np.inf)
-    for corner, edge in zip(corners, edges, strict=True):
-        normal = turn * np.array([-edge[1], edge[0]]) / np.linalg.norm(edge)
-        distance = np.minimum(distance, (points[..., :2] - corner) @ normal)
-    return distance
+    after = np.concatenate([corners[1:], corners[:1]])
+    (x, y), (u, v) = corners.T, (after - corners).T
+    inward = np.sign(x @ after[:, 1] - y @ after[:, 0]) * np.array([-v, u]) / np.hypot(u, v)
+    return np.asarray(np.min(points[..., :2] @ inward - (x * inward[0] + y * inward[1]), axis=-1))
 
 
 def footing(plates: tuple[Plate, ...], soles: Soles, surfaces: "Surfaces", touching: _Mask) -> Footing:

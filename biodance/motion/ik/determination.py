@@ -88,8 +88,8 @@ def _jacobian(body: Body, columns: list[int]) -> Array:
 
 
 def _carried(body: Body) -> NDArray[np.bool_]:
-    """Return (n, N) True where a segment moves with a joint."""
-    out = np.zeros((len(body.joints), len(body.segments)), dtype=bool)
+    """Return (n, N + P) True where a segment, or a part of one, moves with a joint."""
+    out = np.zeros((len(body.joints), len(body.segment_joint)), dtype=bool)
     for segment, joint in enumerate(body.segment_joint):
         while joint >= 0:
             out[joint, segment] = True

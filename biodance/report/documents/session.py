@@ -9,7 +9,7 @@ import numpy as np
 from biodance.motion.comparison import Agreement
 from biodance.pipeline.provenance import Provenance
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.trial_result import QuietStanding, TrialResult, WrenchComparison
+from biodance.pipeline.trial_result import QuietStanding, ShownJoints, TrialResult, WrenchComparison
 from biodance.records import CHANNELS, Plate
 from biodance.report.documents.identification import added_mass_document, agreement, identification_document
 
@@ -103,6 +103,26 @@ def _mass_check(result: SessionResult) -> dict[str, Any]:
     }
 
 
+def _optional_joints(shown: ShownJoints) -> dict[str, Any]:
+    """Return what each joint beyond the 23 axes brings: to its markers (mm), and all to the vertical force (N)."""
+    return {
+        "optional_joints": [
+            {
+                "joint": gain.name,
+                "taken": gain.taken,
+                "markers": gain.markers,
+                "fitted_mm": 1000 * gain.fitted,
+                "held_out_without_mm": 1000 * gain.without,
+                "held_out_with_mm": 1000 * gain.with_it,
+            }
+            for gain in shown.gains
+        ],
+        "optional_joints_force": [
+            {"trial": one.trial, "rms_without_N": one.without, "rms_with_N": one.with_them} for one in shown.forces
+        ],
+    }
+
+
 def results_document(result: SessionResult, provenance: Provenance) -> dict[str, Any]:
     """Return all of ``result`` as one JSON document; null where a step was refused or does not exist in this
     version.
@@ -121,7 +141,11 @@ def results_document(result: SessionResult, provenance: Provenance) -> dict[str,
         "trials": [_trial(trial, found.agreements.get(trial.trial.name) if found else None) for trial in result.trials],
         "refused": dict(result.session.refused),
         "notes": result.session.notes,
-        "body": {"source": result.body_source, "notes": result.body.notes if result.body else ()},
+        "body": {
+            "source": result.body_source,
+            "notes": result.body.notes if result.body else (),
+            **_optional_joints(result.shown_joints),
+        },
         "steps": [{"step": s.name, "status": s.status, "reason": s.text} for s in result.steps],
         "checks": [
             {

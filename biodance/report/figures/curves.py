@@ -17,13 +17,14 @@ _NARROW, _TALL = 46.0, 110.0
 @dataclass(frozen=True, eq=False)
 class Curve:
     """One curve: ``name`` as in the legend, ``values`` (T,), NaN where it is broken; ``half_width`` (T,) of the band
-    about it, or None.
+    about it, or None; ``kind`` "line" is read at the cursor, "each" is one repetition of the curve of the same name.
     """
 
     name: str
     values: Array
     look: Stroke
     half_width: Array | None = None
+    kind: str = "line"
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +60,7 @@ class CurveFigure:
     """Panels over one time axis: ``cells`` of strips that stand over each other, the cells in columns.
 
     ``time`` (T,); ``about`` what it shows, one sentence; ``used`` (T,) False where frames are left out (grey);
-    ``trial`` makes the cursor go with the replay of that trial.
+    ``trial`` makes the cursor go with the replay of that trial; ``label`` of the time axis; ``band`` what bands mean.
     """
 
     time: Array
@@ -68,6 +69,7 @@ class CurveFigure:
     used: NDArray[np.bool_] | None = None
     trial: str = ""
     label: str = "time (s)"
+    band: str = "95 % interval"
     heights: tuple[float, float] = field(default=(_TALL, _NARROW))
 
     def html(self) -> str:
@@ -92,9 +94,9 @@ class CurveFigure:
                 if one.half_width is not None:
                     low, high = one.values - one.half_width, one.values + one.half_width
                     marks.append(band(x, y, self.time, low, high, one.look.colour, name=one.name))
-                marks.append(curve_line(x, y, self.time, one.values, one.look, name=one.name))
+                marks.append(curve_line(x, y, self.time, one.values, one.look, name=one.name, kind=one.kind))
             height, last = self.heights[1 if strip.even else 0], i == len(strips) - 1
-            about = f"{strip.title}: {', '.join(one.name for one in strip.curves)}"
+            about = f"{strip.title}: {', '.join(dict.fromkeys(one.name for one in strip.curves))}"
             out.append(panel(x, y, marks, about, frame=Frame(height=height), numbers=last))
         return "".join(out)
 
@@ -107,7 +109,7 @@ class CurveFigure:
         )
         banded = any(one.half_width is not None for one in looks.values())
         grey = '<span><i class="swatch out"></i>left out: not fully measured</span>' if left_out else ""
-        return buttons + ('<span><i class="swatch in"></i>95 % interval</span>' if banded else "") + grey
+        return buttons + (f'<span><i class="swatch in"></i>{escape(self.band)}</span>' if banded else "") + grey
 
 
 def swatch(look: Stroke) -> str:

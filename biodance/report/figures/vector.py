@@ -114,16 +114,16 @@ def path(across: NDArray[np.int64], down: NDArray[np.int64]) -> str:
     return f"{start}l{' '.join(map(str, moved))}".replace(" -", "-") if moved else f"{start}h0"
 
 
-def curve_line(x: Axis, y: Axis, at: Array, values: Array, look: Stroke, *, name: str = "") -> str:
+def curve_line(x: Axis, y: Axis, at: Array, values: Array, look: Stroke, *, name: str = "", kind: str = "line") -> str:
     """Return a curve of ``values`` (T,) over ``at`` (T,), broken where a value is not finite; ``name`` for the legend's
-    button.
+    button, ``kind`` its class.
     """
     chosen = envelope(values)
     across, held = x.steps(at[chosen]), values[chosen]
     finite = np.isfinite(held)
     down = STEPS - y.steps(np.where(finite, held, 0.0))
     d = "".join(path(across[a:b], down[a:b]) for a, b in runs(finite))
-    return f'<path class="line" {_named(name)}{look.attributes} d="{d}"/>' if d else ""
+    return f'<path class="{kind}" {_named(name)}{look.attributes} d="{d}"/>' if d else ""
 
 
 def band(x: Axis, y: Axis, at: Array, low: Array, high: Array, colour: str, *, name: str = "") -> str:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from biodance.pipeline.replay import SessionReplay, TrialReplay
+from biodance.pipeline.session_frames import SessionReplay, TrialReplay
 from biodance.records import Array
 from biodance.report.figures.still import FORCE_SCALE, RESIDUAL_SCALE
 from biodance.report.pages.template import template_text

@@ -14,8 +14,8 @@ from biodance.identification.validation import TrialValidation
 from biodance.lab.markers.gaps import MarkerGaps
 from biodance.pipeline.attention import session_attention
 from biodance.pipeline.provenance import Provenance
-from biodance.pipeline.replay import SessionReplay
 from biodance.pipeline.results import SessionResult
+from biodance.pipeline.session_frames import SessionReplay
 from biodance.pipeline.trial_result import Check, TrialResult
 from biodance.records import CHANNELS
 from biodance.records.attention import Attention
@@ -151,11 +151,12 @@ def page(
     *,
     attention: Sequence[Attention] | None = None,
     diagnosis: str = "",
+    movement: str = "",
     replay: SessionReplay | None = None,
 ) -> str:
     """Return the page of ``result`` as HTML text; ``attention`` what a person must see (by default
-    `session_attention`), ``diagnosis`` the section on what the simulation gets wrong, "" for none;
-    ``replay`` its frames in 3-D.
+    `session_attention`); ``diagnosis`` and ``movement`` the sections on what the simulation gets wrong and on what
+    moved, "" for none; ``replay`` its frames in 3-D.
 
     The same arguments give the same characters.
     """
@@ -178,7 +179,7 @@ def page(
         headline=next((one for one in said if one.about == ABOUT), None),
         attention=[(trial_and_subject(one), one.text) for one in said if one.about != ABOUT],
         tiles=key_figures(result),
-        contents=_contents(f"{diagnosis}{identified}", replayed=replay is not None),
+        contents=_contents(f"{diagnosis}{identified}{movement}", replayed=replay is not None),
         check_table=check_table(result),
         result=result,
         provenance=provenance,
@@ -188,6 +189,7 @@ def page(
         shown_still=worst,
         more_stills=[(Markup(still_figure(one)), one) for one in others],
         diagnosis=Markup(diagnosis),
+        movement=Markup(movement),
         identification=Markup(identified),
         words=STATUS_WORDS,
     )

@@ -199,11 +199,12 @@ function show() {
   document.body.dataset.second = second.toFixed(3);
   document.body.dataset.phase = now.phase;
   document.body.dataset.frames = ++frames;
+  dispatchEvent(new Event("shown"));
 }
 function tick(time) {
   if (!playing) return;
   const before = moment(second);
-  second += (Math.min(time - stamp, 250) / 1000) * Number(by("speed").value);
+  second += (Math.min(Math.max(time - stamp, 0), 1000) / 1000) * Number(by("speed").value);
   stamp = time;
   sound(before, moment(second));
   show();
@@ -214,7 +215,7 @@ function run(on) {
   playing = on;
   by("play").textContent = on ? "Pause" : second > -LEAD && second < data.duration_s ? "Go on" : "Start";
   if (!on) return show();
-  if (second >= data.duration_s) second = -LEAD;
+  if (second >= data.duration_s) restart();
   audio = audio || new AudioContext();
   stamp = performance.now();
   requestAnimationFrame(tick);
@@ -222,10 +223,15 @@ function run(on) {
 function leap(step) {
   const at = moment(second).cue + step;
   second = at < 0 ? -LEAD : cues[Math.min(at, cues.length - 1)].move_s;
+  dispatchEvent(new Event("leapt"));
   show();
 }
-function stop() {
+function restart() {
   second = -LEAD;
+  dispatchEvent(new Event("restarted"));
+}
+function stop() {
+  restart();
   run(false);
 }
 by("play").onclick = () => run(!playing);
@@ -265,6 +271,7 @@ by("film").onclick = async () => {
   by("camera").hidden = by("align").hidden = !stream;
   by("film").setAttribute("aria-pressed", String(Boolean(stream)));
   if (!stream) { aligned = null; corners(false); }
+  dispatchEvent(new Event("camera"));
   show();
 };
 

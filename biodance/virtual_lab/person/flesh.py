@@ -42,6 +42,11 @@ length.
 """
 
 
+_POPULATION = 0.08
+"""Relative standard deviation of what the people of one place have in common beside the tables' midpoint: as published
+tables differ among themselves (de Leva 1996, Dumas 2018, Zatsiorsky)."""
+
+
 def true_pseudo_inertia(mass: float, com: Array, radii: Array) -> Array:
     """Return J (4, 4) of a body of ``mass`` kg with CoM (3,) m and radii of gyration (3,) m about the frame's axes
     at the CoM.
@@ -105,9 +110,11 @@ def draw_sip(
     side_sd: float,
     shape_sd: float,
     com_sd: float,
+    population: int | None = None,
 ) -> Sip:
     """Draw the true parameters of the 16 segments; their masses add up to ``mass`` kg exactly.
 
+    All persons of one ``population`` differ from the midpoint of the tables alike (`_POPULATION`), None = not at all.
     ``mass_sd`` is the relative sd of a kind of segment, common to both sides; ``side_sd`` that between right and left;
     ``shape_sd`` that of the linear map of the shape; ``com_sd`` the sd of the CoM shift in units of the body's own
     spread along each axis.
@@ -115,6 +122,9 @@ def draw_sip(
     table = _FEMALE if sex == "F" else _MALE
     rng = stream(seed, "flesh")
     factor = {kind: np.exp(mass_sd * rng.normal()) for kind in table}
+    if population is not None:
+        common = stream(population, "population")
+        factor = {kind: own * np.exp(_POPULATION * common.normal()) for kind, own in factor.items()}
     bodies = []
     for segment in TRUE_SEGMENTS:
         kind = next((k for k in ARM_AND_LEG if segment.endswith(k)), segment)

@@ -110,12 +110,13 @@ def make_person(
     loads: tuple[AddedLoad, ...] = (),
     session: int = 0,
     joint_shifts: Mapping[str, Array] = NO_SHIFTS,
+    population: int | None = None,
 ) -> Person:
     """Return the virtual person number ``seed`` of the given mass (kg), stature (m) and sex.
 
     The same ``seed`` is the same body for ever; ``session`` only moves the markers as another day does. ``loads`` come
     on top of the subject's mass. ``joint_shifts`` (3,) m by joint (one of ``MOVABLE``) move true joint centres in the
-    frame of the segment before them.
+    frame of the segment before them. People of one ``population`` have something in common (`draw_sip`).
     """
     t = tolerances
     size = draw_proportions(subject, seed, length_sd=t.segment_length, centre_sd=t.joint_centre, tilt_sd=t.joint_axis)
@@ -129,6 +130,7 @@ def make_person(
         side_sd=t.side_mass,
         shape_sd=t.segment_shape,
         com_sd=t.com,
+        population=population,
     )
     joints = build_joints(size)
     lower, upper = np.radians([LIMITS_DEGREES[j.name.removeprefix("right_").removeprefix("left_")] for j in joints]).T

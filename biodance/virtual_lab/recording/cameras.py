@@ -42,19 +42,30 @@ DRIFT = 0.0005
 """m rms per axis, slower than 0.5 Hz."""
 
 
+TISSUES = {"pulled": (1.0, 1.0, 0.0), "swinging": (0.4, 3.0, 0.0), "wavy": (0.3, 1.0, 1.0)}
+"""Kinds of soft tissue: how many times as large as usual its pull by the joints, its swing under acceleration, and
+waves at frequencies of their own (Cheze 1995, doi:10.1016/0021-9290(94)00072-D) are.
+"""
+_WAVES = (1.0, 8.0)
+"""rad/s between which the frequencies of waves lie: those of whole-body movement."""
+_BENT = 0.5
+"""rad: a wave is as large as what a joint pulls that is bent so far."""
+
+
 @dataclass(frozen=True, eq=False)
 class SoftTissue:
     """Coefficients of one person in one session: ``pull`` (n, K, 3) m/rad per true joint; ``sag`` (K,) s² multiplies
-    the specific force.
+    the specific force; ``wave`` (3, K, 3) amplitude m, frequency rad/s and phase rad per axis.
     """
 
     pull: Array
     sag: Array
+    wave: Array
 
 
-def draw_soft_tissue(person: Person, session: int, tolerances: LabTolerances) -> SoftTissue:
-    """Draw the coefficients: most belong to the person, a share of their variance to the day (clothes, tape, place
-    on the skin).
+def draw_soft_tissue(person: Person, session: int, tolerances: LabTolerances, tissue: str = "pulled") -> SoftTissue:
+    """Draw the coefficients of a kind of ``tissue`` (`TISSUES`): most belong to the person, a share of their variance
+    to the day (clothes, tape, place on the skin).
     """
     joints = [joint.name for joint in person.body.joints]
     markers = person.body.markers
@@ -76,7 +87,17 @@ def draw_soft_tissue(person: Person, session: int, tolerances: LabTolerances) ->
     soft = np.exp(
         0.3 * (np.sqrt(1 - share) * own.normal(size=swing.size) + np.sqrt(share) * day.normal(size=swing.size))
     )
-    return SoftTissue(tolerances.soft_tissue * scale[..., None] * direction, tolerances.soft_tissue * soft / swing**2)
+    pulled, swinging, waving = TISSUES[tissue]
+    waves = stream(person.seed, "waves", str(session))
+    wave = np.stack(
+        [
+            waving * tolerances.soft_tissue * _BENT * scale.max(axis=0)[:, None] * waves.normal(size=(swing.size, 3)),
+            waves.uniform(*_WAVES, size=(swing.size, 3)),
+            waves.uniform(0, 2 * np.pi, size=(swing.size, 3)),
+        ]
+    )
+    pull = pulled * tolerances.soft_tissue * scale[..., None] * direction
+    return SoftTissue(pull, swinging * tolerances.soft_tissue * soft / swing**2, wave)
 
 
 def _kind_and_side(segment: str, marker: str) -> tuple[str, str]:
@@ -114,6 +135,9 @@ def skin_displacement(
     markers: SegmentMarkers = person.body.markers
     turn = poses.rotation[:, list(markers.segment)]
     local = np.einsum("tj,jki->tki", angles - reference_angles(person), tissue.pull)
+    if tissue.wave[0].any():
+        size, frequency, phase = tissue.wave
+        local += size * np.sin(frequency * time[:, None, None] + phase)
     specific = np.einsum("tkji,tkj->tki", turn, GRAVITY - acceleration)
     local += tissue.sag[:, None] * (specific - np.array([0.0, GRAVITY[2], 0.0]))
     if np.any(tissue.sag):

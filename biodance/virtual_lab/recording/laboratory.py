@@ -14,16 +14,45 @@ from biodance.virtual_lab.movement.protocol import TrialPlan
 from biodance.virtual_lab.person.person import Person
 from biodance.virtual_lab.person.placement import MARKER_RADIUS
 from biodance.virtual_lab.person.skeleton import small_rotation
-from biodance.virtual_lab.recording.cameras import SoftTissue, draw_soft_tissue, film
+from biodance.virtual_lab.recording.cameras import TISSUES, SoftTissue, draw_soft_tissue, film
 from biodance.virtual_lab.recording.plates import HALF_SIZE, TruePlate, digitise, lay_plate, sense_plate
 from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances, stream
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Laboratory:
-    """``centre`` (2,) m where the subject stands; ``heading`` rad from lab x that the subject faces; ``plates`` 1, or 2
-    = one under each foot; ``plate_type`` 2 or 4; ``camera_rate`` Hz, ``samples`` of force per camera frame, ``bits`` of
-    the converter.
+    """A place with its instruments, its habits and its people; `family.draw_laboratory` draws one.
+
+    Parameters
+    ----------
+    centre : tuple of float
+        (2,) m where the subject stands.
+    heading : float
+        rad from lab x that the subject faces.
+    plates : int
+        1; 2 = one under each foot; 3 and 4: these two and empty ones before and behind them.
+    plate_type : int
+        2 or 4.
+    camera_rate : float
+        Hz.
+    samples : int
+        Of force per camera frame.
+    bits : int
+        Of the converter.
+    tolerances : LabTolerances
+        How far everything is from the ideal here.
+    moment_zero : float
+        N·m, standard deviation of a plate's zero in each moment, beyond what belongs to its zero in Fz.
+    segments : int
+        12 to 22 parts of the true body that move by themselves, see `family`.
+    tissue : str
+        Kind of soft tissue, one of `cameras.TISSUES`.
+    population : int or None
+        What its people have in common beside the tables (`flesh.draw_sip`); None = nothing.
+    joints : str
+        "functional" or "static": how the joints are placed when its sessions are read.
+    children : bool
+        Whether its people are children.
     """
 
     centre: tuple[float, float] = (0.3, 0.2)
@@ -33,15 +62,27 @@ class Laboratory:
     camera_rate: float = 100.0
     samples: int = 10
     bits: int = 16
+    tolerances: LabTolerances = REALISTIC
+    moment_zero: float = 0.0
+    segments: int = 16
+    tissue: str = "pulled"
+    population: int | None = None
+    joints: str = "functional"
+    children: bool = False
 
     def __post_init__(self) -> None:
-        if self.plates not in (1, 2) or self.plate_type not in (2, 4):
+        if self.plates not in (1, 2, 3, 4) or self.plate_type not in (2, 4):
             raise BiodanceError(
-                f"Laboratory: {self.plates} plates of TYPE {self.plate_type}; legal are 1 or 2 plates of TYPE 2 or 4."
+                f"Laboratory: {self.plates} plates of TYPE {self.plate_type}; legal are 1 to 4 plates of TYPE 2 or 4."
             )
         if self.camera_rate <= 0 or self.samples < 1:
             raise BiodanceError(
                 f"Laboratory: {self.camera_rate} Hz with {self.samples} force samples per frame; both must be positive."
+            )
+        if self.tissue not in TISSUES or not 12 <= self.segments <= 22:
+            raise BiodanceError(
+                f"Laboratory: tissue {self.tissue!r}, {self.segments} segments; legal are {', '.join(TISSUES)} and 12 "
+                f"to 22 segments."
             )
 
 
@@ -65,8 +106,8 @@ Fault = Callable[[Recording], Recording]
 @dataclass(frozen=True, eq=False)
 class LabVisit:
     """The day of a session: its ``number`` (another day: markers glued, postures performed, instruments drawn anew),
-    the ``laboratory``, the ``tolerances`` of everything, and ``faults`` that change each recording (markers, raw analog
-    samples, parameters) before it is written.
+    the ``laboratory``, the ``tolerances`` of everything (None = the laboratory's), and ``faults`` that change each
+    recording (markers, raw analog samples, parameters) before it is written.
 
     ``tilt`` (3,) rad turns the laboratory's axes off the true vertical, beyond the tolerance; ``forces`` act on the
     person beside gravity and ground; ``joint_shifts`` (3,) m by joint (``right_hip``) move true joint centres in the
@@ -76,12 +117,15 @@ class LabVisit:
 
     number: int = 0
     laboratory: Laboratory = field(default_factory=Laboratory)
-    tolerances: LabTolerances = REALISTIC
+    tolerances: LabTolerances = None  # type: ignore[assignment]
     faults: tuple[Fault, ...] = ()
     tilt: tuple[float, float, float] = (0.0, 0.0, 0.0)
     forces: tuple[AppliedForce, ...] = ()
     joint_shifts: Mapping[str, Array] = field(default_factory=dict)
     marker_shifts: Mapping[str, Array] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "tolerances", self.tolerances or self.laboratory.tolerances)
 
 
 FIRST_VISIT = LabVisit()
@@ -106,13 +150,19 @@ def set_up(person: Person, visit: LabVisit) -> Instruments:
     rng = stream(person.seed, "instruments", str(session))
     tilt = np.array([*(tolerances.lab_tilt * rng.normal(size=2)), 0.0]) + np.array(visit.tilt)
     middle = np.array([*laboratory.centre, 0.0])
+    ahead = np.array([np.cos(laboratory.heading), np.sin(laboratory.heading), 0.0]) * HALF_SIZE[1]
     leftward = np.array([-np.sin(laboratory.heading), np.cos(laboratory.heading), 0.0]) * HALF_SIZE[0]
-    sides = [("both", 0.0)] if laboratory.plates == 1 else [("right", -1.0), ("left", 1.0)]
+    places = [("both", 0 * ahead)] if laboratory.plates == 1 else [("right", -leftward), ("left", leftward)]
+    places += [("none", 2 * ahead), ("none", -2 * ahead)][: laboratory.plates - 2] if laboratory.plates > 2 else []
     plates = tuple(
-        lay_plate(middle + sign * leftward, laboratory.heading, side, tolerances, rng) for side, sign in sides
+        lay_plate(middle + place, laboratory.heading, side, tolerances, rng, moment_zero=laboratory.moment_zero)
+        for side, place in places
     )
     return Instruments(
-        visit, plates, frozen_array(small_rotation(tilt), (3, 3), "tilt"), draw_soft_tissue(person, session, tolerances)
+        visit,
+        plates,
+        frozen_array(small_rotation(tilt), (3, 3), "tilt"),
+        draw_soft_tissue(person, session, tolerances, laboratory.tissue),
     )
 
 

@@ -45,7 +45,7 @@ FULL_SCALE = 10.0 * np.diag(CALIBRATION)
 class TruePlate:
     """One plate as it truly is: ``corners`` (4, 3) m as surveyed; ``turn`` (3, 3), ``centre`` (3,) m its true pose in
     the lab frame; ``mixing`` (6, 6) gains and cross-talk; ``offset`` (6,) N, N·m; ``side`` whose foot it carries,
-    "both" for a single plate.
+    "both" for a single plate, "none" for an empty one.
     """
 
     corners: Array
@@ -57,10 +57,16 @@ class TruePlate:
 
 
 def lay_plate(
-    centre: Array, heading: float, side: str, tolerances: LabTolerances, rng: np.random.Generator
+    centre: Array,
+    heading: float,
+    side: str,
+    tolerances: LabTolerances,
+    rng: np.random.Generator,
+    *,
+    moment_zero: float = 0.0,
 ) -> TruePlate:
     """Return a plate whose long side lies along ``heading`` (rad from lab x), surveyed at ``centre`` (3,) m and truly a
-    little elsewhere.
+    little elsewhere; ``moment_zero`` N·m, standard deviation of its moments' zeros beyond that of its forces.
     """
     t, relative = tolerances, FULL_SCALE / FULL_SCALE[2]
     forward, leftward = (
@@ -73,22 +79,20 @@ def lay_plate(
     mixing = t.plate_crosstalk * rng.normal(size=(6, 6)) * np.outer(FULL_SCALE, 1 / FULL_SCALE)
     np.fill_diagonal(mixing, 1.0 + t.plate_gain * rng.normal(size=6))
     true_turn = turn @ small_rotation(t.plate_rotation * rng.normal(size=3))
-    return TruePlate(
-        corners,
-        true_turn,
-        centre + t.plate_position * rng.normal(size=3),
-        mixing,
-        t.plate_offset * relative * rng.normal(size=6),
-        side,
-    )
+    place, zero = centre + t.plate_position * rng.normal(size=3), t.plate_offset * relative * rng.normal(size=6)
+    if moment_zero:
+        zero[3:] += moment_zero * rng.normal(size=3)
+    return TruePlate(corners, true_turn, place, mixing, zero, side)
 
 
 def contact_wrench(performance: Performance, time: Array, side: str) -> Array:
-    """Return the true wrench (T, 6) about the lab origin under one foot, or under "both".
+    """Return the true wrench (T, 6) about the lab origin under one foot, under "both" or "none".
 
     The weight is shared as planned; each foot's pressure lies as far from its own place as the common one from the
     place wanted.
     """
+    if side == "none":
+        return np.zeros((time.size, 6))
     wrench = performance.wrench(time)
     if side == "both":
         return wrench.value

@@ -1,0 +1,172 @@
+"""Curves over a cycle, 0 to 100 %: joint angles, pelvis and foot in the lab, centre of mass."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.cycles.cut import PERCENT, Cycle
+from biodance.cycles.events import heel_and_toe
+from biodance.motion.contact.soles import Soles
+from biodance.motion.kinematics import Poses, centre_of_mass, poses
+from biodance.records import SIDES, Array, Motion, frozen_array
+from biodance.records.arrays import assign
+
+_TRAVELS = 0.3
+"""m that the pelvis goes in a cycle from which its way, not the way it faces, is the direction of walking."""
+_PELVIS = ("pelvis_tilt", "pelvis_obliquity", "pelvis_rotation")
+
+
+@dataclass(frozen=True, eq=False)
+class CycleCurve:
+    """One ``quantity`` over one ``cycle``: ``side`` "right", "left" or "middle" of the joint; ``value`` (101,) at
+    `PERCENT` in ``unit``, NaN = not known; ``sd`` (101,) what the inertial parameters leave uncertain, NaN = not
+    counted.
+    """
+
+    cycle: Cycle
+    quantity: str
+    side: str
+    unit: str
+    value: Array
+    sd: Array
+
+    def __post_init__(self) -> None:
+        assign(
+            self,
+            value=frozen_array(self.value, (PERCENT.size,), f"CycleCurve {self.quantity}"),
+            sd=frozen_array(self.sd, (PERCENT.size,), f"CycleCurve {self.quantity}, sd"),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class CurveGroup:
+    """All repetitions of one quantity: ``kind`` of the cycles; ``values`` (n, 101); their ``mean`` and ``sd`` (101,)
+    between repetitions (NaN for fewer than two); ``parameters_sd`` (101,) what the inertial parameters leave uncertain
+    in the mean (NaN = not counted). NaN where no repetition is known.
+    """
+
+    kind: str
+    quantity: str
+    side: str
+    unit: str
+    values: Array
+    mean: Array
+    sd: Array
+    parameters_sd: Array
+
+
+def over_cycle(
+    cycle: Cycle, quantity: str, side: str, unit: str, time: Array, value: Array, sd: Array | None = None
+) -> CycleCurve:
+    """Return a quantity (T,) of a trial over one of its cycles; NaN beside frames in which it is NaN."""
+    at = cycle.times()
+    spread = np.full(at.size, np.nan) if sd is None else np.interp(at, time, sd)
+    return CycleCurve(cycle, quantity, side, unit, np.interp(at, time, value), spread)
+
+
+def group_curves(curves: Sequence[CycleCurve]) -> tuple[CurveGroup, ...]:
+    """Return the curves of the same kind, quantity and side together, in the order in which they come."""
+    keys = dict.fromkeys((one.cycle.kind, one.quantity, one.side) for one in curves)
+    found = []
+    for kind, quantity, side in keys:
+        same = [one for one in curves if (one.cycle.kind, one.quantity, one.side) == (kind, quantity, side)]
+        values = np.stack([one.value for one in same])
+        mean, spread = mean_and_sd(values)
+        known, _ = mean_and_sd(np.stack([one.sd for one in same]))
+        found.append(CurveGroup(kind, quantity, side, same[0].unit, values, mean, spread, known))
+    return tuple(found)
+
+
+def mean_and_sd(values: Array) -> tuple[Array, Array]:
+    """Return mean and standard deviation (101,) over the rows (n, 101) that are known; NaN for fewer than one, two."""
+    known = np.isfinite(values)
+    count = known.sum(axis=0)
+    mean = np.where(count > 0, np.where(known, values, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
+    square = np.where(known, (values - mean) ** 2, 0.0).sum(axis=0)
+    return mean, np.where(count > 1, np.sqrt(square / np.maximum(count - 1, 1)), np.nan)
+
+
+def angle_curves(cycle: Cycle, body: Body, motion: Motion) -> Iterator[CycleCurve]:
+    """Yield the joint angles of a cycle in degrees: of its own side and of the trunk in a gait cycle, else of all.
+
+    The axes are those of the ISB (Wu et al. 2002, doi:10.1016/S0021-9290(01)00222-6) in the order flexion about the
+    z axis of the proximal segment, adduction about the floating axis, rotation about the y axis of the distal one;
+    docs/guide/movement.md says each sign. In a gait cycle bending and rotation of the trunk are seen from the cycle's
+    side, as those of the pelvis: its own side down, its own side forwards are positive.
+    """
+    angle = np.where(motion.determined[:, None], motion.angles, np.nan)
+    for j, joint in enumerate(body.joints):
+        if (seen := seen_from(cycle, joint.name)) is not None:
+            side, quantity, sign = seen
+            yield over_cycle(cycle, quantity, side, "deg", motion.time, sign * angle[:, j])
+
+
+def seen_from(cycle: Cycle, joint: str) -> tuple[str, str, float] | None:
+    """Return side, name without it and sign with which a joint belongs to a cycle; None where it does not."""
+    side, name = side_and_name(joint)
+    if cycle.side == "both":
+        return side, name, 1.0
+    if side == "middle":
+        return cycle.side, name, -1.0 if cycle.side == "left" and not name.endswith("flexion") else 1.0
+    return (side, name, 1.0) if side == cycle.side else None
+
+
+def side_and_name(joint: str) -> tuple[str, str]:
+    """Return side ("right", "left", "middle") and name without it of a joint or segment: ``left_knee_flexion``."""
+    side, _, name = joint.partition("_")
+    return (side, name) if side in SIDES else ("middle", joint)
+
+
+def lab_curves(cycle: Cycle, body: Body, motion: Motion, soles: Soles) -> Iterator[CycleCurve]:
+    """Yield pelvis, foot progression (deg) and centre of mass (m) of a cycle.
+
+    The pelvis in the frame of the way it goes (of the way it faces on average where it goes nowhere), in the order
+    rotation, obliquity, tilt (Baker 2001, doi:10.1016/S0966-6362(00)00083-7): forward tilt, the cycle's own side up,
+    its own side forward are positive. Foot progression, while the foot stands: toes inwards are positive. The centre of
+    mass: m ahead of where the cycle began, to the side of the foot, over the ground.
+    """
+    pose, time = poses(body, motion.q), motion.time
+    forward = _direction(cycle, pose, time)
+    mirror = -1.0 if cycle.side == "left" else 1.0
+    known = np.where(motion.determined, 1.0, np.nan)
+    right = np.array([forward[1], -forward[0], 0.0])
+    frame = np.stack([np.array([*forward, 0.0]), np.array([0.0, 0.0, 1.0]), right])
+    for name, angle in zip(_PELVIS, _pelvis(frame @ pose.rotation[:, 0], mirror), strict=True):
+        yield over_cycle(cycle, name, "middle" if cycle.side == "both" else cycle.side, "deg", time, known * angle)
+    heel, toe = heel_and_toe(body, soles.outline)
+    for foot, side in enumerate(SIDES):
+        if cycle.side in (side, "both"):
+            ahead, aside = ((toe - heel)[:, foot] @ frame[k] for k in (0, 2))
+            inwards = -np.degrees(np.arctan2(aside, ahead)) * (-1.0 if side == "left" else 1.0)
+            stands = np.where((time > cycle.off) & (cycle.side == side), np.nan, known)
+            yield over_cycle(cycle, "foot_progression", side, "deg", time, stands * inwards)
+    centre = centre_of_mass(body, motion)
+    began = np.array([np.interp(cycle.start, time, column) for column in centre.T]) * np.array([1.0, 1.0, 0.0])
+    ground = float(np.percentile(soles.outline[..., 2].min(axis=(1, 2)), 5))
+    for name, axis, sign, zero in (("ahead", 0, 1.0, 0.0), ("aside", 2, mirror, 0.0), ("height", 1, 1.0, ground)):
+        path = sign * ((centre - began) @ frame[axis]) - zero
+        yield over_cycle(
+            cycle, f"centre_of_mass_{name}", "middle" if cycle.side == "both" else cycle.side, "m", time, known * path
+        )
+
+
+def _direction(cycle: Cycle, pose: Poses, time: Array) -> Array:
+    """Return the horizontal unit vector (2,) in which a cycle goes, or in which the pelvis faces on average."""
+    inside = (time >= cycle.start) & (time <= cycle.end)
+    faces = pose.rotation[inside, 0, :2, 0].mean(axis=0)
+    path = pose.position[inside, 0, :2]
+    way = path[-1] - path[0]
+    chosen = way if np.linalg.norm(way) > _TRAVELS and way @ faces > 0 else faces
+    return np.asarray(chosen / np.linalg.norm(chosen))
+
+
+def _pelvis(rotation: Array, mirror: float) -> tuple[Array, Array, Array]:
+    """Return tilt, obliquity and rotation (T,) deg of the pelvis (T, 3, 3) in the frame forward, up, right; ``mirror``
+    -1 for the left side.
+    """
+    turn = np.arctan2(rotation[:, 0, 2], rotation[:, 2, 2])
+    over = -np.arcsin(np.clip(rotation[:, 1, 2], -1.0, 1.0))
+    tilt = np.arctan2(rotation[:, 1, 0], rotation[:, 1, 1])
+    return -np.degrees(tilt), -mirror * np.degrees(over), mirror * np.degrees(turn)

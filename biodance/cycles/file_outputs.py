@@ -1,0 +1,95 @@
+"""What another program computed into the same C3D file, beside ours: Vicon's joint angles, and the events that the
+laboratory set.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.lab.c3d.outputs import FileOutputs
+from biodance.motion.contact.events import FootEvent
+from biodance.records import Motion
+
+PLUG_IN_GAIT: Mapping[str, tuple[str, int]] = {
+    "hip_flexion": ("HipAngles", 0),
+    "hip_adduction": ("HipAngles", 1),
+    "hip_rotation": ("HipAngles", 2),
+    "knee_flexion": ("KneeAngles", 0),
+    "ankle_dorsiflexion": ("AnkleAngles", 0),
+}
+"""Our angle -> the label (with L or R before it) and component of plug-in gait's, where both have the same positive
+sense. Its knee has two more angles, which ours has not; the turn of its foot is that of a line, not of a body.
+"""
+_NEAR_EVENT = 0.15
+"""s within which an event of ours and one of the file are the same."""
+_FEWEST = 20
+"""Frames without which nothing is compared."""
+
+
+@dataclass(frozen=True)
+class AngleComparison:
+    """One joint angle beside that of the file: ``offset`` deg the mean of ours less the file's, ``sd`` deg of the
+    difference about it, ``correlation`` (NaN where one does not move), over ``frames``.
+    """
+
+    joint: str
+    label: str
+    offset: float
+    sd: float
+    correlation: float
+    frames: int
+
+
+@dataclass(frozen=True)
+class EventComparison:
+    """Our strikes (``down``) or leavings beside the file's: ``late`` s, the mean of ours less the file's, ``sd`` s over
+    ``count`` events; ``missed`` events of the file without one of ours.
+    """
+
+    down: bool
+    late: float
+    sd: float
+    count: int
+    missed: int
+
+
+def compare_angles(body: Body, motion: Motion, outputs: FileOutputs) -> tuple[AngleComparison, ...]:
+    """Return every angle that both have, over the frames in which both are known."""
+    found = []
+    for j, joint in enumerate(body.joints):
+        side, _, name = joint.name.partition("_")
+        label, axis = PLUG_IN_GAIT.get(name, ("", 0))
+        theirs = outputs.angles.get(f"{side[:1].upper()}{label}") if label else None
+        if theirs is None or len(theirs) != motion.time.size:
+            continue
+        known = motion.determined & np.isfinite(theirs).all(axis=1)
+        ours, other = motion.angles[known, j], theirs[known, axis]
+        if ours.size < _FEWEST:
+            continue
+        moves = np.ptp(ours) > 1.0 and np.ptp(other) > 1.0
+        correlation = float(np.corrcoef(ours, other)[0, 1]) if moves else float("nan")
+        apart = ours - other
+        label = f"{side[:1].upper()}{label} {'xyz'[axis]}"
+        found.append(
+            AngleComparison(joint.name, label, float(apart.mean()), float(apart.std()), correlation, ours.size)
+        )
+    return tuple(found)
+
+
+def compare_events(events: tuple[FootEvent, ...], outputs: FileOutputs) -> tuple[EventComparison, ...]:
+    """Return how our events lie beside those that the file holds; () where it holds none."""
+    found = []
+    for down in (True, False):
+        theirs = [one for one in outputs.events if one.down is down]
+        late = []
+        for one in theirs:
+            near = [e.time - one.time for e in events if (e.side, e.down) == (one.side, down)]
+            nearest = min(near, key=abs, default=np.inf)
+            if abs(nearest) < _NEAR_EVENT:
+                late.append(nearest)
+        if theirs:
+            mean, sd = (float(np.mean(late)), float(np.std(late))) if late else (np.nan, np.nan)
+            found.append(EventComparison(down, mean, sd, len(late), len(theirs) - len(late)))
+    return tuple(found)

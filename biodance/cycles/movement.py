@@ -1,0 +1,225 @@
+"""What moved in one trial: events, cycles, curves over each of them, spatio-temporal values, all in one record."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from biodance import display
+from biodance.body.body import Body
+from biodance.cycles.curves import CurveGroup, CycleCurve, angle_curves, group_curves, lab_curves
+from biodance.cycles.cut import PERCENT, Cycle, gait_cycles, repetitions
+from biodance.cycles.events import agreement_of_events, joined_events, kinematic_events
+from biodance.cycles.file_outputs import AngleComparison, EventComparison, compare_angles, compare_events
+from biodance.cycles.loads import load_curves
+from biodance.cycles.steps import Stride, mean_values, strides
+from biodance.errors import TrialRefused, UnknownName
+from biodance.lab.c3d.outputs import FileOutputs
+from biodance.motion.contact.contact import Contact, foot_wrenches
+from biodance.motion.contact.events import FootEvent, foot_events
+from biodance.motion.contact.soles import soles_from_body
+from biodance.records import Array, Motion, Sip, Trial
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_WORDS = {"gait": ("gait cycle", "gait cycles"), "squat": ("squat", "squats"), "sit_to_stand": ("rise", "rises")}
+
+
+@dataclass(frozen=True, eq=False)
+class TrialMovement:
+    """What moved in one trial.
+
+    Parameters
+    ----------
+    trial : str
+        Its name.
+    events : tuple of FootEvent
+        Strikes and leavings of both feet: of the plates where they saw one, else of the markers.
+    cycles : tuple of Cycle
+        Gait cycles of each foot, squats, rises from a chair.
+    curves : tuple of CycleCurve
+        Angles (deg), moments (N·m/kg) and powers (W/kg) of every cycle over 0 to 100 %, with what the parameters leave
+        uncertain in them; pelvis, foot progression and centre of mass.
+    strides : tuple of Stride
+        Spatio-temporal values of every gait cycle.
+    late : tuple
+        (n,) s arrays for strikes and leavings: how much later the markers tell them than the plates.
+    file_angles, file_events : tuple
+        Ours beside those that another program wrote into the same file.
+    notes : tuple of str
+        What a person should know.
+
+    Examples
+    --------
+    >>> biodance.describe_movement(result)["squat_1"]
+    TrialMovement('squat_1': 3 squats)
+    """
+
+    trial: str
+    events: tuple[FootEvent, ...]
+    cycles: tuple[Cycle, ...]
+    curves: tuple[CycleCurve, ...]
+    strides: tuple[Stride, ...]
+    late: tuple[Array, Array]
+    file_angles: tuple[AngleComparison, ...] = ()
+    file_events: tuple[EventComparison, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"TrialMovement({self.trial!r}: {self.told})"
+
+    def _repr_html_(self) -> str:
+        return display.card(repr(self), None, self.notes)
+
+    @property
+    def name(self) -> str:
+        """Name of the trial."""
+        return self.trial
+
+    @property
+    def told(self) -> str:
+        """The repetitions in words."""
+        counts = {kind: sum(one.kind == kind for one in self.cycles) for kind in _WORDS}
+        said = [f"{n} {_WORDS[kind][n > 1]}" for kind, n in counts.items() if n]
+        return ", ".join(said) or "no repetition"
+
+    @property
+    def groups(self) -> tuple[CurveGroup, ...]:
+        """The curves of each quantity and side together, with mean and sd."""
+        return group_curves(self.curves)
+
+    def curve(self, quantity: str, side: str = "right") -> CurveGroup:
+        """Return all repetitions of one quantity.
+
+        Parameters
+        ----------
+        quantity : str
+            As ``knee_flexion``, ``knee_flexion_moment`` or ``knee_power``.
+        side : str
+            "right", "left" or "middle".
+
+        Returns
+        -------
+        CurveGroup
+            ``values`` (n, 101), ``mean``, ``sd`` in ``unit``.
+
+        Raises
+        ------
+        UnknownName
+            There is none; the legal names are listed.
+
+        Examples
+        --------
+        >>> biodance.describe_movement(result)["squat_1"].curve("knee_flexion", "left").unit
+        'deg'
+        """
+        same = [one for one in self.groups if (one.quantity, one.side) == (quantity, side)]
+        if not same:
+            names = tuple(dict.fromkeys(f"{one.quantity} ({one.side})" for one in self.groups))
+            raise UnknownName.of(f"curve of trial {self.trial}", f"{quantity} ({side})", names)
+        return same[0]
+
+    def table(self) -> "pd.DataFrame":
+        """Return mean and sd of every curve.
+
+        Returns
+        -------
+        pandas.DataFrame
+            One row for each quantity, side and per cent: kind, quantity, side, unit, percent, count, mean, sd,
+            parameters_sd.
+
+        Examples
+        --------
+        >>> biodance.describe_movement(result)["squat_1"].table()["percent"].max()
+        100.0
+        """
+        import pandas as pd
+
+        columns = ["kind", "quantity", "side", "unit", "percent", "count", "mean", "sd", "parameters_sd"]
+        rows = [row for one in self.groups for row in _rows(one)]
+        return pd.DataFrame(rows, columns=columns)
+
+    def spatiotemporal(self, side: str = "both") -> dict[str, tuple[float, float, int]]:
+        """Return mean, sd and number of the spatio-temporal values.
+
+        Parameters
+        ----------
+        side : str
+            "right", "left" or "both".
+
+        Returns
+        -------
+        dict
+            Name -> (mean, sd, count) in the units of `cycles.steps.STRIDE_UNITS`; {} where nobody walks.
+
+        Examples
+        --------
+        >>> biodance.describe_movement(result)["squat_1"].spatiotemporal()
+        {}
+        """
+        return mean_values(self.strides, side)
+
+
+def _rows(one: CurveGroup) -> list[tuple[Any, ...]]:
+    count = np.isfinite(one.values).sum(axis=0)
+    return [
+        (one.kind, one.quantity, one.side, one.unit, float(p), int(n), m, s, k)
+        for p, n, m, s, k in zip(PERCENT, count, one.mean, one.sd, one.parameters_sd, strict=True)
+    ]
+
+
+def trial_movement(
+    trial: Trial,
+    body: Body,
+    motion: Motion,
+    *,
+    sip: Sip | None = None,
+    contact: Contact | None = None,
+    outputs: FileOutputs | None = None,
+) -> TrialMovement:
+    """Return what moved in a prepared trial.
+
+    ``sip`` what is known of the inertial parameters (by default the body's), ``contact`` with the plates (None: no
+    forces, so that only trunk and arms have moments), ``outputs`` of another program in the trial's file.
+
+    Raises
+    ------
+    TrialRefused
+        The body has no two feet, or the trial less than three frames.
+    """
+    if motion.time.size < 3:
+        raise TrialRefused(f"Trial {trial.name}: has {motion.time.size} frames, which hold no movement.")
+    soles = soles_from_body(body, motion)
+    markers, force = kinematic_events(body, motion), tuple[FootEvent, ...]()
+    feet = foot_wrenches(trial, contact, soles) if contact is not None else None
+    if contact is not None and feet is not None:
+        force = foot_events(feet, contact)
+    events = joined_events(force, markers) if markers else ()
+    cycles = (*gait_cycles(trial.name, events), *repetitions(trial.name, body, motion, soles))
+    curves: list[CycleCurve] = []
+    for cycle in cycles:
+        curves += [*angle_curves(cycle, body, motion), *lab_curves(cycle, body, motion, soles)]
+        if contact is not None and feet is not None:
+            curves += load_curves(cycle, body, sip or body.sip, motion, feet, contact.told)
+    found = compare_events(events, outputs) if outputs else ()
+    return TrialMovement(
+        trial.name,
+        events,
+        cycles,
+        tuple(curves),
+        strides(cycles, events, body, soles),
+        agreement_of_events(force, markers),
+        compare_angles(body, motion, outputs) if outputs else (),
+        found,
+        _notes(cycles, contact),
+    )
+
+
+def _notes(cycles: Sequence[Cycle], contact: Contact | None) -> tuple[str, ...]:
+    if not cycles:
+        return ("No step, no squat and no rise from a chair was found, so there are no cycles.",)
+    if contact is None:
+        return ("No force plate tells what the ground does, so there are no moments and powers.",)
+    return ()

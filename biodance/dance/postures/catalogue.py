@@ -1,0 +1,161 @@
+"""All postures of one foot configuration that words can make, with the pelvis where it keeps the balance.
+
+The joints of trunk, arms and lifted leg are what the words say; planted legs follow from the feet, and the pelvis
+goes where the centre of mass is over the middle of the support and the knees bend as said.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.dance.limits import Limit
+from biodance.dance.limits.self_collision import surface_distances
+from biodance.dance.performers import APART, Imprecision, centre_of_mass
+from biodance.dance.postures.exchange import counterpart
+from biodance.dance.postures.vocabulary import Word, Words, joint_of
+from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.state import State
+from biodance.motion.kinematics import poses
+from biodance.motion.regressor import regressor
+from biodance.records import Array
+
+_ROUNDS = 5
+"""Corrections of the pelvis; each leaves about a fifth of the error."""
+_DRAWN, _SIGMAS = 64, 3.7
+"""Imprecise copies of a posture that are looked at, and standard deviations of a distance that it must bear."""
+_SPARE = {"foot_placement": 0.05}
+"""Share of the scale kept in reserve where it is another one than the limit's own: the moves are straight."""
+_BACK = 0.03
+"""m behind the middle of the support where people stand: over the arch of the foot."""
+_LEAN, _TILT = ROOT - 2, ROOT - 1
+"""Coordinates of the pelvis' lean to the right, and of its tilt backward."""
+
+
+@dataclass(frozen=True, eq=False)
+class Catalogue:
+    """``words`` of every part of the body on the feet of ``stance``; posture s has the words ``index[s]`` (S, parts)
+    and the coordinates ``x`` (S, n).
+    """
+
+    chain: Chain
+    stance: Stance
+    words: Words
+    index: NDArray[np.intp]
+    x: Array
+
+    @classmethod
+    def of(cls, chain: Chain, stance: Stance, words: Words) -> "Catalogue":
+        """Return all combinations of ``words`` on the feet ``stance``."""
+        index = np.array(list(product(*(range(len(group)) for group in words.values()))), dtype=np.intp)
+        return cls(chain, stance, words, index, posed(chain, stance, words, index))
+
+    @cached_property
+    def parts(self) -> tuple[str, ...]:
+        """What moves, in the order of the columns of ``index``."""
+        return tuple(self.words)
+
+    @cached_property
+    def mirrored(self) -> NDArray[np.intp]:
+        """(S,) number of the posture with the sides exchanged, -1 where there is none."""
+        if any("lifted" in part for part in self.parts):
+            return np.full(len(self.index), -1)
+        place = {tuple(row): s for s, row in enumerate(self.index)}
+        names = {part: [word.key for word in group] for part, group in self.words.items()}
+        other = {part: counterpart(part) for part in self.parts}
+        out = np.full(len(self.index), -1)
+        for s, row in enumerate(self.index):
+            keys = {other[part]: self.words[part][k].mirror for part, k in zip(self.parts, row, strict=True)}
+            if all(keys[part] in names[part] for part in self.parts):
+                out[s] = place[tuple(names[part].index(keys[part]) for part in self.parts)]
+        return out
+
+    def chosen(self, s: int) -> dict[str, Word]:
+        """Return the word of every part of posture ``s``."""
+        return {part: self.words[part][k] for part, k in zip(self.parts, self.index[s], strict=True)}
+
+    @cached_property
+    def standing(self) -> Array:
+        """(S, 6, 10 N) regressor of standing still in each posture."""
+        motion = self.chain.motion(np.arange(len(self.x), dtype=float), self.x, *np.zeros((2, *self.x.shape)))
+        return np.asarray(regressor(self.chain.body, motion)).reshape(len(self.x), 6, -1)
+
+    def keeps(self, s: int, limits: tuple[Limit, ...]) -> str:
+        """Return the limit that posture ``s`` breaks with the reserve for moves and for imprecise people, "" if
+        none.
+        """
+        state = State(self.chain, self.stance, self.x[s : s + 1], *np.zeros((2, 1, self.chain.size)))
+        for limit in (limit for limit in limits if limit.at_rest):
+            spare = _SPARE.get(limit.name, limit.hold_reserve(self.stance)) * limit.scale
+            if (limit.margins(state).value < spare).any():
+                return limit.name
+        return "" if self.apart(s) else "self_collision"
+
+    def apart(self, s: int) -> bool:
+        """Return whether segments stay `APART` when people copy posture ``s`` imprecisely."""
+        how, rng = Imprecision(), np.random.default_rng(0)
+        x = np.repeat(self.x[s : s + 1], _DRAWN, axis=0)
+        x[:, ROOT:] += how.tracking * rng.normal(size=(_DRAWN, self.chain.size - ROOT))
+        x[:, 3:ROOT] += how.pelvis * how.tracking * rng.normal(size=(_DRAWN, 3))
+        x = self.chain.plant(x, self.stance.planted, self.stance.ankle)
+        motion = self.chain.motion(np.arange(_DRAWN, dtype=float), x, *np.zeros((2, *x.shape)))
+        gap, _ = surface_distances(self.chain.body, poses(self.chain.body, motion.q), near=np.inf)
+        return bool((gap.mean(axis=0) - _SIGMAS * gap.std(axis=0) > APART).all())
+
+
+def posed(chain: Chain, stance: Stance, words: Words, index: NDArray[np.intp]) -> Array:
+    """Return the coordinates (S, n) of the postures with the words ``index`` (S, parts)."""
+    x, knee, names = np.zeros((len(index), chain.size)), np.zeros(len(index)), _columns(chain)
+    for column, (part, group) in enumerate(words.items()):
+        for k, word in enumerate(group):
+            rows = index[:, column] == k
+            ahead, aside = word.pelvis
+            x[rows, _TILT] -= ahead
+            x[rows, _LEAN] += aside if part.startswith("left") else -aside
+            for joint, angle in word.angles:
+                if part == "legs" and joint == "knee_flexion":
+                    knee[rows] = angle
+                elif (name := joint_of(part, joint)) in names:
+                    x[rows, names[name]] = angle
+    return settled(chain, stance, x, knee)
+
+
+def _columns(chain: Chain) -> dict[str, int]:
+    return {joint.name: ROOT + j for j, joint in enumerate(chain.body.joints)}
+
+
+def settled(chain: Chain, stance: Stance, x: Array, knee: Array) -> Array:
+    """Return coordinates ``x`` (S, n) with the pelvis over the middle of the support and the planted ``knee`` (S,) rad
+    bent; of a person on a stool on the seat.
+    """
+    x = x.copy()
+    if stance.seat:
+        x[:, 2] = stance.seat
+        return x
+    x[:, :2] = middle = _middle(stance)
+    for _ in range(_ROUNDS):
+        x[:, 2] = pelvis_height(chain, stance, x, knee)
+        x = chain.plant(x, stance.planted, stance.ankle)
+        x[:, :2] += middle - centre_of_mass(chain, x)[:, :2]
+    x[:, 2] = pelvis_height(chain, stance, x, knee)
+    return chain.plant(x, stance.planted, stance.ankle)
+
+
+def _middle(stance: Stance) -> Array:
+    """Return the point (2,) m over which people stand: behind the middle of the support, or of the foot that bears."""
+    along = stance if stance.over is None else stance.on(stance.over)
+    return np.array([along.centre[0] - _BACK, stance.centre[1]])
+
+
+def pelvis_height(chain: Chain, stance: Stance, x: Array, knee: Array) -> Array:
+    """Return the height (S,) m of the pelvis at which no planted knee is bent by less than ``knee`` (S,) rad."""
+    turn, tops = chain.root_rotation(x), []
+    for side in stance.planted:
+        leg = chain.legs[side]
+        hip = turn @ leg.hip
+        across = np.sum((x[:, :2] + hip[:, :2] - stance.ankle[side, :2]) ** 2, axis=1)
+        tops.append(stance.ankle[side, 2] + np.sqrt(np.maximum(leg.length(knee) ** 2 - across, 0.01)) - hip[:, 2])
+    return np.min(tops, axis=0)

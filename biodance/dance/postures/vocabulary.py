@@ -1,0 +1,164 @@
+"""Postures that people know, limb by limb, and a few free ones of the arms: what a followable dance is made of.
+
+The words lie in ``protocols/vocabulary/people.toml``, which explains its keys.
+"""
+
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.dance.problem.plan import Plan
+from biodance.dance.problem.stance import Stance
+from biodance.errors import BiodanceError
+from biodance.library import locate, read_toml
+from biodance.records import SIDES
+
+_KEYS = ("name", "angles", "mirror", "rest", "gentle", "deep", "double")
+_GROUPS = ("arm", "trunk", "legs", "lifted", "hanging")
+TILT, LEAN = "pelvis_tilt", "pelvis_lean"
+"""Angles of a word that are no joint's: how far the pelvis leans forward, and towards the leg that stands."""
+_FREE = {
+    "shoulder_flexion": (0, 30, 60, 90, 120),
+    "shoulder_adduction": (-45, -60, -75, -90),
+    "shoulder_rotation": (-30, 0, 30),
+    "elbow_flexion": (10, 45, 75, 105),
+}
+"""degrees: what free postures of an arm are drawn from; away from trunk and thighs."""
+_FREE_WORDS = 8
+_FITS = np.radians(25.0)
+"""rad: a word that a person's range shortens by more is not asked of that person."""
+_STOP = np.radians(1.5)
+"""rad that a word keeps from a joint's stop."""
+
+
+@dataclass(frozen=True)
+class Word:
+    """What one group of joints does: ``angles`` (joint without side, rad), positive in the joint's anatomical sense.
+
+    ``text`` as it is called; ``mirror`` the key of the word that does the same on the other side.
+    """
+
+    key: str
+    text: str
+    angles: tuple[tuple[str, float], ...]
+    mirror: str
+    rest: bool = False
+    gentle: bool = False
+    deep: bool = False
+    double: bool = False
+
+    @property
+    def pelvis(self) -> tuple[float, float]:
+        """How far the pelvis leans forward, and towards the leg that stands, rad."""
+        angles = dict(self.angles)
+        return angles.get(TILT, 0.0), angles.get(LEAN, 0.0)
+
+
+Words = dict[str, tuple[Word, ...]]
+"""Group: its words, the one for rest first."""
+
+
+def read_vocabulary(name: str = "people") -> Words:
+    """Return the words of a file in ``protocols/vocabulary``.
+
+    Raises
+    ------
+    BiodanceError
+        A group is missing or unknown, a key is unknown, a group has not one word for rest, or a mirror image is missing.
+    """
+    path = locate("protocols/vocabulary", name)
+    raw = read_toml(path)
+    if set(raw) != set(_GROUPS):
+        raise BiodanceError(f"{path}: groups {', '.join(sorted(raw))}; expected {', '.join(_GROUPS)}.")
+    found = {}
+    for group in _GROUPS:
+        words = sorted((_word(f"{path}: {group}.{key}", key, raw[group][key]) for key in raw[group]), key=_resting)
+        keys = [word.key for word in words]
+        if [word.rest for word in words] != [True] + [False] * (len(words) - 1):
+            raise BiodanceError(f"{path}: {group} needs exactly one word with rest = true.")
+        if lost := [word.mirror for word in words if word.mirror not in keys]:
+            raise BiodanceError(f"{path}: {group} names the mirror image {lost[0]!r}, which is not there.")
+        found[group] = tuple(words)
+    return found
+
+
+def _resting(word: Word) -> bool:
+    return not word.rest
+
+
+def _word(where: str, key: str, raw: dict[str, Any]) -> Word:
+    if unknown := set(raw) - set(_KEYS):
+        raise BiodanceError(f"{where}: unknown key {sorted(unknown)[0]!r}; legal are {', '.join(_KEYS)}.")
+    angles = tuple((joint, float(np.radians(angle))) for joint, angle in raw.get("angles", {}).items())
+    flags = {name: bool(raw.get(name, False)) for name in ("rest", "gentle", "deep", "double")}
+    return Word(key, str(raw["name"]), angles, str(raw.get("mirror", key)), **flags)
+
+
+def groups_of(stance: Stance) -> dict[str, str]:
+    """Return what moves on these feet: part of the body (``right_arm``, ``trunk``, ``legs``, ``left_lifted`` ...) and
+    the group of words that it takes.
+    """
+    parts = {"trunk": "trunk", **{f"{side}_arm": "arm" for side in SIDES}}
+    if stance.seat:
+        return parts | {f"{side}_hanging": "hanging" for side in SIDES}
+    up = [SIDES[side] for side in (0, 1) if side not in stance.planted]
+    return parts | {"legs": "legs"} | {f"{side}_lifted": "lifted" for side in up}
+
+
+def words_for(body: Body, plan: Plan, stance: Stance, words: Words, rng: np.random.Generator) -> Words:
+    """Return for every part of `groups_of` what this person may be asked on these feet, rest first; ``rng`` draws the
+    free postures of the arms.
+    """
+    alone = len(stance.planted) == 1
+    out: Words = {}
+    free = () if plan.gentle else free_words(rng)
+    for part, group in groups_of(stance).items():
+        kept = [
+            word
+            for word in (*words[group], *(free if group == "arm" else ()))
+            if (plan.deep or not word.deep) and (word.gentle or not plan.gentle) and not (alone and word.double)
+        ]
+        fitted = [_fitted(body, part, word) for word in kept if stance.over is None or word.rest or group == "arm"]
+        out[part] = tuple(word for word in fitted if word is not None)
+    return out
+
+
+def free_words(rng: np.random.Generator) -> tuple[Word, ...]:
+    """Return free postures of an arm, on a grid of angles that can be called."""
+    grid = list(product(*_FREE.values()))
+    chosen = sorted(int(k) for k in rng.choice(len(grid), _FREE_WORDS, replace=False))
+    out = []
+    for number, k in enumerate(chosen, start=1):
+        angles = tuple((joint, float(np.radians(angle))) for joint, angle in zip(_FREE, grid[k], strict=True))
+        key = f"free_{number}"
+        out.append(Word(key, f"{{}} arm free {number}", angles, key))
+    return tuple(out)
+
+
+def joint_of(part: str, joint: str) -> str:
+    """Return the name of the body's joint of a word's angle: ``right_arm``, ``shoulder_flexion`` ->
+    ``right_shoulder_flexion``.
+    """
+    side = part.partition("_")[0]
+    return f"{side}_{joint}" if side in SIDES else joint
+
+
+def _fitted(body: Body, part: str, word: Word) -> Word | None:
+    """Return the word within the ranges of this body, None where that would leave too little of it."""
+    if part == "legs":
+        return word
+    names, angles = [joint.name for joint in body.joints], []
+    for joint, angle in word.angles:
+        if joint in (TILT, LEAN):
+            angles.append((joint, angle))
+            continue
+        j = names.index(joint_of(part, joint))
+        low, high = body.limits.lower[j] + _STOP, body.limits.upper[j] - _STOP
+        near = float(np.clip(angle, min(low, high), max(low, high)))
+        if abs(near - angle) > _FITS and not word.rest:
+            return None
+        angles.append((joint, near))
+    return Word(word.key, word.text, tuple(angles), word.mirror, word.rest, word.gentle, word.deep, word.double)

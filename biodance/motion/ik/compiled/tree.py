@@ -1,0 +1,133 @@
+"""The motion of a tree of joints and the regressor of its segments, compiled (numba): what `motion.kinematics` and
+`motion.regressor` define, frame by frame.
+
+``parent`` (n,) is the joint before each, -1 the root. Functions fill the arrays that come last.
+"""
+
+import numpy as np
+
+from biodance.motion.ik.compiled import compiled
+
+
+@compiled
+def _apply(R, v, out):
+    """Fill out (3,) with R v."""
+    for c in range(3):
+        out[c] = R[c, 0] * v[0] + R[c, 1] * v[1] + R[c, 2] * v[2]
+
+
+@compiled
+def _apply_transposed(R, v, out):
+    """Fill out (3,) with R' v."""
+    for c in range(3):
+        out[c] = R[0, c] * v[0] + R[1, c] * v[1] + R[2, c] * v[2]
+
+
+@compiled
+def _add_product(a, b, out):
+    """Add the vector product a x b to out (3,)."""
+    out[0] += a[1] * b[2] - a[2] * b[1]
+    out[1] += a[2] * b[0] - a[0] * b[2]
+    out[2] += a[0] * b[1] - a[1] * b[0]
+
+
+@compiled
+def _multiply(A, B, out):
+    """Fill out (3, k) with A (3, 3) times B (3, k)."""
+    for c in range(3):
+        for d in range(B.shape[1]):
+            out[c, d] = A[c, 0] * B[0, d] + A[c, 1] * B[1, d] + A[c, 2] * B[2, d]
+
+
+@compiled
+def place_joints(parent, turn, translation, root_rotation, root_position, angle, rotation, position):
+    """Fill rotation (T, n, 3, 3) and position (T, n, 3) m of the joints at angle (T, n) rad; ``turn`` (n, 3, 3, 3): a
+    joint's own rotation is turn[0] + sin turn[1] + (1 - cos) turn[2].
+    """
+    own, arm = np.empty((3, 3)), np.empty(3)
+    for t in range(angle.shape[0]):
+        for j in range(parent.shape[0]):
+            k, sine, versine = parent[j], np.sin(angle[t, j]), 1 - np.cos(angle[t, j])
+            above, place = (root_rotation[t], root_position[t]) if k < 0 else (rotation[t, k], position[t, k])
+            for c in range(3):
+                for d in range(3):
+                    own[c, d] = turn[j, 0, c, d] + sine * turn[j, 1, c, d] + versine * turn[j, 2, c, d]
+            _multiply(above, own, rotation[t, j])
+            _apply(above, translation[j], arm)
+            for c in range(3):
+                position[t, j, c] = place[c] + arm[c]
+
+
+@compiled
+def move_joints(parent, axis, rotation, position, root, rate, rate2, moved):
+    """Fill moved (3, T, n, 3), angular velocity rad/s, angular acceleration rad/s² and acceleration m/s² of the joints,
+    lab, from rate (T, n) and rate2 (T, n); ``root`` (4, T, 3) the root's same three, then its position m.
+    """
+    arm, spin, across = np.empty(3), np.empty(3), np.empty(3)
+    for t in range(rate.shape[0]):
+        for j in range(parent.shape[0]):
+            k = parent[j]
+            w, dw, a, x = root[0, t], root[1, t], root[2, t], root[3, t]
+            if k >= 0:
+                w, dw, a, x = moved[0, t, k], moved[1, t, k], moved[2, t, k], position[t, k]
+            omega, alpha, acceleration = moved[0, t, j], moved[1, t, j], moved[2, t, j]
+            _apply(rotation[t, j], axis[j], spin)
+            for c in range(3):
+                arm[c], across[c] = position[t, j, c] - x[c], 0.0
+                alpha[c], acceleration[c] = dw[c] + spin[c] * rate2[t, j], a[c]
+                spin[c] *= rate[t, j]
+                omega[c] = w[c] + spin[c]
+            _add_product(w, spin, alpha)
+            _add_product(dw, arm, acceleration)
+            _add_product(w, arm, across)
+            _add_product(w, across, acceleration)
+
+
+@compiled
+def fill_regressor(rotation, position, omega, alpha, drive, W):
+    """Fill W (T, 6, 10N) for segments with angular velocity ``omega``, angular acceleration ``alpha`` and ``drive`` =
+    acceleration minus gravity (T, N, 3), lab; W holds zeros.
+    """
+    w, dw, column = np.empty(3), np.empty(3), np.empty(3)
+    A, L, B, first, second = np.empty((3, 3)), np.zeros((3, 6)), np.empty((3, 6)), np.empty((3, 3)), np.empty((3, 6))
+    for t in range(position.shape[0]):
+        for s in range(position.shape[1]):
+            R, p, f, own = rotation[t, s], position[t, s], drive[t, s], W[t, :, 10 * s : 10 * s + 10]
+            _apply_transposed(R, omega[t, s], w)
+            _apply_transposed(R, alpha[t, s], dw)
+            square = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
+            for c in range(3):
+                for d in range(3):
+                    A[c, d] = w[c] * w[d] - (square if c == d else 0.0)
+            A[0, 1], A[0, 2], A[1, 2] = A[0, 1] - dw[2], A[0, 2] + dw[1], A[1, 2] - dw[0]
+            A[1, 0], A[2, 0], A[2, 1] = A[1, 0] + dw[2], A[2, 0] - dw[1], A[2, 1] + dw[0]
+            _multiply(R, A, first)
+            _inertia_columns(w, L)
+            for d in range(6):
+                B[0, d] = w[1] * L[2, d] - w[2] * L[1, d]
+                B[1, d] = w[2] * L[0, d] - w[0] * L[2, d]
+                B[2, d] = w[0] * L[1, d] - w[1] * L[0, d]
+            _inertia_columns(dw, L)
+            B += L
+            _multiply(R, B, second)
+            for c in range(3):
+                own[c, 0] = f[c]
+                for d in range(3):
+                    own[c, 1 + d] = first[c, d]
+                for d in range(6):
+                    own[3 + c, 4 + d] = second[c, d]
+            _add_product(p, f, own[3:, 0])
+            for d in range(3):
+                column[:] = 0.0
+                _add_product(p, first[:, d], column)
+                _add_product(R[:, d], f, column)
+                own[3:, 1 + d] = column
+
+
+@compiled
+def _inertia_columns(v, L):
+    """Fill L (3, 6) with L [Ixx Ixy Iyy Ixz Iyz Izz] = I v."""
+    x, y, z = v
+    L[0, 0], L[0, 1], L[0, 3] = x, y, z
+    L[1, 1], L[1, 2], L[1, 4] = x, y, z
+    L[2, 3], L[2, 4], L[2, 5] = x, y, z

@@ -1,0 +1,152 @@
+"""What a results folder keeps so that nothing is computed twice: the body and the motions of the trials."""
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.body.body_file import read_body
+from biodance.errors import FileRefused, SessionRefused, TrialRefused
+from biodance.lab.session.read import read_session
+from biodance.motion.contact.contact import ground_contact
+from biodance.motion.contact.soles import soles_from_body
+from biodance.pipeline.results import SessionResult
+from biodance.pipeline.trial import attempt, compare_wrenches, prepare_trial
+from biodance.pipeline.trial_result import Step, TrialResult
+from biodance.records import Array, Motion, Trial
+from biodance.settings import Value
+
+BODY = "body.json"
+"""File in which `biodance identify` and `report` keep the identified body."""
+SCALED = "scaled_body.json"
+"""The same where nothing was identified: scaled, with the table's parameters; nobody's earlier body (``--body``)."""
+MOTIONS = "motions.npz"
+"""File in which they keep the motions, and where the recordings lie."""
+_ARRAYS = ("time", "q", "v", "a", "residual", "determined")
+_TEXTS = ("marker_names", "notes", "joint_names")
+
+
+@dataclass(frozen=True, eq=False)
+class KeptResults:
+    """A results folder as read: ``body`` with ``source`` in words; ``motions`` by trial; ``hashes`` of the recordings
+    by trial and what their ``loads`` sum to after preparing (N·s, N·m·s); ``session`` folder of the recordings, whose
+    ``settings`` were chosen.
+    """
+
+    body: Body
+    source: str
+    motions: dict[str, Motion]
+    hashes: dict[str, str]
+    loads: dict[str, Array]
+    session: Path
+    settings: Mapping[str, Value]
+
+
+def keep_motions(result: SessionResult, folder: Path) -> Path | None:
+    """Write the motions of all trials into a results folder; return the path, None where there are none."""
+    moved = [one for one in result.trials if one.motion is not None]
+    if not moved:
+        return None
+    held: dict[str, np.ndarray] = {"session": np.array(os.path.relpath(result.session.folder, folder))}
+    held["trials"] = np.array([one.name for one in moved])
+    held["hashes"] = np.array([one.trial.source.sha256 for one in moved])
+    held["loads"] = np.array([_load(one.trial) for one in moved])
+    held["settings"] = np.array(json.dumps(result.settings.as_dict()))
+    for k, one in enumerate(moved):
+        held |= {f"{k}.{name}": np.asarray(getattr(one.motion, name)) for name in _ARRAYS}
+        held |= {f"{k}.{name}": np.array(getattr(one.motion, name), dtype=str) for name in _TEXTS}
+    part = folder / f".{MOTIONS}.part"
+    with open(part, "wb") as stream:
+        np.savez(stream, **held)  # type: ignore[arg-type]
+    part.replace(folder / MOTIONS)
+    return folder / MOTIONS
+
+
+def kept_body(folder: Path) -> Path:
+    """Return the file with the body of a results folder, which may itself be that file; it need not exist."""
+    return (
+        folder
+        if folder.is_file()
+        else next((folder / name for name in (BODY, SCALED) if (folder / name).is_file()), folder / BODY)
+    )
+
+
+def read_kept(folder: Path) -> KeptResults:
+    """Return what a results folder keeps.
+
+    Raises
+    ------
+    SessionRefused
+        It keeps no motions: it was made by an earlier version, or no trial gave one.
+    FileRefused
+        A file in it is none of biodance's.
+    """
+    body, source = read_body(kept_body(folder))
+    if not (folder / MOTIONS).is_file():
+        raise SessionRefused(f"{folder}: holds a body and no trial. Give the session folder instead.")
+    try:
+        with np.load(folder / MOTIONS, allow_pickle=False) as held:
+            motions = {str(name): _motion(held, k) for k, name in enumerate(held["trials"])}
+            hashes = dict(zip(motions, (str(one) for one in held["hashes"]), strict=True))
+            loads = dict(zip(motions, held["loads"], strict=True))
+            session = Path(os.path.normpath(folder / str(held["session"])))
+            settings = json.loads(str(held["settings"]))
+    except (OSError, ValueError, KeyError) as error:
+        raise FileRefused(f"{folder / MOTIONS}: is no file of motions ({error}). Run the session again.") from error
+    return KeptResults(body, source, motions, hashes, loads, session, settings)
+
+
+def _load(trial: Trial) -> Array:
+    """Return the sum (6,) of a prepared trial's wrench over time; zeros without plates."""
+    return np.nansum(trial.wrench.value, axis=0) if trial.plates else np.zeros(6)
+
+
+def _motion(held: "np.lib.npyio.NpzFile", k: int) -> Motion:
+    arrays = {name: held[f"{k}.{name}"] for name in _ARRAYS}
+    return Motion(**arrays, **{name: tuple(str(one) for one in held[f"{k}.{name}"]) for name in _TEXTS})
+
+
+def kept_trials(kept: KeptResults, names: tuple[str, ...], *, subject: str | None = None) -> tuple[TrialResult, ...]:
+    """Return trials of a results folder with their recordings prepared again; nothing is tracked or identified.
+
+    Raises
+    ------
+    SessionRefused
+        The recordings are not where they were.
+    TrialRefused
+        A recording is not the one that the motion was found in.
+    """
+    if not kept.session.is_dir():
+        raise SessionRefused(
+            f"{kept.session}: the recordings that these results come from are not there. Put them back, or give the "
+            f"session folder."
+        )
+    session = read_session(kept.session, subject_name=subject, settings=kept.settings)
+    return tuple(_again(session[name], kept, name) for name in names)
+
+
+def _again(trial: Trial, kept: KeptResults, name: str) -> TrialResult:
+    if trial.source.sha256 != kept.hashes[name]:
+        raise TrialRefused(
+            f"Trial {name}: {trial.source.path} has changed since the results were made. Run the session again."
+        )
+    ready, motion, steps = prepare_trial(trial), kept.motions[name], list[Step]()
+    if not np.allclose(_load(ready.trial), kept.loads[name], rtol=1e-6, atol=1e-3):
+        raise TrialRefused(
+            f"Trial {name}: its plates were corrected when the results were made (a lab.toml). Give the session folder."
+        )
+    one = TrialResult(ready.trial, ready.steps, motion=motion)
+    if not ready.trial.plates:
+        return one
+    soles = soles_from_body(kept.body, motion)
+    mass = float(kept.body.sip.mass.sum())
+    contact = attempt(steps, "contact", lambda: ground_contact(ready.trial, soles, mass=mass))
+    if contact is None:
+        return one
+    return replace(
+        one, comparison=attempt(steps, "compare", lambda: compare_wrenches(ready.trial, kept.body, motion, contact))
+    )

@@ -1,0 +1,138 @@
+"""A folder that OpenSim opens as it is: model with geometry, markers, motion, forces of the ground, and the set-up of
+its inverse dynamics, whose torques are ours.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.body.export import write_model
+from biodance.body.solids import SegmentSolids, segment_solids
+from biodance.errors import BiodanceError, SessionRefused, TrialRefused
+from biodance.lab.opensim.inverse_dynamics import external_loads, ground_table, inverse_dynamics_setup
+from biodance.lab.opensim.mot import TimeTable, write_mot
+from biodance.lab.opensim.trc import write_trc
+from biodance.lab.plain_text import write_new
+from biodance.lab.session.results_folder import made_folder
+from biodance.motion.contact.contact import Contact, foot_wrenches
+from biodance.motion.contact.soles import soles_from_body
+from biodance.motion.dynamics import joint_torques
+from biodance.pipeline.coordinates import opensim_coordinates
+from biodance.pipeline.movement import contact_of
+from biodance.pipeline.trial_result import TrialResult
+from biodance.records import SIDES, Motion, Wrench, runs
+
+MODEL = "model.osim"
+_SHORTEST = 10
+"""Frames without which no inverse dynamics is set up."""
+
+
+@dataclass(frozen=True)
+class OpensimTrial:
+    """What was written of one trial: ``files`` by name; ``dynamics`` the span (s) in which the plates measure all, None
+    where they never do; ``why_not`` in words.
+    """
+
+    trial: str
+    files: tuple[str, ...]
+    dynamics: tuple[float, float] | None
+    why_not: str = ""
+
+
+def write_opensim_folder(
+    trials: tuple[TrialResult, ...],
+    body: Body,
+    folder: Path,
+    *,
+    source: str,
+    solids: SegmentSolids | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+) -> tuple[OpensimTrial, ...]:
+    """Write ``model.osim`` with the meshes of its segments, and the files of every trial that gives a motion.
+
+    These are ``.trc`` (markers), ``.mot`` (coordinates), ``_forces.mot`` (of each foot), ``_ExternalLoads.xml``,
+    ``_InverseDynamics.xml`` over the longest span in which the plates measure all, and ``_torques.sto``, our own.
+
+    Raises
+    ------
+    SessionRefused
+        The folder holds files already.
+    TrialRefused
+        No trial gives a motion.
+    BiodanceError
+        The body's inertia cannot exist, or OpenSim cannot hold its joints.
+    """
+    moving = [one for one in trials if one.motion is not None]
+    if not moving:
+        said = " ".join(one.reason for one in trials)
+        raise TrialRefused(
+            f"{folder}: no trial gives a motion, so there is nothing for OpenSim to move. {said}".strip()
+        )
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise SessionRefused(f"{folder}: holds files already and nothing is overwritten. Give another folder.")
+    made_folder(folder)
+    tell("writing the model")
+    solids = segment_solids(body) if solids is None else solids
+    write_model(body, folder / MODEL, format="osim", source=source, solids=solids)
+    written = []
+    for one in moving:
+        tell(f"writing {one.name}")
+        written.append(_trial(one, body, folder))
+    return tuple(written)
+
+
+def _trial(one: TrialResult, body: Body, folder: Path) -> OpensimTrial:
+    motion, name = one.motion, one.name
+    assert motion is not None
+    files = [write_mot(folder / f"{name}.mot", opensim_coordinates(body, motion)).name]
+    if one.trial.markers is not None:
+        files.insert(0, write_trc(folder / f"{name}.trc", one.trial.markers).name)
+    contact = contact_of(one.trial, one, body)
+    if contact is None:
+        return OpensimTrial(name, tuple(files), None, "It has no force plate.")
+    feet = foot_wrenches(one.trial, contact, soles_from_body(body, motion))
+    ground = {f"{side}_foot": _finite(wrench) for side, wrench in zip(SIDES, feet, strict=True)}
+    files.append(write_mot(folder / f"{name}_forces.mot", ground_table(ground, name=name)).name)
+    loads = external_loads(tuple(ground), data_file=f"{name}_forces.mot")
+    files.append(write_new(folder / f"{name}_ExternalLoads.xml", loads.encode()).name)
+    span = _span(contact, motion)
+    if span is None:
+        return OpensimTrial(name, tuple(files), None, f"The plates do not measure all the ground does. {one.reason}")
+    between = (float(motion.time[span.start]), float(motion.time[span.stop - 1]))
+    setup = inverse_dynamics_setup(
+        name,
+        model=MODEL,
+        coordinates=f"{name}.mot",
+        loads=f"{name}_ExternalLoads.xml",
+        between=between,
+        out=f"{name}_opensim_torques.sto",
+    )
+    files.append(write_new(folder / f"{name}_InverseDynamics.xml", setup.encode()).name)
+    files.append(write_mot(folder / f"{name}_torques.sto", _torques(body, motion, ground, span, name)).name)
+    return OpensimTrial(name, tuple(files), between)
+
+
+def _finite(wrench: Wrench) -> Wrench:
+    """Return a wrench with zeros where the plates tell nothing: OpenSim's files hold finite numbers only, and no
+    dynamics is set up there.
+    """
+    return Wrench(wrench.time, np.nan_to_num(wrench.value))
+
+
+def _span(contact: Contact, motion: Motion) -> slice | None:
+    """Return the longest run of frames in which plates and markers tell all; None where it is too short."""
+    first, stop = max(runs(contact.measured & motion.determined), key=lambda run: run[1] - run[0], default=(0, 0))
+    return slice(first, stop) if stop - first >= _SHORTEST else None
+
+
+def _torques(body: Body, motion: Motion, ground: dict[str, Wrench], span: slice, name: str) -> TimeTable:
+    """Return our torques in OpenSim's names, N·m."""
+    try:
+        found = joint_torques(body, motion, ground)
+    except BiodanceError as why:
+        raise TrialRefused(f"Trial {name}: {why}") from why
+    columns = tuple(f"{joint.name}_moment" for joint in body.joints)
+    return TimeTable(f"{name} torques of biodance", columns, motion.time[span], found.torque[span])

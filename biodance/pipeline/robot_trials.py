@@ -1,0 +1,181 @@
+"""Which plate recording belongs to which motion of a robot, when and where; what contradicts it, in a sentence."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.errors import BiodanceError, FileRefused, TrialRefused
+from biodance.identification.robot import RobotMotion, robot_fit, surprise
+from biodance.lab.filters import LowPass, low_pass
+from biodance.lab.robot.encoders import for_joints
+from biodance.lab.robot.recording import BaseSensors, RobotRecording, RobotTrial
+from biodance.motion.base_seen import BaseSeen, base_of_inclinations, base_of_markers
+from biodance.motion.clocks import PlateFit, fit_plate, on_motion_clock
+from biodance.motion.grounded import RATE, Grounded, even_angles, ground
+from biodance.motion.regressor import predict_wrench
+from biodance.records import Array, Wrench
+
+_SAME = 0.9
+"""Least correlation of the paths of the centre of pressure, needed and measured, of one motion."""
+_SCALES = (0.7, 1.4)
+"""Legal sizes of the measured path over the needed one."""
+_WEIGHTS = (0.5, 2.0)
+"""Legal weight on the plate over that of the drawing."""
+ODD, _FAITHFUL = 1.6, 0.99
+"""Beyond this surprise, or below this correlation, exchanged columns are looked for."""
+_BETTER = 0.25
+"""They are named if, exchanged back, they leave so much of what the correlation lacks to one."""
+_COARSE = 20.0
+"""Hz at which exchanged columns are looked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class MatchedTrial:
+    """One trial with plate and encoders brought together: ``motion`` to identify from, ``plate`` when and where,
+    ``measured`` wrench, filtered, on the plate's clock, ``surprise`` of the drawing at it.
+    """
+
+    recorded: RobotTrial
+    motion: RobotMotion
+    plate: PlateFit
+    measured: Wrench
+    surprise: float
+
+
+def bring_together(
+    body: Body, recording: RobotRecording, *, tell: Callable[[str], None] = lambda _: None
+) -> tuple[list[MatchedTrial], dict[str, str]]:
+    """Return the trials in which plate and encoders are of one motion, and why others are not, by name."""
+    trials, refused = list[MatchedTrial](), dict[str, str]()
+    for one in recording.trials:
+        tell(f"{one.name}: bringing plate and encoders together")
+        try:
+            trials.append(_matched(body, one, recording))
+        except BiodanceError as why:
+            refused[one.name] = str(why)
+    return trials, refused
+
+
+def _matched(body: Body, one: RobotTrial, recording: RobotRecording) -> MatchedTrial:
+    """Return one trial with plate and encoders brought together."""
+    where = str(one.files[0])
+    limits = (np.asarray(body.limits.lower), np.asarray(body.limits.upper))
+    encoders = for_joints(one.encoders, tuple(j.name for j in body.joints), limits, where=where, fixed=recording.fixed)
+    time, angle = even_angles(encoders)
+    measured = Wrench(one.wrench.time, low_pass(one.wrench.value, one.wrench.rate, LowPass()))
+    carried = float(np.median(measured.value[:, 2])) / -float(body.gravity[2])
+    weight = float(body.sip.mass.sum())
+    if not _WEIGHTS[0] < carried / weight < _WEIGHTS[1]:
+        raise TrialRefused(
+            f"{one.files[1]}: carries {carried:.2f} kg (median), {body.name} weighs {weight:.2f} kg. Is it the plate "
+            f"of this robot, in N, zeroed while empty?"
+        )
+    base = recording.base
+    grounded, fit = _stood(body, time, angle, measured, base=_inclined(one, base, time))
+    if base.markers:
+        grounded = _marked(body, one, base, grounded, angle, fit)
+    motion = robot_fit(one.name, grounded, angle, on_motion_clock(measured, time, fit))
+    odd = surprise(body, motion)
+    foreign = fit.correlation < _SAME or not _SCALES[0] < fit.scale < _SCALES[1]
+    if odd > ODD or fit.correlation < _FAITHFUL:
+        pair = _exchanged(body, time, angle, measured, limits)
+        if pair:
+            raise TrialRefused(
+                f"{where}: the columns of {pair[0]} and {pair[1]} are exchanged: exchanged back, the motion needs what "
+                f"the plate shows. Correct the headings."
+            )
+    if foreign:
+        raise TrialRefused(
+            f"{one.files[1]}: is not the plate of this motion ({where}): at no delay does its centre of pressure "
+            f"follow what the encoders need (best correlation {fit.correlation:.2f}, least {_SAME:g}; size "
+            f"{fit.scale:.2f}, legal {_SCALES[0]:g} to {_SCALES[1]:g}). Pair the files of one run; else look for a "
+            f"wrong sign or zero of an encoder, or hands on the robot."
+        )
+    return MatchedTrial(replace(one, encoders=encoders), motion, fit, measured, odd)
+
+
+def _stood(
+    body: Body,
+    time: Array,
+    angle: Array,
+    measured: Wrench,
+    *,
+    settings: LowPass | None = None,
+    base: BaseSeen | None = None,
+) -> tuple[Grounded, PlateFit]:
+    """Return the motion and its place on the plate; where the angles leave open which foot stands, the plate tells."""
+    tried = []
+    for lean in (None, 0, 1):
+        found = ground(body, time, angle, settings=settings, lean=lean, base=base)
+        tried.append((found, fit_plate(predict_wrench(body, found.motion), measured, found.use)))
+        if not found.unclear:
+            break
+    return max(tried, key=lambda pair: pair[1].correlation)
+
+
+def _inclined(one: RobotTrial, base: BaseSensors, time: Array) -> BaseSeen | None:
+    """Return what the base's IMU shows at ``time`` (T,) s; None without one."""
+    if base.imu is None:
+        return None
+    lost = [name for name in base.imu if name not in one.encoders.joints]
+    if lost:
+        raise FileRefused(f"{one.files[0]}: has no column {lost[0]}, which recording.toml [base] imu names.")
+    columns = [one.encoders.joints.index(name) for name in base.imu]
+    _, angle = even_angles(replace(one.encoders, joints=base.imu, angle=one.encoders.angle[:, columns]))
+    return base_of_inclinations(*angle.T)
+
+
+def _marked(body: Body, one: RobotTrial, base: BaseSensors, found: Grounded, angle: Array, fit: PlateFit) -> Grounded:
+    """Return the motion with the base where its markers are, in the frame of the first standing sole; only frames with
+    all markers count.
+    """
+    if one.markers is None:
+        raise FileRefused(f"{one.files[1]}: holds no markers, which recording.toml [base] markers names.")
+    time, seen = found.motion.time, one.markers
+    rotation, position = base_of_markers(seen, dict(base.markers), str(one.files[1]))
+    whole = np.isfinite(position[:, 0])
+    rows = np.column_stack([position, rotation.reshape(-1, 9)])
+    at = time + fit.delay
+    rows = np.stack([np.interp(at, seen.time[whole], row[whole]) for row in rows.T], axis=1)
+    near = np.interp(at, seen.time, whole, left=0.0, right=0.0) > 1 - 1e-9
+    u, _, vt = np.linalg.svd(rows[:, 3:].reshape(-1, 3, 3))
+    c, s = np.cos(fit.yaw), np.sin(fit.yaw)
+    turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    pose = BaseSeen(turn @ (u @ vt), (rows[:, :3] - [*fit.place, 0.0]) @ turn.T)
+    out = ground(body, time, angle, lean=found.lean, base=pose)
+    return replace(out, use=out.use & near)
+
+
+def _exchanged(
+    body: Body, time: Array, angle: Array, measured: Wrench, limits: tuple[Array, Array]
+) -> tuple[str, str] | None:
+    """Return the two joints whose exchange lets the plate follow from the encoders; None if no exchange does."""
+    step, slow = round(RATE / _COARSE), LowPass(cutoff=0.2 * _COARSE)
+    measured = Wrench(measured.time, low_pass(measured.value, measured.rate, slow))
+    coarse, few = time[::step], angle[::step]
+    low, high = limits[0] - 0.35, limits[1] + 0.35
+    inside = (few.min(axis=0)[:, None] >= low) & (few.max(axis=0)[:, None] <= high)
+    moving = few.std(axis=0) > 0.01
+    best, pair = min(_BETTER * _lacking(body, coarse, few, measured), 2 * (1 - _FAITHFUL)), None
+    for i, j in combinations(range(few.shape[1]), 2):
+        if not (inside[i, j] and inside[j, i] and (moving[i] or moving[j])):
+            continue
+        other = few.copy()
+        other[:, [i, j]] = few[:, [j, i]]
+        size = _lacking(body, coarse, other, measured)
+        if size < best:
+            best, pair = size, (body.joints[i].name, body.joints[j].name)
+    return pair
+
+
+def _lacking(body: Body, time: Array, angle: Array, measured: Wrench) -> float:
+    """Return what the correlation at a coarse motion lacks to one; infinite where nothing fits."""
+    try:
+        found, fit = _stood(body, time, angle, measured, settings=LowPass(cutoff=0.2 * _COARSE))
+        legal = _SCALES[0] < fit.scale < _SCALES[1] and found.use.any()
+        return 1 - fit.correlation if legal else np.inf
+    except BiodanceError:
+        return np.inf

@@ -1,0 +1,232 @@
+// Follows the person before the camera, grades every posture by what it tells, and asks for what is missing. Pictures
+// go from the camera into a worker of this page and are forgotten there.
+const LOOKS = 192, SURE = 0.3, ENOUGH = 0.9, AGAIN = 12; // pixels; how sure; share of the plan; looks between two counts
+const NAMED = [["nose", 0], ...follow.points.map((one) => [one.name, one.number])];
+let worker = null, busy = false, box = null, looks = 0, others = 0, unclear = { said: "", times: 0 };
+let camera = { at: [2.8, 0, 1.0, 0], count: 0 }, last = null, knots = {}, paused = false;
+
+// ---- the worker and its pictures ----
+const page = (id) => bytes(by(id).textContent);
+function begin() {
+  if (worker) return;
+  try {
+    worker = new Worker(URL.createObjectURL(new Blob([page("pose-program")], { type: "text/javascript" })));
+  } catch (error) {
+    return report("This browser cannot follow you (" + error.name + "); the dance works without it.");
+  }
+  worker.onerror = () => report("Following failed in this browser; the dance works without it.");
+  worker.onmessage = ({ data: told }) => {
+    busy = false;
+    if (told.error) return report("Following failed in this browser (" + told.error + "); the dance works without it.");
+    document.body.dataset.follow = "ready";
+    if (told.points) told.tag.second ? count(told) : take(told);
+    look();
+  };
+  busy = true;
+  report("Getting ready to follow you.");
+  const [wasm, weights] = ["pose-kernels", "pose-weights"].map(page);
+  worker.postMessage({ wasm, weights, topology: new TextDecoder().decode(page("pose-model")) }, [wasm, weights]);
+}
+const small = document.createElement("canvas");
+small.width = small.height = LOOKS;
+const pen = small.getContext("2d", { willReadFrequently: true });
+function look() { // send the newest picture, cut to a square about the person; or all of it without the person
+  const film = by("camera");
+  if (!worker || busy || !stream || film.readyState < 2 || document.hidden) return;
+  const width = film.videoWidth, height = film.videoHeight, size = Math.max(width, height);
+  const whole = { x: (width - size) / 2, y: (height - size) / 2, size }, again = last && ++looks % AGAIN === 0;
+  const cut = box && !again ? box : whole, s = LOOKS / cut.size;
+  pen.fillStyle = "#777";
+  pen.fillRect(0, 0, LOOKS, LOOKS);
+  pen.drawImage(film, -cut.x * s, -cut.y * s, width * s, height * s);
+  if (again && last.frame) pen.fillRect(...[last.frame.x - cut.x, last.frame.y - cut.y, last.frame.w, last.frame.h].map(
+    (value) => value * s));
+  const pixels = pen.getImageData(0, 0, LOOKS, LOOKS).data.buffer;
+  busy = true;
+  worker.postMessage({ pixels, tag: { cut, width, height, at: second, second: again } }, [pixels]);
+}
+function found({ points, tag }) { // 17 points in pixels of the picture
+  const { x, y, size } = tag.cut;
+  return Array.from({ length: 17 }, (_, k) => ({ x: x + points[3 * k + 1] * size, y: y + points[3 * k] * size,
+    sure: points[3 * k + 2] }));
+}
+function extent(points, more) {
+  const xs = points.map((one) => one.x), ys = points.map((one) => one.y), margin = more * Math.max(
+    Math.max(...xs) - Math.min(...xs), Math.max(...ys) - Math.min(...ys));
+  const left = Math.min(...xs) - margin, top = Math.min(...ys) - margin;
+  return { x: left, y: top, w: Math.max(...xs) + margin - left, h: Math.max(...ys) + margin - top };
+}
+function around(points) { // the square about the hips that holds trunk and limbs (as in MoveNet's own demonstration)
+  const trunk = [5, 6, 11, 12].map((k) => points[k]);
+  if (trunk.some((one) => one.sure < 0.2)) return null;
+  const x = (trunk[2].x + trunk[3].x) / 2, y = (trunk[2].y + trunk[3].y) / 2;
+  const reach = (list) => Math.max(...list.map((one) => Math.max(Math.abs(one.x - x), Math.abs(one.y - y))));
+  const half = Math.max(1.9 * reach(trunk), 1.2 * reach(points.filter((one) => one.sure > 0.2)));
+  return { x: x - half, y: y - half, size: 2 * half };
+}
+function count(told) { // is there somebody else where the person is not?
+  const sure = found(told).filter((one) => one.sure > SURE);
+  others = sure.length >= 9 ? others + 1 : 0;
+}
+
+// ---- who is seen ----
+function unseen(points) { // why nobody can be followed now; "" when somebody can
+  const sees = (...names) => names.filter((name) => points[NAMED.find(([one]) => one === name)[1]].sure > SURE).length;
+  const all = NAMED.filter(([name]) => sees(name)).length;
+  if (all < 5) return "I see nobody. Step into the picture.";
+  if (others > 0) return "I see two people. Only one may be in the picture.";
+  if (sees("left shoulder", "right shoulder") < 2 && sees("nose") < 1) return "I do not see your head and shoulders.";
+  if (sees("left ankle", "right ankle", "left knee", "right knee") < 3) return "I do not see your legs and feet. Step back.";
+  return all < 9 ? "I see only a part of you. Step back, into the light." : "";
+}
+function take(told) {
+  const points = found(told), why = unseen(points), { width, height, at: when } = told.tag;
+  const sure = points.filter((one) => one.sure > SURE);
+  document.body.dataset.looks = 1 + Number(document.body.dataset.looks ?? 0);
+  document.body.dataset.ms = told.ms.toFixed(1);
+  box = around(points);
+  unclear = { said: why, times: why === unclear.said ? unclear.times + 1 : 1 };
+  if (unclear.times === 3 || (why && unclear.times > 3 && by("followed").textContent !== why)) report(why);
+  last = sure.length >= 5 ? { frame: extent(sure, 0.12), p: last?.p } : null;
+  if (why || when < 0 || !playing) return;
+  const plan = planned(when), spots = follow.points.map(({ number }) => (points[number].sure > SURE ? {
+    x: (2 * points[number].x - width) / height, y: 1 - (2 * points[number].y) / height, sure: points[number].sure } : null));
+  const one = fit(spots, plan, last.p, camera);
+  if (!one.p.every(Number.isFinite)) return void (last.p = null);
+  last.p = one.p;
+  const share = 1 / Math.min(++camera.count, 50);
+  camera.at = camera.at.map((value, k) => value + share * (one.p[k] - value));
+  keep(when, one);
+  correct(when, plan, one);
+}
+function report(text) {
+  by("followed").textContent = text;
+  document.body.dataset.followed = text;
+}
+
+// ---- what is told by what was danced: the plan, moved by what the camera saw at knots of time ----
+const smooth = (u) => u * u * u * (10 - 15 * u + 6 * u * u);
+const knot = (phase, when) => { // the end of a hold, the middle of a move
+  const part = (when - phase.start) / (phase.end - phase.start);
+  if (phase.kind === "hold") return part > 0.3 ? "hold" + phase.posture : null;
+  return Math.abs(part - 0.5) < 0.17 ? "move" + phase.posture : null;
+};
+function keep(when, one) {
+  const phase = follow.phases.find(({ start, end }) => when >= start && when < end), key = phase && knot(phase, when);
+  if (key) (knots[key] ??= []).push(one.p.slice(4));
+}
+function middle(key) { // median over looks of every deviation; null when nothing was seen
+  const rows = knots[key];
+  return rows && rows[0].map((_, j) => rows.map((row) => row[j]).sort((a, b) => a - b)[rows.length >> 1]);
+}
+function states(phase, deviation) { // the motion of a phase as danced
+  const steps = Math.max(3, Math.floor((phase.end - phase.start) * follow.rate + 1e-6) + 1);
+  return Array.from({ length: steps }, (_, k) => {
+    const part = k / (steps - 1), plan = planned(phase.start + part * (phase.end - phase.start)), d = deviation(part);
+    if (!d) return plan;
+    return stand(moved(plan, [0, 0, 0, 0, ...d]), plan, phase.planted);
+  });
+}
+function danced(phase) { // information of a phase as the camera saw it; null when it did not
+  const after = middle("hold" + phase.posture);
+  if (phase.kind === "hold") return after && information(states(phase, () => after), true);
+  const before = middle("hold" + (phase.posture - 1)), between = middle("move" + phase.posture);
+  if (!after || !before) return null;
+  const blend = (a, b, u) => a.map((value, j) => value + smooth(u) * (b[j] - value));
+  return information(states(phase, (part) => (!between ? blend(before, after, part) : part < 0.5
+    ? blend(before, between, 2 * part) : blend(between, after, 2 * part - 1))), false);
+}
+const sum = (A, B) => A.map((value, i) => value + B[i]), mean = (list) => list.reduce((a, b) => a + b, 0) / list.length;
+const full = [], intended = (phase) => full[follow.phases.indexOf(phase)] ??= information(states(phase, () => null),
+  phase.kind === "hold");
+let H = new Float64Array(P * P), known = new Array(PARTS).fill(0), goal = null, graded = new Set(), grades = {};
+function grade(phase) { // after a hold: what the move that led to it and the posture itself have told
+  const mine = follow.phases.filter((one) => one.posture === phase.posture), parts = mine.map(danced);
+  graded.add(phase.posture);
+  const whole = shares(mine.map(intended).reduce(sum, H)), before = known;
+  parts.forEach((part) => { if (part) H = sum(H, part); });
+  known = parts.some(Boolean) ? shares(H) : known;
+  const got = mean(known) - mean(before), could = mean(whole) - mean(before);
+  grades[phase.posture] = Math.round(100 * Math.min(1, Math.max(0, got / Math.max(could, 1e-6))));
+  const number = cues[phase.posture].number;
+  by("grade").textContent = parts.some(Boolean) ? `Posture ${number}: ${grades[phase.posture]} % of what it can tell.`
+    : `Posture ${number}: I did not see it.`;
+  draw_known();
+  if (!paused && known.every((value, s) => value >= ENOUGH * goal[s])) finish();
+}
+function draw_known() {
+  goal ??= shares(follow.phases.map(intended).reduce(sum));
+  const percent = known.map((value, s) => Math.min(100, Math.round((100 * value) / goal[s])));
+  by("parts").replaceChildren(...percent.map((value, s) => {
+    const item = words(`${follow.segments[s]}: ${value} %`);
+    item.style.setProperty("--share", value + "%");
+    return item;
+  }));
+  document.body.dataset.known = known.map((value) => value.toFixed(4)).join(" ");
+  document.body.dataset.goal = goal.map((value) => value.toFixed(4)).join(" ");
+}
+function finish() {
+  paused = true;
+  run(false);
+  by("now").textContent = "Enough is known. Thank you";
+  by("ask").textContent = "";
+  document.body.dataset.enough = second.toFixed(2);
+}
+function missing() { // at the end: the posture that adds most to what was danced
+  const open = known.map((value, s) => value / goal[s]), least = open.indexOf(Math.min(...open));
+  if (open[least] >= ENOUGH) return "";
+  const gain = (p) => shares(follow.phases.filter((one) => one.posture === p).map(intended).reduce(sum, H))[least];
+  const best = [...graded].map((p) => [gain(p), p]).sort((a, b) => b[0] - a[0])[0];
+  return best ? `Least is known of your ${follow.segments[least]}: dance posture ${cues[best[1]].number} once more.` : "";
+}
+
+// ---- what to correct now, in a posture that is held ----
+const WAYS = [[2, "higher", "lower"], [1, "further to your left", "further to your right"]];
+let asked_for = "", asked_times = 0;
+function correct(when, plan, one) {
+  const now = moment(when);
+  if (now.phase !== "hold") return void (by("ask").textContent = "");
+  const phase = follow.phases.find(({ kind, start, end }) => kind === "hold" && when >= start && when < end);
+  if (!phase) return;
+  const is = joints(pose(stand(moved(plan, one.p), plan, phase.planted))), want = joints(pose(plan));
+  let worst = 0.1, said = ""; // m
+  want.forEach((x, k) => WAYS.forEach(([axis, more, less]) => {
+    const off = x[axis] - is[k][axis], weight = follow.points[k].asks;
+    if (weight * Math.abs(off) > worst) [worst, said] = [weight * Math.abs(off), `${follow.points[k].name} ${off > 0
+      ? more : less}`];
+  }));
+  asked_times = said === asked_for ? asked_times + 1 : 0;
+  asked_for = said;
+  if (asked_times >= 1) by("ask").replaceChildren(...(said ? words(said[0].toUpperCase() + said.slice(1) + ".").childNodes
+    : [document.createTextNode("Good.")]));
+}
+
+// ---- in step with the page ----
+addEventListener("camera", () => {
+  by("known").hidden = !stream;
+  if (stream) begin();
+  else report("");
+  last = box = null;
+  camera.count = 0;
+  if (stream) draw_known();
+  look();
+});
+setInterval(look, 40);
+addEventListener("shown", () => {
+  if (!stream || !playing && second < data.duration_s) return;
+  const over = follow.phases.find((one) => one.kind === "hold" && !graded.has(one.posture) && second >= one.end - 0.05
+    && second < one.end + 3);
+  if (over) grade(over);
+  if (second >= data.duration_s) by("ask").textContent = missing();
+});
+addEventListener("leapt", () => { // what is danced once more tells once more
+  const from = moment(second).cue;
+  graded = new Set([...graded].filter((posture) => posture < from));
+  for (const key of Object.keys(knots)) if (Number(key.slice(4)) >= from) delete knots[key];
+  paused = false;
+});
+addEventListener("restarted", () => {
+  [H, known, graded, grades, knots, paused] = [new Float64Array(P * P), new Array(PARTS).fill(0), new Set(), {}, {}, false];
+  for (const id of ["ask", "grade"]) by(id).textContent = "";
+  if (stream) draw_known();
+});

@@ -1,0 +1,239 @@
+"""Cycles and curves on movements whose events, lengths and angles are set by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from biodance.body.human.human import human
+from biodance.cycles.curves import angle_curves, group_curves, lab_curves
+from biodance.cycles.cut import Cycle, gait_cycles, repetitions
+from biodance.cycles.events import agreement_of_events, joined_events, kinematic_events
+from biodance.cycles.file_outputs import compare_angles, compare_events
+from biodance.cycles.loads import load_curves
+from biodance.cycles.steps import mean_values, strides
+from biodance.lab.c3d.outputs import FileEvent, FileOutputs
+from biodance.motion.contact.events import FootEvent
+from biodance.motion.contact.soles import soles_from_body
+from biodance.motion.dynamics import joint_torques
+from biodance.motion.kinematics import poses
+from biodance.records import Motion, Subject, Wrench
+
+BODY = human(Subject(62.0, 1.70, "F", 30.0, "S01"))
+RATE = 100.0
+STRIDE, STANCE, SPEED = 1.1, 0.66, 1.2
+"""s, s, m/s of the walk made by hand."""
+
+
+def motion_of(time, columns, root):
+    """A motion with the named angles (rad), the others zero; root (T, 3) m, upright, facing lab x."""
+    q = np.tile(BODY.neutral, (time.size, 1))
+    q[:, :3] = root
+    for name, angle in columns.items():
+        q[:, 7 + BODY.joint_index(name)] = angle
+    v, a = np.zeros((2, time.size, BODY.nv))
+    v[:, 6:] = np.gradient(q[:, 7:], time, axis=0)
+    v[:, :3] = np.gradient(q[:, :3], time, axis=0) @ BODY_FROM_LAB
+    return Motion(time, q, v, a, joint_names=tuple(joint.name for joint in BODY.joints))
+
+
+BODY_FROM_LAB = Rotation.from_quat(BODY.neutral[3:7]).as_matrix()
+
+
+def walk(*, speed=SPEED, belt=0.0, turned=0.0):
+    """Straight legs swing so that each foot goes with the ground from strike to leaving: time, motion, true strikes."""
+    time = np.arange(0, 5, 1 / RATE)
+    leg = (
+        -poses(BODY, BODY.neutral[None]).position[0, [3, 6], 2].mean()
+        + poses(BODY, BODY.neutral[None]).position[0, 1, 2]
+    )
+    columns, strikes = {}, {}
+    for side, first in (("right", 0.2), ("left", 0.2 + STRIDE / 2)):
+        phase = (time - first) % STRIDE
+        half = speed * STANCE / 2
+        swing = (phase - STANCE) / (STRIDE - STANCE)
+        place = np.where(phase < STANCE, half - speed * phase, -half + 2 * half * (3 * swing**2 - 2 * swing**3))
+        columns[f"{side}_hip_flexion"] = np.arcsin(place / leg)
+        columns[f"{side}_ankle_dorsiflexion"] = -np.arcsin(place / leg)
+        strikes[side] = np.arange(first, 5, STRIDE)
+    root = np.stack([(speed - belt) * time, 0 * time, 0.9 + 0 * time], axis=1)
+    moved = motion_of(time, columns, root)
+    if turned:
+        turn = Rotation.from_euler("z", turned)
+        q = moved.q.copy()
+        q[:, :3], q[:, 3:7] = turn.apply(q[:, :3]), (turn * Rotation.from_quat(q[:, 3:7])).as_quat()
+        moved = replace(moved, q=q)
+    return moved, strikes
+
+
+@pytest.mark.parametrize("kind", [{}, {"belt": SPEED}, {"turned": 2.0}])
+def test_strikes_and_leavings_are_found_where_the_feet_take_the_ground_s_speed(kind):
+    moved, strikes = walk(**kind)
+    found = kinematic_events(BODY, moved)
+    for side, true in strikes.items():
+        for down, shift in ((True, 0.0), (False, STANCE)):
+            ours = np.array([e.time for e in found if e.side == side and e.down is down])
+            inside = [t for t in true + shift if 0.3 < t < 4.7]
+            assert len(inside) >= 3
+            for t in inside:
+                assert np.abs(ours - t).min() < 0.025
+
+
+def test_strides_have_the_speed_length_cadence_and_width_that_were_walked():
+    moved, _ = walk()
+    events = kinematic_events(BODY, moved)
+    cycles, soles = gait_cycles("walk", events), soles_from_body(BODY, moved)
+    found = mean_values(strides(cycles, events, BODY, soles))
+    hips = 2 * BODY.joints[BODY.joint_index("right_hip_flexion")].translation[2]
+    expected = {
+        "cadence": (120 / STRIDE, 1.0),
+        "speed": (SPEED, 0.02),
+        "stride_length": (SPEED * STRIDE, 0.02),
+        "step_length": (SPEED * STRIDE / 2, 0.03),
+        "step_width": (hips, 0.003),
+        "stance": (100 * STANCE / STRIDE, 3.5),
+        "double_support": (100 * (2 * STANCE / STRIDE - 1), 7.0),
+    }
+    for name, (value, within) in expected.items():
+        assert found[name][0] == pytest.approx(value, abs=within), name
+
+
+def test_on_a_treadmill_the_belt_s_way_is_walked():
+    moved, _ = walk(belt=SPEED)
+    events = kinematic_events(BODY, moved)
+    found = mean_values(strides(gait_cycles("walk", events), events, BODY, soles_from_body(BODY, moved)))
+    assert found["speed"][0] == pytest.approx(SPEED, abs=0.05)
+
+
+def test_who_stands_makes_no_step_and_a_lone_swing_is_no_cycle():
+    time = np.arange(0, 3, 1 / RATE)
+    still = motion_of(time, {}, np.tile([0, 0, 0.9], (time.size, 1)))
+    assert kinematic_events(BODY, still) == ()
+    same = tuple(FootEvent(t, "right", True) for t in (0.5, 1.5))
+    assert gait_cycles("swing", same) == ()
+    assert len(gait_cycles("walk", (*same, FootEvent(1.0, "left", True)))) == 1
+
+
+def test_a_plate_s_event_comes_before_the_markers_and_how_late_they_are_is_said():
+    force = (FootEvent(1.0, "right", True),)
+    markers = (FootEvent(1.02, "right", True, "markers"), FootEvent(1.6, "right", False, "markers"))
+    assert [e.source for e in joined_events(force, markers)] == ["force", "markers"]
+    strikes, leavings = agreement_of_events(force, markers)
+    assert strikes == pytest.approx([0.02])
+    assert leavings.size == 0
+
+
+def bent(time, hip, knee, lean=0.0):
+    """Knees and hips bent with the feet where they were: the root follows."""
+    columns = {
+        f"{side}_{name}": angle
+        for side in ("right", "left")
+        for name, angle in (("hip_flexion", hip), ("knee_flexion", knee), ("ankle_dorsiflexion", knee - hip))
+    }
+    moved = motion_of(time, columns | {"trunk_flexion": lean + 0 * time}, np.zeros((time.size, 3)))
+    foot = poses(BODY, moved.q).position[:, BODY.segment_index("right_foot")]
+    q = moved.q.copy()
+    q[:, :3] = foot[:1] * [1, 1, 0] - foot + [0, 0, 0.08] + [0.0, 0.0, 0.0]
+    return replace(moved, q=q)
+
+
+def test_squats_are_counted_from_standing_to_standing():
+    time = np.arange(0, 9, 1 / RATE)
+    depth = np.where((time > 1) & (time < 7), 0.5 - 0.5 * np.cos(np.pi * (time - 1)), 0.0)
+    moved = bent(time, np.radians(62) * depth, np.radians(95) * depth, lean=np.radians(45) * depth)
+    found = repetitions("squat", BODY, moved, soles_from_body(BODY, moved))
+    assert [one.kind for one in found] == ["squat"] * 3
+    assert [one.off for one in found] == pytest.approx([2.0, 4.0, 6.0], abs=0.02)
+    assert all(1.0 < one.duration < 2.0 for one in found)
+
+
+def test_a_rise_from_a_chair_begins_seated_and_ends_standing():
+    time = np.arange(0, 5, 1 / RATE)
+    up = np.clip((time - 2) / 1.5, 0, 1)
+    up = up**2 * (3 - 2 * up)
+    moved = bent(time, np.radians(90) * (1 - up), np.radians(90) * (1 - up), lean=np.radians(30) * np.sin(np.pi * up))
+    (one,) = repetitions("chair", BODY, moved, soles_from_body(BODY, moved))
+    assert one.kind == "sit_to_stand"
+    assert 1.9 < one.start < 2.3
+    assert 2.2 < one.off < one.end < 3.6
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_the_pelvis_has_the_signs_that_the_docstring_says(side):
+    time = np.arange(0, 2, 1 / RATE)
+    sign = 1.0 if side == "right" else -1.0
+    turn = Rotation.from_euler("ZXY", [sign * 10, -sign * 6, 4], degrees=True)  # lab: up, forward, left
+    still = motion_of(time, {}, np.stack([1.2 * time, 0 * time, 0.9 + 0 * time], axis=1))
+    q = still.q.copy()
+    q[:, 3:7] = (turn * Rotation.from_quat(BODY.neutral[3:7])).as_quat()
+    moved = replace(still, q=q)
+    cycle = Cycle("walk", "gait", side, 0.2, 1.6, np.nan)
+    found = {one.quantity: one.value.mean() for one in lab_curves(cycle, BODY, moved, soles_from_body(BODY, moved))}
+    assert found["pelvis_tilt"] == pytest.approx(4, abs=1e-6)  # about the left axis: forwards
+    assert found["pelvis_obliquity"] == pytest.approx(6, abs=1e-6)
+    assert found["pelvis_rotation"] == pytest.approx(10, abs=1e-6)
+    assert found["centre_of_mass_height"] > 0.5
+
+
+def test_repeats_have_mean_and_sd_and_gaps_stay_gaps():
+    time = np.arange(0, 4, 1 / RATE)
+    angle = np.where(time < 2, 0.2, 0.4)
+    moved = motion_of(time, {"right_knee_flexion": angle}, np.zeros((time.size, 3)))
+    moved = replace(moved, determined=(time < 2.5) | (time > 3.0))
+    cycles = [Cycle("t", "gait", "right", start, start + 1.0, np.nan) for start in (0.5, 2.4)]
+    curves = [one for cycle in cycles for one in angle_curves(cycle, BODY, moved)]
+    (knee,) = [one for one in group_curves(curves) if one.quantity == "knee_flexion"]
+    assert knee.values.shape == (2, 101)
+    assert knee.mean[0] == pytest.approx(np.degrees(0.3))
+    assert knee.sd[0] == pytest.approx(np.degrees(0.2) / np.sqrt(2))
+    assert knee.mean[30] == pytest.approx(np.degrees(0.2))
+    assert np.isnan(knee.sd[30])
+    assert {one.side for one in curves} == {"right"}
+
+
+def test_moments_and_powers_are_those_of_recursive_newton_euler_per_kg():
+    rng = np.random.default_rng(3)
+    moved, _ = walk()
+    moved = replace(moved, a=rng.normal(0, 1, moved.a.shape))
+    feet = tuple(Wrench(moved.time, rng.normal(0, 100, (moved.time.size, 6))) for _ in range(2))
+    told = np.ones((moved.time.size, 2), dtype=bool)
+    cycle = Cycle("walk", "gait", "left", 0.5, 1.5, np.nan)
+    step = rng.normal(0, 1e-2, BODY.sip.phi.size) * np.abs(BODY.sip.phi)
+    sip = replace(BODY.sip, covariance=np.outer(step, step))
+    found = {one.quantity: one for one in load_curves(cycle, BODY, sip, moved, feet, told)}
+    mass = BODY.sip.mass.sum()
+
+    def torque(phi):
+        ground = {"right_foot": feet[0], "left_foot": feet[1]}
+        return joint_torques(replace(BODY, sip=replace(BODY.sip, phi=phi)), moved, ground).torque
+
+    frames, j = np.arange(50, 151), BODY.joint_index("left_hip_flexion")
+    now = torque(BODY.sip.phi)
+    np.testing.assert_allclose(found["hip_flexion_moment"].value, now[frames, j] / mass, atol=1e-8)
+    np.testing.assert_allclose(
+        found["hip_flexion_moment"].sd, np.abs(torque(BODY.sip.phi + step) - now)[frames, j] / mass, atol=1e-8
+    )
+    axes = slice(j, j + 3)
+    power = np.sum(now[:, axes] * moved.v[:, 6:][:, axes], axis=1)
+    np.testing.assert_allclose(found["hip_power"].value, power[frames] / mass, atol=1e-8)
+    told[60:90, 1] = False
+    known = {one.quantity: one.value for one in load_curves(cycle, BODY, sip, moved, feet, told)}
+    assert "hip_power" not in known  # less than 80 % of the cycle
+    assert np.isfinite(known["trunk_flexion_moment"]).all()  # needs no foot
+
+
+def test_another_program_s_angles_and_events_stand_beside_ours():
+    time = np.arange(0, 2, 1 / RATE)
+    moved = motion_of(time, {"left_knee_flexion": 0.5 + 0.4 * np.sin(3 * time)}, np.zeros((time.size, 3)))
+    theirs = np.zeros((time.size, 3))
+    theirs[:, 0] = np.degrees(0.5 + 0.4 * np.sin(3 * time)) - 2.0
+    theirs[:10] = np.nan
+    outputs = FileOutputs({"LKneeAngles": theirs}, (FileEvent(1.0, "left", True), FileEvent(1.9, "left", True)))
+    (one,) = compare_angles(BODY, moved, outputs)
+    assert (one.joint, one.label, one.frames) == ("left_knee_flexion", "LKneeAngles x", 190)
+    assert one.offset == pytest.approx(2.0)
+    assert one.correlation == pytest.approx(1.0)
+    (strikes,) = compare_events((FootEvent(1.01, "left", True),), outputs)
+    assert (strikes.count, strikes.missed) == (1, 1)
+    assert strikes.late == pytest.approx(0.01)

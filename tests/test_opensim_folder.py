@@ -1,0 +1,85 @@
+"""The folder for OpenSim: its own InverseDynamicsTool finds our torques in it."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from biodance.body.human.human import human
+from biodance.errors import SessionRefused, TrialRefused
+from biodance.lab.opensim.ground_forces import plates_of
+from biodance.lab.opensim.mot import read_mot
+from biodance.motion.kinematics import poses
+from biodance.motion.regressor import predict_wrench
+from biodance.pipeline.opensim_folder import write_opensim_folder
+from biodance.pipeline.trial_result import TrialResult
+from biodance.records import Motion, Plate, Source, Subject, Trial, Wrench
+
+BODY = human(Subject(62.0, 1.70, "F", 30.0, "S01"))
+TIME = np.arange(0, 2, 0.01)
+
+
+def squat() -> TrialResult:
+    """Somebody who squats with both feet on one large plate, which measures exactly what that needs."""
+    depth, rate, bend = (np.pi * TIME, np.pi, {"hip_flexion": 65, "knee_flexion": 95, "ankle_dorsiflexion": 30})
+    q, v, a = np.tile(BODY.neutral, (TIME.size, 1)), *np.zeros((2, TIME.size, BODY.nv))
+    for side in ("right", "left"):
+        for name, angle in bend.items():
+            j = BODY.joint_index(f"{side}_{name}")
+            half = np.radians(angle) / 2
+            q[:, 7 + j], v[:, 6 + j] = half * (1 - np.cos(depth)), half * rate * np.sin(depth)
+            a[:, 6 + j] = half * rate**2 * np.cos(depth)
+    q[:, :3] = np.array([0.0, 0.0, 0.075]) - poses(BODY, q).position[:, BODY.segment_index("right_foot")]
+    turn = poses(BODY, q).root_rotation[0]
+    v[:, :3] = np.gradient(q[:, :3], TIME, axis=0, edge_order=2) @ turn
+    a[:, :3] = np.gradient(v[:, :3], TIME, axis=0, edge_order=2)
+    motion = Motion(TIME, q, v, a)
+    corners = np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]]) * 1.0
+    plate = Plate("plate1", 2, corners, Wrench(TIME, predict_wrench(BODY, motion).value))
+    trial = Trial("squat", "fit", None, (plate,), Source(Path("squat.c3d"), "", "C3D", 100.0, 100.0))
+    return TrialResult(trial, (), motion=motion)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    out = tmp_path_factory.mktemp("lab") / "opensim"
+    (one,) = write_opensim_folder((squat(),), BODY, out, source="The table.")
+    assert one.dynamics == pytest.approx((0, 1.99))
+    return out
+
+
+def test_opensim_s_inverse_dynamics_finds_our_torques_within_one_percent(folder, monkeypatch):
+    opensim = pytest.importorskip("opensim")
+    opensim.Logger.removeFileSink()
+    opensim.Logger.setLevelString("Off")
+    monkeypatch.chdir(folder)
+    assert opensim.InverseDynamicsTool("squat_InverseDynamics.xml").run()
+    theirs, ours = read_mot("squat_opensim_torques.sto"), read_mot("squat_torques.sto")
+    inner = slice(15, -15)  # splines and differences both bend at the ends
+    for name in ours.columns:
+        found = np.interp(ours.time, theirs.time, theirs[name])[inner]
+        largest = np.abs(ours[name]).max()
+        assert np.abs(found - ours[name][inner]).max() < max(0.01 * largest, 0.02), name
+    assert np.abs(ours["right_knee_flexion_moment"]).max() > 30
+
+
+def test_the_forces_of_both_feet_are_what_the_plate_measured(folder):
+    plates, _ = plates_of(read_mot(folder / "squat_forces.mot"), where="squat_forces.mot")
+    total = np.sum([plate.wrench.value for plate in plates], axis=0)
+    np.testing.assert_allclose(total, squat().trial.plates[0].wrench.value, atol=1e-6)
+
+
+def test_the_model_has_a_mesh_for_every_segment(folder):
+    meshes = {path.name.rpartition(BODY.name)[2].strip("_") for path in (folder / "Geometry").iterdir()}
+    assert len(meshes) == len(BODY.segments)
+    assert all(name in (folder / "model.osim").read_text() for name in os.listdir(folder / "Geometry"))
+
+
+def test_nothing_is_overwritten_and_without_a_motion_nothing_is_written(folder, tmp_path):
+    with pytest.raises(SessionRefused, match="holds files already"):
+        write_opensim_folder((squat(),), BODY, folder, source="")
+    still = TrialResult(squat().trial, ())
+    with pytest.raises(TrialRefused, match="no trial gives a motion"):
+        write_opensim_folder((still,), BODY, tmp_path / "none", source="")
+    assert not (tmp_path / "none").exists()

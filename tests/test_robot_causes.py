@@ -1,0 +1,85 @@
+"""What is not as drawn about a robot is named with its size; causes are made by pinocchio alone, not by the formulas
+that find them.
+"""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from robot_recordings import FEET, RATE, SOLE_OVER_ANKLE, danced, drawing, real_robot
+
+from biodance.body.body import Body
+from biodance.body.robot.urdf import read_urdf
+from biodance.diagnosis.robot import robot_causes
+from biodance.identification.robot import RobotMotion, robot_fit
+from biodance.motion.clocks import PlateFit, from_plate
+from biodance.motion.grounded import ground
+from biodance.pipeline.robot_words import cause_words
+from biodance.records import Array
+
+_SECONDS, _STEP = 16.0, 2
+ANKLE, SOFT = "left_ankle_pitch", 60.0
+"""The joint that gives, and its stiffness, N·m/rad."""
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Body:
+    return read_urdf(drawing(tmp_path_factory.mktemp("drawn")), feet=FEET)
+
+
+@pytest.fixture(scope="module")
+def truth() -> list[tuple[Array, Array, Array]]:
+    return [danced(real_robot(), seed, _SECONDS) for seed in (0, 1)]
+
+
+def seen(body: Body, angle: Array, wrench: Array) -> RobotMotion:
+    """Return what encoders and a plate under the left sole show."""
+    rng = np.random.default_rng(4)
+    time = np.arange(0, len(angle), _STEP) / RATE
+    shown = angle[::_STEP] + 0.0003 * rng.normal(size=angle[::_STEP].shape)
+    pressed = wrench[::_STEP] + rng.normal(size=(time.size, 6)) * [0.1, 0.1, 0.1, 0.01, 0.01, 0.01]
+    middle = np.mean(real_robot().feet["left"].outline, axis=0)
+    place = PlateFit(0.0, (float(middle[2]), float(middle[1])), 0.0, 1.0, 1.0)
+    found = ground(body, time, shown)
+    return robot_fit("run", found, shown, from_plate(pressed, place.place, 0.0))
+
+
+def ankle_torque(angle: Array, wrench: Array) -> Array:
+    """Return the torque (T,) N·m of the standing ankle: what the foot, weighed alone, leaves of the ground's wrench."""
+    body = real_robot()
+    model, joint = body.model, body.segment_joint[body.feet["left"].segment] + 2
+    data, column = model.createData(), [one.name for one in body.joints].index(ANKLE)
+    planted = pin.SE3(np.array([[0.0, 0, 1], [0, -1, 0], [1, 0, 0]]), np.array([0.0, 0.0, -SOLE_OVER_ANKLE]))
+    out = []
+    for one, pressed in zip(angle, wrench, strict=True):
+        q = np.concatenate([[0.0, 0, 0, 0, 0, 0, 1], one])
+        pin.forwardKinematics(model, data, q)
+        q[:7] = pin.SE3ToXYZQUAT(planted * data.oMi[joint].inverse())
+        weight = pin.computeGeneralizedGravity(model, data, q)
+        pin.computeJointJacobians(model, data, q)
+        out.append((weight - pin.getJointJacobian(model, data, joint, pin.WORLD).T @ pressed)[6 + column])
+    return np.array(out)
+
+
+def test_nothing_is_named_where_only_a_cover_is_off(robot: Body, truth: list[tuple[Array, Array, Array]]) -> None:
+    fit, kept = (seen(robot, angle, wrench) for _, angle, wrench in truth)
+    found, (same, _) = robot_causes(robot, (fit,), (kept,))
+    assert found == ()
+    assert same is fit
+
+
+def test_an_ankle_that_gives_is_named_with_its_stiffness(robot: Body, truth: list[tuple[Array, Array, Array]]) -> None:
+    trials = []
+    for _, angle, wrench in truth:
+        shown = np.array(angle)
+        column = [one.name for one in robot.joints].index(ANKLE)
+        shown[:, column] += ankle_torque(angle, wrench) / SOFT
+        trials.append((seen(robot, shown, wrench), angle[::_STEP, column], shown[::_STEP, column]))
+    found, (fit, _) = robot_causes(robot, (trials[0][0],), (trials[1][0],))
+    first = found[0]
+    assert (first.cause.kind, first.cause.where) == ("flexible_joint", ANKLE)
+    assert first.value == pytest.approx(1 / SOFT, rel=0.1)
+    assert first.kept_gain > 10
+    _, true, shown = trials[0]
+    left = np.std(fit.angle[:, column] - true)
+    assert left < 0.2 * np.std(shown - true)
+    assert f"{ANKLE} gives under load" in cause_words(found)[0].text
