@@ -116,9 +116,7 @@ def calls(body: Body, before: Array, after: Array, planted: tuple[str, ...] = ()
     return tuple(call.text for call in sorted(found, key=lambda call: -call.size))
 
 
-def instructions(
-    body: Body, before: Array, after: Array, was: Stance | None, now: Stance
-) -> tuple[str, ...]:
+def instructions(body: Body, before: Array, after: Array, was: Stance | None, now: Stance) -> tuple[str, ...]:
     """Return everything that is called on the way between two postures: what the feet do, then what moves.
 
     ``before``, ``after`` (n,) rad angles of the joints; ``was`` the feet before, None at the start, ``now`` after.

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.body.changes import parts_as_segments
 from biodance.body.solids import shape_parts
 from biodance.identification.validation import TrialValidation
-from biodance.motion.kinematics import poses
+from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.standing import centre_of_mass
 from biodance.pipeline.trial_result import TrialResult
 from biodance.records import SIDES, Array, Motion
 from biodance.spatial import zero_moment_point
@@ -67,11 +67,12 @@ def frames_of(result: SessionResult) -> SessionReplay | None:
     validated = {one.name: one for one in (*found.validations, *found.fitted)} if found else {}
     frames = sum(one.motion.time.size / one.motion.rate for one in moving if one.motion)
     rate = min(_FASTEST, _FRAMES / max(frames, 1e-9))
+    whole, body = body, parts_as_segments(body)
     parts = shape_parts(body)
     best = found.search.best if found and found.search.found else None
     placed = best is not None and bool(np.isfinite(best.place).all())
     return SessionReplay(
-        tuple(_trial(body, one, rate, validated) for one in moving),
+        tuple(_trial(whole, body, one, rate, validated) for one in moving),
         np.reshape([box for _, box in parts], (-1, 2, 3)),
         tuple(segment for segment, _ in parts),
         tuple(next((side for side in SIDES if body.segments[k].startswith(side)), "middle") for k, _ in parts),
@@ -79,7 +80,10 @@ def frames_of(result: SessionResult) -> SessionReplay | None:
     )
 
 
-def _trial(body: Body, one: TrialResult, rate: float, validated: Mapping[str, TrialValidation]) -> TrialReplay:
+def _trial(
+    whole: Body, body: Body, one: TrialResult, rate: float, validated: Mapping[str, TrialValidation]
+) -> TrialReplay:
+    """Return one trial of the ``whole`` body, drawn as ``body``, whose parts are segments."""
     from scipy.spatial.transform import Rotation
 
     trial, motion = one.trial, one.motion
@@ -102,7 +106,7 @@ def _trial(body: Body, one: TrialResult, rate: float, validated: Mapping[str, Tr
         pose.position,
         turn,
         trial.markers.xyz[chosen],
-        centre_of_mass(body, shown),
+        centre_of_mass(whole, shown),
         measured[chosen],
         simulated[chosen],
         parameters,

@@ -221,7 +221,9 @@ class Walk:
         if last is None:
             return still
         ends, chain = np.array([last.x, step.x]), self.work.chain
-        parts = [part[1:-1] @ ends for part in (self.samples.position, self.samples.velocity, self.samples.acceleration)]
+        parts = [
+            part[1:-1] @ ends for part in (self.samples.position, self.samples.velocity, self.samples.acceleration)
+        ]
         W = regressor(chain.body, chain.motion(np.arange(len(parts[0])) / _RATE, *parts))
         return np.concatenate([still, self._white(np.asarray(W).reshape(1, -1, W.shape[-1]))[0]])
 
@@ -267,6 +269,12 @@ def _pair_words(pair: list[Word]) -> list[str]:
 
 
 def _one(text: str) -> str:
-    for many, one in (("arms", "arm"), ("forearms", "forearm"), ("elbows", "elbow"), ("legs", "leg"), ("thighs", "thigh")):
+    for many, one in (
+        ("arms", "arm"),
+        ("forearms", "forearm"),
+        ("elbows", "elbow"),
+        ("legs", "leg"),
+        ("thighs", "thigh"),
+    ):
         text = text.replace(f"{many} ", f"{one} ", 1)
     return text

@@ -198,9 +198,12 @@ def read_plan(name_or_path: str | Path) -> Plan:
     words = {key: str(raw[name]) for key, name in (("ranges", "ranges"), ("whom", "for")) if name in raw}
     flags = {name: _flag(path, name, raw[name]) for name in _FLAGS if name in raw}
     free = flags.pop("free", False)
-    fields: dict[str, Any] = ({} if free else dict(_FOLLOWABLE)) | flags | words | {
-        field: finite_number(path, key, raw[key]) for key, field in _NUMBERS.items() if key in raw
-    }
+    fields: dict[str, Any] = (
+        ({} if free else dict(_FOLLOWABLE))
+        | flags
+        | words
+        | {field: finite_number(path, key, raw[key]) for key, field in _NUMBERS.items() if key in raw}
+    )
     counts = table(path, raw, "postures")
     for stance, count in counts.items():
         if not isinstance(count, int) or isinstance(count, bool):

@@ -74,9 +74,9 @@ def impact_figure(found: Sequence[Impact]) -> str:
     )
     y = Axis(-0.6, len(rows) - 0.4, "", ticks)
     far = max(2.0, *(abs(row.pull) + row.left for row in rows))
-    pulled = Axis(-1.05 * far, 1.05 * far, "pull from the prior (prior standard deviations)")
+    pulled = Axis(-1.05 * far, 1.05 * far, "pull from the prior (prior sd)")
     largest = max(max(row.knee, row.hip) for row in rows)
-    moment = Axis(0.0, 1.08 * largest, "what one standard deviation still does to the moment (N·m RMS)")
+    moment = Axis(0.0, 1.08 * largest, "moment that one sd left adds (N·m RMS)")
     left = [shade(pulled, -1.0, 1.0, kind="certain"), rule(pulled, 0.0, upright=True)]
     right = []
     for (at, _), row in zip(ticks, rows, strict=True):
