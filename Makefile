@@ -10,7 +10,7 @@ demo: $(STAMP) bundle-if-possible
 	$(BIN)/biodance demo --out demo --force || [ $$? -eq 1 ] # 1: done, and something needs a person
 
 test: $(STAMP) bundle-if-possible
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist worksteal # halves that stay whole: what a file's tests share is made once
 
 PART ?= 1/1
 hidden: $(STAMP) # every cause hidden in a session and found again; PART=2/7: every seventh

@@ -10,7 +10,20 @@ from collections.abc import Sequence
 
 from cyclopts import CycloptsError
 
-from biodance.cli import archive, batch, dance, diagnose, init, live, machine, register, session, virtual
+from biodance.cli import (
+    archive,
+    batch,
+    dance,
+    diagnose,
+    files,
+    identify,
+    init,
+    live,
+    machine,
+    register,
+    session,
+    virtual,
+)
 from biodance.cli.app import DONE, NOT_DONE, STOPPED, app, say
 
 __all__ = [
@@ -19,6 +32,8 @@ __all__ = [
     "batch",
     "dance",
     "diagnose",
+    "files",
+    "identify",
     "init",
     "live",
     "machine",

@@ -6,7 +6,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, ForceOption, JsonOption, OutOption, app, print_json
+from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json
+from biodance.cli.options import ForceOption, JsonOption, OutOption
 from biodance.cli.progress import progress
 
 

@@ -5,7 +5,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, JsonOption, OutOption, Set, app, print_json, say
+from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json, say
+from biodance.cli.options import JsonOption, OutOption, Set
 from biodance.cli.progress import progress
 
 

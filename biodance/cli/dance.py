@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, STOPPED, ForceOption, JsonOption, OutOption, app, print_json, say
+from biodance.cli.app import DONE, NEEDS_A_PERSON, STOPPED, app, print_json, say
+from biodance.cli.options import ForceOption, JsonOption, OutOption
 from biodance.errors import BiodanceError
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ def dance_command(
     limits: Annotated[Path | None, Parameter(help="TOML file with what this person can and may do.")] = None,
     urdf: Annotated[Path | None, Parameter(help="URDF file of a robot that dances instead of a person.")] = None,
     feet: Annotated[str | None, Parameter(help="Links of the robot's right and left foot: RIGHT,LEFT.")] = None,
-    seed: Annotated[int, Parameter(help="The same seed gives the same dance_command.")] = 0,
+    seed: Annotated[int, Parameter(help="The same seed gives the same dance.")] = 0,
     out: OutOption,
     json: JsonOption = False,
     force: ForceOption = False,

@@ -6,23 +6,10 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import (
-    DONE,
-    NEEDS_A_PERSON,
-    BodyOption,
-    ForceOption,
-    JsonOption,
-    LabOption,
-    MarkersFile,
-    OutOption,
-    ReferenceOption,
-    Set,
-    Tables,
-    app,
-    print_json,
-)
+from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json
+from biodance.cli.options import USUAL_READING, JsonOption, Reading, Results
 from biodance.cli.progress import progress
-from biodance.cli.session import Reading, examine_with_reference, ready, tabled
+from biodance.cli.session import examine_with_reference, tabled
 
 
 @app.command(name="foresee")
@@ -55,10 +42,8 @@ def foresee_command(dance: Path, *, json: JsonOption = False) -> int:
 def diagnose_command(
     session: Path,
     *,
-    out: OutOption,
-    reference: ReferenceOption = None,
-    body: BodyOption = None,
-    lab: LabOption = None,
+    results: Results,
+    reading: Reading = USUAL_READING,
     accept: Annotated[
         bool,
         Parameter(
@@ -68,12 +53,6 @@ def diagnose_command(
             "copy first.",
         ),
     ] = False,
-    subject: str | None = None,
-    chosen: Set = (),
-    tables: Tables = None,
-    markers: MarkersFile = None,
-    json: JsonOption = False,
-    force: ForceOption = False,
 ) -> int:
     """Say what the simulation of a session gets wrong: the cause, its size, how sure, what else it could be, and what
     naming it gains.
@@ -82,8 +61,6 @@ def diagnose_command(
     ----------
     session
         Folder with the static trial and the other trials.
-    subject
-        The person to diagnose where C3D files hold several.
     """
     from rich.console import Console
 
@@ -95,9 +72,8 @@ def diagnose_command(
     from biodance.report.write import write_diagnosis
 
     with progress() as tell:
-        place = ready(tables, session, force=force)
-        options, carried = Reading(subject, markers, chosen, reference, body, lab), read_lab(lab)
-        result, before, folder = examine_with_reference(session, out, options, force=force, tell=tell)
+        place, carried = results.make_tables_folder(session), read_lab(reading.lab)
+        result, before, folder = examine_with_reference(session, reading, results, tell)
         found = front.diagnose(result, reference=before, tolerances=carried.tolerances, accept=accept, tell=tell)
         if found.mended is not None:
             write_mended(result.session, found.mended.session, folder)
@@ -105,7 +81,7 @@ def diagnose_command(
         tell("writing the page")
         tabled(result, place, found.diagnosis)
         document = write_diagnosis(result, found, folder, accepted=accept, earlier=carried.corrections)
-    if json:
+    if results.json:
         print_json(document)
     else:
         print_diagnosis(document, Console())

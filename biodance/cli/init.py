@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, JsonOption, app, print_json
+from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json
+from biodance.cli.options import JsonOption
 
 
 @app.command(name="init")

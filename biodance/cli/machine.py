@@ -1,6 +1,7 @@
 """Commands about this machine: doctor."""
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, JsonOption, app, print_json
+from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json
+from biodance.cli.options import JsonOption
 from biodance.cli.progress import progress
 
 

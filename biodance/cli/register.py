@@ -6,7 +6,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE, ForceOption, JsonOption, app, print_json, say
+from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE, app, print_json, say
+from biodance.cli.options import ForceOption, JsonOption
 from biodance.cli.progress import progress
 
 

@@ -6,7 +6,8 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, ForceOption, OutOption, app
+from biodance.cli.app import DONE, app
+from biodance.cli.options import ForceOption, OutOption
 from biodance.cli.progress import progress
 from biodance.cli.session import print_reported, report_session
 

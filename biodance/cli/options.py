@@ -1,0 +1,112 @@
+"""The options that commands share, and the two groups of them that travel together."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+if TYPE_CHECKING:
+    from biodance.records import Session
+
+JsonOption = Annotated[
+    bool, Parameter(name="--json", negative="", help="Print one JSON document on stdout and nothing else there.")
+]
+ForceOption = Annotated[
+    bool, Parameter(name="--force", negative="", help="Write into a folder that already holds files.")
+]
+Tables = Annotated[
+    Path | None, Parameter(name="--tables", help="Folder for the same numbers as tables, CSV and Parquet.")
+]
+OutOption = Annotated[Path, Parameter(name="--out", help="Folder for the results; it is made if it is missing.")]
+
+ReferenceOption = Annotated[
+    Path | None,
+    Parameter(
+        name="--reference",
+        help="An earlier session of the same person without load: changes and loads are then told against it.",
+    ),
+]
+BodyOption = Annotated[
+    Path | None,
+    Parameter(
+        name="--body",
+        help="body.json of an earlier session of the same person: what is known before, instead of the table.",
+    ),
+]
+LabOption = Annotated[
+    Path | None, Parameter(name="--lab", help="lab.toml: the laboratory's accepted corrections, made first.")
+]
+Set = Annotated[
+    tuple[str, ...],
+    Parameter(
+        name="--set",
+        negative=(),
+        help="Choose a setting: --set filter.cutoff=6; may be repeated. `biodance settings` prints all.",
+    ),
+]
+MarkersFile = Annotated[
+    str | None,
+    Parameter(
+        name="--markers", help="The marker set that was worn: a TOML file of your own (see CONTRIBUTING.md), or a name."
+    ),
+]
+SubjectOption = Annotated[
+    str | None,
+    Parameter(
+        name="--subject",
+        help="The person to look at where C3D files hold several; without it such a file is refused and names them.",
+    ),
+]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """How a session's folder is read: the person where files hold several, the marker set that was worn, the settings
+    chosen; and what is known from earlier sessions: a reference, a body, the laboratory's file.
+    """
+
+    reference: ReferenceOption = None
+    body: BodyOption = None
+    lab: LabOption = None
+    subject: SubjectOption = None
+    markers: MarkersFile = None
+    chosen: Set = ()
+
+    def read(self, folder: Path, tell: Callable[[str], None]) -> "Session":
+        """Return the session in ``folder``."""
+        from biodance.lab.session.read import read_session
+        from biodance.settings import assignments
+
+        return read_session(
+            folder, subject_name=self.subject, markers=self.markers, settings=assignments(self.chosen), tell=tell
+        )
+
+    def given(self) -> tuple[str, ...]:
+        """Return the names of the options that were given."""
+        names = {"chosen": "--set"}
+        return tuple(
+            names.get(one.name, f"--{one.name}") for one in fields(self) if getattr(self, one.name) != one.default
+        )
+
+
+USUAL_READING = Reading()
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Results:
+    """Where results go: a folder, beside it tables where they are wanted; and whether JSON is printed."""
+
+    out: OutOption
+    tables: Tables = None
+    json: JsonOption = False
+    force: ForceOption = False
+
+    def make_tables_folder(self, session: Path) -> Path | None:
+        """Return the folder for tables, made; None where none are wanted."""
+        from biodance.report.tables import tables_folder
+
+        return None if self.tables is None else tables_folder(self.tables, session, force=self.force)
