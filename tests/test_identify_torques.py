@@ -8,6 +8,8 @@ from identify_trials import noisy_fit, person, smooth_motion
 
 from biodance.errors import UnknownName
 from biodance.identification.identification import identify_body
+from biodance.identification.impact import impacts
+from biodance.identification.knowledge import QUANTITIES, segment_quantities
 from biodance.identification.torques import ground_torques, torque_bands, torque_regressor
 from biodance.motion.dynamics import joint_torques
 from biodance.records import Sip, Wrench
@@ -54,3 +56,28 @@ def test_the_band_is_the_spread_of_the_belief() -> None:
     drawn = found.belief.factor @ rng.normal(size=(found.belief.factor.shape[1], 4000))
     spread = (torque_regressor(body, motion) @ drawn).std(axis=2)
     np.testing.assert_allclose(bands.sd, spread, rtol=0.1)
+
+
+def test_an_impact_is_what_one_standard_deviation_does_to_the_moment() -> None:
+    body, truth, rng = person(50)
+    names = {1: "right_hip_flexion", 2: "right_knee_flexion"}
+    joints = [replace(one, name=names.get(i, one.name)) for i, one in enumerate(body.joints)]
+    body = replace(body, joints=tuple(joints))
+    found = identify_body(body, (noisy_fit(body, smooth_motion(body, rng, frames=900), truth, rng),))
+    motion, use = smooth_motion(body, rng, frames=60), np.arange(60) > 9
+    rows = impacts(found, motion, use)
+    assert rows == tuple(sorted(rows, key=lambda row: -max(row.knee, row.hip)))
+    # parameters drawn from the belief: the moment's regression on the quantity, times the quantity's spread
+    drawn = rng.multivariate_normal(np.zeros(len(truth)), found.belief.covariance, 40000)
+    for row in (rows[0], rows[7]):
+        cut = slice(*(10 * body.segment_index(row.segment) + np.array([0, 10])))
+        slope = segment_quantities(found.sip.phi[cut])[1][QUANTITIES.index(row.quantity)]
+        quantity = drawn[:, cut] @ slope
+        for size, joint in ((row.knee, names[2]), (row.hip, names[1])):
+            Y = torque_regressor(body, motion)[use][:, body.joint_index(joint)]
+            along = (drawn @ Y.T).T @ quantity / len(drawn) / quantity.std()
+            assert np.sqrt(np.mean(along**2)) == pytest.approx(size, rel=0.05)
+        known = next(k for k in found.known if (k.segment, k.quantity) == (row.segment, row.quantity))
+        assert row.pull == pytest.approx((known.value - known.table) / known.table_sd)
+        assert row.left == pytest.approx(known.sd / known.table_sd)
+    assert impacts(found, motion, np.zeros(60, dtype=bool)) == ()

@@ -12,7 +12,7 @@ import pytest
 from example_results import full_session
 from rich.console import Console
 
-from biodance.diagnosis.diagnosis import ABOUT, Adequacy, Alias, Diagnosis, Estimate, Finding
+from biodance.diagnosis.diagnosis import Adequacy, Alias, Diagnosis, Estimate, Finding
 from biodance.pipeline.attention import told
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.provenance import provenance
@@ -105,4 +105,4 @@ def test_a_trial_with_a_failed_check_is_not_ok() -> None:
     for check in CHECKS:
         one = replace(trial, checks=(check,))
         assert one.status == "warning"
-        assert ABOUT not in one.reason
+        assert check.what[1:] in one.reason

@@ -1,5 +1,6 @@
 """What is drawn in 3-D: the frame with the largest residual, the load where it sits, postures; with GL and without."""
 
+import base64
 import json
 import re
 from dataclasses import replace
@@ -8,16 +9,20 @@ from io import BytesIO
 import numpy as np
 import pytest
 from identified_sessions import session_result
+from scipy.spatial.transform import Rotation
 
 from biodance.body.solids import shape_parts
 from biodance.identification.added_mass import added_mass
 from biodance.identification.load_posterior import MASSES, LoadPosterior
 from biodance.motion.kinematics import poses
+from biodance.motion.regressor import predict_wrench
+from biodance.pipeline.session_frames import frames_of
 from biodance.pipeline.still import load_still, posture_still, worst_still
 from biodance.records import Markers
 from biodance.report.figures import solid
 from biodance.report.figures.solid import sheet_png
 from biodance.report.figures.still import RESIDUAL_SCALE, VIEWS, still_figure
+from biodance.report.pages.replay import replay_data
 
 
 @pytest.fixture(scope="module")
@@ -134,3 +139,47 @@ def test_a_child_without_gl_is_no_crash_and_no_hang(result, monkeypatch, code):
     monkeypatch.setattr(solid, "_PATIENCE", 1.5)
     monkeypatch.setattr(solid.subprocess, "run", lambda words, **kind: run([words[0], "-c", code], **kind))
     assert sheet_png([posture_still(result.body, result.body.neutral, "one")]) is None
+
+
+def unpacked(text: str, *shape: int) -> np.ndarray:
+    """Return int16 numbers of the page, -32768 as NaN."""
+    whole = np.frombuffer(base64.b64decode(text), "<i2").reshape(shape).astype(float)
+    return np.where(whole == -32768, np.nan, whole)
+
+
+def test_a_replay_holds_every_body_marker_and_force_where_they_were(result):
+    replay = frames_of(result)
+    data = json.loads(replay_data(replay))
+    one, found = data["trials"][0], result.trials[0]
+    frames, segments, markers = one["frames"], one["segments"], one["markers"]
+    frame = np.argmin(np.abs(found.motion.time - (one["start_s"] + 7 * one["step_s"])))
+    assert 1 / one["step_s"] <= 25 + 1e-9
+    places = unpacked(one["places"], frames, segments + markers + 3, 3) * one["unit"] + np.array(one["origin"])
+    pose = poses(result.body, found.motion.q[frame])
+    np.testing.assert_allclose(places[7, :segments], pose.position[0], atol=1e-3)
+    np.testing.assert_allclose(places[7, segments:-3], found.trial.markers.xyz[frame], atol=1e-3)
+    turn = unpacked(one["turns"], frames, segments, 4)[7] / 32767
+    np.testing.assert_allclose(Rotation.from_quat(turn).as_matrix(), pose.rotation[0], atol=1e-3)
+    forces = unpacked(one["forces"], frames, 3, 3) / 10
+    identified = predict_wrench(result.identification.identification.identified, found.motion).force
+    np.testing.assert_allclose(forces[7, 1], identified[frame], atol=0.06)
+    left = np.where(found.comparison.used[:, None], found.comparison.measured[:, :3] - identified, np.nan)
+    worst = np.nanargmax(np.linalg.norm(left, axis=1))
+    assert one["worst_s"] == pytest.approx(found.motion.time[worst])
+    shown = round((one["worst_s"] - one["start_s"]) / one["step_s"])
+    np.testing.assert_allclose(forces[shown, 2], left[worst], atol=0.06)
+    assert np.isnan(forces[:, 0]).all()  # no plate, no measured force
+    assert {box["side"] for box in data["boxes"]} == {"left", "right", "middle"}
+    assert [trial["name"] for trial in data["trials"]] == [trial.name for trial in result.trials]
+
+
+def test_a_replay_shows_the_load_that_was_found_and_stays_small(result, monkeypatch):
+    monkeypatch.setattr("biodance.pipeline.session_frames._FRAMES", 40)
+    search, place = result.identification.search, np.array([0.0, -0.2, 0.02])
+    best = replace(search.best, segment="left_forearm_hand", place=place)
+    found = replace(result.identification, search=replace(search, suspects=(best, *search.suspects[1:])))
+    replay = frames_of(replace(result, identification=found))
+    data = json.loads(replay_data(replay))
+    assert data["load"] == {"on": result.body.segment_index("left_forearm_hand"), "place": place.tolist()}
+    assert sum(one["frames"] for one in data["trials"]) <= 44
+    assert frames_of(replace(result, body=None)) is None

@@ -17,7 +17,12 @@ def read_back(result):
 def test_a_trial_has_the_keys_that_others_rely_on():
     result = full_session()
     trial = read_back(result)["trials"][0]
-    assert (trial["name"], trial["role"], trial["status"], trial["reason"]) == ("walk <1>", "fit", "ok", "")
+    assert (trial["name"], trial["role"], trial["status"], trial["reason"]) == (
+        "walk <1>",
+        "fit",
+        "warning",
+        "Gaps: 3.1 %, should be at most 2 %.",
+    )
     assert (trial["marker_rms_m"], trial["marker_max_m"]) == (0.011, 0.044)
     assert trial["wrench"]["identified"] is None
     np.testing.assert_array_equal(trial["wrench"]["table"]["rms"], result.trials[0].comparison.rms)

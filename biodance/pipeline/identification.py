@@ -14,6 +14,7 @@ from biodance.body.tables.error_sizes import error_size
 from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identification.added_mass import LoadSearch, added_mass
 from biodance.identification.identification import Identification, identify_body, standing_point
+from biodance.identification.impact import Impact, impacts
 from biodance.identification.knowledge import SIGMAS
 from biodance.identification.sessions import Difference, differences
 from biodance.identification.statistics import Fit
@@ -64,6 +65,9 @@ class SessionIdentification:
         Since the reference session; () without one.
     torques : TorqueBands or None
         Of the joints in the first trial kept (else fitted); None where the feet's wrenches are not known.
+    impacts : tuple of Impact
+        How far each quantity was pulled from its prior and what it means for knee and hip in the trial of ``torques``,
+        the largest impact first.
     performance : PerformanceScore or None
         How well the dance that was shown was danced; None where none was named.
     notes : tuple of str
@@ -87,6 +91,7 @@ class SessionIdentification:
     search: LoadSearch
     changes: tuple[Difference, ...] = ()
     torques: TorqueBands | None = None
+    impacts: tuple[Impact, ...] = ()
     performance: "PerformanceScore | None" = None
     notes: tuple[str, ...] = ()
     failures: Mapping[str, str] = field(default_factory=dict)
@@ -264,13 +269,16 @@ def _predicted(
             "validate."
         )
     notes += _weight(fitted, -float(found.body.gravity[2]))
+    torques = _torques(found, results)
+    shown = next((one for one in results if torques and one.name == torques.trial), None)
     return replace(
         one,
         fitted=fitted,
         validations=kept,
         agreements={fit.name: _at_origin(identified, fit) for fit in _fits(results, ROLES)},
         gain=_gain(kept, notes),
-        torques=_torques(found, results),
+        torques=torques,
+        impacts=impacts(found, shown.motion, torques.use) if torques and shown and shown.motion else (),
         notes=tuple(notes),
     )
 

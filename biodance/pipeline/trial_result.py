@@ -216,5 +216,6 @@ class TrialResult:
 
     @property
     def reason(self) -> str:
-        """The `reasons` as one text; "" if there are none."""
-        return " ".join(self.reasons)
+        """The `reasons` and the checks outside their limits as one text; "" if there are none."""
+        outside = [f"{one.what}: {one.value}, should be {one.limit}." for one in self.checks if not one.inside]
+        return " ".join([*self.reasons, *(f"{said[:1].upper()}{said[1:]}" for said in outside)])

@@ -16,6 +16,7 @@ from biodance.pipeline.kept import BODY, SCALED, keep_motions
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.provenance import Provenance, now, provenance
 from biodance.pipeline.results import SessionResult
+from biodance.pipeline.session_frames import frames_of
 from biodance.report.documents.diagnosis import attention_document, diagnosis_document, judged_document
 from biodance.report.documents.identification import identification_document
 from biodance.report.documents.methods import METHODS, methods_text
@@ -160,7 +161,8 @@ def _page(
     told = diagnosis_section(diagnosis) if diagnosis else ""
     moved = movement_section(movement) if movement else ""
     attention = diagnosis.diagnosis.attention if diagnosis else None
-    return page(result, made, attention=attention, diagnosis=told, movement=moved)
+    frames = frames_of(result)
+    return page(result, made, attention=attention, diagnosis=told, movement=moved, replay=frames)
 
 
 def write_files(folder: Path, files: dict[str, str]) -> None:

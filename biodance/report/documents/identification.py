@@ -200,6 +200,8 @@ def identification_document(found: SessionIdentification) -> dict[str, Any]:
     ``known_together`` the mass of neighbours that is more certain than their own, null if none;
     ``added_mass_search`` says what was looked for and whether one is "found", there is "none" or one "cannot tell";
     ``joint_torques`` of one trial with what the parameters leave uncertain (not this trial's own skin and plates);
+    ``impacts`` the ``pull`` of every quantity from its prior and what is ``left`` of its standard deviation, both in
+    prior ones, and the RMS moment that one standard deviation of it after the data adds at knee and hip, largest first;
     ``differences`` to the reference session, empty without one; ``performance`` how well the dance that was shown was
     danced, null without one. ``failures`` what could not be computed, with cause and
     cure; after a failed fit (``status``) there are no segments.
@@ -226,6 +228,17 @@ def identification_document(found: SessionIdentification) -> dict[str, Any]:
         "added_mass_search": _search(found.search),
         "known_together": _together(one),
         "joint_torques": torques_document(found.torques),
+        "impacts": [
+            {
+                "segment": row.segment,
+                "quantity": row.quantity,
+                "pull": row.pull,
+                "left": row.left,
+                "knee_Nm": row.knee,
+                "hip_Nm": row.hip,
+            }
+            for row in found.impacts
+        ],
         "differences": [_difference(row) for row in found.changes],
         "performance": performance_document(found.performance),
         "notes": found.notes,

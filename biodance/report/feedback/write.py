@@ -1,8 +1,6 @@
 """Write the page that leads a person through a dance: one file, no network, opened from disk."""
 
 import json
-import re
-import zipfile
 from base64 import b64encode
 from importlib.resources import files
 from pathlib import Path
@@ -12,10 +10,9 @@ from biodance.dance.dance import Dance
 from biodance.errors import BiodanceError
 from biodance.report.feedback.follow import follow_scene
 from biodance.report.feedback.scene import scene_of
+from biodance.report.three import three_js
 from biodance.version import __version__
 
-_LIBRARY = re.compile(r"<script>(/\*\*\s*\* @license[^/]*\*/\n[^\n]{100000,})\n")
-"""The first script of trimesh's viewer: the licence, and on one line the library."""
 _BUNDLE = {"program": "pose.js", "kernels": "pose.wasm", "model": "movenet.json", "weights": "movenet.bin"}
 """What follows a person: parts of the bundle that `make bundle` writes beside this module."""
 
@@ -73,27 +70,3 @@ def feedback_page(name: str, scene: dict[str, Any], carried: dict[str, str] | No
         bundle={key: Markup(value) for key, value in carried.items()} if carried else None,
         following=text("follow_body.js") + text("follow.js"),
     )
-
-
-def three_js() -> str:
-    """Return the text of three.js with its licence notice, as trimesh carries it for its own viewer.
-
-    Raises
-    ------
-    BiodanceError
-        The installed trimesh carries none.
-    """
-    import trimesh
-
-    place = Path(trimesh.__file__).parent / "resources" / "templates" / "viewer.zip"
-    try:
-        with zipfile.ZipFile(place) as packed:
-            page = packed.read("viewer.html.template").decode("utf-8")
-    except (OSError, KeyError, zipfile.BadZipFile) as error:
-        raise BiodanceError(
-            f"{place}: trimesh lacks its viewer ({error}). Install trimesh anew: see README."
-        ) from error
-    found = _LIBRARY.search(page)
-    if found is None or "</script" in found.group(1):
-        raise BiodanceError(f"{place}: holds no three.js. Install the trimesh of constraints.txt.")
-    return found.group(1)

@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.records import Array, runs
-from biodance.report.figures.vector import Axis, Frame, Stroke, around, band, curve_line, panel, rule, shade
+from biodance.report.figures.vector import STEPS, Axis, Frame, Stroke, around, band, curve_line, panel, rule, shade
 
+_MUCH = 0.7
+"""Share of used frames below which a figure begins with these."""
 _NARROW, _TALL = 46.0, 110.0
 """px of the height of a difference and of a curve."""
 
@@ -79,11 +81,22 @@ class CurveFigure:
         shades = [shade(x, float(self.time[a]), float(self.time[b - 1])) for a, b in left_out]
         cells = "".join(f'<div class="cell">{self._cell(x, strips, shades)}</div>' for strips in self.cells)
         trial = f' data-trial="{escape(self.trial)}"' if self.trial else ""
+        trial += self._first_view(x)
         return (
             f'<div class="curves" role="group" aria-label="{escape(self.about)}"{trial}>'
             f'<div class="legend">{self._legend(bool(shades))}</div><p class="reading"></p>'
             f'<div class="cells">{cells}</div></div>'
         )
+
+    def _first_view(self, x: Axis) -> str:
+        """Return the steps that are seen first, as an attribute: where much is left out, the rest with its
+        surroundings; "" for all.
+        """
+        if self.used is None or not 0 < self.used.mean() < _MUCH:
+            return ""
+        first, last = x.steps(self.time[np.flatnonzero(self.used)[[0, -1]]]).tolist()
+        room = max((last - first) // 4, STEPS // 100)
+        return f' data-view="{max(0, first - room)} {min(STEPS, last + room)}"'
 
     def _cell(self, x: Axis, strips: Sequence[Strip], shades: list[str]) -> str:
         out = []

@@ -1,9 +1,12 @@
 """Figures of an identification: segment masses (paper Fig. 8) and joint torques with bands."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from biodance.display import BLACK, GREY, RED
+from biodance.display import BLACK, BLUE, GREY, RED
 from biodance.identification.identification import Identification
+from biodance.identification.impact import Impact
 from biodance.identification.knowledge import mass_interval
 from biodance.identification.torques import TorqueBands
 from biodance.report.figures.curves import Curve, CurveFigure, Strip
@@ -16,7 +19,9 @@ from biodance.report.figures.vector import (
     Stroke,
     panel,
     points,
+    rule,
     segments,
+    shade,
 )
 
 LIGHT = 5.0
@@ -53,6 +58,44 @@ def forest_figure(found: Identification) -> str:
     words = ("grey ring: table", "red point: identified, known", "pale: partly known", "black ring: cannot be known")
     legend = "".join(f"<span>{word}</span>" for word in words)
     return f'<div class="legend">{legend}</div><div class="cells">{"".join(drawn)}</div>'
+
+
+_RANKED = 15
+"""Quantities that the figure of pulls and impacts shows."""
+
+
+def impact_figure(found: Sequence[Impact]) -> str:
+    """Return the quantities with the largest impact: left the pull from the prior with what is left of its standard
+    deviation, right what that does to the moments of knee (blue) and hip (red ring).
+    """
+    rows = list(found[:_RANKED])
+    ticks = tuple(
+        (len(rows) - 1.0 - i, f"{row.segment} {row.quantity}".replace("_", " ")) for i, row in enumerate(rows)
+    )
+    y = Axis(-0.6, len(rows) - 0.4, "", ticks)
+    far = max(2.0, *(abs(row.pull) + row.left for row in rows))
+    pulled = Axis(-1.05 * far, 1.05 * far, "pull from the prior (prior sd)")
+    largest = max(max(row.knee, row.hip) for row in rows)
+    moment = Axis(0.0, 1.08 * largest, "moment that one sd left adds (N·m RMS)")
+    left = [shade(pulled, -1.0, 1.0, kind="certain"), rule(pulled, 0.0, upright=True)]
+    right = []
+    for (at, _), row in zip(ticks, rows, strict=True):
+        ends = np.array([[row.pull - row.left, at], [row.pull + row.left, at]])
+        left += [segments(pulled, y, ends, Stroke(BLACK)), _point(pulled, y, row.pull, at, Stroke(BLACK))]
+        knee, hip = (np.array([[0.0, at + up], [size, at + up]]) for up, size in ((0.16, row.knee), (-0.16, row.hip)))
+        right += [segments(moment, y, knee, Stroke(BLUE, "", 2.0)), segments(moment, y, hip, Stroke(RED, "4 2", 2.0))]
+        right += [_point(moment, y, row.knee, at + 0.16, RIGHT_SIDE)]
+        right += [_point(moment, y, row.hip, at - 0.16, LEFT_SIDE, inside="#fff")]
+    frame = Frame(height=_ROW * len(rows), left=138.0, above=4.0)
+    drawn = panel(pulled, y, left, "pull of every quantity", frame=frame)
+    drawn += panel(moment, y, right, "impact on knee and hip", frame=frame)
+    words = ("grey: one prior standard deviation", "blue point: knee flexion", "red ring: hip flexion")
+    legend = "".join(f"<span>{word}</span>" for word in words)
+    return f'<div class="legend">{legend}</div><div class="cells">{drawn}</div>'
+
+
+def _point(x: Axis, y: Axis, across: float, up: float, look: Stroke, *, inside: str = "") -> str:
+    return points(x, y, np.array([across]), np.array([up]), look, inside=inside)
 
 
 _SHOWN = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion", "trunk_flexion", "shoulder_flexion", "elbow_flexion")

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from html import escape
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.display import BLACK, GREEN, GREY
 from biodance.identification.validation import TrialValidation
@@ -71,7 +72,8 @@ def _paths(x: Axis, y: Axis, standing: QuietStanding) -> list[str]:
     for path, look, inside in ((standing.cop, _COP, ""), (standing.com, _COM, "#fff")):
         if path.size:
             way = _turned(path, standing)
-            out += [segments(x, y, way, look), points(x, y, *np.nanmean(way, axis=0)[:, None], look, inside=inside)]
+            right, ahead = np.nanmean(way, axis=0)[:, None]
+            out += [segments(x, y, way, look), points(x, y, right, ahead, look, inside=inside)]
     return out
 
 
@@ -84,7 +86,8 @@ def _surroundings(x: Axis, y: Axis, standing: QuietStanding) -> list[str]:
         chosen = [i for i, name in enumerate(standing.foot_names) if name.startswith(side)]
         if chosen:
             inside = "#fff" if side == "left" else ""
-            out.append(points(x, y, *_turned(standing.feet[chosen], standing).T, look, inside=inside))
+            right, ahead = _turned(standing.feet[chosen], standing).T
+            out.append(points(x, y, right, ahead, look, inside=inside))
     return out
 
 
@@ -119,7 +122,7 @@ def standing_figure(standing: QuietStanding) -> str:
     return f'<div class="legend">{legend}</div><div class="cells">{wide}{near}</div>'
 
 
-def _channels(curves: list[tuple[str, Array, Stroke]], measured: Array, used: Array) -> list[list[Strip]]:
+def _channels(curves: list[tuple[str, Array, Stroke]], measured: Array, used: NDArray[np.bool_]) -> list[list[Strip]]:
     """Return for each channel its curves (measured first) over the differences measured minus curve; forces left,
     moments right.
     """

@@ -168,7 +168,7 @@ def points(x: Axis, y: Axis, across: Array, up: Array, look: Stroke, *, size: fl
 
 def segments(x: Axis, y: Axis, way: Array, look: Stroke) -> str:
     """Return a line through the places ``way`` (n, 2), broken where one is not finite."""
-    finite = np.isfinite(way).all(axis=1)
+    finite = np.asarray(np.isfinite(way).all(axis=1))
     held = np.where(finite[:, None], way, 1.0)
     across, down = x.steps(held[:, 0]), STEPS - y.steps(held[:, 1])
     return f'<path {look.attributes} d="{"".join(path(across[a:b], down[a:b]) for a, b in runs(finite))}"/>'
@@ -184,7 +184,7 @@ class Frame:
     height: float = 110.0
     left: float = 44.0
     below: float = 16.0
-    above: float = 15.0
+    above: float = 18.0
     right: float = 8.0
 
 

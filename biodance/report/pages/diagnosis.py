@@ -14,7 +14,7 @@ from biodance.pipeline.provenance import Provenance
 from biodance.pipeline.results import SessionResult
 from biodance.records import CHANNELS
 from biodance.report.figures.diagnosis import adequacy_table, left_figure, limits_figure
-from biodance.report.pages.template import render, template_text
+from biodance.report.pages.template import print_sheet, render, template_text
 from biodance.report.wording import format_number, trial_and_subject
 
 _SHOWN = {"m": (1000.0, "mm", 0), "rad": (57.29578, "°", 1), "s": (1000.0, "ms", 1), "1": (100.0, "%", 1)}
@@ -125,7 +125,7 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
     from markupsafe import Markup
 
     one = found.diagnosis
-    masses = []
+    masses, made = [], f"biodance {provenance.versions['biodance']}, {provenance.created}"
     if found.before and found.accepted:
         then, now = (
             dict(zip(one.sip.segments, one.sip.mass.tolist(), strict=True)) for one in (found.before, found.accepted)
@@ -135,6 +135,7 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
         "diagnosis.html.j2",
         filters={"sized": sized, "estimated": estimated, "odds": odds, "first_upper": first_upper},
         scripts=[template_text("curves.js")],
+        sheet=Markup(print_sheet(f"Session {result.session.folder.name}", provenance.visit, made)),
         named=named,
         words_of=words_of,
         result=result,

@@ -6,7 +6,7 @@ from biodance.identification.sessions import certain_changes
 from biodance.pipeline.identification import SessionIdentification
 from biodance.records import CHANNELS
 from biodance.report.documents.identification import information_share, segment_rows, torques_document
-from biodance.report.figures.identification import drawn_joints, forest_figure, torque_figure
+from biodance.report.figures.identification import drawn_joints, forest_figure, impact_figure, torque_figure
 from biodance.report.figures.sessions import changes_figure, excitation_figure
 from biodance.report.pages.template import render
 from biodance.report.wording import format_number
@@ -47,6 +47,7 @@ def identification_section(found: SessionIdentification) -> str:
         gain=found.gain,
         trials=[(trial, "kept") for trial in found.validations] + [(trial, "fitted") for trial in found.fitted],
         channels=list(zip(CHANNELS, _UNITS, strict=True)),
+        ranked=Markup(impact_figure(found.impacts)) if found.impacts else "",
         torques=found.torques,
         torque_rows=(torques_document(found.torques) or {}).get("joints", []),
         torque_image=Markup(torque_figure(found.torques)) if found.torques and drawn_joints(found.torques) else "",

@@ -15,6 +15,7 @@ from biodance.lab.markers.gaps import MarkerGaps
 from biodance.pipeline.attention import session_attention
 from biodance.pipeline.provenance import Provenance
 from biodance.pipeline.results import SessionResult
+from biodance.pipeline.session_frames import SessionReplay
 from biodance.pipeline.trial_result import Check, TrialResult
 from biodance.records import CHANNELS
 from biodance.records.attention import Attention
@@ -27,6 +28,7 @@ from biodance.report.figures.session import (
 )
 from biodance.report.figures.still import still_figure
 from biodance.report.pages.identification import identification_section
+from biodance.report.pages.replay import replay_data, replay_scripts
 from biodance.report.pages.template import print_sheet, render, template_text
 from biodance.report.wording import format_number, millimetres, trial_and_subject
 
@@ -131,11 +133,16 @@ def _apart(value: float, above: str, below: str) -> str:
     return f"{millimetres(abs(value))} mm {above if value > 0 else below}"
 
 
-def _contents(inner: str) -> list[tuple[str, str]]:
+def _contents(inner: str, *, replayed: bool) -> list[tuple[str, str]]:
     """Return address and title of every section of the page, of which ``inner`` holds those in the middle."""
     found = re.findall(r'<section id="([^"]+)">\s*<h2>([^<]+)</h2>', inner)
     last = {"checks": "Quality checks", "standing": "Quiet standing", "trials": "Trials", "made": "How it was made"}
-    return [("body", "The body"), *((where, unescape(title)) for where, title in found), *last.items()]
+    return [
+        ("body", "The body"),
+        *([("replay", "Replay")] if replayed else []),
+        *((where, unescape(title)) for where, title in found),
+        *last.items(),
+    ]
 
 
 def page(
@@ -145,10 +152,11 @@ def page(
     attention: Sequence[Attention] | None = None,
     diagnosis: str = "",
     movement: str = "",
+    replay: SessionReplay | None = None,
 ) -> str:
     """Return the page of ``result`` as HTML text; ``attention`` what a person must see (by default
     `session_attention`); ``diagnosis`` and ``movement`` the sections on what the simulation gets wrong and on what
-    moved, "" for none.
+    moved, "" for none; ``replay`` its frames in 3-D.
 
     The same arguments give the same characters.
     """
@@ -164,12 +172,14 @@ def page(
     return render(
         "page.html.j2",
         filters={"place": place_words, "apart": _apart},
-        scripts=[template_text("curves.js")],
+        scripts=[template_text("curves.js"), *(replay_scripts() if replay else ())],
+        replay=Markup(replay_data(replay)) if replay else "",
+        loaded=bool(replay and replay.load),
         sheet=Markup(print_sheet(f"Session {name}", provenance.visit, made)),
         headline=next((one for one in said if one.about == ABOUT), None),
         attention=[(trial_and_subject(one), one.text) for one in said if one.about != ABOUT],
         tiles=key_figures(result),
-        contents=_contents(f"{diagnosis}{identified}{movement}"),
+        contents=_contents(f"{diagnosis}{identified}{movement}", replayed=replay is not None),
         check_table=check_table(result),
         result=result,
         provenance=provenance,

@@ -144,6 +144,7 @@
       const start = Math.min(STEPS - 2 * half, Math.max(0, middle - half));
       show([start, start + 2 * half]);
     };
+    if (root.dataset.view) show(numbers(root.dataset.view));
     button("+", "zoom in", () => narrow(0.5));
     button("\u2212", "zoom out", () => narrow(2));
     button("all", "show all", () => show([0, STEPS]));
