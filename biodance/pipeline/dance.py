@@ -118,7 +118,7 @@ class DanceResult:
     def warnings(self) -> tuple[str, ...]:
         """What this dance cannot tell, in plain sentences: where the criterion is far from its bound."""
         unsafe = tuple(
-            f"NOT SAFE for imprecise people: {m.limit.removesuffix(OF_PERFORMERS).replace('_', ' ').strip()} fell short "
+            f"NOT SAFE when imprecise: {m.limit.removesuffix(OF_PERFORMERS).replace('_', ' ').strip()} fell short "
             f"by {-1000 * m.worst:.0f} mm at {m.where_s:.0f} s ({m.what.replace('_', ' ')}) for the worst of "
             f"{PERFORMER_COUNT}. Try another seed, an easier protocol, or dance it with somebody at hand."
             for m in broken(self.margins)
