@@ -133,22 +133,26 @@ def perform_with(workers: Executor, dance: Dance, *, count: int = PERFORMER_COUN
     ]
     parts = [task.result() for task in tasks]
     count = sum(part.count for part in parts)
-    rooms = []
-    for name in ("balance", "gap"):
-        some = [getattr(part, name) for part in parts]
-        failing = sum(part.count * getattr(part, name).failing for part in parts) / count
-        rooms.append(replace(min(some, key=lambda room: room.worst), failing=failing))
-    return Rehearsed(count, *rooms, tuple(sorted({p for part in parts for p in part.bad})))
+
+    def together(rooms: list[Room]) -> Room:
+        failing = sum(part.count * room.failing for part, room in zip(parts, rooms, strict=True)) / count
+        return replace(min(rooms, key=lambda room: room.worst), failing=failing)
+
+    balance, gap = together([part.balance for part in parts]), together([part.gap for part in parts])
+    return Rehearsed(count, balance, gap, tuple(sorted({p for part in parts for p in part.bad})))
 
 
 def _joined(count: int, parts: dict[str, list["_Least"]]) -> Rehearsed:
     """Return the worst of all performers, for the zero-moment point and for the segments."""
-    rooms, bad = [], set[int]()
-    for need, found in zip((0.0, SEGMENT_GAP), parts.values(), strict=True):
+    bad = set[int]()
+
+    def worst_of(found: list["_Least"], need: float) -> Room:
         worst = min(found, key=lambda one: one.room)
-        rooms.append(Room(worst.room, worst.posture, worst.what, float(np.mean([one.room < need for one in found]))))
-        bad |= {int(p) for one in found for p in np.flatnonzero(one.each < need)}
-    return Rehearsed(count, *rooms, tuple(sorted(bad)))
+        bad.update(int(p) for one in found for p in np.flatnonzero(one.each < need))
+        return Room(worst.room, worst.posture, worst.what, float(np.mean([one.room < need for one in found])))
+
+    balance, gap = parts.values()
+    return Rehearsed(count, worst_of(balance, 0.0), worst_of(gap, SEGMENT_GAP), tuple(sorted(bad)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,7 +244,8 @@ class _Planned:
         way.
         """
         turn, tops = self.chain.root_rotation(x), []
-        for side, leg in enumerate(self.chain.legs):
+        for side in (0, 1):
+            leg = self.chain.legs[side]
             hip, reach = turn @ leg.hip, float(leg.length(_STRAIGHT))
             across = np.sum((x[:, :2] + hip[:, :2] - ankle[:, side, :2]) ** 2, axis=1)
             tops.append(ankle[:, side, 2] + np.sqrt(np.maximum(reach**2 - across, 0.01)) - hip[:, 2] + up[:, side])
