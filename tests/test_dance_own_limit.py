@@ -162,14 +162,14 @@ def test_a_protocol_gives_the_limits_their_numbers(tmp_path: Path) -> None:
     path = tmp_path / "p.toml"
 
     def read(text: str) -> Plan:
-        path.write_text(f"[postures]\nparallel = 2\n{text}")
+        path.write_text(f"free = true\n[postures]\nparallel = 2\n{text}")
         return read_plan(path)
 
     usual = {limit.name: limit for limit in read("").limits}
     assert usual == {limit.name: limit for limit in family()}
     found = {limit.name: limit for limit in read("[limits.friction]\nmu = 0.4\n[limits.balance]\nshare = 0.5\n").limits}
     assert found == {**usual, "friction": Friction(mu=0.4), "balance": replace(usual["balance"], share=0.5)}
-    path.write_text("share_of_support = 0.5\n[postures]\nparallel = 2\n")
+    path.write_text("free = true\nshare_of_support = 0.5\n[postures]\nparallel = 2\n")
     assert read_plan(path).limits == read("[limits.balance]\nshare = 0.5\n").limits
     assert read_plan(path).share == 0.5
 
@@ -207,6 +207,15 @@ def test_nobody_but_the_limits_themselves_knows_a_limit_by_name() -> None:
         ("robot.py", "seat"),  # a size of a stance
         ("rehearsal.py", "friction"),  # of MuJoCo's floor
         ("plan.py", "balance"),  # share_of_support, the short form in protocols
+        ("plain.py", "balance"),  # what slowness mends, with three others
+        ("plain.py", "friction"),
+        ("plain.py", "joint_speed"),
+        ("plain.py", "joint_torque"),
+        ("catalogue.py", "foot_placement"),  # less reserve: moves are straight
+        ("catalogue.py", "self_collision"),  # what imprecise people need
+        ("walk.py", "self_collision"),
+        ("performers.py", "self_collision"),
+        ("performers.py", "balance"),
     }
 
 

@@ -221,7 +221,7 @@ def _events(dance: Dance) -> dict[str, FileValue]:
 
 def _phases(dance: Dance) -> dict[str, FileValue]:
     """Return the support phases: from when to when (s), on which feet."""
-    feet = [" and ".join(SIDES[side] for side in phase.stance.planted) or "seat" for phase in dance.phases]
+    feet = [" and ".join(SIDES[side] for side in phase.stance.planted) or "stool" for phase in dance.phases]
     times = np.array([[phase.start, phase.end] for phase in dance.phases]).T
     return {"SUPPORT": feet, "SUPPORT_TIMES": times}
 
