@@ -133,7 +133,11 @@ def test_the_command_says_it_and_writes_and_exports_no_body(failing, monkeypatch
         monkeypatch.setattr(f"{room}.examine", lambda session, **_: found)
     assert run(["identify", str(tmp_path / "S01"), "--out", str(tmp_path / "out")]) == NEEDS_A_PERSON
     assert "Identification, segments: Not solved." in capsys.readouterr().out
-    assert sorted(path.name for path in (tmp_path / "out").glob("[!.]*")) == ["report.html", "results.json"]
+    assert sorted(path.name for path in (tmp_path / "out").glob("[!.]*")) == [
+        "methods.md",
+        "report.html",
+        "results.json",
+    ]
     assert json.loads((tmp_path / "out" / "results.json").read_text())["status"] == "failed"
     assert run(["export", str(tmp_path / "S01"), "--format", "csv", "--out", str(tmp_path / "s.csv")]) == NOT_DONE
     assert "by force" in capsys.readouterr().err

@@ -11,9 +11,12 @@ import numpy as np
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import ChannelEffect, Parameter
 from biodance.records import Array
+from biodance.spatial import wrench_about_point
 
 REVERSAL = np.array([5.0, 5.0, 20.0, 5.0, 5.0, 2.0])
 """N, N·m by which a channel must turn back until the loop is crossed (to 63 %)."""
+_WIDEST = 0.02
+"""Share of the largest load of its channel that a loop can be wide: four times the worst of makers' sheets."""
 
 
 class PlateHysteresis(ChannelEffect):
@@ -30,8 +33,19 @@ class PlateHysteresis(ChannelEffect):
     advice = "Load and unload the plate with dead weights; look for a loose top plate, cable or screw."
 
     def in_channel(self, case: Case) -> Array:
-        """Return minus the memory of the predicted channel."""
-        return -memory(case.predicted_on(self.plate_of(case))[:, self.channel], REVERSAL[self.channel])
+        """Return minus the memory of the channel."""
+        return -memory(self._load(case), REVERSAL[self.channel])
+
+    def possible_in(self, case: Case, theta: Array) -> bool:
+        """Return whether the loop turns the way of friction and is no wider than such a load makes it."""
+        return bool(0 < theta[0] <= _WIDEST * np.abs(self._load(case)).max())
+
+    def _load(self, case: Case) -> Array:
+        """Return what the channel (T,) read about the plate's centre: in double support no prediction has one plate's
+        part of it.
+        """
+        plate = self.plate_of(case)
+        return wrench_about_point(plate.wrench.value, plate.centre)[:, self.channel]
 
 
 def memory(load: Array, reversal: float) -> Array:

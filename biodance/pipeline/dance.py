@@ -75,6 +75,8 @@ class DanceResult:
         What was left out for the person (``dance.notes``: because a move was impossible).
     seconds : float
         Of computing.
+    reason_of_person : str
+        Why the person's file asks for limits of their own; "" without one.
 
     Examples
     --------
