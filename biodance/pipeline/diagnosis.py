@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 _FAR = "its markers move more on the body than where tolerances were learned"
 """Why no cause is told from a movement whose soft tissue or joints err more than in null sessions."""
+_MORE_JOINTS = "its body moves at joints ({}) that the tolerances were not learned with"
+"""Why what is left of a body with optional joints may be theirs."""
 TRIAL_SECONDS = 20.0
 """s: a designed dance is looked at as trials of about this length."""
 
@@ -192,6 +194,10 @@ def _diagnosed(
     if not own.believed:
         examined = replace(examined, diagnosis=replace(examined.diagnosis, doubt=_FAR))
         return SessionDiagnosis(_disbelieved(without_names(examined).diagnosis), examined)
+    joints = [one.name for one in result.shown_joints.gains if one.taken]
+    if joints and examined.diagnosis.verdict == "unexplained" and not examined.diagnosis.doubt:
+        doubt = _MORE_JOINTS.format(", ".join(joints))
+        examined = replace(examined, diagnosis=replace(examined.diagnosis, doubt=doubt))
     tell("measuring what the findings change")
     return _with_gains(result, examined)
 
