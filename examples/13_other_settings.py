@@ -14,7 +14,7 @@ def main(picture: Path) -> None:
     """Print the causes found; draw measured and simulated wrench of the squat."""
     with tempfile.TemporaryDirectory() as scratch:
         subject, hidden = biodance.Subject(62.0, 1.70, "F", 31.0), ["plate_gain:target=Fz,gain=0.06"]
-        folder = biodance.simulate(subject, "short", Path(scratch) / "visit", seed=2, effects=hidden)
+        folder = biodance.simulate(subject, "squat", Path(scratch) / "visit", seed=2, effects=hidden)
         visits = [biodance.read_session(folder, settings={"filter.cutoff": cutoff}) for cutoff in (10, 6)]
     for visit in visits:
         found = biodance.diagnose(visit)

@@ -92,7 +92,7 @@ def visited(folder: Path, *more: str) -> SessionResult:
     lab = os.environ.get("BIODANCE_FOREIGN_LAB")
     if not lab:
         pytest.skip("BIODANCE_FOREIGN_LAB is not set: no independent virtual laboratory here")
-    person = {"seed": 611, "sex": "M", "height": 1.78, "mass": 74, "trials": 4, "noise": 0.6, "camera": 0.3}
+    person = {"seed": 611, "sex": "M", "height": 1.78, "mass": 74, "trials": 3, "noise": 0.6, "camera": 0.3}
     asked = [text for name, value in person.items() for text in (f"--{name}", str(value))]
     command = [sys.executable, str(Path(lab) / "foreign_lab.py"), *asked, *more, "--out", str(folder)]
     subprocess.run(command, check=True, capture_output=True, timeout=240)
