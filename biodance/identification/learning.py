@@ -7,6 +7,7 @@ import numpy as np
 from biodance.identification.posterior import Posterior, posterior
 from biodance.identification.statistics import Statistics
 from biodance.records import Array, Sip
+from biodance.threads import one_thread
 from biodance.uncertainty.learning import maximise, noise_of
 from biodance.uncertainty.noise import Noise
 
@@ -16,6 +17,7 @@ WORTH = 6.0
 """Coefficients' worth of the start that every band keeps."""
 
 
+@one_thread()
 def learn_noise(
     data: Statistics, prior: Sip, *, rounds: int = 12, tolerance: float = 1e-3, start: Array = START
 ) -> tuple[Noise, Posterior]:

@@ -11,6 +11,7 @@ from biodance.body.inertia import PSEUDO_INERTIA, pseudo_inertia, smallest_eigen
 from biodance.errors import NotSolved
 from biodance.identification.posterior import Posterior
 from biodance.records import Array, Sip
+from biodance.threads import one_thread
 
 if TYPE_CHECKING:
     import cvxpy as cp
@@ -83,6 +84,7 @@ class FailedFit:
     """Likewise."""
 
 
+@one_thread()
 def physical_fit(belief: Posterior, body: "Body") -> PhysicalFit | FailedFit:
     """Return the physically consistent parameters nearest to the posterior mean, CoM inside ``body.com_boxes``; look at
     ``status``.

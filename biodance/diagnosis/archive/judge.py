@@ -17,6 +17,7 @@ from biodance.diagnosis.archive.findings import (
 )
 from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES, PlateEvidence, PlateVisit, in_order
 from biodance.diagnosis.archive.series import series_of
+from biodance.threads import one_thread
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +61,7 @@ class ArchiveJudgement:
         return tuple(finding for card in self.plates for finding in card.findings)
 
 
+@one_thread()
 def judge(observations: Sequence[PlateEvidence]) -> ArchiveJudgement:
     """Return what the observations of an archive say about its plates, kinds of trial and people; none gives an empty
     judgement.
