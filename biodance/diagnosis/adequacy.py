@@ -20,9 +20,10 @@ LIMIT = 4.5
 """Standard deviations of null sessions beyond which one band of one channel is not adequate."""
 _BEYOND = 9.0
 """Standard deviations beyond which a name does not tell the main part."""
-STRAINED = 4.5
+STRAINED = 3.5
 """Standard deviations by which the body may be more unlike the table than people are (sessions without fault: 1.4 at
-most of 14 of the own laboratory, 4.1 of 36 of an independent one, whose people are drawn around other tables).
+most of 14 of the own laboratory; beyond it in 1 of 36 of an independent one, whose people are drawn around other
+tables: 4.1).
 """
 STRETCHED = 7.0
 """Standard deviations beyond which no tolerance of a cause is believed: with the right cause named at most 6.1 in 22

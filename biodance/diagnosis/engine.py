@@ -22,7 +22,7 @@ from biodance.diagnosis.adequacy import (
 from biodance.diagnosis.consequence import matters, unit_at
 from biodance.diagnosis.diagnosis import Diagnosis, Estimate, Finding, Unobservable
 from biodance.diagnosis.model import Model, NamedCause
-from biodance.diagnosis.naming import SURE, Naming, Round, less_one, name_causes, named_of, suspicious
+from biodance.diagnosis.naming import Naming, Round, less_one, name_causes, named_of, suspicious
 from biodance.diagnosis.observability import detection_limits, hidden, visibility
 from biodance.diagnosis.passing import with_passing
 from biodance.diagnosis.plate_axes import in_plate_axes
@@ -150,7 +150,7 @@ def judged(examined: Examined) -> Examined:
     every = [(cause, _finding(cause, r, known, plates)) for cause, r in zip(named, naming.accepted, strict=True)]
     large = [pair for pair in every if matters(pair[0].effect, pair[0].theta)]
     told = verdict(len(large), alarming(left), one.gates, strained=strained)
-    doubted = [pair for pair in large if _one_of_several(pair[0], named) or not _shown(*pair)]
+    doubted = [pair for pair in large if _one_of_several(pair[0], named)]
     trusted = [] if told == "unexplained" else [pair for pair in large if pair not in doubted]
     several = any(_one_of_several(cause, named) for cause, _ in large)
     if doubted and told != "unexplained":
@@ -171,15 +171,6 @@ def judged(examined: Examined) -> Examined:
 def _one_of_several(one: NamedCause, named: tuple[NamedCause, ...]) -> bool:
     """Return whether a cause that is believed only alone (`Effect.single`) was named at several targets."""
     return one.effect.single and sum(other.effect.name == one.effect.name for other in named) > 1
-
-
-def _shown(one: NamedCause, found: Finding) -> bool:
-    """Return whether the markers show what they could show by themselves of a cause: a joint that does not move in them
-    is none, whatever the forces gain by it.
-    """
-    if type(one.effect).shown is Effect.shown or one.course:
-        return True
-    return abs(found.parameters[0].value) >= SURE * found.parameters[0].sd
 
 
 def moves(case: Case) -> bool:
