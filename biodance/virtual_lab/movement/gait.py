@@ -13,27 +13,22 @@ from biodance.virtual_lab.movement.performance import MARGIN, Performance
 from biodance.virtual_lab.movement.posing import Z, take_stance, turn_about
 from biodance.virtual_lab.movement.protocol import TrialPlan
 from biodance.virtual_lab.movement.steps import Foot
-from biodance.virtual_lab.movement.stride import STRIDE_RATE, find_stride
+from biodance.virtual_lab.movement.stride import STRIDE_RATE, Stride, find_stride
 from biodance.virtual_lab.person.person import Person
 from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances, stream
-
-_AIM = 0.75
-"""Of stature: height over the belt at which the ground forces aim; over the centre of mass, as in people (Maus et al.
-2010, doi:10.1038/ncomms1073)."""
 
 
 @dataclass(frozen=True, eq=False)
 class GaitPerformance(Performance):
     """A trial on a belt: as `Performance`, its ground forces prescribed foot by foot.
 
-    ``gait`` and ``feet`` (right, left) in the axes of the belt; ``aim`` m; ``twist`` m, free moment per vertical force;
-    ``balance_error`` N·m·s, angular momentum that the motion lacks.
+    ``gait`` and ``feet`` (right, left) in the axes of the belt; ``stride`` that is repeated; ``balance_error`` N·m·s,
+    angular momentum that the motion lacks.
     """
 
     gait: Gait = GAITS["walk"]
     feet: tuple[Foot, ...] = ()
-    aim: float = 1.0
-    twist: float = 0.0
+    stride: Stride = None  # type: ignore[assignment]
 
     def foot_wrench(self, time: Array, side: str) -> Array:
         """Return the true wrench (T, 6) about the lab origin under one foot, exactly zero while it is in the air."""
@@ -53,9 +48,9 @@ class GaitPerformance(Performance):
 
     def _asked(self, foot: Foot, time: Array) -> Array:
         """Return the prescribed wrench (T, 6) of one foot about the lab origin."""
-        force = foot.force(self.gait, time, self.person.mass, self.aim)
+        force = foot.force(self.gait, time, self.person.mass, self.stride.aim)
         moment = np.cross(foot.pressure(self.gait, time), force)
-        moment[:, 2] += self.twist * force[:, 2]
+        moment[:, 2] += self.stride.twist * force[:, 2]
         turn = turn_about(Z, np.array([self.stance.heading]))[0]
         force, moment = force @ turn.T, moment @ turn.T
         return np.concatenate([force, moment + np.cross(self.middle, force)], axis=1)
@@ -90,17 +85,14 @@ def perform_gait(
         Foot(side, person.size["sole"], person.size["ankle_height"], out)
         for side, out in zip(SIDES, person.habits.toe_out, strict=True)
     )
-    aim = _AIM * person.subject.stature
-    found = find_stride(person, gait, feet, aim)
+    found = find_stride(person, gait, feet)
     index = np.arange(round((plan.duration + 2 * MARGIN) * STRIDE_RATE) + 1) - round(MARGIN * STRIDE_RATE)
     nodes, time = found.q[np.mod(index, len(found.q))].copy(), index / STRIDE_RATE
     turn = turn_about(Z, np.array([stance.heading]))[0]
     nodes[:, :3] = nodes[:, :3] @ turn.T + middle_of(stance.ankle)
     nodes[:, 3:7] = _without_jumps((Rotation.from_matrix(turn) * Rotation.from_quat(nodes[:, 3:7])).as_quat())
     curves = Curves(time, np.zeros((time.size, WIDTH)))
-    return GaitPerformance(
-        plan, person, stance, curves, time, nodes, found.missed, gait=gait, feet=feet, aim=aim, twist=found.twist
-    )
+    return GaitPerformance(plan, person, stance, curves, time, nodes, found.missed, gait=gait, feet=feet, stride=found)
 
 
 def _personal(gait: Gait, rng: np.random.Generator, tolerances: LabTolerances, speed: float) -> Gait:

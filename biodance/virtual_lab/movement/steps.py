@@ -20,6 +20,28 @@ _ROLL = (-0.22, 0.66)
 """The centre of pressure goes from here to there, in lengths of the sole from the ankle."""
 
 
+@dataclass(frozen=True, eq=False)
+class Aim:
+    """The point over the belt at which the ground forces aim: ``height`` m, and ahead and to the left (N, 2) m at
+    ``sway`` N even instants of one ``period`` s.
+    """
+
+    height: float
+    period: float
+    sway: Array
+
+    def at(self, time: Array) -> Array:
+        """Return the point (T, 3) m at ``time`` (T,) s."""
+        spectrum = np.fft.rfft(self.sway, axis=0)[: HARMONICS + 1] / len(self.sway)
+        wave = np.exp(2j * np.pi * np.outer(time / self.period, np.arange(len(spectrum))))
+        wave[:, 1:] *= 2
+        return np.column_stack([(wave @ spectrum).real, np.full(time.size, self.height)])
+
+
+HARMONICS = 6
+"""Of the stride, in the sway of the point at which forces aim."""
+
+
 @dataclass(frozen=True)
 class Foot:
     """One foot on the belt: its ``side``, ``length`` m of the sole, ``height`` m of the ankle, ``out`` rad of the toes,
@@ -47,15 +69,11 @@ class Foot:
         y = self.sign * (0.5 * gait.width + along * np.sin(self.out))
         return np.stack([x, y, 0.0 * x], axis=1)
 
-    def force(self, gait: Gait, time: Array, mass: float, height: float) -> Array:
-        """Return the ground's force (T, 3) N on the foot: smooth, zero in swing, towards a point ``height`` m over the
-        belt's middle.
-        """
+    def force(self, gait: Gait, time: Array, mass: float, aim: Aim) -> Array:
+        """Return the ground's force (T, 3) N on the foot: smooth, zero in swing, towards the point of ``aim``."""
         s = gait.since_strike(time, self.side) / gait.contact
         vertical = 0.5 * gait.stride * mass * G / (gait.contact * _mean_pulse(gait)) * _pulse(gait, s)
-        towards = -self.pressure(gait, time) / height
-        towards[:, 2] = 1.0
-        return vertical[:, None] * towards
+        return vertical[:, None] * (aim.at(time) - self.pressure(gait, time)) / aim.height
 
     def path(self, gait: Gait, time: Array) -> tuple[Array, Array]:
         """Return the ankle (T, 3) m and the pitch (T,) rad of the foot, toes up positive."""

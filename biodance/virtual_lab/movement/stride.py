@@ -21,15 +21,21 @@ from biodance.virtual_lab.movement.gaits import Gait
 from biodance.virtual_lab.movement.performance import motion_through
 from biodance.virtual_lab.movement.posing import turn_about
 from biodance.virtual_lab.movement.protocol import STAND
-from biodance.virtual_lab.movement.steps import Foot, G
+from biodance.virtual_lab.movement.steps import Aim, Foot, G
 from biodance.virtual_lab.person.person import Person
 
 STRIDE_RATE = 200.0
 """Hz of the nodes of a stride."""
-_ROUNDS, _EASE = 80, 0.5
+_ROUNDS, _LEARNED, _EASE = 120, 30, 0.5
+"""Most rounds; rounds in which forces learn to aim; share of each correction that is made."""
+_AIM = {False: 0.57, True: 0.75}
+"""Of stature, height at which the ground forces aim: the centre of mass in walking, above it in running (Maus et al.
+2010, doi:10.1038/ncomms1073)."""
 _SPIN, _PLACE = 1e-3, 1e-6
 """N·m·s and m: a stride is settled when angular momentum and centre of mass are everywhere this close to what the
 forces make of them."""
+_SHORT = 1e-3
+"""m by which the longest distance from hip to ankle may miss that of a nearly straight leg."""
 _STRAIGHT = float(np.radians(4.0))
 """Knee flexion below which no leg is stretched."""
 _PAD = 12
@@ -41,11 +47,12 @@ _LATERAL = np.array([0.0, -1.0, 0.0])
 class Stride:
     """One stride of a person on a belt, in the belt's axes.
 
-    ``q`` (N, 46) nodes at `STRIDE_RATE`; ``twist`` m, free moment per vertical force of both feet; ``missed`` N·m·s,
-    angular momentum that the motion lacks of the one that the forces make.
+    ``q`` (N, 46) nodes at `STRIDE_RATE`; ``aim`` of the ground forces; ``twist`` m, free moment per vertical force of
+    both feet; ``missed`` N·m·s, angular momentum that the motion lacks of the one that the forces make.
     """
 
     q: Array
+    aim: Aim
     twist: float
     missed: float
 
@@ -55,21 +62,24 @@ class _Problem:
     person: Person
     gait: Gait
     feet: tuple[Foot, ...]
-    height: float
 
     @cached_property
     def time(self) -> Array:
         """(N,) s of the nodes."""
         return np.arange(round(self.gait.stride * STRIDE_RATE)) / STRIDE_RATE
 
-    @cached_property
-    def carried(self) -> tuple[Array, Array]:
-        """Total force (N, 3) N and its moment (N, 3) N·m about the belt's middle."""
-        force = [foot.force(self.gait, self.time, self.person.mass, self.height) for foot in self.feet]
+    def carried(self, aim: Aim) -> tuple[Array, Array]:
+        """Return the total force (N, 3) N and its moment (N, 3) N·m about the belt's middle."""
+        force = [foot.force(self.gait, self.time, self.person.mass, aim) for foot in self.feet]
         moment = [
             np.cross(foot.pressure(self.gait, self.time), one) for foot, one in zip(self.feet, force, strict=True)
         ]
         return np.sum(force, axis=0), np.sum(moment, axis=0)
+
+    def aimed(self, height: float, sway: Array) -> Aim:
+        """Return the aim at ``height`` m whose forces push nobody ahead or aside in the mean."""
+        force, _ = self.carried(Aim(height, self.gait.stride, sway))
+        return Aim(height, self.gait.stride, sway - height * force[:, :2].mean(axis=0) / force[:, 2].mean())
 
     @cached_property
     def model(self) -> tuple[Any, Any]:
@@ -87,11 +97,11 @@ class _Problem:
             out[foot.side] = yaw @ turn_about(_LATERAL, pitch) @ UPRIGHT, ankle
         return out
 
-    def demanded(self, height: float) -> tuple[Array, Array, float]:
+    def demanded(self, aim: Aim, height: float) -> tuple[Array, Array, float]:
         """Return the path of the centre of mass (N, 3) m, the angular momentum (N, 3) N·m·s about it (up to a
         constant) that the forces make, and the twist m, with the centre of mass at a mean ``height`` m.
         """
-        force, moment = self.carried
+        force, moment = self.carried(aim)
         weight = self.person.mass * G
         com = _integral(_integral(force / self.person.mass - [0.0, 0.0, G], self.gait.stride), self.gait.stride)
         com = com + [0.0, 0.0, height]
@@ -149,36 +159,51 @@ class _Problem:
         return q
 
 
-def find_stride(person: Person, gait: Gait, feet: tuple[Foot, ...], height: float) -> Stride:
-    """Return the stride of ``person`` whose ``feet`` take the prescribed forces, which aim at a point ``height`` m over
-    the belt.
+def find_stride(person: Person, gait: Gait, feet: tuple[Foot, ...]) -> Stride:
+    """Return the stride of ``person`` whose ``feet`` take the prescribed forces.
+
+    In walking the forces first learn to aim so that the trunk neither nods nor rolls; then the pelvis turns by what
+    is left. The legs are as long as the height of the centre of mass allows.
 
     Raises
     ------
     BiodanceError
         The repetition does not settle: no such motion was found for this person.
     """
-    problem = _Problem(person, gait, feet, height)
-    upper, level = problem.upper(), 0.57 * person.subject.stature
+    problem, learns = _Problem(person, gait, feet), gait.flight == 0
+    upper, level = problem.upper(), 0.55 * person.subject.stature
     root, turned = np.tile([0.0, 0.0, level], (problem.time.size, 1)), np.zeros((problem.time.size, 3))
-    lever = _upper_inertia(person)
-    missed = np.inf
-    for _ in range(_ROUNDS):
-        com, spin, twist = problem.demanded(level)
+    height, sway = (_AIM[gait.flight > 0] * person.subject.stature), np.zeros((problem.time.size, 2))
+    lever, missed, off = _upper_inertia(person), np.inf, np.inf
+    for number in range(_ROUNDS):
+        aim = problem.aimed(height, sway)
+        com, spin, twist = problem.demanded(aim, level)
         q, short = problem.posed(upper, root, turned)
         centre, has = problem.moved(q)
         lacks = spin - has
         lacks = lacks - lacks.mean(axis=0)
         missed, off = float(np.abs(lacks).max()), float(np.abs(com - centre).max())
-        if missed < _SPIN and off < _PLACE and abs(short) < 1e-3:
-            return Stride(q, twist, missed)
-        level -= _EASE * short
-        root = root + (com - centre)
-        turned = turned + _EASE * _integral(lacks / lever, gait.stride)
+        if missed < _SPIN and off < _PLACE and abs(short) < _SHORT:
+            return Stride(q, aim, twist, missed)
+        level, root = level - _EASE * short, root + (com - centre)
+        step = _EASE * _integral(lacks / lever, gait.stride)
+        if learns and number < _LEARNED:
+            sway = sway + _EASE * _sway(lacks, problem.carried(aim)[0][:, 2], gait.stride, height / level)
+            step[:, :2] = 0.0
+        turned = turned + step
     raise BiodanceError(
         f"Gait {gait.name} at {gait.speed:.2f} m/s: no motion of this person was found that the ground forces carry "
-        f"({missed:.3g} N·m·s of angular momentum, {off:.3g} m of the centre of mass left). Choose another seed or speed."
+        f"({missed:.3g} N·m·s of angular momentum, {off:.3g} m of the centre of mass left). Choose another seed or "
+        f"speed."
     )
+
+
+def _sway(lacks: Array, vertical: Array, period: float, lever: float) -> Array:
+    """Return by how much (N, 2) m the forces must aim elsewhere to give the angular momentum that ``lacks`` (N, 3)."""
+    spectrum = np.fft.rfft(lacks[:, :2], axis=0)
+    spectrum *= 2j * np.pi * np.fft.rfftfreq(len(lacks), period / len(lacks))[:, None]
+    rate = np.fft.irfft(spectrum, len(lacks), axis=0)
+    return np.asarray(lever * np.stack([rate[:, 1], -rate[:, 0]], axis=1) / vertical[:, None])
 
 
 def _upper_inertia(person: Person) -> Array:
