@@ -17,6 +17,9 @@ from biodance.virtual_lab.movement.stride import STRIDE_RATE, Stride, find_strid
 from biodance.virtual_lab.person.person import Person
 from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances, stream
 
+_STATURE = 1.75
+"""m of the person whose gait is described by `gaits`; others go in proportion."""
+
 
 @dataclass(frozen=True, eq=False)
 class GaitPerformance(Performance):
@@ -79,7 +82,7 @@ def perform_gait(
     from lab x; the same arguments give the same motion.
     """
     rng = stream(person.seed, "gait", str(session), plan.name)
-    gait = _personal(GAITS[plan.gait], rng, tolerances, plan.speed)
+    gait = _personal(GAITS[plan.gait], rng, tolerances, plan.speed, person.subject.stature)
     stance = take_stance(person, "parallel", centre, heading, rng)
     feet = tuple(
         Foot(side, person.size["sole"], person.size["ankle_height"], out)
@@ -95,13 +98,17 @@ def perform_gait(
     return GaitPerformance(plan, person, stance, curves, time, nodes, found.missed, gait=gait, feet=feet, stride=found)
 
 
-def _personal(gait: Gait, rng: np.random.Generator, tolerances: LabTolerances, speed: float) -> Gait:
-    """Return the gait of this trial: everything but the belt's ``speed`` (0: the gait's) a little its own."""
+def _personal(gait: Gait, rng: np.random.Generator, tolerances: LabTolerances, speed: float, stature: float) -> Gait:
+    """Return the gait of this trial: lengths as the ``stature`` m, times and speed as its square root (both pendulums
+    alike), and everything but the belt's ``speed`` (0: the gait's) a little its own.
+    """
+    size = stature / _STATURE
     names = ("width", "strike", "push", "clearance", "arm", "elbow", "lean")
     own = {name: getattr(gait, name) * float(1 + tolerances.performance * rng.normal()) for name in names}
-    pace = float(1 + 0.3 * tolerances.performance * rng.normal())
+    own = {name: value * (size if name in ("width", "clearance") else 1) for name, value in own.items()}
+    pace = np.sqrt(size) * float(1 + 0.3 * tolerances.performance * rng.normal())
     stride = 2 * round(0.5 * gait.stride * pace * STRIDE_RATE) / STRIDE_RATE
-    return replace(gait, speed=speed or gait.speed, stride=stride, **own)
+    return replace(gait, speed=float(np.sqrt(size)) * (speed or gait.speed), stride=stride, **own)
 
 
 def _without_jumps(quaternion: Array) -> Array:

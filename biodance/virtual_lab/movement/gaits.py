@@ -15,7 +15,8 @@ class Gait:
     running, with flight); ``width`` m between the ankles; ``strike``, ``push`` rad: pitch of the foot, toes up, when it
     lands, heel up when it leaves; ``flat`` shares of stance between which it lies flat; ``clearance`` m by which the
     ankle is lifted in swing; ``dip`` of the vertical force in mid stance (0 = one peak); ``arm``, ``elbow`` rad: swing
-    of the upper arms and mean flexion of the elbows; ``lean`` rad of the trunk.
+    of the upper arms and mean flexion of the elbows; ``lean`` rad of the trunk; ``knee`` rad, their least
+    flexion.
     """
 
     name: str
@@ -31,6 +32,7 @@ class Gait:
     arm: float
     elbow: float
     lean: float
+    knee: float
 
     @property
     def contact(self) -> float:
@@ -48,7 +50,7 @@ class Gait:
 
 
 GAITS = {
-    "walk": Gait("walk", 1.1, 1.06, 0.62, 0.17, 0.26, 0.55, (0.14, 0.58), 0.03, 0.18, 0.4, 0.35, 0.03),
-    "run": Gait("run", 2.6, 0.72, 0.34, 0.09, 0.08, 0.6, (0.12, 0.45), 0.06, 0.0, 0.6, 1.4, 0.08),
+    "walk": Gait("walk", 1.1, 1.16, 0.6, 0.17, 0.2, 0.5, (0.24, 0.5), 0.03, 0.18, 0.4, 0.35, 0.03, 0.07),
+    "run": Gait("run", 2.4, 0.7, 0.36, 0.09, 0.05, 0.5, (0.35, 0.5), 0.15, 0.0, 0.6, 1.4, 0.08, 0.15),
 }
 """Ways to go, by the names that a protocol uses."""

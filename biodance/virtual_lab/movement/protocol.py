@@ -58,7 +58,8 @@ class ProtocolStep:
 @dataclass(frozen=True)
 class TrialPlan:
     """One trial of a protocol: ``lead`` seconds of standing before and after the ``steps``; or ``gait`` ("walk", "run")
-    on a belt of ``speed`` m/s (0: the gait's own) for twice the ``lead``.
+    on a belt of ``speed`` m/s (0: the gait's own) for a person of 1.75 m, others as the root of stature; for twice the
+    ``lead``.
     """
 
     name: str

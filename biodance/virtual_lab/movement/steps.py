@@ -85,7 +85,7 @@ class Foot:
         u = np.clip((t - gait.contact) / swing, 0.0, 1.0)
         bump = gait.clearance * 64 * u**3 * (1 - u) ** 3
         moved = [_hermite(u, swing, [end[k] for end in ends]) for k in range(3)]
-        pitch, x, z = (np.where(on, a, b) for a, b in zip((pitch, x, z), (moved[0], moved[1], moved[2] + bump)))
+        pitch, x, z = (np.where(on, a, b) for a, b in zip((pitch, x, z), (*moved[:2], moved[2] + bump), strict=True))
         return np.stack([x * np.cos(self.out), self.sign * (0.5 * gait.width + 0 * x), z], axis=1), pitch
 
 

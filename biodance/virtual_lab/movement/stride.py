@@ -36,8 +36,6 @@ _SPIN, _PLACE = 1e-3, 1e-6
 forces make of them."""
 _SHORT = 1e-3
 """m by which the longest distance from hip to ankle may miss that of a nearly straight leg."""
-_STRAIGHT = float(np.radians(4.0))
-"""Knee flexion below which no leg is stretched."""
 _PAD = 12
 """Nodes of the strides before and after with which a stride's derivatives are taken."""
 _LATERAL = np.array([0.0, -1.0, 0.0])
@@ -104,9 +102,9 @@ class _Problem:
         force, moment = self.carried(aim)
         weight = self.person.mass * G
         com = _integral(_integral(force / self.person.mass - [0.0, 0.0, G], self.gait.stride), self.gait.stride)
-        com = com + [0.0, 0.0, height]
+        com[:, 2] += height
         about = (moment - np.cross(com, force)).mean(axis=0) / weight
-        com = com + [-about[1], about[0], 0.0]
+        com[:, :2] += np.array([-about[1], about[0]])
         rate = moment - np.cross(com, force)
         twist = -rate[:, 2].mean() / weight
         rate[:, 2] += twist * force[:, 2]
@@ -124,7 +122,7 @@ class _Problem:
         for side, (foot, ankle) in self.soles.items():
             leg = Leg.of(body, side)
             away = np.linalg.norm(root + turn @ leg.hip - ankle, axis=1)
-            short = max(short, float(np.max(away - leg.length(_STRAIGHT))))
+            short = max(short, float(np.max(away - leg.length(self.gait.knee))))
             q[:, [7 + column for column in leg.columns]] = leg.solve(turn, root, foot, ankle)
         return q, short
 
@@ -185,7 +183,7 @@ def find_stride(person: Person, gait: Gait, feet: tuple[Foot, ...]) -> Stride:
         missed, off = float(np.abs(lacks).max()), float(np.abs(com - centre).max())
         if missed < _SPIN and off < _PLACE and abs(short) < _SHORT:
             return Stride(q, aim, twist, missed)
-        level, root = level - _EASE * short, root + (com - centre)
+        level, root = level - _EASE * short, root + _EASE * (com - centre)
         step = _EASE * _integral(lacks / lever, gait.stride)
         if learns and number < _LEARNED:
             sway = sway + _EASE * _sway(lacks, problem.carried(aim)[0][:, 2], gait.stride, height / level)
