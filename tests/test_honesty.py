@@ -284,8 +284,12 @@ def test_the_size_of_what_is_left_is_in_newton() -> None:
 
 # ---- real recordings
 
-EXCHANGED = {"HC050A": ("LWRA/LWRB",), "HC055A": ("LBHD/RBHD", "LFHD/RFHD")}
-"""Truly exchanged in one walk each: the distances to elbow and head say so, too."""
+EXCHANGED = {
+    "HC038A": ("LWRA/LWRB", "RWRA/RWRB"),
+    "HC050A": ("LWRA/LWRB",),
+    "HC055A": ("LBHD/RBHD", "LFHD/RFHD"),
+}
+"""Truly exchanged in one walk each: finger markers on the palm, distances to elbow and within the head say so, too."""
 CHILDREN = ("HC031A", "HC032A", "HC038A", "HC044A", "HC050A", "HC055A")
 
 
