@@ -12,6 +12,8 @@ that was stopped goes on; the table in docs/benchmarks/diagnosis.md is printed f
 import argparse
 import json
 import os
+import pickle
+import re
 import subprocess
 import sys
 import tempfile
@@ -22,7 +24,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 from bench_honesty import PEOPLE, ROOM
-from hidden_sessions import CACHE
+from hidden_sessions import CACHE, store
 from test_hidden_causes import CAUSES
 from test_hidden_effects import hidden
 
@@ -32,6 +34,8 @@ from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine
 
+UNKNOWN = "unknown"
+"""Effect of a cause of the foreign laboratory that no file here describes."""
 FOREIGN = (
     ("plate_position", "plate_position", "0.03", "x"), ("plate_rotation", "plate_rotation", "5", "z"),
     ("time_delay", "time_delay", "0.02", ""), ("plate_gain", "plate_gain", "0.05", "Fz"),
@@ -43,6 +47,9 @@ FOREIGN = (
     ("head_joint", "head_joint", "15", ""), ("marker_misplaced", "marker_misplaced", "0.06", "RKNE:x"),
     ("plate_hysteresis", "plate_hysteresis", "", ""), ("wobbling_mass", "wobbling_mass", "", ""),
     ("filter_mismatch", "force_filter", "3", ""), ("trunk_joint", "trunk_joint", "10", ""),
+    ("joint_centre", "joint_centre", "0.06", "hipR:x"), ("segment_length", "segment_length", "0.05", "kneeL"),
+    ("marker_misplaced", "marker_moved", "0.06", "RKNE:x"), ("labels_swapped", "marker_swap", "", ""),
+    ("clipping", "clipping", "", ""), (UNKNOWN, "creep", "", ""),
 )  # fmt: skip
 """Effect here, cause of the foreign laboratory, its size ("" its own) and target."""
 SAME = {"joint_centre": {"segment_length"}, "segment_length": {"joint_centre"}}
@@ -86,6 +93,18 @@ def foreign(index: int, folder: Path) -> SessionResult:
     for squat in (folder / "s").glob("squat*"):
         squat.unlink()
     return examine(read_session(folder / "s"))
+
+
+def _kept(key: str, session: Callable[[Path], SessionResult]) -> SessionResult:
+    """Return an examined session, made once."""
+    path = CACHE / "removed" / f"{re.sub('[^A-Za-z0-9.=-]', '_', key)}.pickle"
+    if path.is_file():
+        with open(path, "rb") as stream:
+            return pickle.load(stream)
+    with tempfile.TemporaryDirectory() as folder, patch("biodance.pipeline.session.can_identify", lambda _: False):
+        result = session(Path(folder))
+    store(path, result)
+    return result
 
 
 def answered(column: str, effect: str, said: str, result: SessionResult, *, without: bool) -> Answer:
@@ -133,9 +152,8 @@ def main() -> None:
     for column, effect, said, session in jobs():
         if column not in asked.only or asked.match not in said or (column, said) in known:
             continue
-        with tempfile.TemporaryDirectory() as folder, patch("biodance.pipeline.session.can_identify", lambda _: False):
-            result = session(Path(folder))
-            both = [answered(column, effect, said, result, without=without) for without in (True, False)]
+        result = _kept(f"{column}-{said}", session)
+        both = [answered(column, effect, said, result, without=without) for without in (True, False)]
         with kept.open("a") as stream:
             stream.writelines(json.dumps(asdict(one)) + "\n" for one in both)
         found += both
