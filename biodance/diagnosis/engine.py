@@ -15,6 +15,7 @@ from biodance.diagnosis.adequacy import (
     adequacy,
     alarming,
     loudness,
+    strain,
     strain_as_loud,
     stretch,
     verdict,
@@ -224,8 +225,9 @@ def without_name(examined: Examined, index: int) -> Examined:
 
 
 def _strange(found: Model) -> tuple[str, ...]:
-    """Say what had to be unlike people or laboratories for the rest to fit."""
-    body, rest = strain_as_loud(found) > STRAINED, stretch(found) > STRETCHED
+    """Say what had to be unlike people or laboratories for the rest to fit; a name has to fit without any excuse."""
+    body = (strain(found) if found.named else strain_as_loud(found)) > STRAINED
+    rest = stretch(found) > STRETCHED
     return (*((STRANGE,) if body else ()), *((UNASKED,) if rest else ()))
 
 
