@@ -32,7 +32,7 @@ def leaking(local, session):
 
 @pytest.mark.parametrize(("change", "guilty", "innocent"), [(zero, ZERO, LEAK), (leaking, LEAK, ZERO)])
 def test_a_zero_and_a_leak_of_the_load_do_not_stand_for_one_another(change, guilty, innocent) -> None:
-    some = looks(1, trials=3, hidden=about_plate(change))
+    some = looks(1, trials=2, hidden=about_plate(change))
     right, wrong = (
         diagnose_trials(body(), some, tolerances=known(), effects=(name,)) for name, _ in (guilty, innocent)
     )
@@ -43,14 +43,9 @@ def test_a_zero_and_a_leak_of_the_load_do_not_stand_for_one_another(change, guil
     like = next(f for f in wrong.diagnosis.resembles if (f.effect, f.target) == innocent)
     assert like.hangs_on
     assert any(HANGS in note for note in wrong.diagnosis.notes)
-
-
-def test_the_load_that_a_zero_stands_for_shows_in_full() -> None:
-    """A leak is in proportion to the load: named as a zero, its size doubles with the load (share 1 of it)."""
-    some = looks(2, trials=3, hidden=about_plate(leaking))
-    naming = diagnose_trials(body(), some, tolerances=known(), effects=("plate_offset",)).naming
-    by_load = next(one for one in departures(naming.found) if (one.cause, one.over) == (ZERO, "load"))
-    assert by_load.share == pytest.approx(1.0, abs=0.35)
+    if innocent == ZERO:  # a leak is in proportion to the load: its size as a zero doubles with it
+        by_load = next(one for one in departures(wrong.naming.found) if (one.cause, one.over) == (ZERO, "load"))
+        assert by_load.share == pytest.approx(1.0, abs=0.35)
 
 
 def a_finding(value: float, hangs_on: str = "") -> Finding:
@@ -80,7 +75,7 @@ def test_a_loud_person_makes_no_body_strange_and_a_strange_body_stays_strange() 
     """Everything 2.2 times as loud as known pulls the body about; its deviations are then no news. A body three times
     as unlike the table as people are stays strange beside the usual noise.
     """
-    found, _ = built(problem(body(), looks(3)), known(), ("plate_offset",))
+    found, _ = built(problem(body(), looks(3, trials=2)), known(), ("plate_offset",))
     belief, k, rng = found.belief, found.problem.factor.shape[1], np.random.default_rng(7)
 
     def of(size: float, loud: float):
