@@ -64,8 +64,8 @@ its middle and an offset."""
 
 @dataclass(frozen=True)
 class Answer:
-    """What one session was told: ``named`` and ``resembled`` effects with their targets, ``z`` of what is left, ``size`` of
-    the culprit where it is named, and its standard deviation.
+    """What one session was told: ``named`` and ``resembled`` effects with their targets, ``z`` of what is left,
+    ``size`` of the culprit where it is named, and its standard deviation.
     """
 
     column: str
