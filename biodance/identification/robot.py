@@ -15,7 +15,7 @@ from biodance.identification.base_parameters import BaseEstimate, BaseParameters
 from biodance.identification.identification import Identification, conclude, usable
 from biodance.identification.learning import START, learn_noise
 from biodance.identification.mismatch import SHORTEST, Mismatch
-from biodance.identification.robot_errors import THINNED, place_changes, some_frames, zero_changes
+from biodance.identification.robot_errors import THINNED, place_changes, places_of, some_frames, zero_changes
 from biodance.identification.statistics import Fit, empty, layout_for, statistics
 from biodance.motion.grounded import Grounded
 from biodance.motion.regressor import regressor
@@ -101,11 +101,12 @@ def _start(body: Body) -> Array:
 
 
 def _errors(body: Body, trials: tuple[tuple[Fit, RobotMotion], ...], noise: Noise) -> Mismatch:
-    """Return the scores of encoder zeros, plate faults (one plate for all trials) and places (one a trial)."""
+    """Return the scores of encoder zeros, of plate faults (one plate for all trials) and of places."""
     size, plates = 10 * len(body.segments), plate_sources()
     encoders, faults = np.zeros((size, len(body.joints))), np.zeros((size, len(plates.delay)))
-    places = np.zeros((len(trials), size, 3))
-    for k, (fit, one) in enumerate(trials):
+    places = []
+    for fit, one in trials:
+        place = np.zeros((size, places_of(one.grounded)))
         changes = zero_changes(body, one.grounded, one.angle)
         white = noise.at(fit.motion.rate)
         for pick in noise.bands.runs(fit.use, fit.motion.rate):
@@ -116,5 +117,6 @@ def _errors(body: Body, trials: tuple[tuple[Fit, RobotMotion], ...], noise: Nois
             weight, wrench = white.weighted(W), W @ body.sip.phi
             encoders += np.tensordot(weight, changes[pick // THINNED], axes=((0, 1), (0, 1)))
             faults += np.tensordot(weight, plate_errors(wrench, motion.rate, noise, plates), axes=((0, 1), (0, 1)))
-            places[k] += np.tensordot(weight, place_changes(wrench, one.grounded), axes=((0, 1), (0, 1)))
+            place += np.tensordot(weight, place_changes(wrench, one.grounded, pick), axes=((0, 1), (0, 1)))
+        places.append(place)
     return Mismatch(encoders, np.concatenate([faults, *places], axis=1))
