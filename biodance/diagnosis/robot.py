@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.diagnosis.robot_columns import Columns, RobotCause, columns_of, motion_changes, without
+from biodance.diagnosis.robot_columns import LOADED_KINDS, Columns, RobotCause, columns_of, motion_changes, without
 from biodance.identification.learning import START, WORTH
 from biodance.identification.mismatch import SHORTEST
 from biodance.identification.posterior import prior_factor
@@ -30,6 +30,8 @@ _CLEAR, _LIKE = 8.0, 3.0
 """Nats: least evidence of a cause; causes within so many of the best are not told apart from it."""
 _WORST = 4.0
 """Standard deviations of a cause that is there, beyond which none is believed: it would be seen without us."""
+_SHARED = 0.15
+"""Of what gives or has play: how far its size may be off because nobody knows how two standing feet share the load."""
 _MOST = 4
 """Causes that are looked for, one after the other."""
 _ROUNDS = 12
@@ -137,7 +139,9 @@ def _refined(
         more, sd = float((covariance @ b)[size + k]), float(np.sqrt(covariance[size + k, size + k]))
         per, most = one.cause.per, _WORST * columns.wide[k]
         more = float(np.clip(one.value / per + more, -most, most) - one.value / per)
-        out.append(replace(one, value=one.value + more * per, sd=sd * per))
+        value = one.value + more * per
+        unshared = _SHARED * abs(value) if one.cause.kind in LOADED_KINDS else 0.0
+        out.append(replace(one, value=value, sd=float(np.hypot(sd * per, unshared))))
         trials = tuple(without(body, trial, columns, one.cause, more) for trial in trials)
     return out, trials
 

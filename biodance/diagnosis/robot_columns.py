@@ -30,6 +30,9 @@ _WIDE = 10.0
 """Standard deviation of a cause that is there, over the usual error of its kind."""
 _LOADED = 2.0
 """The same of what gives or has play, in units of `GIVE`; usual is none."""
+_ALIKE = 0.33
+"""Of the RMS torque of its like: a joint that bears less says nothing of whether both give."""
+LOADED_KINDS = ("flexible_joint", "backlash", "soft_sole")
 SOLE = {"forwards": 0, "sideways": 1}
 BANDS_OF_CAUSES = Bands((0.0, 0.04, 0.3, 1.0), 25.0)
 """Hz. Beyond, what a motion needs is more and more the encoders' noise, twice differentiated: masses that explain it
@@ -82,7 +85,7 @@ def columns_of(body: Body, fitted: tuple[RobotMotion, ...], trials: tuple[RobotM
     causes: list[RobotCause | None] = [
         RobotCause("encoder_zero", name, ZERO, "rad", (j,)) for j, name in enumerate(names)
     ]
-    encoders, groups = len(causes), _legs_and_pairs(body)
+    encoders, groups = len(causes), _legs_and_pairs(body, torque)
     for some in groups:
         per = GIVE / float(torque[list(some)].mean() + 1e-9)
         causes.append(RobotCause("flexible_joint", _both(names, some), per, "rad/(N·m)", some))
@@ -104,12 +107,14 @@ def columns_of(body: Body, fitted: tuple[RobotMotion, ...], trials: tuple[RobotM
     )
 
 
-def _legs_and_pairs(body: Body) -> list[tuple[int, ...]]:
-    """Return every joint of the legs alone, and each of the right with its like of the left."""
+def _legs_and_pairs(body: Body, torque: Array) -> list[tuple[int, ...]]:
+    """Return every joint of the legs alone, and each of the right with its like of the left where both bear ``torque``
+    (n,) N·m.
+    """
     right, left = leg_chains(body)
-    alone = sorted({*right, *left})
-    pairs = [(r, m) for r, m in zip(right, left, strict=True) if r != m] if len(right) == len(left) else []
-    return [*((j,) for j in alone), *pairs]
+    pairs = [pair for pair in zip(right, left, strict=False) if len(right) == len(left) and pair[0] != pair[1]]
+    both = [pair for pair in pairs if torque[list(pair)].min() > _ALIKE * torque[list(pair)].max()]
+    return [*((j,) for j in sorted({*right, *left})), *both]
 
 
 def _both(names: list[str], some: tuple[int, ...]) -> str:

@@ -17,6 +17,7 @@ from biodance.identification.base_parameters import BaseEstimate
 from biodance.identification.identification import Identification
 from biodance.identification.robot import identify_links
 from biodance.identification.validation import TrialValidation, residual_ratio
+from biodance.lab.filters import LowPass, low_pass
 from biodance.lab.robot.recording import RobotRecording, read_robot_recording
 from biodance.motion.clocks import fit_plate, onto_plate
 from biodance.motion.comparison import Agreement, compare
@@ -33,6 +34,8 @@ _KEPT = 0.2
 """Share of every trial, at its end, that is kept where no trial is."""
 _NEAR = 0.3
 """s: clocks that were brought together are not moved further for validation."""
+_SLOW = 1.0
+"""Hz: faster, what is left is noise of encoders and contact, the same with and without a cause."""
 _NO_SEARCH = "Of a robot, what differs from the drawing is told link by link instead."
 
 
@@ -141,12 +144,17 @@ def _identified(body: Body, name: str, fitted: list[MatchedTrial], kept: list[Ma
 
 
 def _predicts_better(one: SessionIdentification, other: SessionIdentification) -> bool:
-    """Whether ``one`` leaves less of the kept motions than ``other``: mean logarithm of the RMS over all channels."""
+    """Whether ``one`` leaves less of the kept motions than ``other``: mean logarithm, over all channels, of the RMS of
+    what is slower than `_SLOW`, where causes show.
+    """
     return bool(_left(one) < _left(other))
 
 
 def _left(one: SessionIdentification) -> float:
-    rms = [trial.identified_agreement.rms for trial in (one.validations or one.fitted)]
+    rms = []
+    for trial in one.validations or one.fitted:
+        slow = low_pass(trial.measured.value - trial.identified.value, trial.measured.rate, LowPass(cutoff=_SLOW))
+        rms.append(np.sqrt(np.mean(slow[trial.use] ** 2, axis=0)))
     return float(np.mean(np.log(rms))) if rms else float("inf")
 
 
