@@ -119,21 +119,22 @@ def try_robot(name: str, folder: Path, out: Path) -> str:
     kept = result.identified.validations[0]
     mass = [float(x) for x in (phi[10 * heavy], body.sip.mass[heavy], done.sip.mass[heavy])]
     sd = float(np.sqrt(done.sip.covariance[10 * heavy, 10 * heavy]))
+    named = ", ".join(f"{one.cause.kind} {one.cause.where} {one.value:.3g}" for one in result.causes)
     rms = [" ".join(f"{x:.2f}" for x in one.rms) for one in (kept.table_agreement, kept.identified_agreement)]
     return (
         f"| {name} | {len(body.segments)} links, {len(names)} joints | "
         f"{body.sip.mass.sum():.1f}, {real.sip.mass.sum():.1f}, {done.sip.mass.sum():.2f}"
         f" | {body.segments[heavy]} {mass[1]:.2f}, {mass[0]:.2f}, {mass[2]:.2f} ± {sd:.2f} | "
-        f"{rms[0]} | {rms[1]} | {made - start:.0f} + {clock.perf_counter() - made:.0f} s |"
+        f"{rms[0]} | {rms[1]} | {result.verdict} {named} | {made - start:.0f} + {clock.perf_counter() - made:.0f} s |"
     )
 
 
 def main(folder: str, out: str, *names: str) -> None:
     """Print one row a robot."""
     sys.stdout.write(
-        "| robot | size | kg drawn, true, identified | heaviest link | RMS drawn | RMS identified | time |\n"
+        "| robot | size | kg drawn, true, identified | heaviest link | RMS drawn | RMS identified | causes | time |\n"
     )
-    sys.stdout.write("|---" * 7 + "|\n")
+    sys.stdout.write("|---" * 8 + "|\n")
     for name in names or tuple(ROBOTS):
         sys.stdout.write(try_robot(name, Path(folder), Path(out)) + "\n")
         sys.stdout.flush()

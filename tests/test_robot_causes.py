@@ -85,7 +85,9 @@ def test_an_ankle_that_gives_is_named_with_its_stiffness(robot: Body, truth: lis
     assert f"{ANKLE} gives under load" in cause_words(found)[0].text
 
 
-def test_a_sole_that_gives_is_named_with_the_ankle_above_it(robot: Body, truth: list[tuple[Array, Array, Array]]) -> None:
+def test_a_sole_that_gives_is_named_with_the_ankle_above_it(
+    robot: Body, truth: list[tuple[Array, Array, Array]]
+) -> None:
     give, trials = 0.005, []
     for seed, (_, angle, wrench) in enumerate(truth):
         middle = np.mean(real_robot().feet["left"].outline, axis=0)[2]

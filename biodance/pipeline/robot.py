@@ -25,7 +25,7 @@ from biodance.motion.grounded import RATE
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.robot_trials import MatchedTrial, bring_together
-from biodance.pipeline.robot_words import cause_words, refusals, told_of, weights
+from biodance.pipeline.robot_words import cause_words, of_file, refusals, told_of, weights
 from biodance.records import Wrench
 from biodance.records.attention import Attention, Judged, strongest_first
 from biodance.spatial import cross, quaternion_matrix, wrench_about_point
@@ -66,7 +66,12 @@ class RobotResult:
 
 
 def identify_robot(
-    recording: str | Path, *, urdf: str | Path, feet: tuple[str, str], tell: Callable[[str], None] = lambda _: None
+    recording: str | Path,
+    *,
+    urdf: str | Path,
+    feet: tuple[str, str],
+    mend: bool = False,
+    tell: Callable[[str], None] = lambda _: None,
 ) -> RobotResult:
     """Identify what every link of a robot weighs from joint encoders and a force plate.
 
@@ -78,6 +83,8 @@ def identify_robot(
         The robot; its masses are the prior.
     feet : tuple of str
         Links of the right and the left foot.
+    mend : bool, default False
+        Take a solid box in place of a link of the file that is no possible body.
     tell : callable, optional
         Is told what is being done.
 
@@ -100,7 +107,7 @@ def identify_robot(
     >>> biodance.identify_robot("run", urdf="hoap3.urdf", feet=("right_foot", "left_foot"))  # doctest: +SKIP
     """
     tell("reading the robot")
-    body = read_urdf(urdf, feet=feet)
+    body = read_urdf(urdf, feet=feet, mend=mend)
     found = read_robot_recording(recording, tuple(joint.name for joint in body.joints))
     trials, refused = bring_together(body, found, tell=tell)
     fitted, kept = _parted(trials)
@@ -115,7 +122,9 @@ def identify_robot(
     doubtful = bool(causes) and not _predicts_better(best.identified, plain.identified)
     best = plain if doubtful else best
     words = cause_words(causes, doubtful=doubtful)
-    said = strongest_first([*refusals(refused), *told_of(trials), *words, *weights(best.identified.identification)])
+    said = strongest_first(
+        [*of_file(body.notes), *refusals(refused), *told_of(trials), *words, *weights(best.identified.identification)]
+    )
     judged = tuple(Judged(one.recorded.name, float(one.motion.fit.use.sum()) / RATE) for one in trials)
     lost = tuple(Judged(name, 0.0, why, missed=True) for name, why in refused.items())
     named = () if doubtful else causes

@@ -13,6 +13,11 @@ _APART = 1.0
 """s: clocks further apart are said first."""
 
 
+def of_file(notes: tuple[str, ...]) -> list[Attention]:
+    """Return what was made of the robot's file."""
+    return [Attention("warn" if note.startswith("Mended") else "note", note, "", "drawing") for note in notes]
+
+
 def refusals(refused: dict[str, str]) -> list[Attention]:
     """Return why trials were left out."""
     return [Attention("warn", why, name, "trial") for name, why in refused.items()]
