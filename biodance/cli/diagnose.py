@@ -7,8 +7,9 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json
-from biodance.cli.options import USUAL_READING, JsonOption, Reading, Results
+from biodance.cli.options import PERSON, USUAL_READING, JsonOption, Reading, Results, RobotFile
 from biodance.cli.progress import progress
+from biodance.cli.robot import diagnose_robot
 from biodance.cli.session import examine_with_reference, tabled
 
 
@@ -53,6 +54,7 @@ def diagnose_command(
             "copy first.",
         ),
     ] = False,
+    robot: RobotFile = PERSON,
 ) -> int:
     """Say what the simulation of a session gets wrong: the cause, its size, how sure, what else it could be, and what
     naming it gains.
@@ -60,8 +62,11 @@ def diagnose_command(
     Parameters
     ----------
     session
-        Folder with the static trial and the other trials.
+        Folder with the static trial and the other trials; of a robot (--urdf), as for identify.
     """
+    if robot.given:
+        for_people = (*reading.given(), *(["--accept"] if accept else []), *(["--tables"] if results.tables else []))
+        return diagnose_robot(session, results, robot, for_people)
     from rich.console import Console
 
     from biodance.pipeline import front

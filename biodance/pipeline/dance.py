@@ -278,15 +278,16 @@ def dance_folder(out: Path, *, force: bool = False) -> Path:
 ROBOTS = Makers(design_robot, expect_robot)
 
 
-def robot_dancer(path: Path, feet: str) -> Body:
-    """Return the robot of a URDF file, in standing frames; ``feet`` the links of its right and left foot, "right,left".
+def robot_dancer(path: Path, feet: str, *, mend: bool = False) -> Body:
+    """Return the robot of a URDF file, in standing frames; ``feet`` the links of its right and left foot, "right,left";
+    ``mend`` as in `urdf.read_urdf`.
 
     Raises
     ------
     BiodanceError
         Not two feet are named, or the file cannot be used (`urdf.read_urdf`, `standing_frames`).
     """
-    return standing_frames(read_urdf(path, feet=named_feet(feet)))
+    return standing_frames(read_urdf(path, feet=named_feet(feet), mend=mend))
 
 
 def named_feet(feet: str) -> tuple[str, str]:
