@@ -103,10 +103,11 @@ def _followable(work: DesignContext) -> tuple[Dance, tuple[Margin, ...]]:
         steps, moves = walk.take(stances)
         dance = _walked(work, stances, steps, moves)
         work.tell("performers", attempt, 0)
-        found = perform_with(work.workers, dance, count=_FEW if attempt < _ATTEMPTS - 1 else PERFORMER_COUNT)
-        found = perform_with(work.workers, dance) if found.safe else found
-        bad = {walk.key(steps[p]) for p in found.bad}
-        if found.safe or not bad - walk.banned:
+        few = _FEW if attempt < _ATTEMPTS - 1 else PERFORMER_COUNT
+        found = perform_with(work.workers, dance, work.plan.limits, count=few)
+        found = perform_with(work.workers, dance, work.plan.limits) if found.safe else found
+        bad = {walk.key(steps[p]): limit for p, limit in found.bad}
+        if found.safe or bad.keys() <= walk.banned.keys():
             break
         walk.banned |= bad
     return dance, found.margins(dance)

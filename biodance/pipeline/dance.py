@@ -19,9 +19,9 @@ from biodance.body.robot.urdf import read_urdf
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.expectation import Expectation, expect
-from biodance.dance.limits import Limit
+from biodance.dance.limits import ForImprecise, Limit
 from biodance.dance.metrics import DanceMetrics, dance_metrics
-from biodance.dance.performers import OF_PERFORMERS, PERFORMER_COUNT, SEGMENT_GAP
+from biodance.dance.performers import OF_PERFORMERS, PERFORMER_COUNT, for_imprecise
 from biodance.dance.problem.person import PersonLimits, fit_to_person
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.shapes import unchecked_pairs
@@ -109,12 +109,15 @@ class DanceResult:
 
     @property
     def performers(self) -> dict[str, float] | None:
-        """What imprecise performers leave, m: of the support, and between segments; None where none were asked."""
-        found = {m.limit.removesuffix(OF_PERFORMERS): m.worst for m in self.margins if m.limit.endswith(OF_PERFORMERS)}
-        if not found:
-            return None
-        gap = found["self_collision_"] + SEGMENT_GAP
-        return {"count": PERFORMER_COUNT, "balance_m": found["balance_"], "gap_m": gap}
+        """What imprecise performers leave of every limit that they must keep, m; None where none were asked."""
+        found = {one.key: worst for one, worst in self._left}
+        return {"count": PERFORMER_COUNT, **found} if found else None
+
+    @property
+    def _left(self) -> list[tuple[ForImprecise, float]]:
+        worst = {margin.limit: margin.worst for margin in self.margins}
+        asked = {f"{limit.name}_{OF_PERFORMERS}": one for limit, one in for_imprecise(self.plan.limits).items()}
+        return [(one, worst[name] + one.least) for name, one in asked.items() if name in worst]
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -145,11 +148,11 @@ class DanceResult:
         out = [f"For {self.plan.whom}."] if self.plan.whom else []
         if self.reason_of_person:
             out.append(f"Made for one person's limits: {self.reason_of_person}.")
-        if found := self.performers:
+        if found := self._left:
+            kept = " and ".join(one.words.format(f"{100 * worst:.1f}") for one, worst in found)
             out.append(
-                f"{found['count']:.0f} simulated people, seven degrees off in every joint, a fifth off in time and "
-                f"swaying, kept the weight {100 * found['balance_m']:.1f} cm inside the feet and arms and legs "
-                f"{100 * found['gap_m']:.1f} cm apart at the worst moment."
+                f"{PERFORMER_COUNT} simulated people, seven degrees off in every joint, a fifth off in time and "
+                f"swaying, {kept} at the worst moment."
             )
         else:
             out.append("Nobody imprecise was tried on this dance: it is for trained people only.")

@@ -21,13 +21,13 @@ def plain_move(task: Task) -> Move:
     """Return the move of ``task`` in which nothing goes out of its way that need not; if none keeps all limits, the one
     that violates least.
     """
-    tried = []
+    tried, eased = [], {limit.name for limit in task.limits if limit.mended_by_slowness}
     for factor in _SLOWER:
         slow = replace(task, duration=factor * task.duration)
         tried.append(evaluate_move(slow, slow.straight())[0])
         if len(task.stance.planted) == 1:
             tried.append(min(tried.pop(), evaluate_move(slow, _stepping(slow))[0], key=lambda move: move.violation))
-        if tried[-1].violation == 0 or tried[-1].limit not in ("balance", "friction", "joint_speed", "joint_torque"):
+        if tried[-1].violation == 0 or tried[-1].limit not in eased:
             break
     best = min(tried, key=lambda move: move.violation)
     return best if best.violation == 0 or task.stance.seat else _round(replace(task, duration=best.duration), best)

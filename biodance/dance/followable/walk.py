@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from biodance.dance.cues import MIRROR_CALL, instructions
-from biodance.dance.followable.catalogue import Catalogue, roomy
+from biodance.dance.followable.catalogue import Catalogue, lost_by_copies
 from biodance.dance.followable.plain import plain_move
 from biodance.dance.followable.vocabulary import Word, read_vocabulary, words_for
 from biodance.dance.postures.selection import learned
@@ -70,11 +70,11 @@ class _Place:
 @dataclass(eq=False)
 class Walk:
     """The search for one dance: what was worked out is kept, so that another round with other ``banned`` postures
-    (feet, number) costs little.
+    (feet, number: the limit that somebody broke there) costs little.
     """
 
     work: DesignContext
-    banned: set[tuple[str, int]] = field(default_factory=set)
+    banned: dict[tuple[str, int], str] = field(default_factory=dict)
     _catalogues: dict[str, Catalogue] = field(default_factory=dict)
     _broken: dict[tuple[str, int], str] = field(default_factory=dict)
     _moves: dict[tuple[bytes, bytes], Move] = field(default_factory=dict)
@@ -204,7 +204,7 @@ class Walk:
     def _wrong(self, step: DanceStep) -> str:
         key = self.key(step)
         if key in self.banned:
-            return "self_collision"
+            return self.banned[key]
         if key not in self._broken:
             self._broken[key] = step.catalogue.keeps(step.s, self.work.plan.limits)
         return self._broken[key]
@@ -216,8 +216,10 @@ class Walk:
             ends = np.array([last.x, step.x])
             move = plain_move(Task(self.work.chain, self.work.blocks, feet, ends, plan.move, plan.limits))
             way = [ends[0] + share * (ends[1] - ends[0]) for share in _BETWEEN]
-            between = len(feet.planted) == 1 or all(roomy(self.work.chain, feet, x) for x in way)
-            self._moves[key] = move if between or move.limit else replace(move, limit="self_collision")
+            if not move.limit and len(feet.planted) != 1:
+                lost = (lost_by_copies(self.work.chain, feet, x, plan.limits) for x in way)
+                move = replace(move, limit=next(filter(None, lost), ""))
+            self._moves[key] = move
         return self._moves[key]
 
     def _told(self, last: DanceStep | None, step: DanceStep) -> Array:
