@@ -6,7 +6,7 @@ corrected. Planted feet stay where they are, and a leg errs the more the farther
 performs dances by other code.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,20 +51,6 @@ class Imprecision:
 
 
 USUAL = Imprecision()
-
-
-def held_copies(chain: Chain, stance: Stance, x: Array, count: int, *, how: Imprecision = USUAL) -> Copied:
-    """Return ``count`` imprecise copies of one posture ``x`` (n,) that is held."""
-    rng, copies = np.random.default_rng(0), np.repeat(x[None], count, axis=0)
-    copies[:, ROOT:] += how.tracking * rng.normal(size=(count, chain.size - ROOT))
-    if not stance.seat:
-        copies[:, 3:ROOT] += how.pelvis * how.tracking * rng.normal(size=(count, 3))
-        copies = chain.plant(copies, stance.planted, stance.ankle)
-        copies[:, :2] += (mass_centre(chain, x[None])[:, :2] - mass_centre(chain, copies)[:, :2]) / _CARRIED
-        copies = chain.plant(copies, stance.planted, stance.ankle)
-    time = np.arange(count, dtype=float)
-    q = chain.motion(time, copies, *np.zeros((2, *copies.shape))).q
-    return Copied(chain.body, time, q, (stance,), np.zeros(count, dtype=np.intp), still=True)
 
 
 def draw_clock(rng: np.random.Generator, duration: float, how: Imprecision) -> tuple[Array, Array]:
@@ -137,20 +123,38 @@ class PlannedDance:
             tops.append(ankle[:, side, 2] + np.sqrt(np.maximum(reach**2 - across, 0.01)) - hip[:, 2] + up[:, side])
         return np.asarray(-np.log(np.exp(-_SOFT * np.array(tops)).sum(axis=0)) / _SOFT)
 
-    def copied(
-        self, rng: np.random.Generator, time: Array, when: Array, how: Imprecision
-    ) -> tuple[Array, NDArray[np.intp]]:
-        """Return the coordinates (T, n) of a performance at ``time`` s, and the phase of the plan at every instant."""
+    def performed(self, rng: np.random.Generator, time: Array, when: Array, how: Imprecision) -> Copied:
+        """Return a performance at ``time`` s, (T,), that is where the plan is at ``when`` s."""
+        error = how.tracking * _noise(rng, time, self.chain.size - 3, _WANDER)
+        return self._copied(time, when, error, how.sway * _noise(rng, time, 2, _SWAY, slow=_PENDULUM), how)
+
+    def held_by(self, count: int, when: Array, how: Imprecision = USUAL) -> Copied:
+        """Return what ``count`` people do who stop at each of the instants ``when`` (W,) s of the plan, instant by
+        instant.
+        """
+        rng, when = np.random.default_rng(0), np.repeat(when, count)
+        error = how.tracking * rng.normal(size=(when.size, self.chain.size - 3))
+        sway = how.sway * rng.normal(size=(when.size, 2))
+        return replace(self._copied(np.arange(when.size, dtype=float), when, error, sway, how), still=True)
+
+    def _copied(self, time: Array, when: Array, error: Array, sway: Array, how: Imprecision) -> Copied:
+        """Return the plan at ``when`` with the ``error`` rad (T, n - 3) of the pelvis' turns and of the joints, the
+        centre of mass off by its ``sway`` m (T, 2).
+        """
+        x, rows = self._off(when, error, sway, how)
+        q = self.chain.motion(time, x, *np.zeros((2, *x.shape))).q
+        return Copied(self.chain.body, time, q, self.stances, rows)
+
+    def _off(self, when: Array, error: Array, sway: Array, how: Imprecision) -> tuple[Array, NDArray[np.intp]]:
         chain, rows = self.chain, self.phase_at(when)
         told = self.spline(when)
         x, com, over = told[:, : chain.size], told[:, chain.size : chain.size + 2], told[:, -1]
-        error = how.tracking * _noise(rng, time, chain.size - 3, _WANDER)
         if self.dance.stances[0].seat:
             x[:, ROOT:] += error[:, 3:]
             return x, rows
         x[:, 3:ROOT] += how.pelvis * error[:, :3]
         x[:, ROOT:] += error[:, 3:]
-        com = com + how.sway * _noise(rng, time, 2, _SWAY, slow=_PENDULUM)
+        com = com + sway
         (up, ankle), wanted = self._feet(rows, when), x.copy()
         for k in range(_ROUNDS + 1):
             x[:, 2] = self._tops(x, up, ankle) + over

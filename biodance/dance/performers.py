@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from biodance.dance.dance import Dance
 from biodance.dance.imprecision import USUAL, Imprecision, PlannedDance, draw_clock
-from biodance.dance.limits import Copied, ForImprecise, Limit
+from biodance.dance.limits import ForImprecise, Limit
 from biodance.dance.verify import Margin
 from biodance.records import Array
 from biodance.threads import one_thread
@@ -20,6 +20,8 @@ OF_PERFORMERS = "of_performers"
 """End of the names of their margins."""
 PERFORMER_COUNT = 200
 """Performers that a dance is tried on."""
+_DRAWN, _SIGMAS = 96, 3.5
+"""Imprecise copies of an instant that are looked at, and standard deviations of what is left that it must bear."""
 
 
 @dataclass(frozen=True)
@@ -89,9 +91,8 @@ def rehearse_imprecisely(
     found: dict[Limit, list[_Least]] = {limit: [] for limit in asked}
     for k in range(first, first + count):
         time, when = draw_clock(np.random.default_rng([seed, 7, k]), dance.duration, how)
-        x, rows = plan.copied(np.random.default_rng([seed, 8, k]), time, when, how)
-        q = dance.chain.motion(time, x, *np.zeros((2, *x.shape))).q
-        copy, posture = Copied(dance.body, time, q, plan.stances, rows), plan.posture[rows]
+        copy = plan.performed(np.random.default_rng([seed, 8, k]), time, when, how)
+        rows, posture = copy.on, plan.posture[copy.on]
         for limit, one in asked.items():
             left = one.left(copy)
             value = np.where(plan.stepping[rows][:, None], np.inf, left.value)[2:-2]
@@ -105,6 +106,22 @@ def rehearse_imprecisely(
         for p in np.flatnonzero(one.each < asked[limit].least)
     }
     return Rehearsed(count, rooms, tuple(sorted(bad)))
+
+
+def lost_by_copies(dance: Dance, limits: tuple[Limit, ...], when: Array) -> str:
+    """Return the limit of which people leave too little who stop at one of the instants ``when`` s of a ``dance`` and
+    are off as performers are, "" if none.
+    """
+    plan = PlannedDance(dance)
+    when = when[~plan.stepping[plan.phase_at(when)]]
+    if not when.size:
+        return ""
+    copy = plan.held_by(_DRAWN, when)
+    for limit, one in for_imprecise(limits).items():
+        left = one.left(copy).value.reshape(len(when), _DRAWN, -1)
+        if (left.mean(axis=1) - _SIGMAS * left.std(axis=1) < one.least).any():
+            return limit.name
+    return ""
 
 
 def perform_with(

@@ -11,10 +11,11 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from biodance.dance.dance import Dance
 from biodance.dance.followable.vocabulary import Vocabulary, Word, own_joint
-from biodance.dance.imprecision import held_copies, mass_centre
+from biodance.dance.imprecision import mass_centre
 from biodance.dance.limits import Limit
-from biodance.dance.performers import for_imprecise
+from biodance.dance.performers import lost_by_copies
 from biodance.dance.postures.exchange import counterpart
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.stance import Stance
@@ -24,8 +25,6 @@ from biodance.records import Array
 
 _ROUNDS = 5
 """Corrections of the pelvis; each leaves about a fifth of the error."""
-_DRAWN, _SIGMAS = 96, 4.5
-"""Imprecise copies of a posture that are looked at, and standard deviations of what is left that it must bear."""
 _BACK = 0.03
 """m behind the middle of the support where people stand: over the arch of the foot."""
 _LEAN, _TILT = ROOT - 2, ROOT - 1
@@ -88,17 +87,9 @@ class Catalogue:
         for limit in (limit for limit in limits if limit.at_rest):
             if (limit.margins(state).value < limit.straight_reserve(self.stance) * limit.scale).any():
                 return limit.name
-        return lost_by_copies(self.chain, self.stance, self.x[s], limits)
-
-
-def lost_by_copies(chain: Chain, stance: Stance, x: Array, limits: tuple[Limit, ...]) -> str:
-    """Return the limit of which people leave too little who copy a posture ``x`` (n,) imprecisely, "" if none."""
-    copies = held_copies(chain, stance, x, _DRAWN)
-    for limit, asked in for_imprecise(limits).items():
-        left = asked.left(copies).value
-        if (left.mean(axis=0) - _SIGMAS * left.std(axis=0) < asked.least).any():
-            return limit.name
-    return ""
+        no_way = np.empty((0, 2, self.chain.size))
+        held = Dance("", self.chain.body, state.x, (self.stance,), np.ones(1), no_way, np.empty(0), (), 0)
+        return lost_by_copies(held, limits, np.zeros(1))
 
 
 def posed(chain: Chain, stance: Stance, words: Vocabulary, index: NDArray[np.intp]) -> Array:

@@ -6,14 +6,16 @@ What a posture must keep it keeps also for people who copy it imprecisely (`cata
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from biodance.dance.cues import MIRROR_CALL, instructions
-from biodance.dance.followable.catalogue import Catalogue, lost_by_copies
+from biodance.dance.dance import Dance
+from biodance.dance.followable.catalogue import Catalogue
 from biodance.dance.followable.plain import plain_move
 from biodance.dance.followable.vocabulary import Word, read_vocabulary, words_for
+from biodance.dance.performers import lost_by_copies
 from biodance.dance.postures.selection import learned
 from biodance.dance.problem.splines import rest_to_rest
 from biodance.dance.problem.stance import Stance, under
@@ -32,7 +34,7 @@ _FORCE, _MOMENT, _RATE = 8.0, 4.0, 4.0
 """N, N·m, Hz: error of one independent sample of a person's wrench, and how many there are (`selection`)."""
 _TRIES = 200
 """Postures that are taken or given up before a walk is."""
-_BETWEEN = (0.5, 0.3, 0.7)
+_BETWEEN = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
 """Shares of a move at which imprecise people must have room, too."""
 _LOOKED_AT = 24
 """Postures that tell most standing still, whose ways are judged, too."""
@@ -213,13 +215,9 @@ class Walk:
         key = (last.x.tobytes(), step.x.tobytes())
         if key not in self._moves:
             feet, plan = under(last.catalogue.stance, step.catalogue.stance), self.work.plan
-            ends = np.array([last.x, step.x])
-            move = plain_move(Task(self.work.chain, self.work.blocks, feet, ends, plan.move, plan.limits))
-            way = [ends[0] + share * (ends[1] - ends[0]) for share in _BETWEEN]
-            if not move.limit and len(feet.planted) != 1:
-                lost = (lost_by_copies(self.work.chain, feet, x, plan.limits) for x in way)
-                move = replace(move, limit=next(filter(None, lost), ""))
-            self._moves[key] = move
+            task = Task(self.work.chain, self.work.blocks, feet, np.array([last.x, step.x]), plan.move, plan.limits)
+            stances = (last.catalogue.stance, step.catalogue.stance)
+            self._moves[key] = plain_move(task, lambda move: _lost(task, stances, move))
         return self._moves[key]
 
     def _told(self, last: DanceStep | None, step: DanceStep) -> Array:
@@ -249,6 +247,13 @@ class Walk:
 
 def _feet(stance: Stance) -> str:
     return f"{stance.name} {stance.planted} {stance.over} {stance.ankle.tobytes().hex()}"
+
+
+def _lost(task: Task, stances: tuple[Stance, Stance], move: Move) -> str:
+    """Return the limit of which imprecise people leave too little on the way, "" if none."""
+    still, time = np.ones(2), np.array([move.duration])
+    way = Dance("", task.chain.body, task.ends, stances, still, move.via[None], time, (task.stance,), 0)
+    return lost_by_copies(way, task.limits, still[0] + move.duration * _BETWEEN)
 
 
 def name_of(step: DanceStep) -> str:

@@ -62,9 +62,9 @@ LIMIT = Balance
 
 def _left(copy: Copied) -> Remaining:
     """Return the distance (T, kinds of stance) m inside the whole support, infinite where another stance is taken."""
-    names = tuple(dict.fromkeys(stance.name for stance in copy.stances))
-    taken = np.array([names.index(stance.name) for stance in copy.stances])[copy.on]
-    return Remaining(np.where(taken[:, None] == np.arange(len(names)), copy.inside(1.0)[:, None], np.inf), names)
+    names = tuple(dict.fromkeys(copy.stances[k].name for k in np.unique(copy.on)))
+    taken = np.array([stance.name for stance in copy.stances])[copy.on]
+    return Remaining(np.where(taken[:, None] == np.array(names), copy.inside(1.0)[:, None], np.inf), names)
 
 
 def _inside(point: Array, corners: Array, share: float) -> Array:
