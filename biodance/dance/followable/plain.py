@@ -17,7 +17,7 @@ _ITERATIONS = (12, 8)
 _STOP = 0.08
 """rad that a lifted leg keeps from the stops of its joints."""
 _STEP = (0.5, -0.1, 0.0, 0.55, 0.0, 0.0)
-"""rad by which hip, knee and ankle of a leg bend on the way of a lifted foot, and by which it goes away from the other."""
+"""rad by which hip, knee and ankle of a leg bend on the way of a lifted foot, and it goes away from the other one."""
 
 
 def plain_move(task: Task, lost: Callable[[Move], str]) -> Move:

@@ -15,7 +15,7 @@ from biodance.dance.dance import Dance
 from biodance.dance.followable.catalogue import Catalogue
 from biodance.dance.followable.plain import plain_move
 from biodance.dance.followable.vocabulary import Word, read_vocabulary, words_for
-from biodance.dance.performers import lost_by_copies
+from biodance.dance.performers import PASSED, lost_by_copies
 from biodance.dance.postures.selection import learned
 from biodance.dance.problem.splines import rest_to_rest
 from biodance.dance.problem.stance import Stance, under
@@ -36,6 +36,8 @@ _TRIES = 200
 """Postures that are taken or given up before a walk is."""
 _BETWEEN = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
 """Shares of a move at which imprecise people must have room, too."""
+_LIFTING = 1.4
+"""Times as long as others that a move takes in which a foot is lifted or put down."""
 _LOOKED_AT = 24
 """Postures that tell most standing still, whose ways are judged, too."""
 
@@ -215,8 +217,10 @@ class Walk:
         key = (last.x.tobytes(), step.x.tobytes())
         if key not in self._moves:
             feet, plan = under(last.catalogue.stance, step.catalogue.stance), self.work.plan
-            task = Task(self.work.chain, self.work.blocks, feet, np.array([last.x, step.x]), plan.move, plan.limits)
             stances = (last.catalogue.stance, step.catalogue.stance)
+            slow = _LIFTING if stances[0].planted != stances[1].planted else 1.0
+            ends, duration = np.array([last.x, step.x]), slow * plan.move
+            task = Task(self.work.chain, self.work.blocks, feet, ends, duration, plan.limits)
             self._moves[key] = plain_move(task, lambda move: _lost(task, stances, move))
         return self._moves[key]
 
@@ -253,7 +257,7 @@ def _lost(task: Task, stances: tuple[Stance, Stance], move: Move) -> str:
     """Return the limit of which imprecise people leave too little on the way, "" if none."""
     still, time = np.ones(2), np.array([move.duration])
     way = Dance("", task.chain.body, task.ends, stances, still, move.via[None], time, (task.stance,), 0)
-    return lost_by_copies(way, task.limits, still[0] + move.duration * _BETWEEN)
+    return lost_by_copies(way, task.limits, still[0] + move.duration * _BETWEEN, PASSED)
 
 
 def name_of(step: DanceStep) -> str:
