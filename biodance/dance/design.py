@@ -23,8 +23,6 @@ from biodance.dance.postures.ordering import order_postures, support_sequence
 from biodance.dance.postures.posture import intermediate_posture
 from biodance.dance.postures.search import find_postures
 from biodance.dance.postures.selection import choose
-from biodance.dance.problem.chain import Chain
-from biodance.dance.problem.excitation import excitation_blocks
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance, under
 from biodance.dance.transitions.context import Checkpoint, Course, DesignContext, Tell
@@ -71,11 +69,9 @@ def design(
         with ProcessPoolExecutor(WORKERS) as pool:
             return design(body, plan, limits=limits, seed=seed, tell=tell, resume=resume, workers=pool)
     plan = plan.with_limits(limits)
-    chain, parts = Chain(body), excitation_blocks(body)
-    parts = replace(parts, weight=parts.weight * plan.emphasis(body.segments), simplicity=plan.simplicity)
-    work = DesignContext(
-        chain, parts, plan, seed, Checkpoint(resume, body, plan, seed), workers, tell or (lambda what, done, of: None)
-    )
+    alone = DesignContext.alone(body, plan, seed)
+    ledger = Checkpoint(resume, body, plan, seed)
+    work = replace(alone, ledger=ledger, workers=workers, tell=tell or alone.tell)
     danced: tuple[Margin, ...] = ()
     if np.isfinite(plan.instructions):
         dance, danced = _followable(work)

@@ -20,12 +20,8 @@ OF_PERFORMERS = "of_performers"
 """End of the names of their margins."""
 PERFORMER_COUNT = 200
 """Performers that a dance is tried on."""
-_DRAWN = 96
-"""Imprecise copies of an instant that are looked at."""
-HELD, PASSED = 4.2, 3.5
-"""Standard deviations of what is left that a posture and an instant of a move must bear: of 200 performers, who stand
-in a posture for seconds, and are on the way to it for a moment.
-"""
+_DRAWN, _SIGMAS = 96, 3.5
+"""Imprecise copies of an instant that are looked at, and standard deviations of what is left that it must bear."""
 
 
 @dataclass(frozen=True)
@@ -112,9 +108,9 @@ def rehearse_imprecisely(
     return Rehearsed(count, rooms, tuple(sorted(bad)))
 
 
-def lost_by_copies(dance: Dance, limits: tuple[Limit, ...], when: Array, sigmas: float) -> str:
-    """Return the limit of which people leave too little, ``sigmas`` standard deviations below their mean, who stop at
-    one of the instants ``when`` s of a ``dance`` and are off as performers are; "" if none.
+def lost_by_copies(dance: Dance, limits: tuple[Limit, ...], when: Array) -> str:
+    """Return the limit of which people leave too little who stop at one of the instants ``when`` s of a ``dance`` and
+    are off as performers are; "" if none.
     """
     plan = PlannedDance(dance)
     when = when[~plan.stepping[plan.phase_at(when)]]
@@ -123,7 +119,7 @@ def lost_by_copies(dance: Dance, limits: tuple[Limit, ...], when: Array, sigmas:
     copy = plan.held_by(_DRAWN, when)
     for limit, one in for_imprecise(limits).items():
         left = one.left(copy).value.reshape(len(when), _DRAWN, -1)
-        if (left.mean(axis=1) - sigmas * left.std(axis=1) < one.least).any():
+        if (left.mean(axis=1) - _SIGMAS * left.std(axis=1) < one.least).any():
             return limit.name
     return ""
 

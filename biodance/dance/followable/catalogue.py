@@ -15,7 +15,7 @@ from biodance.dance.dance import Dance
 from biodance.dance.followable.vocabulary import Vocabulary, Word, own_joint
 from biodance.dance.imprecision import mass_centre
 from biodance.dance.limits import Limit
-from biodance.dance.performers import HELD, lost_by_copies
+from biodance.dance.performers import lost_by_copies
 from biodance.dance.postures.exchange import counterpart
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.stance import Stance
@@ -89,7 +89,7 @@ class Catalogue:
                 return limit.name
         no_way = np.empty((0, 2, self.chain.size))
         held = Dance("", self.chain.body, state.x, (self.stance,), np.ones(1), no_way, np.empty(0), (), 0)
-        return lost_by_copies(held, limits, np.zeros(1), HELD)
+        return lost_by_copies(held, limits, np.zeros(1))
 
 
 def posed(chain: Chain, stance: Stance, words: Vocabulary, index: NDArray[np.intp]) -> Array:

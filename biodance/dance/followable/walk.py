@@ -15,7 +15,7 @@ from biodance.dance.dance import Dance
 from biodance.dance.followable.catalogue import Catalogue
 from biodance.dance.followable.plain import plain_move
 from biodance.dance.followable.vocabulary import Word, read_vocabulary, words_for
-from biodance.dance.performers import PASSED, lost_by_copies
+from biodance.dance.performers import lost_by_copies
 from biodance.dance.postures.selection import learned
 from biodance.dance.problem.splines import rest_to_rest
 from biodance.dance.problem.stance import Stance, under
@@ -118,6 +118,18 @@ class Walk:
                 break
         raise BiodanceError(self._stuck(stances[max(0, len(path) - 1)], len(path) - 1, why))
 
+    def choose(self, stances: tuple[Stance, ...]) -> list[DanceStep]:
+        """Return one step for each of ``stances``, as `take` does, without a look at the moves between them."""
+        steps, belief = list[DanceStep](), np.eye(self.factor.shape[1])
+        for number, stance in enumerate(stances):
+            step = next((one for one in self._ranked(steps, stance, belief) if not self._wrong(one)), None)
+            if step is None:
+                raise BiodanceError(self._stuck(stance, number, {}))
+            Z = learned(belief, self._told(steps[-1] if steps else None, step))
+            belief = belief - Z.T @ Z
+            steps.append(step)
+        return steps
+
     def _possible(
         self, steps: list[DanceStep], stance: Stance, belief: Array, why: dict[str, int]
     ) -> Iterator[tuple[DanceStep, Move | None]]:
@@ -169,6 +181,9 @@ class Walk:
     def _reach(self, last: DanceStep | None, catalogue: Catalogue) -> Iterator[DanceStep]:
         """Yield all postures of a catalogue that can be reached from the last one within the instructions."""
         body, most = self.work.chain.body, self.work.plan.instructions
+        if np.isinf(most):
+            yield from (DanceStep(catalogue, s, ()) for s in range(len(catalogue.index)))
+            return
         zero = np.zeros(self.work.chain.size)
         mirror = catalogue.mirrored[last.s] if last is not None and last.catalogue is catalogue else -1
         for s in self._near(last, catalogue):
@@ -181,8 +196,6 @@ class Walk:
 
     def _near(self, last: DanceStep | None, catalogue: Catalogue) -> list[int]:
         """Return the postures that differ in few parts of the body from the last one, and its mirror image."""
-        if np.isinf(self.work.plan.instructions):
-            return list(range(len(catalogue.index)))
         was = {part: word.key for part, word in last.words.items()} if last is not None else {}
         off = np.zeros(len(catalogue.index), dtype=int)
         for column, part in enumerate(catalogue.parts):
@@ -257,7 +270,7 @@ def _lost(task: Task, stances: tuple[Stance, Stance], move: Move) -> str:
     """Return the limit of which imprecise people leave too little on the way, "" if none."""
     still, time = np.ones(2), np.array([move.duration])
     way = Dance("", task.chain.body, task.ends, stances, still, move.via[None], time, (task.stance,), 0)
-    return lost_by_copies(way, task.limits, still[0] + move.duration * _BETWEEN, PASSED)
+    return lost_by_copies(way, task.limits, still[0] + move.duration * _BETWEEN)
 
 
 def name_of(step: DanceStep) -> str:
