@@ -1,0 +1,26 @@
+"""The page of what a planned movement will see: a summary, what to change, and every cause."""
+
+from pathlib import Path
+from typing import Any
+
+from biodance.errors import BiodanceError
+from biodance.pipeline.provenance import now
+from biodance.report.pages.template import render
+from biodance.version import __version__
+
+
+def refuse_existing(path: Path, *, force: bool) -> None:
+    """Raise BiodanceError where ``path`` exists and ``force`` was not given, or its folder is missing."""
+    if path.exists() and not force:
+        raise BiodanceError(f"{path}: exists and nothing is overwritten. Choose another --out, or --force.")
+    if not path.parent.is_dir():
+        raise BiodanceError(f"{path.parent}: there is no such folder. Make it, or choose another --out.")
+
+
+def foresight_page(document: dict[str, Any], name: str) -> str:
+    """Return the page (HTML) of what `foresight_document` says of the movement ``name``."""
+    return render("foresight.html.j2", found=document, movement=name, version=__version__, created=now(), words=_words)
+
+
+def _words(cause: str) -> str:
+    return cause.replace("_", " ")
