@@ -32,13 +32,13 @@ def foresee_command(
 
     from biodance.pipeline.diagnosis import foresee_dance
     from biodance.report.documents.diagnosis import foresight_document
-    from biodance.report.pages.foresight import foresight_page, refuse_existing
+    from biodance.report.pages.foresight import foresight_page, refuse_page
     from biodance.report.terminal import print_foresight
 
     with progress() as tell:
         tell("foreseeing what the dance will see")
         if out is not None:
-            refuse_existing(out, force=force)
+            refuse_page(out, force=force)
         document = foresight_document(foresee_dance(dance))
         if out is not None:
             out.write_text(foresight_page(document, dance.stem), encoding="utf-8", newline="\n")

@@ -50,7 +50,7 @@ class Imprecision:
     sway: float = 0.006
 
 
-USUAL = Imprecision()
+USUAL_IMPRECISION = Imprecision()
 
 
 def draw_clock(rng: np.random.Generator, duration: float, how: Imprecision) -> tuple[Array, Array]:
@@ -128,7 +128,7 @@ class PlannedDance:
         error = how.tracking * _noise(rng, time, self.chain.size - 3, _WANDER)
         return self._copied(time, when, error, how.sway * _noise(rng, time, 2, _SWAY, slow=_PENDULUM), how)
 
-    def held_by(self, count: int, when: Array, how: Imprecision = USUAL) -> Copied:
+    def held_by(self, count: int, when: Array, how: Imprecision = USUAL_IMPRECISION) -> Copied:
         """Return what ``count`` people do who stop at each of the instants ``when`` (W,) s of the plan, instant by
         instant.
         """

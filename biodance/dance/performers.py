@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.dance.dance import Dance
-from biodance.dance.imprecision import USUAL, Imprecision, PlannedDance, draw_clock
+from biodance.dance.imprecision import USUAL_IMPRECISION, Imprecision, PlannedDance, draw_clock
 from biodance.dance.limits import ForImprecise, Limit
 from biodance.dance.verify import Margin
 from biodance.records import Array
@@ -81,7 +81,7 @@ def rehearse_imprecisely(
     count: int = PERFORMER_COUNT,
     seed: int = 0,
     first: int = 0,
-    how: Imprecision = USUAL,
+    how: Imprecision = USUAL_IMPRECISION,
 ) -> Rehearsed:
     """Return what ``count`` performers leave of the ``limits`` in ``dance``; performer number k from ``first`` on is
     the same whoever else dances.

@@ -43,7 +43,7 @@ class Confusion:
 
 
 @dataclass(frozen=True)
-class Change:
+class Remedy:
     """What to ``do`` beside the movement, so that causes are seen that it hides (``unseen``) and told apart that it
     confuses (``confused``): effect and target of each.
     """
@@ -63,7 +63,7 @@ class Foresight:
     limits: tuple[Unobservable, ...]
     hidden: tuple[Unobservable, ...]
     confusions: tuple[Confusion, ...]
-    changes: tuple[Change, ...] = ()
+    changes: tuple[Remedy, ...] = ()
 
     @property
     def seen(self) -> tuple[Unobservable, ...]:
@@ -144,7 +144,7 @@ def _confusions(seen: Visibility, rows: tuple[Unobservable, ...]) -> tuple[Confu
 
 def _changes(
     causes: tuple[Candidate, ...], rows: tuple[Unobservable, ...], pairs: tuple[Confusion, ...]
-) -> tuple[Change, ...]:
+) -> tuple[Remedy, ...]:
     """Return what to do, in the words of the effects that stay unseen at their typical size or are confused."""
     words = {one.effect.name: one.effect.separated_by for one in causes}
     unseen = [(row.effect, row.target) for row in rows if row.limit > row.typical]
@@ -154,7 +154,7 @@ def _changes(
         for cause in some:
             if words.get(cause[0]):
                 out.setdefault(words[cause[0]], ([], []))[k].append(cause)
-    found = [Change(do, tuple(hides), tuple(mixed)) for do, (hides, mixed) in out.items()]
+    found = [Remedy(do, tuple(hides), tuple(mixed)) for do, (hides, mixed) in out.items()]
     return tuple(sorted(found, key=lambda one: -len(one.unseen) - len(one.confused)))
 
 

@@ -9,7 +9,7 @@ from biodance.report.pages.template import render
 from biodance.version import __version__
 
 
-def refuse_existing(path: Path, *, force: bool) -> None:
+def refuse_page(path: Path, *, force: bool) -> None:
     """Raise BiodanceError where ``path`` exists and ``force`` was not given, or its folder is missing."""
     if path.exists() and not force:
         raise BiodanceError(f"{path}: exists and nothing is overwritten. Choose another --out, or --force.")
