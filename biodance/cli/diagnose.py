@@ -8,15 +8,22 @@ from cyclopts import Parameter
 
 from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json
 from biodance.cli.options import PERSON, USUAL_READING, JsonOption, Reading, Results, RobotFile
+from biodance.cli.options import USUAL_READING, ForceOption, JsonOption, Reading, Results
 from biodance.cli.progress import progress
 from biodance.cli.robot import diagnose_robot
 from biodance.cli.session import examine_with_reference, tabled
 
 
 @app.command(name="foresee")
-def foresee_command(dance: Path, *, json: JsonOption = False) -> int:
+def foresee_command(
+    dance: Path,
+    *,
+    out: Annotated[Path | None, Parameter(name="--out", help="Page to write, such as foresee.html.")] = None,
+    json: JsonOption = False,
+    force: ForceOption = False,
+) -> int:
     """Say before a recording what a designed dance will be able to see, from which size on, and which causes it will
-    confuse.
+    confuse; and what to change so that it sees more. With --out as a page, too.
 
     Parameters
     ----------
@@ -27,11 +34,16 @@ def foresee_command(dance: Path, *, json: JsonOption = False) -> int:
 
     from biodance.pipeline.diagnosis import foresee_dance
     from biodance.report.documents.diagnosis import foresight_document
+    from biodance.report.pages.foresight import foresight_page, refuse_page
     from biodance.report.terminal import print_foresight
 
     with progress() as tell:
         tell("foreseeing what the dance will see")
+        if out is not None:
+            refuse_page(out, force=force)
         document = foresight_document(foresee_dance(dance))
+        if out is not None:
+            out.write_text(foresight_page(document, dance.stem), encoding="utf-8", newline="\n")
     if json:
         print_json(document)
     else:
