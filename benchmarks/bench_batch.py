@@ -1,9 +1,9 @@
-"""Send an archive of a thousand sessions through `biodance batch` while its processes are killed, and write what came out.
+"""Send an archive of a thousand sessions through `biodance batch` while its processes are killed; print what came out.
 
-    BIODANCE_DATA=folder python benchmarks/bench_batch.py [--sessions 1000] [--workers 2] [--dask] [--out FILE.md]
+    BIODANCE_DATA=folder python benchmarks/bench_batch.py [--sessions 1000] [--workers 2] [--dask]
 
-Plate-only recordings (data/bds), real and virtual sessions with markers, repeated as links, and one in twenty broken. One
-process of the workers is killed every minute; at 40 % the command itself. Budget: 400 s of processor time for 1,000.
+Plate-only recordings (data/bds), real and virtual sessions with markers, repeated as links, and one in twenty broken.
+One process of the workers is killed every minute; at 40 % the command itself. Budget: 400 s of processor time.
 """
 
 import argparse
@@ -51,7 +51,7 @@ def build(archive: Path, count: int) -> Counter[str]:
     makers = {
         "plates": lambda folder, k: plates_only(folder, people.iloc[k % len(people)]),
         "virtual": lambda folder, k: link_all(models[k % len(models)], folder),
-        "real": lambda folder, k: real_session(folder, k),
+        "real": real_session,
         "broken": broken,
     }
     kinds = [kind for kind, share in KINDS.items() for _ in range(round(share * count))]
@@ -69,9 +69,9 @@ def plates_only(folder: Path, row: pd.Series) -> None:
     """Link one recording of somebody who stands on a plate, and describe it."""
     (folder / f"{row.trial}.txt").symlink_to(DATA / "bds" / f"{row.trial}.txt")
     (folder / f"{row.trial}.toml").write_text(DESCRIBED)
-    (folder / "session.toml").write_text(
-        f"[subject]\nmass_kg = {row.weight_kg}\nheight_m = {row.height_cm / 100}\nsex = \"{row.sex}\"\nage = {row.age_yr}\n"
-    )
+    said = {"mass_kg": row.weight_kg, "height_m": row.height_cm / 100, "sex": f'"{row.sex}"', "age": row.age_yr}
+    lines = ["[subject]", *(f"{key} = {value}" for key, value in said.items()), ""]
+    (folder / "session.toml").write_text("\n".join(lines))
 
 
 def virtual_models(folder: Path, count: int) -> list[Path]:
@@ -124,7 +124,7 @@ def broken(folder: Path, k: int) -> None:
 
 @dataclass
 class Watch:
-    """What was seen of the processes below this one, once a second: the largest sum of their memory, MB, and the kills."""
+    """What was seen of the processes below this one, once a second: largest sum of their memory, MB, and the kills."""
 
     every: float
     killed: int = 0
