@@ -84,6 +84,7 @@ def diagnose_command(
     from biodance.pipeline import front
     from biodance.pipeline.attention import is_well
     from biodance.pipeline.carry import read_lab
+    from biodance.pipeline.front_movement import describe_movement
     from biodance.pipeline.mended import write_mended
     from biodance.report.terminal import print_diagnosis
     from biodance.report.write import write_diagnosis
@@ -96,8 +97,9 @@ def diagnose_command(
             write_mended(result.session, found.mended.session, folder)
             result = found.mended
         tell("writing the page")
-        tabled(result, place, found.diagnosis)
-        document = write_diagnosis(result, found, folder, accepted=accept, earlier=carried.corrections)
+        moved = describe_movement(result, lab=reading.lab, tell=tell)
+        tabled(result, place, found.diagnosis, movement=moved)
+        document = write_diagnosis(result, found, folder, accepted=accept, earlier=carried.corrections, movement=moved)
     results.show_page(folder)
     if results.json:
         print_json(document)
