@@ -240,7 +240,8 @@ def screen(found: Model, causes: tuple[Candidate, ...]) -> tuple[ScoredCandidate
     """Return all causes with their evidence, most probable first."""
     widths = [one.basis.shape[1] for one in causes]
     named = taken(found)
-    Z = found.white(np.concatenate([one.basis for one in causes], axis=1))
+    Z = np.concatenate([one.basis for one in causes], axis=1)
+    Z = found.white(Z, out=Z)
     s, G = found.belief.score(Z)
     if named.shape[1]:
         G = G - shared(found, named, Z)
