@@ -2,8 +2,8 @@
 
 Every part is a tube lofted through 40 sections, closed by fans; parts touch and do not overlap, so that mass and CoM of
 every segment are known by themselves (trimesh, part by part). Nothing here cuts a surface. Arms hang straight, 20 to 45
-degrees away from the trunk; a leg stands a little apart; hands and feet are drawn by themselves. The scanner adds clothes
-or smoothing (all surfaces 1.5 mm out or in), and the person faces anywhere.
+degrees away from the trunk; a leg stands a little apart; hands and feet are drawn by themselves. The scanner adds
+clothes or smoothing (all surfaces 1.5 mm out or in), and the person faces anywhere.
 """
 
 from collections.abc import Callable
@@ -82,10 +82,10 @@ def scanned_person(seed: int) -> ScannedPerson:
     joints = {"pelvis": hip, "trunk_head": waist}
     for side, sign in (("right", 1.0), ("left", -1.0)):
         size = float(np.exp(rng.normal(0, 0.005)))
-        top = hip + [0.0, 0.0, sign * HIP * stature]
+        top = hip + np.array([0.0, 0.0, sign * HIP * stature])
         knee, heel = top - lengths["thigh"] * _UP, top - (lengths["thigh"] + lengths["shank"]) * _UP
         down = np.array([0.0, -np.cos(hang), sign * np.sin(hang)])
-        arm = neck + [0.0, -0.012 * stature, sign * out]
+        arm = neck + np.array([0.0, -0.012 * stature, sign * out])
         elbow = arm + lengths["upper_arm"] * down
         wrist = elbow + lengths["forearm"] * down
         parts |= {

@@ -29,7 +29,7 @@ def typed_outline(given: Mapping[str, float]) -> dict[str, FootOutline]:
         short = next((name.removeprefix(f"{side}_") for side in SIDES if name.startswith(f"{side}_")), name)
         if short not in _LEGAL:
             raise SessionRefused(
-                f"foot_outline: there is no size {name!r}. Legal: {', '.join(_LEGAL)}, with right_ or left_ before them "
+                f"foot_outline: there is no size {name!r}. Legal: {', '.join(_LEGAL)}, with right_ or left_ before "
                 "for one foot."
             )
         _refuse_impossible(name, value, short)

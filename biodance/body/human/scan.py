@@ -113,7 +113,7 @@ def _turned(path: str, corners: Array, stature: float) -> Scan:
     if min(low.area, high.area) <= 0 or abs(ahead) < _AHEAD * stature:
         raise SessionRefused(
             f"[subject] scan: {path} has no feet: {100 * _FOOT:.0f} % of the stature over its lowest point the body "
-            f"reaches {1000 * abs(ahead):.0f} mm ahead of the ankles (at least {1000 * _AHEAD * stature:.0f}). Scan the "
+            f"reaches {1000 * abs(ahead):.0f} mm ahead of the ankles (least {1000 * _AHEAD * stature:.0f}). Scan the "
             "feet as well, both flat on the floor, side by side, toes ahead."
         )
     forward = np.append(np.sign(ahead) * deep, 0.0)

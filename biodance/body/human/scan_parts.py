@@ -103,7 +103,7 @@ def _hip(scan: Scan, skeleton: Skeleton, side: str) -> tuple[Array, Array]:
     section = cut_section(leg, np.array([0.0, up, 0.0]), _UP)
     if section.area <= 0:
         raise SessionRefused(
-            f"[subject] scan: no flesh is found at the height of the {side} ankle. Scan the whole person, upright, both "
+            f"[subject] scan: no flesh is found at the {side} ankle's height. Scan the whole person, upright, both "
             "feet flat on the floor."
         )
     ankle = section.middle
