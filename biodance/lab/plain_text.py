@@ -9,6 +9,8 @@ from pathlib import Path
 
 from biodance.errors import FileRefused
 
+_LARGEST = 2**31
+"""Bytes: an hour of 100 markers at 200 Hz and 32 channels at 2000 Hz has 2.1 GB."""
 TEXT_LOOKS_BINARY = b"\x00"
 
 
@@ -53,10 +55,17 @@ def write_new(path: Path, content: bytes) -> Path:
 
 
 def refuse_special(path: Path) -> None:
-    """Raise FileRefused for a pipe, socket or device, on which reading could wait for ever."""
+    """Raise FileRefused for a pipe, socket or device, on which reading could wait for ever, and for a file larger than
+    any recording, which would fill the memory.
+    """
     if path.exists() and not path.is_file() and not path.is_dir():
         raise FileRefused(
             f"{path}: is a pipe, socket or device, an ordinary file is expected. Copy the recording into a file."
+        )
+    if path.is_file() and path.stat().st_size > _LARGEST:
+        raise FileRefused(
+            f"{path}: has {path.stat().st_size / 1e9:.1f} GB, a recording at most {_LARGEST / 1e9:.1f}. If it is one, "
+            f"export it in shorter trials."
         )
 
 
