@@ -8,6 +8,7 @@ import pytest
 from lab_sessions import two_trials
 
 from biodance.errors import BiodanceError, FileRefused
+from biodance.lab.c3d.raw import read_raw
 from biodance.lab.read import format_of, read_trial
 from biodance.lab.session.read import read_session
 
@@ -94,7 +95,7 @@ def test_a_file_larger_than_any_recording_is_refused_without_reading_it(tmp_path
     with open(huge, "wb") as stream:
         stream.truncate(6 * 10**9)
     with pytest.raises(FileRefused, match=r"has 6.0 GB, a recording at most 2.1"):
-        read_trial(huge)
+        read_raw(huge)
 
 
 def test_a_full_disk_names_the_place_that_was_asked_for(tmp_path, monkeypatch, capsys):

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from biodance.records import SIDES, Array, Wrench
@@ -36,7 +37,7 @@ class GaitPerformance(Performance):
     def foot_wrench(self, time: Array, side: str) -> Array:
         """Return the true wrench (T, 6) about the lab origin under one foot, exactly zero while it is in the air."""
         asked = {foot.side: self._asked(foot, time) for foot in self.feet}
-        total = sum(asked.values())
+        total = np.sum([*asked.values()], axis=0)
         share = asked[side][:, 2:3] / np.maximum(total[:, 2:3], 1e-9)
         value = asked[side] + share * (self._wrench_spline(time) - total)
         return np.asarray(np.where(asked[side][:, 2:3] > 0, value, 0.0))
@@ -45,9 +46,9 @@ class GaitPerformance(Performance):
         """Return the true ground wrench on the person about the lab origin, both feet together."""
         return Wrench(time, self.foot_wrench(time, "right") + self.foot_wrench(time, "left"))
 
-    def on_belt(self, time: Array, side: str) -> Array:
+    def on_belt(self, time: Array, side: str) -> NDArray[np.bool_]:
         """Return (T,) True while a foot touches the belt."""
-        return self.gait.since_strike(time, side) < self.gait.contact
+        return np.asarray(self.gait.since_strike(time, side) < self.gait.contact)
 
     def _asked(self, foot: BeltFoot, time: Array) -> Array:
         """Return the prescribed wrench (T, 6) of one foot about the lab origin."""

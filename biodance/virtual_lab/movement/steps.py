@@ -122,7 +122,7 @@ def _rolling(foot: BeltFoot, gait: Gait, s: Array) -> tuple[Array, Array, Array]
 def _end(foot: BeltFoot, gait: Gait, at: float) -> list[tuple[float, float, float]]:
     """Return value, rate and second rate of pitch, x and z at the start (0) or the end (1) of stance."""
     step = 1e-3
-    s = at + (1 - 2 * at) * step * np.arange(4)
+    s = at + (1 - 2 * at) * step * np.arange(4.0)
     sign = (1 - 2 * at) / (step * gait.contact)
     out = []
     for curve in _rolling(foot, gait, s):

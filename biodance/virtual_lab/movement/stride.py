@@ -141,7 +141,7 @@ class _Problem:
         """Return the nodes (N, 46) with arms, trunk and head as they are told."""
         body, gait, n = self.person.body, self.gait, self.time.size
         q = np.zeros((n, body.nq))
-        angle = dict(self.person.habits.angles)
+        angle: dict[str, Array | float] = dict(self.person.habits.angles)
         angle["lumbar_flexion"] += gait.lean
         swing = np.cos(2 * np.pi * self.time / gait.stride)
         for side, sign in zip(SIDES, (-1.0, 1.0), strict=True):
