@@ -8,6 +8,7 @@ import pytest
 from lab_sessions import two_trials
 
 from biodance.errors import BiodanceError, FileRefused
+from biodance.lab.c3d.raw import read_raw
 from biodance.lab.read import format_of, read_trial
 from biodance.lab.session.read import read_session
 
@@ -87,3 +88,22 @@ def test_content_counts_more_than_the_name(tmp_path, folder):
     table = tmp_path / "numbers.dat"
     table.write_text("1,2,3,4,5,6\n-1,2.5,3e-1,4,5,6\n")
     assert format_of(table) == ".asc"
+
+
+def test_a_file_larger_than_any_recording_is_refused_without_reading_it(tmp_path):
+    huge = tmp_path / "huge.c3d"
+    with open(huge, "wb") as stream:
+        stream.truncate(6 * 10**9)
+    with pytest.raises(FileRefused, match=r"has 6.0 GB, a recording at most 2.1"):
+        read_raw(huge)
+
+
+def test_a_full_disk_names_the_place_that_was_asked_for(tmp_path, monkeypatch, capsys):
+    from biodance import cli
+
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(cli, "app", full)
+    assert cli.run(["report", "visit", "--out", str(tmp_path)]) == 2
+    assert f"{tmp_path}: No space left on device." in capsys.readouterr().err

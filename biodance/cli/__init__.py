@@ -56,7 +56,7 @@ def run(tokens: Sequence[str] | None = None) -> int:
     except BiodanceError as error:
         say(str(error))
     except OSError as error:
-        say(f"{error.filename or 'biodance'}: {error.strerror or error}.")
+        say(f"{error.filename or _out(tokens)}: {error.strerror or error}.")
     except Exception as error:
         if "BIODANCE_TRACEBACK" in os.environ:
             raise
@@ -68,6 +68,13 @@ def run(tokens: Sequence[str] | None = None) -> int:
         say("Stopped before the command was done; what was already written is complete.")
         return STOPPED
     return NOT_DONE
+
+
+def _out(tokens: Sequence[str] | None) -> str:
+    """Return the place that a command was asked to write to, for a fault that does not tell its path."""
+    given = list(sys.argv[1:] if tokens is None else tokens)
+    at = given.index("--out") + 1 if "--out" in given else len(given)
+    return given[at] if at < len(given) else "biodance"
 
 
 def main() -> None:

@@ -108,7 +108,8 @@ class FrameRate(DiscreteEffect):
 
 def moving_parts(case: Case) -> tuple[Array, Array, float] | None:
     """Return measured force less weight, the force that the accelerations need (n, 3) N, both below BAND, and the rate;
-    the weight is made to fit, so that units do not matter here. None where the motion does not explain the force.
+    the mean force is made to fit (a runner's median is none), so that units do not matter here. None where the motion
+    does not explain the force.
     """
     frames, rate = case.motion.time.size, case.motion.rate
     if frames < 2 * _EDGE * rate + 2 * rate or rate < 3 * BAND:
@@ -116,11 +117,12 @@ def moving_parts(case: Case) -> tuple[Array, Array, float] | None:
     still = Motion(case.motion.time, case.motion.q, 0 * case.motion.v, 0 * case.motion.a)
     weight = predict_wrench(case.body, still, case.phi).force
     force = case.trial.wrench.force
-    if not np.isfinite(force).all() or not np.median(force[:, 2]) > 0:
+    if not np.isfinite(force).all() or not force[:, 2].mean() > 0:
         return None
-    measured = force * (np.median(weight[:, 2]) / np.median(force[:, 2])) - weight
-    measured = measured - np.median(measured, axis=0)
-    smooth = low_pass(np.hstack([measured, case.predicted[:, :3] - weight]), rate, LowPass(order=4, cutoff=BAND))
+    needed = case.predicted[:, :3] - weight
+    measured = force * (case.predicted[:, 2].mean() / force[:, 2].mean()) - weight
+    measured = measured - (measured - needed).mean(axis=0)
+    smooth = low_pass(np.hstack([measured, needed]), rate, LowPass(order=4, cutoff=BAND))
     inside = slice(int(_EDGE * rate), -int(_EDGE * rate))
     measured, needed = smooth[inside, :3], smooth[inside, 3:]
     alike = float((measured * needed).sum() / np.sqrt((measured**2).sum() * (needed**2).sum() + 1e-12))
@@ -162,7 +164,7 @@ def _slow_parts(case: Case) -> tuple[Array, Array, Array]:
     some = Motion(motion.time[take], motion.q[take], motion.v[take], motion.a[take])
     weight, whole = regressor(case.body, Motion(some.time, some.q, 0 * some.v, 0 * some.a)), regressor(case.body, some)
     force = case.trial.wrench.value[take]
-    force = force * (np.median(weight[:, 2] @ case.phi) / np.median(force[:, 2]))
+    force = force * (np.mean(whole[:, 2] @ case.phi) / np.mean(force[:, 2]))
     shift, count = np.eye(6), int(2 * BAND * some.time.size / some.rate)
     shift[3:, :3] = -skew(np.array([*np.median(some.q[:, :2], axis=0), 0.0]))
 

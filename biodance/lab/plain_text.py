@@ -9,6 +9,8 @@ from pathlib import Path
 
 from biodance.errors import FileRefused
 
+_LARGEST = 2**31
+"""Bytes: an hour of 100 markers at 200 Hz and 32 channels at 2000 Hz has 2.1 GB."""
 TEXT_LOOKS_BINARY = b"\x00"
 
 
@@ -18,9 +20,10 @@ def read_bytes(path: Path) -> bytes:
     Raises
     ------
     FileRefused
-        There is no such file, it is a pipe or device, it cannot be opened, or it is empty.
+        There is no such file, it is a pipe or device or too large, it cannot be opened, or it is empty.
     """
     refuse_special(path)
+    refuse_huge(path)
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -57,6 +60,15 @@ def refuse_special(path: Path) -> None:
     if path.exists() and not path.is_file() and not path.is_dir():
         raise FileRefused(
             f"{path}: is a pipe, socket or device, an ordinary file is expected. Copy the recording into a file."
+        )
+
+
+def refuse_huge(path: Path) -> None:
+    """Raise FileRefused for a file larger than any recording, which would fill the memory."""
+    if path.is_file() and path.stat().st_size > _LARGEST:
+        raise FileRefused(
+            f"{path}: has {path.stat().st_size / 1e9:.1f} GB, a recording at most {_LARGEST / 1e9:.1f}. If it is one, "
+            f"export it in shorter trials."
         )
 
 

@@ -18,6 +18,7 @@ from biodance.lab.c3d.layout import Layout, read_layout, texts
 from biodance.lab.c3d.numbers import Numbers, read_numbers, second_opinion
 from biodance.lab.c3d.parameters import RESAVE, Parameters, read_header, read_parameters
 from biodance.lab.c3d.units import metres_per_unit
+from biodance.lab.plain_text import refuse_huge
 from biodance.records import Array
 
 GROUPS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS", "MODELED_MARKERS")
@@ -99,6 +100,7 @@ def read_raw(path: str | Path) -> RawC3d:
         The path is no readable file, no C3D file, or a C3D file that is damaged, cut off or contradicts itself.
     """
     path = Path(path)
+    refuse_huge(path)
     try:
         content = path.read_bytes()
     except IsADirectoryError as error:

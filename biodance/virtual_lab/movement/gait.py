@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from biodance.records import SIDES, Array, Wrench
@@ -12,8 +13,8 @@ from biodance.virtual_lab.movement.gaits import GAITS, Gait
 from biodance.virtual_lab.movement.performance import MARGIN, Performance
 from biodance.virtual_lab.movement.posing import Z, take_stance, turn_about
 from biodance.virtual_lab.movement.protocol import TrialPlan
-from biodance.virtual_lab.movement.steps import Foot
-from biodance.virtual_lab.movement.stride import STRIDE_RATE, Stride, find_stride
+from biodance.virtual_lab.movement.steps import BeltFoot
+from biodance.virtual_lab.movement.stride import STRIDE_RATE, FoundStride, find_stride
 from biodance.virtual_lab.person.person import Person
 from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances, stream
 
@@ -30,13 +31,13 @@ class GaitPerformance(Performance):
     """
 
     gait: Gait = GAITS["walk"]
-    feet: tuple[Foot, ...] = ()
-    stride: Stride = None  # type: ignore[assignment]
+    feet: tuple[BeltFoot, ...] = ()
+    stride: FoundStride = None  # type: ignore[assignment]
 
     def foot_wrench(self, time: Array, side: str) -> Array:
         """Return the true wrench (T, 6) about the lab origin under one foot, exactly zero while it is in the air."""
         asked = {foot.side: self._asked(foot, time) for foot in self.feet}
-        total = sum(asked.values())
+        total = np.sum([*asked.values()], axis=0)
         share = asked[side][:, 2:3] / np.maximum(total[:, 2:3], 1e-9)
         value = asked[side] + share * (self._wrench_spline(time) - total)
         return np.asarray(np.where(asked[side][:, 2:3] > 0, value, 0.0))
@@ -45,11 +46,11 @@ class GaitPerformance(Performance):
         """Return the true ground wrench on the person about the lab origin, both feet together."""
         return Wrench(time, self.foot_wrench(time, "right") + self.foot_wrench(time, "left"))
 
-    def on_belt(self, time: Array, side: str) -> Array:
+    def on_belt(self, time: Array, side: str) -> NDArray[np.bool_]:
         """Return (T,) True while a foot touches the belt."""
-        return self.gait.since_strike(time, side) < self.gait.contact
+        return np.asarray(self.gait.since_strike(time, side) < self.gait.contact)
 
-    def _asked(self, foot: Foot, time: Array) -> Array:
+    def _asked(self, foot: BeltFoot, time: Array) -> Array:
         """Return the prescribed wrench (T, 6) of one foot about the lab origin."""
         force = foot.force(self.gait, time, self.person.mass, self.stride.aim)
         moment = np.cross(foot.pressure(self.gait, time), force)
@@ -61,10 +62,10 @@ class GaitPerformance(Performance):
     @cached_property
     def middle(self) -> Array:
         """(3,) m, where the belt's middle under the person lies in the laboratory."""
-        return middle_of(self.stance.ankle)
+        return floor_between(self.stance.ankle)
 
 
-def middle_of(ankle: dict[str, Array]) -> Array:
+def floor_between(ankle: dict[str, Array]) -> Array:
     """Return the place (3,) m on the floor between the ankles of a stance."""
     return np.array([*np.mean([ankle[side][:2] for side in SIDES], axis=0), 0.0])
 
@@ -85,14 +86,14 @@ def perform_gait(
     gait = _personal(GAITS[plan.gait], rng, tolerances, plan.speed, person.subject.stature)
     stance = take_stance(person, "parallel", centre, heading, rng)
     feet = tuple(
-        Foot(side, person.size["sole"], person.size["ankle_height"], out)
+        BeltFoot(side, person.size["sole"], person.size["ankle_height"], out)
         for side, out in zip(SIDES, person.habits.toe_out, strict=True)
     )
     found = find_stride(person, gait, feet)
     index = np.arange(round((plan.duration + 2 * MARGIN) * STRIDE_RATE) + 1) - round(MARGIN * STRIDE_RATE)
     nodes, time = found.q[np.mod(index, len(found.q))].copy(), index / STRIDE_RATE
     turn = turn_about(Z, np.array([stance.heading]))[0]
-    nodes[:, :3] = nodes[:, :3] @ turn.T + middle_of(stance.ankle)
+    nodes[:, :3] = nodes[:, :3] @ turn.T + floor_between(stance.ankle)
     nodes[:, 3:7] = _without_jumps((Rotation.from_matrix(turn) * Rotation.from_quat(nodes[:, 3:7])).as_quat())
     curves = Curves(time, np.zeros((time.size, WIDTH)))
     return GaitPerformance(plan, person, stance, curves, time, nodes, found.missed, gait=gait, feet=feet, stride=found)

@@ -43,7 +43,7 @@ HARMONICS = 6
 
 
 @dataclass(frozen=True)
-class Foot:
+class BeltFoot:
     """One foot on the belt: its ``side``, ``length`` m of the sole, ``height`` m of the ankle, ``out`` rad of the toes,
     ``lead`` m by which it lands farther ahead than its centre of pressure's middle under the body.
     """
@@ -104,7 +104,7 @@ def _mean_pulse(gait: Gait) -> float:
     return float(np.trapezoid(_pulse(gait, s), s))
 
 
-def _rolling(foot: Foot, gait: Gait, s: Array) -> tuple[Array, Array, Array]:
+def _rolling(foot: BeltFoot, gait: Gait, s: Array) -> tuple[Array, Array, Array]:
     """Return pitch (T,) rad, x and z (T,) m of the ankle in stance: turning over the heel, flat, over the toes, while
     the belt carries it back.
     """
@@ -119,10 +119,10 @@ def _rolling(foot: Foot, gait: Gait, s: Array) -> tuple[Array, Array, Array]:
     return pitch, foot.lead - middle - gait.speed * gait.contact * (s - 0.5) + x, z
 
 
-def _end(foot: Foot, gait: Gait, at: float) -> list[tuple[float, float, float]]:
+def _end(foot: BeltFoot, gait: Gait, at: float) -> list[tuple[float, float, float]]:
     """Return value, rate and second rate of pitch, x and z at the start (0) or the end (1) of stance."""
     step = 1e-3
-    s = at + (1 - 2 * at) * step * np.arange(4)
+    s = at + (1 - 2 * at) * step * np.arange(4.0)
     sign = (1 - 2 * at) / (step * gait.contact)
     out = []
     for curve in _rolling(foot, gait, s):

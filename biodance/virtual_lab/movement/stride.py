@@ -21,7 +21,7 @@ from biodance.virtual_lab.movement.gaits import Gait
 from biodance.virtual_lab.movement.performance import motion_through
 from biodance.virtual_lab.movement.posing import turn_about
 from biodance.virtual_lab.movement.protocol import STAND
-from biodance.virtual_lab.movement.steps import Aim, Foot, G
+from biodance.virtual_lab.movement.steps import Aim, BeltFoot, G
 from biodance.virtual_lab.person.person import Person
 
 STRIDE_RATE = 200.0
@@ -42,7 +42,7 @@ _LATERAL = np.array([0.0, -1.0, 0.0])
 
 
 @dataclass(frozen=True, eq=False)
-class Stride:
+class FoundStride:
     """One stride of a person on a belt, in the belt's axes.
 
     ``q`` (N, 46) nodes at `STRIDE_RATE`; ``aim`` of the ground forces; ``twist`` m, free moment per vertical force of
@@ -59,7 +59,7 @@ class Stride:
 class _Problem:
     person: Person
     gait: Gait
-    feet: tuple[Foot, ...]
+    feet: tuple[BeltFoot, ...]
 
     @cached_property
     def time(self) -> Array:
@@ -141,7 +141,7 @@ class _Problem:
         """Return the nodes (N, 46) with arms, trunk and head as they are told."""
         body, gait, n = self.person.body, self.gait, self.time.size
         q = np.zeros((n, body.nq))
-        angle = dict(self.person.habits.angles)
+        angle: dict[str, Array | float] = dict(self.person.habits.angles)
         angle["lumbar_flexion"] += gait.lean
         swing = np.cos(2 * np.pi * self.time / gait.stride)
         for side, sign in zip(SIDES, (-1.0, 1.0), strict=True):
@@ -157,7 +157,7 @@ class _Problem:
         return q
 
 
-def find_stride(person: Person, gait: Gait, feet: tuple[Foot, ...]) -> Stride:
+def find_stride(person: Person, gait: Gait, feet: tuple[BeltFoot, ...]) -> FoundStride:
     """Return the stride of ``person`` whose ``feet`` take the prescribed forces.
 
     In walking the forces first learn to aim so that the trunk neither nods nor rolls; then the pelvis turns by what
@@ -182,7 +182,7 @@ def find_stride(person: Person, gait: Gait, feet: tuple[Foot, ...]) -> Stride:
         lacks = lacks - lacks.mean(axis=0)
         missed, off = float(np.abs(lacks).max()), float(np.abs(com - centre).max())
         if missed < _SPIN and off < _PLACE and abs(short) < _SHORT:
-            return Stride(q, aim, twist, missed)
+            return FoundStride(q, aim, twist, missed)
         level, root = level - _EASE * short, root + _EASE * (com - centre)
         step = _EASE * _integral(lacks / lever, gait.stride)
         if learns and number < _LEARNED:
