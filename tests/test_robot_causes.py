@@ -88,13 +88,11 @@ def test_an_ankle_that_gives_is_named_with_its_stiffness(robot: Body, truth: lis
 def test_a_sole_that_gives_is_named_with_the_ankle_above_it(
     robot: Body, truth: list[tuple[Array, Array, Array]]
 ) -> None:
-    give, trials = 0.005, []
-    for seed, (_, angle, wrench) in enumerate(truth):
-        middle = np.mean(real_robot().feet["left"].outline, axis=0)[2]
-        nod = np.pad(-give * (wrench[:, 4] + middle * wrench[:, 2]), 1, mode="edge")
-        _, _, tilted = danced(real_robot(), seed, _SECONDS, nod=nod)
-        trials.append(seen(robot, angle, tilted))
-    found, _ = robot_causes(robot, (trials[0],), (trials[1],))
+    give, (_, angle, wrench) = 0.005, truth[0]
+    middle = np.mean(real_robot().feet["left"].outline, axis=0)[2]
+    nod = np.pad(-give * (wrench[:, 4] + middle * wrench[:, 2]), 1, mode="edge")
+    _, _, tilted = danced(real_robot(), 0, _SECONDS, nod=nod)
+    found, _ = robot_causes(robot, (seen(robot, angle, tilted),))
     first = found[0]
     named = [(one.kind, one.where) for one in (first.cause, *first.rivals)]
     assert ("soft_sole", "forwards") in named

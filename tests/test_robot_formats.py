@@ -13,6 +13,7 @@ from biodance.errors import BiodanceError
 from biodance.lab.read import read_trial
 from biodance.lab.robot.recording import read_robot_recording
 from biodance.motion.clocks import onto_plate
+from biodance.pipeline.robot import identify_robot
 from biodance.pipeline.robot_trials import MatchedTrial, bring_together
 from biodance.pipeline.robot_words import of_file
 from biodance.records import CHANNELS
@@ -66,6 +67,13 @@ def test_parquet_and_text_say_what_csv_and_c3d_say(place: Path, tmp_path: Path) 
     assert other.plate.yaw == pytest.approx(one.plate.yaw, abs=0.002)
     seen = [onto_plate(run.motion.fit.wrench.value, run.plate)[run.motion.fit.use] for run in (one, other)]
     np.testing.assert_allclose(seen[1][:, :3], seen[0][:, :3], atol=0.1)
+
+
+def test_a_plate_of_another_motion_is_refused_and_no_exchange_is_blamed(place: Path, tmp_path: Path) -> None:
+    other = recorded(tmp_path / "other", seed=8, seconds=8.0)
+    (other / "run_joints.csv").write_bytes((place / "good" / "run_joints.csv").read_bytes())
+    with pytest.raises(BiodanceError, match="is not the plate of this motion"):
+        identify_robot(other, urdf=place / "hoap3.urdf", feet=FEET)
 
 
 def test_a_link_that_no_body_can_be_is_refused_by_name_and_mended_on_request(place: Path, tmp_path: Path) -> None:

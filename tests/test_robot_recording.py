@@ -142,12 +142,6 @@ def test_exchanged_columns_are_named(place: Path, tmp_path: Path) -> None:
     assert pair[1] in said
 
 
-def test_a_plate_of_another_motion_is_refused(place: Path, tmp_path: Path) -> None:
-    other = recorded(tmp_path / "other", seed=8)
-    (other / "run_joints.csv").write_bytes((place / "good" / "run_joints.csv").read_bytes())
-    assert "is not the plate of this motion" in refused(other, place)
-
-
 def test_folders_that_are_no_recording_say_what_one_is(place: Path, tmp_path: Path) -> None:
     assert "is no folder" in refused(tmp_path / "nowhere", place)
     (tmp_path / "notes.txt").write_text("nothing")

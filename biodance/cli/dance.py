@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from biodance.cli.app import DONE, NEEDS_A_PERSON, STOPPED, app, print_json, say
-from biodance.cli.options import PERSON, ForceOption, JsonOption, OutOption, RobotFile
+from biodance.cli.options import NO_ROBOT, ForceOption, JsonOption, OutOption, RobotFile
 from biodance.errors import BiodanceError
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def dance_command(
         str, Parameter(help="easy, patient, chair, short, one_segment, full, or a TOML file.")
     ] = "full",
     limits: Annotated[Path | None, Parameter(help="TOML file with what this person can and may do.")] = None,
-    robot: RobotFile = PERSON,
+    robot: RobotFile = NO_ROBOT,
     seed: Annotated[int, Parameter(help="The same seed gives the same dance.")] = 0,
     out: OutOption,
     json: JsonOption = False,

@@ -7,7 +7,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json
-from biodance.cli.options import PERSON, USUAL_READING, ForceOption, JsonOption, Reading, Results, RobotFile
+from biodance.cli.options import NO_ROBOT, USUAL_READING, ForceOption, JsonOption, Reading, Results, RobotFile
 from biodance.cli.progress import progress
 from biodance.cli.robot import diagnose_robot
 from biodance.cli.session import examine_with_reference, tabled
@@ -65,7 +65,7 @@ def diagnose_command(
             "copy first.",
         ),
     ] = False,
-    robot: RobotFile = PERSON,
+    robot: RobotFile = NO_ROBOT,
 ) -> int:
     """Say what the simulation of a session gets wrong: the cause, its size, how sure, what else it could be, and what
     naming it gains.

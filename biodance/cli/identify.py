@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json
-from biodance.cli.options import PERSON, USUAL_READING, Reading, Results, RobotFile
+from biodance.cli.options import NO_ROBOT, USUAL_READING, Reading, Results, RobotFile
 from biodance.cli.progress import progress
 from biodance.cli.robot import examine_robot
 from biodance.cli.session import examine_with_reference, tabled
@@ -27,7 +27,7 @@ def identify_command(
     dance: Annotated[
         Path | None, Parameter(name="--dance", help="dance.npz that was shown: says how well it was danced.")
     ] = None,
-    robot: RobotFile = PERSON,
+    robot: RobotFile = NO_ROBOT,
 ) -> int:
     """Identify what every segment weighs, with intervals, validate it on the trials kept, and look for an added mass.
 

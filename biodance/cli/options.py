@@ -116,7 +116,7 @@ class RobotFile:
     @property
     def given(self) -> bool:
         """Whether any of it was asked for."""
-        return self != PERSON
+        return self != NO_ROBOT
 
     def named(self) -> tuple[Path, str]:
         """Return file and feet; BiodanceError if one is missing."""
@@ -127,7 +127,7 @@ class RobotFile:
         return self.urdf, self.feet
 
 
-PERSON = RobotFile()
+NO_ROBOT = RobotFile()
 
 
 @Parameter(name="*")

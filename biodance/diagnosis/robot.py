@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.diagnosis.robot_columns import LOADED_KINDS, Columns, RobotCause, columns_of, motion_changes, without
+from biodance.diagnosis.robot_columns import LOADED_KINDS, Columns, RobotCause, cause_columns, motion_changes, without
 from biodance.identification.learning import START, WORTH
 from biodance.identification.mismatch import SHORTEST
 from biodance.identification.posterior import prior_factor
@@ -89,7 +89,7 @@ def robot_causes(
     ``fitted`` and ``kept`` trials; all frames in which a foot certainly stands are used.
     """
     trials, found = (*fitted, *kept), list[RobotFinding]()
-    columns = columns_of(body, fitted, trials)
+    columns = cause_columns(body, fitted, trials)
     size, here = prior_factor(body.sip).shape[1], np.array(columns.usual)
     noise = replace(columns.layout, covariance=np.tile(_start(body), (len(columns.layout.bands), 1, 1)))
     while True:

@@ -77,7 +77,7 @@ def _moves(cause: RobotCause) -> bool:
     return bool(cause.joints) or cause.kind == "soft_sole"
 
 
-def columns_of(body: Body, fitted: tuple[RobotMotion, ...], trials: tuple[RobotMotion, ...]) -> Columns:
+def cause_columns(body: Body, fitted: tuple[RobotMotion, ...], trials: tuple[RobotMotion, ...]) -> Columns:
     """Return what may be wrong in ``trials``; units by the loads of those ``fitted``."""
     found = [loads(body, one.grounded, one.fit.wrench.value) for one in fitted]
     torque, moment = (np.mean([getattr(one, name) for one in found], axis=0) for name in ("torque", "moment"))

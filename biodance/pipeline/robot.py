@@ -25,7 +25,7 @@ from biodance.motion.grounded import RATE
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.robot_trials import MatchedTrial, bring_together
-from biodance.pipeline.robot_words import cause_words, of_file, refusals, told_of, weights
+from biodance.pipeline.robot_words import cause_words, misweighed, of_file, refusals, told_of, weights
 from biodance.records import Wrench
 from biodance.records.attention import Attention, Judged, strongest_first
 from biodance.spatial import cross, quaternion_matrix, wrench_about_point
@@ -121,16 +121,15 @@ def identify_robot(
     best = _identified(body, found.folder.name, *without) if causes else plain
     doubtful = bool(causes) and not _predicts_better(best.identified, plain.identified)
     best = plain if doubtful else best
-    words = cause_words(causes, doubtful=doubtful)
-    said = strongest_first(
-        [*of_file(body.notes), *refusals(refused), *told_of(trials), *words, *weights(best.identified.identification)]
-    )
+    wrong = misweighed(best.identified)
+    words = (*cause_words(causes, doubtful=doubtful), *wrong, *weights(best.identified.identification))
+    said = strongest_first([*of_file(body.notes), *refusals(refused), *told_of(trials), *words])
     judged = tuple(Judged(one.recorded.name, float(one.motion.fit.use.sum()) / RATE) for one in trials)
     lost = tuple(Judged(name, 0.0, why, missed=True) for name, why in refused.items())
     named = () if doubtful else causes
     return RobotResult(
         *(found, Path(urdf), body, tuple(trials), best.identified, best.alone, named, best.in_root),
-        *(said, (*judged, *lost), "unexplained" if doubtful else "named" if causes else "clean"),
+        *(said, (*judged, *lost), "named" if named else "unexplained" if doubtful or wrong else "clean"),
     )
 
 

@@ -82,7 +82,7 @@ def _matched(body: Body, one: RobotTrial, recording: RobotRecording) -> MatchedT
     foreign = fit.correlation < _SAME or not _SCALES[0] < fit.scale < _SCALES[1]
     if odd > ODD or fit.correlation < _FAITHFUL:
         pair = _exchanged(body, time, angle, measured, limits)
-        if pair:
+        if pair and _explains(body, time, angle, measured, pair):
             raise TrialRefused(
                 f"{where}: the columns of {pair[0]} and {pair[1]} are exchanged: exchanged back, the motion needs what "
                 f"the plate shows. Correct the headings."
@@ -169,6 +169,20 @@ def _exchanged(
         if size < best:
             best, pair = size, (body.joints[i].name, body.joints[j].name)
     return pair
+
+
+def _explains(body: Body, time: Array, angle: Array, measured: Wrench, pair: tuple[str, str]) -> bool:
+    """Whether the wrench follows, most of the time, once two joints are exchanged back: a few seconds of another motion
+    can resemble a path.
+    """
+    names = [joint.name for joint in body.joints]
+    i, j = (names.index(name) for name in pair)
+    other = angle.copy()
+    other[:, [i, j]] = angle[:, [j, i]]
+    found, fit = _stood(body, time, other, measured)
+    motion = robot_fit("exchanged", found, other, on_motion_clock(measured, time, fit))
+    most = 2 * motion.fit.use.sum() > found.use.sum()
+    return bool(most and fit.correlation > _FAITHFUL and surprise(body, motion) < ODD)
 
 
 def _lacking(body: Body, time: Array, angle: Array, measured: Wrench) -> float:

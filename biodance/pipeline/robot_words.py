@@ -6,9 +6,12 @@ from biodance.diagnosis.robot import RobotFinding
 from biodance.diagnosis.robot_columns import RobotCause
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import SIGMAS
+from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.robot_trials import ODD, MatchedTrial
 from biodance.records.attention import Attention
 
+_MISWEIGHED = 0.02
+"""Of its weight: by so much the identified robot may differ from what the plate carries."""
 _APART = 1.0
 """s: clocks further apart are said first."""
 
@@ -91,6 +94,20 @@ def _told(one: RobotFinding) -> str:
 
 def _size(value: float) -> str:
     return "large" if value > 0 else "small"
+
+
+def misweighed(found: SessionIdentification) -> list[Attention]:
+    """Return where the plate carries another weight than the identified robot has."""
+    out = []
+    for one in found.validations or found.fitted:
+        seen, needed = (float(np.mean(wrench.value[one.use, 2])) for wrench in (one.measured, one.identified))
+        if abs(seen - needed) > _MISWEIGHED * needed:
+            text = (
+                f"The plate carries {seen:.1f} N, the robot that moments and weight together tell weighs {needed:.1f} "
+                f"N: look at the plate's zero and its gain of Fz; the recording does not tell which."
+            )
+            out.append(Attention("warn", text, one.name, "plate"))
+    return out
 
 
 def weights(done: Identification) -> list[Attention]:
