@@ -5,8 +5,8 @@ than those of the tape, sections |x/a|^p + |z/b|^p = 1 with a drawn exponent and
 length of the section's edge, at a place missed by a centimetre, read with 1 %.
 """
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 
@@ -53,7 +53,10 @@ _SLICES = 80
 
 @dataclass(frozen=True)
 class GeneratedPerson:
-    """``mass`` kg and ``stature`` m; ``lengths`` m by part; ``masses`` kg by segment of biodance; ``girths`` m."""
+    """``mass`` kg and ``stature`` m; ``lengths`` m by part; ``masses`` kg by segment of biodance; ``girths`` m; by part
+    ``sections`` (radius m of a circle of the same area as a function of the place from 0 to 1, aspect, exponent) and
+    ``densities`` kg/m³.
+    """
 
     sex: Literal["F", "M"]
     mass: float
@@ -61,6 +64,8 @@ class GeneratedPerson:
     lengths: dict[str, float]
     masses: dict[str, float]
     girths: dict[str, float]
+    sections: dict[str, Any]
+    densities: dict[str, float]
 
 
 def section_edge(radius: float, aspect: float, power: float) -> float:
@@ -83,7 +88,7 @@ def generate_person(seed: int) -> GeneratedPerson:
     stature = rng.normal(1.65 if sex == "F" else 1.78, 0.07)
     build = rng.normal(0.0, 0.07)
     lengths = {part: share * stature * np.exp(rng.normal(0, 0.03)) for part, share in _LENGTH.items()}
-    masses, girths, sections = {}, {}, {}
+    masses, girths, sections, densities = {}, {}, {}, {}
     for part, (places, radii) in _KNOTS.items():
         size = stature / 1.70 * _SEX[sex].get(part, 1.0)
         size *= np.exp((0.3 if part == "head" else 1.0) * build + rng.normal(0, 0.02 if part == "head" else 0.035))
@@ -93,12 +98,15 @@ def generate_person(seed: int) -> GeneratedPerson:
         sections[part] = shape, aspect, rng.uniform(1.9, 2.6)
         where = (np.arange(_SLICES) + 0.5) / _SLICES
         volume = float(np.mean(np.pi * np.exp(2 * shape(where)))) * lengths[part]
-        masses[part] = volume * _DENSITY[part] * np.exp(rng.normal(-0.1 * build, 0.02))
+        densities[part] = _DENSITY[part] * np.exp(rng.normal(-0.1 * build, 0.02))
+        masses[part] = volume * densities[part]
+        sections[part] = (lambda place, knots=shape: np.exp(knots(place))), *sections[part][1:]
     for girth, (part, place) in _TAPES.items():
-        shape, aspect, power = sections[part]
+        radius, aspect, power = sections[part]
         put = np.clip(place + rng.normal(0, 0.01) / lengths[part], 0, 1)
-        girths[girth] = section_edge(float(np.exp(shape(put))), aspect, power) * np.exp(rng.normal(0, 0.01))
-    return _assembled(sex, stature, lengths, masses, girths, rng)
+        girths[girth] = section_edge(float(radius(put)), aspect, power) * np.exp(rng.normal(0, 0.01))
+    person = _assembled(sex, stature, lengths, masses, girths, rng)
+    return replace(person, sections=sections, densities=densities)
 
 
 def _assembled(
@@ -121,4 +129,4 @@ def _assembled(
     for part, kg in both.items():
         apart = rng.normal(0, 0.01)
         whole[f"right_{part}"], whole[f"left_{part}"] = kg * np.exp(apart), kg * np.exp(-apart)
-    return GeneratedPerson(sex, sum(whole.values()), stature, lengths, whole, girths)
+    return GeneratedPerson(sex, sum(whole.values()), stature, lengths, whole, girths, {}, {})

@@ -72,7 +72,8 @@ class Body:
         The same table with the trunk's matter along with its joint, which movement may put elsewhere than the table
         cuts the trunk from the pelvis; None where both are one.
     girths : mapping
-        By segment, the girths of the person that its mass in ``sip`` takes in beside the table.
+        By segment, what of the person's shape its mass in ``sip`` takes in beside the table: girths by name, "foot
+        outline", "scan".
     parts : tuple
         Pieces of segments that move on joints of their own (``Part``): the head, hands, collar bones.
 

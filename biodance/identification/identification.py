@@ -264,11 +264,16 @@ def conclude(
     room = before if machine else may_carry(body, before)
     noise = noise or learn_noise(total, room)[0]
     data, sizes = _discounted(total, noise, found, room)
+    as_measured = data, sizes, noise
     for _ in range(_ROUNDS if found is not None and not machine else 0):
         table = more_probable_place(data, before, body)[0] if prior is None else before
-        real = undiluted(total, posterior(data, table).mean, body.segments)
+        belief = posterior(data, table)
+        real = undiluted(total, belief.mean, body.segments)
         noise = learn_noise(real, room, rounds=_AGAIN)[0]
         data, sizes = _discounted(real, noise, found, room)
+        if _carried_away(belief, posterior(data, table)):
+            data, sizes, noise = as_measured
+            break
     before, placed = more_probable_place(data, before, body) if prior is None else (before, "")
     belief = posterior(data, before)
     fit = physical_fit(belief, body)
@@ -283,6 +288,16 @@ def conclude(
         known = knowledge(fit.sip, first, belief)
         words += _notes(known, fit)
     return Identification(body, belief, data, base, noise, sizes, fit, trials, data.frames, known, words)
+
+
+def _carried_away(before: Posterior, after: Posterior) -> bool:
+    """Whether giving back what noise in the kinematics takes moves a mass by more than its standard deviation.
+
+    A gain and the mass under which it is measured stand in for each other: where movement is slow and noise is most of
+    what is fast, each round lowers the one and raises the other.
+    """
+    sd = np.sqrt(np.diag(before.covariance)[::10])
+    return bool(np.any(np.abs(after.mean - before.mean)[::10] > sd))
 
 
 def _discounted(total: Statistics, noise: Noise, found: Mismatch | None, room: Sip) -> tuple[Information, Sizes]:

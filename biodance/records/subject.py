@@ -13,6 +13,15 @@ SIDES = ("right", "left")
 
 
 @dataclass(frozen=True)
+class FootOutline:
+    """The outline of one foot, m: ``length`` heel to toe tip, ``breadth`` at the ball, ``heel_breadth``."""
+
+    length: float
+    breadth: float
+    heel_breadth: float
+
+
+@dataclass(frozen=True)
 class Subject:
     """The person.
 
@@ -34,6 +43,12 @@ class Subject:
         What nobody declared: "mass", "stature", "sex".
     girths : mapping
         Girths m by name: ``thigh`` of both sides or ``right_thigh`` of one; see docs/guide/record.md.
+    scan : str
+        File of a scanned standing person, a closed surface in m; "" = none.
+    scan_up : {"z", "y", "x"}
+        Axis of that file that points up.
+    foot_outline : mapping
+        `FootOutline` by side, right and left; empty = not measured.
 
     Examples
     --------
@@ -49,6 +64,9 @@ class Subject:
     measurements: Mapping[str, float] = field(default_factory=dict)
     guessed: tuple[str, ...] = ()
     girths: Mapping[str, float] = field(default_factory=dict)
+    scan: str = ""
+    scan_up: Literal["z", "y", "x"] = "z"
+    foot_outline: Mapping[str, FootOutline] = field(default_factory=dict)
 
     def require(self, *quantities: Literal["mass", "stature", "age"]) -> None:
         """Refuse to go on where a quantity is not known.

@@ -3,18 +3,19 @@ skeleton.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.human.girths import girth_opinions
+from biodance.body.human.feet import sole_corners, usual_outline
 from biodance.body.human.limits import joint_limits
+from biodance.body.human.opinions import body_opinions, told_by
 from biodance.body.human.prior import child_widening, com_sd, cut_at_joint, is_child, prior
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, generic_skeleton, joint_tree, kind_of, side_of
 from biodance.body.parts import Foot, SegmentMarkers
 from biodance.body.tables.anthropometry import read_table, row_numbers
 from biodance.body.tables.choice import measured_whole, reference, studies, trunk_joint
-from biodance.body.tables.reference import proportion
 from biodance.lab.markers.sets import MarkerSet, read_marker_set
 from biodance.records import SIDES, Array, Sip, Subject
 from biodance.settings import STANDARD_GRAVITY, Settings
@@ -55,11 +56,15 @@ def com_boxes(sip: Sip, skeleton: Skeleton, boxes: Array) -> Array:
 def sole(skeleton: Skeleton, subject: Subject, side: str) -> Foot:
     """Return the sole under one foot: a hexagon of heel, ball and toe corners, m, counter-clockwise seen from above."""
     segment = f"{side}_foot"
-    length, heel = skeleton.lengths[segment], -skeleton.heel_behind_ankle[side]
-    ball, toe = heel + proportion("ball_from_heel", subject.sex) * length, heel + length
-    wide, narrow = (proportion(size, subject.sex) * length / 2 for size in ("foot_breadth", "heel_breadth"))
-    corners = [(heel, narrow), (ball, wide), (toe, narrow), (toe, -narrow), (ball, -wide), (heel, -narrow)]
+    outline = subject.foot_outline.get(side) or usual_outline(skeleton.lengths[segment], subject.sex)
+    corners = sole_corners(outline, subject.sex) - [skeleton.heel_behind_ankle[side], 0.0]
     return Foot(SEGMENTS.index(segment), np.array([[x, -skeleton.ankle_height[side], z] for x, z in corners]))
+
+
+def _with_feet(skeleton: Skeleton, subject: Subject) -> Skeleton:
+    """Return the skeleton with feet as long as their outlines."""
+    feet = {f"{side}_foot": outline.length for side, outline in subject.foot_outline.items()}
+    return replace(skeleton, lengths={**skeleton.lengths, **feet})
 
 
 ADULT = (18.0, 65.0)
@@ -131,11 +136,12 @@ def assemble(
     gravity: float = STANDARD_GRAVITY,
 ) -> Body:
     """Return the Body of a skeleton: joint tree, prior SIP, limits, boxes and soles."""
+    skeleton = _with_feet(skeleton, subject)
     usual, boxes = reference(table, subject), shape_boxes(skeleton)
-    sip = prior(usual, skeleton, subject)
+    opinions = body_opinions(usual, skeleton, subject)
+    sip = prior(usual, skeleton, subject, opinions)
     along = prior(usual, cut_at_joint(skeleton), subject) if skeleton.cut else None
-    opinions = girth_opinions(usual, skeleton, subject) if subject.girths else {}
-    girths = {segment: one.said for segment, one in opinions.items()}
+    told = told_by(opinions)
     rooms = np.array([com_boxes(one, skeleton, boxes) for one in (sip, along) if one])
     return Body(
         name=subject.name or "human",
@@ -147,24 +153,25 @@ def assemble(
         boxes=boxes,
         com_boxes=np.stack([rooms[:, :, 0].min(axis=0), rooms[:, :, 1].max(axis=0)], axis=1),
         feet={side: sole(skeleton, subject, side) for side in SIDES},
-        notes=(*notes, *_prior_notes(subject, table), *_girth_notes(girths)),
+        notes=(*notes, *_prior_notes(subject, table), *_shape_notes(told)),
         gravity=np.array([0.0, 0.0, -gravity]),
         at_joint=along,
-        girths=girths,
+        girths=told,
     )
 
 
-def _girth_notes(girths: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
-    """Return which girths say something about which masses."""
-    if not girths:
+def _shape_notes(told: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
+    """Return what of the person's shape says something about which masses."""
+    if not told:
         return ()
     said: dict[str, list[str]] = {}
-    for segment, names in girths.items():
+    for segment, names in told.items():
         said.setdefault(", ".join(names), []).append(segment)
     words = "; ".join(f"{names} for {' and '.join(segments)}" for names, segments in said.items()).replace("_", " ")
     return (
-        f"Girths weigh beside the table in the prior masses ({words}): stadium solids (Yeadon 1990) about the mean of "
-        "all tables; other segments keep the table's opinion under the same body mass.",
+        f"Shapes of the person weigh beside the table in the prior ({words}): girths as stadium solids (Yeadon 1990) "
+        "and foot outlines about the mean of all tables, a scan by volume and density; other segments keep the table's "
+        "opinion under the same body mass.",
     )
 
 

@@ -3,13 +3,14 @@ as a covariance.
 """
 
 import functools
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from biodance.body.human.fractions import MAN, WOMAN, published_fractions, published_people
-from biodance.body.human.girths import SegmentOpinion, girth_opinions
+from biodance.body.human.opinions import Opinion, body_opinions, primitives_of, told_by
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of, side_of
 from biodance.body.inertia import TENSOR, RigidInertia, inertial_parameters, mirror_inertia, turn_inertia
 from biodance.body.tables.choice import measured_whole, reference
@@ -93,10 +94,13 @@ MIRROR = np.array([1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0])
 """Signs of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] under reflection at z = 0."""
 
 
-def prior(reference: Reference, skeleton: Skeleton, subject: Subject) -> Sip:
+def prior(
+    reference: Reference, skeleton: Skeleton, subject: Subject, opinions: tuple[Opinion, ...] | None = None
+) -> Sip:
     """Return the prior SIP of a person with covariance (120, 120); the masses sum to the subject's mass.
 
-    The table scaled to the skeleton; girths of the subject are one more opinion, weighted with its precision.
+    The table scaled to the skeleton; girths, foot outlines and a scan of the subject are opinions beside it, weighted
+    with their precision (``opinions``, taken from the subject if None).
     """
     lumps = scaled_lumps(reference, skeleton, subject)
     others = tuple(
@@ -104,7 +108,7 @@ def prior(reference: Reference, skeleton: Skeleton, subject: Subject) -> Sip:
         for name in measured_whole()
         if name != reference.table
     )
-    opinions = girth_opinions(reference, skeleton, subject) if subject.girths else {}
+    opinions = body_opinions(reference, skeleton, subject) if opinions is None else opinions
     least = error_size("segment_mass", "floor") if opinions else 0.0
     covariance, apart = (
         child_widening(subject) ** 2 * primitive_covariance(lumps, skeleton, tables, least=least)
@@ -117,37 +121,33 @@ def prior(reference: Reference, skeleton: Skeleton, subject: Subject) -> Sip:
         jacobian[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] = parameter_jacobian(lump)
     covariance = jacobian @ covariance @ jacobian.T
     phi = np.concatenate([inertial_parameters(lump) for lump in lumps])
-    return Sip(SEGMENTS, phi, (covariance + covariance.T) / 2, tuple(opinions))
+    return Sip(SEGMENTS, phi, (covariance + covariance.T) / 2, tuple(told_by(opinions)))
 
 
 def _weigh(
-    lumps: tuple[RigidInertia, ...], covariance: Array, apart: Array, opinions: Mapping[str, SegmentOpinion]
+    lumps: tuple[RigidInertia, ...], covariance: Array, apart: Array, opinions: tuple[Opinion, ...]
 ) -> tuple[tuple[RigidInertia, ...], Array]:
-    """Return segments and covariance (120, 120) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] after opinions on masses.
+    """Return segments and covariance (120, 120) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] after other opinions.
 
-    The sum of the masses is kept. The sides err together: same tape, same shape of muscle. The weights are those of
-    ``apart`` (120, 120), in which segments hang together by the body mass alone: that a thigh is like another table's
-    says nothing about the foot. The covariance is that of these weights (Joseph form).
+    The sum of the masses is kept. The weights are those of ``apart`` (120, 120), in which segments hang together by
+    the body mass alone: that a thigh is like another table's says nothing about the foot. The covariance is that of
+    these weights (Joseph form).
     """
-    where = np.array([10 * SEGMENTS.index(segment) for segment in opinions])
-    kinds = np.array([kind_of(segment) for segment in opinions])
-    sds = np.array([one.mass_sd for one in opinions.values()])
-    together = np.where(kinds[:, None] == kinds, error_size("left_right_correlation", "mass"), 0.0)
-    np.fill_diagonal(together, 1.0)
-    noise = together * np.outer(sds, sds)
-    masses = np.array([lump.mass for lump in lumps])
-    total = masses.sum()
+    where = np.concatenate([one.where for one in opinions])
+    noise = block_diag(*(one.noise for one in opinions))
+    theta = np.concatenate([primitives_of(lump) for lump in lumps])
+    total = theta[::10].sum()
     gain = np.linalg.solve(apart[np.ix_(where, where)] + noise, apart[where]).T
     keep = np.eye(len(covariance))
-    keep[:, where] -= gain
-    step = gain @ (np.array([one.mass for one in opinions.values()]) - masses[where // 10])
-    theta = np.concatenate([_primitives(lump) for lump in lumps]) + step
+    for row, column in zip(where, gain.T, strict=True):
+        keep[:, row] -= column
+    theta = theta + gain @ (np.concatenate([one.value for one in opinions]) - theta[where])
     theta[::10] *= total / theta[::10].sum()
     return tuple(_lump(row) for row in theta.reshape(-1, 10)), keep @ covariance @ keep.T + gain @ noise @ gain.T
 
 
 def _lump(row: Array) -> RigidInertia:
-    """Return the segment of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz]; the inverse of `_primitives`."""
+    """Return the segment of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz]; the inverse of `primitives_of`."""
     inertia = np.zeros((3, 3))
     for value, (i, j) in zip(row[4:], TENSOR, strict=True):
         inertia[i, j] = inertia[j, i] = row[0] * value
@@ -230,14 +230,10 @@ def disagreement(lumps: tuple[RigidInertia, ...], other: tuple[RigidInertia, ...
     Zero for pelvis and trunk, which tables divide at different heights.
     """
     rows = [
-        np.zeros(10) if s in TRUNK else _primitives(b) - _primitives(a)
+        np.zeros(10) if s in TRUNK else primitives_of(b) - primitives_of(a)
         for s, a, b in zip(SEGMENTS, lumps, other, strict=True)
     ]
     return np.concatenate(rows)
-
-
-def _primitives(lump: RigidInertia) -> Array:
-    return np.array([lump.mass, *lump.com, *(lump.inertia[i, j] / lump.mass for i, j in TENSOR)])
 
 
 def primitive_covariance(

@@ -19,7 +19,10 @@ filter.cutoff = 6
 ``[markers] map = {LASI = "left_asis", BACK4 = "trunk_head"}`` says it here: which label is which landmark, or sits on
 which segment.
 
-``[subject] girths_cm = {thigh = 54, right_shank = 37}`` says how thick the person is (`lab.girths`).
+``[subject] girths_cm = {thigh = 54, right_shank = 37}`` says how thick the person is (`lab.girths`),
+``foot_outline = {length = 26, breadth = 10, heel_breadth = 7}`` (cm) or ``"feet.csv"`` how large the feet are
+(`lab.foot_outline`), ``scan = "body.obj"`` names the closed surface of the standing person, in m (``scan_up`` its axis
+that points up, by default z).
 
 ``[session]`` may say ``date`` (2026-03-05), ``lab``, ``operator`` and ``condition``.
 
@@ -38,9 +41,10 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from biodance.errors import BiodanceError, SessionRefused
+from biodance.lab.foot_outline import traced_outline, typed_outline
 from biodance.lab.girths import legal_girths
 from biodance.library import read_toml
-from biodance.records import Role
+from biodance.records import FootOutline, Role
 from biodance.settings import USUAL, Settings
 
 FILES = ("subject.toml", "session.toml")
@@ -59,11 +63,21 @@ class SubjectEntry(_Entry):
     age: Annotated[float, Field(ge=0, le=120)] | None = None
     name: str | None = None
     girths_cm: dict[str, float] | None = None
+    scan: str | None = None
+    scan_up: Literal["z", "y", "x"] | None = None
+    foot_outline: str | dict[str, float] | None = None
 
     @property
     def girths(self) -> dict[str, float]:
         """Girths in m by name, checked when the file was read."""
         return legal_girths({name: value / 100 for name, value in (self.girths_cm or {}).items()})
+
+    @property
+    def outlines(self) -> dict[str, FootOutline]:
+        """Outlines of the feet by side, checked when the file was read."""
+        if isinstance(self.foot_outline, str):
+            return traced_outline(self.foot_outline)
+        return typed_outline({name: value / 100 for name, value in (self.foot_outline or {}).items()})
 
 
 class TrialEntry(_Entry):
@@ -188,13 +202,23 @@ def _marker_set(path: Path, said: MarkersEntry) -> str:
 def _read(path: Path) -> _Contents:
     raw = read_toml(path)
     try:
-        found = _Contents.model_validate(_whole_numbers_are_numbers(raw))
-        _ = found.subject.girths
+        found = _beside(path, _Contents.model_validate(_whole_numbers_are_numbers(raw)))
+        _ = found.subject.girths, found.subject.outlines
         return found
     except SessionRefused as error:
         raise SessionRefused(f"{path}: [subject] {error}") from None
     except ValidationError as error:
         raise SessionRefused(" ".join(_sentence(path, fault) for fault in error.errors())) from None
+
+
+def _beside(path: Path, found: _Contents) -> _Contents:
+    """Return the contents with the files that the subject's table names as paths from where we stand."""
+    subject = found.subject
+    files = {"scan": subject.scan, "foot_outline": subject.foot_outline}
+    placed = {name: str(path.parent / said) for name, said in files.items() if isinstance(said, str)}
+    if subject.scan is not None and not Path(placed["scan"]).is_file():
+        raise SessionRefused(f"scan: there is no file {placed['scan']}. Check the path, relative to {path.name}.")
+    return found.model_copy(update={"subject": subject.model_copy(update=placed)})
 
 
 def _whole_numbers_are_numbers(raw: Any) -> Any:
@@ -235,6 +259,9 @@ _HELP = {
     "sex": 'Write "F" or "M".',
     "age": "Give the age in years.",
     "girths_cm": "Write {thigh = 54, right_shank = 37}, in cm.",
+    "scan": 'Write the path of a mesh, for example "body.obj".',
+    "scan_up": 'Write the axis of the scan that points up: "z", "y" or "x".',
+    "foot_outline": "Write {length = 26, breadth = 10, heel_breadth = 7} in cm, or the path of a CSV file.",
     "file": 'Write the path of a marker set, for example "my_set.toml".',
     "map": 'Write {LABEL = "left_asis", ...}.',
     "role": f"Legal are {', '.join(get_args(Role))}.",

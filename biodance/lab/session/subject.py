@@ -86,6 +86,9 @@ def identify_subject(
         measures,
         tuple(what for what in known if not known[what]),
         typed.girths,
+        typed.scan or "",
+        typed.scan_up or "z",
+        typed.outlines,
     ), tuple(notes)
 
 

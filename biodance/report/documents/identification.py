@@ -37,9 +37,11 @@ def information_share(rows: Sequence[Known]) -> float:
 
 
 def prior_source(found: Identification, name: str) -> str:
-    """Return where the prior mass of a segment comes from: "table", or "table and girths (thigh, knee)"."""
+    """Return where the prior mass of a segment comes from: "table", "table and girths (knee) and scan"."""
     said = found.body.girths.get(name, ())
-    return f"table and girths ({', '.join(said).replace('_', ' ')})" if said else "table"
+    shapes = [word for word in said if word in ("foot outline", "scan")]
+    girths = ", ".join(word for word in said if word not in shapes).replace("_", " ")
+    return " and ".join(["table", *([f"girths ({girths})"] if girths else []), *shapes])
 
 
 def _segment(found: Identification, name: str) -> dict[str, Any]:

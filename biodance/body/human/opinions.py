@@ -1,0 +1,139 @@
+"""What else speaks of a person's segments beside the table: girths, the outlines of the feet, a scan; each with its own
+noise, all weighed in the same way.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance.body.human.feet import foot_opinions
+from biodance.body.human.girths import SegmentOpinion, girth_opinions
+from biodance.body.human.scan import read_scan
+from biodance.body.human.scan_parts import ScannedBody, cut_scan
+from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of
+from biodance.body.inertia import TENSOR, RigidInertia
+from biodance.body.tables.error_sizes import error_size
+from biodance.body.tables.reference import Reference
+from biodance.errors import SessionRefused
+from biodance.records import SIDES, Array, Subject
+
+_CONTRADICTION = 0.15
+"""Share of the body mass by which a scan may miss it."""
+_NEIGHBOURS = {
+    "hip": ("pelvis", "thigh"),
+    "knee": ("thigh", "shank"),
+    "ankle": ("shank", "foot"),
+    "shoulder": ("trunk_head", "upper_arm"),
+    "elbow": ("upper_arm", "forearm_hand"),
+}
+_TRUNK = ("pelvis", "trunk_head")
+
+
+@dataclass(frozen=True, eq=False)
+class Opinion:
+    """``value`` (n,) of the rows ``where`` (n,) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] (120,; kg, m, m²) of all
+    segments with covariance ``noise`` (n, n); ``said`` by segment: what told its mass.
+    """
+
+    where: np.ndarray
+    value: Array
+    noise: Array
+    said: Mapping[str, tuple[str, ...]]
+
+
+def body_opinions(reference: Reference, skeleton: Skeleton, subject: Subject) -> tuple[Opinion, ...]:
+    """Return what girths, foot outlines and a scan of the subject say, as far as they were given.
+
+    Raises
+    ------
+    SessionRefused
+        One of them cannot be of this person.
+    """
+    found = []
+    if subject.girths:
+        found.append(_of_masses(girth_opinions(reference, skeleton, subject)))
+    if subject.foot_outline:
+        found.append(_of_masses(foot_opinions(skeleton, subject)))
+    if subject.scan:
+        scan = read_scan(subject.scan, subject.stature, subject.scan_up)
+        found.append(scan_opinion(cut_scan(scan, skeleton), subject))
+    return tuple(found)
+
+
+def told_by(opinions: tuple[Opinion, ...]) -> dict[str, tuple[str, ...]]:
+    """Return by segment what told its mass beside the table, in the order of the segments."""
+    said = {name: tuple(word for one in opinions for word in one.said.get(name, ())) for name in SEGMENTS}
+    return {name: words for name, words in said.items() if words}
+
+
+def _of_masses(opinions: Mapping[str, SegmentOpinion]) -> Opinion:
+    """Return opinions on masses; the sides err together: same tape, same shape of muscle."""
+    kinds = np.array([kind_of(segment) for segment in opinions])
+    sds = np.array([one.mass_sd for one in opinions.values()])
+    together = np.where(kinds[:, None] == kinds, error_size("left_right_correlation", "mass"), 0.0)
+    np.fill_diagonal(together, 1.0)
+    where = np.array([10 * SEGMENTS.index(segment) for segment in opinions], dtype=np.intp)
+    value = np.array([one.mass for one in opinions.values()])
+    return Opinion(where, value, together * np.outer(sds, sds), {name: one.said for name, one in opinions.items()})
+
+
+def scan_opinion(body: ScannedBody, subject: Subject) -> Opinion:
+    """Return what a cut scan says about mass, CoM and inertia of every segment.
+
+    Masses err with the density of their kind, with all volumes alike (clothes), and with every cut, which takes from
+    one segment what it gives to its neighbour.
+
+    Raises
+    ------
+    SessionRefused
+        Volumes times densities miss the body mass by more than 15 %.
+    """
+    lumps = [body.lumps[name] for name in SEGMENTS]
+    mass = np.array([lump.mass for lump in lumps])
+    if abs(mass.sum() / subject.mass - 1) > _CONTRADICTION:
+        raise SessionRefused(
+            f"[subject] scan: the scan weighs {mass.sum():.1f} kg by volume and density, but the body mass is "
+            f"{subject.mass:.1f} kg ({100 * (mass.sum() / subject.mass - 1):+.0f} %, at most "
+            f"{100 * _CONTRADICTION:.0f} % is believed). Is it the same person, in tight clothes, and mass_kg right?"
+        )
+    value = np.concatenate([primitives_of(lump) for lump in lumps])
+    sd = np.concatenate([[0.0, *[error_size("scan_com", "any")] * 3, *_tensor_sd(lump)] for lump in lumps])
+    noise = np.diag(sd**2)
+    noise[::10, ::10] = _mass_noise(mass, body)
+    return Opinion(np.arange(value.size), value, noise, dict.fromkeys(SEGMENTS, ("scan",)))
+
+
+def primitives_of(lump: RigidInertia) -> Array:
+    """Return [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] (10,) of a lump: kg, m, m²."""
+    return np.array([lump.mass, *lump.com, *(lump.inertia[i, j] / lump.mass for i, j in TENSOR)])
+
+
+def _tensor_sd(lump: RigidInertia) -> Array:
+    own = np.diag(lump.inertia) / lump.mass
+    return error_size("scan_inertia", "any") * np.array([np.sqrt(own[i] * own[j]) for i, j in TENSOR])
+
+
+def _mass_noise(mass: Array, body: ScannedBody) -> Array:
+    """Return the covariance (12, 12) kg² of the masses of a scan."""
+    kinds = np.array([kind_of(name) for name in SEGMENTS])
+    density = np.array([error_size("scan_density", "trunk" if kind in _TRUNK else "limb") for kind in kinds])
+    noise = np.where(kinds[:, None] == kinds, np.outer(density * mass, density * mass), 0.0)
+    surface, cuts = np.array([body.surfaces[name] for name in SEGMENTS]), body.cuts
+    noise += error_size("scan_surface", "any") ** 2 * np.outer(surface, surface)
+    alike = error_size("left_right_correlation", "mass")
+    for joint, (near, far) in _NEIGHBOURS.items():
+        moved = np.array([_moved(cuts[f"{side}_{joint}"], near, far, side) for side in SIDES])
+        spread = error_size("scan_cut", joint) ** 2
+        both = moved.sum(axis=0)
+        noise += spread * ((1 - alike) * moved.T @ moved + alike * np.outer(both, both))
+    across = _moved(cuts["trunk"], *_TRUNK, "")
+    return np.asarray(noise + error_size("scan_cut", "trunk") ** 2 * np.outer(across, across))
+
+
+def _moved(slope: float, near: str, far: str, side: str) -> Array:
+    """Return what a cut moved by a metre gives to every segment (12,) kg/m."""
+    out = np.zeros(len(SEGMENTS))
+    for kind, sign in ((near, 1.0), (far, -1.0)):
+        out[SEGMENTS.index(kind if kind in _TRUNK else f"{side}_{kind}")] += sign * slope
+    return out
