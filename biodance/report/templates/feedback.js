@@ -322,8 +322,8 @@ function solve(M, v) { // Gauss with pivoting; M is spoilt
   return v;
 }
 
-// Focal length in halves of the height by the images of the plate's axes, which are at right angles and equally long: the
-// least squares of both conditions; as of usual webcams where the picture does not tell.
+// Focal length in halves of the height by the images of the plate's axes, which are at right angles and equally long:
+// the least squares of both conditions; as of usual webcams where the picture does not tell.
 function focal(a, b) {
   const rows = [[a[0] * b[0] + a[1] * b[1], a[2] * b[2]],
     [(a[0] ** 2 + a[1] ** 2 - b[0] ** 2 - b[1] ** 2) / 2, (a[2] ** 2 - b[2] ** 2) / 2]];

@@ -106,7 +106,8 @@ function take(told) {
   keep(when, best);
   correct(when, plan, best);
 }
-function nearest(spots, plan, before, planted) { // of some descents: from the last look; else with sides confused, arms hanging
+// of some descents: from the last look; else with sides confused, arms hanging
+function nearest(spots, plan, before, planted) {
   const first = planned(0).angles, hang = [...camera.at, 0, 0, 0, ...first.map((angle, j) => angle - plan.angles[j])];
   let best = fit(spots((k) => k), plan, before, camera, planted);
   for (const [order, start] of [[(k) => k, hang], [(k) => (k % 2 ? k + 1 : k - 1), null],
