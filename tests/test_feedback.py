@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from browser import Page
+from scipy.spatial.transform import Rotation
 from small_dances import small_dance
 
 from biodance.cli import run
@@ -112,3 +114,16 @@ def _dom(page: Path, second: float) -> str:
         [*command, f"{page.as_uri()}#t={second}"], capture_output=True, text=True, timeout=120, check=True
     )
     return found.stdout
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")
+@pytest.mark.parametrize("yaw", [0.0, 0.5])
+def test_the_corners_of_the_plate_tell_the_focal_length_of_the_camera(page: Path, yaw: float) -> None:
+    with Page(page.as_uri()) as browser:
+        for focal, tilt in ((1.3, 0.3), (2.4, 0.5)):
+            turn = Rotation.from_euler("ZYX", [yaw, tilt, 0.0]).as_matrix()  # columns: away from the floor's axes
+            right, up, back = np.array([-turn[:, 1], turn[:, 2], -turn[:, 0]])
+            axes = [[focal * right[k], focal * up[k], -back[k]] for k in (0, 1)]
+            scaled = [[float(value / 2.7) for value in axis] for axis in axes]
+            assert browser.run(f"focal({scaled[0]}, {scaled[1]})") == pytest.approx(focal, rel=1e-6)
+        assert browser.run("focal([0, 0.1, 0], [0.1, 0, 0])") == 1.9  # straight from above: nothing to be told

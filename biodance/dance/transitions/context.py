@@ -4,7 +4,7 @@ where it stopped.
 
 import hashlib
 from collections.abc import Callable
-from concurrent.futures import Executor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -80,15 +80,17 @@ class DesignContext:
     plan: Plan
     seed: int
     ledger: Checkpoint
-    workers: Executor | None
+    workers: Executor
     tell: Tell
 
     @classmethod
     def alone(cls, body: Body, plan: Plan, seed: int) -> "DesignContext":
-        """Return a design that keeps nothing, tells nobody and has no workers."""
+        """Return a design that keeps nothing, tells nobody and works on one thread."""
         parts = excitation_blocks(body)
         parts = replace(parts, weight=parts.weight * plan.emphasis(body.segments), simplicity=plan.simplicity)
-        return cls(Chain(body), parts, plan, seed, Checkpoint(None, body, plan, seed), None, lambda *_: None)
+        return cls(
+            Chain(body), parts, plan, seed, Checkpoint(None, body, plan, seed), ThreadPoolExecutor(1), lambda *_: None
+        )
 
 
 @dataclass(frozen=True, eq=False)

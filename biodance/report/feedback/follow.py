@@ -17,7 +17,7 @@ _NUMBERS = {"shoulder": 5, "elbow": 7, "wrist": 9, "hip": 11, "knee": 13, "ankle
 """Of the left point among the 17 of MoveNet (order of COCO); the right one comes next."""
 _ASKED = {"elbow": 1.0, "wrist": 1.0, "knee": 1.0, "shoulder": 0.8}
 """Points that a person is asked to correct, and how readily; the others follow them."""
-_ARMS, _TRUNK_AND_LEGS = 0.6, 0.25
+_LIMBS, _TRUNK = 0.6, 0.25
 """rad, standard deviation of a joint angle about the plan: what the camera does not tell stays near it."""
 
 
@@ -46,7 +46,7 @@ def follow_scene(dance: Dance) -> dict[str, Any] | None:
                 "rotation": joint.rotation.ravel().tolist(),
                 "translation": joint.translation.tolist(),
                 "axis": joint.axis.tolist(),
-                "free": _ARMS if "shoulder" in joint.name or "elbow" in joint.name else _TRUNK_AND_LEGS,
+                "free": _TRUNK if joint.name.startswith("trunk") else _LIMBS,
             }
             for joint in body.joints
         ],

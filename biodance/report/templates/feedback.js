@@ -322,6 +322,15 @@ function solve(M, v) { // Gauss with pivoting; M is spoilt
   return v;
 }
 
+// Focal length in halves of the height by the images of the plate's axes, which are at right angles and equally long:
+// the least squares of both conditions; as of usual webcams where the picture does not tell.
+function focal(a, b) {
+  const rows = [[a[0] * b[0] + a[1] * b[1], a[2] * b[2]],
+    [(a[0] ** 2 + a[1] ** 2 - b[0] ** 2 - b[1] ** 2) / 2, (a[2] ** 2 - b[2] ** 2) / 2]];
+  const inverse = -rows.reduce((sum, [p, q]) => sum + p * q, 0) / rows.reduce((sum, [p]) => sum + p * p, 0);
+  return inverse > 1 / 25 && inverse < 2 ? 1 / Math.sqrt(inverse) : 1.9;
+}
+
 function align() { // the camera whose picture has the plate's corners where they were drawn (Zhang 2000, one plane)
   const height = canvas.clientHeight, width = canvas.clientWidth, M = [], v = [];
   PLATE.forEach(([X, Y], k) => { // unmirrored, centred, y up, in halves of the height
@@ -330,8 +339,8 @@ function align() { // the camera whose picture has the plate's corners where the
     v.push(x, y);
   });
   const h = solve(M, v), [a, b, t] = [[h[0], h[3], h[6]], [h[1], h[4], h[7]], [h[2], h[5], 1]];
-  const square = -(a[0] * b[0] + a[1] * b[1]) / (a[2] * b[2]);
-  const f = square > 0.5 && square < 25 ? Math.sqrt(square) : 1.9; // as usual webcams, where the picture does not tell
+  const f = focal(a, b);
+  dispatchEvent(new CustomEvent("focal", { detail: f }));
   const ray = (c) => new THREE.Vector3(c[0] / f, c[1] / f, -c[2]);
   const X = ray(a), Y = ray(b), scale = 2 / (X.length() + Y.length());
   X.normalize();

@@ -97,7 +97,8 @@ function take(told) {
     const { x, y, sure: s } = points[order(number)];
     return s > SURE ? { x: (2 * x - width) / height, y: 1 - (2 * y) / height, sure: s } : null;
   });
-  const best = nearest(spots, plan, last.p);
+  const { planted } = follow.phases.findLast(({ start }) => when >= start) ?? follow.phases[0];
+  const best = nearest(spots, plan, last.p, planted);
   if (!best.p.every(Number.isFinite) || best.error > POOR) return void (last.p = null);
   last.p = best.p;
   const share = 1 / Math.min(++camera.count, 50);
@@ -105,13 +106,14 @@ function take(told) {
   keep(when, best);
   correct(when, plan, best);
 }
-function nearest(spots, plan, before) { // of some descents: from the last look; else with sides confused, arms hanging
+// of some descents: from the last look; else with sides confused, arms hanging
+function nearest(spots, plan, before, planted) {
   const first = planned(0).angles, hang = [...camera.at, 0, 0, 0, ...first.map((angle, j) => angle - plan.angles[j])];
-  let best = fit(spots((k) => k), plan, before, camera);
+  let best = fit(spots((k) => k), plan, before, camera, planted);
   for (const [order, start] of [[(k) => k, hang], [(k) => (k % 2 ? k + 1 : k - 1), null],
     [(k) => (k % 2 ? k + 1 : k - 1), hang]]) {
     if (best.error < GOOD) break;
-    const other = fit(spots(order), plan, start, camera);
+    const other = fit(spots(order), plan, start, camera, planted);
     if (!(other.error >= best.error)) best = other;
   }
   return best;
@@ -232,6 +234,7 @@ addEventListener("camera", () => {
   if (stream) draw_known();
   look();
 });
+addEventListener("focal", ({ detail }) => { focus = detail; });
 setInterval(look, 40);
 addEventListener("shown", () => {
   if (!stream || !playing && second < data.duration_s) return;

@@ -62,24 +62,32 @@ function stand(state, like, planted) { // the same posture with its planted feet
 }
 
 // ---- the posture in the picture: most probable near the plan, by Gauss and Newton ----
-const FOCUS = 1.9, SPREAD = 0.045; // of usual webcams, and of the points found, both in halves of the picture's height
+let focus = 1.9; // of usual webcams, in halves of the picture's height; the aligned plate tells it
+const SPREAD = 0.045; // of the points found, in halves of the picture's height
+const FLAT = [0.1, 0.03]; // sd of what planted feet turn, rad, and of how far they are from where they are planned, m
 const LOOSE = [1.2, 0.4, 0.4, 0.15, 0.1, 0.1, 0.1]; // sd: camera m, its tilt rad, turn of the pelvis rad
 function seen(x, [cx, cy, cz, tilt]) { // in halves of the picture's height, unmirrored, y up
   const r = minus(x, [cx, cy, cz]), c = Math.cos(tilt), s = Math.sin(tilt), deep = Math.max(0.2, -c * r[0] - s * r[2]);
-  return [(FOCUS * r[1]) / deep, (FOCUS * (c * r[2] - s * r[0])) / deep];
+  return [(focus * r[1]) / deep, (focus * (c * r[2] - s * r[0])) / deep];
 }
 function moved(plan, p) {
   return { place: plan.place, turn: product(turn(p.slice(4, 7)), plan.turn),
     angles: plan.angles.map((angle, j) => angle + p[7 + j]) };
 }
-function fit(points, plan, first, camera) { // points: {x, y, sure} or null, in the order of follow.points
+// points: {x, y, sure} or null, in the order of follow.points; planted: segments of the feet that stand, by which a leg
+// that the camera sees from the front is known to bend when the pelvis comes down
+function fit(points, plan, first, camera, planted) {
   const N = 7 + SIZE, centre = [...camera.at, 0, 0, 0, ...new Array(SIZE).fill(0)];
   const loose = [...(camera.count > 20 ? [0.15, 0.15, 0.15, 0.03, 0.1, 0.1, 0.1] : LOOSE),
     ...follow.joints.map((joint) => joint.free)];
   let p = first ? [...first] : [...centre];
-  const rows = (q) => {
-    const out = [];
-    joints(pose(moved(plan, q))).forEach((x, k) => {
+  const like = pose(plan), rows = (q) => {
+    const out = [], found = pose(stand(moved(plan, q), plan, planted));
+    for (const s of planted) {
+      out.push(...times(1 / FLAT[0], spin(product(found.turns[s], turned(like.turns[s])))));
+      out.push(...times(1 / FLAT[1], minus(found.places[s], like.places[s])));
+    }
+    joints(found).forEach((x, k) => {
       if (!points[k]) return;
       const [u, v] = seen(x, q), weight = Math.sqrt(points[k].sure) / SPREAD;
       const a = weight * (u - points[k].x), b = weight * (v - points[k].y), far = Math.hypot(a, b);
@@ -100,7 +108,7 @@ function fit(points, plan, first, camera) { // points: {x, y, sure} or null, in 
     const size = solve(M, v), most = Math.max(...size.map(Math.abs)), short = most > 0.6 ? 0.6 / most : 1;
     p = p.map((value, i) => value + short * size[i]);
   }
-  const r = rows(p);
+  const r = rows(p).slice(6 * planted.length);
   return { p, error: (SPREAD * Math.hypot(...r)) / Math.sqrt(Math.max(1, r.length / 2)), N };
 }
 
