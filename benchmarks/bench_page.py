@@ -1,6 +1,6 @@
 """How long the everyday commands take: processor time with one thread and warm caches, memory, size of the page.
 
-    BIODANCE_DATA=folder python benchmarks/bench_page.py --nine SESSION --seven SESSION [--against CHECKOUT] [--repeat 1]
+    BIODANCE_DATA=folder python benchmarks/bench_page.py --nine SESSION --seven SESSION [--against CHECKOUT]
 
 `report` on a real static trial, walk and turn; `identify` on ``--nine`` (nine trials of ten seconds), `report` with all
 tables on eleven simulated trials, and ``--seven`` (seven minutes of C3D) to parameters with intervals without a page.
