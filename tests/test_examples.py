@@ -1,5 +1,6 @@
 """Every example runs alone, says something and makes one figure."""
 
+import os
 import runpy
 import sys
 from pathlib import Path
@@ -12,7 +13,7 @@ SHORTEST, LONGEST = 5, 60
 
 
 def test_there_are_examples_and_they_are_short() -> None:
-    assert len(EXAMPLES) >= 10
+    assert len(EXAMPLES) >= 12
     for path in EXAMPLES:
         assert SHORTEST < len(path.read_text().splitlines()) <= LONGEST, path.name
 
@@ -21,6 +22,8 @@ def test_there_are_examples_and_they_are_short() -> None:
 def test_example_runs_alone_and_makes_one_figure(
     path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    if "BIODANCE_DATA" in path.read_text() and not os.environ.get("BIODANCE_DATA"):
+        pytest.skip("this example reads a real recording: BIODANCE_DATA is not set")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", [str(path)])
     runpy.run_path(str(path), run_name="__main__")

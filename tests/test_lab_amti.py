@@ -11,6 +11,7 @@ import pytest
 from biodance.errors import FileRefused
 from biodance.lab.amti.bsf import INSTRUMENT, MAIN
 from biodance.lab.amti.read import read_amti_ascii, read_bsf
+from biodance.lab.readers.amti_text import sniff
 
 POUND, INCH = 4.4482216152605, 0.0254
 IMPERIAL = np.array([POUND] * 3 + [POUND * INCH] * 3)
@@ -269,3 +270,8 @@ def test_the_real_text(recordings, tmp_path):
     assert wrench.value.shape == (200, 6)
     assert wrench.rate == pytest.approx(200)
     assert wrench.force[:, 2].max() == pytest.approx(930.4, abs=0.1)
+
+
+def test_a_table_with_unknown_numbers_is_a_recording_and_not_passed_over():
+    assert sniff(b"t Fx Fy Fz Mx My Mz\n0.01 1 2 nan 4 5 6\n0.02 1 2 NaN 4 5 6\n")
+    assert not sniff(b"name Fx Fy Fz Mx My Mz\nann 1 2 3 4 5 6\n")

@@ -183,3 +183,8 @@ def test_a_replay_shows_the_load_that_was_found_and_stays_small(result, monkeypa
     assert data["load"] == {"on": result.body.segment_index("left_forearm_hand"), "place": place.tolist()}
     assert sum(one["frames"] for one in data["trials"]) <= 44
     assert frames_of(replace(result, body=None)) is None
+    first, *others = result.trials
+    motion = first.motion
+    kept = ("time", "q", "v", "a", "residual", "determined")
+    still = replace(first, motion=replace(motion, **{name: getattr(motion, name)[:1] for name in kept}))
+    assert first.name not in [one.name for one in frames_of(replace(result, trials=(still, *others))).trials]

@@ -88,7 +88,7 @@ def test_every_part_has_a_range_or_an_honest_word(result):
 def test_a_failed_check_gives_no_mass(result, what):
     failed = Check(what, "fit_0", "30 mm", "at most 20 mm", False)
     html = subject_page(account_for(replace(result, checks=(failed,))))
-    assert "We can not give you numbers this time" in html
+    assert "We cannot give you numbers this time" in html
     assert " kg" not in html
     assert "data:image" not in html
     assert grade(html) <= 7

@@ -61,7 +61,8 @@ class SessionReplay:
 def frames_of(result: SessionResult) -> SessionReplay | None:
     """Return the replay of a session; None where no trial has a motion."""
     body, found = result.body, result.identification
-    moving = [one for one in result.trials if one.motion is not None and one.trial.markers is not None]
+    told = [one for one in result.trials if one.motion is not None and one.trial.markers is not None]
+    moving = [one for one in told if one.motion is not None and one.motion.time.size > 1]
     if body is None or not moving:
         return None
     validated = {one.name: one for one in (*found.validations, *found.fitted)} if found else {}

@@ -4,6 +4,7 @@
 """
 
 import ast
+import os
 import shutil
 import subprocess
 import sys
@@ -74,7 +75,10 @@ def short(script: Path) -> str:
 
 
 def run(script: Path) -> None:
-    """Run one script; keep what it prints and draws."""
+    """Run one script; keep what it prints and draws. One that reads real recordings needs the folder BIODANCE_DATA."""
+    if "BIODANCE_DATA" in script.read_text() and not os.environ.get("BIODANCE_DATA"):
+        sys.stderr.write(f"{script.name} is left as it is: BIODANCE_DATA is not set.\n")
+        return
     KEPT.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as scratch:
         done = subprocess.run([sys.executable, script], cwd=scratch, capture_output=True, text=True, check=True)

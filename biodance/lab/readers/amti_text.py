@@ -11,11 +11,12 @@ EXTENSIONS = (".asc", ".txt", ".csv")
 PREFERENCE = 90
 """Asked last: any table of numbers looks like this format."""
 NUMBER = r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?"
-ROW = re.compile(rf"\s*{NUMBER}(?:[\s,;]+{NUMBER}){{5,}}[\s,;]*")
+_CELL = rf"(?:{NUMBER}|nan)"
+ROW = re.compile(rf"\s*{_CELL}(?:[\s,;]+{_CELL}){{5,}}[\s,;]*", flags=re.IGNORECASE)
 
 
 def sniff(head: bytes) -> bool:
-    """Return whether the rows after the first (which may be labels) hold at least six numbers each."""
+    """Return whether the rows after the first (which may be labels) hold at least six numbers (or nan) each."""
     rows = [line for line in head_text(head).splitlines()[:4] if line.strip()]
     return bool(rows) and all(ROW.fullmatch(line) for line in rows[1:] or rows)
 
