@@ -1,6 +1,6 @@
 """Learn the noise of dances that virtual people performed: writes anthropometry/uncertainty/dances.toml anew.
 
-    OMP_NUM_THREADS=1 python benchmarks/learn_dances.py FOLDER [--dance short] [--out anthropometry/uncertainty/dances.toml]
+    OMP_NUM_THREADS=1 python benchmarks/learn_dances.py FOLDER [--dance short] [--out FILE]
 
 FOLDER is that of bench_chain.py: the sessions of its people with this dance (performer normal) are read, tracked and
 identified anew. The noise is the root mean square over people of the standard deviations that identification
