@@ -5,9 +5,10 @@ session is read and identified, and what the segments weigh is compared with the
     squats,short,full] [--borrow] [--lab SEED]
 
 Every person dances the dance that was designed for him or her (mass, stature, sex); `squats` are the fit trials of the
-protocol squat, `squats_long` nine times as many. With `--borrow` a person without a dance takes the one in FOLDER that was designed for the person
-nearest in stature; with `--lab` the sessions are recorded in the laboratory drawn from that seed. Everything found is kept in FOLDER (dances, sessions, one JSON a session), so that an interrupted run
-goes on. Remove FOLDER/rows when identification changes.
+protocol squat, `squats_long` nine times as many. With `--borrow` a person without a dance takes the one in FOLDER that
+was designed for the person nearest in stature; with `--lab` the sessions are recorded in the laboratory drawn from that
+seed. Everything found is kept in FOLDER (dances, sessions, one JSON a session), so that an interrupted run goes on.
+Remove FOLDER/rows when identification changes.
 """
 
 import argparse
@@ -39,7 +40,9 @@ from biodance.virtual_lab.truth import sip_in_frames
 
 @dataclass(frozen=True)
 class Way:
-    """How the people perform, and where: ``performer`` by name, whether they ``borrow`` dances, ``visit``, its ``place``."""
+    """How the people perform, and where: ``performer`` by name, whether they ``borrow`` dances, ``visit`` and its
+    ``place``.
+    """
 
     performer: str
     borrow: bool = False
