@@ -43,6 +43,7 @@ REAL = (
 )  # fmt: skip
 TRULY = {
     "biomechzoo/HC030A": {"labels_swapped"},
+    "biomechzoo/HC038A": {"labels_swapped"},
     "biomechzoo/HC050A": {"labels_swapped"},
     "biomechzoo/HC055A": {"labels_swapped"},
     "c3d_parser_QCMAS": {"time_delay"},
@@ -246,7 +247,7 @@ def jobs(foreign: int, own: int, family: int) -> list[tuple[str, str, object, se
         true = {f"{effect.partition(':')[0]} {rest.partition(',')[0]}".strip()}
         get = partial(family_session, number, text)
         out.append((f"family {number}, {text}", "family, one fault", get, true, text))
-    for one in nulls(range(own), range(1)):
+    for one in nulls()[:own]:
         out.append((f"own {one.key}", "own", lambda one=one: examined(one), set(), ""))
     causes = {one.words.partition(",")[0]: one for one in SINGLE}
     texts = [next(c for words, c in causes.items() if words.startswith(name)).text(0) for name in NAMED]

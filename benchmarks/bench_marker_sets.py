@@ -3,6 +3,7 @@ the labels of the known sets are spelled in other laboratories' ways.
 
     python benchmarks/bench_marker_sets.py sessions    # needs BIODANCE_DATA
     python benchmarks/bench_marker_sets.py names       # needs BIODANCE_DATA
+    python benchmarks/bench_marker_sets.py labels      # needs BIODANCE_DATA; exchanged labels, in copies, too
 """
 
 import os
@@ -73,6 +74,79 @@ def sessions(data: Path) -> None:
 def _why(one: object) -> str:
     """Return the first refusal of a trial."""
     return next((step.text for step in one.steps if step.status != "done"), "?")[:160]
+
+
+_WRISTS = {side: (f"{side}WRA", f"{side}WRB") for side in "LR"}
+EXCHANGES = {
+    "left wrist": (_WRISTS["L"],),
+    "right wrist": (_WRISTS["R"],),
+    "both wrists": (_WRISTS["L"], _WRISTS["R"]),
+    "head, sides": (("LFHD", "RFHD"), ("LBHD", "RBHD")),
+    "head, ends": (("LBHD", "LFHD"), ("RBHD", "RFHD")),
+    "head, front": (("LFHD", "RFHD"),),
+    "pelvis, front": (("LASI", "RASI"),),
+    "knees": (("LKNE", "RKNE"),),
+}
+"""What is exchanged in copies of the children's trials."""
+
+
+def labels(data: Path) -> None:
+    """Print which labels are exchanged in the sessions, how near the mended copies are, and which exchanges are found
+    in copies.
+    """
+    from biodance.effects import Recorded
+    from biodance.effects.labels_swapped import exchanges
+    from biodance.lab.session.read import read_session
+    from biodance.pipeline.mended import with_right_labels
+    from biodance.pipeline.session import examine
+
+    folders = [*sorted((data / "biomechzoo").glob("HC*")), data / "pycgm", data / "adl_gait"]
+    folders += [data / name for name in ("c3d_parser", "c3d_parser_QCMAS", "c3d_parser_Sydney", "gaitalytics")]
+    print("| session | exchanged | RMS mm: as recorded -> mended |\n|---|---|---|")
+    for folder in folders:
+        session = read_session(folder)
+        found = exchanges(Recorded(session))
+        said = "; ".join(f"{name}: {', '.join(sorted('/'.join(p) for p in pairs))}" for name, pairs in found.items())
+        moved = "-"
+        if found:
+            result = examine(session)
+            mended, _ = with_right_labels(result, tell=lambda text: None)
+            pairs = [(a, b) for a, b in zip(result.trials, mended.trials, strict=True) if a.fit and b.fit]
+            moved = "; ".join(
+                f"{a.trial.name}: {1e3 * a.fit.total_rms:.1f} -> {1e3 * b.fit.total_rms:.1f}" for a, b in pairs
+            )
+        print(f"| {folder.name} | {said or 'none'} | {moved} |", flush=True)
+    _copies(data)
+
+
+def _copies(data: Path) -> None:
+    """Print by kind of exchange how many copies, exchanged in none to all of three files, give the right set."""
+    from itertools import chain, combinations
+
+    from biodance.effects import Recorded
+    from biodance.effects.labels_swapped import exchanges, renamed
+    from biodance.lab.session.read import read_session
+    from biodance.records import Session
+
+    print("\n| exchanged in copies | right sets |\n|---|---|")
+    children = [read_session(folder) for folder in sorted((data / "biomechzoo").glob("HC*"))]
+    for kind, pairs in EXCHANGES.items():
+        right = total = 0
+        for session in children:
+            there = exchanges(Recorded(session))
+            for wrong in chain.from_iterable(combinations(range(len(session.trials)), n) for n in range(4)):
+                copies = [renamed(one, pairs) if k in wrong else one for k, one in enumerate(session.trials)]
+                whole = all(one.markers and {*chain(*pairs)} <= {*one.markers.names} for one in session.trials)
+                composed = any(not set(a).isdisjoint(b) and a != b for p in there.values() for a in p for b in pairs)
+                if not whole or composed:
+                    continue
+                truth = {
+                    one.name: frozenset(there.get(one.name, ())) ^ frozenset(pairs if k in wrong else ())
+                    for k, one in enumerate(session.trials)
+                }
+                found = exchanges(Recorded(Session(session.subject, tuple(copies), session.folder)))
+                total, right = total + 1, right + (found == {name: p for name, p in truth.items() if p})
+        print(f"| {kind} | {right} of {total} |", flush=True)
 
 
 LABORATORIES = read_toml(Path(__file__).with_name("marker_names.toml"))
@@ -164,4 +238,4 @@ def names(data: Path) -> None:
 
 
 if __name__ == "__main__":
-    {"sessions": sessions, "names": names}[sys.argv[1]](Path(os.environ["BIODANCE_DATA"]))
+    {"sessions": sessions, "names": names, "labels": labels}[sys.argv[1]](Path(os.environ["BIODANCE_DATA"]))

@@ -12,6 +12,8 @@ that was stopped goes on; the table in docs/benchmarks/diagnosis.md is printed f
 import argparse
 import json
 import os
+import pickle
+import re
 import subprocess
 import sys
 import tempfile
@@ -21,17 +23,22 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from unittest.mock import patch
 
+import numpy as np
 from bench_honesty import PEOPLE, ROOM
-from hidden_sessions import CACHE
+from hidden_sessions import CACHE, store
 from test_hidden_causes import CAUSES
 from test_hidden_effects import hidden
 
+from biodance.diagnosis.diagnosis import Finding
 from biodance.effects import causes
 from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine
+from biodance.virtual_lab.faults.causes import parse_cause
 
+UNKNOWN = "unknown"
+"""Effect of a cause of the foreign laboratory that no file here describes."""
 FOREIGN = (
     ("plate_position", "plate_position", "0.03", "x"), ("plate_rotation", "plate_rotation", "5", "z"),
     ("time_delay", "time_delay", "0.02", ""), ("plate_gain", "plate_gain", "0.05", "Fz"),
@@ -43,15 +50,23 @@ FOREIGN = (
     ("head_joint", "head_joint", "15", ""), ("marker_misplaced", "marker_misplaced", "0.06", "RKNE:x"),
     ("plate_hysteresis", "plate_hysteresis", "", ""), ("wobbling_mass", "wobbling_mass", "", ""),
     ("filter_mismatch", "force_filter", "3", ""), ("trunk_joint", "trunk_joint", "10", ""),
+    ("joint_centre", "joint_centre", "0.06", "hipR:x"), ("segment_length", "segment_length", "0.05", "kneeL"),
+    ("marker_misplaced", "marker_moved", "0.06", "RKNE:x"), ("labels_swapped", "marker_swap", "", ""),
+    ("clipping", "clipping", "", ""), (UNKNOWN, "creep", "", ""),
 )  # fmt: skip
 """Effect here, cause of the foreign laboratory, its size ("" its own) and target."""
-SAME = {"joint_centre": {"segment_length"}, "segment_length": {"joint_centre"}}
-"""Other names of the same thing: a bone of another length is a joint elsewhere."""
+SAME = {
+    "joint_centre": {"segment_length"}, "segment_length": {"joint_centre"}, "plate_drift": {"plate_offset"},
+}  # fmt: skip
+"""Other names of the same thing: a bone of another length is a joint elsewhere; a drift from zero on is a drift about
+its middle and an offset."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What one session was told: ``named`` and ``resembled`` effects with their targets, ``z`` of what is left."""
+    """What one session was told: ``named`` and ``resembled`` effects with their targets, ``z`` of what is left,
+    ``size`` of the culprit where it is named, and its standard deviation.
+    """
 
     column: str
     effect: str
@@ -61,6 +76,7 @@ class Answer:
     named: tuple[str, ...]
     resembled: tuple[str, ...]
     z: float
+    size: tuple[float, float] | None = None
 
     @property
     def innocents(self) -> tuple[str, ...]:
@@ -88,12 +104,44 @@ def foreign(index: int, folder: Path) -> SessionResult:
     return examine(read_session(folder / "s"))
 
 
+def _kept(key: str, session: Callable[[Path], SessionResult]) -> SessionResult:
+    """Return an examined session, made once."""
+    path = CACHE / "removed" / f"{re.sub('[^A-Za-z0-9.=-]', '_', key)}.pickle"
+    if path.is_file():
+        with open(path, "rb") as stream:
+            return pickle.load(stream)
+    with tempfile.TemporaryDirectory() as folder, patch("biodance.pipeline.session.can_identify", lambda _: False):
+        result = session(Path(folder))
+    store(path, result)
+    return result
+
+
+def size_of(one: Finding) -> tuple[float, float]:
+    """Return the size of a finding, all parameters of the unit of the first as a vector, and its standard deviation."""
+    same = [p for p in one.parameters if p.unit == one.parameters[0].unit]
+    value, sd = np.array([p.value for p in same]), np.array([p.sd for p in same])
+    length = float(np.linalg.norm(value))
+    return length, float(np.linalg.norm(value * sd) / max(length, 1e-12))
+
+
+def truth(one: Answer) -> float:
+    """Return the size that was hidden, as `size_of` gives it; NaN where the two laboratories say it otherwise."""
+    if one.column == "own":
+        return float(np.linalg.norm(next(iter(parse_cause(one.hidden).values.values()))))
+    index = next(k for k, row in enumerate(FOREIGN) if " ".join(filter(None, row[1:])) == one.hidden)
+    effect, _, size, _ = FOREIGN[index]
+    units = {"body_mass": PEOPLE[index % 4][2], "plate_rotation": np.pi / 180, "lab_tilt": np.pi / 180}
+    alike = effect not in {"head_joint", "trunk_joint", "filter_mismatch", "clock_drift"}
+    return float(size) * units.get(effect, 1.0) if size and alike else float("nan")
+
+
 def answered(column: str, effect: str, said: str, result: SessionResult, *, without: bool) -> Answer:
     """Diagnose a session and say what it was told."""
     chosen = tuple(name for name in causes() if name != effect) if without else None
     one = diagnose_session(result, effects=chosen).diagnosis
     named, like = (tuple(f"{f.effect} {f.target}".strip() for f in some) for some in (one.findings, one.resembles))
-    return Answer(column, effect, said, without, one.verdict, named, like, one.worst)
+    mine = next((f for f in one.findings if f.effect in {effect, *SAME.get(effect, ())} and f.parameters), None)
+    return Answer(column, effect, said, without, one.verdict, named, like, one.worst, mine and size_of(mine))
 
 
 def jobs() -> list[tuple[str, str, str, Callable[[Path], SessionResult]]]:
@@ -118,6 +166,20 @@ def table(found: list[Answer]) -> None:
                 print(f"- {one.hidden}: {one.verdict} [{', '.join(one.named)}]")
 
 
+def per_cause(found: list[Answer], column: str) -> None:
+    """Print what the whole family says of every cause of one column: named, sized, and with whom."""
+    print("| cause | verdict | named | size, found | resembled | without its effect |", "|" + "---|" * 6, sep="\n")
+    without = {one.hidden: one for one in found if one.without and one.column == column}
+    for one in (one for one in found if not one.without and one.column == column):
+        size = f"{truth(one):.3g}: {one.size[0]:.3g} ± {one.size[1]:.2g}" if one.size else ""
+        other = without[one.hidden]
+        print("", one.hidden, one.verdict, ", ".join(one.named), size, ", ".join(one.resembled),
+              f"{other.verdict} {', '.join(other.named)}".strip(), "", sep=" | ")  # fmt: skip
+    sized = [one for one in found if not one.without and one.column == column and one.size and truth(one) == truth(one)]
+    inside = sum(abs(one.size[0] - truth(one)) <= 1.96 * one.size[1] for one in sized)
+    print(f"intervals that cover: {inside} of {len(sized)}")
+
+
 def main() -> None:
     """Run what is not there yet and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -133,14 +195,15 @@ def main() -> None:
     for column, effect, said, session in jobs():
         if column not in asked.only or asked.match not in said or (column, said) in known:
             continue
-        with tempfile.TemporaryDirectory() as folder, patch("biodance.pipeline.session.can_identify", lambda _: False):
-            result = session(Path(folder))
-            both = [answered(column, effect, said, result, without=without) for without in (True, False)]
+        result = _kept(f"{column}-{said}", session)
+        both = [answered(column, effect, said, result, without=without) for without in (True, False)]
         with kept.open("a") as stream:
             stream.writelines(json.dumps(asdict(one)) + "\n" for one in both)
         found += both
         print(*both, sep="\n", flush=True)
     table(found)
+    for column in asked.only:
+        per_cause(found, column)
 
 
 if __name__ == "__main__":

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from biodance.lab.session.read import read_session as read_session
     from biodance.motion.regressor import predict_wrench as predict_wrench
     from biodance.motion.track import track as track
-    from biodance.pipeline.dance import DanceResult as DanceResult
+    from biodance.pipeline.dance_result import DanceResult as DanceResult
     from biodance.pipeline.diagnosis import SessionDiagnosis as SessionDiagnosis
     from biodance.pipeline.export import export as export
     from biodance.pipeline.front import SessionComparison as SessionComparison
@@ -84,7 +84,7 @@ HOMES = {
     "lab.session.read": ("read_session",),
     "motion.regressor": ("predict_wrench",),
     "motion.track": ("track",),
-    "pipeline.dance": ("DanceResult",),
+    "pipeline.dance_result": ("DanceResult",),
     "pipeline.diagnosis": ("SessionDiagnosis",),
     "pipeline.export": ("export",),
     "pipeline.front": ("SessionComparison", "compare_sessions", "diagnose", "identify"),

@@ -10,10 +10,12 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from biodance.body.human.human import human
+from biodance.identification.identification import Identification, identify_body
 from biodance.identification.loads import compact_load
+from biodance.identification.rival_bodies import weighing
 from biodance.motion.comparison import compare
 from biodance.motion.regressor import predict_wrench
-from biodance.pipeline.identification import identify_trials
+from biodance.pipeline.identification import identify_trials, trial_fit
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import TrialResult, WrenchComparison
 from biodance.records import Motion, Session, Source, Subject, Trial, Wrench
@@ -77,3 +79,10 @@ def session_result(*, load: float = 0.0, roles: tuple[str, ...] = ("fit", "valid
     session = Session(SUBJECT, tuple(t.trial for t in trials), Path("/lab/S01"))
     result = SessionResult(session, SUBJECT, body(), "From stature alone.", (), trials, (), None, None)
     return replace(result, identification=identify_trials(body(), trials, name="S01")) if "fit" in roles else result
+
+
+def declared(result: SessionResult, mass: float) -> Identification:
+    """Return the identification of the fitted trials of a session whose analyst declared ``mass`` kg."""
+    assert result.body is not None
+    fits = tuple(fit for one in result.trials if one.trial.role == "fit" and (fit := trial_fit(one)) is not None)
+    return identify_body(replace(result.body, sip=weighing(result.body.sip, mass)), fits)

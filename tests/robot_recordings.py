@@ -37,9 +37,9 @@ def real_robot() -> Body:
     return replace(body, sip=Sip(body.segments, phi, body.sip.covariance))
 
 
-def danced(body: Body, seed: int, seconds: float) -> tuple[Array, Array, Array]:
+def danced(body: Body, seed: int, seconds: float, *, nod: Array | float = 0.0) -> tuple[Array, Array, Array]:
     """Return times (T,) s, angles (T, n) rad and the ground's wrench (T, 6) about the middle of nothing but the origin
-    under the left ankle.
+    under the left ankle, on which the foot nods by ``nod`` (T + 2,) rad, toes down.
     """
     rng, time = np.random.default_rng(seed), np.arange(0, seconds, 1 / RATE)
     names = [joint.name for joint in body.joints]
@@ -52,11 +52,12 @@ def danced(body: Body, seed: int, seconds: float) -> tuple[Array, Array, Array]:
     model, ankle = body.model, body.segment_joint[body.feet["left"].segment] + 2
     data = model.createData()
     planted = pin.SE3(np.array([[0.0, 0, 1], [0, -1, 0], [1, 0, 0]]), np.array([0.0, 0.0, -SOLE_OVER_ANKLE]))
-    q = np.empty((len(time), model.nq))
+    q, nods = np.empty((len(time), model.nq)), np.broadcast_to(nod, time.shape)
     for t, one in enumerate(angle):
         rest = np.concatenate([[0.0, 0, 0, 0, 0, 0, 1], one])
         pin.forwardKinematics(model, data, rest)
-        root = planted * data.oMi[ankle].inverse()
+        tilted = pin.SE3(pin.exp3(np.array([0.0, nods[t], 0.0])), np.zeros(3))
+        root = tilted * planted * data.oMi[ankle].inverse()
         q[t] = np.concatenate([pin.SE3ToXYZQUAT(root), one])
     v = np.array([pin.difference(model, a, b) for a, b in zip(q[:-2], q[2:], strict=True)]) * RATE / 2
     a = np.gradient(v, 1 / RATE, axis=0)

@@ -16,7 +16,7 @@ import pytest
 
 import biodance
 from biodance.batch.ledger import LEDGER, Ledger
-from biodance.batch.rows import ROW_TYPES
+from biodance.batch.rows import ROW_TYPES, rows_of
 from biodance.batch.run import run_batch
 from biodance.batch.summary import outliers, summary_table
 from biodance.batch.work import Outcome, SessionStatus, SessionTask, process_session
@@ -161,6 +161,22 @@ def test_real_sessions_end_in_tables_and_on_a_page(tmp_path: Path, capsys: pytes
     assert "walk.c3d" in page
     assert (out / "sessions" / "good" / "results.json").exists()
     assert not (out / "sessions" / "good" / "report.html").exists()
+
+
+def test_what_moved_stands_beside_each_trial() -> None:
+    curves = [{"quantity": "knee_flexion", "side": side, "max": top} for side, top in (("left", 61.0), ("right", 64.0))]
+    speed = {"quantity": "speed", "side": "both", "mean": 1.2}
+    cycles = [{"kind": "gait"}, {"kind": "gait"}, {"kind": "sit_to_stand"}]
+    moved = {"trial": "walk", "cycles": cycles, "events": [{}] * 5, "spatiotemporal": [speed], "curves": curves}
+    trial = dict.fromkeys(("role", "status", "reason", "frames", "rate_hz", "gaps_percent"))
+    trial |= {"marker_rms_m": None, "marker_max_m": None, "wrench": None, "warnings": []}
+    document = {"mass_check": None, "diagnosis": None, "attention": [], "subject": {"mass_kg": 60.0}, "refused": {}}
+    document |= {"trials": [{**trial, "name": "walk"}, {**trial, "name": "static"}], "movement": {"trials": [moved]}}
+    walk, static = rows_of(document)
+    assert [walk[name] for name in ("gait_cycles", "squats", "rises", "foot_events")] == [2, 0, 1, 5]
+    assert (walk["speed_m_per_s"], walk["knee_flexion_max_deg"], walk["hip_flexion_max_deg"]) == (1.2, 64.0, None)
+    assert "gait_cycles" not in static
+    assert set(walk) <= set(ROW_TYPES)
 
 
 def test_what_stands_out_is_measured_by_the_archive_itself() -> None:

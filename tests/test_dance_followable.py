@@ -12,8 +12,9 @@ from biodance.dance.design import _walked
 from biodance.dance.followable.catalogue import Catalogue
 from biodance.dance.followable.vocabulary import read_vocabulary, words_for
 from biodance.dance.followable.walk import Walk
+from biodance.dance.imprecision import Imprecision, mass_centre
 from biodance.dance.limits.self_collision import solid_distances, surface_distances
-from biodance.dance.performers import Imprecision, mass_centre, perform_with, rehearse_imprecisely
+from biodance.dance.performers import perform_with, rehearse_imprecisely
 from biodance.dance.postures.ordering import support_sequence
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import excitation_blocks
@@ -67,19 +68,18 @@ def test_a_catalogue_stands_balanced_on_its_feet() -> None:
 
 def test_an_exact_performer_does_the_dance_itself() -> None:
     exact = Imprecision(tracking=0.0, timing=0.0, sway=0.0, pace=1.0)
-    found = rehearse_imprecisely(small_dance(), count=1, how=exact)
+    found = rehearse_imprecisely(small_dance(), PLAN.limits, count=1, how=exact)
     motion = small_dance().motion(5.0)
     gap, _ = solid_distances(BODY, poses(BODY, motion.q))
-    assert found.gap.worst == pytest.approx(gap.min(), abs=2e-3)
-    bad = rehearse_imprecisely(small_dance(), count=3)
-    assert bad.gap.worst < found.gap.worst
-    assert bad.balance.worst < found.balance.worst
+    assert found["self_collision"].worst == pytest.approx(gap.min(), abs=2e-3)
+    bad = rehearse_imprecisely(small_dance(), PLAN.limits, count=3)
+    assert all(bad[name].worst < found[name].worst for name in ("self_collision", "balance"))
 
 
 def test_performers_are_the_same_in_groups() -> None:
     with ThreadPoolExecutor(2) as pool:
-        together = perform_with(pool, small_dance(), count=4)
-    assert together.gap == rehearse_imprecisely(small_dance(), count=4).gap
+        together = perform_with(pool, small_dance(), PLAN.limits, count=4)
+    assert together == rehearse_imprecisely(small_dance(), PLAN.limits, count=4)
 
 
 def test_closed_form_distances_are_those_of_coal() -> None:

@@ -207,15 +207,6 @@ def test_nobody_but_the_limits_themselves_knows_a_limit_by_name() -> None:
         ("robot.py", "seat"),  # a size of a stance
         ("rehearsal.py", "friction"),  # of MuJoCo's floor
         ("plan.py", "balance"),  # share_of_support, the short form in protocols
-        ("plain.py", "balance"),  # what slowness mends, with three others
-        ("plain.py", "friction"),
-        ("plain.py", "joint_speed"),
-        ("plain.py", "joint_torque"),
-        ("catalogue.py", "foot_placement"),  # less reserve: moves are straight
-        ("catalogue.py", "self_collision"),  # what imprecise people need
-        ("walk.py", "self_collision"),
-        ("performers.py", "self_collision"),
-        ("performers.py", "balance"),
     }
 
 

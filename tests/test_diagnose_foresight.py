@@ -1,9 +1,14 @@
 """What a movement will be able to see, before any force is measured."""
 
+from html import escape
+
 import numpy as np
 from diagnosed_sessions import body, known, motion
 
 from biodance.diagnosis.foresight import foresee, planned, session_of
+from biodance.effects import effects
+from biodance.report.documents.diagnosis import foresight_document
+from biodance.report.pages.foresight import foresight_page
 
 CHOSEN = ("plate_gain", "plate_offset", "body_mass", "time_delay", "added_mass")
 
@@ -38,3 +43,15 @@ def test_a_long_movement_is_cut_into_trials() -> None:
     pieces = session_of(motion(1), 4.0)
     assert len(pieces) == 3
     assert sum(one.time.size for one in pieces) == motion(1).time.size
+
+
+def test_what_to_change_is_in_the_words_of_the_causes_that_stay_unseen() -> None:
+    still = motion(1)
+    frozen = type(still)(still.time, np.tile(still.q[0], (still.time.size, 1)), 0 * still.v, 0 * still.a)
+    found = foresee(body(), (frozen,), tolerances=known(), effects=("plate_gain", "plate_offset"))
+    page = foresight_page(foresight_document(found), "standing")
+    (squats, *_) = [one for one in found.changes if one.do == effects()["plate_gain"].separated_by]
+    assert {name for name, _ in squats.unseen} == {"plate_gain"}
+    assert escape(squats.do, quote=True).replace("&#x27;", "&#39;") in page
+    assert f"{len(found.seen)} at their typical size" in page
+    assert "plate gain (" in page

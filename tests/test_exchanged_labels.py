@@ -74,6 +74,9 @@ def test_a_copy_with_other_labels_is_the_same_to_the_byte_elsewhere(tmp_path: Pa
     [
         ("HC030A", {name: {("LWRA", "LWRB")} for name in ("HC030A01", "HC030A05", "HC030A22")}),
         ("HC055A", {"HC055A34": {("LFHD", "RFHD"), ("LBHD", "RBHD")}}),
+        ("HC038A", {"HC038A11": {("LWRA", "LWRB"), ("RWRA", "RWRB")}}),
+        ("HC050A", {"HC050A11": {("LWRA", "LWRB")}}),
+        ("HC031A", {}),
         ("HC032A", {}),
         ("HC044A", {}),
     ],
@@ -81,3 +84,26 @@ def test_a_copy_with_other_labels_is_the_same_to_the_byte_elsewhere(tmp_path: Pa
 def test_real_exchanges_are_found_and_no_others(child: str, truth: dict) -> None:
     found = exchanges(Recorded(read_session(Path(str(REAL)) / "biomechzoo" / child)))
     assert found == truth
+
+
+WRISTS = {side: (f"{side}WRA", f"{side}WRB") for side in "LR"}
+FRONT = (("LBHD", "LFHD"), ("RBHD", "RFHD"))
+
+
+@pytest.mark.skipif(not REAL, reason="BIODANCE_DATA is not set: real recordings are not here")
+@pytest.mark.parametrize(
+    ("wrong", "pairs"),
+    [
+        ((), ()),
+        ((1,), (WRISTS["R"],)),
+        ((0, 1, 2), tuple(WRISTS.values())),
+        ((0, 1, 2), FRONT),
+    ],
+)
+def test_real_copies_with_exchanged_bytes_give_the_right_set(wrong: tuple, pairs: tuple, tmp_path: Path) -> None:
+    names = {one: other for pair in pairs for one, other in (pair, pair[::-1])}
+    for number, path in enumerate(sorted((Path(str(REAL)) / "biomechzoo" / "HC032A").glob("*.c3d"))):
+        write_relabelled(path, tmp_path / path.name, names if number in wrong else {})
+    session = read_session(tmp_path)
+    right = {session.trials[number].name: set(pairs) for number in wrong}
+    assert exchanges(Recorded(session)) == right

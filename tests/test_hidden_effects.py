@@ -71,6 +71,7 @@ def test_late_forces_are_named_by_the_command_also_where_no_body_can_be_identifi
     assert (tmp_path / "out" / "report.html").read_text().count("by force") >= 2
     assert not (tmp_path / "out" / "body.json").exists()
     assert document["verdict"].startswith("named")
+    assert any(one["cycles"] for one in document["movement"]["trials"])
     first = document["findings"][0]
     assert (first["effect"], first["target"]) == ("time_delay", "")
     assert first["parameters"]["delay"]["value"] == pytest.approx(0.025, rel=0.25)

@@ -191,6 +191,16 @@ def test_forces_that_fit_a_doubtful_body_do_not_end_as_nothing_wrong() -> None:
     assert told(Diagnosis("named, complete", (thigh,)), doubtful, (STATIC,)).verdict == "named, complete"
 
 
+def test_a_session_whose_walks_were_all_left_out_cannot_tell() -> None:
+    full = full_session()
+    result = replace(full, trials=tuple(replace(trial, checks=()) for trial in full.trials), checks=())
+    assert told(Diagnosis("nothing wrong", ()), result, (STATIC,)).verdict == "nothing wrong"
+    one = told(Diagnosis("nothing wrong", ()), result, (replace(STATIC, seconds=0.0), WALK))
+    assert one.verdict == "unexplained"
+    assert one.attention[0].text.startswith("Cannot tell")
+    assert not is_well(one)
+
+
 def test_a_check_points_to_the_cause_that_was_found() -> None:
     result = replace(full_session(), checks=(HEAVY,))
     plain = next(one for one in session_attention(result) if one.about == HEAVY.what)
@@ -284,8 +294,12 @@ def test_the_size_of_what_is_left_is_in_newton() -> None:
 
 # ---- real recordings
 
-EXCHANGED = {"HC050A": ("LWRA/LWRB",), "HC055A": ("LBHD/RBHD", "LFHD/RFHD")}
-"""Truly exchanged in one walk each: the distances to elbow and head say so, too."""
+EXCHANGED = {
+    "HC038A": ("LWRA/LWRB", "RWRA/RWRB"),
+    "HC050A": ("LWRA/LWRB",),
+    "HC055A": ("LBHD/RBHD", "LFHD/RFHD"),
+}
+"""Truly exchanged in one walk each: finger markers on the palm, distances to elbow and within the head say so, too."""
 CHILDREN = ("HC031A", "HC032A", "HC038A", "HC044A", "HC050A", "HC055A")
 
 

@@ -58,9 +58,23 @@ def test_the_more_probable_place_is_kept(along: bool, seed: int) -> None:
     assert ("along with the joint" in words) == along
 
 
+def test_the_height_of_pelvis_and_trunk_is_known_to_the_way_between_cut_and_joint() -> None:
+    body, table = low_joint(), widened(low_joint().sip)
+    found, _ = more_probable_place(moments(body, body.sip), table, body)
+    way = float(np.linalg.norm((body.at_joint.com - body.sip.com)[TRUNK]))
+    more = np.diag(found.covariance - table.covariance).reshape(12, 10)
+    for i in (0, TRUNK):
+        assert more[i, 2] == pytest.approx((body.sip.mass[i] * way) ** 2)  # the first moment along the spine
+        np.testing.assert_allclose(more[i, [0, 1, 3]], 0.0, atol=1e-9)  # mass and the other axes are not less known
+        assert (more[i, [4, 9]] > 0).all()  # about the axes across the spine
+    assert np.abs(np.delete(more, [0, TRUNK], axis=0)).max() < 1e-9
+    assert more_probable_place(moments(body, body.sip), table, replace(body, at_joint=None)) == (table, "")
+
+
 def test_a_prior_of_another_mass_is_placed_at_that_mass_and_back_again() -> None:
     body = low_joint()
-    heavy = Sip(body.segments, 1.1 * widened(body.sip).phi, 1.21 * np.asarray(widened(body.sip).covariance))
+    placed, _ = more_probable_place(moments(body, body.sip), widened(body.sip), body)
+    heavy = Sip(body.segments, 1.1 * placed.phi, 1.21 * np.asarray(placed.covariance))
     there = placed_as(heavy, body, along=True)
     np.testing.assert_allclose(there.com, body.at_joint.com, atol=1e-12)
     assert there.mass.sum() == pytest.approx(heavy.mass.sum())

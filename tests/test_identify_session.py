@@ -125,7 +125,7 @@ def test_caution_widens_without_moving_or_breaking_the_scale() -> None:
 def test_a_turned_frame_and_a_shifted_centre_to_first_order() -> None:
     from scipy.spatial.transform import Rotation
 
-    from biodance.uncertainty.caution import _shift_slope, _turn_slope
+    from biodance.uncertainty.caution import shift_slope, _turn_slope
     from biodance.virtual_lab.person.flesh import of_parameters, parameters_of_inertia, place_inertia
 
     phi = np.array(person(6)[0].sip.phi[:10])
@@ -136,7 +136,7 @@ def test_a_turned_frame_and_a_shifted_centre_to_first_order() -> None:
     ]
     shift = [(parameters_of_inertia(place_inertia(J, np.eye(3), step * e)) - phi) / step for e in np.eye(3)]
     np.testing.assert_allclose(_turn_slope(phi), np.array(turn).T, atol=1e-4)
-    np.testing.assert_allclose(_shift_slope(phi), np.array(shift).T, atol=1e-4)
+    np.testing.assert_allclose(shift_slope(phi), np.array(shift).T, atol=1e-4)
     np.testing.assert_allclose(pseudo_inertia(phi)[0], J, atol=1e-12)
 
 

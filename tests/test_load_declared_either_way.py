@@ -1,35 +1,19 @@
-"""A load is the same whether the scale weighed it or not; people without load raise no alarm, also not those of another
-laboratory (BIODANCE_FOREIGN_LAB).
-"""
+"""A load is the same whether the scale weighed it or not, and people without load raise no alarm."""
 
-import os
-import subprocess
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
-from identified_sessions import body, session_result
+from identified_sessions import body, declared, session_result
 
 from biodance.identification.added_mass import added_mass
-from biodance.identification.identification import Identification, identify_body
 from biodance.identification.rival_bodies import weighing
 from biodance.identification.sessions import differences
-from biodance.lab.session.read import read_session
 from biodance.pipeline.checks import load_doubts
-from biodance.pipeline.identification import SessionIdentification, identify_trials, trial_fit
+from biodance.pipeline.identification import SessionIdentification, identify_trials
 from biodance.pipeline.results import Check, SessionResult
-from biodance.pipeline.session import examine
 from biodance.report.documents.identification import identification_document
 
 LOAD = 2.4
-
-
-def declared(result: SessionResult, mass: float) -> Identification:
-    """Return the identification of the fitted trials of a session whose analyst declared ``mass`` kg."""
-    assert result.body is not None
-    fits = tuple(fit for one in result.trials if one.trial.role == "fit" and (fit := trial_fit(one)) is not None)
-    return identify_body(replace(result.body, sip=weighing(result.body.sip, mass)), fits)
 
 
 def heavier(result: SessionResult) -> SessionIdentification:
@@ -85,30 +69,3 @@ def test_a_weight_other_than_declared_needs_a_reference(weighed: bool, doubts: i
     heavy = Check("mass on the plates against declared", "static", "3.9 %", "at most 2 %", False, "Weigh again.")
     off = Check("markers not seen", "dance_1", "40.0 %", "at most 10 %", False, "Fill the gaps.")
     assert len(load_doubts((heavy, off, replace(heavy, inside=True)), weighed=weighed)) == doubts
-
-
-def visited(folder: Path, *more: str) -> SessionResult:
-    """Return a session of the other laboratory, made now."""
-    lab = os.environ.get("BIODANCE_FOREIGN_LAB")
-    if not lab:
-        pytest.skip("BIODANCE_FOREIGN_LAB is not set: no independent virtual laboratory here")
-    person = {"seed": 611, "sex": "M", "height": 1.78, "mass": 74, "trials": 3, "noise": 0.6, "camera": 0.3}
-    asked = [text for name, value in person.items() for text in (f"--{name}", str(value))]
-    command = [sys.executable, str(Path(lab) / "foreign_lab.py"), *asked, *more, "--out", str(folder)]
-    subprocess.run(command, check=True, capture_output=True, timeout=240)
-    return examine(read_session(folder))
-
-
-def test_a_foreign_person_without_load_is_not_accused_and_a_load_is_found_either_way(tmp_path: Path) -> None:
-    bare = visited(tmp_path / "A")
-    worn = ("--session", "2", "--cause", "added_mass", "--target", "l_farm", "--size", str(LOAD), "--weighed")
-    loaded = visited(tmp_path / "B", *worn)
-    assert bare.identification is not None
-    assert loaded.declared_mass == pytest.approx(74.0 + LOAD)
-    assert bare.identification.search.status == "none"
-    for mass in (74.0, 74.0 + LOAD):
-        found = added_mass(declared(loaded, mass), reference=bare.identification.identification)
-        assert found.found
-        assert found.best.segment == "left_forearm_hand"
-        assert found.best.mass == pytest.approx(LOAD, abs=0.35)
-        assert found.best.interval[0] < LOAD < found.best.interval[1]

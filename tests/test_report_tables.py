@@ -1,6 +1,8 @@
 """Tables hold the numbers of the records, in both files alike; no folder of the user's is written over."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -10,6 +12,7 @@ from identified_sessions import session_result
 
 from biodance.diagnosis.diagnosis import Adequacy, Alias, Diagnosis, Estimate, Finding, Gain, Unobservable
 from biodance.errors import SessionRefused
+from biodance.pipeline.movement import session_movement
 from biodance.pipeline.tables import session_tables
 from biodance.report.tables import tables_folder, write_tables
 
@@ -146,3 +149,24 @@ def test_no_folder_of_the_users_is_written_over(tmp_path):
     (folder / "thesis.docx").write_text("mine")
     with pytest.raises(SessionRefused, match=r"thesis\.docx"):
         tables_folder(folder, session, force=True)
+
+
+def test_the_lines_of_the_guide_make_xarrays(result, tmp_path, monkeypatch):
+    pytest.importorskip("xarray", reason="xarray is not installed")
+    (tmp_path / "Session1-tables").mkdir()
+    name = result.trials[0].trial.name
+    movement = session_movement(result)
+    write_tables(session_tables(result, movement=movement), tmp_path / "Session1-tables")
+    monkeypatch.chdir(tmp_path)
+    guide = (Path(__file__).parents[1] / "docs" / "guide" / "movement.md").read_text()
+    (lines,) = re.findall(r"```python\n(angles = .*?)```", guide, flags=re.DOTALL)
+    made = {"pd": pd}
+    exec(lines.replace("walk_1", name), made)
+    motion = result.trials[0].motion
+    np.testing.assert_array_equal(made["walk"].time_s, motion.time)
+    flexion = 180 / np.pi * motion.q[:, 7 + result.body.joint_index("left_knee_flexion")]
+    np.testing.assert_allclose(made["walk"].left_knee_flexion_deg, flexion, rtol=1e-12)
+    moved = next(one for one in movement if one.cycles)
+    group = moved.curve("knee_flexion", "left")
+    held = made["repetitions"].sel(trial=moved.trial, quantity="knee_flexion", side="left")
+    np.testing.assert_allclose(held.dropna("cycle", how="all"), group.values, rtol=1e-12)

@@ -83,3 +83,21 @@ def test_an_ankle_that_gives_is_named_with_its_stiffness(robot: Body, truth: lis
     left = np.std(fit.angle[:, column] - true)
     assert left < 0.2 * np.std(shown - true)
     assert f"{ANKLE} gives under load" in cause_words(found)[0].text
+
+
+def test_a_sole_that_gives_is_named_with_the_ankle_above_it(
+    robot: Body, truth: list[tuple[Array, Array, Array]]
+) -> None:
+    give, trials = 0.005, []
+    for seed, (_, angle, wrench) in enumerate(truth):
+        middle = np.mean(real_robot().feet["left"].outline, axis=0)[2]
+        nod = np.pad(-give * (wrench[:, 4] + middle * wrench[:, 2]), 1, mode="edge")
+        _, _, tilted = danced(real_robot(), seed, _SECONDS, nod=nod)
+        trials.append(seen(robot, angle, tilted))
+    found, _ = robot_causes(robot, (trials[0],), (trials[1],))
+    first = found[0]
+    named = [(one.kind, one.where) for one in (first.cause, *first.rivals)]
+    assert ("soft_sole", "forwards") in named
+    assert first.value == pytest.approx(give, rel=0.4)
+    assert ("flexible_joint", ANKLE) in named
+    assert any("standing foot" in said.text or "soft sole" in said.text for said in cause_words(found))

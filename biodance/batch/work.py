@@ -175,6 +175,7 @@ def _examined(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> t
     from biodance.batch.rows import rows_of
     from biodance.lab.session.read import read_session
     from biodance.pipeline.diagnosis import diagnosed
+    from biodance.pipeline.movement import session_movement
     from biodance.pipeline.session import examine
     from biodance.report.write import write_report
     from biodance.settings import assignments
@@ -182,7 +183,7 @@ def _examined(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> t
     result = examine(read_session(task.session, settings=assignments(task.chosen), tell=tell), tell=tell)
     found = diagnosed(result, tell=tell)
     tell("writing")
-    document = write_report(result, folder, diagnosis=found, drawn=task.pages)
+    document = write_report(result, folder, diagnosis=found, movement=session_movement(result), drawn=task.pages)
     first = document["attention"][0]["text"] if document["attention"] else ""
     status = SessionStatus.NEEDS_A_PERSON if result.needs_a_person else SessionStatus.DONE
     tell(f"{status}: {first}")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from biodance.cli.app import DONE, NEEDS_A_PERSON, STOPPED, app, print_json, say
-from biodance.cli.options import ForceOption, JsonOption, OutOption
+from biodance.cli.options import PERSON, ForceOption, JsonOption, OutOption, RobotFile
 from biodance.errors import BiodanceError
 
 if TYPE_CHECKING:
@@ -30,8 +30,7 @@ def dance_command(
         str, Parameter(help="easy, patient, chair, short, one_segment, full, or a TOML file.")
     ] = "full",
     limits: Annotated[Path | None, Parameter(help="TOML file with what this person can and may do.")] = None,
-    urdf: Annotated[Path | None, Parameter(help="URDF file of a robot that dances instead of a person.")] = None,
-    feet: Annotated[str | None, Parameter(help="Links of the robot's right and left foot: RIGHT,LEFT.")] = None,
+    robot: RobotFile = PERSON,
     seed: Annotated[int, Parameter(help="The same seed gives the same dance.")] = 0,
     out: OutOption,
     json: JsonOption = False,
@@ -57,8 +56,11 @@ def dance_command(
     from biodance.report.dance_write import print_dance, write_dance
 
     plan, person = read_plan(protocol), read_person(limits) if limits else HEALTHY
-    who = _who(sex, height, mass, age, urdf, feet)
-    body, make = (robot_dancer(*who), make_robot_dance) if isinstance(who, tuple) else (dancer(who, plan), make_dance)
+    who = _who(sex, height, mass, age, robot)
+    if isinstance(who, RobotFile):
+        body, make = robot_dancer(*who.named(), mend=who.mend), make_robot_dance
+    else:
+        body, make = dancer(who, plan), make_dance
     folder = dance_folder(out, force=force)
     with counted_progress() as tell:
         try:
@@ -67,7 +69,7 @@ def dance_command(
             say(f"Stopped; {folder} keeps what is finished. The same command goes on from there.")
             return STOPPED
         tell("writing", 0, 0)
-        result = result if isinstance(who, tuple) else designed_for(result, who)
+        result = result if isinstance(who, RobotFile) else designed_for(result, who)
         found = write_dance(result, folder)
     shutil.rmtree(folder / UNFINISHED, ignore_errors=True)
     if json:
@@ -142,16 +144,14 @@ def _who(
     height: float | None,
     mass: float | None,
     age: float,
-    urdf: Path | None,
-    feet: str | None,
-) -> "Subject | tuple[Path, str]":
-    """Return the person, or the robot's file and feet; BiodanceError if it is neither or both."""
+    robot: RobotFile,
+) -> "Subject | RobotFile":
+    """Return the person or the robot; BiodanceError if it is neither or both."""
     from biodance.records import Subject
 
-    person, robot = (sex, height, mass), (urdf, feet)
-    if urdf is not None and feet is not None and person == (None, None, None):
-        return urdf, feet
-    if sex is not None and height is not None and mass is not None and robot == (None, None):
+    if robot.urdf is not None and robot.feet is not None and (sex, height, mass) == (None, None, None):
+        return robot
+    if sex is not None and height is not None and mass is not None and not robot.given:
         return Subject(mass, height, sex, age)
     raise BiodanceError(
         "Say who dances: a person with --sex, --height and --mass, or a robot with --urdf FILE and --feet RIGHT,LEFT."

@@ -7,15 +7,23 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json
-from biodance.cli.options import USUAL_READING, JsonOption, Reading, Results
+from biodance.cli.options import PERSON, USUAL_READING, JsonOption, Reading, Results, RobotFile
+from biodance.cli.options import USUAL_READING, ForceOption, JsonOption, Reading, Results
 from biodance.cli.progress import progress
+from biodance.cli.robot import diagnose_robot
 from biodance.cli.session import examine_with_reference, tabled
 
 
 @app.command(name="foresee")
-def foresee_command(dance: Path, *, json: JsonOption = False) -> int:
+def foresee_command(
+    dance: Path,
+    *,
+    out: Annotated[Path | None, Parameter(name="--out", help="Page to write, such as foresee.html.")] = None,
+    json: JsonOption = False,
+    force: ForceOption = False,
+) -> int:
     """Say before a recording what a designed dance will be able to see, from which size on, and which causes it will
-    confuse.
+    confuse; and what to change so that it sees more. With --out as a page, too.
 
     Parameters
     ----------
@@ -26,11 +34,16 @@ def foresee_command(dance: Path, *, json: JsonOption = False) -> int:
 
     from biodance.pipeline.diagnosis import foresee_dance
     from biodance.report.documents.diagnosis import foresight_document
+    from biodance.report.pages.foresight import foresight_page, refuse_page
     from biodance.report.terminal import print_foresight
 
     with progress() as tell:
         tell("foreseeing what the dance will see")
+        if out is not None:
+            refuse_page(out, force=force)
         document = foresight_document(foresee_dance(dance))
+        if out is not None:
+            out.write_text(foresight_page(document, dance.stem), encoding="utf-8", newline="\n")
     if json:
         print_json(document)
     else:
@@ -53,6 +66,7 @@ def diagnose_command(
             "copy first.",
         ),
     ] = False,
+    robot: RobotFile = PERSON,
 ) -> int:
     """Say what the simulation of a session gets wrong: the cause, its size, how sure, what else it could be, and what
     naming it gains.
@@ -60,13 +74,17 @@ def diagnose_command(
     Parameters
     ----------
     session
-        Folder with the static trial and the other trials.
+        Folder with the static trial and the other trials; of a robot (--urdf), as for identify.
     """
+    if robot.given:
+        for_people = (*reading.given(), *(["--accept"] if accept else []), *(["--tables"] if results.tables else []))
+        return diagnose_robot(session, results, robot, for_people)
     from rich.console import Console
 
     from biodance.pipeline import front
     from biodance.pipeline.attention import is_well
     from biodance.pipeline.carry import read_lab
+    from biodance.pipeline.front_movement import describe_movement
     from biodance.pipeline.mended import write_mended
     from biodance.report.terminal import print_diagnosis
     from biodance.report.write import write_diagnosis
@@ -79,8 +97,9 @@ def diagnose_command(
             write_mended(result.session, found.mended.session, folder)
             result = found.mended
         tell("writing the page")
-        tabled(result, place, found.diagnosis)
-        document = write_diagnosis(result, found, folder, accepted=accept, earlier=carried.corrections)
+        moved = describe_movement(result, lab=reading.lab, tell=tell)
+        tabled(result, place, found.diagnosis, movement=moved)
+        document = write_diagnosis(result, found, folder, accepted=accept, earlier=carried.corrections, movement=moved)
     results.show_page(folder)
     if results.json:
         print_json(document)

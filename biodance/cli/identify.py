@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json
-from biodance.cli.options import USUAL_READING, Reading, Results
+from biodance.cli.options import PERSON, USUAL_READING, Reading, Results, RobotFile
 from biodance.cli.progress import progress
+from biodance.cli.robot import examine_robot
 from biodance.cli.session import examine_with_reference, tabled
 
 if TYPE_CHECKING:
@@ -26,10 +27,7 @@ def identify_command(
     dance: Annotated[
         Path | None, Parameter(name="--dance", help="dance.npz that was shown: says how well it was danced.")
     ] = None,
-    urdf: Annotated[
-        Path | None, Parameter(help="URDF file of the robot that was recorded instead of a person.")
-    ] = None,
-    feet: Annotated[str | None, Parameter(help="Links of the robot's right and left foot: RIGHT,LEFT.")] = None,
+    robot: RobotFile = PERSON,
 ) -> int:
     """Identify what every segment weighs, with intervals, validate it on the trials kept, and look for an added mass.
 
@@ -39,9 +37,9 @@ def identify_command(
         Folder with the static trial and the other trials; of a robot (--urdf), with encoder tables (CSV or Parquet: s,
         rad) and force plate files.
     """
-    if urdf is not None or feet is not None:
+    if robot.given:
         for_people = (*reading.given(), *_given({"--dance": dance, "--tables": results.tables}))
-        return _identify_robot(session, results, urdf, feet, for_people)
+        return _told_identified(*examine_robot(session, results, robot, for_people), results.json)
     from biodance.dance.dance import Dance
     from biodance.pipeline import front
     from biodance.pipeline.front_movement import describe_movement
@@ -64,30 +62,6 @@ def identify_command(
 def _given(options: "dict[str, object]") -> tuple[str, ...]:
     """Return the names of the options that were given."""
     return tuple(name for name, value in options.items() if value is not None)
-
-
-def _identify_robot(
-    recording: Path, results: Results, urdf: Path | None, feet: str | None, for_people: tuple[str, ...]
-) -> int:
-    """Identify a robot instead of a person; options ``for_people`` are refused."""
-    from biodance.errors import BiodanceError
-    from biodance.lab.session.results_folder import results_folder
-    from biodance.pipeline.dance import named_feet
-    from biodance.pipeline.robot import identify_robot
-    from biodance.report.robot_write import write_robot
-
-    if urdf is None or feet is None:
-        raise BiodanceError("A robot is told by both --urdf FILE and --feet RIGHT,LEFT; one of them is missing.")
-    if for_people:
-        raise BiodanceError(f"{', '.join(for_people)} cannot be used with --urdf: they are for sessions of people.")
-    with progress() as tell:
-        both = named_feet(feet)
-        folder = results_folder(results.out, recording, force=results.force)
-        result = identify_robot(recording, urdf=urdf, feet=both, tell=tell)
-        tell("writing the page")
-        found = write_robot(result, folder)
-    results.show_page(folder)
-    return _told_identified(result, folder, found, results.json)
 
 
 def _told_identified(result: "SessionResult | RobotResult", folder: Path, found: "dict[str, Any]", json: bool) -> int:

@@ -100,6 +100,38 @@ USUAL_READING = Reading()
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
+class RobotFile:
+    """The robot instead of a person: its file, its feet, and what to do about a link that is no possible body."""
+
+    urdf: Annotated[Path | None, Parameter(help="URDF file of a robot instead of a person.")] = None
+    feet: Annotated[str | None, Parameter(help="Links of the robot's right and left foot: RIGHT,LEFT.")] = None
+    mend: Annotated[
+        bool,
+        Parameter(
+            negative="",
+            help="Where a link of the URDF file is no possible body, take a solid box of its mass instead and say so.",
+        ),
+    ] = False
+
+    @property
+    def given(self) -> bool:
+        """Whether any of it was asked for."""
+        return self != PERSON
+
+    def named(self) -> tuple[Path, str]:
+        """Return file and feet; BiodanceError if one is missing."""
+        from biodance.errors import BiodanceError
+
+        if self.urdf is None or self.feet is None:
+            raise BiodanceError("A robot is told by both --urdf FILE and --feet RIGHT,LEFT; one of them is missing.")
+        return self.urdf, self.feet
+
+
+PERSON = RobotFile()
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
 class Results:
     """Where results go: a folder, beside it tables where they are wanted; what is printed and opened."""
 

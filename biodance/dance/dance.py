@@ -6,7 +6,7 @@ planted feet stay where they are at every instant, not only at samples.
 
 import json
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -42,6 +42,9 @@ class Phase:
     kind: Literal["hold", "move"]
     stance: Stance
     posture: int
+
+
+_chain_of = lru_cache(maxsize=4)(Chain)
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +149,7 @@ class Dance:
     @cached_property
     def chain(self) -> Chain:
         """The coordinates in which the dance is written."""
-        return Chain(self.body)
+        return _chain_of(self.body)
 
     @property
     def duration(self) -> float:

@@ -23,8 +23,6 @@ from biodance.dance.postures.ordering import order_postures, support_sequence
 from biodance.dance.postures.posture import intermediate_posture
 from biodance.dance.postures.search import find_postures
 from biodance.dance.postures.selection import choose
-from biodance.dance.problem.chain import Chain
-from biodance.dance.problem.excitation import excitation_blocks
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance, under
 from biodance.dance.transitions.context import Checkpoint, Course, DesignContext, Tell
@@ -71,11 +69,9 @@ def design(
         with ProcessPoolExecutor(WORKERS) as pool:
             return design(body, plan, limits=limits, seed=seed, tell=tell, resume=resume, workers=pool)
     plan = plan.with_limits(limits)
-    chain, parts = Chain(body), excitation_blocks(body)
-    parts = replace(parts, weight=parts.weight * plan.emphasis(body.segments), simplicity=plan.simplicity)
-    work = DesignContext(
-        chain, parts, plan, seed, Checkpoint(resume, body, plan, seed), workers, tell or (lambda what, done, of: None)
-    )
+    alone = DesignContext.alone(body, plan, seed)
+    ledger = Checkpoint(resume, body, plan, seed)
+    work = replace(alone, ledger=ledger, workers=workers, tell=tell or alone.tell)
     danced: tuple[Margin, ...] = ()
     if np.isfinite(plan.instructions):
         dance, danced = _followable(work)
@@ -103,10 +99,11 @@ def _followable(work: DesignContext) -> tuple[Dance, tuple[Margin, ...]]:
         steps, moves = walk.take(stances)
         dance = _walked(work, stances, steps, moves)
         work.tell("performers", attempt, 0)
-        found = perform_with(work.workers, dance, count=_FEW if attempt < _ATTEMPTS - 1 else PERFORMER_COUNT)
-        found = perform_with(work.workers, dance) if found.safe else found
-        bad = {walk.key(steps[p]) for p in found.bad}
-        if found.safe or not bad - walk.banned:
+        few = _FEW if attempt < _ATTEMPTS - 1 else PERFORMER_COUNT
+        found = perform_with(work.workers, dance, work.plan.limits, count=few)
+        found = perform_with(work.workers, dance, work.plan.limits) if found.safe else found
+        bad = {walk.key(steps[p]): limit for p, limit in found.bad}
+        if found.safe or bad.keys() <= walk.banned.keys():
             break
         walk.banned |= bad
     return dance, found.margins(dance)

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from biodance.diagnosis.diagnosis import Adequacy, Verdict
+from biodance.diagnosis.evidence import believe
 from biodance.diagnosis.model import Model
 from biodance.records import CHANNELS, Array
 from biodance.uncertainty.bands import BANDS
@@ -147,6 +148,20 @@ def strain(found: Model) -> float:
         return 0.0
     spread = 2 / 9 * float(np.sum(weight**2) / weight.sum() ** 2)
     return float((np.cbrt(u @ u / weight.sum()) - 1 + spread) / np.sqrt(spread))
+
+
+def strain_as_loud(found: Model) -> float:
+    """Return `strain`; where that is beyond `STRAINED`, under noise as loud as what is left is in every band and
+    channel, where it is louder than in sessions without fault: a restless person, whose forces alone are loud, makes no
+    body strange.
+    """
+    plain = strain(found)
+    if plain <= STRAINED:
+        return plain
+    belief, band = found.belief, found.problem.spectrum.band
+    weight = np.ones(belief.y.size)
+    weight[: 6 * band.size] = np.minimum(1.0, np.sqrt(found.tolerances.energy / energies(found)))[band].ravel()
+    return strain(replace(found, belief=believe(weight[:, None] * belief.X, weight * belief.y)))
 
 
 def stretch(found: Model) -> float:

@@ -16,10 +16,12 @@ from biodance.diagnosis.adequacy import (
     alarming,
     loudness,
     strain,
+    strain_as_loud,
     stretch,
     verdict,
 )
 from biodance.diagnosis.consequence import matters, unit_at
+from biodance.diagnosis.constancy import hanging
 from biodance.diagnosis.diagnosis import Diagnosis, Estimate, Finding, Unobservable
 from biodance.diagnosis.model import Model, NamedCause
 from biodance.diagnosis.naming import Naming, Round, less_one, name_causes, named_of, suspicious
@@ -47,6 +49,10 @@ UNASKED = (
 SEVERAL = (
     "Several channels would have to disturb each other at once. That is what a plate looks like that lies or is turned "
     "otherwise than the file says, or whose matrix is another one: none of these cross-talks is named."
+)
+HANGS = (
+    "is only what this resembles: a true cause has one size in every trial, band and channel, under every load and at "
+    "every place, and the size of this one hangs on"
 )
 LOUD = (
     "What no cause explains is {:.1f} times as large as where tolerances were learned, in most bands and channels "
@@ -147,25 +153,38 @@ def judged(examined: Examined) -> Examined:
     put, known = naming.found.problem, naming.found.tolerances
     plates = put.cases[0].trial.plates
     named = tuple(_measured(cause, put, known) for cause in naming.found.named)
-    every = [(cause, _finding(cause, r, known, plates)) for cause, r in zip(named, naming.accepted, strict=True)]
+    hung = {names: one.over for names, one in hanging(naming.found).items()}
+    every = [
+        (cause, replace(_finding(cause, r, known, plates), hangs_on=hung.get(named_of(cause), "")))
+        for cause, r in zip(named, naming.accepted, strict=True)
+    ]
     large = [pair for pair in every if matters(pair[0].effect, pair[0].theta)]
     told = verdict(len(large), alarming(left), one.gates, strained=strained)
-    doubted = [pair for pair in large if _one_of_several(pair[0], named)]
+    doubted = [pair for pair in large if _one_of_several(pair[0], named) or pair[1].hangs_on]
     trusted = [] if told == "unexplained" else [pair for pair in large if pair not in doubted]
     several = any(_one_of_several(cause, named) for cause, _ in large)
     if doubted and told != "unexplained":
         told = "named, incomplete" if trusted else "unexplained"
-    said = (*_strange(naming.found), *((SEVERAL,) if several else ()))
+    said = (
+        *_strange(naming.found),
+        *((SEVERAL,) if several else ()),
+        *(_hangs(pair[1]) for pair in large if pair[1].hangs_on),
+    )
     found = replace(
         one,
         verdict=told,
-        notes=(*(note for note in one.notes if note not in (STRANGE, UNASKED, SEVERAL)), *said),
+        notes=(*(note for note in one.notes if note not in (STRANGE, UNASKED, SEVERAL) and HANGS not in note), *said),
         findings=tuple(finding for _, finding in trusted),
         resembles=tuple(finding for pair in large if pair not in trusted for finding in pair[1:]),
         tolerated=tuple(finding for cause, finding in every if not matters(cause.effect, cause.theta)),
         adequacy=left,
     )
     return Examined(found, naming, tuple(cause for cause, _ in trusted or large))
+
+
+def _hangs(one: Finding) -> str:
+    """Say that a cause is only resembled, because its size hangs on something."""
+    return f"{one.effect.replace('_', ' ')} {one.target}".strip() + f" {HANGS} {one.hangs_on}."
 
 
 def _one_of_several(one: NamedCause, named: tuple[NamedCause, ...]) -> bool:
@@ -206,8 +225,9 @@ def without_name(examined: Examined, index: int) -> Examined:
 
 
 def _strange(found: Model) -> tuple[str, ...]:
-    """Say what had to be unlike people or laboratories for the rest to fit."""
-    body, rest = strain(found) > STRAINED, stretch(found) > STRETCHED
+    """Say what had to be unlike people or laboratories for the rest to fit; a name has to fit without any excuse."""
+    body = (strain(found) if found.named else strain_as_loud(found)) > STRAINED
+    rest = stretch(found) > STRETCHED
     return (*((STRANGE,) if body else ()), *((UNASKED,) if rest else ()))
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.diagnosis.candidates import Candidate
 from biodance.diagnosis.diagnosis import Unobservable
 from biodance.diagnosis.naming import built
 from biodance.diagnosis.observability import Visibility, detection_limits, hidden, visibility
@@ -26,6 +27,8 @@ _HALF = 0.3
 """m: half the side of the plate that is put under the movement."""
 CLOSEST = 12
 """Pairs of causes that are listed."""
+TOLD = 3.0
+"""Log Bayes factor from which two causes count as told apart: twenty to one."""
 
 
 @dataclass(frozen=True)
@@ -39,15 +42,33 @@ class Confusion:
     difference: float
 
 
+@dataclass(frozen=True)
+class Remedy:
+    """What to ``do`` beside the movement, so that causes are seen that it hides (``unseen``) and told apart that it
+    confuses (``confused``): effect and target of each.
+    """
+
+    do: str
+    unseen: tuple[tuple[str, str], ...]
+    confused: tuple[tuple[str, str], ...]
+
+
 @dataclass(frozen=True, eq=False)
 class Foresight:
     """``limits`` of all causes, easiest first; ``hidden`` those that will stay unseen; ``confusions`` the closest pairs
-    among the causes that will be seen at their typical size, worst first.
+    among the causes that will be seen at their typical size, worst first; ``changes`` what would help, that which helps
+    against most causes first.
     """
 
     limits: tuple[Unobservable, ...]
     hidden: tuple[Unobservable, ...]
     confusions: tuple[Confusion, ...]
+    changes: tuple[Remedy, ...] = ()
+
+    @property
+    def seen(self) -> tuple[Unobservable, ...]:
+        """The causes that will be seen at their typical size."""
+        return tuple(row for row in self.limits if row.limit <= row.typical)
 
     @property
     def separation(self) -> float:
@@ -82,7 +103,7 @@ def foresee(
     found, causes = built(put, known, effects)
     seen = visibility(found, causes)
     rows = tuple(sorted(detection_limits(seen, body, known.threshold), key=lambda row: row.limit / row.typical))
-    return Foresight(rows, hidden(rows), _confusions(seen, rows))
+    return Foresight(rows, hidden(rows), pairs := _confusions(seen, rows), _changes(causes, rows, pairs))
 
 
 def planned(body: Body, motion: Motion, name: str) -> Trial:
@@ -119,6 +140,22 @@ def _confusions(seen: Visibility, rows: tuple[Unobservable, ...]) -> tuple[Confu
         nearest = int(np.argmin(difference))
         found.append(Confusion(one.names, seen.causes[nearest].names, float(difference[nearest])))
     return tuple(sorted(found, key=lambda pair: pair.difference)[:CLOSEST])
+
+
+def _changes(
+    causes: tuple[Candidate, ...], rows: tuple[Unobservable, ...], pairs: tuple[Confusion, ...]
+) -> tuple[Remedy, ...]:
+    """Return what to do, in the words of the effects that stay unseen at their typical size or are confused."""
+    words = {one.effect.name: one.effect.separated_by for one in causes}
+    unseen = [(row.effect, row.target) for row in rows if row.limit > row.typical]
+    confused = [pair.cause for pair in pairs if pair.difference < TOLD]
+    out: dict[str, tuple[list[tuple[str, str]], list[tuple[str, str]]]] = {}
+    for k, some in enumerate((unseen, confused)):
+        for cause in some:
+            if words.get(cause[0]):
+                out.setdefault(words[cause[0]], ([], []))[k].append(cause)
+    found = [Remedy(do, tuple(hides), tuple(mixed)) for do, (hides, mixed) in out.items()]
+    return tuple(sorted(found, key=lambda one: -len(one.unseen) - len(one.confused)))
 
 
 def session_of(motion: Motion, seconds: float) -> tuple[Motion, ...]:

@@ -15,6 +15,8 @@ from biodance.diagnosis.testimony import Verdicts, size_by
 
 _FAR = 3.0
 """Standard deviations between two sizes of one cause from which they contradict each other."""
+_PLAIN = 3.0
+"""Times its limit: a cause so large is seen by the simulation, whatever else it cannot explain."""
 _EXCLUDED = "what the simulation would explain by a {} is none, as feet, clocks and weights show"
 """Why nothing can be told where the only cause of the simulation is excluded by the witnesses."""
 _RAW = ("clipping", "axis_error", "unit_error", "frame_rate")
@@ -60,12 +62,25 @@ def _names(one: Finding | Alias) -> tuple[str, str]:
 
 def _explained_without(finding: Finding, one: Diagnosis) -> bool:
     """Return whether the simulation found something else wrong, though it would see a cause of this size: a load is
-    weight to the plates, and a hand that carries it moves where people stand.
+    weight to the plates, and a hand that carries it moves where people stand; or found this very cause to have no one
+    size. Where it doubts what it found, it still has to have seen some of a cause that is `_PLAIN`.
     """
-    if one.doubt or not finding.parameters or one.verdict == "nothing wrong":
+    if any(_names(other) == _names(finding) and other.hangs_on for other in one.resembles):
+        return True
+    if not finding.parameters or one.verdict == "nothing wrong":
         return False
     limits = {(row.effect, row.target): row.limit for row in one.limits}
-    return abs(finding.parameters[0].value) > limits.get(_names(finding), float("inf"))
+    times = abs(finding.parameters[0].value) / limits.get(_names(finding), float("inf"))
+    if one.doubt:
+        return times > _PLAIN and _evidence(finding, one) <= 0.0
+    return times > 1.0
+
+
+def _evidence(finding: Finding, one: Diagnosis) -> float:
+    """Return the log Bayes factor of a cause for the simulation alone, before any was named; infinite where it was not
+    asked.
+    """
+    return next((a.log_bayes_factor for a in one.candidates if _names(a) == _names(finding)), float("inf"))
 
 
 def _together(by_witnesses: Finding, by_simulation: Finding | None) -> Finding:

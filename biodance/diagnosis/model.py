@@ -55,9 +55,9 @@ class Model:
         """(10N,) posterior mean of the parameters."""
         return self.problem.prior.phi + self.problem.factor @ self.belief.mean[: self.problem.factor.shape[1]]
 
-    def white(self, rows: Array) -> Array:
-        """Return whitened ``rows`` (r, n)."""
-        return white(self.problem, self.tolerances, rows)
+    def white(self, rows: Array, *, out: Array | None = None) -> Array:
+        """Return whitened ``rows`` (r, n), in ``out`` (which may be ``rows``) or a new array."""
+        return white(self.problem, self.tolerances, rows, out=out)
 
     def less(self, named: tuple[NamedCause, ...]) -> "Model":
         """Return the model with the causes ``named`` taken off the target."""
@@ -68,10 +68,10 @@ class Model:
         return replace(self, belief=Belief.known(X, factor, self.white(y[:, None])[:, 0]), named=named)
 
 
-def white(problem: Problem, tolerances: Tolerances, rows: Array) -> Array:
-    """Return ``rows`` (r, n) of the problem in units of their standard deviation."""
+def white(problem: Problem, tolerances: Tolerances, rows: Array, *, out: Array | None = None) -> Array:
+    """Return ``rows`` (r, n) of the problem in units of their standard deviation, in ``out`` or a new array."""
     mass = float(problem.cases[0].body.sip.mass.sum())
-    return whitened(rows, problem.spectrum.band, marker_keys(problem), mass, tolerances)
+    return whitened(rows, problem.spectrum.band, marker_keys(problem), mass, tolerances, out=out)
 
 
 def marker_keys(problem: Problem) -> tuple[str, ...]:
@@ -129,6 +129,8 @@ def model(problem: Problem, causes: tuple[Candidate, ...], tolerances: Tolerance
         problem, tuple(one for one in causes if tolerances.size(key_of(*one.names)) > 0)
     )
     expected = shown_left_out(columns @ np.array([tolerances.mean(key) for key in mean_keys]), marker_keys(problem))
-    X = np.concatenate([problem.sip, columns * np.array([tolerances.size(key) for key in keys])], axis=1)
-    both = white(problem, tolerances, np.concatenate([X, (problem.target - expected)[:, None]], axis=1))
+    columns *= np.array([tolerances.size(key) for key in keys])
+    both = np.concatenate([problem.sip, columns, (problem.target - expected)[:, None]], axis=1)
+    del columns  # the largest arrays of a diagnosis are not kept twice
+    both = white(problem, tolerances, both, out=both)
     return Model(problem, tolerances, believe(both[:, :-1], both[:, -1]), expected)

@@ -240,10 +240,11 @@ def screen(found: Model, causes: tuple[Candidate, ...]) -> tuple[ScoredCandidate
     """Return all causes with their evidence, most probable first."""
     widths = [one.basis.shape[1] for one in causes]
     named = taken(found)
-    Z = found.white(np.concatenate([one.basis for one in causes], axis=1))
+    Z = np.concatenate([one.basis for one in causes], axis=1)
+    Z = found.white(Z, out=Z)
     s, G = found.belief.score(Z)
     if named.shape[1]:
-        G = G - _shared(found, named, Z)
+        G = G - shared(found, named, Z)
     targets = {name: sum(1 for one in causes if one.names[0] == name) for name, _ in (c.names for c in causes)}
     suspects, start = [], 0
     for one, width in zip(causes, widths, strict=True):
@@ -263,7 +264,7 @@ def taken(found: Model) -> Array:
     return found.white(np.concatenate(parts, axis=1)) if parts else np.empty((found.belief.y.size, 0))
 
 
-def _shared(found: Model, named: Array, Z: Array) -> Array:
+def shared(found: Model, named: Array, Z: Array) -> Array:
     """Return (k, k): what of the information of ``Z`` (r, k) the sizes of the named causes may still absorb."""
     both = np.concatenate([named, Z], axis=1)
     _, G = found.belief.score(both)

@@ -117,7 +117,8 @@ def unit_directions(one: Candidate) -> list[Array]:
 def visibility(found: Model, causes: tuple[Candidate, ...]) -> Visibility:
     """Return what ``found``, a model without named causes, lets every cause show."""
     widths = np.cumsum([0, *(one.basis.shape[1] for one in causes)])
-    Z = found.white(np.concatenate([one.basis for one in causes], axis=1))
+    Z = np.concatenate([one.basis for one in causes], axis=1)
+    Z = found.white(Z, out=Z)
     _, G = found.belief.score(Z)
     return Visibility(causes, G, tuple(slice(a, b) for a, b in pairwise(widths.tolist())), found)
 

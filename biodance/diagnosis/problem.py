@@ -5,7 +5,7 @@
 Columns of faults come from `candidates`; sizes of everything from `tolerances`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -74,11 +74,11 @@ class Problem:
     def columns(self, some: Sequence[Effect]) -> list[Array]:
         """Return (r, p) for each of ``some`` effects: what one unit of each parameter adds to the rows."""
         wrench = self.spectrum.rows(
-            tuple(np.concatenate([one.columns(case) for one in some], axis=2) for case in self.cases)
+            np.concatenate([one.columns(case) for one in some], axis=2) for case in self.cases
         )
-        ends = np.cumsum([len(one.parameters) for one in some])
-        parts = np.split(wrench.reshape(self.wrench_rows, -1), ends[:-1], axis=1)
-        return [np.concatenate([part, self.marker_rows(one)]) for part, one in zip(parts, some, strict=True)]
+        markers = np.concatenate([self.marker_rows(one) for one in some], axis=1)
+        found = np.concatenate([wrench.reshape(self.wrench_rows, -1), markers])
+        return np.split(found, np.cumsum([len(one.parameters) for one in some])[:-1], axis=1)
 
     def unit(self, effect: Effect) -> Array:
         """Return the columns (r, p) of one effect, computed once."""
@@ -121,7 +121,7 @@ class Problem:
         absurd = table[:, 0] < _LIGHTEST * own[:, 0]
         table[absurd] = own[absurd]
         heavier = replace(body, sip=Sip(body.sip.segments, table.ravel(), body.sip.covariance))
-        rows, markers = _kinematic_rows(self.spectrum, _errors(heavier, self.cases, self.spectrum))
+        rows, markers, _ = _kinematic_rows(self.spectrum, _errors(heavier, self.cases, self.spectrum))
         return replace(self, kinematics=np.concatenate([rows, markers, np.zeros((len(self.shown), rows.shape[1]))]))
 
 
@@ -155,15 +155,11 @@ def problem(
     cases = tuple(case for case, _ in pairs)
     where = spectrum(cases, tuple(use for _, use in pairs), about, shortest=shortest)
     factor = prior_factor(before)
-    W = where.rows(tuple(case.regressor @ factor for case in cases))
-    errors = _errors(body, cases, where)
-    rows, markers = _kinematic_rows(where, errors)
+    W = where.rows(case.regressor @ factor for case in cases)
+    rows, markers, unit = _kinematic_rows(where, _errors(body, cases, where))
     shown = sizes_shown(cases, {**effects(), **effects(chosen)})
     sip = np.concatenate([W.reshape(-1, W.shape[2]), np.zeros((len(markers) + len(shown), W.shape[2]))])
-    unit = next(one for some in errors for one in some)
-    groups = tuple(
-        in_state(_of_whole(group, body), joint, body) for group, joint in zip(unit.groups, unit.joints, strict=True)
-    )
+    groups = tuple(in_state(_of_whole(group, body), joint, body) for group, joint in unit)
     measured = where.rows(tuple(case.residual[:, :, None] for case in cases))
     target = np.concatenate([measured.ravel(), _mean_markers(cases, where).ravel(), list(shown.values())])
     rows = np.concatenate([rows, markers, np.zeros((len(shown), rows.shape[1]))])
@@ -191,33 +187,37 @@ def _of_whole(group: str, body: Body) -> str:
     return f"{quantity} {wholes.get(target, target)}"
 
 
-def _errors(body: Body, cases: tuple[Case, ...], where: Spectrum) -> list[list[Errors]]:
-    """Return the elementary errors of every run of every trial."""
-    return [
-        [forward(of_clusters(parts_as_segments(body)), _part(case.motion, pick)) for pick in picks]
-        for case, picks in zip(cases, where.picks, strict=True)
-    ]
+def _errors(body: Body, cases: tuple[Case, ...], where: Spectrum) -> Iterator[tuple[int, NDArray[np.intp], Errors]]:
+    """Return the elementary errors of every run of every trial, with the trial's index and the run's frames; one after
+    the other, because they are large.
+    """
+    sources = of_clusters(parts_as_segments(body))
+    for index, (case, picks) in enumerate(zip(cases, where.picks, strict=True)):
+        for pick in picks:
+            yield index, pick, forward(sources, _part(case.motion, pick))
 
 
 def _part(motion: Motion, pick: NDArray[np.intp]) -> Motion:
     return Motion(motion.time[pick], motion.q[pick], motion.v[pick], motion.a[pick])
 
 
-def _kinematic_rows(where: Spectrum, errors: list[list[Errors]]) -> tuple[Array, Array]:
-    """Return the rows (6 m, K) of the errors' wrenches and (3M, K) of the mean marker residuals; signs as `forward`
-    has them.
+def _kinematic_rows(
+    where: Spectrum, errors: Iterable[tuple[int, NDArray[np.intp], Errors]]
+) -> tuple[Array, Array, tuple[tuple[str, str], ...]]:
+    """Return the rows (6 m, K) of the errors' wrenches, (3M, K) of the mean marker residuals, signs as `forward` has
+    them, and the group and joint of each error (K).
     """
-    wrench, frames = [], 0
-    markers = np.zeros_like(next(one for some in errors for one in some).markers)
-    for index, some in enumerate(errors):
+    wrench, names, frames = [], (), 0
+    markers = np.zeros(())
+    for index, pick, one in errors:
         bands = where.layout.bands.at(where.rates[index])
-        for pick, one in zip(where.picks[index], some, strict=True):
-            kept = bands.of(pick.size) >= 0
-            wrench.append(bands.coefficients(where.layout.shift @ one.wrench)[kept])
-            markers += pick.size * one.markers
-            frames += pick.size
+        kept = bands.of(pick.size) >= 0
+        wrench.append(bands.coefficients(where.layout.shift @ one.wrench)[kept])
+        names = names or tuple(zip(one.groups, one.joints, strict=True))
+        markers = markers + pick.size * one.markers
+        frames += pick.size
     rows = np.concatenate(wrench)
-    return rows.reshape(-1, rows.shape[2]), (markers / frames).reshape(-1, rows.shape[2])
+    return rows.reshape(-1, rows.shape[2]), (markers / frames).reshape(-1, rows.shape[2]), names
 
 
 def _shares(where: Spectrum, count: int) -> Array:

@@ -11,57 +11,30 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.identification.identification import standing_point
+from biodance.diagnosis.robot_columns import LOADED_KINDS, Columns, RobotCause, columns_of, motion_changes, without
 from biodance.identification.learning import START, WORTH
 from biodance.identification.mismatch import SHORTEST
 from biodance.identification.posterior import prior_factor
 from biodance.identification.robot import RobotMotion
-from biodance.identification.robot_errors import (
-    GIVE,
-    THINNED,
-    ZERO,
-    angle_changes,
-    leg_joints,
-    load_angles,
-    place_changes,
-    slow_wrench,
-    some_frames,
-)
-from biodance.identification.statistics import Statistics, empty, layout_for
-from biodance.motion.grounded import ground_again
+from biodance.identification.robot_errors import THINNED, place_changes, slow_wrench, some_frames
+from biodance.identification.statistics import Statistics, empty
 from biodance.motion.regressor import regressor
-from biodance.records import CHANNELS, Array, Wrench
+from biodance.records import Array
 from biodance.threads import one_thread
 from biodance.uncertainty.learning import Moments, maximise, noise_of
 from biodance.uncertainty.noise import Noise
-from biodance.uncertainty.plates import Plates, plate_errors, plate_sources
+from biodance.uncertainty.plates import plate_errors, plate_sources
 from biodance.uncertainty.tolerances import REFERENCE_PERSON
 
-_WIDE = 10.0
-"""Standard deviation of a cause that is there, over the usual error of its kind."""
-_LOADED = 2.0
-"""The same of joints that give or have play, in units of `GIVE`; usual is none."""
 _CLEAR, _LIKE = 8.0, 3.0
 """Nats: least evidence of a cause; causes within so many of the best are not told apart from it."""
 _WORST = 4.0
 """Standard deviations of a cause that is there, beyond which none is believed: it would be seen without us."""
+_SHARED = 0.15
+"""Of what gives or has play: how far its size may be off because nobody knows how two standing feet share the load."""
 _MOST = 4
 """Causes that are looked for, one after the other."""
 _ROUNDS = 12
-_OF_JOINTS = ("encoder_zero", "flexible_joint", "backlash")
-
-
-@dataclass(frozen=True)
-class RobotCause:
-    """One thing that may be wrong: ``kind`` (encoder_zero, flexible_joint, backlash, plate_gain, plate_crosstalk,
-    plate_rotation, plate_position, plate_offset, time_delay), ``where`` joint or channel, and what one column means:
-    ``per`` of ``unit``.
-    """
-
-    kind: str
-    where: str
-    per: float
-    unit: str
 
 
 @dataclass(frozen=True)
@@ -76,16 +49,6 @@ class RobotFinding:
     gain: float
     kept_gain: float
     rivals: tuple[RobotCause, ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class _Columns:
-    """Names and meaning of all columns beside the parameters: ``usual`` and ``wide`` (k,) standard deviations."""
-
-    causes: tuple[RobotCause | None, ...]
-    usual: Array
-    wide: Array
-    layout: Noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +89,7 @@ def robot_causes(
     ``fitted`` and ``kept`` trials; all frames in which a foot certainly stands are used.
     """
     trials, found = (*fitted, *kept), list[RobotFinding]()
-    columns = _columns(body, fitted, len(trials))
+    columns = columns_of(body, fitted, trials)
     size, here = prior_factor(body.sip).shape[1], np.array(columns.usual)
     noise = replace(columns.layout, covariance=np.tile(_start(body), (len(columns.layout.bands), 1, 1)))
     while True:
@@ -148,9 +111,7 @@ def robot_causes(
         found, trials = _refined(body, found, trials, columns, every, here)
 
 
-def _chosen(
-    columns: _Columns, gain: Array, later: Array, known: list[RobotCause]
-) -> tuple[int, tuple[RobotCause, ...]]:
+def _chosen(columns: Columns, gain: Array, later: Array, known: list[RobotCause]) -> tuple[int, tuple[RobotCause, ...]]:
     """Return the column of the best cause (-1: none is clear) and the causes that cannot be told from it."""
     free = np.array([one is not None and one not in known for one in columns.causes])
     ranked = np.where(free & (later >= 0), gain, -np.inf)
@@ -165,7 +126,7 @@ def _refined(
     body: Body,
     found: list[RobotFinding],
     trials: tuple[RobotMotion, ...],
-    columns: _Columns,
+    columns: Columns,
     equations: tuple[Array, Array],
     here: Array,
 ) -> tuple[list[RobotFinding], tuple[RobotMotion, ...]]:
@@ -178,93 +139,27 @@ def _refined(
         more, sd = float((covariance @ b)[size + k]), float(np.sqrt(covariance[size + k, size + k]))
         per, most = one.cause.per, _WORST * columns.wide[k]
         more = float(np.clip(one.value / per + more, -most, most) - one.value / per)
-        out.append(replace(one, value=one.value + more * per, sd=sd * per))
-        trials = tuple(_without(body, trial, one.cause, k, more) for trial in trials)
+        value = one.value + more * per
+        unshared = _SHARED * abs(value) if one.cause.kind in LOADED_KINDS else 0.0
+        out.append(replace(one, value=value, sd=float(np.hypot(sd * per, unshared))))
+        trials = tuple(without(body, trial, columns, one.cause, more) for trial in trials)
     return out, trials
 
 
-def _without(body: Body, one: RobotMotion, cause: RobotCause, column: int, amount: float) -> RobotMotion:
-    """Return a trial without ``amount`` of the cause in ``column``."""
-    fit, n = one.fit, len(body.joints)
-    if cause.kind in _OF_JOINTS:
-        shape = np.zeros_like(one.angle)
-        j = [joint.name for joint in body.joints].index(cause.where)
-        soft, play, _ = load_angles(body, one.grounded, fit.wrench.value)
-        unit = {"encoder_zero": -ZERO * np.ones(len(shape)), "flexible_joint": cause.per * soft[:, j]}
-        shape[:, j] = amount * unit.get(cause.kind, GIVE * play[:, j])
-        angle = one.angle + shape
-        found = ground_again(body, one.grounded, angle)
-        return RobotMotion(replace(fit, motion=found.motion), angle, found)
-    plates = plate_sources()
-    k = column - n - 2 * len(leg_joints(body))
-    one_fault = Plates(plates.mixing[k : k + 1], plates.offset[k : k + 1], plates.delay[k : k + 1])
-    about = layout_for(standing_point((fit,)))
-    error = plate_errors(slow_wrench(body, one.grounded, one.angle), fit.motion.rate, about, one_fault)[:, :, 0]
-    return replace(one, fit=replace(fit, wrench=Wrench(fit.wrench.time, fit.wrench.value - amount * error)))
-
-
-def _columns(body: Body, fitted: tuple[RobotMotion, ...], trials: int) -> _Columns:
-    """Return what every column means: encoders, joints that give, play, plate, places of the trials."""
-    legs = leg_joints(body)
-    torque = np.mean([load_angles(body, one.grounded, one.fit.wrench.value)[2] for one in fitted], axis=0)
-    names = [joint.name for joint in body.joints]
-    causes: list[RobotCause | None] = [RobotCause("encoder_zero", name, ZERO, "rad") for name in names]
-    causes += [RobotCause("flexible_joint", names[j], GIVE / float(torque[j] + 1e-9), "rad/(N·m)") for j in legs]
-    causes += [RobotCause("backlash", names[j], 2 * GIVE, "rad") for j in legs]
-    causes += _plate_causes()
-    loaded = slice(len(names), len(names) + 2 * len(legs))
-    usual, wide = np.ones(len(causes)), np.full(len(causes), _WIDE)
-    usual[loaded], wide[loaded] = 0.0, _LOADED
-    places = np.ones(3 * trials)
-    about = standing_point(tuple(one.fit for one in fitted))
-    return _Columns(
-        (*causes, *[None] * len(places)), np.append(usual, places), np.append(wide, places), layout_for(about)
-    )
-
-
-def _plate_causes() -> list[RobotCause]:
-    """Return the causes of `plate_sources`, in its order."""
-    plates = plate_sources()
-    rows, columns = np.divmod(np.arange(36), 6)
-    out = []
-    for k, (r, c) in enumerate(zip(rows, columns, strict=True)):
-        per, where = float(plates.mixing[k, r, c]), CHANNELS[c] if r == c else f"{CHANNELS[c]} to {CHANNELS[r]}"
-        out.append(RobotCause("plate_gain" if r == c else "plate_crosstalk", where, per, ""))
-    out += [
-        RobotCause("plate_rotation", axis, float(np.abs(plates.mixing[36 + i]).max()), "rad")
-        for i, axis in enumerate("xyz")
-    ]
-    out += [
-        RobotCause("plate_position", axis, float(np.abs(plates.mixing[39 + i]).max()), "m")
-        for i, axis in enumerate("xyz")
-    ]
-    units = ("N",) * 3 + ("N·m",) * 3
-    out += [
-        RobotCause("plate_offset", channel, float(plates.offset[42 + i, i]), unit)
-        for i, (channel, unit) in enumerate(zip(CHANNELS, units, strict=True))
-    ]
-    return [*out, RobotCause("time_delay", "plate", float(plates.delay[48]), "s")]
-
-
-def _gathered(body: Body, trials: tuple[RobotMotion, ...], fitted: int, columns: _Columns) -> list[_Products]:
+def _gathered(body: Body, trials: tuple[RobotMotion, ...], fitted: int, columns: Columns) -> list[_Products]:
     """Return the products of the ``fitted`` first trials, and of the others where there are some."""
-    parts = [_products(body, one, columns, k, len(trials)) for k, one in enumerate(trials)]
+    parts = [_products(body, one, columns, k) for k, one in enumerate(trials)]
     return [_Products.of(some) for some in (parts[:fitted], parts[fitted:]) if some]
 
 
-def _products(body: Body, one: RobotMotion, columns: _Columns, place: int, trials: int) -> Statistics:
+def _products(body: Body, one: RobotMotion, columns: Columns, trial: int) -> Statistics:
     """Return the second moments of [W S, causes, what the drawing leaves] of one trial."""
-    S, layout, legs, n = prior_factor(body.sip), columns.layout, list(leg_joints(body)), len(body.joints)
-    soft, play, _ = load_angles(body, one.grounded, one.fit.wrench.value)
-    per = np.array([cause.per for cause in columns.causes[n : n + len(legs)] if cause])
-    shapes = np.zeros((len(one.angle), n, n + 2 * len(legs)))
-    shapes[:, range(n), range(n)] = ZERO
-    shapes[:, legs, range(n, n + len(legs))] = per * soft[:, legs]
-    shapes[:, legs, range(n + len(legs), n + 2 * len(legs))] = GIVE * play[:, legs]
-    shapes[:, :, :n] *= -1
-    changes = angle_changes(body, one.grounded, one.angle, shapes)
+    S, layout = prior_factor(body.sip), columns.layout
+    changes = motion_changes(body, one, columns.of_motion)
     plates, fit, slow = plate_sources(), one.fit, slow_wrench(body, one.grounded, one.angle)
-    count = S.shape[1] + changes.shape[2] + len(plates.delay) + 3 * trials
+    count = S.shape[1] + len(columns.causes)
+    first, some = columns.places[trial]
+    first -= changes.shape[2] + len(plates.delay)
     total = empty(count, layout)
     gram, frames = total.gram.copy(), total.count.copy()
     for pick in layout.bands.runs(fit.use, fit.motion.rate):
@@ -272,8 +167,8 @@ def _products(body: Body, one: RobotMotion, columns: _Columns, place: int, trial
             continue
         motion = some_frames(fit.motion, pick)
         W = regressor(body, motion)
-        places = np.zeros((pick.size, 6, 3 * trials))
-        places[:, :, 3 * place : 3 * place + 3] = place_changes(slow[pick], one.grounded)
+        places = np.zeros((pick.size, 6, len(columns.causes) - changes.shape[2] - len(plates.delay)))
+        places[:, :, first : first + some] = place_changes(slow[pick], one.grounded, pick)
         near = np.minimum(pick // THINNED, len(changes) - 1)
         faults = plate_errors(slow[pick], motion.rate, layout, plates)
         left = (fit.wrench.value[pick] - W @ body.sip.phi)[:, :, None]

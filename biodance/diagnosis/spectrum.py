@@ -5,6 +5,7 @@ A stationary error is nearly independent between coefficients; within a band its
 Recordings are low-passed at 10 Hz; what lies above the last of `BANDS` is not looked at.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,9 +38,17 @@ class Spectrum:
     trial: NDArray[np.intp]
     seconds: float
 
-    def rows(self, samples: tuple[Array, ...]) -> Array:
-        """Return the coefficients (m, 6, n) of per-trial ``samples`` (T, 6, n) of wrenches about the lab origin."""
-        return np.concatenate([self.of_trial(i, one) for i, one in enumerate(samples)])
+    def rows(self, samples: Iterable[Array]) -> Array:
+        """Return the coefficients (m, 6, n) of per-trial ``samples`` (T, 6, n) of wrenches about the lab origin, taken
+        one trial after the other.
+        """
+        out: Array | None = None
+        for index, one in enumerate(samples):
+            found = self.of_trial(index, one)
+            out = np.empty((self.band.size, *found.shape[1:])) if out is None else out
+            out[self.trial == index] = found
+        assert out is not None
+        return out
 
     def of_trial(self, index: int, samples: Array) -> Array:
         """Return the coefficients (m_i, 6, n) of one trial's ``samples`` (T, 6, n)."""

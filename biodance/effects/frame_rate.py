@@ -89,6 +89,8 @@ class FrameRate(DiscreteEffect):
         if len(steps) < 2:
             return ()
         step = float(np.median(steps))
+        if np.min(np.sign(step) * np.array(steps)) < -_STEP:
+            return ()  # lost frames are not found again: where trials contradict each other, something else is wrong
         if abs(step) > _STEP:
             said = (
                 f"From the middle of the trials on, forces are {1000 * step:.0f} ms later than at their start: "

@@ -14,8 +14,9 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.effects._base.case import Case
-from biodance.effects._base.exchanged_labels import Pair, exchanged_pairs, partner, travels
+from biodance.effects._base.exchanged_labels import Pair, arms_hang, exchanged_pairs
 from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded
+from biodance.effects._base.wrists import partner
 from biodance.errors import BiodanceError
 from biodance.motion.ik.inverse_kinematics import solve_ik
 from biodance.records import Array, Markers, Session, Trial
@@ -81,8 +82,9 @@ def _exchanges(session: Session) -> tuple[frozenset[Pair], dict[str, frozenset[P
     alone show them; with and without plates.
     """
     static = next((trial for trial in session.trials if trial.role == "static" and trial.markers is not None), None)
-    known = exchanged_pairs(static, None, frozenset()) if static else frozenset()
-    found = {trial.name: exchanged_pairs(trial, static, known) for trial in session.trials}
+    hang = [trial.markers for trial in session.trials if trial.markers is not None and arms_hang(trial)]
+    known = exchanged_pairs(static, None, frozenset(), hang) if static else frozenset()
+    found = {trial.name: exchanged_pairs(trial, static, known, hang) for trial in session.trials}
     return known, {name: pairs for name, pairs in found.items() if pairs}
 
 
@@ -91,7 +93,7 @@ def _is_open(trial: Trial, pair: Pair) -> bool:
     a wrist, while the arms do anything.
     """
     sides = partner(pair[0]) == pair[1]
-    return trial.role != "static" and trial.markers is not None and not sides and not travels(trial.markers)
+    return trial.markers is not None and not sides and not arms_hang(trial)
 
 
 def fits_better(case: Case, pair: Pair) -> bool:

@@ -5,7 +5,7 @@ A joint that gives lies, beyond its encoder, by torque over stiffness away from 
 the side to which its load pushes. Both torques are the drawing's. The robot is put on its foot anew with every change.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from biodance.motion.grounded import Grounded, ground_again
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
 from biodance.records import SIDES, Array, Motion, Wrench
-from biodance.spatial import cross, quaternion_matrix
+from biodance.spatial import cross, quaternion_matrix, wrench_about_point
 
 ZERO = 0.005
 """rad: standard deviation of an encoder's zero about the drawing's (judgement: 0.3 degrees, set by hand at stops)."""
@@ -27,6 +27,9 @@ _TURNS = 0.2
 """Of the RMS torque of a joint: load at which its play is taken up (smooth, as friction holds it near zero load)."""
 PLACE, YAW = 0.02, 0.035
 """m and rad: how well the place on the plate follows from the drawing's centre of pressure, before the data."""
+SLIP = 0.25
+"""Of both: how far a later stance may be from where the chain of joints puts it; feet slide, soles are set down askew.
+"""
 _NEAR = 0.02
 """Of the height of the root: soles so near the lower one bear too."""
 _QUIET = 1.5
@@ -53,39 +56,59 @@ def zero_changes(body: Body, one: Grounded, angle: Array) -> Array:
     )
 
 
-def leg_joints(body: Body) -> tuple[int, ...]:
-    """Return the joints between the root and either foot."""
-    found = set[int]()
+def leg_chains(body: Body) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return the joints from the root to the right and to the left foot."""
+    out = []
     for side in SIDES:
-        joint = body.segment_joint[body.feet[side].segment]
+        found, joint = list[int](), body.segment_joint[body.feet[side].segment]
         while joint >= 0:
-            found.add(joint)
+            found.append(joint)
             joint = body.joints[joint].parent
-    return tuple(sorted(found))
+        out.append(tuple(reversed(found)))
+    return out[0], out[1]
 
 
-def load_angles(body: Body, one: Grounded, measured: Array) -> tuple[Array, Array, Array]:
-    """Return by how much (T, n) rad each joint lies beyond its encoder where it gives by 1 rad per N·m, and where it
-    has play of 1 rad to either side; and the RMS torques (n,) N·m, with the ``measured`` wrench (T, 6) of the
-    ground, NaN where unknown. Zero for joints that are not of the legs.
+@dataclass(frozen=True, eq=False)
+class Loads:
+    """What gives under load: by how much (T, n) rad each joint lies beyond its encoder where it gives by 1 rad per N·m
+    (``soft``) and where it has play of 1 rad to either side (``play``), zero for joints that are not of the legs; by
+    how much the standing sole is turned, rotation vectors (T, 3) rad, where ground and sole give by 1 rad per N·m
+    ``forwards`` and ``sideways``; and the RMS ``torque`` (n,) of the joints, ``moment`` (2,) of the sole, N·m.
     """
-    joints = list(leg_joints(body))
+
+    soft: Array
+    play: Array
+    forwards: Array
+    sideways: Array
+    torque: Array
+    moment: Array
+
+
+def loads(body: Body, one: Grounded, measured: Array) -> Loads:
+    """Return the loads with the ``measured`` wrench (T, 6) of the ground, NaN where unknown."""
+    joints = sorted(set(sum(leg_chains(body), ())))
+    every, pressed, ahead = _torques(body, one, measured)
     torque = np.zeros((len(measured), len(body.joints)))
-    torque[:, joints] = _torques(body, one, measured)[:, joints]
+    torque[:, joints] = every[:, joints]
     size = np.sqrt(np.mean(torque**2, axis=0))
-    return -torque, -np.tanh(torque / np.maximum(_TURNS * size, 1e-9)), size
+    left = np.cross([0.0, 0.0, 1.0], ahead)
+    give = [-np.einsum("ti,ti->t", pressed, axis) for axis in (left, ahead)]
+    moment = np.sqrt(np.mean(np.square(give), axis=1))
+    play = -np.tanh(torque / np.maximum(_TURNS * size, 1e-9))
+    return Loads(-torque, play, give[0][:, None] * left, give[1][:, None] * ahead, size, moment)
 
 
-def angle_changes(body: Body, one: Grounded, angle: Array, shapes: Array) -> Array:
+def angle_changes(body: Body, one: Grounded, angle: Array, shapes: Array, tilts: Array | None = None) -> Array:
     """Return the change (T / `THINNED`, 6, k) of the needed wrench by changes ``shapes`` (T, n, k) rad of the joint
-    ``angle`` (T, n) rad.
+    ``angle`` (T, n) rad and ``tilts`` (T, 3, k) rad of the standing sole.
     """
     few, time = angle[::THINNED], one.motion.time
     slow = LowPass(cutoff=_SLOW / float(time[THINNED] - time[0]))
     before = _needed(body, ground_again(body, one, few, every=THINNED, settings=slow).motion)
     out = np.empty((*before.shape, shapes.shape[2]))
     for k in range(shapes.shape[2]):
-        after = ground_again(body, one, few + shapes[::THINNED, :, k], every=THINNED, settings=slow)
+        tilt = 0.0 if tilts is None else tilts[::THINNED, :, k]
+        after = ground_again(body, one, few + shapes[::THINNED, :, k], every=THINNED, settings=slow, tilt=tilt)
         out[:, :, k] = _needed(body, after.motion) - before
     return out
 
@@ -111,27 +134,42 @@ def _needed(body: Body, motion: Motion) -> Array:
     return np.concatenate([force, moment + cross(motion.q[:, :3], force)], axis=1)
 
 
-def place_changes(wrench: Array, one: Grounded) -> Array:
-    """Return the changes (T, 6, 3) of a wrench by one standard deviation of the place along x, y and of the turn."""
+def places_of(one: Grounded) -> int:
+    """Return how many columns `place_changes` gives."""
+    return 3 * len(one.supports)
+
+
+def place_changes(wrench: Array, one: Grounded, pick: "slice | np.ndarray" = slice(None)) -> Array:
+    """Return the changes (T, 6, 3 S) of a wrench by one standard deviation of the place along x, y and of the turn: of
+    the whole motion, and of each of the S stances after the first; ``wrench`` at the instants ``pick``.
+    """
     force, moment = wrench[:, :3], wrench[:, 3:]
-    out = np.zeros((len(wrench), 6, 3))
+    whole = np.zeros((len(wrench), 6, 3))
     for k in range(2):
-        out[:, 3:, k] = cross(PLACE * np.eye(3)[k], force)
+        whole[:, 3:, k] = cross(PLACE * np.eye(3)[k], force)
     up = YAW * np.eye(3)[2]
-    out[:, :3, 2], out[:, 3:, 2] = cross(up, force), cross(up, moment)
+    whole[:, :3, 2], whole[:, 3:, 2] = cross(up, force), cross(up, moment)
+    stance = one.stance[pick]
+    later = [SLIP * (stance == s)[:, None, None] * whole for s in range(1, len(one.supports))]
+    out = np.concatenate([whole, *later], axis=2)
     return out / 10 if one.base is not None and one.base.position is not None else out
 
 
-def _torques(body: Body, one: Grounded, measured: Array) -> Array:
-    """Return the torques (T, n) N·m under the measured wrench, from the feet upwards; a foot whose sole is near the
-    ground bears its share. Accelerations are left out: they would bring in the encoders' noise.
+def _torques(body: Body, one: Grounded, measured: Array) -> tuple[Array, Array, Array]:
+    """Return the torques (T, n) N·m under the measured wrench, from the feet upwards, the moment (T, 3) N·m on the
+    standing sole about its middle, and the direction (T, 3) in which it points; a foot whose sole is near the ground
+    bears its share. Accelerations are left out: they would bring in the encoders' noise.
     """
     pose = poses(body, one.motion.q)
-    soles = []
+    rest = poses(body, np.concatenate([[0.0, 0, 0, 0, 0, 0, 1], np.zeros(len(body.joints))])[None])
+    soles, aheads = [], []
     for side in SIDES:
         foot = body.feet[side]
         middle = foot.outline.mean(axis=0)
         soles.append(pose.rotation[:, foot.segment] @ middle + pose.position[:, foot.segment])
+        ahead = pose.rotation[:, foot.segment] @ (rest.rotation[0, foot.segment].T @ [1.0, 0.0, 0.0])
+        flat = ahead * [1.0, 1.0, 0.0]
+        aheads.append(flat / np.linalg.norm(flat, axis=1, keepdims=True))
     height = np.stack([sole[:, 2] for sole in soles], axis=1)
     down = height < height.min(axis=1, keepdims=True) + _NEAR * np.median(one.motion.q[:, 2])
     down[np.arange(len(down)), one.foot] = True
@@ -141,4 +179,7 @@ def _torques(body: Body, one: Grounded, measured: Array) -> Array:
     wrench = Wrench(still.time, low_pass(measured, still.rate, LowPass(cutoff=_QUIET)))
     parts = distribute(wrench, soles[0], soles[1], down)
     names = [body.segments[body.feet[side].segment] for side in SIDES]
-    return joint_torques(body, still, dict(zip(names, parts, strict=True))).torque
+    torque = joint_torques(body, still, dict(zip(names, parts, strict=True))).torque
+    standing = np.arange(len(down))
+    pressed = [wrench_about_point(part.value, sole)[:, 3:] for part, sole in zip(parts, soles, strict=True)]
+    return torque, np.array(pressed)[one.foot, standing], np.array(aheads)[one.foot, standing]

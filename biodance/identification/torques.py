@@ -10,7 +10,7 @@ measured wrenches: errors of skin and plates in this very trial are not counted,
 are.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,8 +20,9 @@ from biodance.body.body import Body
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import SIGMAS
 from biodance.motion.kinematics import below, poses, segment_motion
-from biodance.motion.regressor import regressor_of
+from biodance.motion.regressor import in_blocks, regressor_of
 from biodance.records import Array, Motion, Wrench
+from biodance.spatial import cross
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,12 +58,26 @@ def torque_bands(
         A segment is not of this body.
     """
     body = found.body
-    Y = torque_regressor(body, motion)
-    given = ground_torques(body, motion, ground)
-    variance = np.einsum("tjp,pq,tjq->tj", Y, found.belief.covariance, Y, optimize=True)
-    torque, table = (Y @ phi - given for phi in (found.sip.phi, body.sip.phi))
+    share = np.eye(10 * len(body.segments)) if body.sharing is None else body.sharing
+    covariance, phi = share @ found.belief.covariance @ share.T, share @ np.stack([found.sip.phi, body.sip.phi], axis=1)
+    needed, variance = np.empty((motion.time.size, len(body.joints), 2)), np.empty((motion.time.size, len(body.joints)))
+    for part, frames in in_blocks(motion):
+        for j, (beyond, Y) in enumerate(_beyond_joints(body, frames)):
+            needed[part, j] = Y @ phi[beyond]
+            variance[part, j] = ((Y @ covariance[np.ix_(beyond, beyond)]) * Y).sum(axis=1)
+    torque, table = np.moveaxis(needed - ground_torques(body, motion, ground)[..., None], 2, 0)
     joints = tuple(joint.name for joint in body.joints)
     return TorqueBands(trial, joints, motion.time, torque, np.sqrt(np.maximum(variance, 0.0)), table, use)
+
+
+def _beyond_joints(body: Body, motion: Motion) -> Iterator[tuple[NDArray[np.intp], Array]]:
+    """Yield for each joint the parameters of the links beyond it and what these need about its axis (T, k)."""
+    W = regressor_of(segment_motion(body, motion), gravity=body.gravity)
+    axis, arm = _axes(body, motion)
+    for j, hangs in enumerate(below(body)):
+        beyond = np.flatnonzero(np.repeat(hangs, 10))
+        some = W[:, :, beyond]
+        yield beyond, np.einsum("tc,tck->tk", axis[:, j], some[:, 3:]) - np.einsum("tc,tck->tk", arm[:, j], some[:, :3])
 
 
 def torque_regressor(body: Body, motion: Motion) -> Array:
@@ -83,7 +98,12 @@ def ground_torques(body: Body, motion: Motion, ground: Mapping[str, Wrench]) -> 
 
 def _about_axes(body: Body, motion: Motion, wrench: Array) -> Array:
     """Return the moments (T, n, k) about the joint axes of wrenches (T, 6, k) about the lab origin: a . (M - o x F)."""
+    axis, arm = _axes(body, motion)
+    return np.asarray(axis @ wrench[:, 3:] - arm @ wrench[:, :3])
+
+
+def _axes(body: Body, motion: Motion) -> tuple[Array, Array]:
+    """Return the joints' axes a (T, n, 3) and a x o (T, n, 3) m, o a point on the axis, lab frame."""
     pose = poses(body, motion.q)
     axis = np.stack([pose.joint_rotation[:, j] @ joint.axis for j, joint in enumerate(body.joints)], axis=1)
-    arm = np.cross(axis, pose.joint_position)
-    return np.asarray(axis @ wrench[:, 3:] - arm @ wrench[:, :3])
+    return axis, cross(axis, pose.joint_position)

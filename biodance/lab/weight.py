@@ -21,8 +21,24 @@ def movement(markers: Markers) -> float:
     seen = markers.seen.any(axis=0)
     if not seen.any():
         return float("nan")
-    low, high = np.nanpercentile(markers.xyz[:, seen], [2, 98], axis=0)
+    low, high = _percentiles(markers.xyz[:, seen], 0.02, 0.98)
     return float(np.median(np.linalg.norm(high - low, axis=1)))
+
+
+def _percentiles(values: Array, *shares: float) -> list[Array]:
+    """Return what the ``shares`` of the numbers along the first axis lie below, (...) each; NaN do not count (as
+    `numpy.nanpercentile`, which goes through the columns one by one: 20 times as long).
+    """
+    ordered = np.sort(values, axis=0)  # NaN last
+    last = np.isfinite(values).sum(axis=0) - 1
+    found = []
+    for share in shares:
+        at = share * last
+        below = np.floor(at).astype(int)
+        around = below, np.minimum(below + 1, last)
+        low, high = (np.take_along_axis(ordered, place[None], axis=0)[0] for place in around)
+        found.append(low + (at - below) * (high - low))
+    return found
 
 
 def is_still(trial: Trial) -> bool:

@@ -6,7 +6,7 @@ where the standing foot changes, the new one stays where the chain has brought i
 first standing sole: origin in its middle, x forwards, y left, z up.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -39,7 +39,7 @@ class Grounded:
     """The ``motion`` of a robot in the frame of its first standing sole, ``foot`` (T,) which stands (0 right, 1 left),
     ``use`` (T,) where one certainly does; ``unclear`` whether angles alone leave that open at times, and ``lean`` the
     foot that was taken to stand then (None: the one that did before); ``base`` what was seen of it beside the joints,
-    and ``under`` as in `ground`.
+    ``under`` as in `ground`, and ``tilt`` (T, 3) rad by which the standing sole is not flat.
     """
 
     motion: Motion
@@ -49,6 +49,12 @@ class Grounded:
     lean: int | None = None
     base: BaseSeen | None = None
     under: float = UNDER[0]
+    tilt: Array | None = None
+
+    @property
+    def stance(self) -> NDArray[np.intp]:
+        """Number (T,) of the stance, from 0: it grows where the standing foot changes."""
+        return np.cumsum(np.diff(self.foot, prepend=self.foot[:1]) != 0)
 
     @property
     def supports(self) -> tuple[tuple[str, float, float], ...]:
@@ -103,23 +109,53 @@ def ground(
     if lean is not None:
         stands[1 - lean] &= ~unclear
     foot, use = _standing(stands, float(1.0 / (time[1] - time[0])))
-    rotation, position = _chained(turn, place, foot)
-    if base is not None:
-        every = np.arange(foot.size)
-        middle = position + np.einsum("tij,tj->ti", rotation, place[foot, every])
-        rotation, position = base.corrected(rotation, position, middle)
-    q = np.concatenate([position, _quaternions(rotation), angle], axis=1)
+    q = _q(angle, turn, place, foot, base=base)
     return Grounded(smooth(body, time, q, settings=settings), foot, use, bool(unclear.any()), lean, base, under)
 
 
-def ground_again(
-    body: Body, one: Grounded, angle: Array, *, every: int = 1, settings: LowPass | None = None
-) -> Grounded:
-    """Return the motion with other joint ``angle`` (T / ``every``, n) rad, standing as ``one`` does, of every so many
-    of its instants.
+def _q(
+    angle: Array,
+    turn: Array,
+    place: Array,
+    foot: NDArray[np.intp],
+    *,
+    base: BaseSeen | None,
+    tilt: Array | None = None,
+) -> Array:
+    """Return the configurations (T, nq) of a robot that stands on ``foot`` (T,), its soles at ``turn`` and ``place`` of
+    `_soles`; ``tilt`` (T, 3) rad, small rotation vectors in the frame of the first standing sole, turns the standing
+    sole from flat about its middle.
     """
-    base = one.base[::every] if one.base else None
-    return ground(body, one.motion.time[::every], angle, settings=settings, lean=one.lean, base=base, under=one.under)
+    rotation, position = _chained(turn, place, foot)
+    middle = position + np.einsum("tij,tj->ti", rotation, place[foot, np.arange(foot.size)])
+    if tilt is not None:
+        lean_over = _turns(tilt)
+        rotation = lean_over @ rotation
+        position = middle + np.einsum("tij,tj->ti", lean_over, position - middle)
+    if base is not None:
+        rotation, position = base.corrected(rotation, position, middle)
+    return np.concatenate([position, _quaternions(rotation), angle], axis=1)
+
+
+def ground_again(
+    body: Body,
+    one: Grounded,
+    angle: Array,
+    *,
+    every: int = 1,
+    settings: LowPass | None = None,
+    tilt: Array | float = 0.0,
+) -> Grounded:
+    """Return the motion with other joint ``angle`` (T / ``every``, n) rad, standing on the same feet as ``one`` does,
+    of every so many of its instants; ``tilt`` (T / ``every``, 3) rad more than there.
+    """
+    base, foot = one.base[::every] if one.base else None, one.foot[::every]
+    leans = tilt if one.tilt is None else one.tilt[::every] + tilt
+    lean_over = leans if isinstance(leans, np.ndarray) else None
+    turn, place, _ = _soles(body, angle)
+    q = _q(angle, turn, place, foot, base=base, tilt=lean_over)
+    motion = smooth(body, one.motion.time[::every], q, settings=settings)
+    return replace(one, motion=motion, foot=foot, use=one.use[::every], base=base, tilt=lean_over)
 
 
 def _leg(body: Body) -> float:
@@ -207,6 +243,12 @@ def _chained(turn: Array, place: Array, foot: NDArray[np.intp]) -> tuple[Array, 
 def _about_z(angle: float) -> Array:
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _turns(vector: Array) -> Array:
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_rotvec(vector).as_matrix())
 
 
 def _quaternions(rotation: Array) -> Array:

@@ -10,12 +10,17 @@ a, with g the gravity vector, first moment h = R mc and inertia J = R I R' about
 and the wrench about the lab origin is [f; n + p x f]. Both are linear in [m, mc, I]: the columns of W.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from biodance.body.body import Body
 from biodance.motion.ik.compiled.tree import fill_regressor
 from biodance.motion.kinematics import SegmentMotion, segment_motion
 from biodance.records import Array, Motion, Wrench
+
+_BLOCK = 512
+"""Frames worked on at once where only a sum over the columns is kept: 3 MB, whatever the recording's length."""
 
 
 def regressor_of(segments: SegmentMotion, *, gravity: Array, sharing: Array | None = None) -> Array:
@@ -67,5 +72,14 @@ def predict_wrench(body: Body, motion: Motion, phi: Array | None = None) -> Wren
     >>> round(float(needed.force[:, 2].mean()), -1)
     610.0
     """
-    W = regressor(body, motion)
-    return Wrench(motion.time, W @ (body.sip.phi if phi is None else phi))
+    value, known = np.empty((motion.time.size, 6)), body.sip.phi if phi is None else phi
+    for part, frames in in_blocks(motion):
+        value[part] = regressor(body, frames) @ known
+    return Wrench(motion.time, value)
+
+
+def in_blocks(motion: Motion) -> Iterator[tuple[slice, Motion]]:
+    """Yield the motion in parts that need little memory, and the frames of each."""
+    for start in range(0, motion.time.size, _BLOCK):
+        part = slice(start, start + _BLOCK)
+        yield part, Motion(motion.time[part], motion.q[part], motion.v[part], motion.a[part])

@@ -29,6 +29,7 @@ _NO_STATIC = (
     "No static trial can be used, so the body comes from stature alone or from one frame of a moving trial, "
     "whichever fits better. Record a static trial."
 )
+_NO_MARKERS = "No trial has markers, so only the plates are reported. Record the movement with markers to go further."
 
 
 def body_of(
@@ -63,6 +64,9 @@ def _without_static(
     the ground; better is the one whose markers lie nearer in that trial.
     """
     worn = [one.trial for one in read if one.usable and one.trial.markers is not None and one.trial.marker_set]
+    if all(one.trial.markers is None for one in read):
+        steps.append(Step("scale", "refused", _NO_MARKERS))
+        return None, "No body: no trial has markers."
     if not had_static:
         steps.append(Step("scale", "refused", _NO_STATIC))
     if not worn:

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 
-from biodance import display
 from biodance.body.body import Body
 from biodance.body.human.human import human
 from biodance.body.human.limits import joint_limits
@@ -19,15 +18,17 @@ from biodance.body.robot.urdf import read_urdf
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.expectation import Expectation, expect
+from biodance.dance.followable.price import freer_dance
 from biodance.dance.limits import Limit
-from biodance.dance.metrics import DanceMetrics, dance_metrics
-from biodance.dance.performers import OF_PERFORMERS, PERFORMER_COUNT, SEGMENT_GAP
+from biodance.dance.metrics import dance_metrics
+from biodance.dance.performers import OF_PERFORMERS
 from biodance.dance.problem.person import PersonLimits, fit_to_person
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.shapes import unchecked_pairs
 from biodance.dance.robot import design_robot, expect_robot, robot_plan
 from biodance.dance.verify import Margin, broken
 from biodance.errors import BiodanceError
+from biodance.pipeline.dance_result import DanceResult
 from biodance.records import Subject
 from biodance.threads import one_thread
 
@@ -53,132 +54,9 @@ class Makers:
 PERSONS = Makers(design, expect)
 
 
-@dataclass(frozen=True, eq=False)
-class DanceResult:
-    """What came of designing a dance.
-
-    Parameters
-    ----------
-    body : Body
-        As fitted to the person.
-    plan : Plan
-        The protocol, as fitted to the person.
-    dance : Dance or None
-        None where none keeps all limits.
-    margins : tuple
-        Worst of every limit, judged by other code than the optimiser's.
-    account, expectation : Account, Expectation or None
-        What the dance tells, and what will be known after it; None without a dance.
-    reason : str
-        Which limit forbids the dance; "" with one.
-    notes : tuple of str
-        What was left out for the person (``dance.notes``: because a move was impossible).
-    seconds : float
-        Of computing.
-    reason_of_person : str
-        Why the person's file asks for limits of their own; "" without one.
-
-    Examples
-    --------
-    >>> made = biodance.design_dance(biodance.Subject(65.0, 1.75, "F"), "one_segment")  # doctest: +SKIP
-    >>> made.feasible  # doctest: +SKIP
-    True
-    """
-
-    body: Body
-    plan: Plan
-    dance: Dance | None
-    margins: tuple[Margin, ...]
-    account: DanceMetrics | None
-    expectation: Expectation | None
-    reason: str
-    notes: tuple[str, ...]
-    seconds: float
-    reason_of_person: str = ""
-
-    def __repr__(self) -> str:
-        return f"DanceResult({self.dance!r})" if self.dance is not None else f"DanceResult(no dance: {self.reason})"
-
-    def _repr_html_(self) -> str:
-        return display.card(repr(self), self.dance.table() if self.dance is not None else None, self.notes)
-
-    @property
-    def feasible(self) -> bool:
-        """True where there is a dance and every margin of it is kept."""
-        return self.dance is not None
-
-    @property
-    def performers(self) -> dict[str, float] | None:
-        """What imprecise performers leave, m: of the support, and between segments; None where none were asked."""
-        found = {m.limit.removesuffix(OF_PERFORMERS): m.worst for m in self.margins if m.limit.endswith(OF_PERFORMERS)}
-        if not found:
-            return None
-        gap = found["self_collision_"] + SEGMENT_GAP
-        return {"count": PERFORMER_COUNT, "balance_m": found["balance_"], "gap_m": gap}
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What this dance cannot tell, in plain sentences: where the criterion is far from its bound."""
-        unsafe = tuple(
-            f"NOT SAFE when imprecise: {m.limit.removesuffix(OF_PERFORMERS).replace('_', ' ').strip()} fell short "
-            f"by {-1000 * m.worst:.0f} mm at {m.where_s:.0f} s ({m.what.replace('_', ' ')}) for the worst of "
-            f"{PERFORMER_COUNT}. Try another seed, an easier protocol, or dance it with somebody at hand."
-            for m in broken(self.margins)
-            if m.limit.endswith(OF_PERFORMERS)
-        )
-        if self.account is None or self.expectation is None or self.account.static <= _FAR * self.account.static_bound:
-            return unsafe
-        ratio, share = self.account.static / self.account.static_bound, self.expectation.share[-1]
-        poor = [
-            name.replace("_", " ") for name, part in zip(self.expectation.segments, share, strict=True) if part < _NEW
-        ]
-        what = f" Of {', '.join(poor)} it tells next to nothing beyond the table." if poor else ""
-        return (
-            *unsafe,
-            f"The static criterion is {ratio:.0f} times its bound: segments that are hardly tilted cannot be learned"
-            f"{f' ({_names(self.account.hardly)})' if self.account.hardly else ''}.{what}",
-        )
-
-    @property
-    def about(self) -> tuple[str, ...]:
-        """What stands before the cues: for whom, the person's own limits and their reason, how safe, what is untold."""
-        out = [f"For {self.plan.whom}."] if self.plan.whom else []
-        if self.reason_of_person:
-            out.append(f"Made for one person's limits: {self.reason_of_person}.")
-        if found := self.performers:
-            out.append(
-                f"{found['count']:.0f} simulated people, seven degrees off in every joint, a fifth off in time and "
-                f"swaying, kept the weight {100 * found['balance_m']:.1f} cm inside the feet and arms and legs "
-                f"{100 * found['gap_m']:.1f} cm apart at the worst moment."
-            )
-        else:
-            out.append("Nobody imprecise was tried on this dance: it is for trained people only.")
-        return (*out, *self.notes, *self.warnings)
-
-    @property
-    def complete(self) -> bool:
-        """True where nothing of the protocol was left out, neither for the person nor because a move was impossible,
-        and imprecise people are safe.
-        """
-        counted = self.dance.counted.sum() if self.dance else 0
-        return (
-            not self.notes
-            and not broken(self.margins)
-            and (np.isfinite(self.plan.budget) or counted == self.plan.count)
-        )
-
-
 def designed_for(made: DanceResult, subject: Subject) -> DanceResult:
     """Return ``made`` with its dance knowing for whom it was designed."""
     return made if made.dance is None else replace(made, dance=replace(made.dance, subject=subject))
-
-
-_FAR, _NEW = 3.0, 0.05
-"""Times its bound at which the static criterion is warned of; share of the table's variance that is next to nothing."""
-
-
-def _names(segments: tuple[str, ...]) -> str:
-    return ", ".join(name.replace("_", " ") for name in segments)
 
 
 _LEGAL = {"mass": (30.0, 200.0, "kg"), "stature": (1.2, 2.2, "m")}
@@ -231,17 +109,23 @@ def make_dance(
         dance, margins = makers.design(own, plan, seed=seed, tell=tell, resume=resume)
     except BiodanceError as error:
         reason = str(error)
-    counted = expected = None
+    counted = expected = freely = None
     if dance is not None:
         tell("counting what the dance tells", 0, 0)
         with ProcessPoolExecutor(1) as aside:
             numbers = aside.submit(dance_metrics, dance, plan)
-            expected, counted = makers.expect(dance), numbers.result()
+            free = aside.submit(_freely, own, plan, seed)
+            expected, counted, freely = makers.expect(dance), numbers.result(), free.result()
         reason = " ".join(_told(margin) for margin in broken(margins) if not margin.limit.endswith(OF_PERFORMERS))
     if reason:
-        dance = counted = expected = None
+        dance = counted = expected = freely = None
     spent = time.perf_counter() - started
-    return DanceResult(own, plan, dance, margins, counted, expected, reason, notes, spent, person.reason)
+    return DanceResult(own, plan, dance, margins, counted, expected, reason, notes, spent, person.reason, freely)
+
+
+def _freely(body: Body, plan: Plan, seed: int) -> Expectation | None:
+    """Return what the same postures chosen freely would tell; None where the plan leaves the choice free."""
+    return expect(freer_dance(body, plan, seed=seed), steps=1) if np.isfinite(plan.instructions) else None
 
 
 def _told(m: Margin) -> str:
@@ -278,15 +162,16 @@ def dance_folder(out: Path, *, force: bool = False) -> Path:
 ROBOTS = Makers(design_robot, expect_robot)
 
 
-def robot_dancer(path: Path, feet: str) -> Body:
-    """Return the robot of a URDF file, in standing frames; ``feet`` the links of its right and left foot, "right,left".
+def robot_dancer(path: Path, feet: str, *, mend: bool = False) -> Body:
+    """Return the robot of a URDF file, in standing frames; ``feet`` the links of its right and left foot, "right,left";
+    ``mend`` as in `urdf.read_urdf`.
 
     Raises
     ------
     BiodanceError
         Not two feet are named, or the file cannot be used (`urdf.read_urdf`, `standing_frames`).
     """
-    return standing_frames(read_urdf(path, feet=named_feet(feet)))
+    return standing_frames(read_urdf(path, feet=named_feet(feet), mend=mend))
 
 
 def named_feet(feet: str) -> tuple[str, str]:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from biodance.dance.dance import Dance
     from biodance.dance.limits import Limit
     from biodance.dance.verify import Margin
-    from biodance.pipeline.dance import DanceResult
+    from biodance.pipeline.dance_result import DanceResult
     from biodance.virtual_lab.faults.causes import Hidden
 
 

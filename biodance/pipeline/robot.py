@@ -17,6 +17,7 @@ from biodance.identification.base_parameters import BaseEstimate
 from biodance.identification.identification import Identification
 from biodance.identification.robot import identify_links
 from biodance.identification.validation import TrialValidation, residual_ratio
+from biodance.lab.filters import LowPass, low_pass
 from biodance.lab.robot.recording import RobotRecording, read_robot_recording
 from biodance.motion.clocks import fit_plate, onto_plate
 from biodance.motion.comparison import Agreement, compare
@@ -24,7 +25,7 @@ from biodance.motion.grounded import RATE
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.robot_trials import MatchedTrial, bring_together
-from biodance.pipeline.robot_words import cause_words, refusals, told_of, weights
+from biodance.pipeline.robot_words import cause_words, of_file, refusals, told_of, weights
 from biodance.records import Wrench
 from biodance.records.attention import Attention, Judged, strongest_first
 from biodance.spatial import cross, quaternion_matrix, wrench_about_point
@@ -33,6 +34,8 @@ _KEPT = 0.2
 """Share of every trial, at its end, that is kept where no trial is."""
 _NEAR = 0.3
 """s: clocks that were brought together are not moved further for validation."""
+_SLOW = 1.0
+"""Hz: faster, what is left is noise of encoders and contact, the same with and without a cause."""
 _NO_SEARCH = "Of a robot, what differs from the drawing is told link by link instead."
 
 
@@ -63,7 +66,12 @@ class RobotResult:
 
 
 def identify_robot(
-    recording: str | Path, *, urdf: str | Path, feet: tuple[str, str], tell: Callable[[str], None] = lambda _: None
+    recording: str | Path,
+    *,
+    urdf: str | Path,
+    feet: tuple[str, str],
+    mend: bool = False,
+    tell: Callable[[str], None] = lambda _: None,
 ) -> RobotResult:
     """Identify what every link of a robot weighs from joint encoders and a force plate.
 
@@ -75,6 +83,8 @@ def identify_robot(
         The robot; its masses are the prior.
     feet : tuple of str
         Links of the right and the left foot.
+    mend : bool, default False
+        Take a solid box in place of a link of the file that is no possible body.
     tell : callable, optional
         Is told what is being done.
 
@@ -97,7 +107,7 @@ def identify_robot(
     >>> biodance.identify_robot("run", urdf="hoap3.urdf", feet=("right_foot", "left_foot"))  # doctest: +SKIP
     """
     tell("reading the robot")
-    body = read_urdf(urdf, feet=feet)
+    body = read_urdf(urdf, feet=feet, mend=mend)
     found = read_robot_recording(recording, tuple(joint.name for joint in body.joints))
     trials, refused = bring_together(body, found, tell=tell)
     fitted, kept = _parted(trials)
@@ -112,7 +122,9 @@ def identify_robot(
     doubtful = bool(causes) and not _predicts_better(best.identified, plain.identified)
     best = plain if doubtful else best
     words = cause_words(causes, doubtful=doubtful)
-    said = strongest_first([*refusals(refused), *told_of(trials), *words, *weights(best.identified.identification)])
+    said = strongest_first(
+        [*of_file(body.notes), *refusals(refused), *told_of(trials), *words, *weights(best.identified.identification)]
+    )
     judged = tuple(Judged(one.recorded.name, float(one.motion.fit.use.sum()) / RATE) for one in trials)
     lost = tuple(Judged(name, 0.0, why, missed=True) for name, why in refused.items())
     named = () if doubtful else causes
@@ -141,12 +153,17 @@ def _identified(body: Body, name: str, fitted: list[MatchedTrial], kept: list[Ma
 
 
 def _predicts_better(one: SessionIdentification, other: SessionIdentification) -> bool:
-    """Whether ``one`` leaves less of the kept motions than ``other``: mean logarithm of the RMS over all channels."""
+    """Whether ``one`` leaves less of the kept motions than ``other``: mean logarithm, over all channels, of the RMS of
+    what is slower than `_SLOW`, where causes show.
+    """
     return bool(_left(one) < _left(other))
 
 
 def _left(one: SessionIdentification) -> float:
-    rms = [trial.identified_agreement.rms for trial in (one.validations or one.fitted)]
+    rms = []
+    for trial in one.validations or one.fitted:
+        slow = low_pass(trial.measured.value - trial.identified.value, trial.measured.rate, LowPass(cutoff=_SLOW))
+        rms.append(np.sqrt(np.mean(slow[trial.use] ** 2, axis=0)))
     return float(np.mean(np.log(rms))) if rms else float("inf")
 
 

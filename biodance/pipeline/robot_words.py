@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from biodance.diagnosis.robot import RobotCause, RobotFinding
+from biodance.diagnosis.robot import RobotFinding
+from biodance.diagnosis.robot_columns import RobotCause
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import SIGMAS
 from biodance.pipeline.robot_trials import ODD, MatchedTrial
@@ -10,6 +11,11 @@ from biodance.records.attention import Attention
 
 _APART = 1.0
 """s: clocks further apart are said first."""
+
+
+def of_file(notes: tuple[str, ...]) -> list[Attention]:
+    """Return what was made of the robot's file."""
+    return [Attention("warn" if note.startswith("Mended") else "note", note, "", "drawing") for note in notes]
 
 
 def refusals(refused: dict[str, str]) -> list[Attention]:
@@ -64,13 +70,17 @@ def _told(one: RobotFinding) -> str:
     """Return a finding as a sentence, with its 95 % interval."""
     where, value, reach = one.cause.where, one.value, SIGMAS * one.sd
     angle = f"{np.degrees(value):.2f} ± {np.degrees(reach):.2f} degrees"
+    several = len(one.cause.joints) > 1
+    verb, its = ("give", "their encoders") if several else ("gives", "its encoder")
     match one.cause.kind:
         case "encoder_zero":
             return f"The encoder of {where} reads {angle} too much: its zero is not the drawing's."
         case "flexible_joint":
-            return f"{where} gives under load behind its encoder: {angle} per N·m."
+            return f"{where} {verb} under load behind {its}: {angle} per N·m."
+        case "soft_sole":
+            return f"Ground or sole give {where} under a standing foot: {angle} per N·m."
         case "backlash":
-            return f"{where} has play: {angle} between its two sides."
+            return f"{where} {'have' if several else 'has'} play: {angle} between the two sides."
         case "plate_gain":
             return f"The plate reads {where} {100 * abs(value):.1f} ± {100 * reach:.1f} % too {_size(value)}."
         case "plate_crosstalk":

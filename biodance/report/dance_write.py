@@ -17,7 +17,7 @@ from biodance.dance.verify import Margin
 from biodance.lab.c3d.parameters import FileValue
 from biodance.lab.c3d.write import write_c3d
 from biodance.motion.kinematics import poses
-from biodance.pipeline.dance import DanceResult
+from biodance.pipeline.dance_result import DanceResult
 from biodance.pipeline.still import posture_still
 from biodance.records import SIDES, Array, Markers
 from biodance.report.documents.session import plain_values, to_text
@@ -102,11 +102,25 @@ def dance_document(result: DanceResult) -> dict[str, Any]:
         "for": result.plan.whom,
         "instructions": _counted(dance),
         "performers": result.performers,
+        "simplicity_price": _price(result),
         "warnings": result.warnings,
         "notes": (*result.notes, *(dance.notes if dance else ())),
         "seed": dance.seed if dance else None,
         "compute_s": result.seconds,
     }
+
+
+def _price(result: DanceResult) -> dict[str, Any] | None:
+    """Return the expected standard deviations (root mean square over the segments) with the dance as it is, and if the
+    same postures were chosen freely.
+    """
+    if result.expectation is None or result.freely is None:
+        return None
+    both = {"with": result.expectation, "without": result.freely}
+    return {
+        f"{key}_{unit}": {name: float(np.sqrt(np.mean(getattr(one, key)[-1] ** 2))) for name, one in both.items()}
+        for key, unit in (("mass", "kg"), ("com", "m"))
+    } | {"sentence": result.price}
 
 
 def _counted(dance: Dance | None) -> dict[str, float] | None:
@@ -275,6 +289,8 @@ def print_dance(found: dict[str, Any]) -> None:
             console.print(table)
         if criterion["hardly_excited"]:
             console.print(f"hardly tilted: {', '.join(criterion['hardly_excited'])}", markup=False)
+    if found["simplicity_price"]:
+        console.print(found["simplicity_price"]["sentence"], markup=False)
     for note in (*found["warnings"], *found["notes"]):
         console.print(f"look: {note}", markup=False)
 

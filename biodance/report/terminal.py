@@ -144,6 +144,17 @@ def print_identification(found: dict[str, Any], console: Console) -> None:
         console.print(f"note: {escape(note)}", soft_wrap=True)
 
 
+def print_robot_diagnosis(found: dict[str, Any], console: Console) -> None:
+    """Print what is not as drawn about a robot (`robot_document`): the verdict, causes with size and evidence."""
+    print_attention(found["attention"], console)
+    console.print(f"verdict: {found['diagnosis']['verdict']}")
+    for one in found["diagnosis"]["findings"]:
+        size = f"{format_number(one['value'], 4)} ± {format_number(1.96 * one['sd'], 4)} {one['unit']}".rstrip()
+        others = f"; not told from {', '.join(one['not_told_from'])}" if one["not_told_from"] else ""
+        text = f"{one['cause'].replace('_', ' ')}, {one['where']}: {size}, {one['evidence_nats']:.0f} nats{others}"
+        console.print(escape(text), soft_wrap=True)
+
+
 def _print_performance(found: dict[str, Any], console: Console) -> None:
     """Print how well a dance was danced, and which transitions to dance once more."""
     console.print(f"dance {escape(found['dance'])}, share of the table's variance removed, reached (planned):")
@@ -173,6 +184,11 @@ def print_foresight(found: dict[str, Any], console: Console) -> None:
             console.print(f"will confuse: {escape(pair['cause'])} with {escape(pair['other'])}")
     hidden = ", ".join(f"{row['effect']} {row['target']}".strip() for row in found["unobservable"])
     console.print(f"cannot see: {escape(hidden or 'nothing of what it looks for')}", soft_wrap=True)
+    console.print(escape(found["summary"]), soft_wrap=True)
+    for one in found["changes"]:
+        console.print(
+            f"to change: {escape(one['do'])} ({len({*one['unseen'], *one['confused']})} causes)", soft_wrap=True
+        )
 
 
 def _print_accepted(found: dict[str, Any], console: Console) -> None:

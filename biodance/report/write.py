@@ -105,6 +105,7 @@ def write_diagnosis(
     *,
     accepted: bool,
     earlier: tuple[PlateCorrection, ...] = (),
+    movement: SessionMovement | None = None,
 ) -> dict[str, Any]:
     """Write ``report.html`` and ``results.json`` of a diagnosis, and return the numbers.
 
@@ -116,6 +117,7 @@ def write_diagnosis(
     numbers = {
         "session": result.session.folder.name,
         **diagnosis_document(found),
+        "movement": movement_document(movement) if movement else None,
         "failures": failures,
         "provenance": made.as_dict(),
     }

@@ -63,7 +63,7 @@ def about_true_centres(sip: Sip, placed: tuple[JointError, ...] = ()) -> Sip:
     for i, segment in enumerate(sip.segments):
         joint = _joint_of(segment)
         sd = known.get(joint, joint_size("joint_centre", joint or segment))
-        slope = sd * _shift_slope(sip.phi[10 * i : 10 * i + 10])
+        slope = sd * shift_slope(sip.phi[10 * i : 10 * i + 10])
         covariance[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] += slope @ slope.T
     return Sip(sip.segments, sip.phi, covariance)
 
@@ -87,8 +87,10 @@ def _joint_of(segment: str) -> str:
     return next((segment.removesuffix(kind) + joint for kind, joint in JOINT.items() if segment.endswith(kind)), "")
 
 
-def _shift_slope(phi: Array) -> Array:
-    """Return d phi / d d (10, 3) for a shift of the matter by d (3,) m."""
+def shift_slope(phi: Array) -> Array:
+    """Return d phi / d d (10, 3) for a shift of the matter of ``phi`` (10,) by d (3,) m: how mass, first moments and
+    inertia about the origin change.
+    """
     out = np.zeros((10, 3))
     out[1:4] = phi[0] * np.eye(3)
     for row, (i, j) in enumerate(TENSOR, start=4):

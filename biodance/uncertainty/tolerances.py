@@ -256,15 +256,24 @@ def mean_key(name: str, target: str, parameter: str) -> str:
 
 
 def whitened(
-    rows: Array, band: NDArray[np.intp], marker_keys: tuple[str, ...], mass: float, tolerances: Tolerances
+    rows: Array,
+    band: NDArray[np.intp],
+    marker_keys: tuple[str, ...],
+    mass: float,
+    tolerances: Tolerances,
+    *,
+    out: Array | None = None,
 ) -> Array:
-    """Return ``rows`` (r, n) in units of their standard deviation."""
+    """Return ``rows`` (r, n) in units of their standard deviation, written into ``out`` (contiguous; may be ``rows``
+    itself: they are the largest arrays of a diagnosis) or a new array.
+    """
     count = 6 * band.size
-    wrench = rows[:count].reshape(band.size, 6, -1)
-    white = np.empty_like(wrench)
+    out = np.empty(rows.shape, rows.dtype) if out is None else out
+    wrench, white = (some[:count].reshape(band.size, 6, -1) for some in (rows, out))
     for b, matrix in enumerate(tolerances.whiteners(mass).astype(rows.dtype)):
         chosen = band == b
         white[chosen] = matrix @ wrench[chosen]
     known, cameras = [tolerances.size(key) for key in marker_keys], error_size("camera", "marker")
     sd = np.array([max(size, cameras) if size > 0 else np.inf for size in known], dtype=rows.dtype)
-    return np.concatenate([white.reshape(count, -1), rows[count:] / sd[:, None]])
+    out[count:] = rows[count:] / sd[:, None]
+    return out

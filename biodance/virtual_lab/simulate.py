@@ -85,6 +85,8 @@ def write_visit(
         The folder is not empty, or the subject is outside the range that the virtual body covers.
     """
     _check(subject, out)
+    if plan.belts:
+        visit = replace(visit, laboratory=replace(visit.laboratory, belts=plan.belts))
     person = make_person(
         subject,
         seed,

@@ -13,7 +13,7 @@ from biodance.lab.markers.sets import FAMILY, landmark, read_marker_set
 from biodance.lab.weight import is_still
 from biodance.motion.contact.footing import inside
 from biodance.motion.contact.soles import OUTLINE
-from biodance.records import SIDES, Array, Markers, Plate, Trial, runs
+from biodance.records import SIDES, Array, Markers, Plate, Trial, Wrench, runs
 from biodance.records.arrays import rate_of
 
 ONSET = 20.0
@@ -24,6 +24,8 @@ _RAISED = 0.05
 """m that a plate stands out above the lowest one: what sticks out over a stair hangs in the air."""
 _BESIDE = 0.04
 """m: a sole that reaches farther over the edge is half beside the plate: its centre of pressure says nothing."""
+_LEVEL, _EDGE = 0.005, 0.01
+"""m: plates edge to edge differ by less in height; the gap between them is less than twice the second."""
 _STILL, _EVEN = 0.5, 0.35
 """m/s against the ground or belt of a foot that stands; the other one swings faster."""
 _LIFTED = 0.06
@@ -91,7 +93,8 @@ class FootPath:
 @dataclass(frozen=True)
 class FootStep:
     """One foot alone on one plate: ``plate`` its name; ``side``; ``middle`` s, a time at which it stands; ``overhang``
-    m that the sole may reach over the edge; ``heel_first`` whether the heel came down first.
+    m that the sole may reach over the edge; ``heel_first`` whether the heel came down first; ``beside`` the plates on
+    which the rest of it stands, where plates lie edge to edge (belts).
     """
 
     plate: str
@@ -99,6 +102,7 @@ class FootStep:
     middle: float
     overhang: float
     heel_first: bool
+    beside: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -143,6 +147,16 @@ class SeenTrial:
             return None
         return slice(*here[-1])
 
+    def under(self, step: FootStep) -> Wrench:
+        """Return the wrench under the foot of a step, at its plate's times: with that of the plates ``beside`` it,
+        which is the foot's alone while the other one swings.
+        """
+        own = self.plate(step.plate).wrench
+        value = np.array(own.value)
+        for other in (self.plate(name).wrench for name in step.beside):
+            value += np.stack([np.interp(own.time, other.time, column) for column in other.value.T], axis=1)
+        return Wrench(own.time, value) if step.beside else own
+
     @property
     def seconds(self) -> float:
         """Time s that one foot stands alone on a plate."""
@@ -161,12 +175,16 @@ def recording(trial: Trial, *, mass: float = float("nan")) -> SeenTrial:
 
     ``mass`` kg as declared, NaN = unknown. Without foot markers or plates there are no steps; nothing is raised.
     """
-    feet = _feet(trial.markers)
+    known = tuple(dict.fromkeys(filter(None, (trial.marker_set, *FAMILY.files()))))
+    feet = _feet(trial.markers, known)
     lowest = min((plate.height for plate in trial.plates), default=0.0)
     steps = tuple(
-        step for plate in trial.plates for step in _steps(plate, feet, raised=plate.height > lowest + _RAISED) if feet
+        step
+        for plate in trial.plates
+        for step in _steps(plate, trial.plates, feet, raised=plate.height > lowest + _RAISED)
+        if feet
     )
-    pelvis = _pelvis(trial.markers)
+    pelvis = _pelvis(trial.markers, known)
     velocity = _velocity(trial.markers, pelvis) if trial.markers is not None and pelvis is not None else None
     steps = tuple(sorted(steps, key=lambda step: step.middle))
     return SeenTrial(trial, mass, feet, steps, pelvis, velocity, is_still(trial))
@@ -185,11 +203,13 @@ def _between(known: Array, path: Array, time: Array) -> Array:
     return out
 
 
-def _feet(markers: Markers | None) -> tuple[FootPath, ...]:
-    """Return both feet by the landmarks heel and toe of the first marker set that has all four; () without."""
+def _feet(markers: Markers | None, known: tuple[str, ...]) -> tuple[FootPath, ...]:
+    """Return both feet by the landmarks heel and toe of the first of the ``known`` marker sets that has all four; ()
+    without.
+    """
     if markers is None or not markers.time.size:
         return ()
-    for name in FAMILY.files():
+    for name in known:
         found = {(s, p): _landmark(markers, name, f"{s}_{p}") for s in SIDES for p in ("heel", "toe")}
         places = {key: path for key, path in found.items() if path is not None and np.isfinite(path).any()}
         if len(places) == len(found):
@@ -204,9 +224,9 @@ def _landmark(markers: Markers, set_name: str, name: str) -> Array | None:
         return None
 
 
-def _pelvis(markers: Markers | None) -> Array | None:
-    """Return the middle (T, 3) m of the front and back of the pelvis; None where no set has them."""
-    for name in FAMILY.files() if markers is not None else ():
+def _pelvis(markers: Markers | None, known: tuple[str, ...]) -> Array | None:
+    """Return the middle (T, 3) m of the front and back of the pelvis; None where no ``known`` set has them."""
+    for name in known if markers is not None else ():
         assert markers is not None
         right, left, back = (_landmark(markers, name, place) for place in ("right_asis", "left_asis", "mid_psis"))
         if right is not None and left is not None and back is not None:
@@ -230,7 +250,9 @@ def _velocity(markers: Markers, path: Array) -> Array:
     return velocity
 
 
-def _steps(plate: Plate, feet: tuple[FootPath, ...], *, raised: bool) -> list[FootStep]:
+def _steps(
+    plate: Plate, plates: tuple[Plate, ...], feet: tuple[FootPath, ...], *, raised: bool
+) -> list[FootStep]:
     """Return the steps on one plate: one foot stands wholly over it while it is loaded, the other one is not on it."""
     found = []
     wrench = plate.wrench
@@ -245,8 +267,22 @@ def _steps(plate: Plate, feet: tuple[FootPath, ...], *, raised: bool) -> list[Fo
         other = [foot for foot in feet if foot not in on and _treads(plate, foot, first, last, belt)]
         if len(on) == 1 and not other:
             overhang = max(0.0, -over[on[0].side])
-            found.append(FootStep(plate.name, on[0].side, float(time[5]), overhang, _heel_first(on[0], first)))
+            beside = _beside(plate, plates, on[0], time) if overhang else ()
+            left = 0.0 if beside else overhang
+            found.append(FootStep(plate.name, on[0].side, float(time[5]), left, _heel_first(on[0], first), beside))
     return found
+
+
+def _beside(plate: Plate, plates: tuple[Plate, ...], foot: FootPath, time: Array) -> tuple[str, ...]:
+    """Return the plates of the same height on which a part of a foot stands at most of some times; () where a part of
+    it stands on no plate.
+    """
+    level = [one for one in plates if one is not plate and abs(one.height - plate.height) < _LEVEL]
+    sole = foot.outline(time)
+    reach = {one.name: inside(one, sole) for one in (plate, *level)}
+    parts = tuple(one.name for one in level if np.nanmedian(reach[one.name].max(axis=1)) > 0)
+    whole = np.max([reach[name] for name in (plate.name, *parts)], axis=0).min(axis=1)
+    return parts if np.nanmedian(whole) > -_EDGE else ()
 
 
 def _over(plate: Plate, foot: FootPath, time: Array, *, raised: bool) -> float:
@@ -276,7 +312,7 @@ def _treads(plate: Plate, foot: FootPath, first: float, last: float, belt: Array
     """
     time = np.linspace(first, last, 30)
     with np.errstate(invalid="ignore"):
-        near = (inside(plate, foot.outline(time)) > 0.01).mean(axis=1) > 0.3
+        near = (inside(plate, foot.outline(time)) > 0.01).any(axis=1)
         slow = np.linalg.norm(_between(foot.time, foot.velocity, time) - belt, axis=1) < _STILL
         low = np.minimum(*(path[:, 2] for path in foot.at(time)))
         lowest = min(np.nanmin(foot.heel[:, 2]), np.nanmin(foot.toe[:, 2]))

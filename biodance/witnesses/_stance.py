@@ -8,6 +8,8 @@ import numpy as np
 from biodance.records import Array
 from biodance.witnesses._recording import FootStep, SeenTrial
 
+_SINGLE = (0.2, 0.8)
+"""Shares of stance between which the other foot swings: only then the plates beside show nothing but this foot."""
 _SEEN = 0.8
 """Share of a phase in which foot and pressure must be known."""
 
@@ -15,7 +17,7 @@ _SEEN = 0.8
 @dataclass(frozen=True, eq=False)
 class StepCourse:
     """One step sample by sample: ``phase`` (n,) 0 at the first contact to 1 at the last; ``time`` (n,) s; ``force``
-    (n, 3) N of its plate; ``ahead`` of the heel marker and ``outwards`` of the line to the toe marker (n,) m: the
+    (n, 3) N under it; ``ahead`` of the heel marker and ``outwards`` of the line to the toe marker (n,) m: the
     centre of pressure in the foot; ``length`` m between the markers.
     """
 
@@ -41,10 +43,12 @@ def step_course(seen: SeenTrial, step: FootStep) -> StepCourse | None:
     part = seen.stance(step)
     if part is None:
         return None
-    plate = seen.plate(step.plate)
-    time = plate.wrench.time[part]
-    cop = plate.wrench.cop(height=plate.height)[part, :2]
+    wrench = seen.under(step)
+    time, force = wrench.time[part], np.array(wrench.force[part])
+    cop = np.array(wrench.cop(height=seen.plate(step.plate).height)[part, :2])
+    phase = (time - time[0]) / max(time[-1] - time[0], 1e-9)
+    if step.beside:
+        cop[(phase < _SINGLE[0]) | (phase > _SINGLE[1])] = np.nan
     ahead, outwards, apart = seen.foot(step.side).in_foot(time, cop)
     length = float(np.nanmedian(apart)) if np.isfinite(apart).any() else float("nan")
-    phase = (time - time[0]) / max(time[-1] - time[0], 1e-9)
-    return StepCourse(phase, time, plate.wrench.force[part], ahead, outwards, length)
+    return StepCourse(phase, time, force, ahead, outwards, length)

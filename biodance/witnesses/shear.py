@@ -37,7 +37,8 @@ class Shear(Witness):
         """Return four observations of each step that begins with the heel."""
         if seen.pelvis is None:
             return ()
-        return tuple(one for step in seen.steps if step.heel_first for one in self._of_step(seen, step))
+        whole = (step for step in seen.steps if step.heel_first and not step.beside)
+        return tuple(one for step in whole for one in self._of_step(seen, step))
 
     def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part = step_course(seen, step)

@@ -45,7 +45,7 @@ class StrideForce(Witness):
         part = seen.stance(step)
         if part is None:
             return []
-        wrench, count = seen.plate(step.plate).wrench, part.stop - part.start
+        wrench, count = seen.under(step), part.stop - part.start
         span = slice(part.start + round(_ONE[0] * count), part.start + round(_ONE[1] * count))
         if span.stop - span.start < _SHORTEST * wrench.rate:
             return []

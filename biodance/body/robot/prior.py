@@ -12,6 +12,8 @@ RELATIVE_MASS_SD, RELATIVE_INERTIA_SD = 0.15, 0.30
 """Of every segment: covers, cables and cards come and go (judgement; Bonnet 2016 finds 0.4 kg of 8 kg in all)."""
 POINT = 1e-6
 """m: links with a smaller radius of gyration are point masses, as some files write them."""
+_ROUNDING = 1e-4
+"""Of the largest moment of inertia: numbers of a file are rounded."""
 _COM_SD = 0.2
 """m of CoM per m of radius of gyration: 10 mm for the links of HOAP-3."""
 
@@ -38,10 +40,21 @@ def extended(lump: RigidInertia, box: Array) -> RigidInertia:
     """Return the lump, or in place of a point mass one that fills its ``box`` (2, 3) m: what is left out is not
     known exactly.
     """
+    return solid(lump, box) if is_point(lump) else lump
+
+
+def solid(lump: RigidInertia, box: Array) -> RigidInertia:
+    """Return a body of uniform density that fills a ``box`` (2, 3) m about its own middle, with the lump's mass and
+    centre of mass.
+    """
     square = np.square(box[1] - box[0])
-    return (
-        RigidInertia(lump.mass, lump.com, lump.mass / 12 * np.diag(square.sum() - square)) if is_point(lump) else lump
-    )
+    return RigidInertia(lump.mass, lump.com, lump.mass / 12 * np.diag(square.sum() - square))
+
+
+def is_possible(lump: RigidInertia) -> bool:
+    """Whether some body has this mass, centre and inertia."""
+    moments = np.linalg.eigvalsh(lump.inertia)
+    return bool(lump.mass > 0 and moments.sum() - 2 * moments[-1] >= -_ROUNDING * moments[-1])
 
 
 def com_deviation(lump: RigidInertia) -> float:

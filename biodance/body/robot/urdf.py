@@ -15,7 +15,7 @@ from biodance.body.export import refuse_impossible
 from biodance.body.inertia import RigidInertia, combine_inertias, inertial_parameters
 from biodance.body.parts import NO_SEGMENT, Foot, Joint, JointLimits, SegmentMarkers
 from biodance.body.robot.likeness import reframed
-from biodance.body.robot.prior import com_deviation, extended, is_point, robot_covariance
+from biodance.body.robot.prior import com_deviation, extended, is_point, is_possible, robot_covariance, solid
 from biodance.body.robot.sole import match_faces, sole_outline
 from biodance.body.robot.urdf_file import Connection, UrdfFile, read_urdf_file
 from biodance.errors import BiodanceError, FileRefused, UnknownName
@@ -41,8 +41,9 @@ class _Carrier:
         return np.concatenate([np.empty((0, 3)), *self.shapes, *self.hulls])
 
 
-def read_urdf(path: str | Path, *, feet: tuple[str, str]) -> Body:
-    """Return the robot of a URDF file as a Body with a free root; ``feet`` the links of its right and its left foot.
+def read_urdf(path: str | Path, *, feet: tuple[str, str], mend: bool = False) -> Body:
+    """Return the robot of a URDF file as a Body with a free root; ``feet`` the links of its right and its left foot;
+    ``mend`` takes, in place of a link that is no possible body, a solid box around its shapes, and notes it.
 
     Links without mass carry no segment. Prior standard deviations: those of a data sheet (`robot_prior`). Speeds,
     ranges and efforts are the file's. No markers.
@@ -72,11 +73,11 @@ def read_urdf(path: str | Path, *, feet: tuple[str, str]) -> Body:
                 f"{file.path}: the foot {foot} has no mass or belongs to the root. Name the links that stand on the "
                 f"ground."
             )
-    body = _body(file, joints, limits, heavy)
+    body = _body(file, joints, limits, heavy, mend=mend)
     return _standing(file, body, {side: owner[foot] for side, foot in zip(SIDES, feet, strict=True)})
 
 
-def _body(file: UrdfFile, joints: list[Joint], limits: JointLimits, heavy: list[_Carrier]) -> Body:
+def _body(file: UrdfFile, joints: list[Joint], limits: JointLimits, heavy: list[_Carrier], *, mend: bool) -> Body:
     """Return the body without soles, its root as in the file; ``heavy`` the links that move and have mass."""
     segments, lumps = (
         tuple(carrier.link for carrier in heavy),
@@ -84,6 +85,9 @@ def _body(file: UrdfFile, joints: list[Joint], limits: JointLimits, heavy: list[
     )
     carried = {carrier.joint: i for i, carrier in enumerate(heavy)}
     boxes = np.array([_box(carrier, lump) for carrier, lump in zip(heavy, lumps, strict=True)])
+    broken = [i for i, lump in enumerate(lumps) if mend and lump.mass > 0 and not is_possible(lump)]
+    for i in broken:
+        lumps[i] = solid(lumps[i], boxes[i])
     com = np.array([lump.com for lump in lumps])[:, None]
     phi = np.concatenate([inertial_parameters(lump) for lump in lumps])
     body = Body(
@@ -95,12 +99,15 @@ def _body(file: UrdfFile, joints: list[Joint], limits: JointLimits, heavy: list[
         SegmentMarkers((), (), np.empty((0, 3)), np.empty(0)),
         boxes,
         np.concatenate([np.minimum(boxes[:, :1], com), np.maximum(boxes[:, 1:], com)], axis=1),
-        notes=_notes(file, heavy, [carrier.link for carrier, lump in zip(heavy, lumps, strict=True) if is_point(lump)]),
+        notes=(
+            *_notes(file, heavy, [c.link for c, lump in zip(heavy, lumps, strict=True) if is_point(lump)]),
+            *_mended([segments[i] for i in broken]),
+        ),
     )
     try:
         refuse_impossible(body)
     except BiodanceError as error:
-        raise FileRefused(f"{file.path}: {error}") from error
+        raise FileRefused(f"{file.path}: {error} Or ask to mend it (--mend): a solid box in its place.") from error
     spread = [extended(lump, box) for lump, box in zip(lumps, boxes, strict=True)]
     return replace(body, sip=Sip(segments, phi, robot_covariance(spread, [com_deviation(lump) for lump in spread])))
 
@@ -172,6 +179,11 @@ def _box(carrier: _Carrier, lump: RigidInertia) -> Array:
     moments = np.diag(lump.inertia)
     half = np.sqrt(np.maximum(1.5 * (moments.sum() - 2 * moments) / lump.mass, 1e-6))
     return np.stack([lump.com - half, lump.com + half])
+
+
+def _mended(links: list[str]) -> list[str]:
+    said = "Mended, since no body has their mass, centre and inertia: solid boxes in place of"
+    return [f"{said} {', '.join(links)}."] if links else []
 
 
 def _notes(file: UrdfFile, heavy: list[_Carrier], points: list[str]) -> tuple[str, ...]:

@@ -11,24 +11,20 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from biodance.dance.dance import Dance
 from biodance.dance.followable.vocabulary import Vocabulary, Word, own_joint
+from biodance.dance.imprecision import mass_centre
 from biodance.dance.limits import Limit
-from biodance.dance.limits.self_collision import surface_distances
-from biodance.dance.performers import SEGMENT_GAP, Imprecision, mass_centre
+from biodance.dance.performers import lost_by_copies
 from biodance.dance.postures.exchange import counterpart
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State
-from biodance.motion.kinematics import poses
 from biodance.motion.regressor import regressor
 from biodance.records import Array
 
 _ROUNDS = 5
 """Corrections of the pelvis; each leaves about a fifth of the error."""
-_DRAWN, _SIGMAS = 96, 4.5
-"""Imprecise copies of a posture that are looked at, and standard deviations of a distance that it must bear."""
-_SPARE = {"foot_placement": 0.05}
-"""Share of the scale kept in reserve where it is another one than the limit's own: the moves are straight."""
 _BACK = 0.03
 """m behind the middle of the support where people stand: over the arch of the foot."""
 _LEAN, _TILT = ROOT - 2, ROOT - 1
@@ -89,21 +85,11 @@ class Catalogue:
         """
         state = State(self.chain, self.stance, self.x[s : s + 1], *np.zeros((2, 1, self.chain.size)))
         for limit in (limit for limit in limits if limit.at_rest):
-            spare = _SPARE.get(limit.name, limit.hold_reserve(self.stance)) * limit.scale
-            if (limit.margins(state).value < spare).any():
+            if (limit.margins(state).value < limit.straight_reserve(self.stance) * limit.scale).any():
                 return limit.name
-        return "" if roomy(self.chain, self.stance, self.x[s]) else "self_collision"
-
-
-def roomy(chain: Chain, stance: Stance, x: Array) -> bool:
-    """Return whether segments stay `SEGMENT_GAP` when people copy a posture ``x`` (n,) imprecisely."""
-    how, rng, copies = Imprecision(), np.random.default_rng(0), np.repeat(x[None], _DRAWN, axis=0)
-    copies[:, ROOT:] += how.tracking * rng.normal(size=(_DRAWN, chain.size - ROOT))
-    copies[:, 3:ROOT] += how.pelvis * how.tracking * rng.normal(size=(_DRAWN, 3))
-    copies = chain.plant(copies, stance.planted, stance.ankle)
-    motion = chain.motion(np.arange(_DRAWN, dtype=float), copies, *np.zeros((2, *copies.shape)))
-    gap, _ = surface_distances(chain.body, poses(chain.body, motion.q), near=np.inf)
-    return bool((gap.mean(axis=0) - _SIGMAS * gap.std(axis=0) > SEGMENT_GAP).all())
+        no_way = np.empty((0, 2, self.chain.size))
+        held = Dance("", self.chain.body, state.x, (self.stance,), np.ones(1), no_way, np.empty(0), (), 0)
+        return lost_by_copies(held, limits, np.zeros(1))
 
 
 def posed(chain: Chain, stance: Stance, words: Vocabulary, index: NDArray[np.intp]) -> Array:

@@ -2,6 +2,7 @@
 and at last with the pelvis and a lifted leg going round.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -13,31 +14,45 @@ from biodance.records import Array
 _SLOWER = (1.0, 1.4, 1.8)
 """Factors on the duration of a straight move, one after the other."""
 _ITERATIONS = (12, 8)
-_STEP = (0.5, 0.0, 0.0, 0.55, 0.0, 0.0)
-"""rad by which hip, knee and ankle of a leg bend on the way, of a foot that is put somewhere else."""
+_STOP = 0.08
+"""rad that a lifted leg keeps from the stops of its joints."""
+_STEP = (0.5, -0.1, 0.0, 0.55, 0.0, 0.0)
+"""rad by which hip, knee and ankle of a leg bend on the way of a lifted foot, and it goes away from the other one."""
 
 
-def plain_move(task: Task) -> Move:
-    """Return the move of ``task`` in which nothing goes out of its way that need not; if none keeps all limits, the one
-    that violates least.
+def plain_move(task: Task, lost: Callable[[Move], str]) -> Move:
+    """Return the move of ``task`` in which nothing goes out of its way that need not, and of which imprecise people do
+    not lose a limit (``lost`` names it, "" if none); if none keeps all limits, the one that violates least.
     """
-    tried = []
+    tried, eased = [], {limit.name for limit in task.limits if limit.mended_by_slowness}
     for factor in _SLOWER:
         slow = replace(task, duration=factor * task.duration)
-        tried.append(evaluate_move(slow, slow.straight())[0])
-        if len(task.stance.planted) == 1:
-            tried.append(min(tried.pop(), evaluate_move(slow, _stepping(slow))[0], key=lambda move: move.violation))
-        if tried[-1].violation == 0 or tried[-1].limit not in ("balance", "friction", "joint_speed", "joint_torque"):
+        ways = [slow.straight(), *([_stepping(slow)] if len(task.stance.planted) == 1 else [])]
+        tried.append(min((_copied(evaluate_move(slow, way)[0], lost) for way in ways), key=_badness))
+        if tried[-1].violation == 0 or tried[-1].limit not in eased:
             break
-    best = min(tried, key=lambda move: move.violation)
-    return best if best.violation == 0 or task.stance.seat else _round(replace(task, duration=best.duration), best)
+    best = min(tried, key=_badness)
+    if best.violation == 0 or task.stance.seat:
+        return best
+    return _copied(_round(replace(task, duration=best.duration), best), lost)
+
+
+def _badness(move: Move) -> tuple[float, bool]:
+    return move.violation, bool(move.limit)
+
+
+def _copied(move: Move, lost: Callable[[Move], str]) -> Move:
+    """Return the move with the limit of which imprecise people leave too little, where the exact one keeps all."""
+    return move if move.limit else replace(move, limit=lost(move))
 
 
 def _stepping(task: Task) -> Array:
-    """Return the via points (2, n) of a straight move on which the free leg is lifted."""
-    via = task.straight()
+    """Return the via points (2, n) of a straight move on which the free leg is lifted, within its joints' ranges."""
+    via, limits = task.straight(), task.chain.body.limits
     for side in {0, 1} - set(task.stance.planted):
-        via[:, task.chain.leg_columns[side]] += _STEP
+        columns = np.array(task.chain.leg_columns[side])
+        low, high = limits.lower[columns - ROOT] + _STOP, limits.upper[columns - ROOT] - _STOP
+        via[:, columns] = np.clip(via[:, columns] + _STEP, np.minimum(low, via[:, columns]), high)
     return via
 
 

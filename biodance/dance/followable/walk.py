@@ -6,14 +6,16 @@ What a posture must keep it keeps also for people who copy it imprecisely (`cata
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from biodance.dance.cues import MIRROR_CALL, instructions
-from biodance.dance.followable.catalogue import Catalogue, roomy
+from biodance.dance.dance import Dance
+from biodance.dance.followable.catalogue import Catalogue
 from biodance.dance.followable.plain import plain_move
 from biodance.dance.followable.vocabulary import Word, read_vocabulary, words_for
+from biodance.dance.performers import lost_by_copies
 from biodance.dance.postures.selection import learned
 from biodance.dance.problem.splines import rest_to_rest
 from biodance.dance.problem.stance import Stance, under
@@ -32,8 +34,10 @@ _FORCE, _MOMENT, _RATE = 8.0, 4.0, 4.0
 """N, N·m, Hz: error of one independent sample of a person's wrench, and how many there are (`selection`)."""
 _TRIES = 200
 """Postures that are taken or given up before a walk is."""
-_BETWEEN = (0.5, 0.3, 0.7)
+_BETWEEN = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
 """Shares of a move at which imprecise people must have room, too."""
+_LIFTING = 1.4
+"""Times as long as others that a move takes in which a foot is lifted or put down."""
 _LOOKED_AT = 24
 """Postures that tell most standing still, whose ways are judged, too."""
 
@@ -70,11 +74,11 @@ class _Place:
 @dataclass(eq=False)
 class Walk:
     """The search for one dance: what was worked out is kept, so that another round with other ``banned`` postures
-    (feet, number) costs little.
+    (feet, number: the limit that somebody broke there) costs little.
     """
 
     work: DesignContext
-    banned: set[tuple[str, int]] = field(default_factory=set)
+    banned: dict[tuple[str, int], str] = field(default_factory=dict)
     _catalogues: dict[str, Catalogue] = field(default_factory=dict)
     _broken: dict[tuple[str, int], str] = field(default_factory=dict)
     _moves: dict[tuple[bytes, bytes], Move] = field(default_factory=dict)
@@ -113,6 +117,18 @@ class Walk:
             else:
                 break
         raise BiodanceError(self._stuck(stances[max(0, len(path) - 1)], len(path) - 1, why))
+
+    def choose(self, stances: tuple[Stance, ...]) -> list[DanceStep]:
+        """Return one step for each of ``stances``, as `take` does, without a look at the moves between them."""
+        steps, belief = list[DanceStep](), np.eye(self.factor.shape[1])
+        for number, stance in enumerate(stances):
+            step = next((one for one in self._ranked(steps, stance, belief) if not self._wrong(one)), None)
+            if step is None:
+                raise BiodanceError(self._stuck(stance, number, {}))
+            Z = learned(belief, self._told(steps[-1] if steps else None, step))
+            belief = belief - Z.T @ Z
+            steps.append(step)
+        return steps
 
     def _possible(
         self, steps: list[DanceStep], stance: Stance, belief: Array, why: dict[str, int]
@@ -165,6 +181,9 @@ class Walk:
     def _reach(self, last: DanceStep | None, catalogue: Catalogue) -> Iterator[DanceStep]:
         """Yield all postures of a catalogue that can be reached from the last one within the instructions."""
         body, most = self.work.chain.body, self.work.plan.instructions
+        if np.isinf(most):
+            yield from (DanceStep(catalogue, s, ()) for s in range(len(catalogue.index)))
+            return
         zero = np.zeros(self.work.chain.size)
         mirror = catalogue.mirrored[last.s] if last is not None and last.catalogue is catalogue else -1
         for s in self._near(last, catalogue):
@@ -177,8 +196,6 @@ class Walk:
 
     def _near(self, last: DanceStep | None, catalogue: Catalogue) -> list[int]:
         """Return the postures that differ in few parts of the body from the last one, and its mirror image."""
-        if np.isinf(self.work.plan.instructions):
-            return list(range(len(catalogue.index)))
         was = {part: word.key for part, word in last.words.items()} if last is not None else {}
         off = np.zeros(len(catalogue.index), dtype=int)
         for column, part in enumerate(catalogue.parts):
@@ -204,7 +221,7 @@ class Walk:
     def _wrong(self, step: DanceStep) -> str:
         key = self.key(step)
         if key in self.banned:
-            return "self_collision"
+            return self.banned[key]
         if key not in self._broken:
             self._broken[key] = step.catalogue.keeps(step.s, self.work.plan.limits)
         return self._broken[key]
@@ -213,11 +230,11 @@ class Walk:
         key = (last.x.tobytes(), step.x.tobytes())
         if key not in self._moves:
             feet, plan = under(last.catalogue.stance, step.catalogue.stance), self.work.plan
-            ends = np.array([last.x, step.x])
-            move = plain_move(Task(self.work.chain, self.work.blocks, feet, ends, plan.move, plan.limits))
-            way = [ends[0] + share * (ends[1] - ends[0]) for share in _BETWEEN]
-            between = len(feet.planted) == 1 or all(roomy(self.work.chain, feet, x) for x in way)
-            self._moves[key] = move if between or move.limit else replace(move, limit="self_collision")
+            stances = (last.catalogue.stance, step.catalogue.stance)
+            slow = _LIFTING if stances[0].planted != stances[1].planted else 1.0
+            ends, duration = np.array([last.x, step.x]), slow * plan.move
+            task = Task(self.work.chain, self.work.blocks, feet, ends, duration, plan.limits)
+            self._moves[key] = plain_move(task, lambda move: _lost(task, stances, move))
         return self._moves[key]
 
     def _told(self, last: DanceStep | None, step: DanceStep) -> Array:
@@ -247,6 +264,13 @@ class Walk:
 
 def _feet(stance: Stance) -> str:
     return f"{stance.name} {stance.planted} {stance.over} {stance.ankle.tobytes().hex()}"
+
+
+def _lost(task: Task, stances: tuple[Stance, Stance], move: Move) -> str:
+    """Return the limit of which imprecise people leave too little on the way, "" if none."""
+    still, time = np.ones(2), np.array([move.duration])
+    way = Dance("", task.chain.body, task.ends, stances, still, move.via[None], time, (task.stance,), 0)
+    return lost_by_copies(way, task.limits, still[0] + move.duration * _BETWEEN)
 
 
 def name_of(step: DanceStep) -> str:

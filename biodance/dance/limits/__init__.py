@@ -17,6 +17,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from biodance.dance.limits._checked import NOTHING, CheckedMotion, Remaining
+from biodance.dance.limits._imprecise import Copied, ForImprecise
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State
 from biodance.discovery import Family
@@ -27,6 +28,8 @@ __all__ = [
     "FAR",
     "NOTHING",
     "CheckedMotion",
+    "Copied",
+    "ForImprecise",
     "Limit",
     "Margins",
     "Remaining",
@@ -68,6 +71,7 @@ class Limit(ABC):
     left out one after the other, the smallest number first, until there would be one; that one is named. ``rounding``
     what the check forgives. ``move_reserve`` least share of the scale that is kept in reserve while a move is designed;
     ``tapers`` True where this reserve ends with the move, because it begins and ends at the limit.
+    ``mended_by_slowness`` True where a move that breaks the limit may keep it if it takes longer.
     """
 
     name: ClassVar[str]
@@ -79,6 +83,7 @@ class Limit(ABC):
     rounding: ClassVar[float] = 0.0
     move_reserve: ClassVar[float] = 0.0
     tapers: ClassVar[bool] = False
+    mended_by_slowness: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         for one in fields(self):
@@ -102,6 +107,16 @@ class Limit(ABC):
         there.
         """
         return 0.06
+
+    def straight_reserve(self, stance: Stance) -> float:
+        """Return what `hold_reserve` does where the moves to and from the posture go straight."""
+        return self.hold_reserve(stance)
+
+    def for_imprecise(self) -> ForImprecise | None:
+        """Return what people who copy a dance imprecisely must keep of this limit; None where that is their own affair,
+        as where they stop at the end of a joint's range.
+        """
+        return None
 
     def resized(self, length: float) -> "Limit":
         """Return the limit of a body that is ``length`` times as large: its numbers in m grow with it."""

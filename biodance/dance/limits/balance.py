@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.dance.limits import CheckedMotion, Limit, Margins, Remaining, bounded
+from biodance.dance.limits import CheckedMotion, Copied, ForImprecise, Limit, Margins, Remaining, bounded
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State
 from biodance.motion.dynamics import zmp
@@ -19,6 +19,7 @@ class Balance(Limit):
 
     share: float = bounded(0.6, 0.1, 1.0)
     name, unit, scale, suspicion = "balance", "m", 0.03, 30
+    mended_by_slowness = True
 
     @property
     def support_share(self) -> float:
@@ -51,8 +52,19 @@ class Balance(Limit):
         least = np.min([_inside(point, some, self.share) for some in corners], axis=0)
         return Remaining(least[:, None], (motion.stance.name,))
 
+    def for_imprecise(self) -> ForImprecise:
+        """Nobody leaves the whole support."""
+        return ForImprecise(_left, 0.0, "balance_m", "kept the weight {} cm inside the feet")
+
 
 LIMIT = Balance
+
+
+def _left(copy: Copied) -> Remaining:
+    """Return the distance (T, kinds of stance) m inside the whole support, infinite where another stance is taken."""
+    names = tuple(dict.fromkeys(copy.stances[k].name for k in np.unique(copy.on)))
+    taken = np.array([stance.name for stance in copy.stances])[copy.on]
+    return Remaining(np.where(taken[:, None] == np.array(names), copy.inside(1.0)[:, None], np.inf), names)
 
 
 def _inside(point: Array, corners: Array, share: float) -> Array:

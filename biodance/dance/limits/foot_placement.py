@@ -32,6 +32,10 @@ class FootPlacement(Limit):
         """More than others': straight legs are singular."""
         return 0.4
 
+    def straight_reserve(self, stance: Stance) -> float:
+        """Less: nothing is sought on a straight way."""
+        return 0.05
+
     def margins(self, state: State) -> Margins:
         """Return how much longer each planted leg could be, (T, planted feet) m; none for hanging legs."""
         if not state.stance.planted:

@@ -18,6 +18,7 @@ class Friction(Limit):
 
     mu: float = bounded(0.5, 0.05, 1.5)
     name, unit, scale, at_rest = "friction", "N", 100.0, False
+    mended_by_slowness = True
 
     def margins(self, state: State) -> Margins:
         """Return the horizontal force that is left along x and y, (T, 2) N."""

@@ -15,6 +15,7 @@ class JointSpeed(Limit):
 
     share: float = bounded(1.0, 0.1, 1.0)
     name, unit, scale, at_rest = "joint_speed", "rad/s", 1.0, False
+    mended_by_slowness = True
 
     def margins(self, state: State) -> Margins:
         """Return speed that is left, (T, joints) rad/s."""

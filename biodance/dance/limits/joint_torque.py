@@ -14,6 +14,7 @@ class JointTorque(Limit):
 
     share: float = bounded(1.0, 0.1, 1.0)
     name, unit, scale, suspicion = "joint_torque", "N m", 15.0, 10
+    mended_by_slowness = True
 
     def margins(self, state: State) -> Margins:
         """Return distance to the lower and to the upper torque limit, (T, 2 joints) N m; with the weight over one foot

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.dance.limits import FAR, CheckedMotion, Limit, Margins, Remaining, bounded
+from biodance.dance.limits import FAR, CheckedMotion, Copied, ForImprecise, Limit, Margins, Remaining, bounded
 from biodance.dance.problem.shapes import Solids
 from biodance.dance.problem.state import State
 from biodance.motion.kinematics import Poses
@@ -21,6 +21,8 @@ _ROUNDS = 6
 """Of the search, which leaves a sixteenth of the line each time."""
 _ENOUGH = 0.05
 """m: a distance above it is given as what is certain."""
+IMPRECISE_GAP = 0.02
+"""m that segments of people stay apart who copy a dance imprecisely."""
 _POINTS = 5
 """Points on the axis of a capsule for the first look."""
 
@@ -45,8 +47,18 @@ class SelfCollision(Limit):
         apart, pairs = solid_distances(motion.body, motion.pose)
         return Remaining(apart - self.gap, tuple(pairs))
 
+    def for_imprecise(self) -> ForImprecise:
+        """Segments stay `IMPRECISE_GAP` apart."""
+        least = max(self.gap, IMPRECISE_GAP)
+        return ForImprecise(_left, least, "gap_m", "kept arms and legs {} cm apart")
+
 
 LIMIT = SelfCollision
+
+
+def _left(copy: Copied) -> Remaining:
+    """Return the distances (T, pairs) m between surfaces, in closed form; large ones of moving people: lower bounds."""
+    return Remaining(*surface_distances(copy.body, copy.pose, near=np.inf if copy.still else _CLOSE))
 
 
 def _capsules(state: State, near: float) -> Margins:

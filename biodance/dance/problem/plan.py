@@ -19,7 +19,7 @@ shipped ones are in ``protocols/dances``:
     budget_s = 115               of free ones: those that inform most per second are danced until the time is used up
     gentle = false               true: only what people can do who tire or fear to fall
     deep = false                 true: deep squats and bows, one-leg squats, too
-    wide = 1.3                   distance between the feet, times the usual one (free: 1)
+    wide = 1.35                  distance between the feet, times the usual one (free: 1)
     other_weight = 1.0           emphasis of the segments that [weights] does not name
     ranges = "comfortable"       what joints may use: what is reached without effort, or "anatomical": all that a
                                  healthy joint allows
@@ -174,7 +174,7 @@ _NUMBERS = {
 _SHORT = {"share_of_support": ("balance", "share")}
 """Key of the file: limit and its number."""
 _FLAGS = ("free", "gentle", "deep")
-_FOLLOWABLE = {"instructions": 4.0, "simplicity": 1.0, "wide": 1.3}
+_FOLLOWABLE = {"instructions": 4.0, "simplicity": 1.0, "wide": 1.35}
 """Of protocols that are not free, unless the file says otherwise."""
 FOLLOWABLE_SHARE = 0.8
 """Share of the support that a followable dance may use: what imprecise people need is judged by performers."""

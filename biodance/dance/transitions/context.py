@@ -5,7 +5,7 @@ where it stopped.
 import hashlib
 from collections.abc import Callable
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.body.body_file import body_text
 from biodance.dance.problem.chain import Chain
-from biodance.dance.problem.excitation import Blocks
+from biodance.dance.problem.excitation import Blocks, excitation_blocks
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance
 from biodance.records import Array
@@ -80,8 +80,15 @@ class DesignContext:
     plan: Plan
     seed: int
     ledger: Checkpoint
-    workers: Executor
+    workers: Executor | None
     tell: Tell
+
+    @classmethod
+    def alone(cls, body: Body, plan: Plan, seed: int) -> "DesignContext":
+        """Return a design that keeps nothing, tells nobody and has no workers."""
+        parts = excitation_blocks(body)
+        parts = replace(parts, weight=parts.weight * plan.emphasis(body.segments), simplicity=plan.simplicity)
+        return cls(Chain(body), parts, plan, seed, Checkpoint(None, body, plan, seed), None, lambda *_: None)
 
 
 @dataclass(frozen=True, eq=False)

@@ -47,6 +47,11 @@ without the reserve on the coarse grid.
 """
 
 
+def straight_way(start: Array, end: Array) -> Array:
+    """Return the via points (2, n) of the smoothest move from ``start`` to ``end`` (n,)."""
+    return np.asarray(start + _THIRDS[:, None] * (end - start))
+
+
 @dataclass(frozen=True, eq=False)
 class Task:
     """A move to find: from ``ends[0]`` to ``ends[1]`` (2, n) in ``duration`` s on the feet of ``stance``, within the
@@ -75,7 +80,7 @@ class Task:
 
     def straight(self) -> Array:
         """Return the via points (2, n) of the smoothest move."""
-        return np.asarray(self.ends[0] + _THIRDS[:, None] * (self.ends[1] - self.ends[0]))
+        return straight_way(*self.ends)
 
     def problem(
         self, via: Array, free: list[int], time: Array, *, reserve: float, objective: Objective

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.effects._base.geometry import Geometry, geometry
+from biodance.effects._base.geometry import Geometry, GeometryChanges, geometry
 from biodance.errors import TrialRefused, UnknownName
 from biodance.lab.filters import motion_filter
 from biodance.motion.kinematics import Poses, SegmentMotion, poses, segment_motion
@@ -109,8 +109,12 @@ class Case:
         return {}
 
     @cached_property
-    def geometry(self) -> Geometry:
-        """How posture, wrench and markers answer to changes of the body's geometry."""
+    def geometry(self) -> GeometryChanges:
+        """How wrench and markers answer to changes of the body's geometry."""
+        return self.body_geometry().changes
+
+    def body_geometry(self) -> Geometry:
+        """Return what the trial says about its body's geometry, posture and all: large, and not kept."""
         return geometry(
             self.body,
             self.motion,

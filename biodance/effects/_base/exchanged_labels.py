@@ -2,11 +2,12 @@
 a rigid group, wrists.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import combinations
 
 import numpy as np
 
+from biodance.effects._base.wrists import middle, rightwards, shows_palm, sides, travels, turned_wrists
 from biodance.lab.markers.sets import MarkerSet, read_marker_set
 from biodance.records import Array, Markers, Trial
 
@@ -16,13 +17,8 @@ _FEWEST = 5
 """Pairs of left and right markers that tell which side is which."""
 _ASIDE = 0.02
 """m by which a left marker must lie to the right of its right partner, in the median over the trial."""
-_OPPOSITE = -0.4
-"""Cosine between one wrist and the mirrored other one from which on they contradict each other (19 real trials: -0.65
-and less where exchanged, 0.25 and more elsewhere)."""
-_BACKWARDS = -0.5
-"""Share of a wrist that points backwards, thumb behind, while the person moves: nobody walks so."""
-_FAR_AWAY = 1.0
-"""m between first and last frame that a person walks at least."""
+_ENDS = (("FHD", "BHD"), ("ASI", "PSI"), ("TOE", "HEE"))
+"""Stems of labels in front and behind of the same bone."""
 _MISFIT = 0.003
 """m: distances within a rigid group that differ so much (RMS) between static and trial are not those of one group."""
 _ARM = ("ELB", "FIN")
@@ -31,24 +27,21 @@ _BETTER = 0.4
 """Share of the misfit that the right names leave at most, and share of what the next best names leave."""
 
 
-def partner(name: str) -> str:
-    """Return the label of the same place on the other side; "" for a midline marker."""
-    other = {"L": "R", "R": "L", "l": "r", "r": "l"}.get(name[:1], "")
-    return other + name[1:] if other else ""
-
-
-def exchanged_pairs(trial: Trial, static: Trial | None, known: frozenset[Pair]) -> frozenset[Pair]:
+def exchanged_pairs(
+    trial: Trial, static: Trial | None, known: frozenset[Pair], others: Iterable[Markers] = ()
+) -> frozenset[Pair]:
     """Return the pairs of markers that carry each other's names in a trial.
 
     ``static`` of the same person (None, or the trial itself: what the trial says alone), ``known`` the pairs that are
-    exchanged in it: distances only tell whether a trial has other names than the static.
+    exchanged in it: distances only tell whether a trial has other names than the static. ``others`` of the same person
+    in which both arms hang.
     """
     markers = trial.markers
     if markers is None:
         return frozenset()
-    alone = {*crossed_sides(markers)}
-    if trial.role == "static" or travels(markers):
-        alone |= {*turned_wrists(markers, moves=trial.role != "static")}
+    alone = {*crossed_sides(markers), *crossed_ends(markers)}
+    if arms_hang(trial):
+        alone |= {*turned_wrists(markers, others)}
     if static is None or static.markers is None or static is trial or not trial.marker_set:
         return frozenset(alone)
     alone = {pair for pair in alone if pair in known or not _farther(markers, static.markers, pair)}
@@ -63,58 +56,45 @@ def exchanged_pairs(trial: Trial, static: Trial | None, known: frozenset[Pair]) 
     return frozenset(alone)
 
 
-def travels(markers: Markers) -> bool:
-    """Return whether the person goes from one place to another: only then, and in a static trial, do both arms hang
-    alike.
-    """
-    place = np.nanmean(markers.xyz[..., :2], axis=1) if markers.seen.any(axis=1).all() else np.zeros((1, 2))
-    return bool(np.linalg.norm(place[-1] - place[0]) > _FAR_AWAY)
+def arms_hang(trial: Trial) -> bool:
+    """Return whether both arms hang in a trial: while somebody stands for the static trial, or walks."""
+    return trial.markers is not None and (trial.role == "static" or travels(trial.markers))
 
 
 def crossed_sides(markers: Markers) -> tuple[Pair, ...]:
     """Return the pairs of left and right markers that lie on each other's side of the body in the median over the
     trial, against the majority of pairs.
     """
-    pairs = [(name, partner(name)) for name in markers.names if name[:1] in "Ll" and partner(name) in markers]
+    pairs = sides(markers)
     if len(pairs) < _FEWEST:
         return ()
-    apart = np.stack([markers[right] - markers[left] for left, right in pairs]) * [1.0, 1.0, 0.0]
-    to_right = _rightwards(apart)
+    apart = np.stack([markers[right] - markers[left] for left, right in pairs])
+    to_right = rightwards(markers)
     with np.errstate(invalid="ignore"):
         side = np.einsum("ptk,tk->pt", apart, to_right)
-    return tuple(_sorted(pair) for pair, one in zip(pairs, side, strict=True) if _middle(one) < -_ASIDE)
+    return tuple(_sorted(pair) for pair, one in zip(pairs, side, strict=True) if middle(one) < -_ASIDE)
 
 
-def turned_wrists(markers: Markers, *, moves: bool) -> tuple[Pair, ...]:
-    """Return the wrists whose thumb-side marker (WRA) and other one (WRB) lie the other way round than at the mirrored
-    other wrist; while the person ``moves``, also every wrist whose thumb side points backwards.
+def crossed_ends(markers: Markers) -> tuple[Pair, ...]:
+    """Return the pairs of a front and a back marker of one side (`_ENDS`) of which the front one lies behind the back
+    one in the median over the trial.
     """
-    if any(f"{side}{name}" not in markers for side in "LR" for name in ("WRA", "WRB")):
+    if len(sides(markers)) < _FEWEST:
         return ()
-    pairs = [(name, partner(name)) for name in markers.names if name[:1] in "Ll" and partner(name) in markers]
-    to_right = _rightwards(np.stack([markers[right] - markers[left] for left, right in pairs]) * [1.0, 1.0, 0.0])
-    ahead = np.cross([0.0, 0.0, 1.0], to_right)
-    out = {}
-    for side, sign in (("L", -1.0), ("R", 1.0)):
-        bar = markers[f"{side}WRA"] - markers[f"{side}WRB"]
-        with np.errstate(invalid="ignore"):
-            bar = bar / np.linalg.norm(bar, axis=1, keepdims=True)
-        parts = (np.sum(bar * ahead, axis=1), sign * np.sum(bar * to_right, axis=1), bar[:, 2])
-        out[side] = np.array([_middle(part) for part in parts])
-    if not np.isfinite([*out.values()]).all():
-        return ()
-    wrong = {side for side, bar in out.items() if moves and bar[0] < _BACKWARDS}
-    if out["L"] @ out["R"] < _OPPOSITE and not wrong:
-        wrong = {min(out, key=lambda side: float(out[side][:2].sum()))}
-    return tuple((f"{side}WRA", f"{side}WRB") for side in sorted(wrong))
+    ahead = np.cross([0.0, 0.0, 1.0], rightwards(markers))
+    pairs = [(side + front, side + back) for side in "LR" for front, back in _ENDS]
+    there = [pair for pair in pairs if pair[0] in markers and pair[1] in markers]
+    lead = [middle(np.sum((markers[front] - markers[back]) * ahead, axis=1)) for front, back in there]
+    return tuple(_sorted(pair) for pair, one in zip(there, lead, strict=True) if one < -_ASIDE)
 
 
 def _farther(markers: Markers, static: Markers, pair: Pair) -> bool:
     """Return whether exchanging the two markers of one wrist takes them away from where the static trial has them
-    beside elbow and finger: then the hand was turned, not the names.
+    beside elbow and finger: then the hand was turned, not the names. Some millimetres, which say less than a
+    finger's marker on the palm.
     """
     side = pair[0][:1]
-    if pair[1][:1] != side:
+    if pair != (side + "WRA", side + "WRB") or shows_palm(markers, side):
         return False
     beside = [side + name for name in _ARM if side + name in markers.names and side + name in static.names]
     if not beside or any(name not in static.names for name in pair):
@@ -176,20 +156,7 @@ def _distances(markers: Markers, group: tuple[str, ...]) -> Array:
     """Return the median distances (n, n) m between the markers of a group."""
     points = np.stack([markers[name] for name in group])
     apart = np.linalg.norm(points[:, None] - points[None], axis=-1)
-    return np.array([[_middle(one) for one in row] for row in apart])
-
-
-def _rightwards(apart: Array) -> Array:
-    """Return the unit vector (T, 3) to the right of the body, from left-to-right vectors (P, T, 3)."""
-    total = np.nansum(apart, axis=0)
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray(np.where(length > 0, total / length, np.nan))
-
-
-def _middle(values: Array) -> float:
-    seen = values[np.isfinite(values)]
-    return float(np.median(seen)) if seen.size else float("nan")
+    return np.array([[middle(one) for one in row] for row in apart])
 
 
 def _sorted(pair: Pair) -> Pair:

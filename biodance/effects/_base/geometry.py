@@ -50,12 +50,13 @@ class Geometry:
     def marker_changes(self) -> "Changes":
         """What one metre of every marker of the model does, three axes of its segment each: P = 3 K."""
         answer = self.answer
-        frames, count = answer.weight.shape
-        moved = np.zeros((frames, count, 3, count, 3))
-        moved[:, range(count), :, range(count)] = np.moveaxis(answer.pose.rotation[:, list(answer.segment)], 1, 0)
+        count = len(answer.segment)
+        turn = answer.pose.rotation[self._few][:, list(answer.segment)]
+        moved = np.zeros((len(turn), count, 3, count, 3))
+        moved[:, range(count), :, range(count)] = np.moveaxis(turn, 1, 0)
         posture = answer.follow(answer.marker_slopes())
         return Changes(
-            self._wrench(self.matter @ posture), self._residual(posture, moved.reshape(frames, count, 3, -1))
+            self._wrench(self.matter @ posture), self._residual(posture, moved.reshape(len(turn), count, 3, -1))
         )
 
     @cached_property
@@ -70,23 +71,33 @@ class Geometry:
             centre, carried = _moves(answer, chain)
             slopes.append(answer.joint_slopes(chain, centre, carried))
             direct.append(self.direct[:, :, hanging[chain[-1]] > 0].sum(axis=2) @ carried)
-            moved.append(answer.hangs[chain[-1]][:, None, None] * carried[:, None])
+            moved.append(answer.hangs[chain[-1]][:, None, None] * carried[self._few][:, None])
         posture = answer.follow(np.concatenate(slopes, axis=2))
         wrench = self._wrench(self.matter @ posture + np.concatenate(direct, axis=2))
         return Changes(wrench, self._residual(posture, np.concatenate(moved, axis=3)))
+
+    @property
+    def changes(self) -> "GeometryChanges":
+        """Only what serves on: what was needed to find it is some ten times as large."""
+        return GeometryChanges(self.marker_changes, self.joint_changes, self.phi)
+
+    @property
+    def _few(self) -> slice:
+        """The frames over which mean marker residuals are taken."""
+        return slice(None, None, max(1, len(self.time) // MEANS))
 
     def _wrench(self, nine: Array) -> Array:
         return wrench_of(nine, self.time, self.wanted, smoothed=self.smoothed, gravity=self.answer.body.gravity)
 
     def _residual(self, posture: Array, moved: Array) -> Array:
         """Return the change (K, 3, P) m of the mean marker residual (measured less model, segment axes) when the
-        model's markers move by ``moved`` (F, K, 3, P) m at fixed posture and the posture changes by ``posture`` (F, nv,
-        P).
+        model's markers move by ``moved`` (f, K, 3, P) m in a few frames at fixed posture and the posture changes by
+        ``posture`` (F, nv, P).
         """
-        answer, few = self.answer, slice(None, None, max(1, len(self.time) // MEANS))
+        answer, few = self.answer, self._few
         segment, (frames, count) = list(answer.segment), answer.weight[few].shape
         wide = (frames, count, 3, posture.shape[2])
-        place = (answer.tangent[few].reshape(frames, 3 * count, -1) @ posture[few]).reshape(wide) + moved[few]
+        place = (answer.tangent[few].reshape(frames, 3 * count, -1) @ posture[few]).reshape(wide) + moved
         turns = self.turns[few][:, segment].reshape(frames, 3 * count, -1)
         weight = np.where(answer.weight > 0, answer.weight, 1.0)[few]
         apart = skew(answer.apart[few] / weight[..., None])
@@ -105,6 +116,17 @@ class Changes:
 
     wrench: Array
     residual: Array
+
+
+@dataclass(frozen=True, eq=False)
+class GeometryChanges:
+    """What a metre of every marker (P = 3 K) and of every joint (P = 4 per joint) changes in a trial, as in
+    `Geometry`; ``phi`` (10N,) the parameters of the matter that moves.
+    """
+
+    marker_changes: Changes
+    joint_changes: Changes
+    phi: Array
 
 
 def _moves(answer: PostureAnswer, chain: tuple[int, ...]) -> tuple[Array, Array]:

@@ -28,7 +28,7 @@ from biodance.body.inertia import TENSOR
 from biodance.lab.filters import LowPass, low_pass
 from biodance.motion.kinematics import Poses, SegmentMotion, below, jacobian
 from biodance.records import Array
-from biodance.spatial import skew
+from biodance.spatial import cross, skew
 
 AT_LIMIT = 5e-3
 """rad: a joint so near to a limit that its markers push it against is held there."""
@@ -142,8 +142,8 @@ class PostureAnswer:
         turn = self.pose.rotation[:, list(self.segment)]
         pushed = np.moveaxis(self.tangent * self.weight[:, :, None, None], 3, 1)
         turning = np.concatenate([np.ones((self.body.n_root // 2, len(self.segment))), self.hangs])
-        lever = skew(self.apart)[:, None] * turning[None, :, :, None, None]
-        pushed[:, self.body.n_root // 2 :] -= np.einsum("fji,fjkil->fjkl", self.axes, lever, optimize=True)
+        lever = cross(self.axes[:, :, None], self.apart[:, None])  # a' [x] = (a x x)'
+        pushed[:, self.body.n_root // 2 :] -= lever * turning[:, :, None]
         return np.asarray(np.einsum("fvki,fkij->fvkj", pushed, turn, optimize=True).reshape(*pushed.shape[:2], -1))
 
     def joint_slopes(self, chain: tuple[int, ...], centre: Array, carried: Array) -> Array:

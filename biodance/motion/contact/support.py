@@ -12,6 +12,8 @@ _SHORTEST_FLIGHT = 0.05
 """s: in less the parabola of the markers cannot be seen."""
 _FALLS = (0.6, 1.4)
 """Downward acceleration of the markers' mean, in g, that counts as free fall (limbs move, markers sit unevenly)."""
+_PARABOLA = 0.005
+"""m, RMS, by which the mean of the markers may leave the parabola (limbs move)."""
 _STILL = 0.05
 """m/s: the mean of the markers of somebody who sits or stands still is slower ..."""
 _LASTING = 0.4
@@ -27,23 +29,35 @@ _NEAR = 0.03
 
 
 def flight(trial: Trial, touching: _Mask, load: _Mask) -> _Mask:
-    """Return (T,) where the person flies: no foot may touch, no plate is loaded, and the markers fall freely.
+    """Return (T,) where the person flies: no plate is loaded and the markers fall freely, for as long as no foot may
+    touch, or for as long as no plate is loaded (the foot that has just left a belt is low and slow).
 
     ``touching`` (T, 2), ``load`` (T, P). The plates then measure all that the ground does: nothing.
     """
     found = np.zeros(len(touching), dtype=bool)
-    markers, free = trial.markers, np.logical_not(np.hstack([touching, load]).any(axis=1))
-    if markers is None or markers.time.size < 2:
-        return found
-    for start, stop in runs(free):
-        span = slice(max(0, start - 1), min(len(free), stop + 1))
-        time, height = markers.time[span], markers.xyz[span, :, 2]
-        whole = np.isfinite(height).all(axis=0)
-        if time[-1] - time[0] < _SHORTEST_FLIGHT or time.size < 4 or not whole.any():
-            continue
-        curve = np.polyfit(time - time.mean(), height[:, whole].mean(axis=1), 2)
-        found[start:stop] = _FALLS[0] <= -2 * curve[0] / trial.settings.gravity <= _FALLS[1]
+    unloaded = np.logical_not(load.any(axis=1))
+    for free in (unloaded, unloaded & np.logical_not(touching.any(axis=1))):
+        for start, stop in runs(free):
+            if not found[start] and _falls(trial, start, stop):
+                found[start:stop] = True
     return found
+
+
+def _falls(trial: Trial, start: int, stop: int) -> bool:
+    """Return whether the markers' mean falls freely from frame ``start`` to before ``stop``: on a parabola of about
+    one g.
+    """
+    if trial.markers is None or trial.markers.time.size < 2:
+        return False
+    span = slice(max(0, start - 1), min(trial.markers.time.size, stop + 1))
+    time, height = trial.markers.time[span], trial.markers.xyz[span, :, 2]
+    whole = np.isfinite(height).all(axis=0)
+    if time[-1] - time[0] < _SHORTEST_FLIGHT or time.size < 4 or not whole.any():
+        return False
+    middle, mean = time - time.mean(), height[:, whole].mean(axis=1)
+    curve = np.polyfit(middle, mean, 2)
+    straight = np.sqrt(np.mean((np.polyval(curve, middle) - mean) ** 2)) < _PARABOLA
+    return bool(straight and _FALLS[0] <= -2 * curve[0] / trial.settings.gravity <= _FALLS[1])
 
 
 def carried_elsewhere(trial: Trial, *, weight: float) -> _Mask:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from biodance.diagnosis.diagnosis import Alias, Finding, Gain, Unobservable
-from biodance.diagnosis.foresight import Foresight
+from biodance.diagnosis.foresight import TOLD, Foresight
 from biodance.diagnosis.heard import Testimony, sights
 from biodance.identification.identification import Identification
 from biodance.pipeline.diagnosis import SessionDiagnosis
@@ -84,7 +84,22 @@ def foresight_document(found: Foresight) -> dict[str, Any]:
         "unobservable": [_limit(row) for row in found.hidden],
         "confusions": pairs,
         "separation": found.separation,
+        "summary": foresight_summary(found),
+        "changes": [
+            {"do": one.do, **{key: [" ".join(c).strip() for c in getattr(one, key)] for key in ("unseen", "confused")}}
+            for one in found.changes
+        ],
     }
+
+
+def foresight_summary(found: Foresight) -> str:
+    """Return in two sentences what a movement will see and confuse."""
+    mixed = sum(pair.difference < TOLD for pair in found.confusions)
+    mixed_up = f"{mixed} of them look like another one" if mixed else "all of them are told from each other"
+    return (
+        f"Of {len(found.limits)} causes that a diagnosis looks for, this movement will see {len(found.seen)} at their "
+        f"typical size; {mixed_up}."
+    )
 
 
 def _masses(found: Identification | None) -> list[dict[str, Any]] | None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from biodance.dance.cues import dance_instructions
 from biodance.dance.problem.stance import stance_words
-from biodance.pipeline.dance import DanceResult
+from biodance.pipeline.dance_result import DanceResult
 from biodance.report.figures.mannequin import mannequin_svg
 
 

@@ -80,6 +80,22 @@ class Performance:
         """
         return Wrench(time, self._wrench_spline(time))
 
+    def foot_wrench(self, time: Array, side: str) -> Array:
+        """Return the true wrench (T, 6) about the lab origin under one foot.
+
+        The weight is shared as planned; each foot's pressure lies as far from its own place as the common one from the
+        place wanted.
+        """
+        wrench = self.wrench(time)
+        share = self.share_right(time)[:, None]
+        pressure, stance = wrench.cop(threshold=1.0), self.stance
+        middle = share * stance.pressure["right"] + (1 - share) * stance.pressure["left"]
+        weight = share if side == "right" else 1 - share
+        place = np.zeros_like(pressure)
+        place[:, :2] = stance.pressure[side] + pressure[:, :2] - middle
+        twist = wrench.moment - np.cross(pressure, wrench.force)
+        return np.concatenate([weight * wrench.force, weight * (np.cross(place, wrench.force) + twist)], axis=1)
+
     def share_right(self, time: Array) -> Array:
         """Return the share (T,) of the weight on the right foot."""
         return np.clip(np.interp(time, self.curves.time, self.curves["shift"][:, 0]), 0.0, 1.0)
@@ -179,6 +195,11 @@ def _splines(time: Array, q: Array) -> tuple[Any, Any, Any]:
 
     spline = make_interp_spline(time, q, k=5)
     return spline, spline.derivative(1), spline.derivative(2)
+
+
+def motion_through(node_time: Array, nodes: Array, time: Array) -> Motion:
+    """Return the motion at ``time`` (T,) s of the quintic spline through ``nodes`` (N, 46) at ``node_time`` (N,) s."""
+    return _motion(_splines(node_time, nodes), time)
 
 
 def _motion(splines: tuple[Any, Any, Any], time: Array) -> Motion:

@@ -8,6 +8,7 @@ from typing import Any, cast
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import locate, read_toml
 from biodance.records import ROLES, Role
+from biodance.virtual_lab.movement.gaits import GAITS
 
 FIELDS: dict[str, tuple[float, ...]] = {
     "pelvis": (0.0, 0.0, 0.0),
@@ -56,13 +57,18 @@ class ProtocolStep:
 
 @dataclass(frozen=True)
 class TrialPlan:
-    """One trial of a protocol: ``lead`` seconds of standing before and after the ``steps``."""
+    """One trial of a protocol: ``lead`` seconds of standing before and after the ``steps``; or ``gait`` ("walk", "run")
+    on a belt of ``speed`` m/s (0: the gait's own) for a person of 1.75 m, others as the root of stature; for twice the
+    ``lead``.
+    """
 
     name: str
     role: Role
     stance: str
     steps: tuple[ProtocolStep, ...]
     lead: float = 1.0
+    gait: str = ""
+    speed: float = 0.0
 
     @property
     def duration(self) -> float:
@@ -72,12 +78,13 @@ class TrialPlan:
 
 @dataclass(frozen=True)
 class Protocol:
-    """A named sequence of trials; ``postures`` by name includes "stand"."""
+    """A named sequence of trials; ``postures`` by name includes "stand"; ``belts`` of the treadmill, 0 without one."""
 
     name: str
     description: str
     trials: tuple[TrialPlan, ...]
     postures: dict[str, ProtocolPosture] = field(default_factory=dict)
+    belts: int = 0
 
 
 STAND = ProtocolPosture("stand", dict(FIELDS))
@@ -111,7 +118,10 @@ def read_protocol(name_or_path: str | Path) -> Protocol:
     names = [plan.name for plan in plans]
     if len(set(names)) < len(names):
         raise BiodanceError(f"{path}: trial names occur twice ({', '.join(names)}). Give every trial its own name.")
-    return Protocol(str(raw.get("name", path.stem)), str(raw.get("description", "")), plans, postures)
+    belts = raw.get("belts", 0)
+    if belts not in (0, 1, 2) or (not belts and any(plan.gait for plan in plans)):
+        raise BiodanceError(f"{path}: belts = {belts!r}; legal are 1 and 2 (split-belt), and 0 without any gait.")
+    return Protocol(str(raw.get("name", path.stem)), str(raw.get("description", "")), plans, postures, belts)
 
 
 def _table(path: Path, raw: dict[str, Any], key: str) -> dict[str, Any]:
@@ -164,6 +174,8 @@ def _trial(path: Path, number: int, given: Any, postures: dict[str, ProtocolPost
     if stance not in _STANCES:
         raise UnknownName.of(f"stance of trial {name!r} in {path}", stance, _STANCES)
     lead = _numbers(path, f"{name}.lead", given.get("lead", 1.0), 1)[0]
+    if "gait" in given:
+        return _gait(path, name, role, given)
     steps = tuple(_step(path, name, step, postures) for step in given.get("steps", []))
     _check_feet(path, name, steps)
     if steps and (steps[-1].to.raised or not steps[-1].cycles) and steps[-1].to.name != "stand":
@@ -171,6 +183,17 @@ def _trial(path: Path, number: int, given: Any, postures: dict[str, ProtocolPost
     if lead < 0 or (not steps and lead == 0):
         raise BiodanceError(f"{path}: trial {name!r} lasts no time; give steps or a lead in seconds.")
     return TrialPlan(name, role, stance, steps, lead)
+
+
+def _gait(path: Path, name: str, role: Role, given: dict[str, Any]) -> TrialPlan:
+    """Return a trial of walking or running: gait, seconds and speed m/s."""
+    if given["gait"] not in GAITS:
+        raise UnknownName.of(f"gait of trial {name!r} in {path}", str(given["gait"]), tuple(GAITS))
+    seconds = _numbers(path, f"{name}.seconds", given.get("seconds", 10.0), 1)[0]
+    speed = _numbers(path, f"{name}.speed", given.get("speed", GAITS[given["gait"]].speed), 1)[0]
+    if not 2 <= seconds <= 600 or not 0.3 <= speed <= 5:
+        raise BiodanceError(f"{path}: trial {name!r}: {seconds} s at {speed} m/s; legal are 2 to 600 s, 0.3 to 5 m/s.")
+    return TrialPlan(name, role, "parallel", (), seconds / 2, str(given["gait"]), speed)
 
 
 def _check_feet(path: Path, trial: str, steps: tuple[ProtocolStep, ...]) -> None:

@@ -9,13 +9,14 @@ import numpy as np
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.write import PlateRecording, write_c3d
 from biodance.records import Array, Markers, Role, frozen_array
+from biodance.virtual_lab.movement.gait import perform_gait
 from biodance.virtual_lab.movement.performance import AppliedForce, Performance, perform
 from biodance.virtual_lab.movement.protocol import TrialPlan
 from biodance.virtual_lab.person.person import Person
 from biodance.virtual_lab.person.placement import MARKER_RADIUS
 from biodance.virtual_lab.person.skeleton import small_rotation
 from biodance.virtual_lab.recording.cameras import TISSUES, SoftTissue, draw_soft_tissue, film
-from biodance.virtual_lab.recording.plates import HALF_SIZE, TruePlate, digitise, lay_plate, sense_plate
+from biodance.virtual_lab.recording.plates import HALF_BELT, HALF_SIZE, TruePlate, digitise, lay_plate, sense_plate
 from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances, stream
 
 
@@ -53,6 +54,8 @@ class Laboratory:
         "functional" or "static": how the joints are placed when its sessions are read.
     children : bool
         Whether its people are children.
+    belts : int
+        0 = plates in the floor; 1 = one instrumented belt, 2 = a split-belt treadmill, instead of them.
     """
 
     centre: tuple[float, float] = (0.3, 0.2)
@@ -69,12 +72,15 @@ class Laboratory:
     population: int | None = None
     joints: str = "functional"
     children: bool = False
+    belts: int = 0
 
     def __post_init__(self) -> None:
         if self.plates not in (1, 2, 3, 4) or self.plate_type not in (2, 4):
             raise BiodanceError(
                 f"Laboratory: {self.plates} plates of TYPE {self.plate_type}; legal are 1 to 4 plates of TYPE 2 or 4."
             )
+        if self.belts not in (0, 1, 2):
+            raise BiodanceError(f"Laboratory: {self.belts} belts; legal are 0 (none), 1 and 2 (split-belt).")
         if self.camera_rate <= 0 or self.samples < 1:
             raise BiodanceError(
                 f"Laboratory: {self.camera_rate} Hz with {self.samples} force samples per frame; both must be positive."
@@ -149,14 +155,9 @@ def set_up(person: Person, visit: LabVisit) -> Instruments:
     laboratory, tolerances, session = visit.laboratory, visit.tolerances, visit.number
     rng = stream(person.seed, "instruments", str(session))
     tilt = np.array([*(tolerances.lab_tilt * rng.normal(size=2)), 0.0]) + np.array(visit.tilt)
-    middle = np.array([*laboratory.centre, 0.0])
-    ahead = np.array([np.cos(laboratory.heading), np.sin(laboratory.heading), 0.0]) * HALF_SIZE[1]
-    leftward = np.array([-np.sin(laboratory.heading), np.cos(laboratory.heading), 0.0]) * HALF_SIZE[0]
-    places = [("both", 0 * ahead)] if laboratory.plates == 1 else [("right", -leftward), ("left", leftward)]
-    places += [("none", 2 * ahead), ("none", -2 * ahead)][: laboratory.plates - 2] if laboratory.plates > 2 else []
     plates = tuple(
-        lay_plate(middle + place, laboratory.heading, side, tolerances, rng, moment_zero=laboratory.moment_zero)
-        for side, place in places
+        lay_plate(place, laboratory.heading, side, tolerances, rng, moment_zero=laboratory.moment_zero, half=half)
+        for side, place, half in _places(laboratory)
     )
     return Instruments(
         visit,
@@ -164,6 +165,19 @@ def set_up(person: Person, visit: LabVisit) -> Instruments:
         frozen_array(small_rotation(tilt), (3, 3), "tilt"),
         draw_soft_tissue(person, session, tolerances, laboratory.tissue),
     )
+
+
+def _places(laboratory: Laboratory) -> list[tuple[str, Array, Array]]:
+    """Return of every plate whose foot it carries, its centre (3,) m and half its sides (2,) m."""
+    middle = np.array([*laboratory.centre, 0.0])
+    half = HALF_BELT if laboratory.belts else HALF_SIZE
+    ahead = np.array([np.cos(laboratory.heading), np.sin(laboratory.heading), 0.0]) * half[1]
+    leftward = np.array([-np.sin(laboratory.heading), np.cos(laboratory.heading), 0.0]) * half[0]
+    apart = laboratory.belts == 2 if laboratory.belts else laboratory.plates > 1
+    places = [("right", -leftward), ("left", leftward)] if apart else [("both", 0 * ahead)]
+    if not laboratory.belts and laboratory.plates > 2:
+        places += [("none", 2 * ahead), ("none", -2 * ahead)][: laboratory.plates - 2]
+    return [(side, middle + place, half) for side, place in places]
 
 
 def perform_in(instruments: Instruments, person: Person, plan: TrialPlan) -> Performance:
@@ -174,7 +188,8 @@ def perform_in(instruments: Instruments, person: Person, plan: TrialPlan) -> Per
     lab = visit.laboratory
     if plan.role != "static":
         person = person.with_markers_moved(visit.marker_shifts)
-    done = perform(
+    moved = perform_gait if plan.gait else perform
+    done = moved(
         person, plan, visit.number, tolerances=visit.tolerances, centre=np.array(lab.centre), heading=lab.heading
     )
     return replace(done, forces=visit.forces)

@@ -17,6 +17,8 @@ from biodance.virtual_lab.tolerances import LabTolerances
 
 HALF_SIZE = np.array([0.2, 0.3])
 """m, half sides along plate x and y."""
+HALF_BELT = np.array([0.25, 0.85])
+"""m, the same of one belt of an instrumented split-belt treadmill."""
 ORIGIN = np.array([0.0004, -0.0006, -0.0380])
 """m, from the sensor's origin to the centre of the surface, plate axes (z down, hence negative)."""
 NEWTON, _INCH = 4.4482216152605, 0.0254
@@ -64,9 +66,11 @@ def lay_plate(
     rng: np.random.Generator,
     *,
     moment_zero: float = 0.0,
+    half: Array = HALF_SIZE,
 ) -> TruePlate:
     """Return a plate whose long side lies along ``heading`` (rad from lab x), surveyed at ``centre`` (3,) m and truly a
-    little elsewhere; ``moment_zero`` N·m, standard deviation of its moments' zeros beyond that of its forces.
+    little elsewhere; ``moment_zero`` N·m, standard deviation of its moments' zeros beyond that of its forces; ``half``
+    (2,) m, half its sides across and along.
     """
     t, relative = tolerances, FULL_SCALE / FULL_SCALE[2]
     forward, leftward = (
@@ -75,7 +79,7 @@ def lay_plate(
     )
     turn = np.stack([leftward, forward, np.array([0.0, 0.0, -1.0])], axis=1)
     signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
-    corners = centre + (signs * HALF_SIZE) @ turn[:, :2].T
+    corners = centre + (signs * half) @ turn[:, :2].T
     mixing = t.plate_crosstalk * rng.normal(size=(6, 6)) * np.outer(FULL_SCALE, 1 / FULL_SCALE)
     np.fill_diagonal(mixing, 1.0 + t.plate_gain * rng.normal(size=6))
     true_turn = turn @ small_rotation(t.plate_rotation * rng.normal(size=3))
@@ -86,24 +90,10 @@ def lay_plate(
 
 
 def contact_wrench(performance: Performance, time: Array, side: str) -> Array:
-    """Return the true wrench (T, 6) about the lab origin under one foot, under "both" or "none".
-
-    The weight is shared as planned; each foot's pressure lies as far from its own place as the common one from the
-    place wanted.
-    """
+    """Return the true wrench (T, 6) about the lab origin under one foot, under "both" or "none"."""
     if side == "none":
         return np.zeros((time.size, 6))
-    wrench = performance.wrench(time)
-    if side == "both":
-        return wrench.value
-    share = performance.share_right(time)[:, None]
-    pressure, stance = wrench.cop(threshold=1.0), performance.stance
-    middle = share * stance.pressure["right"] + (1 - share) * stance.pressure["left"]
-    weight = share if side == "right" else 1 - share
-    place = np.zeros_like(pressure)
-    place[:, :2] = stance.pressure[side] + pressure[:, :2] - middle
-    twist = wrench.moment - np.cross(pressure, wrench.force)
-    return np.concatenate([weight * wrench.force, weight * (np.cross(place, wrench.force) + twist)], axis=1)
+    return performance.wrench(time).value if side == "both" else performance.foot_wrench(time, side)
 
 
 def sense_plate(

@@ -1,0 +1,193 @@
+"""How people copy a dance: degrees off in every joint, late and early, swaying.
+
+A performer's joints err by smooth noise and the tempo wanders. Whoever stands corrects: the pelvis keeps the centre of
+mass where the dance has it, but for the sway; what hurried or crooked limbs do to the zero-moment point is not
+corrected. Planted feet stay where they are, and a leg errs the more the farther it is lifted. The virtual laboratory
+performs dances by other code.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from biodance.body.parts import UPRIGHT
+from biodance.body.pinocchio_model import load_pinocchio
+from biodance.dance.dance import Dance, Phase
+from biodance.dance.limits import Copied
+from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.stance import Stance
+from biodance.records import Array
+
+_RATE, _PLAN_RATE = 5.0, 25.0
+"""Hz at which performances are judged, and the plan is laid out."""
+_WANDER, _TEMPO, _SWAY = 0.25, 0.2, 0.5
+"""Hz: how fast errors, tempo and sway change."""
+_STRAIGHT, _SOFT = float(np.radians(5.0)), 80.0
+"""rad of a knee that counts as straight; 1/m of the soft minimum over the legs."""
+_PENDULUM = 0.1
+"""s²: height of the centre of mass over gravity."""
+_LIFT = 1.0
+"""Share of a move in which a foot leaves the ground, or comes back."""
+_ROUNDS = 2
+"""Corrections of the pelvis; what is left is a tenth of a millimetre a degree."""
+_CARRIED = 0.85
+"""m that the centre of mass goes when the pelvis goes 1 m over planted feet."""
+
+
+@dataclass(frozen=True)
+class Imprecision:
+    """How badly people copy: ``tracking`` rad root mean square of every joint's error, ``pelvis`` the share of it that
+    the pelvis' turns have, ``pace`` times the planned duration, ``timing`` root mean square of the tempo's wandering,
+    ``sway`` m root mean square of the centre of pressure. The usual values are those of a restless performer.
+    """
+
+    tracking: float = float(np.radians(7.0))
+    pelvis: float = 0.4
+    pace: float = 1.2
+    timing: float = 0.2
+    sway: float = 0.006
+
+
+USUAL_IMPRECISION = Imprecision()
+
+
+def draw_clock(rng: np.random.Generator, duration: float, how: Imprecision) -> tuple[Array, Array]:
+    """Return instants (T,) s of a performance, and those of the plan (T,) s that belong to them."""
+    time = np.arange(round(duration * how.pace * _RATE) + 1) / _RATE
+    tempo = np.exp(how.timing * _noise(rng, time, 1, _TEMPO)[:, 0])
+    done = np.concatenate([[0.0], np.cumsum((tempo[1:] + tempo[:-1]) / 2)])
+    return time, duration * done / done[-1]
+
+
+def _noise(rng: np.random.Generator, time: Array, columns: int, cutoff: float, *, slow: float = 0.0) -> Array:
+    """Return smooth random curves (T, columns) of unit standard deviation, whose amplitudes fall with exp(-(f /
+    cutoff)²); ``slow`` s²: divided by 1 + slow (2 pi f)², as the mass of a pendulum moves when its support sways.
+    """
+    duration = 1.3 * (time[-1] - time[0]) + 1.0
+    frequency = np.arange(1, int(np.ceil(2.5 * cutoff * duration)) + 1) / duration
+    weight = np.exp(-((frequency / cutoff) ** 2))
+    weight /= np.sqrt(np.sum(weight**2)) * (1 + slow * (2 * np.pi * frequency) ** 2)
+    cosine, sine = rng.normal(size=(2, frequency.size, columns)) * weight[None, :, None]
+    phase = 2 * np.pi * np.outer(time, frequency)
+    return np.asarray(np.cos(phase) @ cosine + np.sin(phase) @ sine)
+
+
+class PlannedDance:
+    """The dance laid out in time: coordinates, place of the centre of mass and of the pelvis, feet of the phases."""
+
+    def __init__(self, dance: Dance) -> None:
+        self.dance, self.chain, phases = dance, dance.chain, dance.phases
+        self.start, self.end = (np.array([getattr(phase, name) for phase in phases]) for name in ("start", "end"))
+        self.posture = np.array([phase.posture for phase in phases])
+        self.stances = tuple(phase.stance for phase in phases)
+        before = [dance.stances[max(0, phase.posture - (phase.kind == "move"))] for phase in phases]
+        after = [dance.stances[phase.posture] for phase in phases]
+        self.down = np.array(
+            [[_planted(s) for s in row] for row in zip(before, (p.stance for p in phases), after, strict=True)]
+        )
+        self.ankles = np.array([[s.ankle for s in row] for row in zip(before, after, strict=True)])
+        self.stepping = np.ptp(self.ankles, axis=1).any(axis=(1, 2))
+        time = np.unique(np.concatenate([_instants(phase) for phase in phases]))
+        rows, x = self.phase_at(time), np.empty((len(time), self.chain.size))
+        for p, phase in enumerate(phases):
+            x[rows == p] = dance.state(phase, time[rows == p]).x
+        up, ankle = self._feet(rows, time)
+        over = x[:, 2] - self._tops(x, up, ankle)
+        self.spline = CubicSpline(time, np.column_stack([x, mass_centre(self.chain, x)[:, :2], over]))
+
+    def phase_at(self, when: Array) -> NDArray[np.intp]:
+        """Return the phase (T,) at instants of the plan."""
+        return np.asarray(np.clip(np.searchsorted(self.start, when + 1e-9, side="right") - 1, 0, None))
+
+    def _feet(self, rows: NDArray[np.intp], when: Array) -> tuple[Array, Array]:
+        """Return how far each foot is up (T, 2), 0 on the ground to 1, and where its ankle stands if it does (T, 2, 3)
+        m.
+        """
+        way = ((when - self.start[rows]) / np.maximum(self.end[rows] - self.start[rows], 1e-9))[:, None]
+        before, during, after = np.moveaxis(self.down[rows], 1, 0)
+        rise = np.where(before, _eased(way / _LIFT), 1.0) * np.where(after, _eased((1 - way) / _LIFT), 1.0)
+        ankle = np.where(way[..., None] < 0.5, self.ankles[rows, 0], self.ankles[rows, 1])
+        return np.where(during, 0.0, rise), ankle
+
+    def _tops(self, x: Array, up: Array, ankle: Array) -> Array:
+        """Return the height (T,) m of the pelvis at which planted legs are nearly straight; a foot that is up gives
+        way.
+        """
+        turn, tops = self.chain.root_rotation(x), []
+        for side in (0, 1):
+            leg = self.chain.legs[side]
+            hip, reach = turn @ leg.hip, float(leg.length(_STRAIGHT))
+            across = np.sum((x[:, :2] + hip[:, :2] - ankle[:, side, :2]) ** 2, axis=1)
+            tops.append(ankle[:, side, 2] + np.sqrt(np.maximum(reach**2 - across, 0.01)) - hip[:, 2] + up[:, side])
+        return np.asarray(-np.log(np.exp(-_SOFT * np.array(tops)).sum(axis=0)) / _SOFT)
+
+    def performed(self, rng: np.random.Generator, time: Array, when: Array, how: Imprecision) -> Copied:
+        """Return a performance at ``time`` s, (T,), that is where the plan is at ``when`` s."""
+        error = how.tracking * _noise(rng, time, self.chain.size - 3, _WANDER)
+        return self._copied(time, when, error, how.sway * _noise(rng, time, 2, _SWAY, slow=_PENDULUM), how)
+
+    def held_by(self, count: int, when: Array, how: Imprecision = USUAL_IMPRECISION) -> Copied:
+        """Return what ``count`` people do who stop at each of the instants ``when`` (W,) s of the plan, instant by
+        instant.
+        """
+        rng, when = np.random.default_rng(0), np.repeat(when, count)
+        error = how.tracking * rng.normal(size=(when.size, self.chain.size - 3))
+        sway = how.sway * rng.normal(size=(when.size, 2))
+        return replace(self._copied(np.arange(when.size, dtype=float), when, error, sway, how), still=True)
+
+    def _copied(self, time: Array, when: Array, error: Array, sway: Array, how: Imprecision) -> Copied:
+        """Return the plan at ``when`` with the ``error`` rad (T, n - 3) of the pelvis' turns and of the joints, the
+        centre of mass off by its ``sway`` m (T, 2).
+        """
+        x, rows = self._off(when, error, sway, how)
+        q = self.chain.motion(time, x, *np.zeros((2, *x.shape))).q
+        return Copied(self.chain.body, time, q, self.stances, rows)
+
+    def _off(self, when: Array, error: Array, sway: Array, how: Imprecision) -> tuple[Array, NDArray[np.intp]]:
+        chain, rows = self.chain, self.phase_at(when)
+        told = self.spline(when)
+        x, com, over = told[:, : chain.size], told[:, chain.size : chain.size + 2], told[:, -1]
+        if self.dance.stances[0].seat:
+            x[:, ROOT:] += error[:, 3:]
+            return x, rows
+        x[:, 3:ROOT] += how.pelvis * error[:, :3]
+        x[:, ROOT:] += error[:, 3:]
+        com = com + sway
+        (up, ankle), wanted = self._feet(rows, when), x.copy()
+        for k in range(_ROUNDS + 1):
+            x[:, 2] = self._tops(x, up, ankle) + over
+            x = self._standing(x, wanted, up, ankle)
+            if k < _ROUNDS:
+                x[:, :2] += (com - mass_centre(chain, x)[:, :2]) / _CARRIED
+        return x, rows
+
+    def _standing(self, x: Array, wanted: Array, up: Array, ankle: Array) -> Array:
+        """Return x (T, n) with legs that hold their feet, as far as these are not up; then they do as ``wanted``."""
+        out, turn = x.copy(), self.chain.root_rotation(x)
+        flat = np.broadcast_to(UPRIGHT, turn.shape)
+        for side, columns in enumerate(self.chain.leg_columns):
+            held = self.chain.legs[side].solve(turn, x[:, :3], flat, ankle[:, side])
+            out[:, columns] = held + up[:, side, None] * (wanted[:, columns] - held)
+        return out
+
+
+def _planted(stance: Stance) -> list[bool]:
+    return [side in stance.planted for side in (0, 1)]
+
+
+def _eased(way: Array) -> Array:
+    s = np.clip(way, 0.0, 1.0)
+    return s**3 * (10 - 15 * s + 6 * s**2)
+
+
+def _instants(phase: Phase) -> Array:
+    count = max(2, round((phase.end - phase.start) * _PLAN_RATE))
+    return np.round(np.linspace(phase.start, phase.end, count, endpoint=False), 9)
+
+
+def mass_centre(chain: Chain, x: Array) -> Array:
+    """Return the centre of mass (S, 3) m of coordinates (S, n), lab frame."""
+    pin = load_pinocchio()
+    return np.array([pin.centerOfMass(chain.model, chain.data, row) for row in x]).reshape(-1, 3)

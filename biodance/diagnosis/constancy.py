@@ -1,0 +1,117 @@
+"""Has a cause that was named the same size everywhere? A true one has: in every trial, second, band and channel, under
+every load and at every place. The size of one that only resembles the truth hangs on something: a zero that stands for
+a cross-talk grows with the load, a cross-talk that stands for a zero shrinks with it.
+
+The trace of the cause is multiplied by each of these, and the score test (`evidence`) asks whether the product is in
+what is left, once everything that is no fault and the sizes of all named causes may adapt.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance.diagnosis.adequacy import LIMIT
+from biodance.diagnosis.model import Model, NamedCause
+from biodance.diagnosis.naming import named_of, shared, taken
+from biodance.diagnosis.problem import Problem
+from biodance.records import CHANNELS, Array
+from biodance.uncertainty.bands import BANDS
+
+_SAME = 1e-6
+"""Share of the largest trace that must be left of one beside everything else, to be asked about at all."""
+_STEP = 0.1
+"""m of place, as wide as a foot."""
+
+
+@dataclass(frozen=True)
+class Departure:
+    """How the size of a named cause hangs on something: the ``cause`` (effect, target), ``over`` what, its ``share`` of
+    the size by which it changes (with twice the load, 0.1 m of place, the whole time; in one channel, band or trial),
+    ``z`` the standard deviations of it from none. No cause is quite like its model (`Tolerances.unlike`), so that no
+    share is surer than that.
+    """
+
+    cause: tuple[str, str]
+    over: str
+    share: float
+    z: float
+
+
+def departures(found: Model) -> tuple[Departure, ...]:
+    """Return how the size of every named cause hangs on load, place, time, trial, band and channel, the surest first.
+
+    A cause that comes and goes has no one size and is not asked.
+    """
+    rows = [one for named in found.named if not named.course for one in _of_one(found, named)]
+    return tuple(sorted(rows, key=lambda one: -abs(one.z)))
+
+
+def hanging(found: Model) -> dict[tuple[str, str], Departure]:
+    """Return for every named cause whose size is not the same everywhere, by more than `LIMIT` standard deviations,
+    what it hangs on most.
+    """
+    beyond: dict[tuple[str, str], Departure] = {}
+    for one in departures(found):
+        if abs(one.z) > LIMIT:
+            beyond.setdefault(one.cause, one)
+    return beyond
+
+
+def _of_one(found: Model, named: NamedCause) -> Iterator[Departure]:
+    over, columns = zip(*_traces(found.problem, named), strict=True)
+    Z = found.white(np.stack(columns, axis=1))
+    s, G = found.belief.score(Z)
+    least = _SAME * float(np.sum(Z**2, axis=0).max())
+    seen = np.diag(G) - np.diag(shared(found, taken(found), Z))
+    for name, score, own in zip(over, s, seen, strict=True):
+        if own > least:
+            share, sd = float(score / own), float(np.hypot(own**-0.5, found.tolerances.unlike(named.effect.name)))
+            yield Departure(named_of(named), name, share, share / sd)
+
+
+def _traces(put: Problem, named: NamedCause) -> Iterator[tuple[str, Array]]:
+    """Yield what the cause would have added (r,), had its size grown with something, and with what."""
+    whole = tuple(named.effect.removed(case, named.theta) for case in put.cases)
+    for name, signals in _signals(put).items():
+        samples = tuple((part * signal[:, None])[:, :, None] for part, signal in zip(whole, signals, strict=True))
+        yield name, _padded(put, put.spectrum.rows(samples)[:, :, 0])
+    rows = put.spectrum.rows(tuple(part[:, :, None] for part in whole))[:, :, 0]
+    names = [case.trial.name for case in put.cases]
+    picks = {channel: np.arange(6)[None, :] == c for c, channel in enumerate(CHANNELS)}
+    picks |= {_band(b): (put.spectrum.band == b)[:, None] for b in range(len(BANDS))}
+    picks |= {name: (put.spectrum.trial == t)[:, None] for t, name in enumerate(names)} if len(names) > 1 else {}
+    for name, pick in picks.items():
+        yield name, _padded(put, np.where(pick, rows, 0.0))
+
+
+def _band(index: int) -> str:
+    return f"{BANDS.edges[index]:g}-{BANDS.edges[index + 1]:g} Hz"
+
+
+def _padded(put: Problem, rows: Array) -> Array:
+    """Return (r,): rows (m, 6) of the plates, and nothing in the others."""
+    return np.concatenate([rows.ravel(), np.zeros(len(put.target) - rows.size)])
+
+
+def _signals(put: Problem) -> dict[str, list[Array]]:
+    """Return per trial (T,) what a size may hang on, about its mean over the frames used: load (of its mean) and place
+    (in `_STEP`) as the movement needs them (what was measured reproduces any residual), time of the session and of the
+    trial (of the whole).
+    """
+    needed = [case.predicted for case in put.cases]
+    force = [np.where(np.abs(wrench[:, 2]) > 1.0, wrench[:, 2], 1.0) for wrench in needed]
+    weight = float(np.mean(np.concatenate(force)))
+    raw = {
+        "load": [wrench[:, 2] / weight for wrench in needed],
+        "place along x": [-wrench[:, 4] / fz / _STEP for wrench, fz in zip(needed, force, strict=True)],
+        "place along y": [wrench[:, 3] / fz / _STEP for wrench, fz in zip(needed, force, strict=True)],
+        "time of the session": [case.session_time for case in put.cases],
+        "time of the trial": [np.linspace(0.0, 1.0, case.motion.time.size) for case in put.cases],
+    }
+    frames = [np.concatenate((*picks, np.zeros(0, dtype=int))) for picks in put.spectrum.picks]
+    mean = {
+        name: np.mean(np.concatenate([signal[pick.astype(int)] for signal, pick in zip(one, frames, strict=True)]))
+        for name, one in raw.items()
+    }
+    return {name: [signal - mean[name] for signal in one] for name, one in raw.items()}

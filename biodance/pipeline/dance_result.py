@@ -1,0 +1,167 @@
+"""What came of designing a dance: the dance, its margins, what it tells, and the sentences that stand before it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from biodance import display
+from biodance.body.body import Body
+from biodance.dance.dance import Dance
+from biodance.dance.expectation import Expectation
+from biodance.dance.limits import ForImprecise
+from biodance.dance.metrics import DanceMetrics
+from biodance.dance.performers import OF_PERFORMERS, PERFORMER_COUNT, for_imprecise
+from biodance.dance.problem.plan import Plan
+from biodance.dance.verify import Margin, broken
+
+_FAR, _NEW = 3.0, 0.9
+"""Times its bound at which the static criterion is warned of; share of the table's standard deviation that is left of
+what is not learned.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class DanceResult:
+    """What came of designing a dance.
+
+    Parameters
+    ----------
+    body : Body
+        As fitted to the person.
+    plan : Plan
+        The protocol, as fitted to the person.
+    dance : Dance or None
+        None where none keeps all limits.
+    margins : tuple
+        Worst of every limit, judged by other code than the optimiser's.
+    account, expectation : Account, Expectation or None
+        What the dance tells, and what will be known after it; None without a dance.
+    reason : str
+        Which limit forbids the dance; "" with one.
+    notes : tuple of str
+        What was left out for the person (``dance.notes``: because a move was impossible).
+    seconds : float
+        Of computing.
+    reason_of_person : str
+        Why the person's file asks for limits of their own; "" without one.
+    freely : Expectation or None
+        What would be known after as many of the same postures chosen freely (`freer_dance`): the price of a dance that
+        can be followed; None where nothing limits the choice.
+
+    Examples
+    --------
+    >>> made = biodance.design_dance(biodance.Subject(65.0, 1.75, "F"), "one_segment")  # doctest: +SKIP
+    >>> made.feasible  # doctest: +SKIP
+    True
+    """
+
+    body: Body
+    plan: Plan
+    dance: Dance | None
+    margins: tuple[Margin, ...]
+    account: DanceMetrics | None
+    expectation: Expectation | None
+    reason: str
+    notes: tuple[str, ...]
+    seconds: float
+    reason_of_person: str = ""
+    freely: Expectation | None = None
+
+    def __repr__(self) -> str:
+        return f"DanceResult({self.dance!r})" if self.dance is not None else f"DanceResult(no dance: {self.reason})"
+
+    def _repr_html_(self) -> str:
+        return display.card(repr(self), self.dance.table() if self.dance is not None else None, self.notes)
+
+    @property
+    def feasible(self) -> bool:
+        """True where there is a dance and every margin of it is kept."""
+        return self.dance is not None
+
+    @property
+    def performers(self) -> dict[str, float] | None:
+        """What imprecise performers leave of every limit that they must keep, m; None where none were asked."""
+        found = {one.key: worst for one, worst in self._left}
+        return {"count": PERFORMER_COUNT, **found} if found else None
+
+    @property
+    def _left(self) -> list[tuple[ForImprecise, float]]:
+        worst = {margin.limit: margin.worst for margin in self.margins}
+        asked = {f"{limit.name}_{OF_PERFORMERS}": one for limit, one in for_imprecise(self.plan.limits).items()}
+        return [(one, worst[name] + one.least) for name, one in asked.items() if name in worst]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What this dance cannot tell, in plain sentences: where the criterion is far from its bound."""
+        unsafe = tuple(
+            f"NOT SAFE when imprecise: {m.limit.removesuffix(OF_PERFORMERS).replace('_', ' ').strip()} fell short "
+            f"by {-1000 * m.worst:.0f} mm at {m.where_s:.0f} s ({m.what.replace('_', ' ')}) for the worst of "
+            f"{PERFORMER_COUNT}. Try another seed, an easier protocol, or dance it with somebody at hand."
+            for m in broken(self.margins)
+            if m.limit.endswith(OF_PERFORMERS)
+        )
+        if self.account is None or self.expectation is None or self.account.static <= _FAR * self.account.static_bound:
+            return unsafe
+        ratio = self.account.static / self.account.static_bound
+        hardly = f" Hardly tilted: {_names(self.account.hardly)}." if self.account.hardly else ""
+        return (
+            *unsafe,
+            f"The static criterion is {ratio:.1f} times its bound.{hardly} {self._unlearned(self.expectation)}",
+        )
+
+    def _unlearned(self, known: Expectation) -> str:
+        """Return what is not learned, in a sentence: what stays nearly as uncertain as in the table."""
+        told = {"mass": known.mass, "centre of mass": known.com}
+        poor = {
+            what: tuple(name for name, ratio in zip(known.segments, sd[-1] / sd[0], strict=True) if ratio > _NEW)
+            for what, sd in told.items()
+        }
+        said = " and ".join(f"the {what} of {_names(names)}" for what, names in poor.items() if names)
+        return f"It cannot teach {said}: these stay as in the table." if said else "Every segment is learned in part."
+
+    @property
+    def price(self) -> str:
+        """What it costs that the dance can be followed, in a sentence; "" where nothing limits the choice."""
+        if self.expectation is None or self.freely is None:
+            return ""
+        here, free = (
+            f"{np.sqrt(np.mean(one.mass[-1] ** 2)):.2f} kg, {1000 * np.sqrt(np.mean(one.com[-1] ** 2)):.1f} mm"
+            for one in (self.expectation, self.freely)
+        )
+        return (
+            f"Expected standard deviations of masses and centres of mass after it: {here}; if the same postures were "
+            f"chosen freely, with any number of instructions at once: {free}."
+        )
+
+    @property
+    def about(self) -> tuple[str, ...]:
+        """What stands before the cues: for whom, the person's own limits and their reason, how safe, what is untold."""
+        out = [f"For {self.plan.whom}."] if self.plan.whom else []
+        if self.reason_of_person:
+            out.append(f"Made for one person's limits: {self.reason_of_person}.")
+        if found := self._left:
+            kept = " and ".join(one.words.format(f"{100 * worst:.1f}") for one, worst in found)
+            out.append(
+                f"{PERFORMER_COUNT} simulated people, seven degrees off in every joint, a fifth off in time and "
+                f"swaying, {kept} at the worst moment."
+            )
+        else:
+            out.append("Nobody imprecise was tried on this dance: it is for trained people only.")
+        out += [self.price] if self.price else []
+        return (*out, *self.notes, *self.warnings)
+
+    @property
+    def complete(self) -> bool:
+        """True where nothing of the protocol was left out, neither for the person nor because a move was impossible,
+        and imprecise people are safe.
+        """
+        counted = self.dance.counted.sum() if self.dance else 0
+        return (
+            not self.notes
+            and not broken(self.margins)
+            and (np.isfinite(self.plan.budget) or counted == self.plan.count)
+        )
+
+
+def _names(segments: tuple[str, ...]) -> str:
+    return ", ".join(name.replace("_", " ") for name in segments)

@@ -1,0 +1,43 @@
+"""The page of what a planned movement will see: a summary, what to change, and every cause."""
+
+from pathlib import Path
+from typing import Any
+
+from biodance.errors import BiodanceError
+from biodance.pipeline.provenance import now
+from biodance.report.pages.template import render
+from biodance.version import __version__
+
+_NAMED = 6
+"""Targets of a cause that are listed by name."""
+
+
+def refuse_page(path: Path, *, force: bool) -> None:
+    """Raise BiodanceError where ``path`` exists and ``force`` was not given, or its folder is missing."""
+    if path.exists() and not force:
+        raise BiodanceError(f"{path}: exists and nothing is overwritten. Choose another --out, or --force.")
+    if not path.parent.is_dir():
+        raise BiodanceError(f"{path.parent}: there is no such folder. Make it, or choose another --out.")
+
+
+def foresight_page(document: dict[str, Any], name: str) -> str:
+    """Return the page (HTML) of what `foresight_document` says of the movement ``name``."""
+    return render(
+        "foresight.html.j2", found=document, movement=name, version=__version__, created=now(), words=_words, some=_some
+    )
+
+
+def _some(causes: list[str]) -> str:
+    """Return causes by effect, the first targets of each by name: "marker misplaced (C7, CLAV and 3 more)"."""
+    targets: dict[str, list[str]] = {}
+    for effect, _, target in (cause.partition(" ") for cause in causes):
+        targets.setdefault(effect, []).append(_words(target))
+    out = []
+    for effect, of in targets.items():
+        more = f" and {len(of) - _NAMED} more" if len(of) > _NAMED else ""
+        out.append(_words(effect) + (f" ({', '.join(of[:_NAMED])}{more})" if of[0] else ""))
+    return "; ".join(out)
+
+
+def _words(cause: str) -> str:
+    return cause.replace("_", " ")

@@ -1,0 +1,45 @@
+"""What a dance that can be followed costs, and the sentences that say what it cannot teach."""
+
+from dataclasses import replace
+
+import numpy as np
+from small_dances import BODY
+
+from biodance.dance.cues import dance_instructions
+from biodance.dance.expectation import Expectation
+from biodance.dance.followable.price import freer_dance
+from biodance.dance.metrics import DanceMetrics
+from biodance.dance.problem.plan import Plan
+from biodance.pipeline.dance_result import DanceResult
+from biodance.report.dance_write import dance_document
+
+PLAN = Plan("x", "", (("parallel", 4),), hold=1.0, instructions=3.0, simplicity=1.0, wide=1.35, gentle=True)
+
+
+def expected(mass: float, com: float) -> Expectation:
+    told = [np.array([np.full(12, before), np.full(12, after)]) for before, after in ((1.0, mass), (0.02, com))]
+    told[0][1, 3] = 0.99
+    return Expectation(BODY.segments, np.array([0.0, 60.0]), *told, told[1], np.zeros((2, 12)))
+
+
+def test_freely_chosen_postures_are_of_the_same_number_and_ask_more_at_once() -> None:
+    free = freer_dance(BODY, PLAN, seed=1)
+    assert free.counted.sum() == 4
+    assert max(map(len, dance_instructions(free)[1:])) > PLAN.instructions
+
+
+def test_the_price_and_what_cannot_be_learned_are_said() -> None:
+    free = freer_dance(BODY, replace(PLAN, blocks=(("parallel", 2),)))
+    poor = DanceMetrics(300.0, 65.0, np.ones(1), 65.0, ("left_foot",), ())
+    result = DanceResult(BODY, PLAN, free, (), poor, expected(0.5, 0.010), "", (), 1.0, freely=expected(0.4, 0.008))
+    price = dance_document(result)["simplicity_price"]
+    assert price["mass_kg"]["with"] > price["mass_kg"]["without"]
+    assert price["com_m"] == {"with": 0.010, "without": 0.008}
+    assert "chosen freely" in result.price
+    assert result.price in result.about
+    (warning,) = result.warnings
+    assert "4.6 times its bound" in warning
+    assert "left foot" in warning
+    assert f"It cannot teach the mass of {BODY.segments[3].replace('_', ' ')}" in warning
+    near = replace(result, account=replace(poor, static=180.0))
+    assert near.warnings == ()

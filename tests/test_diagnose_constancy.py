@@ -1,0 +1,90 @@
+"""A cause is named only where it has one size everywhere: a look-alike, whose size hangs on the load, is resembled."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosed_sessions import about_plate, body, known, looks
+
+from biodance.diagnosis import heard
+from biodance.diagnosis.adequacy import LIMIT, STRAINED, energies, strain, strain_as_loud
+from biodance.diagnosis.constancy import departures
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Unobservable
+from biodance.diagnosis.engine import HANGS, diagnose_trials
+from biodance.diagnosis.evidence import Belief
+from biodance.diagnosis.joined import with_witnesses
+from biodance.diagnosis.naming import built
+from biodance.diagnosis.problem import problem
+from biodance.diagnosis.testimony import Verdicts
+
+ZERO, LEAK = ("plate_offset", "Fx"), ("plate_crosstalk", "Fz->Fx")
+
+
+def zero(local, session):
+    local[:, 0] += 25.0
+    return local
+
+
+def leaking(local, session):
+    local[:, 0] += 0.04 * local[:, 2]
+    return local
+
+
+@pytest.mark.parametrize(("change", "guilty", "innocent"), [(zero, ZERO, LEAK), (leaking, LEAK, ZERO)])
+def test_a_zero_and_a_leak_of_the_load_do_not_stand_for_one_another(change, guilty, innocent) -> None:
+    some = looks(1, trials=2, hidden=about_plate(change))
+    right, wrong = (
+        diagnose_trials(body(), some, tolerances=known(), effects=(name,)) for name, _ in (guilty, innocent)
+    )
+    assert [(f.effect, f.target) for f in right.diagnosis.findings] == [guilty]
+    assert not right.diagnosis.findings[0].hangs_on
+    assert max(abs(one.z) for one in departures(right.naming.found)) < LIMIT
+    assert (wrong.diagnosis.verdict, wrong.diagnosis.findings) == ("unexplained", ())
+    like = next(f for f in wrong.diagnosis.resembles if (f.effect, f.target) == innocent)
+    assert like.hangs_on
+    assert any(HANGS in note for note in wrong.diagnosis.notes)
+    if innocent == ZERO:  # a leak is in proportion to the load: its size as a zero doubles with it
+        by_load = next(one for one in departures(wrong.naming.found) if (one.cause, one.over) == (ZERO, "load"))
+        assert by_load.share == pytest.approx(1.0, abs=0.35)
+
+
+def a_finding(value: float, hangs_on: str = "") -> Finding:
+    size = Estimate("offset", value, 0.5, "N")
+    return Finding(*ZERO, (size,), (Alias(*ZERO, 30.0),), 0.5, hangs_on=hangs_on)
+
+
+HEARD = heard.Testimony((), {}, {}, {})
+DOUBTED = Diagnosis("unexplained", (), limits=(Unobservable(*ZERO, 2.0, "N"),), doubt="its body moves otherwise")
+
+
+@pytest.mark.parametrize(
+    ("simulation", "named"),
+    [
+        (replace(DOUBTED, candidates=(Alias(*ZERO, -4.0),)), False),
+        (replace(DOUBTED, candidates=(Alias(*ZERO, 40.0),)), True),
+        (replace(DOUBTED, candidates=(Alias(*ZERO, 40.0),), resembles=(a_finding(9.0, "load"),)), False),
+        (replace(DOUBTED, candidates=(Alias(*ZERO, -4.0),), limits=()), True),
+    ],
+)
+def test_a_witness_names_nothing_of_which_the_simulation_saw_no_trace(simulation: Diagnosis, named: bool) -> None:
+    one = with_witnesses(simulation, Verdicts((a_finding(9.2),), HEARD), HEARD, judged=True)
+    assert bool(one.findings) is named
+
+
+def test_a_loud_person_makes_no_body_strange_and_a_strange_body_stays_strange() -> None:
+    """Everything 2.2 times as loud as known pulls the body about; its deviations are then no news. A body three times
+    as unlike the table as people are stays strange beside the usual noise.
+    """
+    found, _ = built(problem(body(), looks(3, trials=2)), known(), ("plate_offset",))
+    belief, k, rng = found.belief, found.problem.factor.shape[1], np.random.default_rng(7)
+
+    def of(size: float, loud: float):
+        u = rng.normal(size=belief.X.shape[1])
+        u[:k] *= size
+        y = belief.X @ u + loud * rng.normal(size=len(belief.y))
+        return replace(found, belief=Belief.known(belief.X, belief.factor, y))
+
+    loud, strange = of(1.6, 2.2), of(3.0, 1.0)
+    assert np.median(energies(loud)) > 2.0
+    assert strain_as_loud(loud) < strain(loud)
+    assert strain_as_loud(strange) > STRAINED
