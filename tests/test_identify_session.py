@@ -125,7 +125,7 @@ def test_caution_widens_without_moving_or_breaking_the_scale() -> None:
 def test_a_turned_frame_and_a_shifted_centre_to_first_order() -> None:
     from scipy.spatial.transform import Rotation
 
-    from biodance.uncertainty.caution import shift_slope, _turn_slope
+    from biodance.uncertainty.caution import _turn_slope, shift_slope
     from biodance.virtual_lab.person.flesh import of_parameters, parameters_of_inertia, place_inertia
 
     phi = np.array(person(6)[0].sip.phi[:10])

@@ -7,8 +7,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json
-from biodance.cli.options import PERSON, USUAL_READING, JsonOption, Reading, Results, RobotFile
-from biodance.cli.options import USUAL_READING, ForceOption, JsonOption, Reading, Results
+from biodance.cli.options import PERSON, USUAL_READING, ForceOption, JsonOption, Reading, Results, RobotFile
 from biodance.cli.progress import progress
 from biodance.cli.robot import diagnose_robot
 from biodance.cli.session import examine_with_reference, tabled

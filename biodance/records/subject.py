@@ -13,7 +13,7 @@ SIDES = ("right", "left")
 
 
 @dataclass(frozen=True)
-class FootOutline:
+class FootSizes:
     """The outline of one foot, m: ``length`` heel to toe tip, ``breadth`` at the ball, ``heel_breadth``."""
 
     length: float
@@ -48,7 +48,7 @@ class Subject:
     scan_up : {"z", "y", "x"}
         Axis of that file that points up.
     foot_outline : mapping
-        `FootOutline` by side, right and left; empty = not measured.
+        `FootSizes` by side, right and left; empty = not measured.
 
     Examples
     --------
@@ -66,7 +66,7 @@ class Subject:
     girths: Mapping[str, float] = field(default_factory=dict)
     scan: str = ""
     scan_up: Literal["z", "y", "x"] = "z"
-    foot_outline: Mapping[str, FootOutline] = field(default_factory=dict)
+    foot_outline: Mapping[str, FootSizes] = field(default_factory=dict)
 
     def require(self, *quantities: Literal["mass", "stature", "age"]) -> None:
         """Refuse to go on where a quantity is not known.
