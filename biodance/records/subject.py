@@ -14,7 +14,24 @@ SIDES = ("right", "left")
 
 @dataclass(frozen=True)
 class FootSizes:
-    """The outline of one foot, m: ``length`` heel to toe tip, ``breadth`` at the ball, ``heel_breadth``."""
+    """The outline of one foot.
+
+    Parameters
+    ----------
+    length : float
+        Heel to toe tip, m.
+    breadth : float
+        At the ball, m.
+    heel_breadth : float
+        Of the heel, m.
+
+    Examples
+    --------
+    >>> foot = biodance.FootSizes(0.264, 0.101, 0.069)
+    >>> person = biodance.Subject(62.0, 1.70, "F", foot_outline={"right": foot, "left": foot})
+    >>> person.foot_outline["left"].breadth
+    0.101
+    """
 
     length: float
     breadth: float
