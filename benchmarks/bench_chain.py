@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from virtual_visits import subjects
 
+from biodance.body.human.skeleton import SEGMENTS
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.problem.plan import read_plan
@@ -122,7 +123,7 @@ def _identified(place: Path) -> dict[str, Any]:
     assert static.motion is not None
     frame = int(np.argmin(np.abs(static.motion.time - document["static_pose"]["time_s"])))
     pose = poses(body, static.motion.q[frame : frame + 1])
-    true = sip_in_frames(document, pose.rotation[0], pose.position[0])
+    true = sip_in_frames(document, pose.rotation[0][: len(SEGMENTS)], pose.position[0][: len(SEGMENTS)])
     known = one.identification.known
 
     def column(name: str, quantities: tuple[str, ...]) -> Array:
