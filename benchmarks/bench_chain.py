@@ -2,22 +2,25 @@
 session is read and identified, and what the segments weigh is compared with the truth.
 
     OMP_NUM_THREADS=1 python benchmarks/bench_chain.py FOLDER [--people 10] [--performer normal] [--motions
-    squats,short,full]
+    squats,short,full] [--borrow] [--lab SEED]
 
 Every person dances the dance that was designed for him or her (mass, stature, sex); `squats` are the fit trials of the
-protocol squat. Everything found is kept in FOLDER (dances, sessions, one JSON a session), so that an interrupted run
-goes on. Remove FOLDER/rows when identification changes.
+protocol squat, `squats_long` nine times as many. With `--borrow` a person without a dance takes the one in FOLDER that
+was designed for the person nearest in stature; with `--lab` the sessions are recorded in the laboratory drawn from that
+seed. Everything found is kept in FOLDER (dances, sessions, one JSON a session), so that an interrupted run goes on.
+Remove FOLDER/rows when identification changes.
 """
 
 import argparse
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from virtual_visits import subjects
 
+from biodance.body.human.skeleton import SEGMENTS
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.problem.plan import read_plan
@@ -29,16 +32,46 @@ from biodance.pipeline.danced import simulate_dance
 from biodance.pipeline.session import examine, identification_of
 from biodance.records import Array, Subject
 from biodance.virtual_lab.movement.dancing import PERFORMERS
+from biodance.virtual_lab.movement.protocol import Protocol, read_protocol
+from biodance.virtual_lab.recording.family import draw_laboratory
+from biodance.virtual_lab.recording.laboratory import FIRST_VISIT, LabVisit
 from biodance.virtual_lab.simulate import simulate_session
 from biodance.virtual_lab.truth import sip_in_frames
+
+
+@dataclass(frozen=True)
+class Way:
+    """How the people perform, and where: ``performer`` by name, whether they ``borrow`` dances, ``visit`` and its
+    ``place``.
+    """
+
+    performer: str
+    borrow: bool = False
+    visit: LabVisit = FIRST_VISIT
+    place: str = ""
+
+    @property
+    def name(self) -> str:
+        """Of the sessions."""
+        return f"{self.performer}{self.place}"
+
 
 FIRST_SEED = 500
 """Person 0 is the virtual person of this seed, as in bench_excitation.py."""
 
 
-def designed(folder: Path, number: int, subject: Subject, protocol: str) -> Dance:
+def borrowed(folder: Path, subject: Subject, protocol: str) -> Path:
+    """Return the dance in the folder that was designed for the person nearest in stature."""
+    people = subjects(10)
+    there = {int(path.stem.split("_")[0]): path for path in (folder / "dances").glob(f"*_{protocol}.npz")}
+    return there[min(there, key=lambda number: abs(people[number].stature - subject.stature))]
+
+
+def designed(folder: Path, number: int, subject: Subject, protocol: str, *, borrow: bool = False) -> Dance:
     """Return the dance of a person, from the folder if it is there."""
     path = folder / "dances" / f"{number}_{protocol}.npz"
+    if borrow and not path.exists():
+        path = borrowed(folder, subject, protocol)
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
         plan = read_plan(protocol)
@@ -47,26 +80,35 @@ def designed(folder: Path, number: int, subject: Subject, protocol: str) -> Danc
     return Dance.load(path)
 
 
-def session(folder: Path, number: int, subject: Subject, motion: str, performer: str) -> Path:
+def many_squats() -> Protocol:
+    """Return the protocol squat with its trial to fit nine times: as long as a short dance."""
+    plan = read_protocol("squat")
+    fits = [replace(trial, name=f"{trial.name}_{n}") for trial in plan.trials if trial.role == "fit" for n in range(9)]
+    return replace(plan, trials=(*(trial for trial in plan.trials if trial.role != "fit"), *fits))
+
+
+def session(folder: Path, number: int, subject: Subject, motion: str, way: Way) -> Path:
     """Return the folder of a session, simulated if it is not there."""
-    place = folder / "sessions" / f"{number}_{motion}_{performer}"
+    place = folder / "sessions" / f"{number}_{motion}_{way.name}"
     if not (place / "truth").is_dir():
         seed = FIRST_SEED + number
         if motion == "squats":
-            simulate_session(subject, "squat", place, seed=seed)
+            simulate_session(subject, "squat", place, seed=seed, visit=way.visit)
+        elif motion == "squats_long":
+            simulate_session(subject, many_squats(), place, seed=seed, visit=way.visit)
         else:
-            dance = designed(folder, number, subject, motion)
-            simulate_dance(subject, dance, place, seed=seed, performer=PERFORMERS[performer])
+            dance = designed(folder, number, subject, motion, borrow=way.borrow)
+            simulate_dance(subject, dance, place, seed=seed, performer=PERFORMERS[way.performer], visit=way.visit)
     return place
 
 
-def row(folder: Path, number: int, subject: Subject, motion: str, performer: str) -> dict[str, Any]:
+def row(folder: Path, number: int, subject: Subject, motion: str, way: Way) -> dict[str, Any]:
     """Return what a session gave: true, table's and identified mass (N,) kg and CoM (N, 3) m with standard deviations,
     and the residuals of the kept squats, table and identified, N and N·m.
     """
-    kept = folder / "rows" / f"{number}_{motion}_{performer}.json"
+    kept = folder / "rows" / f"{number}_{motion}_{way.name}.json"
     if not kept.exists():
-        place = session(folder, number, subject, motion, performer)
+        place = session(folder, number, subject, motion, way)
         kept.parent.mkdir(parents=True, exist_ok=True)
         kept.write_text(json.dumps(_identified(place), default=np.ndarray.tolist))
     return dict(json.loads(kept.read_text()))
@@ -81,7 +123,7 @@ def _identified(place: Path) -> dict[str, Any]:
     assert static.motion is not None
     frame = int(np.argmin(np.abs(static.motion.time - document["static_pose"]["time_s"])))
     pose = poses(body, static.motion.q[frame : frame + 1])
-    true = sip_in_frames(document, pose.rotation[0], pose.position[0])
+    true = sip_in_frames(document, pose.rotation[0][: len(SEGMENTS)], pose.position[0][: len(SEGMENTS)])
     known = one.identification.known
 
     def column(name: str, quantities: tuple[str, ...]) -> Array:
@@ -161,11 +203,15 @@ def main() -> None:
     parser.add_argument("--people", type=int, default=10)
     parser.add_argument("--performer", choices=tuple(PERFORMERS), default="normal")
     parser.add_argument("--motions", default="squats,short,full")
+    parser.add_argument("--borrow", action="store_true")
+    parser.add_argument("--lab", type=int, help="seed of a drawn laboratory")
     chosen = parser.parse_args()
+    visit = FIRST_VISIT if chosen.lab is None else LabVisit(laboratory=draw_laboratory(chosen.lab))
+    way = Way(chosen.performer, chosen.borrow, visit, "" if chosen.lab is None else f"_lab{chosen.lab}")
     motions, rows = chosen.motions.split(","), {}
     for number, subject in enumerate(subjects(chosen.people)):
         for motion in motions:
-            rows[number, motion] = row(chosen.folder, number, replace(subject, age=33.0), motion, chosen.performer)
+            rows[number, motion] = row(chosen.folder, number, replace(subject, age=33.0), motion, way)
             (mass, com), (before, there) = (errors(rows[number, motion], which) for which in ("identified", "table"))
             print(
                 f"{number} {subject.sex} {subject.stature:.2f} m {subject.mass:.0f} kg {motion}: mass "

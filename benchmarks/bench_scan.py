@@ -21,7 +21,7 @@ from biodance.body.human.skeleton import SEGMENTS, Skeleton, generic_skeleton, k
 from biodance.body.tables.choice import reference
 from biodance.errors import SessionRefused
 from biodance.identification.knowledge import segment_quantities
-from biodance.records import SIDES, Array, FootOutline, Sip, Subject
+from biodance.records import SIDES, Array, FootSizes, Sip, Subject
 from biodance.settings import Settings
 from biodance.uncertainty.caution import widened
 
@@ -45,7 +45,7 @@ def priors(scanned: ScannedPerson, rng: np.random.Generator, folder: Path) -> li
     person, path = scanned.person, folder / f"{rng.integers(1 << 40)}.ply"
     scanned.mesh.export(path)
     plain = Subject(person.mass + rng.normal(0, 0.1), person.stature, person.sex, 30.0)
-    outline = {side: FootOutline(*(np.array(scanned.feet) + rng.normal(0, 0.003, 3))) for side in SIDES}
+    outline = {side: FootSizes(*(np.array(scanned.feet) + rng.normal(0, 0.003, 3))) for side in SIDES}
     whole = replace(plain, scan=str(path))
     given = (plain, replace(plain, foot_outline=outline), whole, replace(whole, girths=person.girths))
     bones = measured_skeleton(scanned, plain, rng)

@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     from biodance.pipeline.results import SessionResult as SessionResult
     from biodance.pipeline.robot import identify_robot as identify_robot
     from biodance.pipeline.session import examine as examine
+    from biodance.records import FootSizes as FootSizes
     from biodance.records import Markers as Markers
     from biodance.records import Motion as Motion
     from biodance.records import Plate as Plate
@@ -99,7 +100,7 @@ HOMES = {
     "pipeline.results": ("SessionResult",),
     "pipeline.robot": ("identify_robot",),
     "pipeline.session": ("examine",),
-    "records": ("Markers", "Motion", "Plate", "Session", "Sip", "Subject", "Trial", "Wrench"),
+    "records": ("FootSizes", "Markers", "Motion", "Plate", "Session", "Sip", "Subject", "Trial", "Wrench"),
     "registration.registration": ("Registration",),
     "settings": ("Settings",),
 }

@@ -10,7 +10,7 @@ from biodance.body.human.human import human
 from biodance.errors import SessionRefused
 from biodance.lab.foot_outline import traced_outline, typed_outline
 from biodance.lab.session.file import read_session_file
-from biodance.records import FootOutline, Subject
+from biodance.records import FootSizes, Subject
 
 MAN = Subject(78.1, 1.777, "M", 30.0)
 SIZES = {"length": 0.27, "breadth": 0.102, "heel_breadth": 0.07}
@@ -22,8 +22,8 @@ def _area(corners: np.ndarray) -> float:
 
 
 def test_the_sole_is_the_outline() -> None:
-    wide = FootOutline(0.28, 0.12, 0.08)
-    body = human(replace(MAN, foot_outline={"right": wide, "left": FootOutline(**SIZES)}))
+    wide = FootSizes(0.28, 0.12, 0.08)
+    body = human(replace(MAN, foot_outline={"right": wide, "left": FootSizes(**SIZES)}))
     sole = body.feet["right"].outline
     assert np.ptp(sole[:, 0]) == pytest.approx(0.28)
     assert np.ptp(sole[:, 2]) == pytest.approx(0.12)
@@ -34,7 +34,7 @@ def test_the_sole_is_the_outline() -> None:
 def test_larger_feet_weigh_more_and_are_known_better() -> None:
     table, given = (
         human(MAN),
-        human(replace(MAN, foot_outline=dict.fromkeys(("right", "left"), FootOutline(0.30, 0.12, 0.085)))),
+        human(replace(MAN, foot_outline=dict.fromkeys(("right", "left"), FootSizes(0.30, 0.12, 0.085)))),
     )
     index = table.segment_index("right_foot")
     assert given.sip.mass[index] > 1.1 * table.sip.mass[index]

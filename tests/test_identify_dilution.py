@@ -1,12 +1,14 @@
 """Regression dilution: accelerations that nobody made shrink parameters; measured gains give that back."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from identify_trials import smooth_motion
 from scipy.signal import butter, sosfiltfilt
 
 from biodance.body.human.human import human
-from biodance.identification.dilution import undiluted
+from biodance.identification.dilution import carried_away, undiluted
 from biodance.identification.posterior import posterior
 from biodance.identification.statistics import Fit, Statistics, layout_for, statistics
 from biodance.motion.regressor import predict_wrench
@@ -77,6 +79,17 @@ def test_the_trunk_gets_its_inertia_back(shaken: Statistics) -> None:
     off = [np.linalg.norm(phi[moment] - true[moment]) / np.linalg.norm(true[moment]) for phi in (before, after)]
     assert off[0] > 0.1
     assert off[1] < 0.5 * off[0]
+
+
+@pytest.mark.parametrize(("sds", "carried"), [(0.8, False), (-1.2, True)])
+def test_masses_may_move_by_what_is_uncertain(shaken: Statistics, sds: float, carried: bool) -> None:
+    noise = Noise(np.tile(np.diag([9.0] * 3 + [4.0] * 3), (len(BANDS), 1, 1)), ABOUT, BANDS)
+    before = posterior(shaken.information(noise), widened(BODY.sip))
+    thigh = 10 * BODY.segment_index("right_thigh")
+    moved = before.mean.copy()
+    moved[thigh] += sds * np.sqrt(before.covariance[thigh, thigh])
+    moved[thigh + 1] += 100.0
+    assert carried_away(before, replace(before, mean=moved)) is carried
 
 
 def test_segments_of_no_person_are_left_alone(shaken: Statistics) -> None:

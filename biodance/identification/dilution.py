@@ -11,6 +11,7 @@ band and channel by channel.
 import numpy as np
 
 from biodance.body.human.skeleton import kind_of
+from biodance.identification.posterior import Posterior
 from biodance.identification.statistics import Statistics
 from biodance.records import Array
 
@@ -48,6 +49,16 @@ def undiluted(total: Statistics, phi: Array, segments: tuple[str, ...]) -> Stati
                 gain = _gains(total.gram[band, channel, :, channel], parts * phi, int(total.count[band]))
                 scale[band, channel, :-1] = np.where(parts.any(axis=0), gain @ parts, 1.0)
     return Statistics(total.gram * scale[..., None, None] * scale[:, None, None], total.count, total.layout)
+
+
+def carried_away(before: Posterior, after: Posterior) -> bool:
+    """Whether giving back what noise takes moves a mass by more than its standard deviation.
+
+    A gain and the mass under which it is measured stand in for each other: where movement is slow and noise is most of
+    what is fast, each round lowers the one and raises the other.
+    """
+    sd = np.sqrt(np.diag(before.covariance)[::10])
+    return bool(np.any(np.abs(after.mean - before.mean)[::10] > sd))
 
 
 def _gains(gram: Array, parts: Array, count: int) -> Array:

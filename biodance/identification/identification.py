@@ -15,7 +15,7 @@ from biodance import display
 from biodance.body.body import Body
 from biodance.errors import NotSolved, TrialRefused, UnknownName
 from biodance.identification.base_parameters import BaseEstimate, estimate_base, structural_base
-from biodance.identification.dilution import undiluted
+from biodance.identification.dilution import carried_away, undiluted
 from biodance.identification.information import Information
 from biodance.identification.knowledge import QUANTITIES, Known, knowledge, known_together, mass_interval
 from biodance.identification.learning import learn_noise
@@ -271,7 +271,7 @@ def conclude(
         real = undiluted(total, belief.mean, body.segments)
         noise = learn_noise(real, room, rounds=_AGAIN)[0]
         data, sizes = _discounted(real, noise, found, room)
-        if _carried_away(belief, posterior(data, table)):
+        if carried_away(belief, posterior(data, table)):
             data, sizes, noise = as_measured
             break
     before, placed = more_probable_place(data, before, body) if prior is None else (before, "")
@@ -288,16 +288,6 @@ def conclude(
         known = knowledge(fit.sip, first, belief)
         words += _notes(known, fit)
     return Identification(body, belief, data, base, noise, sizes, fit, trials, data.frames, known, words)
-
-
-def _carried_away(before: Posterior, after: Posterior) -> bool:
-    """Whether giving back what noise in the kinematics takes moves a mass by more than its standard deviation.
-
-    A gain and the mass under which it is measured stand in for each other: where movement is slow and noise is most of
-    what is fast, each round lowers the one and raises the other.
-    """
-    sd = np.sqrt(np.diag(before.covariance)[::10])
-    return bool(np.any(np.abs(after.mean - before.mean)[::10] > sd))
 
 
 def _discounted(total: Statistics, noise: Noise, found: Mismatch | None, room: Sip) -> tuple[Information, Sizes]:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from biodance.errors import SessionRefused
-from biodance.records import SIDES, Array, FootOutline
+from biodance.records import SIDES, Array, FootSizes
 
 _LEGAL = {"length": (0.12, 0.36), "breadth": (0.05, 0.15), "heel_breadth": (0.03, 0.11)}
 """m."""
@@ -17,7 +17,7 @@ _HEEL = 0.15
 """Share of the length, from the heel, at which its breadth is measured."""
 
 
-def typed_outline(given: Mapping[str, float]) -> dict[str, FootOutline]:
+def typed_outline(given: Mapping[str, float]) -> dict[str, FootSizes]:
     """Return the outline of each foot from sizes in m: ``length`` of both or ``right_length`` of one foot.
 
     Raises
@@ -33,7 +33,7 @@ def typed_outline(given: Mapping[str, float]) -> dict[str, FootOutline]:
                 "for one foot."
             )
         _refuse_impossible(name, value, short)
-    found: dict[str, FootOutline] = {}
+    found: dict[str, FootSizes] = {}
     for side in SIDES if given else ():
         sizes = {name: given.get(f"{side}_{name}", given.get(name)) for name in _LEGAL}
         missing = [name for name, value in sizes.items() if value is None]
@@ -41,7 +41,7 @@ def typed_outline(given: Mapping[str, float]) -> dict[str, FootOutline]:
             raise SessionRefused(
                 f"foot_outline: the {side} foot has no {' and no '.join(missing)}. Give all three, in cm."
             )
-        found[side] = FootOutline(**{name: float(value) for name, value in sizes.items() if value is not None})
+        found[side] = FootSizes(**{name: float(value) for name, value in sizes.items() if value is not None})
     return found
 
 
@@ -56,7 +56,7 @@ def _refuse_impossible(name: str, value: float, short: str) -> None:
     )
 
 
-def traced_outline(path: str | Path) -> dict[str, FootOutline]:
+def traced_outline(path: str | Path) -> dict[str, FootSizes]:
     """Return the outline of each foot from a CSV file with the columns ``side`` (right, left), ``x_cm`` from the heel
     to the toes and ``y_cm`` across: points in order round each foot.
 
@@ -87,7 +87,7 @@ def traced_outline(path: str | Path) -> dict[str, FootOutline]:
     return found
 
 
-def _sizes(points: Array) -> FootOutline:
+def _sizes(points: Array) -> FootSizes:
     """Return length, breadth and heel breadth of points (n, 2) m in order round one foot."""
     x = points[:, 0] - points[:, 0].min()
     length = float(x.max())
@@ -95,7 +95,7 @@ def _sizes(points: Array) -> FootOutline:
     sizes = {"length": length, "breadth": float(np.ptp(points[:, 1])), "heel_breadth": heel}
     for name, value in sizes.items():
         _refuse_impossible(name, value, name)
-    return FootOutline(**sizes)
+    return FootSizes(**sizes)
 
 
 def _breadth(x: Array, y: Array, at: float) -> float:

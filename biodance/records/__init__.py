@@ -10,7 +10,7 @@ from biodance.records.markers import Markers
 from biodance.records.motion import Motion
 from biodance.records.session import ROLES, Role, Session, Source, Trial
 from biodance.records.sip import Sip
-from biodance.records.subject import SIDES, FootOutline, Subject
+from biodance.records.subject import SIDES, FootSizes, Subject
 from biodance.records.wrench import Plate, Wrench
 
 __all__ = [
@@ -19,7 +19,7 @@ __all__ = [
     "ROLES",
     "SIDES",
     "Array",
-    "FootOutline",
+    "FootSizes",
     "Index",
     "Markers",
     "Motion",

@@ -13,8 +13,25 @@ SIDES = ("right", "left")
 
 
 @dataclass(frozen=True)
-class FootOutline:
-    """The outline of one foot, m: ``length`` heel to toe tip, ``breadth`` at the ball, ``heel_breadth``."""
+class FootSizes:
+    """The outline of one foot.
+
+    Parameters
+    ----------
+    length : float
+        Heel to toe tip, m.
+    breadth : float
+        At the ball, m.
+    heel_breadth : float
+        Of the heel, m.
+
+    Examples
+    --------
+    >>> foot = biodance.FootSizes(0.264, 0.101, 0.069)
+    >>> person = biodance.Subject(62.0, 1.70, "F", foot_outline={"right": foot, "left": foot})
+    >>> person.foot_outline["left"].breadth
+    0.101
+    """
 
     length: float
     breadth: float
@@ -48,7 +65,7 @@ class Subject:
     scan_up : {"z", "y", "x"}
         Axis of that file that points up.
     foot_outline : mapping
-        `FootOutline` by side, right and left; empty = not measured.
+        `FootSizes` by side, right and left; empty = not measured.
 
     Examples
     --------
@@ -66,7 +83,7 @@ class Subject:
     girths: Mapping[str, float] = field(default_factory=dict)
     scan: str = ""
     scan_up: Literal["z", "y", "x"] = "z"
-    foot_outline: Mapping[str, FootOutline] = field(default_factory=dict)
+    foot_outline: Mapping[str, FootSizes] = field(default_factory=dict)
 
     def require(self, *quantities: Literal["mass", "stature", "age"]) -> None:
         """Refuse to go on where a quantity is not known.

@@ -8,16 +8,16 @@ from biodance.body.human.skeleton import Skeleton
 from biodance.body.tables.anthropometry import read_table
 from biodance.body.tables.error_sizes import error_size
 from biodance.body.tables.reference import Sex, proportion
-from biodance.records import SIDES, Array, FootOutline, Subject
+from biodance.records import SIDES, Array, FootSizes, Subject
 
 
-def usual_outline(length: float, sex: Sex) -> FootOutline:
+def usual_outline(length: float, sex: Sex) -> FootSizes:
     """Return the outline of a usual foot of this length, m."""
     breadth, heel = (proportion(size, sex) * length for size in ("foot_breadth", "heel_breadth"))
-    return FootOutline(length, breadth, heel)
+    return FootSizes(length, breadth, heel)
 
 
-def sole_corners(outline: FootOutline, sex: Sex) -> Array:
+def sole_corners(outline: FootSizes, sex: Sex) -> Array:
     """Return the corners (6, 2) m of a sole, ahead of the heel and to the right, counter-clockwise from above: heel,
     ball, toes.
     """
@@ -46,6 +46,6 @@ def foot_opinions(skeleton: Skeleton, subject: Subject) -> dict[str, SegmentOpin
     return found
 
 
-def _area(outline: FootOutline, sex: Sex) -> float:
+def _area(outline: FootSizes, sex: Sex) -> float:
     x, y = sole_corners(outline, sex).T
     return 0.5 * abs(float(x @ np.roll(y, 1) - y @ np.roll(x, 1)))

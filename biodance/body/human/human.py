@@ -166,8 +166,10 @@ def _shape_notes(told: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
         return ()
     said: dict[str, list[str]] = {}
     for segment, names in told.items():
-        said.setdefault(", ".join(names), []).append(segment)
-    words = "; ".join(f"{names} for {' and '.join(segments)}" for names, segments in said.items()).replace("_", " ")
+        said.setdefault(", ".join(name for name in names if name != "scan"), []).append(segment)
+    some = [f"{names} for {' and '.join(segments)}" for names, segments in said.items() if names]
+    scanned = ["the scan for all segments"] if "scan" in told.get("pelvis", ()) else []
+    words = "; ".join([*some, *scanned]).replace("_", " ")
     return (
         f"Shapes of the person weigh beside the table in the prior ({words}): girths as stadium solids (Yeadon 1990) "
         "and foot outlines about the mean of all tables, a scan by volume and density; other segments keep the table's "

@@ -44,7 +44,7 @@ from biodance.errors import BiodanceError, SessionRefused
 from biodance.lab.foot_outline import traced_outline, typed_outline
 from biodance.lab.girths import legal_girths
 from biodance.library import read_toml
-from biodance.records import FootOutline, Role
+from biodance.records import FootSizes, Role
 from biodance.settings import USUAL, Settings
 
 FILES = ("subject.toml", "session.toml")
@@ -73,7 +73,7 @@ class SubjectEntry(_Entry):
         return legal_girths({name: value / 100 for name, value in (self.girths_cm or {}).items()})
 
     @property
-    def outlines(self) -> dict[str, FootOutline]:
+    def outlines(self) -> dict[str, FootSizes]:
         """Outlines of the feet by side, checked when the file was read."""
         if isinstance(self.foot_outline, str):
             return traced_outline(self.foot_outline)
