@@ -8,7 +8,6 @@ from cyclopts import Parameter
 
 from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json
 from biodance.cli.options import NO_ROBOT, USUAL_READING, ForceOption, JsonOption, Reading, Results, RobotFile
-from biodance.cli.options import PERSON, USUAL_READING, ForceOption, JsonOption, Reading, Results, RobotFile
 from biodance.cli.progress import progress
 from biodance.cli.robot import diagnose_robot
 from biodance.cli.session import examine_with_reference, tabled
