@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.diagnosis.adequacy import LIMIT
+from biodance.diagnosis.candidates import removed
+from biodance.diagnosis.diagnosis import LEAST_FORCE, LEAST_MOMENT
 from biodance.diagnosis.model import Model, NamedCause
 from biodance.diagnosis.naming import named_of, shared, taken
 from biodance.diagnosis.problem import Problem
@@ -56,6 +58,17 @@ def hanging(found: Model) -> dict[tuple[str, str], Departure]:
         if abs(one.z) > LIMIT:
             beyond.setdefault(one.cause, one)
     return beyond
+
+
+def felt(found: Model, named: NamedCause) -> bool:
+    """Return whether what a cause adds to the wrench matters in any channel (root mean square over all trials):
+    `LEAST_FORCE`, `LEAST_MOMENT`.
+    """
+    put = found.problem
+    rows = removed(put, named.effect, named.theta)[: put.wrench_rows].reshape(-1, 6)
+    frames = max(1, sum(pick.size for picks in put.spectrum.picks for pick in picks))
+    size = np.sqrt(np.sum(rows**2, axis=0) / frames)
+    return bool(np.any(size >= np.repeat([LEAST_FORCE, LEAST_MOMENT], 3)))
 
 
 def _of_one(found: Model, named: NamedCause) -> Iterator[Departure]:
