@@ -9,6 +9,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.diagnosis.adequacy import (
+    LIMIT,
     LOUDER,
     STRAINED,
     STRETCHED,
@@ -165,6 +166,8 @@ def judged(examined: Examined) -> Examined:
     several = any(_one_of_several(cause, named) for cause, _ in large)
     if doubted and told != "unexplained":
         told = "named, incomplete" if trusted else "unexplained"
+    if told == "named, complete" and any(row.z > LIMIT for row in left):
+        told = "named, incomplete"
     said = (
         *strange,
         *((SEVERAL,) if several else ()),
