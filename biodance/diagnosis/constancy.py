@@ -22,6 +22,9 @@ from biodance.uncertainty.bands import BANDS
 
 _SAME = 1e-6
 """Share of the largest trace that must be left of one beside everything else, to be asked about at all."""
+_UNLIKE = 0.07
+"""Share of its size by which every cause is unlike its model at least: derivatives at the samples that are looked at are
+no better at the upper edge of the bands."""
 _STEP = 0.1
 """m of place, as wide as a foot."""
 
@@ -75,11 +78,12 @@ def _of_one(found: Model, named: NamedCause) -> Iterator[Departure]:
     over, columns = zip(*_traces(found.problem, named), strict=True)
     Z = found.white(np.stack(columns, axis=1))
     s, G = found.belief.score(Z)
+    unlike = max(_UNLIKE, found.tolerances.unlike(named.effect.name))
     least = _SAME * float(np.sum(Z**2, axis=0).max())
     seen = np.diag(G) - np.diag(shared(found, taken(found), Z))
     for name, score, own in zip(over, s, seen, strict=True):
         if own > least:
-            share, sd = float(score / own), float(np.hypot(own**-0.5, found.tolerances.unlike(named.effect.name)))
+            share, sd = float(score / own), float(np.hypot(own**-0.5, unlike))
             yield Departure(named_of(named), name, share, share / sd)
 
 
