@@ -23,8 +23,8 @@ from biodance.uncertainty.bands import BANDS
 _SAME = 1e-6
 """Share of the largest trace that must be left of one beside everything else, to be asked about at all."""
 _UNLIKE = 0.07
-"""Share of its size by which every cause is unlike its model at least: derivatives at the samples that are looked at are
-no better at the upper edge of the bands."""
+"""Share of its size by which every cause is unlike its model at least: derivatives at the samples that are looked at
+are no better at the upper edge of the bands."""
 _STEP = 0.1
 """m of place, as wide as a foot."""
 
