@@ -8,7 +8,7 @@ from diagnosed_sessions import about_plate, body, known, looks
 
 from biodance.diagnosis import heard
 from biodance.diagnosis.adequacy import LIMIT, STRAINED, energies, strain, strain_as_loud
-from biodance.diagnosis.constancy import departures
+from biodance.diagnosis.constancy import departures, felt
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Unobservable
 from biodance.diagnosis.engine import HANGS, diagnose_trials
 from biodance.diagnosis.evidence import Belief
@@ -46,6 +46,14 @@ def test_a_zero_and_a_leak_of_the_load_do_not_stand_for_one_another(change, guil
     if innocent == ZERO:  # a leak is in proportion to the load: its size as a zero doubles with it
         by_load = next(one for one in departures(wrong.naming.found) if (one.cause, one.over) == (ZERO, "load"))
         assert by_load.share == pytest.approx(1.0, abs=0.35)
+
+
+def test_what_is_only_resembled_must_move_something_that_matters() -> None:
+    some = looks(1, trials=1, hidden=about_plate(zero))
+    found = diagnose_trials(body(), some, tolerances=known(), effects=("plate_offset",)).naming.found
+    (named,) = found.named
+    assert felt(found, named)
+    assert not felt(found, replace(named, theta=np.array([0.2])))
 
 
 def a_finding(value: float, hangs_on: str = "") -> Finding:

@@ -22,7 +22,7 @@ from biodance.effects import (
     wrench_about_origin,
     wrench_about_point,
 )
-from biodance.effects.frame_rate import clock_beside_body
+from biodance.effects.frame_rate import FrameRate, clock_beside_body
 from biodance.effects.unit_error import FACTORS
 from biodance.errors import BiodanceError, UnknownName
 from biodance.motion.kinematics import poses
@@ -98,6 +98,20 @@ def test_nothing_is_found_where_nothing_is_wrong() -> None:
         "lost frames",
         "labels of the markers",
     }
+
+
+def test_frames_that_are_lost_are_not_found_again() -> None:
+    """Forces 30 ms later from the middle on in all trials, or in two of three and 30 ms earlier in the third."""
+    time = np.arange(0, 10, 0.01)
+
+    def part(step: float):
+        needed, late = (
+            20 * np.sin(2 * np.pi * 0.5 * (time - by))[:, None] for by in (0.0, np.where(time < 5, 0, step))
+        )
+        return late * np.ones(3), needed * np.ones(3), 100.0
+
+    assert failed(FrameRate._lost([part(0.03)] * 3)) == [("frame_rate", "")]
+    assert FrameRate._lost([part(0.03), part(0.03), part(-0.03)]) == ()
 
 
 @pytest.mark.parametrize("factor", FACTORS)

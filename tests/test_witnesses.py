@@ -11,7 +11,7 @@ from biodance.diagnosis.heard import hear, sights
 from biodance.diagnosis.testimony import size_by, weigh
 from biodance.effects import causes
 from biodance.errors import BiodanceError
-from biodance.records import Session, Subject, Trial
+from biodance.records import Session, Subject, Trial, Wrench
 from biodance.witnesses import (
     FAMILY,
     Observation,
@@ -97,6 +97,15 @@ def test_strides_weigh_the_person_and_each_plate() -> None:
     assert alone / clean == pytest.approx(1.05, abs=1e-6)
     assert other == pytest.approx(same)
     assert values(walk(Wrong(gain=0.05)), "double_support")[0] == pytest.approx(0.05 * clean + clean - same, abs=0.01)
+
+
+def test_a_foot_beside_another_that_stands_on_a_plate_weighs_nobody() -> None:
+    """Half of the weight is on the other plate all the time: neither foot is alone."""
+    made = walk()
+    ground = [replace(plate, wrench=Wrench(plate.wrench.time, plate.wrench.value + 300.0 * np.eye(6)[2])) for plate in
+              made.plates[1:]]  # fmt: skip
+    assert len(values(made, "stride_force", "alone")) == 2
+    assert len(values(replace(made, plates=(made.plates[0], *ground)), "stride_force", "alone")) < 2
 
 
 def test_shear_brakes_first_and_pushes_then() -> None:

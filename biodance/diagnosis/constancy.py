@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.diagnosis.adequacy import LIMIT
+from biodance.diagnosis.candidates import removed
+from biodance.diagnosis.diagnosis import LEAST_FORCE, LEAST_MOMENT
 from biodance.diagnosis.model import Model, NamedCause
 from biodance.diagnosis.naming import named_of, shared, taken
 from biodance.diagnosis.problem import Problem
@@ -20,6 +22,9 @@ from biodance.uncertainty.bands import BANDS
 
 _SAME = 1e-6
 """Share of the largest trace that must be left of one beside everything else, to be asked about at all."""
+_UNLIKE = 0.07
+"""Share of its size by which every cause is unlike its model at least: derivatives at the samples that are looked at
+are no better at the upper edge of the bands."""
 _STEP = 0.1
 """m of place, as wide as a foot."""
 
@@ -58,15 +63,27 @@ def hanging(found: Model) -> dict[tuple[str, str], Departure]:
     return beyond
 
 
+def felt(found: Model, named: NamedCause) -> bool:
+    """Return whether what a cause adds to the wrench matters in any channel (root mean square over all trials):
+    `LEAST_FORCE`, `LEAST_MOMENT`.
+    """
+    put = found.problem
+    rows = removed(put, named.effect, named.theta)[: put.wrench_rows].reshape(-1, 6)
+    frames = max(1, sum(pick.size for picks in put.spectrum.picks for pick in picks))
+    size = np.sqrt(np.sum(rows**2, axis=0) / frames)
+    return bool(np.any(size >= np.repeat([LEAST_FORCE, LEAST_MOMENT], 3)))
+
+
 def _of_one(found: Model, named: NamedCause) -> Iterator[Departure]:
     over, columns = zip(*_traces(found.problem, named), strict=True)
     Z = found.white(np.stack(columns, axis=1))
     s, G = found.belief.score(Z)
+    unlike = max(_UNLIKE, found.tolerances.unlike(named.effect.name))
     least = _SAME * float(np.sum(Z**2, axis=0).max())
     seen = np.diag(G) - np.diag(shared(found, taken(found), Z))
     for name, score, own in zip(over, s, seen, strict=True):
         if own > least:
-            share, sd = float(score / own), float(np.hypot(own**-0.5, found.tolerances.unlike(named.effect.name)))
+            share, sd = float(score / own), float(np.hypot(own**-0.5, unlike))
             yield Departure(named_of(named), name, share, share / sd)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.diagnosis.adequacy import (
+    LIMIT,
     LOUDER,
     STRAINED,
     STRETCHED,
@@ -21,7 +22,7 @@ from biodance.diagnosis.adequacy import (
     verdict,
 )
 from biodance.diagnosis.consequence import matters, unit_at
-from biodance.diagnosis.constancy import hanging
+from biodance.diagnosis.constancy import felt, hanging
 from biodance.diagnosis.diagnosis import Diagnosis, Estimate, Finding, Unobservable
 from biodance.diagnosis.model import Model, NamedCause
 from biodance.diagnosis.naming import Naming, Round, less_one, name_causes, named_of, suspicious
@@ -149,8 +150,7 @@ def judged(examined: Examined) -> Examined:
     without fault.
     """
     naming, one = examined.naming, examined.diagnosis
-    left, strained = adequacy(naming.found), bool(_strange(naming.found))
-    put, known = naming.found.problem, naming.found.tolerances
+    left, put, known = adequacy(naming.found), naming.found.problem, naming.found.tolerances
     plates = put.cases[0].trial.plates
     named = tuple(_measured(cause, put, known) for cause in naming.found.named)
     hung = {names: one.over for names, one in hanging(naming.found).items()}
@@ -158,15 +158,18 @@ def judged(examined: Examined) -> Examined:
         (cause, replace(_finding(cause, r, known, plates), hangs_on=hung.get(named_of(cause), "")))
         for cause, r in zip(named, naming.accepted, strict=True)
     ]
-    large = [pair for pair in every if matters(pair[0].effect, pair[0].theta)]
-    told = verdict(len(large), alarming(left), one.gates, strained=strained)
+    large = [pair for pair in every if _counts(naming.found, *pair)]
+    strange = _strange(naming.found, named=bool(large))
+    told = verdict(len(large), alarming(left), one.gates, strained=bool(strange))
     doubted = [pair for pair in large if _one_of_several(pair[0], named) or pair[1].hangs_on]
     trusted = [] if told == "unexplained" else [pair for pair in large if pair not in doubted]
     several = any(_one_of_several(cause, named) for cause, _ in large)
     if doubted and told != "unexplained":
         told = "named, incomplete" if trusted else "unexplained"
+    if told == "named, complete" and any(row.z > LIMIT for row in left):
+        told = "named, incomplete"
     said = (
-        *_strange(naming.found),
+        *strange,
         *((SEVERAL,) if several else ()),
         *(_hangs(pair[1]) for pair in large if pair[1].hangs_on),
     )
@@ -176,10 +179,17 @@ def judged(examined: Examined) -> Examined:
         notes=(*(note for note in one.notes if note not in (STRANGE, UNASKED, SEVERAL) and HANGS not in note), *said),
         findings=tuple(finding for _, finding in trusted),
         resembles=tuple(finding for pair in large if pair not in trusted for finding in pair[1:]),
-        tolerated=tuple(finding for cause, finding in every if not matters(cause.effect, cause.theta)),
+        tolerated=tuple(pair[1] for pair in every if pair not in large),
         adequacy=left,
     )
     return Examined(found, naming, tuple(cause for cause, _ in trusted or large))
+
+
+def _counts(found: Model, cause: NamedCause, finding: Finding) -> bool:
+    """Return whether a cause is large enough to be told; one that is only resembled must also change the wrench by
+    what matters.
+    """
+    return matters(cause.effect, cause.theta) and (not finding.hangs_on or felt(found, cause))
 
 
 def _hangs(one: Finding) -> str:
@@ -224,9 +234,11 @@ def without_name(examined: Examined, index: int) -> Examined:
     return replace(found, diagnosis=replace(found.diagnosis, resembles=resembles))
 
 
-def _strange(found: Model) -> tuple[str, ...]:
-    """Say what had to be unlike people or laboratories for the rest to fit; a name has to fit without any excuse."""
-    body = (strain(found) if found.named else strain_as_loud(found)) > STRAINED
+def _strange(found: Model, *, named: bool) -> tuple[str, ...]:
+    """Say what had to be unlike people or laboratories for the rest to fit; where a cause is ``named``, it has to fit
+    without any excuse.
+    """
+    body = (strain(found) if named else strain_as_loud(found)) > STRAINED
     rest = stretch(found) > STRETCHED
     return (*((STRANGE,) if body else ()), *((UNASKED,) if rest else ()))
 

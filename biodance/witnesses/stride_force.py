@@ -47,7 +47,7 @@ class StrideForce(Witness):
             return []
         wrench, count = seen.under(step), part.stop - part.start
         span = slice(part.start + round(_ONE[0] * count), part.start + round(_ONE[1] * count))
-        if span.stop - span.start < _SHORTEST * wrench.rate:
+        if span.stop - span.start < _SHORTEST * wrench.rate or _beside(seen, step.plate, *step.beside, span=span):
             return []
         value = _mass(seen, wrench.time[span], wrench.force[span, 2])
         bias, sd = _ALONE
@@ -102,6 +102,12 @@ def _one_clock(seen: SeenTrial) -> bool:
     return all(np.array_equal(plate.wrench.time, time) for plate in seen.trial.plates)
 
 
+def _beside(seen: SeenTrial, *plates: str, span: slice) -> bool:
+    """Return whether another plate than ``plates`` is loaded in ``span``: the other foot stands there."""
+    others = [plate for plate in seen.trial.plates if plate.name not in plates] if _one_clock(seen) else []
+    return any(bool((plate.wrench.force[span, 2] > ONSET).any()) for plate in others)
+
+
 def _middle_to_middle(seen: SeenTrial, first: FootStep, last: FootStep) -> slice | None:
     """Return the samples from the middle of one stance to that of the next; None where a foot is in the air between
     or a plate without a foot of these steps is loaded.
@@ -110,10 +116,7 @@ def _middle_to_middle(seen: SeenTrial, first: FootStep, last: FootStep) -> slice
     if parts[0] is None or parts[1] is None or parts[1].start >= parts[0].stop:
         return None
     span = slice((parts[0].start + parts[0].stop) // 2, (parts[1].start + parts[1].stop) // 2)
-    others = [plate for plate in seen.trial.plates if plate.name not in (first.plate, last.plate)]
-    if any((plate.wrench.force[span, 2] > ONSET).any() for plate in others):
-        return None
-    return span
+    return None if _beside(seen, first.plate, last.plate, span=span) else span
 
 
 WITNESS = StrideForce
