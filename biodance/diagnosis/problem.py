@@ -205,7 +205,8 @@ def _kinematic_rows(
     """Return the rows (6 m, K) of the errors' wrenches, (3M, K) of the mean marker residuals, signs as `forward` has
     them, and the group and joint of each error (K).
     """
-    wrench, names, frames = [], (), 0
+    wrench, frames = [], 0
+    names: tuple[tuple[str, str], ...] = ()
     markers = np.zeros(())
     for index, pick, one in errors:
         bands = where.layout.bands.at(where.rates[index])
