@@ -73,9 +73,7 @@ class Problem:
 
     def columns(self, some: Sequence[Effect]) -> list[Array]:
         """Return (r, p) for each of ``some`` effects: what one unit of each parameter adds to the rows."""
-        wrench = self.spectrum.rows(
-            np.concatenate([one.columns(case) for one in some], axis=2) for case in self.cases
-        )
+        wrench = self.spectrum.rows(np.concatenate([one.columns(case) for one in some], axis=2) for case in self.cases)
         markers = np.concatenate([self.marker_rows(one) for one in some], axis=1)
         found = np.concatenate([wrench.reshape(self.wrench_rows, -1), markers])
         return np.split(found, np.cumsum([len(one.parameters) for one in some])[:-1], axis=1)

@@ -260,9 +260,7 @@ def _velocity(markers: Markers, path: Array) -> Array:
     return velocity
 
 
-def _steps(
-    plate: Plate, plates: tuple[Plate, ...], feet: tuple[FootPath, ...], *, raised: bool
-) -> list[FootStep]:
+def _steps(plate: Plate, plates: tuple[Plate, ...], feet: tuple[FootPath, ...], *, raised: bool) -> list[FootStep]:
     """Return the steps on one plate: one foot stands wholly over it while it is loaded, the other one is not on it."""
     found = []
     wrench = plate.wrench

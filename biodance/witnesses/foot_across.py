@@ -29,7 +29,8 @@ class FootAcross(Witness):
 
     def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return three observations of each step, the early one only where the heel came down first, on one
-        plate alone."""
+        plate alone.
+        """
         return tuple(one for step in seen.steps for one in self._of_step(seen, step))
 
     def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
