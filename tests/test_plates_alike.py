@@ -35,7 +35,7 @@ def test_the_same_trace_on_another_plate_or_another_trace_is_not_alike() -> None
     clean = [session(k, f"S{k:02d}") for k in range(10)]
     here = session(100, "here", size=1.0)
     elsewhere = SessionLeft("elsewhere", frozenset({"plate7"}), session(101, "", size=1.0).left, told=False)
-    other = {cell: z for cell, z in session(102, "").left.items()} | {("Fz", (0.04, 0.3)): 12.0, ("Mz", (0.0, 0.04)): 9.0}
+    other = dict(session(102, "").left) | {("Fz", (0.04, 0.3)): 12.0, ("Mz", (0.0, 0.04)): 9.0}
     assert not likenesses([*clean, here, elsewhere])
     assert not likenesses([*clean, here, SessionLeft("other", here.plates, other, told=False)])
 

@@ -114,4 +114,3 @@ def _step(
     )
     length = float(np.median(apart))
     return PlateStep(number, SIDES[foot], phase, place, forwards, outwards, ahead, beside, length, onset)
-

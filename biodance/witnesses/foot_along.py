@@ -13,8 +13,8 @@ ALONG_PHASES = {
 """Start and stop of the phase as shares of stance; expected distance ahead of the heel marker in units of the distance
 from heel to toe marker; sd of one step, of one person, of one laboratory's markers in the same unit."""
 _MIDDLE = (0.30, 0.60, 0.75, 0.063, 0.11, 0.08)
-"""The same of the middle of stance, where people differ most: asked only where a foot stands on two plates edge to edge,
-which early and late hold the other foot, too (36 steps of 12 persons)."""
+"""The same of the middle of stance, where people differ most: asked only where a foot stands on two plates edge to
+edge, which early and late hold the other foot, too (48 steps of 12 persons)."""
 
 
 class FootAlong(Witness):

@@ -1,4 +1,4 @@
-"""What no cause describes, compared over an archive: is it the same thing in several sessions on the same plate?
+"""What no cause describes, compared over an archive: the same thing may be left of several sessions on one plate.
 
 A session's pattern is how far what is left lies from sessions without fault, for every channel and band, as a logarithm
 (a thing twice as large keeps its pattern). What all sessions of the archive have in common, their median, is taken off.
