@@ -278,7 +278,7 @@ def _steps(plate: Plate, plates: tuple[Plate, ...], feet: tuple[FootPath, ...], 
         mixed = any(_treads(plate, foot, np.linspace(first, last, 30), belt) for foot in others)
         if mixed and any(_treads(plate, foot, time, belt) for foot in others):
             continue
-        near = _neighbours(plate, plates)
+        near = _neighbours(plate, plates) if mixed or over[on[0].side] < 0 else []
         beside = tuple(one.name for one in near) if mixed or _carry(near, time) else ()
         if mixed and not beside:
             continue

@@ -41,7 +41,7 @@ class SessionLeft:
 
 
 @dataclass(frozen=True)
-class Likeness:
+class AlikeSessions:
     """What is left of a ``session`` looks like what is left of ``others`` on the same ``plates``: the least
     ``correlation`` and the cells (``channel``, band in Hz) that stand out most in all of them.
     """
@@ -54,7 +54,7 @@ class Likeness:
 
     @property
     def text(self) -> str:
-        """The likeness as a sentence."""
+        """It as a sentence."""
         where = ", ".join(f"{channel} at {band[0]:g} to {band[1]:g} Hz" for channel, band in self.cells)
         names = " and ".join(filter(None, (", ".join(self.others[:-1]), self.others[-1])))
         return (
@@ -64,7 +64,7 @@ class Likeness:
         )
 
 
-def likenesses(sessions: Sequence[SessionLeft]) -> tuple[Likeness, ...]:
+def likenesses(sessions: Sequence[SessionLeft]) -> tuple[AlikeSessions, ...]:
     """Return for every session that no cause describes which others on the same plates are left with the same thing.
 
     Parameters
@@ -74,7 +74,7 @@ def likenesses(sessions: Sequence[SessionLeft]) -> tuple[Likeness, ...]:
 
     Returns
     -------
-    tuple of Likeness
+    tuple of AlikeSessions
         One for each session that is like another one; none where fewer than six sessions share their cells.
     """
     cells = sorted(set.intersection(*(set(one.left) for one in sessions))) if sessions else []
@@ -93,17 +93,17 @@ def likenesses(sessions: Sequence[SessionLeft]) -> tuple[Likeness, ...]:
         correlation = _correlation(pattern[i], pattern[j])
         if correlation >= max(needed, _LEAST):
             alike.setdefault(i, {})[j] = alike.setdefault(j, {})[i] = correlation
-    return tuple(_likeness(sessions, cells, pattern, i, near) for i, near in sorted(alike.items()))
+    return tuple(_of_one(sessions, cells, pattern, i, near) for i, near in sorted(alike.items()))
 
 
-def _likeness(
+def _of_one(
     sessions: Sequence[SessionLeft], cells: list[Cell], pattern: Array, index: int, near: Mapping[int, float]
-) -> Likeness:
+) -> AlikeSessions:
     every = [index, *sorted(near)]
     common = frozenset.intersection(*(sessions[i].plates for i in every))
     plates = common or frozenset.union(*(sessions[index].plates & sessions[i].plates for i in near))
     most = np.argsort(-pattern[every].min(axis=0))[:2]
-    return Likeness(
+    return AlikeSessions(
         sessions[index].session,
         tuple(sessions[i].session for i in sorted(near)),
         tuple(sorted(plates)),
