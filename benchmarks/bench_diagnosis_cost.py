@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from itertools import pairwise
+from pathlib import Path
 
 _STAGES = ("imports", "reading", "tracking and identifying", "diagnosing")
 
@@ -32,7 +33,7 @@ def measure(folder: str) -> None:
     moved = sum(one.motion.time[-1] - one.motion.time[0] for one in result.trials if one.motion is not None)
     parts = " | ".join(f"{b - a:.1f}" for a, b in pairwise(seconds))
     largest = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    print(f"| {session.name} | {len(result.trials)} | {moved:.0f} | {parts} | {seconds[-1]:.1f} | {largest:.0f} | "
+    print(f"| {Path(folder).name} | {len(result.trials)} | {moved:.0f} | {parts} | {seconds[-1]:.1f} | {largest:.0f} | "
           f"{found.verdict} |", flush=True)  # fmt: skip
 
 

@@ -44,7 +44,6 @@ REAL = (
 TRULY = {
     "biomechzoo/HC030A": {"labels_swapped"},
     "biomechzoo/HC038A": {"labels_swapped"},
-    "biomechzoo/HC038A": {"labels_swapped"},
     "biomechzoo/HC050A": {"labels_swapped"},
     "biomechzoo/HC055A": {"labels_swapped"},
     "c3d_parser_QCMAS": {"time_delay"},

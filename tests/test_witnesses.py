@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from walkers import WEIGHT, Stand, plate, walker
 from walking import FOOT, MASS, STANCE, Wrong, standing, walk
 
 from biodance.diagnosis.heard import hear, sights
@@ -255,3 +256,26 @@ def test_a_laboratory_s_own_norm_is_expected_and_a_fault_is_no_norm() -> None:
         assert now.expected - was.expected == pytest.approx(0.004, rel=0.01)
         assert now.norms["laboratory onset"] < 0.1 * was.norms["laboratory onset"]
         assert wrong == was
+
+
+def test_a_foot_across_two_belts_is_judged_by_both_together() -> None:
+    """One foot stands 60 % on one belt and 40 % on the next while the other one swings."""
+    belts = [plate("plate1", (0.0, 0.5), (-0.5, 0.5)), plate("plate2", (-0.5, 0.0), (-0.5, 0.5))]
+    turned = np.pi / 2
+    right = [Stand(0.0, 0.3, (0.02, -0.5, 0.0), turned), Stand(0.7, 1.5, (0.02, 0.0, 0.0), turned),
+             Stand(1.9, 2.5, (0.02, 0.5, 0.0), turned)]  # fmt: skip
+    left = [Stand(0.0, 0.8, (-0.12, -0.2, 0.0), turned), Stand(1.4, 2.5, (-0.12, 0.3, 0.0), turned)]
+    trial, *_ = walker(right, left, belts, duration=2.5)
+    shares = {"plate1": 0.6, "plate2": 0.4}
+    whole = sum(one.wrench.value for one in trial.plates)
+    here = (trial.plates[0].wrench.time >= 0.7) & (trial.plates[0].wrench.time <= 1.5)
+    shared = tuple(
+        replace(one, wrench=Wrench(one.wrench.time, np.where(here[:, None], shares[one.name] * whole, 0.0)))
+        for one in trial.plates
+    )
+    seen = recording(replace(trial, plates=shared), mass=WEIGHT / 9.80665)
+    step = next(one for one in seen.steps if one.side == "right" and 0.7 < one.middle < 1.5)
+    assert {step.plate, *step.beside} == {"plate1", "plate2"}
+    assert step.overhang == 0.0
+    middle = (seen.plate(step.plate).wrench.time > 0.9) & (seen.plate(step.plate).wrench.time < 1.3)
+    np.testing.assert_allclose(seen.under(step).force[middle, 2], WEIGHT, rtol=1e-9)

@@ -1,6 +1,7 @@
 """All sessions of an archive in one table and on one page."""
 
-from collections.abc import Sequence
+import json
+from collections.abc import Iterable, Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,6 +11,7 @@ import numpy as np
 
 from biodance.batch.rows import ROW_TYPES
 from biodance.batch.work import Outcome
+from biodance.diagnosis.archive.alike import SessionLeft, likenesses
 from biodance.display import BLUE, RED
 
 if TYPE_CHECKING:
@@ -63,7 +65,8 @@ def write_summary(folder: Path, name: str, outcomes: Sequence[Outcome], left_out
     parquet.replace(folder / "summary.parquet")
     text.replace(folder / "summary.csv")
     page = folder / f".{_PAGE}.part"
-    page.write_text(_page(name, outcomes, table, left_out, _links(folder, outcomes)), encoding="utf-8")
+    alike = [one.text for one in likenesses(left_in_archive(folder, [one.name for one in outcomes]))]
+    page.write_text(_page(name, outcomes, table, left_out, _links(folder, outcomes), alike), encoding="utf-8")
     page.replace(folder / _PAGE)
 
 
@@ -94,6 +97,22 @@ def outliers(table: "pd.DataFrame") -> "list[dict[str, Any]]":
     return found
 
 
+def left_in_archive(folder: Path, names: Iterable[str]) -> tuple[SessionLeft, ...]:
+    """Return what is left of the sessions ``names`` whose results lie in the ``folder`` of an archive; sessions that
+    were not diagnosed are left out.
+    """
+    found = []
+    for name in names:
+        path = folder / SESSIONS / folder_name(name) / "results.json"
+        document = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+        one = document.get("diagnosis") or {}
+        left = {(row["channel"], tuple(row["band_hz"])): float(row["z"]) for row in one.get("adequacy") or ()}
+        if left:
+            plates = frozenset(plate["name"] for trial in document["trials"] for plate in trial["plates"])
+            found.append(SessionLeft(name, plates, left, told=one["verdict"] in ("nothing wrong", "named, complete")))
+    return tuple(found)
+
+
 def _links(folder: Path, outcomes: Sequence[Outcome]) -> dict[str, str]:
     """Return the address of every session's own page, where one was drawn."""
     pages = {one.name: Path(SESSIONS, folder_name(one.name), _PAGE) for one in outcomes}
@@ -119,7 +138,12 @@ def _figure(table: "pd.DataFrame") -> "Figure | None":
 
 
 def _page(
-    name: str, outcomes: Sequence[Outcome], table: "pd.DataFrame", left_out: Sequence[str], links: dict[str, str]
+    name: str,
+    outcomes: Sequence[Outcome],
+    table: "pd.DataFrame",
+    left_out: Sequence[str],
+    links: dict[str, str],
+    alike: Sequence[str] = (),
 ) -> str:
     """Return the page of an archive as HTML text."""
     from jinja2 import Environment, StrictUndefined
@@ -148,6 +172,7 @@ def _page(
         mass=first["mass_difference_percent"].dropna().to_dict(),
         verdict=first["verdict"].dropna().to_dict(),
         strange=outliers(table),
+        alike=alike,
         figure=svg_address(drawn) if drawn else "",
         left_out=left_out,
         trials=len(table),

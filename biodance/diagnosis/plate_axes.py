@@ -1,9 +1,11 @@
 """A channel of the laboratory in a plate's own axes: what the amplifier and the maker's software call it."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 
+from biodance.diagnosis.diagnosis import Finding
 from biodance.records import Plate
 
 _CHANNEL = re.compile(r"(?:(?P<plate>plate\w*):)?(?P<first>[FM][xyz])(?:->(?P<second>[FM][xyz]))?$")
@@ -26,6 +28,15 @@ def in_plate_axes(target: str, plates: tuple[Plate, ...]) -> str:
     if own == names:
         return ""
     return f"In the axes of {plate.name} itself: {' into '.join(own)}."
+
+
+def with_plate_axes(findings: tuple[Finding, ...], plates: tuple[Plate, ...]) -> tuple[Finding, ...]:
+    """Return findings whose advice says their channels in the plate's own axes, too, whoever found them."""
+    said = [in_plate_axes(one.target, plates) for one in findings]
+    return tuple(
+        replace(one, advice=f"{one.advice} {text}".strip()) if text and text not in one.advice else one
+        for one, text in zip(findings, said, strict=True)
+    )
 
 
 def _own(channel: str, plate: Plate) -> str:

@@ -205,9 +205,9 @@ def _kinematic_rows(
     """Return the rows (6 m, K) of the errors' wrenches, (3M, K) of the mean marker residuals, signs as `forward` has
     them, and the group and joint of each error (K).
     """
-    wrench, frames = [], 0
+    wrench: list[Array] = []
     names: tuple[tuple[str, str], ...] = ()
-    markers = np.zeros(())
+    markers, frames = np.zeros(()), 0
     for index, pick, one in errors:
         bands = where.layout.bands.at(where.rates[index])
         kept = bands.of(pick.size) >= 0

@@ -111,13 +111,17 @@ def is_well(one: Diagnosis) -> bool:
 
 
 def amount(result: SessionResult, judged: tuple[Judged, ...]) -> str:
-    """Return what was judged in words: ``3 s of standing and 12 s of movement``; "" for nothing."""
+    """Return what was judged in words: ``3 s of standing (static) and 12 s of movement (walk_1, walk_2)``; "" for
+    nothing.
+    """
     static = {one.trial.name for one in result.trials if one.trial.role == "static"}
-    sums = [
-        (sum(row.seconds for row in judged if (row.trial in static) is quiet), what)
-        for quiet, what in ((True, "standing"), (False, "movement"))
-    ]
-    return " and ".join(f"{total:.{0 if total >= 9.5 else 1}f} s of {what}" for total, what in sums if total > 0)
+    parts = []
+    for quiet, what in ((True, "standing"), (False, "movement")):
+        rows = [row for row in judged if (row.trial in static) is quiet and row.seconds > 0]
+        total = sum(row.seconds for row in rows)
+        if rows:
+            parts.append(f"{total:.{0 if total >= 9.5 else 1}f} s of {what} ({_listed([row.trial for row in rows])})")
+    return " and ".join(parts)
 
 
 def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside: tuple[Check, ...]) -> Attention:

@@ -12,9 +12,9 @@ from biodance.motion.contact.footing import inside
 from biodance.motion.contact.soles import Soles
 from biodance.records import SIDES, Array, Motion, Trial, Wrench, runs
 from biodance.registration.pose import Forces, FramePose
+from biodance.witnesses import ONSET, FootPath
+from biodance.witnesses.force_onset import heel_strike
 
-_ONSET = 20.0
-"""N: a plate that carries more is stepped on."""
 _SHORTEST, _LONGEST = 0.3, 1.6
 """s: a walking step."""
 _OVERHANG = 0.02
@@ -58,7 +58,7 @@ def plate_steps(
     found = []
     for number, plate in enumerate(forces.plates):
         recorded = plate.wrench
-        for start, stop in runs(recorded.force[:, 2] > _ONSET):
+        for start, stop in runs(recorded.force[:, 2] > ONSET):
             time = recorded.time[start:stop] - pose.delay
             ends = start == 0 or stop == len(recorded.time)
             if ends or not _SHORTEST <= time[-1] - time[0] <= _LONGEST or not _covered(motion, time):
@@ -96,41 +96,21 @@ def _step(
     number: int, foot: int, part: Wrench, height: float, frames: Array, heel: Array, toe: Array
 ) -> PlateStep | None:
     """Return one step sample by sample; None where a marker of the foot is not seen."""
-    time, place = part.time, part.cop(height=height, threshold=_ONSET)
+    time, place = part.time, part.cop(height=height, threshold=ONSET)
     near = (frames > time[0] - 0.2) & (frames < time[-1] + 0.1)
     if not (np.isfinite(heel[near]).all() and np.isfinite(toe[near]).all()):
         return None
-    at = [np.stack([np.interp(time, frames, mark[:, k]) for k in range(3)], axis=1) for mark in (heel, toe)]
-    line = (at[1] - at[0]) * np.array([1.0, 1.0, 0.0])
-    apart = np.linalg.norm(line, axis=1)
-    forwards = line / apart[:, None]
-    left = np.stack([-forwards[:, 1], forwards[:, 0], np.zeros(len(line))], axis=1)
+    path = FootPath(SIDES[foot], frames, heel, toe)
+    ahead, beside, apart = path.in_foot(time, place[:, :2])
+    behind, front = path.at(time)
+    forwards = (front - behind) * np.array([1.0, 1.0, 0.0]) / apart[:, None]
+    left = np.stack([-forwards[:, 1], forwards[:, 0], np.zeros(len(forwards))], axis=1)
     outwards = -left if SIDES[foot] == "right" else left
-    away = place - at[0]
     phase = (time - time[0]) / (time[-1] - time[0])
-    ahead, beside = (np.einsum("ti,ti->t", away, axis) for axis in (forwards, outwards))
-    onset = time[0] - _heel_strike(frames, heel[:, 2], time[0], float(time.mean()))
+    onset = time[0] - heel_strike(path, float(time.mean()), time[0])
     known = np.isfinite(ahead)
     phase, place, forwards, outwards, ahead, beside = (
         x[known] for x in (phase, place, forwards, outwards, ahead, beside)
     )
     length = float(np.median(apart))
     return PlateStep(number, SIDES[foot], phase, place, forwards, outwards, ahead, beside, length, onset)
-
-
-def _heel_strike(time: Array, height: Array, near: float, middle: float) -> float:
-    """Return the time s at which a heel marker's upward acceleration peaks within 0.08 s of ``near``, close to the
-    ground (its ``height`` at ``middle`` s + 20 mm); NaN where no peak shows it.
-    """
-    step = float(np.median(np.diff(time)))
-    rise = np.full(height.size, np.nan)
-    rise[1:-1] = (height[2:] - 2 * height[1:-1] + height[:-2]) / step**2
-    low = height < np.interp(middle, time, height) + 0.02
-    look = np.flatnonzero((np.abs(time - near) < 0.08) & low)
-    peaks = [i for i in look if 2 <= i < height.size - 2 and rise[i] >= max(rise[i - 1], rise[i + 1]) and rise[i] > 0]
-    if not peaks:
-        return float("nan")
-    top = max(peaks, key=lambda i: rise[i])
-    before, at, after = rise[top - 1 : top + 2]
-    bend = before - 2 * at + after
-    return float(time[top] + (0.5 * (before - after) / bend if bend < 0 else 0.0) * step)

@@ -18,9 +18,10 @@ import numpy as np
 
 from biodance.discovery import Chosen, Family
 from biodance.witnesses._causes import Alteration, possible_causes, turned_signs
-from biodance.witnesses._recording import FootPath, FootStep, SeenTrial, recording
+from biodance.witnesses._recording import ONSET, FootPath, FootStep, SeenTrial, recording
 
 __all__ = [
+    "ONSET",
     "Alteration",
     "FootPath",
     "FootStep",

@@ -7,6 +7,7 @@ force comes late, must not hide the very steps that show it.
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.errors import BiodanceError
 from biodance.lab.markers.sets import FAMILY, landmark, read_marker_set
@@ -24,8 +25,8 @@ _RAISED = 0.05
 """m that a plate stands out above the lowest one: what sticks out over a stair hangs in the air."""
 _BESIDE = 0.04
 """m: a sole that reaches farther over the edge is half beside the plate: its centre of pressure says nothing."""
-_LEVEL, _EDGE = 0.005, 0.01
-"""m: plates edge to edge differ by less in height; the gap between them is less than twice the second."""
+_LEVEL = 0.005
+"""m: plates side by side differ by less in height."""
 _STILL, _EVEN = 0.5, 0.35
 """m/s against the ground or belt of a foot that stands; the other one swings faster."""
 _LIFTED = 0.06
@@ -94,7 +95,8 @@ class FootPath:
 class FootStep:
     """One foot alone on one plate: ``plate`` its name; ``side``; ``middle`` s, a time at which it stands; ``overhang``
     m that the sole may reach over the edge; ``heel_first`` whether the heel came down first; ``beside`` the plates on
-    which the rest of it stands, where plates lie edge to edge (belts).
+    which the rest of it stands, where plates lie edge to edge (belts); ``mixed`` whether the other foot treads on the
+    plate, too, before or after it swings.
     """
 
     plate: str
@@ -103,6 +105,7 @@ class FootStep:
     overhang: float
     heel_first: bool
     beside: tuple[str, ...] = ()
+    mixed: bool = False
 
     @property
     def name(self) -> str:
@@ -156,6 +159,13 @@ class SeenTrial:
         for other in (self.plate(name).wrench for name in step.beside):
             value += np.stack([np.interp(own.time, other.time, column) for column in other.value.T], axis=1)
         return Wrench(own.time, value) if step.beside else own
+
+    def swings(self, step: FootStep, time: Array) -> NDArray[np.bool_]:
+        """Return (n,) whether the other foot swings at some ``time`` (n,) s while this one stands."""
+        other = next(foot for foot in self.feet if foot.side != step.side)
+        belt = self.foot(step.side).drift(np.linspace(step.middle - 0.1, step.middle + 0.1, 5))
+        off = np.linalg.norm(_between(other.time, other.velocity, time) - belt, axis=1)
+        return np.asarray(np.nan_to_num(off, nan=0.0) > _STILL)
 
     @property
     def seconds(self) -> float:
@@ -262,25 +272,35 @@ def _steps(plate: Plate, plates: tuple[Plate, ...], feet: tuple[FootPath, ...], 
         over = {foot.side: _over(plate, foot, time, raised=raised) for foot in feet}
         on = [foot for foot in feet if over[foot.side] > -_BESIDE and _stands(foot, time)]
         belt = on[0].drift(time) if on else np.zeros(3)
-        other = [foot for foot in feet if foot not in on and _treads(plate, foot, first, last, belt)]
-        if len(on) == 1 and not other:
-            overhang = max(0.0, -over[on[0].side])
-            beside = _beside(plate, plates, on[0], time) if overhang else ()
-            left = 0.0 if beside else overhang
-            found.append(FootStep(plate.name, on[0].side, float(time[5]), left, _heel_first(on[0], first), beside))
+        if len(on) != 1:
+            continue
+        others = [foot for foot in feet if foot not in on]
+        mixed = any(_treads(plate, foot, np.linspace(first, last, 30), belt) for foot in others)
+        if mixed and any(_treads(plate, foot, time, belt) for foot in others):
+            continue
+        near = _neighbours(plate, plates) if mixed or over[on[0].side] < 0 else []
+        beside = tuple(one.name for one in near) if mixed or _carry(near, time) else ()
+        if mixed and not beside:
+            continue
+        overhang = 0.0 if beside else max(0.0, -over[on[0].side])
+        heel_first = _heel_first(on[0], first)
+        found.append(FootStep(plate.name, on[0].side, float(time[5]), overhang, heel_first, beside, mixed))
     return found
 
 
-def _beside(plate: Plate, plates: tuple[Plate, ...], foot: FootPath, time: Array) -> tuple[str, ...]:
-    """Return the plates of the same height on which a part of a foot stands at most of some times; () where a part of
-    it stands on no plate.
-    """
+def _neighbours(plate: Plate, plates: tuple[Plate, ...]) -> list[Plate]:
+    """Return the plates of the same height whose edges come so near to those of one that a foot stands on both."""
+    share = np.linspace(0.0, 1.0, 20)[:, None]
+    sides = zip(plate.corners, np.roll(plate.corners, -1, axis=0), strict=True)
+    edge = np.concatenate([a + share * (b - a) for a, b in sides])[None, :, :2]
     level = [one for one in plates if one is not plate and abs(one.height - plate.height) < _LEVEL]
-    sole = foot.outline(time)
-    reach = {one.name: inside(one, sole) for one in (plate, *level)}
-    parts = tuple(one.name for one in level if np.nanmedian(reach[one.name].max(axis=1)) > 0)
-    whole = np.max([reach[name] for name in (plate.name, *parts)], axis=0).min(axis=1)
-    return parts if np.nanmedian(whole) > -_EDGE else ()
+    return [one for one in level if inside(one, edge).max() > -_BESIDE]
+
+
+def _carry(plates: list[Plate], time: Array) -> bool:
+    """Return whether plates carry a load at most of some times."""
+    force = [np.interp(time, one.wrench.time, one.wrench.force[:, 2]) for one in plates if one.wrench.time.size]
+    return bool(force) and float(np.median(np.sum(force, axis=0))) > ONSET
 
 
 def _over(plate: Plate, foot: FootPath, time: Array, *, raised: bool) -> float:
@@ -304,17 +324,16 @@ def _stands(foot: FootPath, time: Array) -> bool:
     return bool(np.linalg.norm(drift) < _STILL or flat)
 
 
-def _treads(plate: Plate, foot: FootPath, first: float, last: float, belt: Array) -> bool:
-    """Return whether any part of a foot is over the plate, low and no faster than
-    the ground (``belt`` (3,) m/s), at some time of a contact.
+def _treads(plate: Plate, foot: FootPath, time: Array, belt: Array) -> bool:
+    """Return whether any part of a foot is over the plate, low and no faster than the ground (``belt`` (3,) m/s), at
+    a tenth of some times (n,) s of a contact.
     """
-    time = np.linspace(first, last, 30)
     with np.errstate(invalid="ignore"):
         near = (inside(plate, foot.outline(time)) > 0.01).any(axis=1)
         slow = np.linalg.norm(_between(foot.time, foot.velocity, time) - belt, axis=1) < _STILL
         low = np.minimum(*(path[:, 2] for path in foot.at(time)))
         lowest = min(np.nanmin(foot.heel[:, 2]), np.nanmin(foot.toe[:, 2]))
-    return bool((near & slow & (low < lowest + _LIFTED)).sum() >= 3)
+    return bool((near & slow & (low < lowest + _LIFTED)).mean() >= 0.1)
 
 
 def _heel_first(foot: FootPath, first: float) -> bool:

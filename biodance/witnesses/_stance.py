@@ -8,8 +8,6 @@ import numpy as np
 from biodance.records import Array
 from biodance.witnesses._recording import FootStep, SeenTrial
 
-_SINGLE = (0.2, 0.8)
-"""Shares of stance between which the other foot swings: only then the plates beside show nothing but this foot."""
 _SEEN = 0.8
 """Share of a phase in which foot and pressure must be known."""
 
@@ -48,7 +46,7 @@ def step_course(seen: SeenTrial, step: FootStep) -> StepCourse | None:
     cop = np.array(wrench.cop(height=seen.plate(step.plate).height)[part, :2])
     phase = (time - time[0]) / max(time[-1] - time[0], 1e-9)
     if step.beside:
-        cop[(phase < _SINGLE[0]) | (phase > _SINGLE[1])] = np.nan
+        cop[~seen.swings(step, time)] = np.nan  # the plates beside hold the other foot, too
     ahead, outwards, apart = seen.foot(step.side).in_foot(time, cop)
     length = float(np.nanmedian(apart)) if np.isfinite(apart).any() else float("nan")
     return StepCourse(phase, time, force, ahead, outwards, length)

@@ -28,7 +28,9 @@ class FootAcross(Witness):
     source = "49 steps of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
 
     def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
-        """Return three observations of each step, the early one only where the heel came down first."""
+        """Return three observations of each step, the early one only where the heel came down first, on one
+        plate alone.
+        """
         return tuple(one for step in seen.steps for one in self._of_step(seen, step))
 
     def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
@@ -36,7 +38,7 @@ class FootAcross(Witness):
         if part is None:
             return []
         for phase, (start, stop, expected, sd, foot, laboratory) in ACROSS_PHASES.items():
-            if phase == "early" and not step.heel_first:
+            if phase == "early" and (step.beside or not step.heel_first):
                 continue
             norms = {f"person {step.side} foot across, {phase}": foot}
             if step.heel_first:

@@ -26,7 +26,7 @@ class ForceEnd(Witness):
 
     def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return one observation of each step that ends within the recording."""
-        return tuple(one for step in seen.steps for one in self._of_step(seen, step))
+        return tuple(one for step in seen.steps if not step.mixed for one in self._of_step(seen, step))
 
     def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part, time = seen.stance(step), seen.plate(step.plate).wrench.time

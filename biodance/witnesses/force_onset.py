@@ -28,7 +28,9 @@ class ForceOnset(Witness):
 
     def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return one observation of each heel strike."""
-        return tuple(one for step in seen.steps if step.heel_first for one in self._of_step(seen, step))
+        return tuple(
+            one for step in seen.steps if step.heel_first and not step.mixed for one in self._of_step(seen, step)
+        )
 
     def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part = seen.stance(step)

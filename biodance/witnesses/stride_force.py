@@ -47,6 +47,9 @@ class StrideForce(Witness):
             return []
         wrench, count = seen.under(step), part.stop - part.start
         span = slice(part.start + round(_ONE[0] * count), part.start + round(_ONE[1] * count))
+        if step.beside:
+            here = np.flatnonzero(seen.swings(step, wrench.time[span])) + span.start
+            span = slice(here[0], here[-1] + 1) if here.size else slice(0, 0)
         if span.stop - span.start < _SHORTEST * wrench.rate or _beside(seen, step.plate, *step.beside, span=span):
             return []
         value = _mass(seen, wrench.time[span], wrench.force[span, 2])

@@ -20,7 +20,8 @@ _BLIND = 0.03
 """m: a direction in which steps know a plate's place no better is not told."""
 _UNKNOWN = 0.3
 """m: what is known of a plate's place before any step."""
-_FAR, _ROUNDS = 2.0, 8
+_TAIL, _ROUNDS = 4.0, 15
+"""Degrees of freedom of a step's own error, as in `diagnosis.testimony`: one step in twenty is odd."""
 _OWN = "person "
 """Beginning of the names of what all steps of a person share."""
 
@@ -67,8 +68,8 @@ def places(rows: Sequence[StepRow]) -> dict[str, tuple[Array, Array]]:
     """Return place (2,) m along x and y of the laboratory beside where the file says, and its standard deviation, of
     every plate that the steps of one visit fell on.
 
-    Least squares beside what a person's feet do (normal, of the size of each part); steps beyond two standard
-    deviations count less (Huber 1964, doi:10.1214/aoms/1177703732).
+    The most probable places beside what a person's feet do (normal, of the size of each part) under errors of steps
+    with heavy tails: an odd step loses its weight (Lange, Little and Taylor 1989, doi:10.1080/01621459.1989.10478852).
     """
     plates, parts = sorted({row.plate for row in rows}), sorted({name for row in rows for name in row.parts})
     sd, value = np.array([row.sd for row in rows]), np.array([row.value for row in rows])
@@ -83,7 +84,7 @@ def places(rows: Sequence[StepRow]) -> dict[str, tuple[Array, Array]]:
     for _ in range(_ROUNDS):
         covariance = np.linalg.inv(columns.T @ (weight[:, None] * columns) + prior)
         found = covariance @ columns.T @ (weight * value)
-        weight = sd**-2 * np.minimum(1.0, _FAR / np.maximum(np.abs(value - columns @ found) / sd, 1e-12))
+        weight = sd**-2 * (_TAIL + 1) / (_TAIL + ((value - columns @ found) / sd) ** 2)
     error = np.sqrt(np.diag(covariance))
     return {plate: (found[2 * i : 2 * i + 2], error[2 * i : 2 * i + 2]) for i, plate in enumerate(plates)}
 
