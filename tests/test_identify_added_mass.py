@@ -56,13 +56,6 @@ def test_without_a_load_nothing_is_announced() -> None:
         assert added_mass(after).reference == "the table"
 
 
-def test_the_smallest_load_is_smaller_with_a_reference() -> None:
-    before, after = visits(20)
-    with_reference = {s.segment: s.smallest for s in added_mass(after, reference=before).suspects}
-    alone = {s.segment: s.smallest for s in added_mass(after).suspects}
-    assert all(0 < with_reference[s] < alone[s] for s in alone)
-
-
 def test_surprise_has_unit_variance_when_nothing_was_added() -> None:
     values = []
     for seed in range(6):

@@ -52,6 +52,15 @@ def test_declared_and_carried_mass_are_said_where_they_differ() -> None:
     assert not any("the plates carry" in note for note in again.notes)
 
 
+def test_the_smallest_load_is_smaller_with_a_reference() -> None:
+    before, after = (session_result(seed=seed).identification for seed in (0, 5))
+    assert before is not None
+    assert after is not None
+    searches = [added_mass(after.identification, reference=one) for one in (before.identification, None)]
+    known, alone = ({one.segment: one.smallest for one in search.suspects} for search in searches)
+    assert all(0 < known[segment] < alone[segment] for segment in alone)
+
+
 def test_a_failed_check_of_a_fitted_trial_silences_the_load() -> None:
     loaded, bare = session_result(load=LOAD, seed=5), session_result().identification
     far = Check("marker distance, RMS", "fit_0", "31.0 mm", "at most 20 mm", False, "See the markers.")

@@ -8,6 +8,7 @@ from biodance.identification.information import Information
 from biodance.identification.placement import goes_along, placed_as
 from biodance.identification.posterior import prior_factor
 from biodance.records import Array, Sip
+from biodance.uncertainty.caution import in_other_frames
 
 _ODD = (1.0, 1.5, 2.25, 3.4)
 """Times that the body may differ from what was known before by more than its standard deviations, equally probable."""
@@ -19,7 +20,8 @@ def expect_unloaded(reference: Identification, session: Identification) -> Sip:
     """Return what ``reference`` lets expect of the unloaded body in ``session``, with covariance.
 
     The belief of the reference, moved by what the table itself changed between the sessions (another static trial,
-    other lengths), with the trunk's matter in the same of its two places. The session's table counts at the mass of the
+    other lengths), with the trunk's matter in the same of its two places, known as on another day (markers glued
+    anew). The session's table counts at the mass of the
     reference: the mass that the session declares may hold the load.
 
     Raises
@@ -31,7 +33,8 @@ def expect_unloaded(reference: Identification, session: Identification) -> Sip:
     same = placed_as(session.belief.prior, session.body, along=along)
     table = weighing(same, float(reference.belief.prior.mass.sum()))
     shift = table.phi - reference.belief.prior.phi
-    return Sip(reference.sip.segments, reference.belief.mean + shift, reference.belief.covariance)
+    moved = Sip(reference.sip.segments, reference.belief.mean + shift, reference.belief.covariance)
+    return in_other_frames(moved, session.body.joint_errors)
 
 
 def weighing(prior: Sip, mass: float) -> Sip:
