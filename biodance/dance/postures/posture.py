@@ -190,8 +190,8 @@ def posture_at(chain: Chain, stance: Stance, x: Array) -> Posture:
 
 
 def describe(state: State, limit: Limit) -> str:
-    """Return in words how much a ``state`` (one sample) breaks a ``limit``, and where: in which joint, on which side,
-    between what.
+    """Return in words how much a ``state`` (one sample) breaks a ``limit`` or its reserve, and where: in which joint,
+    on which side, between what.
     """
     motion = state.chain.motion(np.zeros(len(state.x)), state.x, state.v, state.a)
     left = limit.check(CheckedMotion(state.chain.body, motion, state.stance))
@@ -202,6 +202,8 @@ def describe(state: State, limit: Limit) -> str:
     elif unit == "m":
         missing, unit = 100 * missing, "cm"
     what = f"{limit.name} of {left.of[column]}".replace("_", " ")
+    if missing < 0:
+        return f"{what} ({-missing:.0f} {unit} left, less than its reserve)"
     return f"{what} (short by about {missing:.0f} {unit})"
 
 
