@@ -41,17 +41,23 @@ class Page:
         self.events: list[dict[str, Any]] = []
         self._session: str | None = None
         try:
-            self._open(url)
+            self._attach(url)
         except BaseException:
             self.__exit__()
             raise
 
-    def _open(self, url: str) -> None:
+    def _attach(self, url: str) -> None:
         (target,) = [one for one in self.send("Target.getTargets")["targetInfos"] if one["type"] == "page"]
         attached = self.send("Target.attachToTarget", targetId=target["targetId"], flatten=True)
         self._session = attached["sessionId"]
         for domain in ("Page", "Runtime", "Network", "Log"):
             self.send(f"{domain}.enable")
+        self.open(url)
+
+    def open(self, url: str) -> None:
+        """Load a page from its beginning, also one that differs behind # alone."""
+        self.send("Page.navigate", url="about:blank")
+        self.until("location.href === 'about:blank'")
         self.send("Page.navigate", url=url)
         self.until("document.readyState === 'complete' && location.href !== 'about:blank'")
 
