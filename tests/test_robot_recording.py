@@ -80,6 +80,7 @@ def test_a_missing_cover_is_found_from_files_alone(
     assert found["added_mass"] is None
     assert any("less than drawn" in said["text"] for said in found["attention"])
     assert "7.94 kg" in (tmp_path / "out" / "report.html").read_text()
+    assert ".curves" in (tmp_path / "out" / "report.html").read_text()  # the style without which figures are black
 
 
 def test_time_and_place_of_a_plate_follow_from_the_path_alone() -> None:

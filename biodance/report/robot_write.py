@@ -1,6 +1,5 @@
 """What was found of a robot, as numbers and as a page."""
 
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ from biodance.report.documents.diagnosis import attention_document, judged_docum
 from biodance.report.documents.identification import agreement, identification_document
 from biodance.report.documents.session import plain_values, to_text
 from biodance.report.pages.identification import identification_section
+from biodance.report.pages.template import render, template_text
 from biodance.report.write import PAGE, write_files
 from biodance.version import __version__
 
@@ -91,14 +91,12 @@ def write_robot(result: RobotResult, folder: Path) -> dict[str, Any]:
 
 
 def _page(result: RobotResult, numbers: dict[str, Any]) -> str:
-    from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
-    folder = files("biodance.report") / "templates"
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    return environment.from_string((folder / "robot.html.j2").read_text(encoding="utf-8")).render(
-        style=Markup((folder / "page.css").read_text(encoding="utf-8")),
-        name=result.body.name,
+    return render(
+        "robot.html.j2",
+        scripts=[template_text("curves.js")],
+        model=result.body.name,
         numbers=numbers,
         version=__version__,
         section=Markup(identification_section(result.identified)),
