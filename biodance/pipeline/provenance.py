@@ -101,8 +101,8 @@ def _git(folder: Path, *words: str) -> str:
 
 
 def blas() -> str:
-    """Return which BLAS numpy runs on: the library and version it was built with, and the kernels of all that are loaded
-    by now, where that can be asked.
+    """Return which BLAS numpy runs on: the library and version it was built with, and the kernels of all that are
+    loaded by now, where that can be asked.
     """
     import numpy as np
 
