@@ -17,6 +17,8 @@ from biodance.virtual_lab.movement.gait import GaitPerformance, perform_gait
 from biodance.virtual_lab.movement.protocol import read_protocol
 from biodance.virtual_lab.person.person import make_person
 from biodance.virtual_lab.simulate import simulate_session
+from biodance.witnesses import observe
+from biodance.witnesses._recording import recording
 
 G = 9.80665
 TIME = np.arange(1.0, 2.5, 1e-3)
@@ -128,6 +130,13 @@ def test_the_flight_of_a_runner_is_found(recorded: dict) -> None:
         empty = one.comparison.measured[:, 2] < 20
         assert 0.15 < empty.mean() < 0.4
         assert one.comparison.used[empty].mean() > 0.97
+
+
+def test_what_is_expected_of_walking_feet_is_not_asked_of_running_ones(recorded: dict) -> None:
+    feet = ("foot_across", "foot_along", "shear")
+    said = {name: [observe(recording(one.trial), feet) for one in recorded[name].trials[1:]] for name in recorded}
+    assert all(said["treadmill"])
+    assert not any(said["run"])
 
 
 @pytest.mark.parametrize("text", ['gait = "hop"', 'gait = "run"\nspeed = 9.0', 'gait = "run"\nseconds = 1.0'])

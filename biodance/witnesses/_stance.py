@@ -10,6 +10,10 @@ from biodance.witnesses._recording import FootStep, SeenTrial
 
 _SEEN = 0.8
 """Share of a phase in which foot and pressure must be known."""
+_WALKS = 0.4
+"""s: a foot that is down for less runs (running 0.2 to 0.3 s, walking 0.5 to 0.8 s; Novacheck 1998,
+doi:10.1016/S0966-6362(97)00038-6), and what is expected of a step is of walking.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +39,8 @@ class StepCourse:
 
 @lru_cache(maxsize=16)
 def step_course(seen: SeenTrial, step: FootStep) -> StepCourse | None:
-    """Return one step sample by sample; None where its plate's force does not show it. Of the last steps it is kept:
-    several witnesses ask for it.
+    """Return one step sample by sample; None where its plate's force does not show it or the foot runs. Of the last
+    steps it is kept: several witnesses ask for it.
     """
     part = seen.stance(step)
     if part is None:
@@ -44,7 +48,9 @@ def step_course(seen: SeenTrial, step: FootStep) -> StepCourse | None:
     wrench = seen.under(step)
     time, force = wrench.time[part], np.array(wrench.force[part])
     cop = np.array(wrench.cop(height=seen.plate(step.plate).height)[part, :2])
-    phase = (time - time[0]) / max(time[-1] - time[0], 1e-9)
+    if time[-1] - time[0] < _WALKS:
+        return None
+    phase = (time - time[0]) / (time[-1] - time[0])
     if step.beside:
         cop[~seen.swings(step, time)] = np.nan  # the plates beside hold the other foot, too
     ahead, outwards, apart = seen.foot(step.side).in_foot(time, cop)
