@@ -149,8 +149,9 @@ class Walk:
         most = max(why, key=lambda name: why[name]).replace("_", " ") if why else "number of instructions"
         return (
             f"No posture {stance.name.replace('_', ' ')} can be reached from posture {number}: most of those within "
-            f"{self.work.plan.instructions:g} instructions exceed the limit on {most}. Widen that limit, allow more "
-            f"instructions, or leave this stance out of the protocol."
+            f"{self.work.plan.instructions:g} instructions exceed the limit on {most}. Try another seed, which "
+            f"draws other postures; else widen that limit, allow more instructions, or leave this stance out of the "
+            f"protocol."
         )
 
     def _ranked(self, steps: list[DanceStep], stance: Stance, belief: Array) -> Iterator[DanceStep]:
