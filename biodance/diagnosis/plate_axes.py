@@ -45,7 +45,7 @@ def _own(channel: str, plate: Plate) -> str:
     axes = np.stack([x / np.linalg.norm(x), y / np.linalg.norm(y)])
     axes = np.vstack([axes, np.cross(*axes)])
     along = axes @ np.eye(3)["xyz".index(channel[1])]
-    order = np.argsort(-np.abs(along))
+    order = np.argsort(-np.abs(along).round(6), kind="stable")  # half-way between two, x comes first
     kept = order[:1] if abs(along[order[0]]) >= _ALONG else order[:2]
     parts = [f"{'-' if along[k] < 0 else ''}{channel[0]}{'xyz'[k]}" for k in kept]
     return " and ".join(parts)
