@@ -14,13 +14,13 @@ from pathlib import Path
 
 import numpy as np
 from bench_girths import _KINDS, skeleton
+from bench_people import deviations
 from scanned_people import HIP, ScannedPerson, scanned_person
 
 from biodance.body.human.prior import prior
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, generic_skeleton, kind_of
 from biodance.body.tables.choice import reference
 from biodance.errors import SessionRefused
-from biodance.identification.knowledge import segment_quantities
 from biodance.records import SIDES, Array, FootSizes, Sip, Subject
 from biodance.settings import Settings
 from biodance.uncertainty.caution import widened
@@ -52,16 +52,6 @@ def priors(scanned: ScannedPerson, rng: np.random.Generator, folder: Path) -> li
     return [widened(prior(reference(Settings.table, plain), bones, subject)) for subject in given]
 
 
-def spreads(sip: Sip) -> Array:
-    """Return the standard deviations (12, 4) of mass kg and CoM m."""
-    out = []
-    for i in range(len(sip.segments)):
-        cut = slice(10 * i, 10 * i + 10)
-        slope = segment_quantities(sip.phi[cut])[1][:4]
-        out.append(np.sqrt(np.diag(slope @ sip.covariance[cut, cut] @ slope.T)))
-    return np.array(out)
-
-
 def compare(count: int, first: int = 1) -> tuple[Array, Array]:
     """Return errors and standard deviations (people, 4 ways, 12, 4) of mass kg and CoM m."""
     errors, sds = [], []
@@ -76,7 +66,7 @@ def compare(count: int, first: int = 1) -> tuple[Array, Array]:
                 print(f"person {seed}: {refused}", file=sys.stderr)
                 continue
             errors.append([np.column_stack([sip.mass - mass, sip.com - com]) for sip in found])
-            sds.append([spreads(sip) for sip in found])
+            sds.append([deviations(sip) for sip in found])
     return np.array(errors), np.array(sds)
 
 

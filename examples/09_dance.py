@@ -23,7 +23,7 @@ def main(picture: Path) -> None:
         raise SystemExit(made.reason)
     print(made)
     for margin in biodance.verify_dance(made.dance, "one_segment"):
-        print(f"{margin.limit:16s} {margin.worst:8.4f} {margin.unit:6s} left at {margin.where_s:5.1f} s")
+        print(f"{margin.limit:30s} {margin.worst:8.4f} {margin.unit:6s} left at {margin.where_s:5.1f} s")
     figure = Figure(figsize=(7, 4), layout="constrained")
     axes = figure.subplots()
     made.dance.motion(25).plot_angles(
