@@ -53,4 +53,6 @@ GAITS = {
     "walk": Gait("walk", 0.9, 1.2, 0.62, 0.17, 0.2, 0.5, (0.24, 0.5), 0.03, 0.18, 0.4, 0.35, 0.03, 0.07),
     "run": Gait("run", 2.0, 0.7, 0.38, 0.09, 0.05, 0.5, (0.35, 0.5), 0.06, 0.0, 0.6, 1.4, 0.08, 0.15),
 }
-"""Ways to go, by the names that a protocol uses."""
+"""Ways to go, by the names that a protocol uses. Stance 62 and 38 % of the stride: Novacheck 1998,
+doi:10.1016/S0966-6362(97)00038-6; all else assumed so that people of 1.35 to 1.95 m settle into even strides.
+"""
