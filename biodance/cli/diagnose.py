@@ -42,7 +42,8 @@ def foresee_command(
             refuse_page(out, force=force)
         document = foresight_document(foresee_dance(dance))
         if out is not None:
-            out.write_text(foresight_page(document, dance.stem), encoding="utf-8", newline="\n")
+            page = foresight_page(document, f"the dance {dance.resolve().parent.name}")
+            out.write_text(page, encoding="utf-8", newline="\n")
     if json:
         print_json(document)
     else:

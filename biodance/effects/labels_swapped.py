@@ -1,9 +1,10 @@
 """Two markers carry each other's names: left and right, front and back of the wrist, for a whole session or from one
 trial on.
 
-Signature: a left marker on the right side, a wrist that is no mirror image of the other, distances within the head that
-are those of the static trial under other names (two pairs at once, too); else both markers are far from the model, each
-where the other one should be. Look-alikes: a marker that fell off (one of the two is right then). Separated by
+Signature: a left marker on the right side, a wrist that is no mirror image of the other or turns the finger's marker to
+the palm, a head, pelvis or foot that points backwards, distances within the head that are those of the static trial
+under other names (two pairs at once, too); else both markers are far from the model, each where the other one should
+be. Look-alikes: a marker that fell off (one of the two is right then). Separated by
 exchanging the two names: only then does the body fit.
 """
 

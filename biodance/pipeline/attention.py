@@ -302,5 +302,5 @@ def _incomplete(one: Diagnosis, rests_on: str) -> str:
     return (
         f"What else there is to see in {rests_on} is as without fault."
         if rests_on and one.adequacy
-        else ("Nothing else was judged.")
+        else "Whether the forces fit the body was not judged."
     )

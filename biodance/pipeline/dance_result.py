@@ -117,7 +117,7 @@ class DanceResult:
             for what, sd in told.items()
         }
         said = " and ".join(f"the {what} of {_names(names)}" for what, names in poor.items() if names)
-        return f"It cannot teach {said}: these stay as in the table." if said else "Every segment is learned in part."
+        return f"It cannot teach {said}: the table alone tells." if said else "Every segment is learned in part."
 
     @property
     def price(self) -> str:
