@@ -28,6 +28,12 @@ class MarkerProblem:
     weight: Array
     tolerance: float
 
+    def __post_init__(self) -> None:
+        """Keep ``xyz`` as a view that nothing writes to: one type for the compiled code, whatever was given."""
+        view = self.xyz.view()
+        view.flags.writeable = False
+        object.__setattr__(self, "xyz", view)
+
 
 @dataclass(frozen=True, eq=False)
 class Minimum:

@@ -170,7 +170,7 @@ def minimise_frames(chain, xyz, weight, frames, q, tolerance, steps, cost, slope
                 hessian(chain, at, at.below[:, 4:7], at.below[:, 7:])
             else:
                 add_up_model(chain, w, at)
-                hessian(chain, at, at.below[:, 1:4], at.model)
+                hessian(chain, at, at.below[:, 1:4], at.model[:, 0:9])  # sliced: the same type as above
             convex = factorise(chain, at, held, damping)
             x[:] = 0.0
             if convex:
