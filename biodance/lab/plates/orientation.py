@@ -48,13 +48,12 @@ def _distances_between(points: Array, feet: Array) -> Array:
     i, j = np.triu_indices(feet.shape[1], 1)
     there = np.isfinite(feet[:, i, 0]) & np.isfinite(feet[:, j, 0])
     frame, pair = np.nonzero(there)
-    start = feet[frame, i[pair]]
-    along = feet[frame, j[pair]] - start
-    length = np.maximum((along**2).sum(axis=1), 1e-12)
-    away = start - points[frame]
-    share = np.clip(-(away * along).sum(axis=1) / length, 0, 1)
+    (x, y), (to_x, to_y) = feet[frame, i[pair]].T, feet[frame, j[pair]].T
+    px, py = points[frame].T
+    ax, ay = to_x - x, to_y - y
+    share = np.clip(((px - x) * ax + (py - y) * ay) / np.maximum(ax * ax + ay * ay, 1e-12), 0, 1)
     found = np.full(there.shape, np.inf)
-    found[frame, pair] = np.linalg.norm(away + share[:, None] * along, axis=1)
+    found[frame, pair] = np.hypot(x + share * ax - px, y + share * ay - py)
     return found.min(axis=1)
 
 
