@@ -37,8 +37,9 @@ def distance_to_feet(cop: Array, time: Array, corners: Array, markers: Markers) 
     told = np.isfinite(point).all(axis=1) & (near.sum(axis=1) >= 2)
     if told.sum() < min(5, markers.time.size):
         return None
-    feet = np.where(near[:, :, None], xyz[:, :, :2], np.inf)[told][:, near[told].any(axis=0)]
-    return float(np.median(_distances_between(point[told], feet)))
+    point, near, feet = point[told], near[told], np.where(near[:, :, None], xyz[:, :, :2], np.inf)[told]
+    first = np.argsort(~near, axis=1, kind="stable")[:, : near.sum(axis=1).max(), None]
+    return float(np.median(_distances_between(point, np.take_along_axis(feet, first, axis=1))))
 
 
 def _distances_between(points: Array, feet: Array) -> Array:
