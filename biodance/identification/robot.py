@@ -32,10 +32,6 @@ explain it come out small (regression dilution): with 6 Hz a robot of 7.36 kg in
 inertias were further from the truth than the drawing's, with 2.5 Hz it is found within 7 g.
 """
 _ROUNDS = 4
-_ROOM = 3.0
-"""A difference between needed and measured wrench within so many standard deviations of what the drawing may be off
-by is no surprise.
-"""
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,7 +35,7 @@ def poses(body: Body, q: Array) -> Poses:
     q = np.atleast_2d(q)
     frames, n = q.shape[0], len(body.joints)
     if body.n_root:
-        root_rotation, root_position = quaternion_matrix(q[:, 3:7]), np.array(q[:, :3])
+        root_rotation, root_position = np.ascontiguousarray(quaternion_matrix(q[:, 3:7])), np.array(q[:, :3])
     else:
         root_rotation, root_position = np.tile(np.eye(3), (frames, 1, 1)), np.zeros((frames, 3))
     rotation, position = np.empty((frames, n, 3, 3)), np.empty((frames, n, 3))

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.display import BLACK, BLUE, GREEN, GREY, PINK, RED
+from biodance.display import BLACK, BLUE, GREY, RED
 from biodance.records import Array, runs
 from biodance.report.wording import format_number
 
@@ -41,8 +41,6 @@ class Stroke:
 
 MEASURED, TABLE, IDENTIFIED = Stroke(BLACK), Stroke(BLUE, "6 3"), Stroke(RED, "2 2", 1.6)
 LEFT_SIDE, RIGHT_SIDE, MIDDLE_SIDE = Stroke(RED, "5 3"), Stroke(BLUE), Stroke(GREY)
-STROKES = (Stroke(BLUE), Stroke(RED, "5 3"), Stroke(GREEN, "2 2", 1.6), Stroke(BLACK, "7 2 2 2"), Stroke(PINK, "9 3"))
-"""Of curve after curve."""
 
 
 @dataclass(frozen=True)
