@@ -29,6 +29,8 @@ _LEVEL = 0.005
 """m: plates side by side differ by less in height."""
 _STILL, _EVEN = 0.5, 0.35
 """m/s against the ground or belt of a foot that stands; the other one swings faster."""
+_BELT = 0.25
+"""m/s of a standing foot from which a belt carries it; slower ones pivot."""
 _LIFTED = 0.06
 """m of a foot above its lowest place in the trial from which it cannot stand."""
 _FLAT = 0.03
@@ -165,6 +167,11 @@ class SeenTrial:
         belt = self.foot(step.side).drift(np.linspace(step.middle - 0.1, step.middle + 0.1, 5))
         off = np.linalg.norm(_between(other.time, other.velocity, time) - belt, axis=1)
         return np.asarray(np.nan_to_num(off, nan=0.0) > _STILL)
+
+    def belt(self, step: FootStep) -> Array | None:
+        """Return the velocity (2,) m/s of the belt that carries the foot of a step; None on the ground."""
+        drift = self.foot(step.side).drift(np.linspace(step.middle - 0.1, step.middle + 0.1, 5))[:2]
+        return drift if np.linalg.norm(drift) > _BELT else None
 
     @property
     def seconds(self) -> float:

@@ -21,8 +21,6 @@ _SLANT = (0.025, 0.055, 0.025)
 """rad: expected direction in which shear goes from braking to pushing, its sd of one step and of one person's foot."""
 _GOES = 0.2
 """m/s of the pelvis over the ground from which somebody walks."""
-_BELT = 0.25
-"""m/s of a standing foot from which a belt carries it; slower ones pivot."""
 _FRAMES = 8
 """Frames of a stance that show how the pelvis goes."""
 
@@ -86,13 +84,12 @@ def way(seen: SeenTrial, step: FootStep, part: StepCourse) -> tuple[Array, Array
     known, middle = seen.trial.markers.time, float(np.mean(part.time[[0, -1]]))
     here = (known >= part.time[0]) & (known <= part.time[-1])
     path = seen.pelvis[here, :2] if seen.pelvis is not None else np.empty((0, 2))
-    belt = seen.foot(step.side).drift(np.linspace(step.middle - 0.1, step.middle + 0.1, 5))[:2]
-    if np.isfinite(path).all(axis=1).sum() < _FRAMES or not np.isfinite(belt).all():
+    if np.isfinite(path).all(axis=1).sum() < _FRAMES:
         return None
-    belt = belt if np.linalg.norm(belt) > _BELT else np.zeros(2)
     at, path = known[here][np.isfinite(path).all(axis=1)] - middle, path[np.isfinite(path).all(axis=1)]
     bend, speed, _ = np.polyfit(at, path, 2)
-    velocity = speed - belt + 2 * bend * (part.time - middle)[:, None]
+    belt = seen.belt(step)
+    velocity = speed - (np.zeros(2) if belt is None else belt) + 2 * bend * (part.time - middle)[:, None]
     return (velocity, 2 * bend) if np.linalg.norm(velocity, axis=1).min() > _GOES else None
 
 

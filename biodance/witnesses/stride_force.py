@@ -14,12 +14,17 @@ from numpy.typing import NDArray
 from biodance.records import Array
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
 from biodance.witnesses._recording import ONSET
+from biodance.witnesses._stance import step_course
 
 DECLARED = 0.01
 """Share of the declared mass by which careful declarations are wrong: clothes, shoes, another day."""
 _STEP, _ALONE, _HORIZONTAL = (-0.001, 0.003, 0.0045), (0.009, 0.0085, 0.008), 0.012
 """Expected error of the mass as a share of it, its sd of one step and of one person: of a whole step, of one foot
 alone; sd of the mean horizontal force over a step as a share of the weight."""
+_ON = (0.0, 0.002, 0.003)
+"""The same of all strides of somebody who goes on on a belt, walking or running: nothing is trodden on beside it."""
+_MANY = 6
+"""Steps from which somebody goes on."""
 _FADES = 0.3
 """Share of a step in which the weights of its mean begin, and end."""
 _ONE = (0.2, 0.8)
@@ -29,8 +34,8 @@ _SHORTEST = 0.15
 
 
 class StrideForce(Witness):
-    """Mass (kg) by the mean vertical force over a step or over one foot alone, and mean horizontal force (N) over a
-    step.
+    """Mass (kg) by the mean vertical force over a step, over one foot alone, over all strides on a belt, and
+    mean horizontal force (N) over a step.
     """
 
     name = "stride_force"
@@ -43,11 +48,22 @@ class StrideForce(Witness):
         if seen.pelvis is None or not seen.mass > 0:
             return ()
         alone = [one for step in seen.steps if not step.overhang for one in self._alone(seen, step)]
-        return (*alone, *(one for pair in _pairs(seen) for one in self._whole(seen, *pair)))
+        return (*alone, *(one for pair in _pairs(seen) for one in self._whole(seen, *pair)), *self._lasting(seen))
+
+    def _lasting(self, seen: SeenTrial) -> list[Observation]:
+        moving = [step for step in seen.steps if seen.belt(step) is not None]
+        if len(moving) < _MANY or len(moving) < len(seen.steps) or not _one_clock(seen):
+            return []
+        total, names = seen.trial.wrench, {step.plate for step in moving}
+        here = (total.time >= moving[0].middle) & (total.time <= moving[-1].middle)
+        value = _mass(seen, total.time[here], total.force[here])
+        return [
+            _weighed(self.name, "all strides", seen, value, "going on", _ON, names.pop() if len(names) == 1 else "")
+        ]
 
     def _alone(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part = seen.stance(step)
-        if part is None:
+        if part is None or step_course(seen, step) is None:
             return []
         wrench, count = seen.under(step), part.stop - part.start
         span = slice(part.start + round(_ONE[0] * count), part.start + round(_ONE[1] * count))
