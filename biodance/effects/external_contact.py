@@ -5,7 +5,10 @@ point times the force. Look-alikes: contact at a neighbouring segment; for a ste
 video, and by the rank of the residual.
 """
 
+from dataclasses import dataclass, replace
+
 import numpy as np
+from scipy.interpolate import BSpline
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
@@ -16,10 +19,13 @@ _STEP = 0.4
 """s: a hand comes and goes within about a second."""
 
 
+@dataclass(frozen=True)
 class ExternalContact(Effect):
-    """A steady ``force`` (x, y, z: N, lab axes) ON the person at the far end of segment ``target``, which the plates
-    lack.
+    """A steady ``force`` (x, y, z: N, lab axes) ON the person at the far end of segment ``target``, or ``place`` (m,
+    segment axes) from it, which the plates lack.
     """
+
+    place: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     name = "external_contact"
     parameters = tuple(
@@ -43,19 +49,24 @@ class ExternalContact(Effect):
         low, high = case.body.boxes[index]
         far = 0.5 * (low + high)
         far[1] = low[1] if index else 0.0
-        point = case.poses.points([index], far[None])[:, 0]
+        point = case.poses.points([index], (far + self.place)[None])[:, 0]
         return -np.stack([wrench_of_force(axis, point) for axis in np.eye(3)], axis=2)
 
     def local(self, case: Case) -> Array | None:
-        """Return the contact as a force that comes and goes: hats of `STEP` s to both sides; None for the root, which
-        hands and feet are not: its forces would explain anything that hangs on the middle of the body.
+        """Return the contact as a force that comes and goes: cubic splines with a knot every `_STEP` s; None for the
+        root, which hands and feet are not: its forces would explain anything that hangs on the middle of the body.
         """
         if case.body.segment_index(self.target) == 0:
             return None
         time = case.motion.time
-        knots = time[0] + _STEP * np.arange(int((time[-1] - time[0]) / _STEP) + 2)
-        hats = np.maximum(0.0, 1.0 - np.abs(time[:, None] - knots) / _STEP)
-        return (self.columns(case)[:, :, None, :] * hats[:, None, :, None]).reshape(time.size, 6, -1)
+        knots = time[0] + _STEP * np.arange(-3, int((time[-1] - time[0]) / _STEP) + 5)
+        course = BSpline.design_matrix(time, knots, 3).toarray()
+        return (self.columns(case)[:, :, None, :] * course[:, None, :, None]).reshape(time.size, 6, -1)
+
+    def beside(self, place: Array) -> "ExternalContact":
+        """Return the contact ``place`` (3,) m from the far end of its segment, in the segment's axes."""
+        x, y, z = place
+        return replace(self, place=(float(x), float(y), float(z)))
 
 
 EFFECT = ExternalContact

@@ -112,6 +112,12 @@ class Effect:
         """
         return None
 
+    def beside(self, place: Array) -> "Effect | None":
+        """Return the cause where it acts ``place`` (3,) m from its usual point, in the axes of its segment; None for
+        one that acts at no point.
+        """
+        return None
+
     def marker_columns(self, case: Case) -> Array | None:
         """Return (K, 3, p) m per unit: what one unit adds to ``case.marker_residual``; None where the markers say
         nothing.
