@@ -131,7 +131,9 @@ def _placed(base: Model, one: _Passing) -> _Passing:
     is several newton metres off. Gauss-Newton steps of the place and the course of the force together.
     """
     place, start = np.zeros(3), base.belief.mean.size
-    for step in range(_STEPS if one.effect.beside(place) else 0):
+    if one.effect.beside(place) is None:
+        return one
+    for step in range(_STEPS):
         loose = _loose(base, one)
         end, white = start + one.white.shape[1], loose.size * one.white
         if step == 0:
@@ -139,7 +141,7 @@ def _placed(base: Model, one: _Passing) -> _Passing:
         slopes = _slopes(base, one.effect, place, loose.size * belief.mean[start:end])
         belief = believe(np.concatenate([base.belief.X, white, _BESIDE * slopes], axis=1), base.belief.y + slopes @ place)
         place = _BESIDE * belief.mean[end:]
-        one = _passing(base, one.effect.beside(place))
+        one = _passing(base, one.effect.beside(place, fine=True))
     return one
 
 

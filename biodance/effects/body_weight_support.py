@@ -72,8 +72,14 @@ class BodyWeightSupport(Effect):
         return bool(theta[0] > 0)
 
     def possible_in(self, case: Case, theta: Array) -> bool:
-        """Return whether the rope carries no more than the person weighs."""
-        return bool(0 < theta[0] <= case.body.sip.mass.sum() * np.linalg.norm(case.body.gravity))
+        """Return whether the rope carries no more than the person weighs, and is tied to its segment, not beyond its
+        ends.
+        """
+        index = case.body.segment_index(self.target)
+        low, high = case.body.boxes[index, :, 1]
+        tied = case.phi[10 * index + 2] / case.phi[10 * index] + theta[2]
+        weight = case.body.sip.mass.sum() * np.linalg.norm(case.body.gravity)
+        return bool(0 < theta[0] <= weight and low <= tied <= high)
 
 
 def _middle(case: Case) -> Array:

@@ -15,8 +15,8 @@ from biodance.effects._base.effect import Effect, Parameter
 from biodance.records import Array
 from biodance.spatial import wrench_of_force
 
-_STEP = 0.4
-"""s: a hand comes and goes within about a second."""
+_STEP, _FINE = 0.4, 0.2
+"""s between the knots of its course: a hand comes and goes within about a second, and takes hold within half of one."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,7 @@ class ExternalContact(Effect):
     """
 
     place: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    step: float = _STEP
 
     name = "external_contact"
     parameters = tuple(
@@ -53,20 +54,20 @@ class ExternalContact(Effect):
         return -np.stack([wrench_of_force(axis, point) for axis in np.eye(3)], axis=2)
 
     def local(self, case: Case) -> Array | None:
-        """Return the contact as a force that comes and goes: cubic splines with a knot every `_STEP` s; None for the
+        """Return the contact as a force that comes and goes: cubic splines with a knot every ``step`` s; None for the
         root, which hands and feet are not: its forces would explain anything that hangs on the middle of the body.
         """
         if case.body.segment_index(self.target) == 0:
             return None
         time = case.motion.time
-        knots = time[0] + _STEP * np.arange(-3, int((time[-1] - time[0]) / _STEP) + 5)
+        knots = time[0] + self.step * np.arange(-3, int((time[-1] - time[0]) / self.step) + 5)
         course = BSpline.design_matrix(time, knots, 3).toarray()
         return (self.columns(case)[:, :, None, :] * course[:, None, :, None]).reshape(time.size, 6, -1)
 
-    def beside(self, place: Array) -> "ExternalContact":
+    def beside(self, place: Array, *, fine: bool = False) -> "ExternalContact":
         """Return the contact ``place`` (3,) m from the far end of its segment, in the segment's axes."""
-        x, y, z = place
-        return replace(self, place=(float(x), float(y), float(z)))
+        x, y, z = map(float, place)
+        return replace(self, place=(x, y, z), step=_FINE if fine else _STEP)
 
 
 EFFECT = ExternalContact

@@ -112,9 +112,9 @@ class Effect:
         """
         return None
 
-    def beside(self, place: Array) -> "Effect | None":
-        """Return the cause where it acts ``place`` (3,) m from its usual point, in the axes of its segment; None for
-        one that acts at no point.
+    def beside(self, place: Array, *, fine: bool = False) -> "Effect | None":
+        """Return the cause that comes and goes where it acts ``place`` (3,) m from its usual point, in the axes of its
+        segment, its course (`local`) as ``fine`` as it may be; None for one that acts at no point.
         """
         return None
 
