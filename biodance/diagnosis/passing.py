@@ -69,14 +69,14 @@ def _with(naming: Naming, base: Model, accepted: tuple[Round, ...], chosen: Chos
     if order[0].found.log_bayes_factor - score < base.tolerances.threshold:
         return None
     suspects = tuple(_suspect(one, score) for one in order)
-    seen = _placed(base, order[0])
-    best = _loose(base, seen)
+    best = _loose(base, _placed(base, order[0]))
     belief = believe(np.concatenate([base.belief.X, best.size * best.white], axis=1), base.belief.y)
     course = belief.mean[-best.white.shape[1] :]
-    if not one_sided(seen.found.mean.reshape(-1, len(best.effect.parameters))):
+    if not one_sided(order[0].found.mean.reshape(-1, len(best.effect.parameters))):
         return None
-    touch = _named(base, best, course, seen)
-    if seen.found.log_bayes_factor - score < needed(base, seen.found.visible) or not stands(base, touch):
+    touch = _named(base, best, course, order[0])
+    seen = order[0].found
+    if seen.log_bayes_factor - score < needed(base, seen.visible) or not stands(base, touch):
         return None
     named = (*base.named, touch)
     model = replace(base, belief=belief, named=named)

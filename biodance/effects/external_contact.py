@@ -8,14 +8,14 @@ video, and by the rank of the residual.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import BSpline
+from scipy.interpolate import CubicSpline
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.records import Array
 from biodance.spatial import wrench_of_force
 
-_STEP, _FINE = 0.4, 0.2
+_STEP, _FINE = 0.4, 0.15
 """s between the knots of its course: a hand comes and goes within about a second, and takes hold within half of one."""
 
 
@@ -54,14 +54,14 @@ class ExternalContact(Effect):
         return -np.stack([wrench_of_force(axis, point) for axis in np.eye(3)], axis=2)
 
     def local(self, case: Case) -> Array | None:
-        """Return the contact as a force that comes and goes: cubic splines with a knot every ``step`` s; None for the
+        """Return the contact as a force that comes and goes: cubic splines through values every ``step`` s; None for the
         root, which hands and feet are not: its forces would explain anything that hangs on the middle of the body.
         """
         if case.body.segment_index(self.target) == 0:
             return None
         time = case.motion.time
-        knots = time[0] + self.step * np.arange(-3, int((time[-1] - time[0]) / self.step) + 5)
-        course = BSpline.design_matrix(time, knots, 3).toarray()
+        knots = time[0] + self.step * np.arange(int((time[-1] - time[0]) / self.step) + 2)
+        course = CubicSpline(knots, np.eye(knots.size))(time)
         return (self.columns(case)[:, :, None, :] * course[:, None, :, None]).reshape(time.size, 6, -1)
 
     def beside(self, place: Array, *, fine: bool = False) -> "ExternalContact":
