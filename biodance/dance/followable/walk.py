@@ -16,7 +16,7 @@ import numpy as np
 from biodance.dance.dance import Dance
 from biodance.dance.followable.naming import name_of
 from biodance.dance.followable.plain import plain_move
-from biodance.dance.followable.reach import FAR, DanceStep, Reach, feet_key
+from biodance.dance.followable.reach import UNREACHABLE, DanceStep, Reach, feet_key
 from biodance.dance.performers import room_of_copies
 from biodance.dance.postures.selection import learned
 from biodance.dance.problem.splines import rest_to_rest
@@ -117,7 +117,7 @@ class Walk:
             if feet_key(pair[0]) == feet_key(pair[1]):
                 continue
             was, now = (self.reach.catalogue(stance) for stance in pair)
-            if self.reach.steps_to(was, now).min() >= FAR:
+            if self.reach.steps_to(was, now).min() >= UNREACHABLE:
                 limits = [move.limit for move in self._moves.values() if move.limit]
                 raise NoWay(self._stuck(pair[1], number, Counter(limits[-1:])), stances, number)
 
