@@ -17,6 +17,7 @@ from biodance.diagnosis.foresight import Foresight, foresee, session_of
 from biodance.diagnosis.heard import hear
 from biodance.diagnosis.joined import with_witnesses
 from biodance.diagnosis.plate_axes import with_plate_axes
+from biodance.diagnosis.repairs import with_repairs
 from biodance.diagnosis.testimony import weigh
 from biodance.discovery import Chosen
 from biodance.effects import DiscreteEffect, Effect, Gate, causes, gates
@@ -136,6 +137,8 @@ def diagnose_session(
     whole = with_witnesses(found.diagnosis, weigh(heard), heard, judged=found.examined is not None)
     if mended:
         whole, found = _with_mended_labels(whole, mended), replace(found, mended=result)
+    if found.examined:
+        whole = with_repairs(whole, found.examined.naming.found.problem.cases, tolerances or shipped(), effects)
     plates = next((trial.plates for trial in result.session.trials if trial.plates), ())
     whole = replace(whole, findings=with_plate_axes(whole.findings, plates))
     used = looked_at(result.trials) if found.examined else ()

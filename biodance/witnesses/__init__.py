@@ -8,6 +8,7 @@ altered as the cause would alter it, and the witness is asked again (`traces`).
 """
 
 import inspect
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -19,6 +20,9 @@ import numpy as np
 from biodance.discovery import Chosen, Family
 from biodance.witnesses._causes import Alteration, possible_causes, turned_signs
 from biodance.witnesses._recording import ONSET, FootPath, FootStep, SeenTrial, recording
+
+_TIME = re.compile(r" (at|from) [-\d.]+ s")
+"""When a step was, as its name says it."""
 
 __all__ = [
     "ONSET",
@@ -72,6 +76,11 @@ class Observation:
         """Witness and phase: what a laboratory learns a norm of."""
         _, comma, phase = self.what.rpartition(", ")
         return f"{self.witness} {phase}" if comma else self.witness
+
+    @property
+    def stride(self) -> str:
+        """Witness, trial and what, but for the time: the same in all strides of one foot on one plate in a trial."""
+        return f"{self.witness}, {self.trial}, {_TIME.sub('', self.what)}"
 
     @property
     def expected_sd(self) -> float:

@@ -114,9 +114,13 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> Functional
         f"would lie "
         f"{1e3 * placed.moved[joint]:.0f} mm from the static trial's place. It seems to have moved since that trial."
     )
-    return replace(
-        better, scaling=replace(better.scaling, notes=(*better.scaling.notes, note)), notes=(*better.notes, note)
+    errors = tuple(one._replace(spared=left_out) if one.joint == joint else one for one in better.errors)
+    without = replace(
+        better.scaling,
+        notes=(*better.scaling.notes, note),
+        centres=replace(better.scaling.centres, errors=errors),
     )
+    return replace(better, scaling=without, errors=errors, notes=(*better.notes, note))
 
 
 def _without(postures: Markers, name: str) -> Markers:
@@ -260,7 +264,8 @@ def _told(
     axis = {hinge: float(deviation[own_turn(hinge)]) for hinge in HINGES}
     wrong = scaling.centres.contradicted
     errors = tuple(
-        JointError(joint, _centre_sd(joint, deviation), axis.get(joint, 0.0), joint in wrong) for joint in moved
+        JointError(joint, _centre_sd(joint, deviation), axis.get(joint, 0.0), joint in wrong, far)
+        for joint, far in moved.items()
     )
     turned = {hinge: float(found.theta[own_turn(hinge)]) for hinge in HINGES if hinge not in kept}
     notes = []
