@@ -139,7 +139,9 @@ def _placed(base: Model, one: _Passing) -> _Passing:
         if step == 0:
             belief = believe(np.concatenate([base.belief.X, white], axis=1), base.belief.y)
         slopes = _slopes(base, one.effect, place, loose.size * belief.mean[start:end])
-        belief = believe(np.concatenate([base.belief.X, white, _BESIDE * slopes], axis=1), base.belief.y + slopes @ place)
+        belief = believe(
+            np.concatenate([base.belief.X, white, _BESIDE * slopes], axis=1), base.belief.y + slopes @ place
+        )
         place = _BESIDE * belief.mean[end:]
         one = _passing(base, one.effect.beside(place, fine=True))
     return one
