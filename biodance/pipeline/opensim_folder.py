@@ -2,7 +2,6 @@
 its inverse dynamics, whose torques are ours.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -66,7 +65,6 @@ def write_opensim_folder(
     *,
     source: str,
     solids: SegmentSolids | None = None,
-    tell: Callable[[str], None] = lambda _: None,
 ) -> tuple[OpensimTrial, ...]:
     """Write ``model.osim`` with the meshes of its segments, and the files of every trial that gives a motion.
 
@@ -91,12 +89,10 @@ def write_opensim_folder(
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise SessionRefused(f"{folder}: holds files already and nothing is overwritten. Give another folder.")
     made_folder(folder)
-    tell("writing the model")
     solids = segment_solids(body) if solids is None else solids
     write_model(body, folder / MODEL, format="osim", source=source, solids=solids)
     written = []
     for one in moving:
-        tell(f"writing {one.name}")
         written.append(_trial(one, body, folder))
     return tuple(written)
 

@@ -17,7 +17,7 @@ from biodance.motion.kinematics import jacobian, poses
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Markers, Motion, Plate, Trial
 from biodance.spatial import quaternion_matrix
-from biodance.uncertainty.bands import BANDS, Bands
+from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.tolerances import REFERENCE_PERSON, InstrumentNoise, Tolerances
 
@@ -100,21 +100,21 @@ def carried(body: Body, q: Array, about: Array) -> Array:
     return np.asarray(per @ spread @ per.T)
 
 
-def of_cameras(body: Body, postures: Array, about: Array, *, noise: float, rate: float, bands: Bands = BANDS) -> Array:
+def of_cameras(body: Body, postures: Array, about: Array, *, noise: float, rate: float) -> Array:
     """Return (B, 6, 6): covariance of one coefficient per band that marker noise of ``noise`` m at ``rate`` Hz adds to
     the wrench residual, mean over the ``postures`` (n, nq).
     """
     lever = np.mean([carried(body, q, about) for q in postures], axis=0)
-    edges = np.array(bands.edges)
+    edges = np.array(BANDS.edges)
     power = (2 * np.pi) ** 4 * np.diff(edges**5) / (5 * np.diff(edges))
-    return np.asarray(noise**2 * min(1.0, bands.rate / rate) * power[:, None, None] * lever)
+    return np.asarray(noise**2 * min(1.0, BANDS.rate / rate) * power[:, None, None] * lever)
 
 
-def of_plates(density: Array, count: int, bands: Bands = BANDS) -> Array:
+def of_plates(density: Array, count: int) -> Array:
     """Return (6, 6): covariance of one coefficient from the noise of ``count`` plates of ``density`` (6,) N, N·m per
     root Hz each.
     """
-    return np.diag(count * density**2 * bands.rate / 2)
+    return np.diag(count * density**2 * BANDS.rate / 2)
 
 
 def added_noise(
