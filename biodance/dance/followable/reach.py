@@ -96,7 +96,8 @@ class Reach:
         return DanceStep(catalogue, s, said) if len(said) <= most else None
 
     def steps_to(self, catalogue: Catalogue, goal: Catalogue) -> NDArray[np.intp]:
-        """Return how many steps (S,) lead from each posture of a catalogue to one of ``goal``, the arms at rest; `UNREACHABLE`
+        """Return how many steps (S,) lead from each posture of a catalogue to one of ``goal``, the arms at rest;
+        `UNREACHABLE`
         where none do.
         """
         key = feet_key(catalogue.stance), feet_key(goal.stance)
