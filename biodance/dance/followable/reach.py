@@ -97,8 +97,7 @@ class Reach:
 
     def steps_to(self, catalogue: Catalogue, goal: Catalogue) -> NDArray[np.intp]:
         """Return how many steps (S,) lead from each posture of a catalogue to one of ``goal``, the arms at rest;
-        `UNREACHABLE`
-        where none do.
+        `UNREACHABLE` where none do.
         """
         key = feet_key(catalogue.stance), feet_key(goal.stance)
         if key not in self._steps:

@@ -15,14 +15,10 @@ import numpy as np
 
 from biodance.dance.dance import Dance
 from biodance.dance.followable.naming import name_of
-from biodance.dance.followable.plain import plain_move
-from biodance.dance.followable.reach import UNREACHABLE, DanceStep, Reach, feet_key
-from biodance.dance.performers import room_of_copies
-from biodance.dance.postures.selection import SAMPLE_ERROR, SAMPLE_RATE, learned
 from biodance.dance.followable.plain import ENOUGH, SURE, plain_move
-from biodance.dance.followable.reach import FAR, DanceStep, Reach, feet_key
+from biodance.dance.followable.reach import UNREACHABLE, DanceStep, Reach, feet_key
 from biodance.dance.performers import deviations_of_copies
-from biodance.dance.postures.selection import learned
+from biodance.dance.postures.selection import SAMPLE_ERROR, SAMPLE_RATE, learned
 from biodance.dance.problem.splines import rest_to_rest
 from biodance.dance.problem.stance import Stance, under
 from biodance.dance.transitions.context import DesignContext
