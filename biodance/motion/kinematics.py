@@ -1,5 +1,6 @@
 """Forward kinematics of a Body for all frames at once, and exact first derivatives of points on its segments."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -138,16 +139,26 @@ def jacobian(body: Body, pose: Poses, segment: list[int], points: Array) -> tupl
     """Return (T, 3S, nv) of points (T, S, 3) on segments and of their turn, per unit of the lab-frame tangent [root
     place, root turn, angles].
     """
-    frames, count = points.shape[:2]
-    place, turn = np.zeros((2, frames, count, 3, body.nv))
+    turn = np.zeros((*points.shape, body.nv))
+    if body.n_root:
+        turn[..., 3:6] = np.eye(3)
+    for j, on, axis in _axes_before(body, pose, segment):
+        turn[..., body.n_root + j][:, on] = axis
+    return place_jacobian(body, pose, segment, points), turn.reshape(len(turn), -1, body.nv)
+
+
+def place_jacobian(body: Body, pose: Poses, segment: list[int], points: Array) -> Array:
+    """Return (T, 3S, nv) of points (T, S, 3) on segments, the first of `jacobian`."""
+    place = np.zeros((*points.shape, body.nv))
     if body.n_root:
         place[..., :3] = np.eye(3)
-        turn[..., 3:6] = np.eye(3)
         place[..., 3:6] = -skew(points - pose.root_position[:, None])
-    hangs = below(body)[:, segment]
-    for j, joint in enumerate(body.joints):
-        on = np.flatnonzero(hangs[j])
-        axis = (pose.joint_rotation[:, j] @ joint.axis)[:, None]
+    for j, on, axis in _axes_before(body, pose, segment):
         place[..., body.n_root + j][:, on] = cross(axis, points[:, on] - pose.joint_position[:, j, None])
-        turn[..., body.n_root + j][:, on] = axis
-    return place.reshape(frames, 3 * count, body.nv), turn.reshape(frames, 3 * count, body.nv)
+    return place.reshape(len(place), -1, body.nv)
+
+
+def _axes_before(body: Body, pose: Poses, segment: list[int]) -> Iterator[tuple[int, Index, Array]]:
+    """Yield every joint, which of the segments hang on it, and its axis (T, 1, 3) in the lab."""
+    for j, hangs in enumerate(below(body)[:, segment]):
+        yield j, np.flatnonzero(hangs), (pose.joint_rotation[:, j] @ body.joints[j].axis)[:, None]
