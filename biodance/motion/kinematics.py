@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -43,10 +44,8 @@ def poses(body: Body, q: Array) -> Poses:
     parent, turn, translation, _ = _tree(body)
     angles = np.array(q[:, body.nq - n :])
     place_joints(parent, turn, translation, root_rotation, root_position, angles, rotation, position)
-    carrier = body.segment_joint
-    seg_r = np.stack([root_rotation if j < 0 else rotation[:, j] for j in carrier], axis=1)
-    seg_p = np.stack([root_position if j < 0 else position[:, j] for j in carrier], axis=1)
-    return Poses(rotation, position, seg_r, seg_p, root_rotation, root_position)
+    segments = _of_segments(body, root_rotation, rotation), _of_segments(body, root_position, position)
+    return Poses(rotation, position, *segments, root_rotation, root_position)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,14 +78,20 @@ def segment_motion(body: Body, motion: Motion) -> SegmentMotion:
     parent, _, _, axis = _tree(body)
     omega, alpha, acc = moved = np.empty((3, frames, n, 3))
     move_joints(parent, axis, pose.joint_rotation, pose.joint_position, root, rate, rate2, moved)
-    pick = body.segment_joint
+    pairs = (w_root, omega), (dw_root, alpha), (acc_root, acc)
+    return SegmentMotion(pose.rotation, pose.position, *(_of_segments(body, *pair) for pair in pairs))
 
-    def gather(root: Array, joints: Array) -> Array:
-        return np.stack([root if j < 0 else joints[:, j] for j in pick], axis=1)
 
-    return SegmentMotion(
-        pose.rotation, pose.position, gather(w_root, omega), gather(dw_root, alpha), gather(acc_root, acc)
-    )
+def _of_segments(body: Body, root: Array, joints: Array) -> Array:
+    """Return (T, N + P, ...) what the segments, and the body's parts behind them, have of ``root`` (T, ...) and
+    ``joints`` (T, n, ...).
+    """
+    carrier = np.array(body.segment_joint)
+    if not body.joints:
+        return np.repeat(root[:, None], carrier.size, axis=1)
+    found = joints.take(np.maximum(carrier, 0), axis=1)
+    found[:, carrier < 0] = root[:, None]
+    return found
 
 
 def centre_of_mass(body: Body, motion: Motion) -> Array:
@@ -98,6 +103,7 @@ def centre_of_mass(body: Body, motion: Motion) -> Array:
     return np.einsum("k,tkj->tj", mass[carried], points) / mass[carried].sum()
 
 
+@lru_cache(maxsize=8)
 def _tree(body: Body) -> tuple[Index, Array, Array, Array]:
     """Return the joint before each (n,), the parts (n, 3, 3, 3) of its rotation (see `place_joints`), its translation
     (n, 3) m and axis (n, 3).
@@ -110,16 +116,19 @@ def _tree(body: Body) -> tuple[Index, Array, Array, Array]:
     return np.array([joint.parent for joint in body.joints], dtype=np.intp), turn, translation, axis
 
 
+@lru_cache(maxsize=8)
 def below(body: Body) -> Array:
-    """Return (n, N + P) 1 where a segment, or a part of one, hangs on a joint."""
+    """Return (n, N + P) 1 where a segment, or a part of one, hangs on a joint; read-only."""
     table = np.zeros((len(body.joints), len(body.segment_joint)))
     for s, j in enumerate(body.segment_joint):
         while j >= 0:
             table[j, s] = 1.0
             j = body.joints[j].parent
+    table.setflags(write=False)
     return table
 
 
+@lru_cache(maxsize=8)
 def chains(body: Body) -> tuple[tuple[int, ...], ...]:
     """Return the axes of every anatomical joint, first to last."""
     found = []

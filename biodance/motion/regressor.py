@@ -15,12 +15,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.motion.ik.compiled.tree import fill_regressor
+from biodance.motion.ik.compiled.tree import fill_regressor, fill_wrench
 from biodance.motion.kinematics import SegmentMotion, segment_motion
 from biodance.records import Array, Motion, Wrench
 
 _BLOCK = 512
-"""Frames worked on at once where only a sum over the columns is kept: 3 MB, whatever the recording's length."""
+"""Frames worked on at once where only a sum over the segments is kept: little memory, whatever the length."""
 
 
 def regressor_of(segments: SegmentMotion, *, gravity: Array, sharing: Array | None = None) -> Array:
@@ -72,9 +72,14 @@ def predict_wrench(body: Body, motion: Motion, phi: Array | None = None) -> Wren
     >>> round(float(needed.force[:, 2].mean()), -1)
     610.0
     """
-    value, known = np.empty((motion.time.size, 6)), body.sip.phi if phi is None else phi
+    known = body.sip.phi if phi is None else np.asarray(phi, dtype=float)
+    links = (known if body.sharing is None else body.sharing @ known).reshape(-1, 10)
+    value = np.zeros((motion.time.size, 6))
     for part, frames in in_blocks(motion):
-        value[part] = regressor(body, frames) @ known
+        move = segment_motion(body, frames)
+        drive = move.acceleration - body.gravity
+        omega, alpha = move.angular_velocity, move.angular_acceleration
+        fill_wrench(move.rotation, move.position, omega, alpha, drive, links, value[part])
     return Wrench(motion.time, value)
 
 
