@@ -58,7 +58,7 @@ PROBES = (
                                                 "pip install pin."),
     Probe("ezc3d (judge and writer)", _importing("ezc3d"), "pip install ezc3d"),
     Probe("scipy", _importing("scipy"), "pip install scipy"),
-    Probe("cvxpy with Clarabel", "import clarabel, cvxpy; print(cvxpy.__version__)", "pip install cvxpy clarabel"),
+    Probe("Clarabel", "import clarabel; print(clarabel.__version__)", "pip install clarabel"),
     Probe("pandas with pyarrow", "import pandas, pyarrow; print(pandas.__version__)", "pip install pandas pyarrow"),
     Probe("trimesh", _importing("trimesh"), "pip install trimesh"),
     Probe("matplotlib", _importing("matplotlib"), "pip install matplotlib"),

@@ -55,7 +55,7 @@ def test_everything_that_biodance_is_made_of_is_looked_at(monkeypatch):
         "anthropometry",
         "protocols",
         "pinocchio",
-        "cvxpy",
+        "Clarabel",
         "GL stills",
         "opensim",
         "mujoco",

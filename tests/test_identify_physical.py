@@ -134,15 +134,15 @@ def test_an_inaccurate_answer_is_asked_for_again_and_never_taken(monkeypatch) ->
     right, solve, asked = physical_fit(belief, body), physical.solve_convex, []
     assert right.moved.any()
 
-    def inaccurate(problem) -> str:
-        asked.append(solve(problem))
-        return "optimal_inaccurate" if len(asked) == 1 else asked[-1]
+    def inaccurate(*rows, **where):
+        asked.append(solve(*rows, **where))
+        return (None, "optimal_inaccurate") if len(asked) == 1 else asked[-1]
 
     monkeypatch.setattr(physical, "solve_convex", inaccurate)
     again = physical_fit(belief, body)
     assert len(asked) > 1
     assert_same(right, again)
-    monkeypatch.setattr(physical, "solve_convex", lambda _: "optimal_inaccurate")
+    monkeypatch.setattr(physical, "solve_convex", lambda *_, **__: (None, "optimal_inaccurate"))
     failed = physical_fit(belief, body)
     assert isinstance(failed, FailedFit)
     assert failed.status == "failed"

@@ -72,7 +72,7 @@ def test_a_stream_that_contradicts_every_body_knows_nothing_enough(failing):
 
 def test_the_paper_s_programme_without_a_solution_has_no_parameters(monkeypatch):
     found = identify_body(*session())
-    monkeypatch.setattr("biodance.identification.paper_programme.solve_convex", lambda _: "infeasible")
+    monkeypatch.setattr("biodance.identification.paper_programme.solve_convex", lambda *_, **__: (None, "infeasible"))
     failed = paper_programme(found.data, found.body)
     assert failed.status == "failed"
     with pytest.raises(NotSolved, match="infeasible"):

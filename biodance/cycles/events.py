@@ -10,10 +10,11 @@ body follows the markers, so that a marker that is lost for a moment costs no ev
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.lab.recursion import butterworth_sections, filter_both_ways
 from biodance.motion.contact.events import FootEvent
 from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.kinematics import poses
-from biodance.records import SIDES, Array, Motion
+from biodance.records import SIDES, Array, Index, Motion
 
 _SWING = 0.25
 """Of the leg's length: a foot that does not travel as far ahead of the other and back makes no step."""
@@ -112,14 +113,13 @@ def _turning_points(path: Array, motion: Motion, *, down: bool, prominence: floa
     """Return the times s at which a foot begins (``down``) or ends to go with the ground, from its ``path`` (T,) m
     ahead of the pelvis.
     """
-    from scipy.signal import butter, find_peaks, sosfiltfilt
-
     rate = motion.rate
     if rate > 2.5 * _EVENT_CUTOFF:
-        path = sosfiltfilt(butter(2, _EVENT_CUTOFF, fs=rate, output="sos"), path, padlen=min(20, path.size - 1))
+        sections = butterworth_sections(2, _EVENT_CUTOFF, rate)
+        path = filter_both_ways(sections, path[:, None], pad=min(20, path.size - 1))[:, 0]
     speed = np.gradient(path, motion.time)
     ground = float(np.median(speed[speed < 0]))
-    tops, _ = find_peaks(path if down else -path, prominence=prominence, distance=max(1, round(_APART * rate)))
+    tops = _tops(path if down else -path, prominence=prominence, apart=max(1, round(_APART * rate)))
     step, level = (1, _STRIKES * ground) if down else (-1, _LEAVES * ground)
     found = []
     for top in tops[motion.determined[tops]]:
@@ -130,3 +130,21 @@ def _turning_points(path: Array, motion: Motion, *, down: bool, prominence: floa
         share = (speed[before] - level) / (speed[before] - speed[here]) if speed[here] <= level else 1.0
         found.append(float(motion.time[before] + step * share / rate))
     return found
+
+
+def _tops(path: Array, *, prominence: float, apart: int) -> Index:
+    """Return the samples of ``path`` (T,) higher than both neighbours, none within ``apart`` samples of a higher one,
+    that rise by ``prominence`` above the saddles towards higher ones, or towards the ends, on both sides.
+    """
+    tops = np.flatnonzero((path[1:-1] > path[:-2]) & (path[1:-1] > path[2:])) + 1
+    left = np.ones(tops.size, dtype=bool)
+    for k in np.argsort(path[tops])[::-1]:
+        if left[k]:
+            left &= (np.abs(tops - tops[k]) >= apart) | (tops == tops[k])
+    kept = []
+    for top in tops[left]:
+        higher = np.flatnonzero(path > path[top])
+        first, last = max(higher[higher < top], default=-1) + 1, min(higher[higher > top], default=path.size)
+        if path[top] - max(path[first:top].min(), path[top:last].min()) >= prominence:
+            kept.append(top)
+    return np.array(kept, dtype=np.intp)

@@ -109,8 +109,6 @@ def _solve(data: Information, body: "Body", E: Array, e: Array) -> tuple[Array |
     """Solve eq. 8 in centred coordinates x = U (phi - centre), where the objective is |x|²; return phi and the
     solver's word.
     """
-    import cvxpy as cp
-
     count = data.triangle.shape[1]
     stacked = np.concatenate(
         [np.column_stack([data.triangle, data.target]), np.column_stack([np.eye(count), body.sip.phi])]
@@ -119,14 +117,8 @@ def _solve(data: Information, body: "Body", E: Array, e: Array) -> tuple[Array |
     inverse = np.linalg.inv(triangle[:count, :count])
     centre = inverse @ triangle[:count, count]
     A, b = inequalities(body)
-    x = cp.Variable(count)
-    constraints = []
-    for matrix, level, equal in ((A, b, False), (E, e, True)):
-        if len(matrix) == 0:
-            continue
-        slope = matrix @ inverse
-        scale = 1 / np.maximum(np.linalg.norm(slope, axis=1), 1e-12)
-        left, right = scale[:, None] * slope @ x, scale * (level - matrix @ centre)
-        constraints.append(left == right if equal else left >= right)
-    word = solve_convex(cp.Problem(cp.Minimize(cp.sum_squares(x)), constraints))
-    return (centre + inverse @ np.asarray(x.value) if word == "optimal" else None), word
+    matrix, level = np.concatenate([E, A]), np.concatenate([e, b])
+    slope = matrix @ inverse
+    scale = 1 / np.maximum(np.linalg.norm(slope, axis=1), 1e-12)
+    x, word = solve_convex(scale[:, None] * slope, scale * (matrix @ centre - level), equal=len(E))
+    return (None if x is None else centre + inverse @ x), word

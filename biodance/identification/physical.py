@@ -1,11 +1,12 @@
 """Convex programmes: solved, or a word why not; an answer that the solver itself calls inaccurate is none."""
 
-import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csc_array
 
 from biodance.body.inertia import PSEUDO_INERTIA, pseudo_inertia, smallest_eigenvalues
 from biodance.errors import NotSolved
@@ -14,24 +15,30 @@ from biodance.records import Array, Sip
 from biodance.threads import one_thread
 
 if TYPE_CHECKING:
-    import cvxpy as cp
-
     from biodance.body.body import Body
 
+_WORDS = {"Solved": "optimal", "PrimalInfeasible": "infeasible", "AlmostSolved": "optimal_inaccurate"}
 
-def solve_convex(problem: "cp.Problem") -> str:
-    """Solve ``problem`` in place and return "optimal", or the solver's word for what it ran into: then no value is
-    to be used.
+
+def solve_convex(slope: Array, level: Array, *, equal: int = 0, cones: Sequence[int] = ()) -> tuple[Array | None, str]:
+    """Return the smallest x (n,) for which ``slope @ x + level`` (m,) is where it must be, and the solver's word;
+    None unless that is "optimal".
+
+    The first ``equal`` rows must be zero; the last are symmetric matrices of the sizes ``cones``, the upper triangle
+    of each column by column with what is off the diagonal times sqrt 2, without a negative eigenvalue; those between
+    must not be negative.
     """
-    import cvxpy as cp
+    import clarabel
 
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # that an answer is inaccurate is said by the word
-            problem.solve(solver=cp.CLARABEL, ignore_dpp=True)
-    except cp.error.SolverError as error:
-        return str(error).split(". ")[0]
-    return str(problem.status)
+    rows, count = slope.shape
+    between = rows - equal - sum(size * (size + 1) // 2 for size in cones)
+    parts = [clarabel.ZeroConeT(equal), clarabel.NonnegativeConeT(between), *map(clarabel.PSDTriangleConeT, cones)]
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    square, nothing = csc_array(2.0 * np.eye(count)), np.zeros(count)
+    found = clarabel.DefaultSolver(square, nothing, csc_array(-slope), level, parts, settings).solve()
+    word = _WORDS.get(str(found.status), str(found.status))
+    return (np.array(found.x) if word == "optimal" else None), word
 
 
 RELATIVE_FLOOR = 1e-3
@@ -171,22 +178,19 @@ def _solve(local: Array, mean: Array, limits: _Limits, bound: NDArray[np.intp]) 
     """Return the smallest z for which mean + local z of the segments ``bound`` is inside the limits, and the
     solver's word.
     """
-    import cvxpy as cp
-
-    z = cp.Variable(local.shape[1])
-    constraints, sides, levels = [], [], []
+    sides, matrices, cones = [], [], []
     for k, i in enumerate(bound):
-        slope, level = local[10 * k : 10 * k + 10], mean[10 * k : 10 * k + 10]
-        free = _free_axes(limits.cone[i] @ np.column_stack([slope, level]))
+        own = np.column_stack([local[10 * k : 10 * k + 10], mean[10 * k : 10 * k + 10]])
+        free = _free_axes(limits.cone[i] @ own)
         axes, count = np.kron(free, free), len(free)
-        least = axes @ limits.floor[i].ravel() + GAP * np.eye(count).ravel()
-        matrix = (axes @ limits.cone[i] @ slope) @ z + (axes @ limits.cone[i] @ level - least)
-        constraints.append(cp.reshape(matrix, (count, count), order="C") >> 0)
-        sides.append(limits.sides[i] @ slope)
-        levels.append(limits.sides[i] @ level)
-    constraints.append(np.concatenate(sides) @ z + np.concatenate(levels) >= 0)
-    word = solve_convex(cp.Problem(cp.Minimize(cp.sum_squares(z)), constraints))
-    return (np.asarray(z.value) if word == "optimal" else None), word
+        matrix = axes @ limits.cone[i] @ own
+        matrix[:, -1] -= axes @ limits.floor[i].ravel() + GAP * np.eye(count).ravel()
+        column, row = np.tril_indices(count)  # the upper triangle, column by column
+        matrices.append(np.where(row == column, 1.0, np.sqrt(2.0))[:, None] * matrix[row * count + column])
+        sides.append(limits.sides[i] @ own)
+        cones.append(count)
+    rows = np.concatenate([*sides, *matrices])
+    return solve_convex(rows[:, :-1], rows[:, -1], cones=cones)
 
 
 def _free_axes(matrices: Array) -> Array:

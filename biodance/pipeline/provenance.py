@@ -22,7 +22,6 @@ LIBRARIES = (
     "numba",
     "llvmlite",
     "pin",
-    "cvxpy",
     "clarabel",
     "pandas",
     "ezc3d",

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from biodance.errors import BiodanceError
 from biodance.lab.markers.sets import FAMILY, landmark, read_marker_set
+from biodance.lab.recursion import butterworth_sections, filter_both_ways
 from biodance.lab.weight import is_still
 from biodance.motion.contact.footing import inside
 from biodance.motion.contact.soles import OUTLINE
@@ -247,14 +248,12 @@ def _pelvis(markers: Markers | None, known: tuple[str, ...]) -> Array | None:
 
 def _velocity(markers: Markers, path: Array) -> Array:
     """Return the velocity (T, 3) m/s of a path (T, 3) m below 8 Hz; NaN where it was not seen."""
-    from scipy.signal import butter, sosfiltfilt
-
     seen = np.isfinite(path).all(axis=1)
     rate = markers.rate
     if seen.sum() < 12 or not rate > 20:
         return np.full(path.shape, np.nan)
     filled = np.stack([np.interp(markers.time, markers.time[seen], column) for column in path[seen].T], axis=1)
-    smooth = sosfiltfilt(butter(2, 8.0, fs=rate, output="sos"), filled, axis=0, padlen=min(20, len(filled) - 1))
+    smooth = filter_both_ways(butterworth_sections(2, 8.0, rate), filled, pad=min(20, len(filled) - 1))
     velocity = np.gradient(smooth, markers.time, axis=0)
     velocity[~seen] = np.nan
     return velocity

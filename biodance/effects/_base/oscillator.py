@@ -5,9 +5,10 @@ only sets the place of rest. The ground then carries m (a + x'') instead of m a,
 """
 
 import numpy as np
-from scipy.signal import cont2discrete, lfilter, lfilter_zi, ss2tf
+from scipy.linalg import expm
 
 from biodance.effects._base.case import Case
+from biodance.lab.recursion import run_section
 from biodance.records import Array
 from biodance.spatial import cross
 
@@ -20,14 +21,21 @@ def relative_motion(acceleration: Array, rate: float, *, frequency: float, dampi
     point.
     """
     w = 2 * np.pi * frequency
-    system = (np.array([[0, 1], [-w * w, -2 * damping * w]]), np.array([[0], [-1]]), np.eye(2), np.zeros((2, 1)))
-    A, B, C, D, _ = cont2discrete(system, 1 / rate, method="foh")
-    numerators, denominator = ss2tf(A, B, C, D)
-    place, speed = (
-        lfilter(b, denominator, acceleration, axis=0, zi=lfilter_zi(b, denominator)[:, None] * acceleration[:1])[0]
-        for b in numerators
-    )
+    whole = np.zeros((4, 4))
+    whole[:2, :2] = np.array([[0, 1], [-w * w, -2 * damping * w]]) / rate
+    whole[1, 2], whole[2, 3] = -1 / rate, 1.0
+    step = expm(whole)
+    A, D = step[:2, :2], step[:2, 3]
+    B = step[:2, 2] - D + A @ D
+    feedback = _characteristic(A)
+    forward = [_characteristic(A - np.outer(B, row)) + (D[i] - 1) * feedback for i, row in enumerate(np.eye(2))]
+    place, speed = (run_section(np.concatenate([b, feedback]), acceleration) for b in forward)
     return place, -acceleration - w * w * place - 2 * damping * w * speed
+
+
+def _characteristic(matrix: Array) -> Array:
+    """Return the coefficients (3,) of the characteristic polynomial of a (2, 2) matrix, highest power first."""
+    return np.array([1.0, -np.trace(matrix), np.linalg.det(matrix)])
 
 
 def point_motion(case: Case, segment: int, local: Array) -> tuple[Array, Array]:
