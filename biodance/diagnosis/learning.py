@@ -38,10 +38,10 @@ class Null:
 
 def null_of(problem: Problem, causes: tuple[Candidate, ...]) -> Null:
     """Return a session without fault as `learn` wants it; ``causes`` all of the family."""
-    columns, keys, mean_keys = nuisances(problem, causes)
+    parts, keys, mean_keys = nuisances(problem, causes)
     own = ("",) * problem.sip.shape[1]
     mass = float(problem.cases[0].body.sip.mass.sum())
-    every: Array = np.concatenate([problem.sip, columns], axis=1).astype(np.float32)  # type: ignore[assignment]
+    every: Array = np.concatenate([problem.sip, *parts], axis=1).astype(np.float32)  # type: ignore[assignment]
     return Null(problem.target, every, own + keys, problem.spectrum.band, marker_keys(problem), mass, own + mean_keys)
 
 

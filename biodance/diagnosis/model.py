@@ -82,9 +82,10 @@ def marker_keys(problem: Problem) -> tuple[str, ...]:
     return keys + tuple(f"shown {name}" for name, _ in problem.shown)
 
 
-def nuisances(problem: Problem, causes: tuple[Candidate, ...]) -> tuple[Array, tuple[str, ...], tuple[str, ...]]:
-    """Return columns (r, K) per unit of all that may be no fault, the keys of their sizes and of their means ("" for
-    those that have none: the signs of slides and tilts are mirrored between sides and persons).
+def nuisances(problem: Problem, causes: tuple[Candidate, ...]) -> tuple[list[Array], tuple[str, ...], tuple[str, ...]]:
+    """Return the parts (r, k) of the columns (r, K) per unit of all that may be no fault, the keys (K) of their sizes
+    and of their means ("" for those that have none: the signs of slides and tilts are mirrored between sides and
+    persons).
     """
     body = problem.cases[0].body
     joints = {joint_of(body, chain) for chain in chains(body)}
@@ -101,7 +102,7 @@ def nuisances(problem: Problem, causes: tuple[Candidate, ...]) -> tuple[Array, t
             parts.append(_where_not_shown(problem, parts[-1]))
             keys += [HABIT + key] * width
             means += [""] * width
-    return np.concatenate(parts, axis=1), tuple(keys), tuple(means)
+    return parts, tuple(keys), tuple(means)
 
 
 def _where_not_shown(problem: Problem, columns: Array) -> Array:
@@ -125,12 +126,13 @@ def shown_left_out(expected: Array, marker_keys: tuple[str, ...]) -> Array:
 
 def model(problem: Problem, causes: tuple[Candidate, ...], tolerances: Tolerances) -> Model:
     """Return the model without any named cause; those of ``causes`` with a learned size are tolerances as well."""
-    columns, keys, mean_keys = nuisances(
-        problem, tuple(one for one in causes if tolerances.size(key_of(*one.names)) > 0)
-    )
+    parts, keys, mean_keys = nuisances(problem, tuple(one for one in causes if tolerances.size(key_of(*one.names)) > 0))
+    # the largest array of a diagnosis is made once: sip, nuisances, target
+    both = np.concatenate([problem.sip, *parts, problem.target[:, None]], axis=1)
+    del parts
+    columns = both[:, problem.sip.shape[1] : -1]
     expected = shown_left_out(columns @ np.array([tolerances.mean(key) for key in mean_keys]), marker_keys(problem))
     columns *= np.array([tolerances.size(key) for key in keys])
-    both = np.concatenate([problem.sip, columns, (problem.target - expected)[:, None]], axis=1)
-    del columns  # the largest arrays of a diagnosis are not kept twice
+    both[:, -1] -= expected
     both = white(problem, tolerances, both, out=both)
     return Model(problem, tolerances, believe(both[:, :-1], both[:, -1]), expected)

@@ -72,15 +72,20 @@ def predict_wrench(body: Body, motion: Motion, phi: Array | None = None) -> Wren
     >>> round(float(needed.force[:, 2].mean()), -1)
     610.0
     """
-    known = body.sip.phi if phi is None else np.asarray(phi, dtype=float)
-    links = (known if body.sharing is None else body.sharing @ known).reshape(-1, 10)
-    value = np.zeros((motion.time.size, 6))
+    known, value = body.sip.phi if phi is None else phi, np.empty((motion.time.size, 6))
     for part, frames in in_blocks(motion):
-        move = segment_motion(body, frames)
-        drive = move.acceleration - body.gravity
-        omega, alpha = move.angular_velocity, move.angular_acceleration
-        fill_wrench(move.rotation, move.position, omega, alpha, drive, links, value[part])
+        value[part] = wrench_of_segments(body, segment_motion(body, frames), known)
     return Wrench(motion.time, value)
+
+
+def wrench_of_segments(body: Body, move: SegmentMotion, phi: Array) -> Array:
+    """Return the wrench (T, 6) about the lab origin that segments which ``move`` need with the parameters ``phi``
+    (10N,): the regressor times phi, without the regressor.
+    """
+    links = np.array(phi if body.sharing is None else body.sharing @ phi, dtype=float).reshape(-1, 10)
+    value, drive = np.zeros((len(move.position), 6)), move.acceleration - body.gravity
+    fill_wrench(move.rotation, move.position, move.angular_velocity, move.angular_acceleration, drive, links, value)
+    return value
 
 
 def in_blocks(motion: Motion) -> Iterator[tuple[slice, Motion]]:
