@@ -9,6 +9,9 @@ from scipy.linalg.lapack import dtbtrs
 
 from biodance.records import Array
 
+_COLUMNS = 64
+"""Columns filtered at once: little memory, however many there are."""
+
 
 def butterworth_sections(order: int, cutoff: float, rate: float) -> Array:
     """Return the second-order sections (S, 6) [b0, b1, b2, 1, a1, a2] of a Butterworth low-pass, each of unit gain at
@@ -45,10 +48,14 @@ def filter_both_ways(sections: Array, values: Array, *, pad: int) -> Array:
     """Return ``values`` (T, n) through all ``sections``, forwards and backwards; the ends are continued by point
     reflection over ``pad`` samples, fewer than T.
     """
-    before, after = 2 * values[:1] - values[pad:0:-1], 2 * values[-1:] - values[-2 : -pad - 2 : -1]
-    run = np.concatenate([before, values, after])
-    for _ in range(2):
-        for section in sections:
-            run = run_section(section, run)
-        run = run[::-1]
-    return run[pad : pad + len(values)]
+    found = np.empty(values.shape)
+    for start in range(0, values.shape[1], _COLUMNS):
+        some = values[:, start : start + _COLUMNS]
+        before, after = 2 * some[:1] - some[pad:0:-1], 2 * some[-1:] - some[-2 : -pad - 2 : -1]
+        run = np.concatenate([before, some, after])
+        for _ in range(2):
+            for section in sections:
+                run = run_section(section, run)
+            run = run[::-1]
+        found[:, start : start + _COLUMNS] = run[pad : pad + len(values)]
+    return found
