@@ -68,7 +68,7 @@ class Response:
     @cached_property
     def follow(self) -> Array:
         """(F, nv, 3M): coordinates per marker displacement, least squares weighted by the body's marker weights."""
-        return -np.linalg.solve(*self._tracking)
+        return np.asarray(-np.linalg.solve(*self._tracking))
 
     @cached_property
     def answer(self) -> Array:
