@@ -85,7 +85,8 @@ def main() -> None:
     parser.add_argument("--repeat", type=int, default=1)
     chosen = parser.parse_args()
     versions = [HERE, *([chosen.against.resolve()] if chosen.against else [])]
-    heads = ("what", "processor time (s)", "wall (s)", "memory (MB)", "page (MB)", "time before (s)", "memory before (MB)")
+    heads = ["what", "processor time (s)", "wall (s)", "memory (MB)", "page (MB)"]
+    heads += ["time before (s)", "memory before (MB)"]
     print("|", " | ".join(heads), "|")
     print("|---|---|---|---|---|---|---|", flush=True)
     with tempfile.TemporaryDirectory() as scratch:

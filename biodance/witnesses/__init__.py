@@ -8,8 +8,8 @@ altered as the cause would alter it, and the witness is asked again (`traces`).
 """
 
 import inspect
-import re
 import math
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
