@@ -70,15 +70,21 @@ def test_sloshing_goes_on_after_the_person_stops() -> None:
     assert np.abs(ring[-100:]).max() > 0.02 * np.abs(ring).max()
 
 
-def test_support_lifts_what_it_says() -> None:
+def test_a_rope_pulls_to_its_hook_and_more_as_it_gets_longer() -> None:
+    """All forces of the rope, as long as its tension says, end at one hook; the plates miss them where it is tied."""
     found = effect("body_weight_support").at(CASE.body.segments[0], CASE)
-    change = found.transform(CASE, np.array([120.0, 0.0])).residual - CASE.residual
-    np.testing.assert_allclose(change[:, 2], -120.0, atol=1e-9)
-    spring = found.columns(CASE)[:, 2, 1]
+    size = np.array([120.0, 300.0, 0.05, 0.2, -0.1, 0.5])
+    change = found.transform(CASE, size).residual - CASE.residual
     index = CASE.body.segment_index(CASE.body.segments[0])
-    com = CASE.phi[10 * index + 1 : 10 * index + 4] / CASE.phi[10 * index]
-    height = CASE.poses.points([index], com[None])[:, 0, 2]
-    np.testing.assert_allclose(spring, height - height.mean(), atol=1e-9)
+    com = CASE.phi[10 * index + 1 : 10 * index + 4] / CASE.phi[10 * index] + [0.0, 0.05, 0.0]
+    tied = CASE.poses.points([index], com[None])[:, 0]
+    pull = -change[:, :3]
+    tension = np.linalg.norm(pull, axis=1)
+    length = 2.5 + (tension - 120.0) / 300.0
+    hooks = tied + pull / tension[:, None] * length[:, None]
+    np.testing.assert_allclose(hooks, np.tile(hooks.mean(axis=0), (len(hooks), 1)), atol=1e-9)
+    np.testing.assert_allclose(hooks[0, :2] - CASE.trial.plates[0].centre[:2], [0.2, -0.1], atol=1e-9)
+    np.testing.assert_allclose(change[:, 3:], np.cross(tied, change[:, :3]), atol=1e-8)
 
 
 def test_hysteresis_loop_has_its_width_and_closes() -> None:

@@ -85,6 +85,7 @@ def test_a_tilted_laboratory_sees_a_share_of_the_weight_sideways(axis: str, chan
 
 
 def test_what_a_rope_carries_the_plates_miss() -> None:
-    """On the mean over time: away from its mean place a person hangs at a slant, but always with the whole force."""
+    """A person beside the hook hangs at a slant: a little less than the tension is lift."""
     cause = effect("body_weight_support").targets(CASE)[0]
-    assert_close(added("body_weight_support", cause, 100.0, 0.0)[:, 2:3], np.full((len(HERE), 1), -100.0))
+    lift = -added("body_weight_support", cause, 100.0, *np.zeros(5))[:, 2]
+    assert np.all((lift > 95.0) & (lift <= 100.0))

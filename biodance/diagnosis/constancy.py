@@ -92,23 +92,18 @@ def _traces(put: Problem, named: NamedCause) -> Iterator[tuple[str, Array]]:
     whole = tuple(named.effect.removed(case, named.theta) for case in put.cases)
     for name, signals in _signals(put).items():
         samples = tuple((part * signal[:, None])[:, :, None] for part, signal in zip(whole, signals, strict=True))
-        yield name, _padded(put, put.spectrum.rows(samples)[:, :, 0])
+        yield name, put.padded(put.spectrum.rows(samples)[:, :, 0])
     rows = put.spectrum.rows(tuple(part[:, :, None] for part in whole))[:, :, 0]
     names = [case.trial.name for case in put.cases]
     picks = {channel: np.arange(6)[None, :] == c for c, channel in enumerate(CHANNELS)}
     picks |= {_band(b): (put.spectrum.band == b)[:, None] for b in range(len(BANDS))}
     picks |= {name: (put.spectrum.trial == t)[:, None] for t, name in enumerate(names)} if len(names) > 1 else {}
     for name, pick in picks.items():
-        yield name, _padded(put, np.where(pick, rows, 0.0))
+        yield name, put.padded(np.where(pick, rows, 0.0))
 
 
 def _band(index: int) -> str:
     return f"{BANDS.edges[index]:g}-{BANDS.edges[index + 1]:g} Hz"
-
-
-def _padded(put: Problem, rows: Array) -> Array:
-    """Return (r,): rows (m, 6) of the plates, and nothing in the others."""
-    return np.concatenate([rows.ravel(), np.zeros(len(put.target) - rows.size)])
 
 
 def _signals(put: Problem) -> dict[str, list[Array]]:

@@ -276,8 +276,7 @@ def refine(found: Model, ranking: Round) -> tuple[Round, Model]:
     """Return the ranking with its first causes fitted with all their curvature, and the model with the most probable
     one named.
     """
-    best = ranking.suspects[0].score
-    near = [one for one in ranking.suspects[:REFINED] if best - one.score <= max(_NEAR, 0.5 * best)]
+    near = _near(found, ranking)
     refined = []
     before = found.log_likelihood - _penalty(found)
     for one in near:
@@ -288,8 +287,22 @@ def refine(found: Model, ranking: Round) -> tuple[Round, Model]:
         bayes = gain if last.effect.possible_in(found.problem.cases[0], last.theta) else -np.inf
         refined.append((replace(one, log_bayes_factor=bayes, score=bayes + one.score - one.log_bayes_factor), settled))
     refined.sort(key=lambda pair: -pair[0].score)
-    rest = ranking.suspects[len(near) :]
+    rest = (one for one in ranking.suspects if one not in near)
     return Round((*(one for one, _ in refined), *rest)), refined[0][1]
+
+
+def _near(found: Model, ranking: Round) -> list[ScoredCandidate]:
+    """Return the causes worth fitting: the first ones of the screening, and of each effect that is not in proportion
+    to its size the first that passes the threshold, because a screening at one size makes too little of it.
+    """
+    best = ranking.suspects[0].score
+    near = [one for one in ranking.suspects[:REFINED] if best - one.score <= max(_NEAR, 0.5 * best)]
+    passed = [one for one in ranking.suspects if one.score >= found.tolerances.threshold]
+    bent: dict[str, ScoredCandidate] = {}
+    for one in passed:
+        if not one.cause.effect.linear:
+            bent.setdefault(one.cause.names[0], one)
+    return near + [one for one in bent.values() if one not in near]
 
 
 def settle(found: Model, named: tuple[NamedCause, ...]) -> Model:

@@ -71,6 +71,10 @@ class Problem:
         """Number of rows that come from the plates: six per coefficient."""
         return 6 * self.spectrum.band.size
 
+    def padded(self, rows: Array) -> Array:
+        """Return (r,): ``rows`` (m, 6) of the plates, and nothing in the others."""
+        return np.concatenate([rows.ravel(), np.zeros(len(self.target) - rows.size)])
+
     def columns(self, some: Sequence[Effect]) -> list[Array]:
         """Return (r, p) for each of ``some`` effects: what one unit of each parameter adds to the rows."""
         wrench = self.spectrum.rows(np.concatenate([one.columns(case) for one in some], axis=2) for case in self.cases)

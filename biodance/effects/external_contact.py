@@ -5,21 +5,28 @@ point times the force. Look-alikes: contact at a neighbouring segment; for a ste
 video, and by the rank of the residual.
 """
 
+from dataclasses import dataclass, replace
+
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.records import Array
 from biodance.spatial import wrench_of_force
 
-_STEP = 0.4
-"""s: a hand comes and goes within about a second."""
+_STEP, _FINE = 0.4, 0.15
+"""s between the knots of its course: a hand comes and goes within about a second, and takes hold within half of one."""
 
 
+@dataclass(frozen=True)
 class ExternalContact(Effect):
-    """A steady ``force`` (x, y, z: N, lab axes) ON the person at the far end of segment ``target``, which the plates
-    lack.
+    """A steady ``force`` (x, y, z: N, lab axes) ON the person at the far end of segment ``target``, or ``place`` (m,
+    segment axes) from it, which the plates lack.
     """
+
+    place: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    step: float = _STEP
 
     name = "external_contact"
     parameters = tuple(
@@ -43,19 +50,24 @@ class ExternalContact(Effect):
         low, high = case.body.boxes[index]
         far = 0.5 * (low + high)
         far[1] = low[1] if index else 0.0
-        point = case.poses.points([index], far[None])[:, 0]
+        point = case.poses.points([index], (far + self.place)[None])[:, 0]
         return -np.stack([wrench_of_force(axis, point) for axis in np.eye(3)], axis=2)
 
     def local(self, case: Case) -> Array | None:
-        """Return the contact as a force that comes and goes: hats of `STEP` s to both sides; None for the root, which
-        hands and feet are not: its forces would explain anything that hangs on the middle of the body.
+        """Return the contact as a force that comes and goes: cubic splines through values every ``step`` s; None for the
+        root, which hands and feet are not: its forces would explain anything that hangs on the middle of the body.
         """
         if case.body.segment_index(self.target) == 0:
             return None
         time = case.motion.time
-        knots = time[0] + _STEP * np.arange(int((time[-1] - time[0]) / _STEP) + 2)
-        hats = np.maximum(0.0, 1.0 - np.abs(time[:, None] - knots) / _STEP)
-        return (self.columns(case)[:, :, None, :] * hats[:, None, :, None]).reshape(time.size, 6, -1)
+        knots = time[0] + self.step * np.arange(int((time[-1] - time[0]) / self.step) + 2)
+        course = CubicSpline(knots, np.eye(knots.size))(time)
+        return (self.columns(case)[:, :, None, :] * course[:, None, :, None]).reshape(time.size, 6, -1)
+
+    def beside(self, place: Array, *, fine: bool = False) -> "ExternalContact":
+        """Return the contact ``place`` (3,) m from the far end of its segment, in the segment's axes."""
+        x, y, z = map(float, place)
+        return replace(self, place=(x, y, z), step=_FINE if fine else _STEP)
 
 
 EFFECT = ExternalContact

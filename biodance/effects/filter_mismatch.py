@@ -36,13 +36,6 @@ class FilterMismatch(Effect):
             case.trial.plates[0], _passed(case, case.predicted, float(np.ravel(theta)[0])) - case.predicted
         )
 
-    def removed(self, case: Case, theta: Array) -> Array:
-        """Return what was measured less the same with what the lower low-pass took put back, as far as the reference
-        passes it.
-        """
-        value = case.trial.wrench.value
-        return value - _passed(case, value, -float(np.ravel(theta)[0]))
-
     def reported(self, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
         """Return the cut-off itself, Hz; its standard deviation to first order."""
         inverse = 1 / REFERENCE**4 + STRENGTH * max(float(theta[0]), 0.0)

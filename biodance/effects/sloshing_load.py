@@ -23,7 +23,8 @@ _CARRIERS = ("pelvis", "trunk_head", "right_forearm_hand", "left_forearm_hand")
 
 class SloshingLoad(Effect):
     """A load of ``mass`` (kg) behind (trunk, pelvis) or at the end of (arms) segment ``target``, of which ``sloshing``
-    (kg) moves freely in the horizontal plane at its own ``frequency`` (Hz).
+    (kg) moves freely in the horizontal plane at its own ``frequency`` (Hz), ``high`` m above the middle of the back or
+    the far end.
     """
 
     name = "sloshing_load"
@@ -41,6 +42,7 @@ class SloshingLoad(Effect):
             0.3,
             "vessels of 10 to 30 cm: 2.5 to 1.4 Hz; what is fitted is the difference from `FREQUENCY`",
         ),
+        Parameter("high", "m", 0.1, "a bag hangs between loins and shoulders"),
     )
     separated_by = "A sudden stop and five seconds of standing still: the load goes on swinging, the person does not."
     advice = "Take the load off, or empty it, and repeat one trial."
@@ -51,25 +53,25 @@ class SloshingLoad(Effect):
         return tuple(name for name in case.body.segments if name in _CARRIERS) or case.body.segments
 
     def columns(self, case: Case) -> Array:
-        """Return the wrench per kilogram carried, and per kilogram that sloshes; nothing for the frequency of what
-        is not there.
+        """Return the wrench per kilogram carried, and per kilogram that sloshes; nothing for frequency and place of
+        what is not there.
         """
-        rigid, sloshing = self._parts(case, _FREQUENCY)
-        return np.stack([rigid, sloshing, np.zeros_like(rigid)], axis=2)
+        rigid, sloshing = self._parts(case, _FREQUENCY, 0.0)
+        return np.stack([rigid, sloshing, np.zeros_like(rigid), np.zeros_like(rigid)], axis=2)
 
     def added(self, case: Case, theta: Array) -> Array:
         """Return (T, 6) the wrench of a load that sloshes at the frequency asked for, within `RANGE`."""
-        rigid, sloshing = self._parts(case, _frequency(theta))
+        rigid, sloshing = self._parts(case, _frequency(theta), float(theta[3]))
         return np.asarray(theta[0] * rigid + theta[1] * sloshing)
 
     def transform(self, case: Case, theta: Array) -> Case:
         """Return the case whose plates also carry the load."""
         return case.with_added(self.plate_of(case), self.added(case, theta))
 
-    def _parts(self, case: Case, frequency: float) -> tuple[Array, Array]:
+    def _parts(self, case: Case, frequency: float, high: float) -> tuple[Array, Array]:
         """Return the wrenches (T, 6) per kilogram carried and per kilogram that sloshes."""
         index = case.body.segment_index(self.target)
-        local = carried_at(case, index)
+        local = carried_at(case, index) + [0.0, high, 0.0]
         rigid = case.regressor[:, :, 10 * index : 10 * index + 10] @ point_mass(1.0, local)
         place, acceleration = point_motion(case, index, local)
         x, relative = relative_motion(acceleration, case.motion.rate, frequency=frequency, damping=_DAMPING)
@@ -78,12 +80,18 @@ class SloshingLoad(Effect):
 
     def reported(self, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
         """Return the frequency itself instead of its difference."""
-        mass, sloshing, _ = super().reported(theta, sd)
-        return mass, sloshing, ("frequency", _frequency(theta), float(sd[2]), "Hz")
+        mass, sloshing, _, high = super().reported(theta, sd)
+        return mass, sloshing, ("frequency", _frequency(theta), float(sd[2]), "Hz"), high
 
     def possible(self, theta: Array) -> bool:
         """Return whether the sizes are positive: a load weighs something, and so does what moves in it."""
         return bool(theta[0] > 0 and theta[1] > 0)
+
+    def possible_in(self, case: Case, theta: Array) -> bool:
+        """Return whether the load hangs at its segment, not beyond its ends."""
+        index = case.body.segment_index(self.target)
+        low, high = case.body.boxes[index, :, 1]
+        return self.possible(theta) and bool(low <= carried_at(case, index)[1] + theta[3] <= high)
 
 
 def _frequency(theta: Array) -> float:

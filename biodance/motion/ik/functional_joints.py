@@ -31,7 +31,7 @@ from biodance.motion.ik.joint_unknowns import (
     own_turn,
     own_unknowns,
 )
-from biodance.motion.kinematics import chains, jacobian, poses
+from biodance.motion.kinematics import chains, place_jacobian, poses
 from biodance.records import Array, Markers
 from biodance.threads import one_thread
 
@@ -114,9 +114,15 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> Functional
         f"would lie "
         f"{1e3 * placed.moved[joint]:.0f} mm from the static trial's place. It seems to have moved since that trial."
     )
-    return replace(
-        better, scaling=replace(better.scaling, notes=(*better.scaling.notes, note)), notes=(*better.notes, note)
+    errors = tuple(
+        one._replace(spared=left_out, moved=placed.moved[joint]) if one.joint == joint else one for one in better.errors
     )
+    without = replace(
+        better.scaling,
+        notes=(*better.scaling.notes, note),
+        centres=replace(better.scaling.centres, errors=errors),
+    )
+    return replace(better, scaling=without, errors=errors, notes=(*better.notes, note))
 
 
 def _without(postures: Markers, name: str) -> Markers:
@@ -202,7 +208,7 @@ def evaluate_joints(
     weight = np.sqrt(body.markers.weight)[:, None] * seen / noise
     rows = weight.reshape(len(q), -1)
     residual = rows * np.where(seen, apart, 0.0).reshape(len(q), -1)
-    coordinates = rows[..., None] * jacobian(body, pose, segment, points)[0] * _free(body, q)[:, None]
+    coordinates = rows[..., None] * place_jacobian(body, pose, segment, points) * _free(body, q)[:, None]
     free = _left_open(coordinates, rows[..., None] * unknowns.slope(body, stand, pose, points, theta))
     prior, prior_slope = unknowns.prior(theta)
     gradient = np.einsum("trp,tr->p", free, residual) + prior_slope.T @ prior
@@ -260,7 +266,8 @@ def _told(
     axis = {hinge: float(deviation[own_turn(hinge)]) for hinge in HINGES}
     wrong = scaling.centres.contradicted
     errors = tuple(
-        JointError(joint, _centre_sd(joint, deviation), axis.get(joint, 0.0), joint in wrong) for joint in moved
+        JointError(joint, _centre_sd(joint, deviation), axis.get(joint, 0.0), joint in wrong, far)
+        for joint, far in moved.items()
     )
     turned = {hinge: float(found.theta[own_turn(hinge)]) for hinge in HINGES if hinge not in kept}
     notes = []
